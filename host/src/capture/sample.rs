@@ -6,6 +6,7 @@
 use crate::error::{CaptureProblem, Result};
 use crate::probe::approach::{Approach, FINGERS};
 use crate::probe::hand;
+use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::random::{self, Purpose};
 use crate::touches::Origin;
@@ -82,22 +83,23 @@ impl<'a> Sampler<'a> {
         // What the real probe adds has a stream of its own, so that the approaches stay the same with it and without.
         let mut added = (!self.origin.real.is_none())
             .then(|| random::generator(self.origin.seed, Purpose::Capture, self.name, index));
-        let mut real = |touch: Touch| match &mut added {
-            Some(random) => self.origin.real.add_to(&touch, random),
-            None => touch,
-        };
+        let Noise { grazing, .. } = self.origin.real;
         let (window, mut late, mut turned_back) = (probe.window(), [0; FINGERS], 0);
         for approaches in 1..=MOST_ATTEMPTS {
             let target = self.origin.aim.target(scene);
             let approach = Approach::draw_at(&mut rng, bounds, target, probe.tilt, clearance);
-            let distances = match self.origin.approaches {
-                true => Some(approach.distances(scene, probe)),
-                false => approach.full_distances(scene, probe).map(|distances| distances.map(Some)),
+            let distances = match &mut added {
+                Some(random) if !grazing.is_none() => grazing.distances(&approach, scene, probe, random),
+                _ if self.origin.approaches => approach.distances(scene, probe),
+                _ => approach.full_distances(scene, probe).map_or([None; FINGERS], |distances| distances.map(Some)),
             };
-            let Some(distances) = distances else { continue };
+            if !self.origin.approaches && distances.contains(&None) {
+                continue;
+            }
             let (distances, is_turned_back) = probe.within_travel(distances);
+            let touch = approach.touch(distances, probe);
+            let touch = added.as_mut().map_or(touch, |random| self.origin.real.add_to(&touch, random));
             // The stroke begins with the first contact that is noticed.
-            let touch = real(approach.touch(distances, probe));
             let is_late = hand::late(&touch, window);
             late.iter_mut().zip(is_late).for_each(|(late, is_late)| *late += u64::from(is_late));
             turned_back += u64::from(is_turned_back);

@@ -1,4 +1,5 @@
-//! Fit of a probe to recorded touches: its speed, its fingers' offsets, its noise, what it misses, its timer.
+//! Fit of a probe to recorded touches: its speed, its fingers' offsets, its noise, what it misses, its timer; fingers that
+//! bend aside at flat angles, and objects that give way.
 //!
 //! The recorded touches are of objects whose meshes are known. Each object is touched in the simulator once, many
 //! times, with the probe as it should be; a candidate probe's distortion is then applied to the simulated touches'
@@ -40,6 +41,7 @@ mod candidate;
 mod density;
 mod error;
 mod late;
+mod layer;
 mod likelihood;
 mod line;
 mod observed;
@@ -49,6 +51,7 @@ mod recording;
 #[cfg(test)]
 mod robots;
 mod search;
+mod slopes;
 mod stroke;
 mod suspects;
 #[cfg(all(test, feature = "objects"))]
@@ -56,7 +59,7 @@ mod tests;
 mod timer;
 mod words;
 pub use error::FitProblem;
-pub use outcome::{Fit, Warning};
+pub use outcome::{Fit, GrazingEstimate, Warning};
 pub use suspects::Suspect;
 pub use words::{Estimate, between, offset, offset_between};
 
@@ -64,11 +67,13 @@ use crate::capture;
 use crate::error::{Error, Result};
 use crate::mesh::Object;
 use crate::probe::approach::Probe;
+use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, ObjectTouches, Origin};
 use candidate::{Candidate, Kept};
 use density::Densities;
+use layer::Layer;
 use likelihood::{Explained, Plate};
 use observed::{FULL, Observed};
 use palpate_shared::Touch;
@@ -140,15 +145,28 @@ pub fn fit(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
-    // Refused before minutes of touching.
-    useful(recorded, objects, plate)?;
-    let simulated = Simulated::new(objects, settings, progress)?;
-    fit_to(&simulated, recorded, objects, plate, settings, progress)
+    let of = useful(recorded, objects, plate)?;
+    let scenes = scenes(objects, settings, progress)?;
+    progress.begin("fitting", None);
+    let kept = kept(recorded);
+    let known: Vec<(&str, &[Scene])> =
+        of.iter().map(|&object| (objects[object].name.as_str(), &scenes[object][..])).collect();
+    let samples = layer::samples(&known, settings);
+    let rigid: Vec<Vec<Touch>> = samples.iter().map(|samples| samples.touches(&Noise::default())).collect();
+    let rigid: Vec<&[Touch]> = rigid.iter().map(Vec::as_slice).collect();
+    let stroke = stroke::stroke(recorded, &rigid, kept, &settings.origin.probe)?;
+    let recordings: Vec<Recording<'_>> =
+        recorded.objects.iter().map(|own| Recording::without_poses(&own.name, own.touches(), kept)).collect();
+    let pressed = plate.map(|touches| Plate::new(touches.iter().map(Observed::of)));
+    let layer = layer::layer(&recordings, samples, pressed.as_ref(), stroke, progress)?;
+    let simulated = Simulated::new(objects, scenes, layer, settings, progress)?;
+    fit_to(&simulated, stroke, recorded, plate, settings, progress)
 }
 
 /// For each recording its object, if there are enough touches.
 fn useful(recorded: &Dataset, objects: &[Object], plate: Option<&[Touch]>) -> Result<Vec<usize>> {
-    let of: Vec<usize> = recorded.objects.iter().map(|own| place(&own.name, objects)).collect::<Result<_>>()?;
+    let place = |own: &ObjectTouches| place(&own.name, objects.iter().map(|object| object.name.as_str()));
+    let of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
     let useful = |touch: &&Touch| Observed::of(touch).contacts() >= 2;
     let found = recorded.touches().chain(plate.into_iter().flatten()).filter(useful).count();
     if found < LEAST {
@@ -157,26 +175,24 @@ fn useful(recorded: &Dataset, objects: &[Object], plate: Option<&[Touch]>) -> Re
     Ok(of)
 }
 
-/// As [`fit`], to touches that were simulated before.
+/// As [`fit`], to simulated touches.
 fn fit_to(
-    Simulated { touches: simulated, scenes }: &Simulated,
+    simulated: &Simulated,
+    stroke: Stroke,
     recorded: &Dataset,
-    objects: &[Object],
     plate: Option<&[Touch]>,
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
-    let of = useful(recorded, objects, plate)?;
+    let Simulated { touches, scenes, layer } = simulated;
+    let place = |own: &ObjectTouches| place(&own.name, touches.iter().map(|own| own.name.as_str()));
+    let of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
     let kept = kept(recorded);
-    let of_recorded: Vec<&ObjectTouches> = of.iter().map(|&object| &simulated[object]).collect();
-    let stroke = stroke::stroke(recorded, &of_recorded, kept, &settings.origin.probe)?;
     let densities = |own: &ObjectTouches| Densities::new(&own.name, own.touches(), stroke.window);
-    let objects: Vec<Densities> = simulated.iter().map(densities).collect();
+    let objects: Vec<Densities> = touches.iter().map(densities).collect();
     let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
-        name: &own.name,
-        touches: own.touches().iter().map(Observed::of).collect(),
-        in_poses: posed::in_poses(&own.name, own.touches(), &scenes[object], settings),
-        kept,
+        in_poses: posed::in_poses(&own.name, own.touches(), &scenes[object], &layer.real, settings),
+        ..Recording::without_poses(&own.name, own.touches(), kept)
     });
     let evidence = Evidence {
         recordings: recordings.collect(),
@@ -188,20 +204,20 @@ fn fit_to(
     progress.begin("fitting", None);
     evidence.of.par_iter().for_each(|&object| evidence.objects[object].prepare());
     let timer = timer::timer(recorded.touches().chain(plate.into_iter().flatten()));
-    let (best, ends) = searched(&evidence, progress)?;
+    let (best, ends) = searched(&evidence, layer.candidate, progress)?;
     progress.begin("checking the recordings", None);
     let suspects = suspects::suspects(&evidence, &best, progress)?;
-    let mut fit = outcome::outcome(&evidence, &best, &ends, timer, suspects, settings);
+    let mut fit = outcome::outcome(&evidence, &best, &ends, layer, timer, suspects, settings);
     fit.warnings = advice::warnings(&fit, timer);
     Ok(fit)
 }
 
 /// The place of the object with this name.
-fn place(name: &str, objects: &[Object]) -> Result<usize> {
-    objects.iter().position(|object| object.name == name).ok_or_else(|| {
-        let known = objects.iter().map(|object| object.name.clone()).collect();
-        FitProblem::NotRecorded { name: name.into(), known }.into()
-    })
+fn place<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Result<usize> {
+    known
+        .clone()
+        .position(|own| own == name)
+        .ok_or_else(|| FitProblem::NotRecorded { name: name.into(), known: known.map(str::to_owned).collect() }.into())
 }
 
 /// The approaches that were recorded, as far as the touches say: every one if some touched nothing, only full touches
@@ -215,23 +231,35 @@ fn kept(recorded: &Dataset) -> Kept {
     }
 }
 
-/// Each object, touched by the probe as it should be whose hand goes on past it, and the scenes of its instances.
+/// Each object's instances.
+fn scenes(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
+    if settings.approaches < 1_000 {
+        return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
+    }
+    let origin = Origin { real: Noise::default(), ..settings.origin.clone() };
+    capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)
+}
+
+/// Each object, touched by the probe as it should be whose hand goes on past it, but for fingers that bend and objects that
+/// give way.
 struct Simulated {
     touches: Vec<ObjectTouches>,
     scenes: Vec<Vec<Scene>>,
+    layer: Layer,
 }
 
 impl Simulated {
-    fn new(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<Self> {
-        if settings.approaches < 1_000 {
-            return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
-        }
-        let real = crate::probe::noise::Noise::default();
+    fn new(
+        objects: &[Object],
+        scenes: Vec<Vec<Scene>>,
+        layer: Layer,
+        settings: &Settings,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         // What the hand does not reach is left out later, when a candidate says how fast it is.
         let probe = Probe { stroke: None, ..settings.origin.probe };
         let (touches, seed) = (settings.approaches, settings.seed);
-        let origin = Origin { approaches: true, touches, seed, real, probe, ..settings.origin.clone() };
-        let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)?;
+        let origin = Origin { approaches: true, touches, seed, real: layer.real, probe, ..settings.origin.clone() };
         progress.begin("touching", Some(objects.len() as u64));
         let one = |(object, scenes): (&Object, &Vec<_>)| {
             let touches = capture::touches(scenes, &object.name, &origin, 0..settings.approaches)?;
@@ -239,18 +267,22 @@ impl Simulated {
             Ok(touches)
         };
         let touches = objects.iter().zip(&scenes).map(one).collect::<Result<_>>()?;
-        Ok(Self { touches, scenes })
+        Ok(Self { touches, scenes, layer })
     }
 }
 
 /// The best candidate, and its intervals, number by number.
-fn searched(evidence: &Evidence<'_>, progress: &dyn Progress) -> Result<(Best, Vec<search::Ends>)> {
+fn searched(
+    evidence: &Evidence<'_>,
+    near: Option<Candidate>,
+    progress: &dyn Progress,
+) -> Result<(Best, Vec<search::Ends>)> {
     let likelihood = |candidate: &Candidate| match progress.is_cancelled() {
         // As bad as can be, and so soon over.
         true => f64::NEG_INFINITY,
         false => evidence.log_likelihood(candidate, |_| true),
     };
-    let mut best = search::best(&likelihood, None);
+    let mut best = search::best(&likelihood, near);
     for _ in 0..4 {
         progress::check(progress)?;
         let interval = |index: usize| search::interval(&likelihood, &best, index);

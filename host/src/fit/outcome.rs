@@ -1,15 +1,25 @@
 //! Results of a fit, and the probe file that states it.
 
 use super::candidate::{Candidate, Kept};
+use super::layer::Layer;
 use super::search::{Best, Ends};
 use super::suspects::Suspect;
 use super::words::{Estimate, between, offset, offset_between};
 use super::{Evidence, Settings, Timer};
 use crate::probe::approach::{FINGERS, Probe};
-use crate::probe::noise::Noise;
+use crate::probe::noise::{Grazing, Noise};
 use palpate_shared::format::Length;
 use serde::Serialize;
 use std::fmt::{self, Write as _};
+
+/// Fingers that bend aside at flat angles: see [`Grazing`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GrazingEstimate {
+    /// In degrees.
+    pub angle: Estimate,
+    /// In milliseconds at the nominal speed.
+    pub bend: Estimate,
+}
 
 /// Something that the recordings tell badly or not at all.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -46,6 +56,11 @@ pub struct Fit {
     pub missed: Option<[Estimate; FINGERS]>,
     /// The stroke where it was not stated, in the probe's unit; none if it was, or if the hand goes on past the objects.
     pub stroke: Option<Estimate>,
+    /// Fingers that bend aside at flat angles; none where the recordings do not show it.
+    pub grazing: Option<GrazingEstimate>,
+    /// By how much an object that gives way makes later contacts late, in the mean; none where the recordings do not show
+    /// it.
+    pub give: Option<Estimate>,
     /// The timer's resolution; none if it is finer than 0.02 ms, or there are too few times to tell.
     pub timer: Option<f64>,
     /// Recorded touches and approaches.
@@ -67,6 +82,7 @@ pub(super) fn outcome(
     evidence: &Evidence<'_>,
     best: &Best,
     ends: &[Ends],
+    layer: &Layer,
     timer: Timer,
     suspects: Vec<Suspect>,
     settings: &Settings,
@@ -91,6 +107,11 @@ pub(super) fn outcome(
     let stroke = evidence.stroke.estimated;
     let written = |stroke: Estimate| (1e4 * stroke.value).round() / 1e4;
     let probe = Probe { stroke: stroke.map(written).or(settings.origin.probe.stroke), ..settings.origin.probe };
+    let layered = |of: &dyn Fn(&Noise) -> f64| {
+        let [low, high] = [0, 1].map(|end: usize| layer.ends.as_ref().map(|ends| of(&ends[end])));
+        Estimate { value: of(&layer.real), low, high }
+    };
+    let bends = !layer.real.grazing.is_none();
     Fit {
         probe,
         unit: settings.origin.unit,
@@ -99,6 +120,11 @@ pub(super) fn outcome(
         noise: estimate(3, false, &noise),
         missed: (!only_full).then_some(missed),
         stroke,
+        grazing: bends.then_some(GrazingEstimate {
+            angle: layered(&|real| real.grazing.angle),
+            bend: layered(&|real| real.grazing.bend / 1e3),
+        }),
+        give: (layer.real.give > 0.0).then_some(layered(&|real| real.give / 1e3)),
         timer: resolution,
         recorded: evidence.recordings.iter().map(|own| own.touches.len()).sum(),
         contacts: super::counts(evidence),
@@ -119,6 +145,11 @@ impl Fit {
             missed: self.missed.map_or([0.0; FINGERS], |missed| missed.map(|share| share.value)),
             bent: [0.0, middle, third],
             speed: self.speed_factor.value,
+            give: self.give.map_or(0.0, |give| 1e3 * give.value),
+            grazing: self.grazing.map_or_else(Grazing::default, |GrazingEstimate { angle, bend }| Grazing {
+                angle: angle.value,
+                bend: 1e3 * bend.value,
+            }),
             ..Noise::default()
         }
     }
@@ -176,6 +207,22 @@ impl Fit {
             let [a, b, c] = missed.map(|share| format!("\"{:.2}%\"", 100.0 * share.value));
             let [d, e, f] = missed.map(|share| format!("{} %", between(&share, 100.0, 1)));
             _ = writeln!(text, "missed = [{a}, {b}, {c}]  # {d}; {e}; {f}");
+        }
+        // Lengths, as offsets are.
+        let length = speed / 1e3;
+        if let Some(give) = &self.give {
+            let unit = if self.unit == Length::Millimeter { " mm" } else { "" };
+            _ = writeln!(text, "give = {:.5}  # {}{unit}", give.value * length, between(give, length, 4));
+        }
+        if let Some(GrazingEstimate { angle, bend }) = &self.grazing {
+            _ = writeln!(
+                text,
+                "grazing = {{ angle = \"{:.2}deg\", bend = {:.5} }}  # {} degrees, {}",
+                angle.value,
+                bend.value * length,
+                between(angle, 1.0, 0),
+                between(bend, length, 4)
+            );
         }
         if let Some(timer) = self.timer {
             _ = writeln!(text, "timer = \"{timer}ms\"");

@@ -9,6 +9,7 @@ use super::candidate::{Candidate, Kept};
 use super::likelihood::{Explained, product};
 use super::observed::{FULL, Observed};
 use crate::probe::approach::Approach;
+use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::random::{self, Purpose};
 use glam::DVec3;
@@ -27,7 +28,7 @@ const SMOOTHING: f64 = 0.06;
 const NEIGHBOR: usize = 3;
 
 /// Approaches in the pose of one recorded touch.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct InPose(Vec<Simulated>);
 
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +45,13 @@ struct Simulated {
 
 /// For each recorded touch of an object, approaches in its pose; none for a touch without a pose. Nothing if no touch has
 /// one.
-pub(super) fn in_poses(name: &str, touches: &[Touch], scenes: &[Scene], settings: &Settings) -> Vec<Option<InPose>> {
+pub(super) fn in_poses(
+    name: &str,
+    touches: &[Touch],
+    scenes: &[Scene],
+    layer: &Noise,
+    settings: &Settings,
+) -> Vec<Option<InPose>> {
     if touches.iter().all(|touch| touch.pose().is_none()) || scenes.is_empty() {
         return Vec::new();
     }
@@ -54,7 +61,12 @@ pub(super) fn in_poses(name: &str, touches: &[Touch], scenes: &[Scene], settings
         let approaches = (0..APPROACHES).map(|turn| {
             let scene = &scenes[turn % scenes.len()];
             let approach = aimed(&mut random, &pose, scene, settings);
-            let touch = approach.touch(approach.distances(scene, &settings.origin.probe), &settings.origin.probe);
+            let probe = &settings.origin.probe;
+            let distances = match layer.grazing.is_none() {
+                true => approach.distances(scene, probe),
+                false => layer.grazing.distances(&approach, scene, probe, &mut random),
+            };
+            let touch = layer.given_way(&approach.touch(distances, probe), &mut random);
             let times = touch.times().map(|time| time.micros().map_or(0.0, |micros| micros as f32 / 1e3));
             Simulated { touched: Observed::of(&touch).fingers, times, gap: 0.0 }
         });

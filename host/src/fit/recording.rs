@@ -4,9 +4,10 @@ use super::candidate::Kept;
 use super::likelihood::Explained;
 use super::observed::Observed;
 use super::posed::{self, InPose};
+use palpate_shared::Touch;
 
 /// Recorded touches of one object.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Recording<'a> {
     pub(super) name: &'a str,
     pub(super) touches: Vec<Observed>,
@@ -15,7 +16,12 @@ pub(super) struct Recording<'a> {
     pub(super) kept: Kept,
 }
 
-impl Recording<'_> {
+impl<'a> Recording<'a> {
+    /// As if no pose had been recorded.
+    pub(super) fn without_poses(name: &'a str, touches: &[Touch], kept: Kept) -> Self {
+        Self { name, touches: touches.iter().map(Observed::of).collect(), in_poses: Vec::new(), kept }
+    }
+
     /// The logarithm of its likelihood, of the object and under the candidate that explain it; poses count where there are some.
     pub(super) fn log_likelihood(&self, explained: &Explained<'_>) -> f64 {
         if self.in_poses.is_empty() {

@@ -34,7 +34,11 @@ struct Bench {
 
 impl Bench {
     fn of(&self, dataset: &Dataset) -> Vec<usize> {
-        dataset.objects.iter().map(|own| place(&own.name, &self.objects).unwrap()).collect()
+        dataset
+            .objects
+            .iter()
+            .map(|own| place(&own.name, self.objects.iter().map(|object| object.name.as_str())).unwrap())
+            .collect()
     }
 
     /// The fit, what looks wrong, and the log-densities of other touches under the fit.
@@ -43,7 +47,13 @@ impl Bench {
         let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
             name: &own.name,
             touches: own.touches().iter().map(Observed::of).collect(),
-            in_poses: posed::in_poses(&own.name, own.touches(), &self.scenes[object], &self.settings),
+            in_poses: posed::in_poses(
+                &own.name,
+                own.touches(),
+                &self.scenes[object],
+                &Noise::default(),
+                &self.settings,
+            ),
             kept,
         });
         let evidence = Evidence {
@@ -76,7 +86,9 @@ fn honest_recordings_of_compliant_robots_are_not_refused_and_a_plate_makes_no_fi
     let sets = repetitions(1).min(4) as usize;
     let settings = Settings::default();
     let objects = source::objects(&[shared.join("objects").to_str().unwrap().into()]).unwrap();
-    let Simulated { touches: simulated, scenes } = Simulated::new(&objects, &settings, &()).unwrap();
+    let scenes = scenes(&objects, &settings, &()).unwrap();
+    let Simulated { touches: simulated, scenes, .. } =
+        Simulated::new(&objects, scenes, Layer::default(), &settings, &()).unwrap();
     let densities = simulated.iter().map(|own| Densities::new(&own.name, own.touches(), None)).collect();
     drop(simulated);
     let bench = Bench { objects, scenes, densities, settings };

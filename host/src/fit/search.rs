@@ -22,7 +22,7 @@ const CLOSE: [f64; 2] = [2e-4, 5e-3];
 /// Twice the loss of log-likelihood at the ends of an interval of 95 %: 3.84, the quantile of chi squared with one
 /// degree of freedom, and more, because the tables come from touches that are simulated and smoothed. With 3.84, 47 of
 /// 56 intervals of probes that were known held the speed, offsets and noise.
-const QUANTILE: f64 = 5.5;
+pub(super) const QUANTILE: f64 = 5.5;
 /// From how many points of a grid a search starts.
 const STARTS: usize = 3;
 

@@ -34,7 +34,7 @@ pub(super) struct Stroke {
 /// [`FitProblem::OtherStroke`] if the recordings show another stroke than the probe states.
 pub(super) fn stroke(
     recorded: &Dataset,
-    simulated: &[&ObjectTouches],
+    simulated: &[&[Touch]],
     kept: Kept,
     probe: &Probe,
 ) -> Result<Stroke, FitProblem> {
@@ -53,13 +53,13 @@ pub(super) fn stroke(
         return Err(other(found));
     }
     let is_later = |micros: f64| micros > FAR * latest && stated.is_none_or(|stated| micros < stated);
-    let expected = |(own, simulated): (&ObjectTouches, &&ObjectTouches)| {
+    let expected = |(own, simulated): (&ObjectTouches, &&[Touch])| {
         let is_kept = |touch: &&Touch| match kept {
             Kept::All => true,
             Kept::Contacts => !touch.is_empty(),
             Kept::Full => touch.is_full(),
         };
-        let all = simulated.touches().iter().filter(is_kept);
+        let all = simulated.iter().filter(is_kept);
         let later = all.clone().filter(|touch| is_later(spread(touch))).count();
         own.len() as f64 * later as f64 / all.count().max(1) as f64
     };

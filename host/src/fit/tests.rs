@@ -3,6 +3,7 @@
 use super::*;
 
 use crate::mesh::builtin;
+use crate::probe::noise::Grazing;
 use crate::touches::{ObjectTouches, Source};
 use palpate_shared::ContactTime;
 use std::sync::LazyLock;
@@ -66,7 +67,12 @@ fn other(name: &str) -> Object {
 
 /// Approaches to an object, with what is wrong with the probe.
 fn approaches(object: &Object, count: usize, seed: u64, probe: &Crooked) -> Vec<Touch> {
-    let origin = Origin { approaches: true, seed: 1_000 + seed, ..Origin::default() };
+    approaches_of(object, count, seed, probe, Noise::default())
+}
+
+/// The same with fingers that bend and objects that give way.
+fn approaches_of(object: &Object, count: usize, seed: u64, probe: &Crooked, real: Noise) -> Vec<Touch> {
+    let origin = Origin { approaches: true, seed: 1_000 + seed, real, ..Origin::default() };
     let scenes = capture::scenes(&[object], &origin, &()).unwrap();
     let touches = capture::touches(&scenes[0], &object.name, &origin, 0..count as u64).unwrap();
     let mut numbers = Numbers(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ object.name.len() as u64);
@@ -94,18 +100,39 @@ fn settings() -> Settings {
     Settings { approaches: 20_000, ..Settings::default() }
 }
 
-/// Simulated touches of the objects, few and many, made once for all fits to them.
-static SIMULATED: LazyLock<Simulated> = LazyLock::new(|| Simulated::new(&objects(), &settings(), &()).unwrap());
-static MANY: LazyLock<Simulated> =
-    LazyLock::new(|| Simulated::new(&objects(), &Settings { approaches: 120_000, ..settings() }, &()).unwrap());
-
-fn fitted(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
-    fit_to(&SIMULATED, recorded, &objects(), plate, &settings(), &()).unwrap()
+/// Touches of rigid fingers, made once for all fits to them.
+fn simulated(settings: &Settings) -> Simulated {
+    let scenes = scenes(&objects(), settings, &()).unwrap();
+    Simulated::new(&objects(), scenes, Layer::default(), settings, &()).unwrap()
 }
 
-/// From more simulated touches: gaps between them are taken for noise, so that 2 ms are found as up to 3.5 ms.
+static SIMULATED: LazyLock<Simulated> = LazyLock::new(|| simulated(&settings()));
+/// More of them: gaps between simulated touches are taken for noise, so that 2 ms are found as up to 3.5 ms.
+static MANY: LazyLock<Simulated> = LazyLock::new(|| simulated(&Settings { approaches: 120_000, ..settings() }));
+
+/// The fit of a probe whose fingers are known to be rigid, and whose objects to stay.
+fn rigid(simulated: &Simulated, recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
+    let settings = settings();
+    let own = |own: &ObjectTouches| {
+        let object = place(&own.name, simulated.touches.iter().map(|own| own.name.as_str())).unwrap();
+        simulated.touches[object].touches()
+    };
+    let touches: Vec<&[Touch]> = recorded.objects.iter().map(own).collect();
+    let stroke = stroke::stroke(recorded, &touches, kept(recorded), &settings.origin.probe).unwrap();
+    fit_to(simulated, stroke, recorded, plate, &settings, &()).unwrap()
+}
+
+fn fitted(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
+    rigid(&SIMULATED, recorded, plate)
+}
+
 fn finely(recorded: &Dataset, plate: &[Touch]) -> Fit {
-    fit_to(&MANY, recorded, &objects(), Some(plate), &settings(), &()).unwrap()
+    rigid(&MANY, recorded, Some(plate))
+}
+
+/// The fit of a probe of which nothing is known.
+fn layered(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
+    fit(recorded, &objects(), plate, &settings(), &()).unwrap()
 }
 
 /// That the values are near those of the probe, and the intervals hold them but for an error of the simulation.
@@ -141,6 +168,24 @@ fn a_plate_that_repeats_better_or_worse_than_touches_tells_offsets_and_leaves_th
         near(&found, &BENT, [0.04, 0.2 + 0.4 * noise, 0.35]);
         assert!(found.late.iter().all(|late| late.width().unwrap() < width), "{:?}", found.late);
     }
+}
+
+#[test]
+fn fingers_that_bend_aside_are_found_and_rigid_ones_are_not_said_to_bend() {
+    let grazing = Grazing { angle: 20.0, bend: 10_000.0 };
+    let real = Noise { grazing, ..Noise::default() };
+    let one =
+        |object: &Object| ObjectTouches::new(&object.name, approaches_of(object, 300, 21, &BENT, real), Source::Object);
+    let soft = Dataset::new(objects().iter().map(one).collect());
+    let found =
+        fit(&soft, &objects(), Some(&plate(60, &BENT)), &Settings { approaches: 100_000, ..settings() }, &()).unwrap();
+    near(&found, &BENT, [0.05, 1.5, 0.6]);
+    let GrazingEstimate { bend, .. } = found.grazing.expect("fingers that bend");
+    assert!((4.0..25.0).contains(&bend.value), "{bend:?}");
+    let file = crate::probe::file::ProbeFile::parse(&found.toml(), "probe.toml".as_ref()).unwrap();
+    assert!((file.real.grazing.bend / found.real().grazing.bend - 1.0).abs() < 1e-2, "{:?}", file.real);
+    let rigid = layered(&recorded(&objects(), 300, 21, &BENT), Some(&plate(60, &BENT)));
+    assert_eq!((rigid.grazing, rigid.give), (None, None));
 }
 
 #[test]
@@ -272,7 +317,7 @@ fn two_objects_in_one_recording_are_named_with_the_place() {
     let mut two = recorded(&objects(), 300, 15, &BENT);
     let watch = two.objects[2].touches().to_vec();
     two.objects[0].edit(|touches| _ = touches.splice(180.., watch[..120].iter().copied()));
-    let found = fitted(&two, None);
+    let found = layered(&two, None);
     let [Suspect::TwoObjects { object, other, from: Some(from), to: Some(to), .. }] = &found.suspects[..] else {
         panic!("{:?}", found.suspects)
     };
@@ -281,7 +326,7 @@ fn two_objects_in_one_recording_are_named_with_the_place() {
     // And if they are mixed.
     let mut mixed = recorded(&objects(), 300, 15, &BENT);
     mixed.objects[0].edit(|touches| (0..300).step_by(3).for_each(|index| touches[index] = watch[index]));
-    let found = fitted(&mixed, None);
+    let found = layered(&mixed, None);
     assert!(
         matches!(&found.suspects[..], [Suspect::TwoObjects { object, other, .. }] if object == "bowl" && other == "wristwatch"),
         "{:?}",
@@ -295,7 +340,7 @@ fn a_probe_that_was_moved_on_the_way_is_named_with_the_place() {
     let after = Crooked { late: [0.0, -12.0, 6.0], ..BENT };
     let changed = approaches(&objects()[0], 400, 17, &after);
     moved.objects[0].edit(|touches| _ = touches.splice(150.., changed[..250].iter().copied()));
-    let found = fitted(&moved, None);
+    let found = layered(&moved, None);
     let suspect = found.suspects.iter().find(|suspect| matches!(suspect, Suspect::Changed { .. }));
     let Some(Suspect::Changed { object, from, what }) = suspect else { panic!("{:?}", found.suspects) };
     assert_eq!(object, "bowl");
@@ -306,7 +351,7 @@ fn a_probe_that_was_moved_on_the_way_is_named_with_the_place() {
 fn a_mesh_of_another_shape_is_like_no_recording() {
     let mut other = recorded(&objects(), 300, 18, &BENT);
     other.objects[1].edit(|touches| *touches = approaches(&self::other("spoon"), 300, 18, &BENT));
-    let found = fitted(&other, None);
+    let found = layered(&other, None);
     assert!(found.suspects.iter().any(|suspect| suspect.to_string().starts_with("mouse: ")), "{:?}", found.suspects);
 }
 
@@ -315,7 +360,7 @@ fn a_fit_is_the_same_on_any_number_of_threads_and_read_back_as_written() {
     let (recorded, plate) = (recorded(&objects(), 150, 19, &BENT), plate(30, &BENT));
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| fitted(&recorded, Some(&plate)))
+        pool.install(|| layered(&recorded, Some(&plate)))
     };
     let found = with(1);
     assert_eq!(found, with(3));

@@ -107,6 +107,7 @@ impl Table {
             speed_bias,
             pose,
             pose_bias,
+            ..Noise::default()
         };
         self.game.as_mut()?.set_noise(noise).ok().map(|()| 0)
     }

@@ -5,7 +5,7 @@ use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::{Global, remark};
 use palpate::error::{FitProblem, ProbeProblem};
-use palpate::fit::{Fit, Settings, between, fit, offset, offset_between};
+use palpate::fit::{Fit, GrazingEstimate, Settings, between, fit, offset, offset_between};
 use palpate::output;
 use palpate::touches::{Origin, read_touches};
 use palpate::{Error, Result};
@@ -120,6 +120,14 @@ fn table(found: &Fit) -> String {
     if let Some(stroke) = &found.stroke {
         let unit = if found.unit == Length::Tenth { "" } else { " mm" };
         line("stroke", format!("{:.3}{unit}", stroke.value), between(stroke, 1.0, 3) + unit);
+    }
+    if let Some(give) = &found.give {
+        line("object gives way", format!("{:.2} ms", give.value), between(give, 1.0, 2) + " ms");
+    }
+    if let Some(grazing) = &found.grazing {
+        let GrazingEstimate { angle, bend } = grazing;
+        line("fingers bend beyond", format!("{:.0}°", angle.value), between(angle, 1.0, 0) + "°");
+        line("aside by", format!("{:.2} ms", bend.value), between(bend, 1.0, 2) + " ms");
     }
     _ = match found.timer {
         Some(timer) => writeln!(text, "{:22}{:>14}", "timer", format!("{timer} ms")),

@@ -69,7 +69,8 @@ impl ProbeArguments {
         let asked = file.map(|file| file.real).filter(|real| !real.is_none());
         match asked {
             None if there.is_none() => Ok(usual),
-            Some(real) if there.is_none() => Ok(real),
+            Some(real) if there.is_none() && real.grazing.is_none() => Ok(real),
+            Some(_) if there.is_none() => Err(ProbeProblem::OnlyCaptured.into()),
             Some(real) if real != there => Err(ProbeProblem::Differs {
                 first: self.path().map_or_else(String::new, |path| path.display().to_string()),
                 second: "the data set".into(),

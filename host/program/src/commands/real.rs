@@ -1,6 +1,7 @@
 //! The option for what a real sensor, timer and robot add to touches.
 
 use palpate::Result;
+use palpate::error::ProbeProblem;
 use palpate::probe::file::ProbeFile;
 use palpate::probe::noise::{Noise, PartialNoise};
 use std::path::{Path, PathBuf};
@@ -30,13 +31,14 @@ impl RealArguments {
     /// Noise of the option; `base` without it, and where it leaves settings open.
     ///
     /// # Errors
-    /// If its probe file cannot be read.
+    /// If its probe file cannot be read; [`ProbeProblem::OnlyCaptured`] for fingers that bend aside.
     pub(crate) fn over(&self, base: Noise) -> Result<Noise> {
-        match self.real.as_ref().map(|real| &real.given) {
-            None => Ok(base),
-            Some(Given::Settings(settings)) => Ok(settings.over(base)),
-            Some(Given::File(path)) => Ok(ProbeFile::read(path)?.real),
-        }
+        let noise = match self.real.as_ref().map(|real| &real.given) {
+            None => base,
+            Some(Given::Settings(settings)) => settings.over(base),
+            Some(Given::File(path)) => ProbeFile::read(path)?.real,
+        };
+        if noise.grazing.is_none() { Ok(noise) } else { Err(ProbeProblem::OnlyCaptured.into()) }
     }
 
     /// True if the option was given.

@@ -1,10 +1,10 @@
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::real::RealArguments;
-use super::{Global, shell};
+use super::{Global, remark, shell};
 use palpate::Result;
 use palpate::output::{print, print_json, refuse_stdout};
-use palpate::probe::noise::Noise;
+use palpate::probe::noise::{Grazing, Noise};
 use palpate::touches::Origin;
 use palpate_report::{self, Existing, Settings};
 use std::path::PathBuf;
@@ -62,6 +62,12 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let capture = size.origin(Origin::default())?;
     let real = size.probe.read()?.map(|file| file.real).filter(|real| !real.is_none());
     let noise = match real {
+        Some(Noise { grazing, .. }) if !grazing.is_none() => {
+            remark(
+                "Fingers bend aside in the simulation that recorded touches are compared with, and not where noise is added.",
+            );
+            given.over(Noise { grazing: Grazing::default(), ..real.unwrap_or_default() })?
+        }
         Some(real) => given.over(real)?,
         None if given.is_given() => given.over(Noise::default())?,
         None => settings.noise,

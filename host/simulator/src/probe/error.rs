@@ -39,6 +39,9 @@ pub enum ProbeProblem {
         /// True if contacts are later than the stroke; else they end before.
         is_later: bool,
     },
+    /// Fingers that bend aside were to be added to touches that are captured already.
+    #[error("grazing is added to touches while they are captured: a data set does not hold the angles of contacts")]
+    OnlyCaptured,
     /// A probe file is not TOML, or not a probe.
     #[error("not a usable probe file: {message}")]
     BadFile {
@@ -82,6 +85,7 @@ impl Problem for ProbeProblem {
                  fit` estimate it."
                     .into()
             }
+            Self::OnlyCaptured => "Capture with `palpate capture --probe FILE`, or leave grazing out of the file.".into(),
             Self::BadFile { .. } => {
                 "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and if you like tilt, stroke, travel, timer and [real].".into()
             }

@@ -20,6 +20,8 @@
 //! speed_bias = "1%"               # off per robot
 //! pose_noise = "2deg"
 //! pose_bias = "1deg"
+//! give = 0.2                      # how far the object gives way at a contact, in the mean
+//! grazing = { angle = "30deg", bend = 0.5 } # beyond this angle, fingers bend aside by bend · tan(angle − this)
 //! ```
 //!
 //! Radius, spacing, speed, stroke and unit are what a data set and a model state and what is compared. What the real probe adds
@@ -27,7 +29,7 @@
 
 use crate::error::{Error, Place, ProbeProblem, Problem, Result};
 use crate::probe::approach::{FINGERS, Probe};
-use crate::probe::noise::{Deviation, Noise, quantity};
+use crate::probe::noise::{Deviation, Grazing, Noise, quantity};
 use palpate_shared::format::Length;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
@@ -83,6 +85,16 @@ struct Real {
     pose_noise: Option<f64>,
     #[serde(deserialize_with = "angle")]
     pose_bias: Option<f64>,
+    give: f64,
+    grazing: Option<Aside>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Aside {
+    #[serde(default, deserialize_with = "angle")]
+    angle: Option<f64>,
+    bend: f64,
 }
 
 impl ProbeFile {
@@ -135,6 +147,12 @@ impl ProbeFile {
             speed_bias: real.speed_bias.unwrap_or_default(),
             pose: real.pose_noise.unwrap_or_default(),
             pose_bias: real.pose_bias.unwrap_or_default(),
+            // Lengths become the times that the probe takes for them.
+            give: real.give / speed * 1e6,
+            grazing: real.grazing.map_or_else(Grazing::default, |Aside { angle, bend }| Grazing {
+                angle: angle.unwrap_or_default(),
+                bend: bend / speed * 1e6,
+            }),
         };
         Self { probe: Probe { radius, spacing, speed, tilt, stroke, travel }, unit, real }
     }
@@ -212,7 +230,7 @@ mod tests {
         let text = format!(
             "unit = \"mm\"\n{MEASURES}tilt = 0\ntimer = \"1ms\"\n[real]\nspeed_factor = 0.98\noffsets = [0, 0.3, -0.1]\n\
              noise = \"0..5ms\"\ndebounce = \"2ms\"\nmissed = \"2%\"\nspeed_error = \"5%\"\nspeed_bias = \"1%\"\n\
-             pose_noise = \"2deg\"\npose_bias = \"1deg\"\n"
+             pose_noise = \"2deg\"\npose_bias = \"1deg\"\ngive = 0.2\ngrazing = {{ angle = \"30deg\", bend = 0.5 }}\n"
         );
         let file = parse(&text).unwrap();
         assert_eq!((file.unit, file.probe.tilt), (Length::Millimeter, 0.0));
@@ -227,6 +245,8 @@ mod tests {
             speed_bias: 0.01,
             pose: 2.0,
             pose_bias: 1.0,
+            give: 2_000.0,
+            grazing: Grazing { angle: 30.0, bend: 5_000.0 },
         };
         assert_eq!(file.real, real);
         let each = parse(&text.replace("\"2%\"", "[\"1%\", \"0.02\", \"0%\"]")).unwrap();

@@ -2,7 +2,7 @@
 
 use crate::error::{MeshProblem, Result};
 use crate::mesh::Mesh;
-use crate::probe::sweep::{Surface, narrow::Triangle};
+use crate::probe::sweep::{Contact, Surface, narrow::Triangle};
 use glam::{DVec3, Vec3};
 
 /// A mesh in the units of the probe, with what makes casting spheres at it fast.
@@ -78,6 +78,11 @@ impl Scene {
     /// when it starts in contact, none when it never touches. With a unit vector as direction, t is a distance in units.
     pub fn first_contact(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
         self.surface.first_contact(origin, direction, radius)
+    }
+
+    /// As [`first_contact`](Self::first_contact), and how the surface stands there. Cost: that of one cast, and little more.
+    pub fn contact(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<Contact> {
+        self.surface.contact(origin, direction, radius)
     }
 
     /// As [`first_contact`](Self::first_contact) of each of these origins, if all of them touch; none as soon as one does not.

@@ -1,5 +1,8 @@
 use super::*;
 use crate::error::Setting;
+use crate::mesh::Mesh;
+use crate::probe::approach::{Approach, Probe};
+use crate::probe::scene::Scene;
 
 fn touches(count: u32) -> Vec<Touch> {
     (0..count).map(|i| Touch::from_micros([i % 977, 500_000, 900_000 + i])).collect()
@@ -187,6 +190,9 @@ fn noise_that_cannot_be_is_refused_by_the_name_of_its_setting() {
         (Noise { speed_bias: -0.1, ..base }, "speed_bias"),
         (Noise { pose: 181.0, ..base }, "pose_noise"),
         (Noise { pose_bias: f64::NAN, ..base }, "pose_bias"),
+        (Noise { give: -1.0, ..base }, "give"),
+        (Noise { grazing: Grazing { angle: 20.0, bend: f64::NAN }, ..base }, "grazing"),
+        (Noise { grazing: Grazing { angle: 90.0, bend: 1.0 }, ..base }, "grazing"),
     ] {
         let error = noise.check().unwrap_err();
         assert!(matches!(error.problem::<Setting>(), Some(Setting { name: found, .. }) if *found == name), "{error}");
@@ -230,4 +236,73 @@ fn levels_and_ranges_are_read() {
     for text in ["", "5", "..", "0..", "..5ms", "5ms..1ms", "0..10", "-1ms..2ms", "x..2ms"] {
         assert!(text.parse::<Deviation>().is_err(), "{text}");
     }
+}
+
+#[test]
+fn an_object_that_gives_way_is_touched_later_by_every_finger_but_the_first() {
+    let noise = Noise { give: 2_000.0, ..Noise::default() };
+    let clean = vec![Touch::from_micros([30_000, 0, 60_000]); 20_000];
+    let touches = noise.add("fork", &clean, 1);
+    let mean = |finger: usize| {
+        let times = touches.iter().map(|touch| f64::from(touch.times()[finger].micros().unwrap()));
+        times.sum::<f64>() / touches.len() as f64
+    };
+    assert_eq!(mean(1), 0.0);
+    // Exponential times: the standard error of a mean is 2 ms / √20,000.
+    assert!((mean(0) - 32_000.0).abs() < 60.0, "{}", mean(0));
+    assert!((mean(2) - 64_000.0).abs() < 85.0, "{}", mean(2));
+    // A contact that is missing moves nothing.
+    let pair =
+        noise.add("fork", &[Touch::new([ContactTime::MISSING, ContactTime::from_micros(0), ContactTime::MISSING])], 1);
+    assert_eq!(pair[0].times()[1].micros(), Some(0));
+}
+
+/// A square of 40 units whose normal is tilted by this angle from the motion along z.
+fn slope(degrees: f64) -> Scene {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let corner = |x: f64, y: f64| [(x * cos) as f32, y as f32, (x * sin) as f32];
+    let vertices = vec![corner(-20.0, -20.0), corner(20.0, -20.0), corner(20.0, 20.0), corner(-20.0, 20.0)];
+    Scene::as_is(&Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] }).unwrap()
+}
+
+/// The distances of fingers that move along z, without bending and with.
+fn grazed(scene: &Scene, grazing: &Grazing, start: DVec3, run: u64) -> [[Option<f64>; FINGERS]; 2] {
+    let (probe, mut random) = (Probe::default(), random::generator(run, Purpose::Capture, "slope", 0));
+    let approach = Approach { start, direction: DVec3::Z, alignment: DVec3::Y };
+    [approach.distances(scene, &probe), grazing.distances(&approach, scene, &probe, &mut random)]
+}
+
+#[test]
+fn fingers_bend_aside_at_flat_angles_only_and_touch_late_by_what_the_slope_makes_of_it() {
+    let grazing = Grazing { angle: 20.0, bend: 10_000.0 };
+    let start = DVec3::new(0.0, 0.0, -30.0);
+    for degrees in [0.0, 10.0, 19.9] {
+        let [rigid, bent] = grazed(&slope(degrees), &grazing, start, 1);
+        assert_eq!(rigid, bent, "{degrees}");
+    }
+    for degrees in [40.0_f64, 60.0] {
+        let scene = slope(degrees);
+        let late = |run: u64| {
+            let [rigid, bent] = grazed(&scene, &grazing, start, run);
+            let late = rigid.iter().zip(bent).map(|(rigid, bent)| bent.unwrap() - rigid.unwrap());
+            late.sum::<f64>() / 3.0
+        };
+        let runs = 4_000;
+        let mean = (0..runs).map(late).sum::<f64>() / runs as f64;
+        // A tenth of a unit aside at 45 degrees beyond the angle, on a surface that falls away by its tangent.
+        let expected = 0.1 * (degrees - 20.0).to_radians().tan() * degrees.to_radians().tan();
+        assert!((mean / expected - 1.0).abs() < 0.05, "{degrees}: {mean} {expected}");
+    }
+}
+
+#[test]
+fn a_finger_that_bends_beyond_an_edge_does_not_touch() {
+    let scene = slope(60.0);
+    let grazing = Grazing { angle: 0.0, bend: 100_000.0 };
+    // Near the edge that falls away: one unit aside at 45 degrees leads beyond it as often as not.
+    let start = DVec3::new(9.5, 0.0, -30.0);
+    let lost = (0..500).flat_map(|run| grazed(&scene, &grazing, start, run)[1]).filter(Option::is_none).count();
+    assert!((300..1_500).contains(&lost), "{lost} of 1500");
+    let rigid = Grazing { angle: 60.5, bend: 100_000.0 };
+    assert!((0..50).all(|run| grazed(&scene, &rigid, start, run)[1].iter().all(Option::is_some)));
 }

@@ -7,6 +7,7 @@
 pub mod budget;
 mod disc;
 pub mod narrow;
+mod nearest;
 mod pack;
 pub mod precision;
 mod tree;
@@ -89,6 +90,15 @@ impl Surface {
         Some(distance * self.unit / start.length)
     }
 
+    /// As [`first_contact`](Self::first_contact), and how the surface stands there.
+    pub fn contact(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<Contact> {
+        let Start { motion, skipped, length } = self.start(origin, direction, radius)?;
+        let (way, triangle) = Search::new(&self.tree, &motion).first_triangle(&self.tree, &self.triangles, &motion)?;
+        let center = motion.origin + motion.direction * way;
+        let away = center - nearest::nearest_point(&self.triangles[triangle], center);
+        Some(Contact { distance: (skipped + way) * self.unit / length, normal: away.normalize_or(-motion.direction) })
+    }
+
     /// As [`first_contact`](Self::first_contact) of each of these origins, if all of them touch; none as soon as one does not,
     /// which takes a part of the time.
     pub fn all_contacts<const N: usize>(&self, origins: [DVec3; N], direction: DVec3, radius: f64) -> Option<[f64; N]> {
@@ -156,6 +166,16 @@ impl Surface {
         }
         (near <= far).then_some(near)
     }
+}
+
+/// First contact of a sphere with a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// As [`Surface::first_contact`] gives it.
+    pub distance: f64,
+    /// Unit vector from the point of contact to the sphere's center; against the direction where the sphere starts on the
+    /// surface.
+    pub normal: DVec3,
 }
 
 /// A cast in the frame of the casts, with its start at the mesh's box.

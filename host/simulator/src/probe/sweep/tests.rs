@@ -450,6 +450,31 @@ fn one_triangle_and_a_million_are_both_touched_at_the_correct_time() {
 }
 
 #[test]
+fn the_normal_of_a_contact_leads_from_the_nearest_point_of_the_mesh_to_the_center() {
+    let triangles = globe(40);
+    let surface = Surface::new(triangles.clone());
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
+    let mut found = 0;
+    for _ in 0..300 {
+        let (origin, direction) = random_cast(&mut rng);
+        let contact = surface.contact(origin, direction, 0.15);
+        assert_eq!(contact.map(|contact| contact.distance), surface.first_contact(origin, direction, 0.15));
+        let Some(Contact { distance, normal }) = contact.filter(|contact| contact.distance > 0.0) else { continue };
+        found += 1;
+        let touched = origin + direction * distance - normal * 0.15;
+        assert!((normal.length() - 1.0).abs() < 1e-9 && normal.dot(direction) < 1e-6, "{normal}");
+        let away = |triangle: &narrow::Triangle| nearest::nearest_point(triangle, touched).distance(touched);
+        let nearest = triangles.iter().map(away).fold(f64::INFINITY, f64::min);
+        assert!(nearest < 1e-7, "{nearest}");
+    }
+    assert!(found > 50, "{found}");
+    // A corner, an edge and a face of one triangle.
+    let surface = Surface::new(vec![FLOOR]);
+    let up = surface.contact(at(0.0, 0.0, 3.0), at(0.0, 0.0, -1.0), 0.5).unwrap();
+    assert!(up.normal.distance(DVec3::Z) < 1e-12, "{up:?}");
+}
+
+#[test]
 #[should_panic(expected = "a surface needs a triangle")]
 fn a_surface_without_triangles_is_refused_as_documented() {
     Surface::new(Vec::new());

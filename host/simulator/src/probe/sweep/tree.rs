@@ -196,6 +196,8 @@ pub(super) struct Search {
     first: f64,
     /// The same for boxes and packs.
     limit: f32,
+    /// The triangle that it touches, in the tree's order.
+    touched: usize,
 }
 
 impl Search {
@@ -207,7 +209,7 @@ impl Search {
             scale::MIDDLE => tree.candidates::<{ scale::MIDDLE }>(&ray, limit),
             _ => tree.candidates::<{ scale::FINE }>(&ray, limit),
         };
-        Self { ray, scale, stack, first, limit }
+        Self { ray, scale, stack, first, limit, touched: 0 }
     }
 
     /// True if the sphere touches a triangle, early or late: much is left to search then.
@@ -217,9 +219,19 @@ impl Search {
     }
 
     /// The distance of the first contact.
-    pub(super) fn first(mut self, tree: &Tree, triangles: &[Triangle], motion: &Motion) -> Option<f64> {
+    pub(super) fn first(self, tree: &Tree, triangles: &[Triangle], motion: &Motion) -> Option<f64> {
+        Some(self.first_triangle(tree, triangles, motion)?.0)
+    }
+
+    /// The distance of the first contact, and the index of the triangle that is touched.
+    pub(super) fn first_triangle(
+        mut self,
+        tree: &Tree,
+        triangles: &[Triangle],
+        motion: &Motion,
+    ) -> Option<(f64, usize)> {
         self.go_on::<false>(tree, triangles, motion);
-        (self.first < farthest(motion)).then_some(self.first)
+        (self.first < farthest(motion)).then_some((self.first, self.touched))
     }
 
     #[inline]
@@ -233,7 +245,7 @@ impl Search {
 
     /// Searches all candidates that are left, or those up to the first pack with a contact.
     fn go_on_at<const PAUSES: bool, const SCALE: u8>(&mut self, tree: &Tree, triangles: &[Triangle], motion: &Motion) {
-        let Self { ray, stack, first, limit, .. } = self;
+        let Self { ray, stack, first, limit, touched, .. } = self;
         while let Some(candidate) = stack.pop() {
             let Some(pack) = tree.resolve::<SCALE>(&candidate, ray, *limit, stack) else { continue };
             let mut earliest = pack.earliest(ray, *limit);
@@ -242,6 +254,7 @@ impl Search {
                 let triangle = &triangles[pack.first as usize + lane];
                 if let Some(distance) = narrow::first_contact(motion, triangle, *first) {
                     *first = distance;
+                    *touched = pack.first as usize + lane;
                     *limit = limit_after(*first, motion, ray);
                     touches = true;
                     if earliest.has_some() {

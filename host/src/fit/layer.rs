@@ -1,0 +1,231 @@
+//! Fingers that bend aside and objects that give way, found beside the probe's other numbers.
+//!
+//! What they do to a touch depends on the angles of its contacts, so simulated touches are made again for each candidate:
+//! the same approaches with the same random numbers, so that candidates differ by nothing else. There are fewer of them than
+//! of the approaches that the rest of the fit uses.
+
+use super::candidate::Candidate;
+use super::density::Densities;
+use super::likelihood::Plate;
+use super::recording::Recording;
+use super::search::{self, Best};
+use super::slopes;
+use super::stroke::Stroke;
+use super::{Evidence, Settings};
+use crate::capture::Sampler;
+use crate::error::Result;
+use crate::probe::approach::{Approach, FINGERS, Probe};
+use crate::probe::noise::{Grazing, Noise};
+use crate::probe::scene::Scene;
+use crate::probe::sweep::Contact;
+use crate::progress::{self, Progress};
+use crate::random::{self, Purpose};
+use crate::touches::Origin;
+use nalgebra::{Matrix3, SymmetricEigen};
+use palpate_shared::Touch;
+use rand_distr::{Distribution, Exp1};
+use rayon::prelude::*;
+
+/// Simulated approaches to each object.
+const APPROACHES: u64 = 20_000;
+/// Gain of log-likelihood from which fingers bend and objects give way: a fit to touches without either finds a little of
+/// them by chance.
+const CERTAIN: f64 = 4.0;
+
+/// Approaches to an object, and what would be touched if nothing gave way.
+pub(super) struct Samples<'a> {
+    name: &'a str,
+    probe: Probe,
+    scenes: &'a [Scene],
+    approaches: Vec<Sample>,
+}
+
+struct Sample {
+    approach: Approach,
+    contacts: [Option<Contact>; FINGERS],
+    /// Exponential numbers of mean 1: by how much each finger bends, and the object gives way at its contact.
+    bends: [f64; FINGERS],
+    gives: [f64; FINGERS],
+}
+
+impl<'a> Samples<'a> {
+    fn new(name: &'a str, scenes: &'a [Scene], settings: &Settings) -> Self {
+        let origin = Origin { seed: settings.seed, ..settings.origin.clone() };
+        let sampler = Sampler::of_instances(scenes, name, &origin);
+        let probe = origin.probe;
+        let one = |index: u64| {
+            let scene = &scenes[index as usize % scenes.len()];
+            let mut random = random::generator(settings.seed, Purpose::Fit, name, index | 1 << 40);
+            let approach = sampler.approach(scene, index);
+            let contact = |finger| scene.contact(finger, approach.direction, probe.radius);
+            Sample {
+                approach,
+                contacts: approach.fingers(probe.spacing).map(contact),
+                bends: std::array::from_fn(|_| Exp1.sample(&mut random)),
+                gives: std::array::from_fn(|_| Exp1.sample(&mut random)),
+            }
+        };
+        let approaches = (0..APPROACHES.min(settings.approaches)).into_par_iter().map(one).collect();
+        Self { name, probe, scenes, approaches }
+    }
+
+    /// The touches of fingers that bend and objects that give way like that.
+    pub(super) fn touches(&self, real: &Noise) -> Vec<Touch> {
+        let one = |(index, sample): (usize, &Sample)| {
+            let scene = &self.scenes[index % self.scenes.len()];
+            let fingers = sample.approach.fingers(self.probe.spacing);
+            let distances = std::array::from_fn(|finger| {
+                let cast = [fingers[finger], sample.approach.direction];
+                let contact = sample.contacts[finger].as_ref()?;
+                real.grazing.distance(cast, contact, sample.bends[finger], scene, &self.probe)
+            });
+            real.given(&sample.approach.touch(distances, &self.probe), sample.gives)
+        };
+        self.approaches.par_iter().enumerate().map(one).collect()
+    }
+}
+
+/// Fingers that bend and objects that give way; by default neither.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Layer {
+    pub(super) real: Noise,
+    /// The ends of the intervals; none where nothing bends or gives way.
+    pub(super) ends: Option<[Noise; 2]>,
+    /// The probe that explains the recordings best with them; none if nothing was searched.
+    pub(super) candidate: Option<Candidate>,
+}
+
+/// A search for the best probe near another one.
+type Climb = fn(search::Likelihood<'_>, &Candidate) -> Best;
+
+/// Angle, bend and give as numbers of about the same scale.
+type Numbers = [f64; 3];
+
+/// Numbers from which the search starts: 20°, 4 ms and 1 ms.
+const START: Numbers = [2.0, 2.0, 1.0];
+/// The first and the last step of the search.
+const STEPS: [f64; 2] = [1.0, 0.2];
+/// How far to either side curvatures are measured.
+const CURVATURE: f64 = 0.5;
+
+fn real_of([angle, bend, give]: Numbers) -> Noise {
+    let grazing = Grazing { angle: 10.0 * angle.clamp(0.0, 8.0), bend: 1e3 * bend.clamp(-4.0, 8.0).exp2() };
+    Noise { grazing, give: 1e3 * give.max(0.0).powi(2), ..Noise::default() }
+}
+
+/// Recordings and approaches to their objects.
+struct Layers<'a> {
+    recordings: &'a [Recording<'a>],
+    samples: Vec<Samples<'a>>,
+    plate: Option<&'a Plate>,
+    stroke: Stroke,
+    progress: &'a dyn Progress,
+}
+
+impl Layers<'_> {
+    fn densities(&self, real: &Noise) -> Vec<Densities> {
+        let of = |samples: &Samples<'_>| Densities::new(samples.name, &samples.touches(real), self.stroke.window);
+        self.samples.iter().map(of).collect()
+    }
+
+    fn evidence<'b>(&'b self, objects: &'b [Densities]) -> Evidence<'b> {
+        Evidence {
+            recordings: self.recordings.to_vec(),
+            objects,
+            of: (0..self.recordings.len()).collect(),
+            plate: self.plate.cloned(),
+            stroke: self.stroke,
+        }
+    }
+
+    /// The best probe with these numbers, near another one, by a quick climb or an exact one.
+    fn explained(&self, numbers: Numbers, from: &Candidate, climb: Climb) -> Result<Best> {
+        progress::check(self.progress)?;
+        let densities = self.densities(&real_of(numbers));
+        let evidence = self.evidence(&densities);
+        Ok(climb(&|candidate: &Candidate| evidence.log_likelihood(candidate, |_| true), from))
+    }
+
+    /// Compass search: a step to either side of each number, and half of it where none is better.
+    fn best(&self, plain: &Best) -> Result<(Numbers, Best)> {
+        let (mut numbers, mut best) = (START, self.explained(START, &plain.candidate, slopes::again)?);
+        let [mut step, last] = STEPS;
+        while step > last {
+            let mut moved = false;
+            for index in 0..numbers.len() {
+                for way in [step, -step] {
+                    let mut there = numbers;
+                    there[index] += way;
+                    if there[0] < 0.0 || there[2] < 0.0 || there[1] < -4.0 {
+                        continue;
+                    }
+                    let found = self.explained(there, &best.candidate, slopes::again)?;
+                    if found.log_likelihood > best.log_likelihood + 0.05 {
+                        (numbers, best, moved) = (there, found, true);
+                        break;
+                    }
+                }
+            }
+            if !moved {
+                step /= 2.0;
+            }
+        }
+        Ok((numbers, best))
+    }
+
+    /// Half the widths of the intervals, from the curvatures of the likelihood.
+    fn widths(&self, numbers: Numbers, best: &Best) -> Result<Numbers> {
+        // Differences of maxima: exact ones, since each of a quick climb may be a tenth of a nat too low.
+        let at = |ways: &[(usize, f64)]| {
+            let mut there = numbers;
+            ways.iter().for_each(|(index, way)| there[*index] += way * CURVATURE);
+            Ok(self.explained(there, &best.candidate, search::near)?.log_likelihood) as Result<f64>
+        };
+        let center = at(&[])?;
+        let mut curvatures = Matrix3::identity();
+        let mut up = [0.0; 3];
+        for index in 0..3 {
+            up[index] = at(&[(index, 1.0)])?;
+            // A give of less than nothing is none.
+            curvatures[(index, index)] = 2.0 * center - up[index] - at(&[(index, -1.0)])?;
+        }
+        for (one, other) in [(0, 1), (0, 2), (1, 2)] {
+            let both = up[one] + up[other] - at(&[(one, 1.0), (other, 1.0)])? - center;
+            (curvatures[(one, other)], curvatures[(other, one)]) = (both, both);
+        }
+        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(curvatures);
+        let spread = eigenvectors
+            * Matrix3::from_diagonal(&eigenvalues.map(|curved| CURVATURE.powi(2) / curved.max(0.05)))
+            * eigenvectors.transpose();
+        Ok([0, 1, 2].map(|index| (search::QUANTILE * spread[(index, index)]).sqrt()))
+    }
+}
+
+/// Approaches to these objects, by their names, that no stroke ends.
+pub(super) fn samples<'a>(objects: &[(&'a str, &'a [Scene])], settings: &Settings) -> Vec<Samples<'a>> {
+    objects.iter().map(|(name, scenes)| Samples::new(name, scenes, settings)).collect()
+}
+
+/// Finds fingers that bend and objects that give way, if the recordings show them. `samples` are of the recordings' objects,
+/// in their order.
+pub(super) fn layer(
+    recordings: &[Recording<'_>],
+    samples: Vec<Samples<'_>>,
+    plate: Option<&Plate>,
+    stroke: Stroke,
+    progress: &dyn Progress,
+) -> Result<Layer> {
+    let layers = Layers { recordings, samples, plate, stroke, progress };
+    let plain = {
+        let densities = layers.densities(&Noise::default());
+        let evidence = layers.evidence(&densities);
+        search::best(&|candidate: &Candidate| evidence.log_likelihood(candidate, |_| true), None)
+    };
+    let (numbers, best) = layers.best(&plain)?;
+    if best.log_likelihood < plain.log_likelihood + CERTAIN {
+        return Ok(Layer { real: Noise::default(), ends: None, candidate: Some(plain.candidate) });
+    }
+    let widths = layers.widths(numbers, &best)?;
+    let ends = [-1.0, 1.0].map(|side| real_of(std::array::from_fn(|index| numbers[index] + side * widths[index])));
+    Ok(Layer { real: real_of(numbers), ends: Some(ends), candidate: Some(best.candidate) })
+}
