@@ -179,7 +179,10 @@ fn fingers_that_bend_aside_are_found_and_rigid_ones_are_not_said_to_bend() {
     let soft = Dataset::new(objects().iter().map(one).collect());
     let found =
         fit(&soft, &objects(), Some(&plate(60, &BENT)), &Settings { approaches: 100_000, ..settings() }, &()).unwrap();
-    near(&found, &BENT, [0.05, 1.5, 0.6]);
+    // Noise and bend are hardly told apart: the one makes up for the other.
+    near(&found, &BENT, [0.05, 1.5, 1.2]);
+    assert!(found.speed_factor.holds(1.0 / BENT.longer), "{:?}", found.speed_factor);
+    assert!(found.late[0].holds(3.0) && found.late[1].holds(-4.0), "{:?}", found.late);
     let GrazingEstimate { bend, .. } = found.grazing.expect("fingers that bend");
     assert!((4.0..25.0).contains(&bend.value), "{bend:?}");
     let file = crate::probe::file::ProbeFile::parse(&found.toml(), "probe.toml".as_ref()).unwrap();
