@@ -105,7 +105,7 @@ type Numbers = [f64; 3];
 const START: Numbers = [2.0, 2.0, 1.0];
 /// The first and the last step of the search.
 const STEPS: [f64; 2] = [1.0, 0.2];
-/// How far to either side curvatures are measured.
+/// Distance to either side over which curvatures are measured.
 const CURVATURE: f64 = 0.5;
 
 fn real_of([angle, bend, give]: Numbers) -> Noise {

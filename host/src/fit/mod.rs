@@ -131,8 +131,8 @@ impl Evidence<'_> {
 /// Finds the probe that made recorded touches of `objects`, which are matched by their names, and presses on a flat plate
 /// if there are any, with a half turn of the probe after each.
 ///
-/// The same recordings, objects and settings give the same fit on any number of threads. Cost: a few seconds for four
-/// objects and 1,200 recorded approaches.
+/// The same recordings, objects and settings give the same fit on any number of threads. Cost: half a minute of a
+/// processor for ten meshes and 300 recorded approaches to four of them, twice that where touches have poses.
 ///
 /// # Errors
 /// [`FitProblem::NotRecorded`] if a recorded object is not among the objects; [`FitProblem::FewRecorded`] for fewer than

@@ -17,7 +17,7 @@ const STEPS: usize = 60;
 const CLOSE: f64 = 0.02;
 /// The longest step of a number.
 const LONGEST: f64 = 3.0;
-/// How far to either side slopes are measured: farther than the cells of the tables, which have edges.
+/// Distance to either side over which slopes are measured: farther than the cells of the tables, which have edges.
 const SLOPE: f64 = 0.1;
 
 /// The best candidate near a start that is nearly the best.

@@ -6,7 +6,7 @@ use crate::probe::sweep::Contact;
 use rand::Rng;
 use rand_distr::{Distribution, Exp1};
 
-/// How fingers bend aside where they meet a surface at a flat angle: they touch late, or never.
+/// Fingers that bend aside where they meet a surface at a flat angle: they touch late, or never.
 ///
 /// Up to an angle between motion and normal, friction holds a fingertip where it touches. Beyond, it slides downhill: a
 /// spring that closes the switch at a force F also bends aside by F · tan(angle − friction's) over the sideways stiffness. The
