@@ -52,6 +52,9 @@ pub struct Plain<'a> {
     /// Bytes of a leaf's number, and the values of all leaves, if the model shares them.
     sentinel: Option<(i32, i32)>,
     shared: Option<(usize, &'a [u8])>,
+    /// Weights by the number of touches, and what a row's margins become, if the model has them.
+    weights: Vec<u64>,
+    row: Option<&'a [u8]>,
     /// For each object.
     pub evidence: Vec<i64>,
     /// Number of touches counted.
@@ -114,6 +117,7 @@ impl<'a> Plain<'a> {
             trees: number(&group[4..]) as usize,
         });
         let (mut odds_by_object, mut sharpness, mut shared, mut sentinel) = (Vec::new(), 1 << 16, None, None);
+        let (mut weights, mut row) = (Vec::new(), None);
         // What a model without the section touches was trained on.
         let (mut patterns, mut needs_pose, mut largest) = (0b10_0000, matches!(descriptor, 2 | 3 | 5 | 6), u32::MAX);
         while !optional.is_empty() {
@@ -121,9 +125,11 @@ impl<'a> Plain<'a> {
             let content = &optional[8..][..length];
             match number(&optional[..2]) & 0x7fff {
                 2 => (patterns, needs_pose, largest) = (content[0], content[2] == 1, number(&content[4..8]) as u32),
+                4 => weights = content[2..][..2 * usize::from(content[0])].chunks(2).map(|w| number(w) + 1).collect(),
                 5 => odds_by_object = content[..4 * objects].chunks(4).map(|odds| number(odds) << 24).collect(),
                 11 if (1 << 12..=1 << 20).contains(&number(&content[..4])) => sharpness = number(&content[..4]),
                 12 => shared = Some((content[0].into(), &content[4..])),
+                16 => row = Some(content),
                 14 => sentinel = Some((signed(&content[..4]), signed(&content[4..8]))),
                 _ => {}
             }
@@ -152,6 +158,8 @@ impl<'a> Plain<'a> {
             leaves,
             sentinel,
             shared,
+            weights,
+            row,
             evidence: Vec::new(),
             touches: 0,
             decision: Decision::Undecided,
@@ -351,6 +359,7 @@ impl<'a> Plain<'a> {
             return;
         }
         for (evidence, &margin) in self.evidence.iter_mut().zip(margins) {
+            let margin = self.row.map_or(margin, |table| of_row(table, margin));
             *evidence = evidence.saturating_add(margin.into());
         }
         self.touches += 1;
@@ -370,9 +379,21 @@ impl<'a> Plain<'a> {
     }
 
     fn weight(&self, object: usize, sharpness: u64) -> u64 {
-        let behind = self.evidence[self.leader()].abs_diff(self.evidence[object]).min(u32::MAX.into());
+        let behind = self.evidence[self.leader()].abs_diff(self.evidence[object]);
+        if behind > u32::MAX.into() {
+            return 0;
+        }
+        let behind = if self.weights.is_empty() { behind } else { (behind * self.factor()) >> 16 };
         let u = (u128::from(behind) * u128::from(self.unit_bits)) >> self.unit_shift;
         exp2(if sharpness == 1 << 16 { u as u64 } else { ((u.min(1 << 42) * u128::from(sharpness)) >> 16) as u64 })
+    }
+
+    /// The weight of the evidence so far, in Q16.
+    fn factor(&self) -> u64 {
+        let doublings = self.touches.max(1).ilog2();
+        let half = if doublings == 0 { 0 } else { self.touches >> (doublings - 1) & 1 };
+        let at = (2 * doublings + half) as usize;
+        self.weights[at.min(self.weights.len() - 1)]
     }
 
     /// Sum of the weights of all objects but the leader.
@@ -394,6 +415,21 @@ impl<'a> Plain<'a> {
 }
 
 /// The pattern's code.
+/// Evidence of a margin of a row, by a table.
+fn of_row(table: &[u8], margin: i32) -> i32 {
+    let (start, step, shift, last) = (signed(&table[..4]), u32::from(table[4]), table[5], u64::from(table[6]));
+    let value = |at: u64| i64::from(signed(&table[8 + 2 * at as usize..][..2]));
+    let beyond = (i64::from(margin) - i64::from(start)).max(0) as u64;
+    let at = beyond >> step;
+    let found = if at >= last {
+        value(last)
+    } else {
+        let rest = (beyond % (1 << step)) >> step.saturating_sub(15);
+        value(at) + (((value(at + 1) - value(at)) * rest as i64) >> step.min(15))
+    };
+    (found << shift) as i32
+}
+
 fn pattern(times: &[Option<u32>; 3]) -> u8 {
     match times.map(|time| time.is_some()) {
         [false, false, false] => 0,

@@ -26,6 +26,7 @@ mod recognize_rows;
 mod renamed;
 mod report;
 mod run;
+mod sequences;
 mod shell;
 mod strangers;
 mod teach;

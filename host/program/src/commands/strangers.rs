@@ -29,6 +29,11 @@ impl StrangersArguments {
         self.strangers.and_then(|Wanted(held)| held)
     }
 
+    /// The data of others, if it is given.
+    pub(crate) fn background(&self) -> Option<&PathBuf> {
+        self.background.as_ref()
+    }
+
     /// The other shapes: those that are given, or as the data set was captured; none for one of unknown origin.
     pub(crate) fn shapes(&self, dataset: &Dataset) -> Result<Vec<ObjectTouches>> {
         match (&self.background, &dataset.origin) {
