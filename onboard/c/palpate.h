@@ -172,6 +172,8 @@ typedef struct {
     const uint8_t *sentinel_; /* features that stand for a missing value, or NULL */
     const uint8_t *weights_; /* weights of evidence by the number of touches or rows, or NULL */
     const uint8_t *row_; /* what a row's margins add to the evidence, or NULL: the margins */
+    int32_t row_start_;  /* the margin of that table's first value */
+    uint32_t row_most_;  /* beyond it, up to the last one */
     uint32_t wrong;          /* the place of what is wrong, in bytes from the start */
     uint32_t largest_spread; /* of touches that count, in microseconds */
     uint16_t objects;        /* that there are margins for, 1 to 256 */
@@ -198,6 +200,9 @@ typedef struct {
     uint8_t verdict;      /* a palpate_verdict */
     uint8_t object;       /* the one that was recognized */
     uint32_t forgotten;   /* of the touches, the first ones that are no longer part of the evidence: of some snapshots */
+#if PALPATE_ROW_EVIDENCE
+    uint32_t unit_, from_, span_; /* bits in a unit of evidence of this number of touches, and of so many numbers */
+#endif
     int64_t evidence[PALPATE_MAX_OBJECTS];
 } palpate_recognizer;
 
@@ -370,27 +375,29 @@ static inline int palpate_check_strangers_(palpate_model *model, const uint8_t *
 /* Evidence of a row by its margins; 0 if it makes no sense. */
 static inline int palpate_check_row_(palpate_model *model, const uint8_t *content, uint32_t length)
 {
-    uint32_t last, start;
-    int32_t before = INT32_MIN;
-    const uint8_t *value = content + 8;
+    uint32_t start, i;
+    uint8_t dropped, between, scale, last;
     if (length < 8) {
         return 0;
     }
-    last = PALPATE_BYTE(content + 6);
     start = palpate_u32_(content);
     start = start >> 31 != 0 ? 0u - start : start;
-    if (last - 1 > 127 || length - 8 < 2 * (last + 1) || start > 1u << 30 || PALPATE_BYTE(content + 4) > 26 ||
-        PALPATE_BYTE(content + 5) > 14 || model->descriptor != 255) {
+    dropped = PALPATE_BYTE(content + 4);
+    between = PALPATE_BYTE(content + 5);
+    scale = PALPATE_BYTE(content + 6);
+    last = PALPATE_BYTE(content + 7);
+    if (last == 0 || last > 128 || length - 9 < last || start > 1u << 30 || between > 15 || dropped + between > 26 ||
+        between + scale > 22 || model->descriptor != 255) {
         return 0;
     }
-    for (; value != content + 10 + 2 * last; value += 2) {
-        const int32_t own = PALPATE_AS_(int16_t, palpate_u16_(value));
-        if (own < before) {
+    for (i = 8; i < 8u + last; i++) {
+        if (PALPATE_BYTE(content + i) > PALPATE_BYTE(content + i + 1)) {
             return 0;
         }
-        before = own;
     }
     model->row_ = content;
+    model->row_start_ = PALPATE_AS_(int32_t, palpate_u32_(content));
+    model->row_most_ = (PALPATE_AS_(uint32_t, last) << between) - 1;
     return 1;
 }
 
@@ -1348,38 +1355,53 @@ PALPATE_API uint64_t palpate_exp2(uint64_t u)
     return PALPATE_AS_(uint64_t, power) << 25 >> whole;
 }
 
-/* The weight in Q16 of the evidence so far where it is compared with a threshold: 65536 unless the model states others. */
-static inline uint32_t palpate_weight_(const palpate_recognizer *recognizer)
+/* Bits in a unit of the evidence of so many touches, where it is compared with a threshold: less than the model's if it states
+ * weights of rows that resemble each other. They are the same for `span` numbers of touches, from `from` on. */
+static inline uint32_t palpate_bits_(const palpate_model *model, uint32_t touches, uint32_t *from, uint32_t *span)
 {
-    const uint8_t *weights = PALPATE_ROW_EVIDENCE ? recognizer->model->weights_ : NULL;
-    uint32_t touches = recognizer->touches - recognizer->forgotten, last = 0, at = 0;
+    const uint32_t bits = palpate_u32_(model->bytes + 36);
+    const uint8_t *weights = PALPATE_ROW_EVIDENCE ? model->weights_ : NULL;
+    uint32_t at = 0, last;
+    *from = 0;
+    *span = UINT32_MAX;
     if (weights == NULL) {
-        return 65536;
+        return bits;
     }
     /* Two for each doubling; none for what is between 1 and 2. */
-    for (; touches > 1; touches >>= 1) {
-        at += 2;
-        last = touches & 1;
+    while (touches >> at > 3) {
+        at++;
     }
-    at += last;
+    *from = touches >> at << at;
+    *span = PALPATE_AS_(uint32_t, 1) << at;
+    at = touches > 1 ? 2 * at + (touches >> at) : 0;
     last = PALPATE_BYTE(weights) - 1u;
-    return palpate_u16_(weights + 2 + 2 * (at < last ? at : last)) + 1;
+    at = palpate_u16_(weights + 2 + 2 * (at < last ? at : last)) + 1;
+    return (bits >> 16) * at + ((bits & 0xffff) * at >> 16);
 }
 
-/* Bits by which an object is behind the leader, in Q32, with the evidence so far weighed; the largest number where its weight
- * is 0 at any temperature. */
-static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uint_fast16_t leader, uint_fast16_t object, uint32_t weight)
+/* The same of the evidence so far; next to no cost while it stays. */
+static inline uint32_t palpate_unit_(palpate_recognizer *recognizer)
 {
-    const uint8_t *bytes = recognizer->model->bytes;
+#if PALPATE_ROW_EVIDENCE
+    const uint32_t touches = recognizer->touches - recognizer->forgotten;
+    if (touches - recognizer->from_ >= recognizer->span_) {
+        recognizer->unit_ = palpate_bits_(recognizer->model, touches, &recognizer->from_, &recognizer->span_);
+    }
+    return recognizer->unit_;
+#else
+    return palpate_u32_(recognizer->model->bytes + 36);
+#endif
+}
+
+/* Bits by which an object is behind the leader, in Q32, by the bits in a unit; the largest number where its weight is 0 at any
+ * temperature. */
+static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uint_fast16_t leader, uint_fast16_t object, uint32_t bits)
+{
     const uint64_t units = PALPATE_AS_(uint64_t, recognizer->evidence[leader]) - PALPATE_AS_(uint64_t, recognizer->evidence[object]);
-    uint32_t weighed = PALPATE_AS_(uint32_t, units);
     if (units >> 32 != 0) {
         return UINT64_MAX;
     }
-    if (PALPATE_ROW_EVIDENCE && weight != 65536) {
-        weighed = (weighed >> 16) * weight + ((weighed & 0xffff) * weight >> 16);
-    }
-    return PALPATE_AS_(uint64_t, weighed) * palpate_u32_(bytes + 36) >> (PALPATE_BYTE(bytes + 40) & 63);
+    return units * bits >> (PALPATE_BYTE(recognizer->model->bytes + 40) & 63);
 }
 
 /* Of the first objects, the one with the most evidence; the first of several. */
@@ -1443,6 +1465,9 @@ PALPATE_API palpate_error palpate_start(palpate_recognizer *recognizer, palpate_
     recognizer->odds = palpate_u32_(bytes + 48) | PALPATE_AS_(uint64_t, palpate_u32_(bytes + 52)) << 32;
     recognizer->max_touches = palpate_u32_(bytes + 56);
     recognizer->by_object = 1;
+#if PALPATE_ROW_EVIDENCE
+    recognizer->span_ = 0;
+#endif
     palpate_reset(recognizer);
     return PALPATE_OK;
 }
@@ -1558,64 +1583,43 @@ static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recog
     return PALPATE_RECOGNIZED;
 }
 
-/* A table from margins of a row to evidence, ready to be used. */
-typedef struct {
-    const uint8_t *values;
-    int32_t start;
-    uint8_t step, fine, coarse, shift, last;
-} palpate_table_;
-
-/* The model's table; it must have one. */
-static inline void palpate_ready_(palpate_table_ *table, const uint8_t *row)
+/* Evidence of a row by its margins, of which it takes the place: by the model's table from margins to evidence. */
+static inline void palpate_evidence_of_(const palpate_model *model, int32_t *margins)
 {
-    table->values = row + 8;
-    table->start = PALPATE_AS_(int32_t, palpate_u32_(row));
-    table->step = PALPATE_BYTE(row + 4);
-    table->fine = PALPATE_AS_(uint8_t, table->step > 15 ? table->step - 15 : 0);
-    table->coarse = PALPATE_AS_(uint8_t, table->step - table->fine);
-    table->shift = PALPATE_BYTE(row + 5);
-    table->last = PALPATE_BYTE(row + 6);
-}
-
-/* Evidence of a row for an object by its margin. Cost: at most 40 instructions on a Cortex-M0+. */
-static inline int32_t palpate_row_(const palpate_table_ *table, int32_t margin)
-{
-    /* Margins are within 2^30, as the start is. */
-    uint32_t beyond = margin > table->start ? PALPATE_AS_(uint32_t, margin) - PALPATE_AS_(uint32_t, table->start) : 0;
-    const uint32_t at = beyond >> table->step;
-    const uint8_t *values = table->values;
-    int32_t low;
-    if (at >= table->last) {
-        return palpate_i16_(values + 2 * PALPATE_AS_(size_t, table->last)) * (PALPATE_AS_(int32_t, 1) << table->shift);
+    const uint8_t *row = model->row_;
+    const int32_t *end = margins + model->objects;
+    const uint32_t most = model->row_most_;
+    const int32_t start = model->row_start_;
+    for (; margins != end; margins++) {
+        const uint8_t *value = row;
+        uint32_t beyond = 0, at, rise;
+        if (*margins > start) {
+            beyond = (PALPATE_AS_(uint32_t, *margins) - PALPATE_AS_(uint32_t, start)) >> PALPATE_BYTE(row + 4);
+            beyond = beyond < most ? beyond : most;
+        }
+        at = beyond >> PALPATE_BYTE(row + 5);
+        value += at;
+        beyond -= at << PALPATE_BYTE(row + 5);
+        at = PALPATE_BYTE(value + 8);
+        rise = (PALPATE_BYTE(value + 9) - at) * beyond;
+        at <<= PALPATE_BYTE(row + 5);
+        *margins = PALPATE_AS_(int32_t, (at + rise) << PALPATE_BYTE(row + 6));
     }
-    values += 2 * at;
-    low = palpate_i16_(values);
-    beyond = (beyond - (at << table->step)) >> table->fine;
-    beyond = PALPATE_AS_(uint32_t, palpate_i16_(values + 2) - low) * beyond >> table->coarse;
-    return (low + PALPATE_AS_(int32_t, beyond)) * (PALPATE_AS_(int32_t, 1) << table->shift);
 }
 
-/* Takes in a touch or row by its margins. */
-PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int32_t *margins)
+/* Takes in a touch by its margins, or a row by its evidence. */
+static inline void palpate_push_evidence_(palpate_recognizer *recognizer, const int32_t *evidence)
 {
     const palpate_model *model = recognizer->model;
     uint64_t left = recognizer->odds;
     palpate_verdict verdict = PALPATE_RECOGNIZED;
-    uint32_t factor;
+    uint32_t bits;
     uint_fast16_t best, i;
     if (recognizer->verdict != PALPATE_UNDECIDED) {
         return;
     }
-    if (PALPATE_ROW_EVIDENCE && model->row_ != NULL) {
-        palpate_table_ table;
-        palpate_ready_(&table, model->row_);
-        for (i = 0; i < model->objects; i++) {
-            recognizer->evidence[i] = palpate_add_(recognizer->evidence[i], palpate_row_(&table, margins[i]));
-        }
-    } else {
-        for (i = 0; i < model->objects; i++) {
-            recognizer->evidence[i] = palpate_add_(recognizer->evidence[i], margins[i]);
-        }
+    for (i = 0; i < model->objects; i++) {
+        recognizer->evidence[i] = palpate_add_(recognizer->evidence[i], evidence[i]);
     }
     recognizer->touches += recognizer->touches != UINT32_MAX;
     best = palpate_best(recognizer);
@@ -1625,10 +1629,10 @@ PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int3
     if (recognizer->by_object != 0 && model->odds_ != NULL) {
         left = PALPATE_AS_(uint64_t, palpate_u32_(model->odds_ + 4 * PALPATE_AS_(size_t, best))) << 24;
     }
-    factor = palpate_weight_(recognizer);
+    bits = palpate_unit_(recognizer);
     for (i = 0; verdict == PALPATE_RECOGNIZED && i < model->objects; i++) {
         if (i != best) {
-            const uint64_t weight = palpate_exp2(palpate_behind_(recognizer, best, i, factor));
+            const uint64_t weight = palpate_exp2(palpate_behind_(recognizer, best, i, bits));
             if (weight > left) {
                 verdict = PALPATE_UNDECIDED;
             }
@@ -1640,6 +1644,22 @@ PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int3
     }
     recognizer->verdict = PALPATE_AS_(uint8_t, verdict);
     recognizer->object = PALPATE_AS_(uint8_t, best);
+}
+
+/* Takes in a touch or row by its margins. */
+PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int32_t *margins)
+{
+    if (PALPATE_ROW_EVIDENCE && recognizer->model->row_ != NULL) {
+        int32_t evidence[PALPATE_MAX_OBJECTS];
+        uint_fast16_t i;
+        for (i = 0; i < recognizer->model->objects; i++) {
+            evidence[i] = margins[i];
+        }
+        palpate_evidence_of_(recognizer->model, evidence);
+        palpate_push_evidence_(recognizer, evidence);
+    } else {
+        palpate_push_evidence_(recognizer, margins);
+    }
 }
 
 /* Takes in a touch; after a decision nothing changes until the reset. Cost: the ensemble's margins, a few instructions for
@@ -1654,7 +1674,7 @@ PALPATE_API palpate_answer palpate_push(palpate_recognizer *recognizer, const pa
     if (answer == PALPATE_COUNTED && recognizer->verdict == PALPATE_UNDECIDED) {
         palpate_features_(recognizer->model, touch, times, features);
         palpate_margins_of(recognizer->model, features, recognizer->model->features, margins);
-        palpate_push_margins(recognizer, margins);
+        palpate_push_evidence_(recognizer, margins);
     }
     return answer;
 }
@@ -1667,7 +1687,10 @@ PALPATE_API palpate_answer palpate_push_features(palpate_recognizer *recognizer,
         return PALPATE_NEEDS_TOUCHES;
     }
     palpate_margins_of(recognizer->model, features, count, margins);
-    palpate_push_margins(recognizer, margins);
+    if (PALPATE_ROW_EVIDENCE && recognizer->model->row_ != NULL) {
+        palpate_evidence_of_(recognizer->model, margins);
+    }
+    palpate_push_evidence_(recognizer, margins);
     return PALPATE_COUNTED;
 }
 
@@ -1699,7 +1722,8 @@ PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uin
     const palpate_model *model = recognizer->model;
     const uint8_t *p = model->part_[PALPATE_OPTIONAL_], *end = model->part_[PALPATE_MARGINS_];
     const uint_fast16_t best = palpate_leader_(recognizer, model->objects);
-    const uint32_t weight = palpate_weight_(recognizer);
+    uint32_t from, span;
+    const uint32_t unit = palpate_bits_(model, recognizer->touches - recognizer->forgotten, &from, &span);
     uint32_t sharpness = 65536;
     uint64_t own = 0, others = 0, all;
     uint_fast16_t i;
@@ -1717,7 +1741,7 @@ PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uin
     for (i = 0; i < model->objects; i++) {
         if (i != best) {
             const uint64_t most = PALPATE_AS_(uint64_t, 1) << 42; /* where a weight is 0 at any temperature */
-            uint64_t bits = palpate_behind_(recognizer, best, i, weight);
+            uint64_t bits = palpate_behind_(recognizer, best, i, unit);
             bits = palpate_exp2((bits < most ? bits : most) * sharpness >> 16);
             others += bits;
             own = i == object ? bits : own;

@@ -427,7 +427,7 @@ fn predictions(put: Put<'_>) {
     with("no weight by the number of touches", Tag::Weights, &[0, 0]);
     with("weights by the number of touches that are cut", Tag::Weights, &[3, 0, 1, 0, 1, 0, 1]);
     with("more weights than there are doublings", Tag::Weights, &[&[65, 0][..], &[1; 130]].concat());
-    let table = [0, 0, 0, 0, 4, 0, 1, 0, 1, 0, 2, 0];
+    let table = [0, 0, 0, 0, 4, 3, 0, 1, 1, 2];
     with("evidence of a row in a model over touches", Tag::RowEvidence, &table);
     let rows = changed_to_rows(&plain);
     let mut with = |name: &str, content: &[u8]| {
@@ -439,11 +439,11 @@ fn predictions(put: Put<'_>) {
         table[place] = value;
         table
     };
-    with("evidence of a row that is cut", &table[..11]);
-    with("evidence of a row by one value", &at(6, 0));
-    with("evidence of a row that falls", &at(10, 0));
-    with("evidence of a row in steps that are too wide", &at(4, 27));
-    with("evidence of a row in units that are too large", &at(5, 15));
+    with("evidence of a row that is cut", &table[..9]);
+    with("evidence of a row by one value", &at(7, 0));
+    with("evidence of a row that falls", &at(9, 0));
+    with("evidence of a row in steps that are too wide", &at(4, 24));
+    with("evidence of a row in units that are too large", &at(6, 20));
     with("evidence of a row that starts beyond all margins", &at(3, 0x41));
 }
 

@@ -383,8 +383,9 @@ impl<'a> Plain<'a> {
         if behind > u32::MAX.into() {
             return 0;
         }
-        let behind = if self.weights.is_empty() { behind } else { (behind * self.factor()) >> 16 };
-        let u = (u128::from(behind) * u128::from(self.unit_bits)) >> self.unit_shift;
+        let bits = u64::from(self.unit_bits);
+        let bits = if self.weights.is_empty() { bits } else { (bits * self.factor()) >> 16 };
+        let u = (u128::from(behind) * u128::from(bits)) >> self.unit_shift;
         exp2(if sharpness == 1 << 16 { u as u64 } else { ((u.min(1 << 42) * u128::from(sharpness)) >> 16) as u64 })
     }
 
@@ -414,22 +415,17 @@ impl<'a> Plain<'a> {
     }
 }
 
-/// The pattern's code.
 /// Evidence of a margin of a row, by a table.
 fn of_row(table: &[u8], margin: i32) -> i32 {
-    let (start, step, shift, last) = (signed(&table[..4]), u32::from(table[4]), table[5], u64::from(table[6]));
-    let value = |at: u64| i64::from(signed(&table[8 + 2 * at as usize..][..2]));
-    let beyond = (i64::from(margin) - i64::from(start)).max(0) as u64;
-    let at = beyond >> step;
-    let found = if at >= last {
-        value(last)
-    } else {
-        let rest = (beyond % (1 << step)) >> step.saturating_sub(15);
-        value(at) + (((value(at + 1) - value(at)) * rest as i64) >> step.min(15))
-    };
-    (found << shift) as i32
+    let (start, [p, q, v, last]) = (signed(&table[..4]), [4, 5, 6, 7].map(|at| u64::from(table[at])));
+    let value = |at: u64| u64::from(table[8 + at as usize]);
+    let beyond = ((i64::from(margin) - i64::from(start)).max(0) as u64 >> p).min((last << q) - 1);
+    let (at, rest) = (beyond >> q, beyond % (1 << q));
+    let found = (value(at) << q) + (value(at + 1) - value(at)) * rest;
+    (found << v) as i32
 }
 
+/// The pattern's code.
 fn pattern(times: &[Option<u32>; 3]) -> u8 {
     match times.map(|time| time.is_some()) {
         [false, false, false] => 0,

@@ -5,8 +5,8 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-    Held, Link, MisfitTerms, ObjectMisfit, OddsByObject, Plan, Prediction, RowEvidence, Section, Sentinel, Strangers,
-    Tag, Temperature, Weights, f32_key, write_section,
+    Held, Link, MisfitTerms, ObjectMisfit, OddsByObject, Plan, Prediction, RowEvidence, Section, Sentinel, Shifts,
+    Strangers, Tag, Temperature, Weights, f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;
@@ -86,12 +86,15 @@ fn weights(rng: &mut SmallRng) -> Vec<u8> {
 /// A table from margins to evidence, about margins that occur.
 fn row_evidence(rng: &mut SmallRng) -> Vec<u8> {
     let mut content = Vec::new();
-    let step = rng.random_range(0..=RowEvidence::MOST_STEP_SHIFT);
-    let mut values: Vec<i16> = (0..rng.random_range(2..=RowEvidence::MOST)).map(|_| rng.random()).collect();
+    let between = rng.random_range(0..=Shifts::MOST_BETWEEN);
+    let dropped = rng.random_range(0..=Shifts::MOST_STEP - between);
+    let scale = rng.random_range(0..=Shifts::MOST_SCALE - between);
+    let mut values: Vec<u8> = (0..rng.random_range(2..=RowEvidence::MOST)).map(|_| rng.random()).collect();
     values.sort_unstable();
+    let step = dropped + between;
     let start = -(1_i32 << rng.random_range(0..=30)).min(1 << rng.random_range(step..27).min(30));
-    let shift = rng.random_range(0..=RowEvidence::MOST_VALUE_SHIFT);
-    RowEvidence::write(start, [step, shift], &values, &mut |part| content.extend_from_slice(part));
+    let shifts = Shifts { dropped, between, scale };
+    RowEvidence::write(start, shifts, &values, &mut |part| content.extend_from_slice(part));
     content
 }
 

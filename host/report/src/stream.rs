@@ -6,6 +6,7 @@ use crate::page::color;
 use crate::page::document::{Figure, Page, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
+use palpate::evaluate::Finding;
 use palpate::stream::{Evaluated, Grown, Point};
 
 /// The most classes whose posteriors are drawn.
@@ -53,10 +54,11 @@ fn promise(evaluated: &Evaluated) -> String {
         return format!("{ends} The model was not calibrated for these thresholds, and promises nothing.");
     };
     let of = promise.of.as_ref().map_or_else(String::new, |of| format!(" ({of})"));
-    let kept = if promise.broken {
-        "That breaks the promise, by more than chance explains."
-    } else {
-        "The promise is kept, as far as these tell."
+    let kept = match promise.finding {
+        Finding::Broken => "That breaks the promise, by more than chance explains.",
+        Finding::Unclear => "That is above it, but no more than chance explains.",
+        Finding::Kept => "The promise is kept.",
+        Finding::Untested => "No name was given.",
     };
     format!(
         "The model promises at most {} % of wrong names; found here: {} %{of}. {kept} {ends}",

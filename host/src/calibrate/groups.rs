@@ -6,16 +6,17 @@
 //!
 //! A threshold's hypothesis, that the expectation is above 0, is rejected by a bet against it (Waudby-Smith and Ramdas,
 //! Estimating means of bounded random variables by betting, 2024): with a fraction λ that is fixed beforehand, from 0 to
-//! 1 / (1 − rate), the expectation of Π (1 − λ · loss) over independent groups is at most 1 under the hypothesis, so by
-//! Markov's inequality the product reaches 1 / (1 − confidence) with a probability of at most 1 − confidence. λ is chosen on
-//! groups that the test does not see, for their number. With λ = 1 / (1 − rate) and no error at all the product is
-//! (1 − rate)^−groups, so as many groups are needed as independent sequences for a binomial test: 299 at 1 %.
+//! 1 / (1 − rate), no factor 1 − λ · loss is below 0, and the expectation of their product over independent groups is at
+//! most 1 under the hypothesis. So by Markov's inequality the product reaches 1 / (1 − confidence) with a probability of at
+//! most 1 − confidence. λ is chosen on groups that the test does not see, for the number of groups that it sees. With
+//! λ = 1 / (1 − rate) and no error at all the product is (1 − rate)^−groups, so as many groups are needed as independent
+//! sequences for a binomial test: 299 at 1 %.
 
 use super::choose::{By, around, grid, learned, summary, tallies};
 use super::sequence::{Odds, Sequence, odds_of};
-use super::walk::{Stop, needed};
+use super::walk::Stop;
 use super::{Chosen, Per, Terms};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The most fractions that are tried.
 const FRACTIONS: u32 = 200;
@@ -29,39 +30,59 @@ pub struct Grouped<'s> {
     pub group: usize,
 }
 
-/// The losses of the groups that have one: by case, group by group.
-fn losses(sequences: &[Grouped<'_>], odds: &Odds, by: By, rate: f64) -> Vec<Vec<f64>> {
-    let count = by.count();
-    // Sum of losses, and sequences.
-    let mut sums: BTreeMap<(usize, usize), (f64, u32)> = BTreeMap::new();
+/// Losses of the groups that have one.
+#[derive(Clone, Debug, Default)]
+struct Losses {
+    /// Of each group: the mean over its sequences.
+    of: Vec<f64>,
+    /// Of each group: the share of its sequences that got a name.
+    named: Vec<f64>,
+}
+
+impl Losses {
+    /// As many groups as would have as many names, if all of their sequences got one.
+    fn whole(&self) -> f64 {
+        self.named.iter().sum()
+    }
+}
+
+/// The losses of each case.
+fn losses(sequences: &[Grouped<'_>], odds: &Odds, by: By, rate: f64) -> Vec<Losses> {
+    // Wrong names, names, sequences.
+    let mut sums: BTreeMap<(usize, usize), (f64, f64, f64)> = BTreeMap::new();
     for Grouped { sequence, group } in sequences {
         let look = sequence.given(odds);
-        let case = match (by, look) {
-            (By::All, _) => Some(0),
-            (By::Touched(_), _) => Some(sequence.object),
-            (By::Named(_), look) => look.map(|look| look.name),
+        let case = match by {
+            By::All => Some(0),
+            By::Touched(_) => Some(sequence.object),
+            By::Named(_) => look.map(|look| look.name),
         };
-        let Some(case) = case.filter(|case| *case < count) else { continue };
-        let loss = look.map_or(0.0, |look| f64::from(u8::from(look.name != sequence.object)) - rate);
+        let Some(case) = case.filter(|case| *case < by.count()) else { continue };
         let sum = sums.entry((case, *group)).or_default();
-        *sum = (sum.0 + loss, sum.1 + 1);
+        sum.0 += f64::from(u8::from(look.is_some_and(|look| look.name != sequence.object)));
+        sum.1 += f64::from(u8::from(look.is_some()));
+        sum.2 += 1.0;
     }
-    let mut losses = vec![Vec::new(); count];
-    sums.into_iter().for_each(|((case, _), (sum, count))| losses[case].push(sum / f64::from(count)));
+    let mut losses = vec![Losses::default(); by.count()];
+    for ((case, _), (wrong, named, all)) in sums {
+        losses[case].of.push((wrong - rate * named) / all);
+        losses[case].named.push(named / all);
+    }
     losses
 }
 
-/// The fraction to bet on groups of which so many are tested, by the losses of others: with it the most errors of their size
-/// are allowed.
-fn fraction(losses: &[f64], groups: usize, rate: f64, confidence: f64) -> f64 {
-    let enough = -(1.0 - confidence).ln() / groups.max(1) as f64;
+/// The fraction to bet on so many groups, by the losses of others: with it the most errors of their size are allowed.
+fn fraction(losses: &[f64], groups: f64, rate: f64, confidence: f64) -> f64 {
+    let enough = -(1.0 - confidence).ln() / groups.max(1.0);
     let most = 1.0 / (1.0 - rate);
+    // With less than that no number of groups without an error would do.
+    let least = (enough.exp_m1() / rate).min(most);
     if losses.iter().any(|loss| *loss > -0.999 * rate) {
         // With their spread: the fraction by which the least is lost to reach the level in so many groups.
         let count = losses.len() as f64;
         let mean = losses.iter().sum::<f64>() / count;
         let variance = losses.iter().map(|loss| (loss - mean).powi(2)).sum::<f64>() / count;
-        return (2.0 * enough / variance.max(1e-12)).sqrt().min(0.9 * most);
+        return (2.0 * enough / variance.max(1e-12)).sqrt().min(0.9 * most).max(least);
     }
     // Nothing is known of errors: as if each were of a whole group.
     let wrong_loss = 1.0 - rate;
@@ -78,16 +99,22 @@ fn fraction(losses: &[f64], groups: usize, rate: f64, confidence: f64) -> f64 {
 
 /// The bets for each case, from groups that are not tested: at the loosest threshold at which they seem to keep the rate.
 fn bets(learned_on: &[Grouped<'_>], by: By, strictest: f64, groups: usize, terms: &Terms) -> Vec<f64> {
-    let mut seen = vec![Vec::new(); by.count()];
+    let learned: BTreeSet<usize> = learned_on.iter().map(|grouped| grouped.group).collect();
+    let mut seen = vec![Losses::default(); by.count()];
     for margin in grid(strictest, super::choose::LOOSEST).step_by(10) {
         let losses = losses(learned_on, &Odds::All(odds_of(margin)), by, terms.rate);
-        let is_kept = |losses: &Vec<f64>| losses.iter().sum::<f64>() <= 0.0;
+        let is_kept = |losses: &Losses| losses.of.iter().sum::<f64>() <= 0.0;
         if !losses.iter().all(is_kept) {
             break;
         }
         seen = losses;
     }
-    seen.iter().map(|losses| fraction(losses, groups, terms.rate, terms.confidence)).collect()
+    let bet = |losses: &Losses| {
+        // A case may be of some groups only.
+        let share = if losses.of.is_empty() { 1.0 } else { losses.of.len() as f64 / learned.len() as f64 };
+        fraction(&losses.of, share * groups as f64, terms.rate, terms.confidence)
+    };
+    seen.iter().map(bet).collect()
 }
 
 /// Chooses thresholds that keep a promise for new groups, as [`choose`](super::choose()) does for independent sequences.
@@ -107,7 +134,7 @@ pub fn choose_groups(
         Per::Object => By::Touched(objects),
         Per::Name => By::Named(objects),
     };
-    let groups: std::collections::BTreeSet<usize> = tested.iter().map(|grouped| grouped.group).collect();
+    let groups: BTreeSet<usize> = tested.iter().map(|grouped| grouped.group).collect();
     let bets = bets(learned_on, by, strictest, groups.len(), terms);
     let steps: Vec<Odds> = match terms.per {
         Per::Average | Per::Object => {
@@ -124,23 +151,24 @@ pub fn choose_groups(
     Ok(summary(odds, kept, &sequences, objects))
 }
 
-/// Fixed-sequence testing, as [`walk`](super::walk()) does for tallies.
+/// Fixed-sequence testing, as [`walk`](super::walk()) does for tallies. Thresholds at which no bet could be won even without an
+/// error are passed over: how many names there are decides that, not how many are errors.
 fn walk(tested: &[Grouped<'_>], steps: Vec<Odds>, by: By, bets: &[f64], terms: &Terms) -> Result<Odds, Stop> {
-    let least = needed(terms.rate, terms.confidence) as usize;
-    let enough = -(1.0 - terms.confidence).ln();
+    // Slack for the last bits of a sum.
+    let enough = -(1.0 - terms.confidence).ln() - 1e-9;
     let mut kept = None;
-    let mut most = vec![0; by.count()];
+    let mut most = vec![0.0_f64; by.count()];
     for odds in steps {
         let losses = losses(tested, &odds, by, terms.rate);
-        let informative = |losses: &Vec<f64>| losses.iter().filter(|loss| **loss != 0.0).count();
-        most.iter_mut().zip(&losses).for_each(|(most, losses)| *most = informative(losses).max(*most));
-        if losses.iter().any(|losses| informative(losses) < least) {
+        most.iter_mut().zip(&losses).for_each(|(most, losses)| *most = losses.whole().max(*most));
+        let could_pass = |(losses, bet): (&Losses, &f64)| {
+            losses.named.iter().map(|named| (bet * terms.rate * named).ln_1p()).sum::<f64>() >= enough
+        };
+        if !losses.iter().zip(bets).all(could_pass) {
             continue;
         }
-        let passes = |(losses, bet): (&Vec<f64>, &f64)| {
-            // Slack for the last bits of a sum.
-            losses.iter().map(|loss| (-bet * loss).ln_1p()).sum::<f64>() >= enough - 1e-9
-        };
+        let passes =
+            |(losses, bet): (&Losses, &f64)| losses.of.iter().map(|loss| (-bet * loss).ln_1p()).sum::<f64>() >= enough;
         match losses.iter().zip(bets).position(|case| !passes(case)) {
             None => kept = Some(odds),
             Some(position) if kept.is_none() => {
@@ -152,8 +180,8 @@ fn walk(tested: &[Grouped<'_>], steps: Vec<Odds>, by: By, bets: &[f64], terms: &
         }
     }
     kept.ok_or_else(|| {
-        let position = (0..most.len()).min_by_key(|&position| most[position]).unwrap_or(0);
-        Stop::TooFew { position, found: most.get(position).copied().unwrap_or(0) as u64 }
+        let position = (0..most.len()).min_by(|&a, &b| most[a].total_cmp(&most[b])).unwrap_or(0);
+        Stop::TooFew { position, found: most.get(position).copied().unwrap_or(0.0).round() as u64 }
     })
 }
 
@@ -202,12 +230,23 @@ mod tests {
     }
 
     #[test]
+    fn the_least_number_of_groups_is_enough_whatever_those_learned_from_did() {
+        for (rate, least) in [(0.01, 299.0), (0.05, 59.0), (0.1, 29.0)] {
+            for losses in [&[0.0; 5][..], &[-rate, 1.0 - rate, -rate], &[]] {
+                let bet = fraction(losses, least, rate, 0.95);
+                assert!(bet * (1.0 - rate) <= 1.0 + 1e-12, "{rate}: {bet}");
+                assert!(least * (bet * rate).ln_1p() >= -(0.05_f64.ln()) - 1e-9, "{rate}: {bet}");
+            }
+        }
+    }
+
+    #[test]
     fn the_bet_depends_on_how_many_errors_there_is_room_for() {
         let most = 1.0 / 0.99;
-        assert!((fraction(&[], 299, 0.01, 0.95) - most).abs() < 1e-9);
-        let many = fraction(&[], 5_000, 0.01, 0.95);
+        assert!((fraction(&[], 299.0, 0.01, 0.95) - most).abs() < 1e-9);
+        let many = fraction(&[], 5_000.0, 0.01, 0.95);
         assert!(many > 0.1 && many < 0.7 * most, "{many}");
         // Small losses allow a larger one.
-        assert!(fraction(&[0.05; 10], 5_000, 0.01, 0.95) > many);
+        assert!(fraction(&[0.05; 10], 5_000.0, 0.01, 0.95) > many);
     }
 }

@@ -1,8 +1,9 @@
 //! A test of whether rows fit any class that the model knows, with a false alarm rate that is kept on sequences.
 
-use super::calibrate::{Parts, Settings, grouped_once, kept_margin};
-use super::{Rows, follow};
-use crate::calibrate::{Until, odds_of};
+use super::Rows;
+use super::begin::Begin;
+use super::calibrate::{Parts, Settings, grouped_once};
+use crate::calibrate::odds_of;
 use crate::compile::{self, Restated, restate};
 use crate::error::Result;
 use crate::strangers::{self, Found, Supply};
@@ -34,26 +35,20 @@ impl Strangers {
 
 /// The share of the sequences that are not learned from on which the false alarm rate is tested; the promise rests on the
 /// others.
-const TESTED: f64 = 3.0 / 7.0;
-/// Beyond the threshold that seems to keep the promise, in nats: where the test is made for.
-const STRICTER: f64 = 0.5;
-
+pub(super) const TESTED: f64 = 3.0 / 7.0;
 /// Adds the test to a model, if one is wanted: its bytes, the parts of the sequences without those that the test used, where
-/// the thresholds begin, and what was found. The test is made under strict thresholds: under looser ones no sequence is
-/// longer, so that there are no more false alarms.
+/// the thresholds begin, and what was found. The test is made under the thresholds at which the walk begins: under looser
+/// ones no sequence is longer, so that there are no more false alarms.
 pub(super) fn test<'s>(
     shaped: &[u8],
     rows: &Rows<'_>,
     parts: Parts<'s>,
     settings: &Settings,
-    strictest: f64,
-    max_rows: u32,
+    begin: Begin,
 ) -> Result<(Vec<u8>, Parts<'s>, f64, Option<Found>)> {
-    let Some(wanted) = &settings.strangers else { return Ok((shaped.to_vec(), parts, strictest, None)) };
+    let Some(wanted) = &settings.strangers else { return Ok((shaped.to_vec(), parts, begin.strictest, None)) };
     let model = compile::open(shaped)?;
-    let until = Until { margin: strictest, max_touches: max_rows };
-    let kept = kept_margin(&follow(&model, rows, &parts.learned, until), strictest, settings.rate);
-    let begin = kept.map_or(strictest, |margin| (margin + STRICTER).min(strictest));
+    let begin = begin.loosest;
     let restated =
         Restated { odds: Some(odds_of(begin)), sections: vec![(Tag::ThresholdsByObject, None)], ..Restated::default() };
     let begun = restate(&model, &restated)?;

@@ -1,10 +1,11 @@
 //! A model's shape, thresholds and promise, from sequences of rows.
 
+use super::begin::Begin;
 use super::shape::{self, Fitted, Gain, STRICTEST};
 use super::{Rows, check, follow};
 use crate::calibrate::{
-    Chosen, Grouped, Odds, OfObject, Per, Sequence, Stop, Tally, Terms, Until, Worse, binomial_tail, choose_groups,
-    choose_independent, margin_of, needed, odds_of, worse,
+    Chosen, Grouped, Odds, OfObject, Per, Sequence, Stop, Tally, Terms, Until, Worse, choose_groups,
+    choose_independent, margin_of, needed, worse,
 };
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Error, Result};
@@ -21,13 +22,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// One sequence, or group, in this many is learned from, and not tested on.
 const LEARNED: usize = 4;
-/// Beyond the posterior's own threshold, in nats: where a walk may begin.
-const BEGIN: [f64; 9] = [2.5, 4.0, 6.0, 8.0, 10.0, 14.0, 18.0, 24.0, f64::INFINITY];
-/// A walk begins where those that were learned from would be so few wrong with at most this probability, at the promised
-/// rate.
-const CLEARLY: f64 = 1e-3;
-/// Otherwise it begins at the strictest margin at which that probability is at most so many times the least.
-const NEARLY: f64 = 2.0;
+/// Thresholds by name are tested on this share of independent sequences: [`choose_independent`] learns them on the others.
+const SHARE_OF_NAMES: f64 = 2.0 / 3.0;
 
 /// Settings of a promise.
 #[derive(Clone, Debug, PartialEq)]
@@ -164,13 +160,13 @@ pub fn calibrate_margins(
         return Err(CalibrateProblem::MissingSequences { objects: missing }.into());
     }
     let parts = Parts::new(sequences, settings)?;
-    let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
+    let terms = terms(settings);
     let fitted = shape::fit(rows, &parts.learned, settings.rate, max_rows);
     let shaped = shaped(model, &fitted, max_rows)?;
-    let strictest = strictest(&compile::open(&shaped)?, rows, &parts.learned, settings.rate, max_rows);
+    let begin = begin(&compile::open(&shaped)?, rows, &parts, settings, max_rows);
+    let strictest = begin.strictest;
     #[cfg(feature = "train")]
-    let (shaped, parts, strictest, tested) =
-        super::background::test(&shaped, rows, parts, settings, strictest, max_rows)?;
+    let (shaped, parts, strictest, tested) = super::background::test(&shaped, rows, parts, settings, begin)?;
     let shaped_model = compile::open(&shaped)?;
     let until = Until { margin: strictest, max_touches: max_rows };
     let tested_on = follow(&shaped_model, rows, &parts.tested, until);
@@ -228,9 +224,8 @@ impl<'s> Parts<'s> {
         let mut all: Vec<&RowSequence> = sequences.iter().collect();
         let mut random = random::generator(settings.seed, Purpose::Calibration, "sequences", 0);
         all.shuffle(&mut random);
-        all.truncate(settings.sequences);
         let has_groups = all.iter().any(|sequence| sequence.group.is_some());
-        let order: Vec<usize> = if has_groups {
+        let mut order: Vec<usize> = if has_groups {
             let groups: BTreeSet<usize> = all.iter().filter_map(|sequence| sequence.group).collect();
             let mut groups: Vec<usize> = groups.into_iter().collect();
             groups.shuffle(&mut random);
@@ -238,6 +233,14 @@ impl<'s> Parts<'s> {
         } else {
             (0..all.len()).collect()
         };
+        // Whole groups, whatever their size: as many as have so many sequences on average.
+        order.truncate((order.len() as u128 * settings.sequences as u128 / all.len().max(1) as u128) as usize);
+        if has_groups {
+            let taken: BTreeSet<usize> = order.iter().copied().collect();
+            all.retain(|sequence| sequence.group.is_some_and(|group| taken.contains(&group)));
+        } else {
+            all.truncate(order.len());
+        }
         let units = order.len();
         let least = needed(settings.rate, settings.confidence) as usize;
         if units < least {
@@ -253,6 +256,12 @@ impl<'s> Parts<'s> {
             (all, tested)
         };
         Ok(Self { learned, tested, has_groups, units })
+    }
+
+    /// Groups, or sequences without groups, that are tested on.
+    fn units_tested(&self) -> usize {
+        let groups: BTreeSet<usize> = self.tested.iter().filter_map(|sequence| sequence.group).collect();
+        if self.has_groups { groups.len() } else { self.tested.len() }
     }
 
     /// A share of what is tested, and the parts without it: whole groups.
@@ -321,44 +330,24 @@ fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Result<Vec<u8>> 
     Ok(shaped)
 }
 
-/// The margin in nats at which the walk begins: the least at which those that were learned from are clearly wrong less often
-/// than promised; if there are too few of them to say so, the strictest at which
-/// they say nearly as much as anywhere.
-fn strictest(model: &Model<'_>, rows: &Rows<'_>, learned: &[&RowSequence], rate: f64, max_rows: u32) -> f64 {
-    let naive = ((1.0 - rate) / rate).ln();
+/// The threshold at which a walk begins.
+fn begin(model: &Model<'_>, rows: &Rows<'_>, parts: &Parts<'_>, settings: &Settings, max_rows: u32) -> Begin {
     let until = Until { margin: STRICTEST, max_touches: max_rows };
-    let followed = follow(model, rows, learned, until);
-    // Of groups, sequences of each of which resemble each other, as many as there are groups.
-    let groups: BTreeSet<usize> = learned.iter().filter_map(|sequence| sequence.group).collect();
-    let share = if groups.is_empty() { 1.0 } else { groups.len() as f64 / learned.len() as f64 };
-    let tally = |margin: f64| {
-        let odds = Odds::All(odds_of(margin));
-        let given = followed.iter().filter_map(|sequence| Some(sequence.object != sequence.given(&odds)?.name));
-        let (wrong, all) = given.fold((0_u64, 0_u64), |(wrong, all), own| (wrong + u64::from(own), all + 1));
-        Tally { wrong: (wrong as f64 * share).ceil() as u64, all: (all as f64 * share) as u64 }
-    };
-    let margins = BEGIN.map(|beyond| (naive + beyond).min(STRICTEST));
-    let found = margins.map(|margin| (margin, binomial_tail(tally(margin), rate)));
-    if followed.is_empty() {
-        return margins[0];
+    let followed = follow(model, rows, &parts.learned, until);
+    let mut share = 1.0;
+    #[cfg(feature = "train")]
+    if settings.strangers.is_some() {
+        share -= super::background::TESTED;
     }
-    let least = found.iter().map(|(_, chance)| *chance).fold(1.0, f64::min);
-    let clear = found.iter().find(|(_, chance)| *chance <= CLEARLY);
-    let nearly = found.iter().rfind(|(_, chance)| *chance <= NEARLY * least);
-    clear.or(nearly).map_or(margins[0], |(margin, _)| *margin)
+    if settings.per == Per::Name && !parts.has_groups {
+        share *= SHARE_OF_NAMES;
+    }
+    let tested = (share * parts.units_tested() as f64) as usize;
+    Begin::new(&followed, &parts.learned, tested, &terms(settings), STRICTEST)
 }
 
-/// The loosest margin, from strict to loose, before the first at which more names are wrong than the rate.
-#[cfg(feature = "train")]
-pub(super) fn kept_margin(followed: &[Sequence], strictest: f64, rate: f64) -> Option<f64> {
-    let margins = (0..).map(|step| strictest - 0.1 * f64::from(step)).take_while(|margin| *margin > 0.05);
-    let is_kept = |margin: &f64| {
-        let odds = Odds::All(odds_of(*margin));
-        let given = followed.iter().filter_map(|sequence| Some(sequence.object != sequence.given(&odds)?.name));
-        let (wrong, all) = given.fold((0_u32, 0_u32), |(wrong, all), own| (wrong + u32::from(own), all + 1));
-        f64::from(wrong) <= rate * f64::from(all)
-    };
-    margins.take_while(is_kept).last()
+fn terms(settings: &Settings) -> Terms {
+    Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per }
 }
 
 /// The first sequence of each group; all of those without one.
@@ -410,7 +399,6 @@ fn finished(
         (name.clone(), of)
     };
     let margin = |(object, name): (usize, &String)| (name.clone(), margin_of(chosen.odds.of(object)));
-    let groups: BTreeSet<Option<usize>> = parts.tested.iter().map(|sequence| sequence.group).collect();
     Ok(Calibrated {
         model: restate(model, &restated)?,
         promise,
@@ -418,7 +406,7 @@ fn finished(
         per: settings.per.name(),
         confidence: settings.confidence,
         sequences: chosen.sequences,
-        groups: parts.has_groups.then_some(groups.len()),
+        groups: parts.has_groups.then(|| parts.units_tested()),
         learned: parts.learned.len(),
         error: chosen.wrong as f64 / chosen.given.max(1) as f64,
         undecided: 1.0 - chosen.given as f64 / chosen.sequences.max(1) as f64,

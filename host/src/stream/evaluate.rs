@@ -3,7 +3,10 @@
 use super::{Rows, check};
 use crate::compile;
 use crate::error::{Error, Result};
+use crate::evaluate::Finding;
+use crate::evaluate::promise::{BY_CHANCE, at_least};
 use palpate_onboard::{Forgetting, Model, Recognizer, Stopping, Verdict};
+use palpate_shared::format::{Per, Promise};
 use palpate_trees::rows::{RowSequence, Sequences};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -85,8 +88,8 @@ pub struct PromiseOfSequences {
     /// The name or class with it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// True if it was found to be above the promised rate by more than chance explains: two standard errors.
-    pub broken: bool,
+    /// Result of a test of significance of that error rate: binomial, or for groups by their standard error.
+    pub finding: Finding,
 }
 
 /// A number of rows, and the error rate with it.
@@ -233,50 +236,64 @@ fn point(sequences: &[RowSequence], ends: &[End]) -> Point {
 }
 
 /// Holds a promise against the ends of sequences.
-fn check_promise(
-    promise: &palpate_shared::format::Promise,
-    sequences: &[RowSequence],
-    ends: &[End],
-    names: &[String],
-) -> PromiseOfSequences {
-    use palpate_shared::format::Per;
+fn check_promise(promise: &Promise, sequences: &[RowSequence], ends: &[End], names: &[String]) -> PromiseOfSequences {
     let case = |sequence: &RowSequence, end: &End| match promise.per {
         Per::Average => Some(0),
         Per::Object => Some(sequence.class),
         Per::Name => end.name,
     };
     let cases = if promise.per == Per::Average { 1 } else { names.len() };
-    let worst = (0..cases).filter_map(|own| {
-        // Of each group, or each sequence: names given and wrong ones.
-        let mut of: BTreeMap<usize, (f64, f64, f64)> = BTreeMap::new();
-        for (number, (sequence, end)) in sequences.iter().zip(ends).enumerate() {
-            if case(sequence, end) != Some(own) {
-                continue;
-            }
-            let unit = if promise.groups { sequence.group.unwrap_or(number) } else { number };
-            let sums = of.entry(unit).or_default();
-            sums.0 += 1.0;
-            sums.1 += f64::from(u8::from(end.name.is_some()));
-            sums.2 += f64::from(u8::from(end.name.is_some_and(|name| name != sequence.class)));
-        }
-        let count = of.len() as f64;
-        let (named, wrong) =
-            of.values().fold((0.0, 0.0), |(named, wrong), sums| (named + sums.1 / sums.0, wrong + sums.2 / sums.0));
-        if named == 0.0 {
-            return None;
-        }
-        let rate = wrong / named;
-        // Of a ratio of means: its residuals, at the promised rate.
-        let residual = |sums: &(f64, f64, f64)| (sums.2 - promise.rate * sums.1) / sums.0;
-        let mean = of.values().map(residual).sum::<f64>() / count;
-        let variance = of.values().map(|sums| (residual(sums) - mean).powi(2)).sum::<f64>() / count;
-        Some((rate, own, mean > 2.0 * (variance / count).sqrt()))
-    });
-    let worst: Vec<(f64, usize, bool)> = worst.collect();
-    let broken = worst.iter().any(|(_, _, broken)| *broken);
-    let (found, own, _) = worst.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default();
+    let mut units = vec![BTreeMap::<usize, Unit>::new(); cases];
+    for (number, (sequence, end)) in sequences.iter().zip(ends).enumerate() {
+        let Some(case) = case(sequence, end).and_then(|case| units.get_mut(case)) else { continue };
+        let unit = case.entry(sequence.group.filter(|_| promise.groups).unwrap_or(number)).or_default();
+        unit.all += 1.0;
+        unit.named += f64::from(u8::from(end.name.is_some()));
+        unit.wrong += f64::from(u8::from(end.name.is_some_and(|name| name != sequence.class)));
+    }
+    let found: Vec<(f64, f64)> = units.iter().map(|units| Unit::error(units, promise)).collect();
+    let is_above = |(error, _): &&(f64, f64)| *error > promise.rate;
+    let finding = match () {
+        () if found.iter().all(|(error, _)| error.is_nan()) => Finding::Untested,
+        () if found.iter().filter(is_above).any(|(_, chance)| *chance < BY_CHANCE / cases as f64) => Finding::Broken,
+        () if found.iter().any(|(error, _)| *error > promise.rate) => Finding::Unclear,
+        () => Finding::Kept,
+    };
+    let given = found.iter().enumerate().filter(|(_, (error, _))| !error.is_nan());
+    let worst = given.max_by(|(_, a), (_, b)| a.0.total_cmp(&b.0));
+    let (own, found) = worst.map_or((0, 0.0), |(own, (error, _))| (own, *error));
     let of = (promise.per != Per::Average).then(|| names.get(own).cloned()).flatten();
-    PromiseOfSequences { promised: promise.rate, per: promise.per.name(), groups: promise.groups, found, of, broken }
+    PromiseOfSequences { promised: promise.rate, per: promise.per.name(), groups: promise.groups, found, of, finding }
+}
+
+/// Names of a sequence, or of a group of them.
+#[derive(Clone, Copy, Debug, Default)]
+struct Unit {
+    wrong: f64,
+    named: f64,
+    all: f64,
+}
+
+impl Unit {
+    /// The error rate of units that weigh the same, and the probability of one as high if the promise is just kept; not a
+    /// number if there is no name.
+    fn error(units: &BTreeMap<usize, Self>, promise: &Promise) -> (f64, f64) {
+        let sum = |of: &dyn Fn(&Self) -> f64| units.values().map(|unit| of(unit) / unit.all).sum::<f64>();
+        let (wrong, named) = (sum(&|unit| unit.wrong), sum(&|unit| unit.named));
+        if named == 0.0 {
+            return (f64::NAN, 1.0);
+        }
+        if !promise.groups {
+            return (wrong / named, if wrong > 0.0 { at_least(wrong, named, promise.rate) } else { 1.0 });
+        }
+        // Of a ratio of means: its residuals, at the promised rate.
+        let count = units.len() as f64;
+        let residual = |unit: &Self| unit.wrong - promise.rate * unit.named;
+        let mean = sum(&residual) / count;
+        let variance = units.values().map(|unit| (residual(unit) / unit.all - mean).powi(2)).sum::<f64>() / count;
+        let errors = mean / (variance / count).sqrt().max(f64::MIN_POSITIVE);
+        (wrong / named, 0.5 * libm::erfc(errors * std::f64::consts::FRAC_1_SQRT_2))
+    }
 }
 
 /// A model and rows.

@@ -23,6 +23,7 @@
 
 #[cfg(feature = "train")]
 mod background;
+mod begin;
 mod calibrate;
 mod evaluate;
 mod follow;

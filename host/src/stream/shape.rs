@@ -3,7 +3,7 @@
 use super::Rows;
 use crate::calibrate::{Look, Odds, Sequence, odds_of};
 use palpate_onboard::Model;
-use palpate_shared::format::{RowEvidence, Weights};
+use palpate_shared::format::{RowEvidence, Shifts, Weights};
 use palpate_trees::rows::RowSequence;
 use rayon::prelude::*;
 
@@ -82,18 +82,16 @@ pub(super) struct Fitted {
 impl Table {
     /// The section that stores it, for margins of a unit in nats.
     pub(super) fn section(&self, unit: f64) -> Vec<u8> {
-        let most = self.values.last().copied().unwrap_or(0.0).max(unit);
-        // As far below 0 as above.
-        let middle = most / 2.0;
-        let limit = f64::from(i16::MAX);
-        let shifts = 0..=RowEvidence::MOST_VALUE_SHIFT;
-        let fits = |shift: &u8| (middle / unit / f64::from(*shift).exp2()).round() <= limit;
-        let shift = shifts.clone().find(fits).unwrap_or(RowEvidence::MOST_VALUE_SHIFT);
-        let stored =
-            |value: &f64| ((value - middle) / unit / f64::from(shift).exp2()).round().clamp(-limit, limit) as i16;
-        let values: Vec<i16> = self.values.iter().map(stored).collect();
+        let most = self.values.last().copied().unwrap_or(0.0).max(unit) / unit;
+        // The bits by which a value is coarser than a unit: as many as can be are those between two values.
+        let coarser = (0..Shifts::MOST_SCALE).find(|bits| (most / f64::from(*bits).exp2()).round() <= 255.0);
+        let coarser = coarser.unwrap_or(Shifts::MOST_SCALE);
+        let between = coarser.min(self.step_shift).min(Shifts::MOST_BETWEEN);
+        let shifts = Shifts { dropped: self.step_shift - between, between, scale: coarser - between };
+        let stored = |value: &f64| (value / unit / f64::from(coarser).exp2()).round().clamp(0.0, 255.0) as u8;
+        let values: Vec<u8> = self.values.iter().map(stored).collect();
         let mut section = Vec::new();
-        RowEvidence::write(self.start, [self.step_shift, shift], &values, &mut |part| section.extend_from_slice(part));
+        RowEvidence::write(self.start, shifts, &values, &mut |part| section.extend_from_slice(part));
         section
     }
 
@@ -124,7 +122,7 @@ impl Table {
         let quantile = |share: f64| all.get((all.len() as f64 * share) as usize).or(all.last()).copied();
         let (low, high) = (quantile(BEYOND)?, quantile(1.0 - BEYOND)?);
         let range = high.checked_sub(low).filter(|range| *range > 0)?.cast_unsigned();
-        let step_shift = (0..=RowEvidence::MOST_STEP_SHIFT).find(|shift| range >> shift < MOST_STEPS)?;
+        let step_shift = (0..=Shifts::MOST_STEP).find(|shift| range >> shift < MOST_STEPS)?;
         let steps = (range >> step_shift) as usize + 1;
         let mut table = Self { start: low, step_shift, values: vec![0.0; steps + 1] };
         let places: Vec<(usize, f64)> =
@@ -340,15 +338,13 @@ fn looks(rows: &Rows<'_>, sequences: &[&RowSequence], shape: &Shape, max_rows: u
     sequences.par_iter().map(of).collect()
 }
 
-/// The rows to a verdict at the loosest threshold before the first, from strict to loose, at which more of the names given
-/// are wrong than the rate; none if that is not below [`ROOM`], or the strictest has more.
+/// The rows to a verdict at the loosest threshold at which no more of the names given are wrong than the rate; none if there
+/// is none below [`ROOM`].
 fn rows_at(sequences: &[Sequence], rate: f64) -> Option<f64> {
     // With fewer than that, no error rate is seen.
     let rate = rate.max(2.0 / sequences.len().max(1) as f64);
-    let steps = (STRICTEST / STEP) as usize;
-    let mut found = None;
-    for step in 0..steps {
-        let margin = STRICTEST - STEP * step as f64;
+    let margins = (1..).map(|step| STEP * f64::from(step)).take_while(|margin| *margin < ROOM);
+    margins.into_iter().find_map(|margin| {
         let odds = Odds::All(odds_of(margin));
         let (mut wrong, mut given, mut rows) = (0_u64, 0_u64, 0_u64);
         for sequence in sequences {
@@ -357,14 +353,9 @@ fn rows_at(sequences: &[Sequence], rate: f64) -> Option<f64> {
             wrong += u64::from(look.is_some_and(|look| look.name != sequence.object));
             rows += u64::from(look.map_or(sequence.touches, |look| look.touches));
         }
-        if wrong as f64 > rate * given as f64 {
-            break;
-        }
-        if given > 0 && margin < ROOM {
-            found = Some(rows as f64 / sequences.len() as f64);
-        }
-    }
-    found
+        let is_kept = given > 0 && wrong as f64 <= rate * given as f64;
+        is_kept.then(|| rows as f64 / sequences.len() as f64)
+    })
 }
 
 /// Fits a table and weights to sequences, and keeps what saves rows: each is compared on the half of them that it was not

@@ -63,8 +63,6 @@ pub(crate) struct Unit {
     pub(crate) shift: u8,
     /// Factor applied to bits, in Q16: one over the temperature.
     pub(crate) sharpness: u32,
-    /// Factor applied to units, in Q16, at most 1: of evidence of so many touches.
-    pub(crate) weight: u32,
 }
 
 /// That of a temperature of 1.
@@ -73,26 +71,26 @@ pub(crate) const SHARPNESS: u32 = 1 << 16;
 const MOST_BITS: u64 = 1 << 42;
 
 impl Unit {
+    /// The same of evidence with a weight in Q16 that is at most 1, rounded down: in products of 32 bits.
+    pub(crate) const fn weighed(self, weight: u32) -> Self {
+        if !cfg!(feature = "row-evidence") || weight >= Weights::ONE {
+            return self;
+        }
+        // Below 2^32 each, and together.
+        let (high, low) = ((self.bits >> 16).wrapping_mul(weight), (self.bits & 0xffff).wrapping_mul(weight) >> 16);
+        Self { bits: high.wrapping_add(low), ..self }
+    }
+
     /// e^-(`ahead` units) in Q56.
     pub(super) fn weight(self, ahead: u64) -> u64 {
         // 2^32 units are at least 256 nats.
-        let Ok(ahead) = u32::try_from(ahead) else { return 0 };
-        let ahead = u64::from(weighed(ahead, self.weight));
+        let Ok(ahead) = u32::try_from(ahead).map(u64::from) else { return 0 };
         let bits = (ahead * u64::from(self.bits)) >> (self.shift & 63);
         if self.sharpness == SHARPNESS {
             return exp2_negative(bits);
         }
         exp2_negative((bits.min(MOST_BITS) * u64::from(self.sharpness)) >> 16)
     }
-}
-
-/// A number of units times a weight in Q16 that is at most 1, rounded down: in 32 bits, for chips whose products have no more.
-const fn weighed(units: u32, weight: u32) -> u32 {
-    if !cfg!(feature = "row-evidence") || weight == Weights::ONE {
-        return units;
-    }
-    // Below 2^32 each, and together.
-    (units >> 16).wrapping_mul(weight).wrapping_add((units & 0xffff).wrapping_mul(weight) >> 16)
 }
 
 /// The object with the most evidence; the first of several.
@@ -167,7 +165,7 @@ mod tests {
     /// A unit of a thousandth of a nat.
     fn unit() -> Unit {
         let bits = core::f64::consts::LOG2_E / 1000.0 * 4_294_967_296.0;
-        Unit { bits: (bits * 256.0).round() as u32, shift: 8, sharpness: SHARPNESS, weight: Weights::ONE }
+        Unit { bits: (bits * 256.0).round() as u32, shift: 8, sharpness: SHARPNESS }
     }
 
     #[test]
@@ -197,17 +195,17 @@ mod tests {
 
     #[test]
     fn weighed_units_are_the_product_rounded_down() {
-        for units in [0, 1, 65_535, 65_536, 65_537, 123_456_789, 1 << 31, u32::MAX] {
+        for bits in [0, 1, 65_535, 65_536, 65_537, 123_456_789, 1 << 31, u32::MAX] {
             for weight in [1, 2, 3_333, 32_768, 65_535, 65_536] {
-                let exact = (u64::from(units) * u64::from(weight)) >> 16;
-                assert_eq!(u64::from(weighed(units, weight)), exact, "{units} {weight}");
+                let exact = (u64::from(bits) * u64::from(weight)) >> 16;
+                assert_eq!(u64::from(Unit { bits, ..unit() }.weighed(weight).bits), exact, "{bits} {weight}");
             }
         }
     }
 
     #[test]
     fn posteriors_of_weighed_evidence_are_those_of_its_part() {
-        let unit = Unit { weight: 6_554, ..unit() };
+        let unit = unit().weighed(6_554);
         let posterior = posterior(&[46_000, 0], 0, unit).to_f64();
         let exact = 1.0 / (1.0 + (-46.0 * 6_554.0 / 65_536.0_f64).exp());
         assert!((posterior - exact).abs() < 2e-5, "{posterior} for {exact}");

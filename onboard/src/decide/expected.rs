@@ -80,12 +80,7 @@ mod tests {
             let bits = unit * core::f64::consts::LOG2_E * 4_294_967_296.0;
             let shift = (0..=63_u8).rev().find(|&shift| bits * f64::from(shift).exp2() < 4_294_967_295.0).unwrap();
             let of = |weight, most| {
-                let unit = Unit {
-                    bits: (bits * f64::from(shift).exp2()).round() as u32,
-                    shift,
-                    sharpness: SHARPNESS,
-                    weight: 1 << 16,
-                };
+                let unit = Unit { bits: (bits * f64::from(shift).exp2()).round() as u32, shift, sharpness: SHARPNESS };
                 prior(weight, most, unit)
             };
             for (weight, most) in [(1, 1), (1, 2), (3, 10), (999, 1_000), (1, u32::MAX), (u32::MAX, u32::MAX)] {

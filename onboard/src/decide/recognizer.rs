@@ -8,7 +8,6 @@ use crate::bytes::AlignedTo8;
 use crate::model::{Model, Refused};
 use core::fmt;
 use palpate_shared::Touch;
-use palpate_shared::format::Weights;
 
 /// Result of the touches so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -394,10 +393,10 @@ fn start(model: &Model<'_>, evidence: &mut [i64]) {
 
 pub(super) fn unit(model: &Model<'_>) -> Unit {
     let header = model.header();
-    Unit { bits: header.unit_bits(), shift: header.unit_shift(), sharpness: SHARPNESS, weight: Weights::ONE }
+    Unit { bits: header.unit_bits(), shift: header.unit_shift(), sharpness: SHARPNESS }
 }
 
 /// The unit of evidence of so many touches.
 fn unit_of(model: &Model<'_>, touches: u32) -> Unit {
-    Unit { weight: model.weight_of(touches), ..unit(model) }
+    unit(model).weighed(model.weight_of(touches))
 }

@@ -214,7 +214,7 @@ impl<'a> Model<'a> {
     /// Makes evidence of a row's margins, in units: what the row adds for each object. Without a
     /// [table](Model::row_evidence) margins stay as they are.
     ///
-    /// Cost: with a table less than 40 instructions for each object, and a few for each optional section. Cannot fail.
+    /// Cost: with a table some 30 instructions for each object, and a few for each optional section. Cannot fail.
     pub fn make_evidence(&self, margins: &mut [i32]) {
         if let Some(table) = self.row_evidence() {
             margins.iter_mut().take(self.object_count()).for_each(|margin| *margin = table.of(*margin));

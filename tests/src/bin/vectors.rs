@@ -268,8 +268,8 @@ fn rows(text: &mut String) {
         play_rows(text, &format!("rows of whole features, {}", layout.name()), &changed(&bytes, 13, &[0]), false);
     }
     let weights = [65_535_u16, 0, 20_000, 9_000].map(u16::to_le_bytes).concat();
-    let values: Vec<u8> = (0..33_i16).flat_map(|value| (900 * value - 14_400).to_le_bytes()).collect();
-    let table = [&(-(1_i32 << 20)).to_le_bytes()[..], &[16, 4, 32, 0], &values].concat();
+    let values: Vec<u8> = (0..33).map(|value| 7 * value).collect();
+    let table = [&(-(1_i32 << 17)).to_le_bytes()[..], &[3, 10, 2, 32], &values].concat();
     let sections = [section(4 | 1 << 15, &[&[4, 0][..], &weights].concat()), section(16 | 1 << 15, &table)].concat();
     let settings = Settings { leaf: Leaf::I16, layout: Some(Layout::Compact), ..Settings::default() };
     let bytes = compile(&imported(random::ensemble(SHAPE, 14), 5), &settings).expect("it fits").bytes;

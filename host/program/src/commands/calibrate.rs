@@ -43,7 +43,7 @@ pub(crate) struct Arguments {
     #[arg(value_name = "DIR")]
     directory: PathBuf,
     /// Recorded touches of the objects; thresholds, or --strangers, are tested on them
-    #[arg(long, value_name = "DIR", conflicts_with = "plan")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["plan", "label"])]
     recorded: Option<PathBuf>,
     /// Where to write; the calibrated model
     #[arg(short, long, value_name = "PATH")]
@@ -80,8 +80,8 @@ pub(crate) struct Arguments {
 }
 
 /// The options that a plan has no use for.
-const PROMISE: [&str; 8] =
-    ["error_rate", "per", "confidence", "sequences", "max_touches", "active", "strangers", "background"];
+const PROMISE: [&str; 9] =
+    ["error_rate", "per", "confidence", "sequences", "max_touches", "active", "strangers", "background", "label"];
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if let Some(rolls) = arguments.plan {

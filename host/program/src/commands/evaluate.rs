@@ -49,13 +49,13 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "HTML", requires = "sequence_column")]
     page: Option<PathBuf>,
     /// Touches of objects that the model does not know: how many are detected
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "label")]
     unknown: Option<PathBuf>,
     /// Give the accuracy after these touches [default: 5,10,20,30,60]
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
+    #[arg(long, value_delimiter = ',', value_name = "N,…", conflicts_with = "label")]
     at: Option<Vec<usize>>,
     /// Sequences of touches to draw; of each object, and as many groups
-    #[arg(long, value_name = "N", default_value = "1000", value_parser = sequences)]
+    #[arg(long, value_name = "N", default_value = "1000", value_parser = sequences, conflicts_with = "label")]
     sequences: usize,
     /// The share of wrong names to accept, such as 1%; stops there [default: the model's own thresholds]
     #[arg(long, value_name = "RATE", value_parser = error_rate)]
@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
     /// Show the confusion matrix after this many touches
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", conflicts_with = "label")]
     confusion: Option<usize>,
     /// Follow the model's plan of approaches
     #[arg(long)]
@@ -80,6 +80,13 @@ pub(crate) struct Arguments {
     real: RealArguments,
 }
 
+impl Arguments {
+    /// True if there is an option for sequences of touches or rows.
+    fn stops(&self) -> bool {
+        self.error_rate.is_some() || self.max_touches.is_some() || self.switch.is_some() || self.expected.is_given()
+    }
+}
+
 /// True if the pattern of touching fingers is evidence to the model.
 fn counts_patterns(file: &ModelFile) -> bool {
     let counted = match file {
@@ -92,11 +99,11 @@ fn counts_patterns(file: &ModelFile) -> bool {
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let file = ModelFile::load(&arguments.model)?;
     if let Some(label) = &arguments.sequences_of_rows.label {
-        if arguments.at.is_some() || arguments.confusion.is_some() {
-            return Err(Error::setting("label", label, "it without --at and --confusion"));
-        }
         return match arguments.sequences_of_rows.columns() {
             Some(columns) => sequences_of(&arguments, &file, columns, global),
+            None if arguments.stops() => {
+                Err(Error::setting("label", label, "it with --sequence-column, or without options of sequences"))
+            }
             None => rows(&arguments, &file, label, global),
         };
     }

@@ -106,6 +106,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let recognizer = Recognizer::<256>::new(&model, stopping).map_err(too_many)?;
     let weights = arguments.expected.weights(&compiled.names(), &palpate::evaluate::own_weights(&model))?;
     if arguments.features {
+        if arguments.expected.is_given() && !arguments.add_up {
+            return Err(Error::setting("features", "each row alone", "--only and --prior with --add-up only"));
+        }
         let rows = super::recognize_rows::Asked { adds_up: arguments.add_up, json: global.json, weights };
         return super::recognize_rows::run(recognizer, &arguments.file, &rows)
             .map_err(|error| error.in_file(&arguments.model));

@@ -7,7 +7,7 @@ use palpate::Result;
 use palpate::calibrate::{Per, of_what};
 use palpate::compile::{self, CompiledModel};
 use palpate::error::{Error, Place, RowsProblem};
-use palpate::evaluate::Confusion;
+use palpate::evaluate::{Confusion, Finding};
 use palpate::output;
 use palpate::rows::{SequenceColumns, Sequences, feature_names};
 use palpate::strangers;
@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct SequenceArguments {
     /// Column of the classes, or a regression's numbers
-    #[arg(long, value_name = "COL")]
+    #[arg(long, value_name = "COL", conflicts_with_all = ["active", "probe", "real"])]
     pub(crate) label: Option<String>,
     /// Column that says which rows are one sequence
     #[arg(long, value_name = "COL", requires = "label")]
@@ -237,7 +237,12 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
             "promised: at most {} % wrong; {} were{of}{groups}: {}",
             super::percent(promise.promised),
             percent(promise.found),
-            if promise.broken { "BROKEN, by more than chance explains" } else { "kept, as far as this tells" },
+            match promise.finding {
+                Finding::Broken => "BROKEN, by more than chance explains",
+                Finding::Unclear => "above it, but no more than chance explains",
+                Finding::Kept => "kept",
+                Finding::Untested => "no name was given",
+            },
         );
     }
     let fixed = |rows: Option<f64>, what: &str| match rows {
