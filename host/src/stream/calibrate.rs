@@ -164,6 +164,7 @@ pub fn calibrate_margins(
     let fitted = shape::fit(rows, &parts.learned, settings.rate, max_rows);
     let shaped = shaped(model, &fitted, max_rows)?;
     let begin = begin(&compile::open(&shaped)?, rows, &parts, settings, max_rows);
+    #[cfg(not(feature = "train"))]
     let strictest = begin.strictest;
     #[cfg(feature = "train")]
     let (shaped, parts, strictest, tested) = super::background::test(&shaped, rows, parts, settings, begin)?;
