@@ -227,7 +227,7 @@ mod tests {
         let text = "id,b,who,kind,a\n7,1,ann,cup,2\n7,3,ann,cup,\nx,5,bo,1,6\ny,7,ann,jug,8\n";
         let read = read(text, &COLUMNS).unwrap();
         assert_eq!((read.len(), read.features, read.by_position), (4, 2, false));
-        assert_eq!((read.values[..3].to_vec(), read.values[2].is_nan()), (vec![2.0, 1.0, read.values[2]], true));
+        assert_eq!((&read.values[..2], read.values[2].is_nan(), read.values[3]), (&[2.0, 1.0][..], true, 3.0));
         let of = |rows, class, group| RowSequence { rows, class, group: Some(group) };
         assert_eq!(read.sequences, [of(0..2, 0, 0), of(2..3, 1, 1), of(3..4, 1, 0)]);
         assert_eq!(read.groups, ["ann", "bo"]);
