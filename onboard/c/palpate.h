@@ -386,7 +386,7 @@ static inline int palpate_check_row_(palpate_model *model, const uint8_t *conten
     between = PALPATE_BYTE(content + 5);
     scale = PALPATE_BYTE(content + 6);
     last = PALPATE_BYTE(content + 7);
-    if (last == 0 || last > 128 || length - 9 < last || start > 1u << 30 || between > 15 || dropped + between > 26 ||
+    if (last == 0 || last > 128 || length - 9 < last || start > 0x40000000u || between > 15 || dropped + between > 26 ||
         between + scale > 22 || model->descriptor != 255) {
         return 0;
     }

@@ -21,20 +21,12 @@ use std::path::PathBuf;
 /// Set a model's thresholds so that it keeps a promised error rate, and uses it up.
 #[derive(clap::Args)]
 #[command(after_help = "\
-The promise holds for touches like those of DIR, which the model was not trained on, or with --recorded for touches like the recorded ones. A sequence without a name is neither right nor wrong. docs/reference/options.md has the method.
-
-With --plan the model gets a plan of approaches instead, and DIR holds approaches with pose.
-
-Of a model over rows, DIR is a file of sequences of rows: CSV or Parquet. Rows of a sequence may depend on each other; sequences, or with --group-column groups, must not.
+The promise holds for touches like those of DIR, which the model was not trained on, or with --recorded for touches like the recorded ones. A sequence without a name is neither right nor wrong. With --plan DIR holds approaches with pose. Of a model over rows DIR is a CSV or Parquet file: rows of a sequence may depend on each other; sequences, or with --group-column groups, must not. docs/reference/options.md has the method.
 
 Examples:
   palpate capture builtin -o fresh --approaches 100000 --seed 3
   palpate calibrate model.palpate fresh -o calibrated.palpate
-  palpate calibrate model.palpate fresh -o names.palpate --per name
-  palpate calibrate model.palpate fresh -o robot.palpate --recorded robot
-  palpate calibrate model.palpate fresh -o wary.palpate --strangers certain
   palpate calibrate model.palpate posed -o planned.palpate --plan 4
-  palpate calibrate planned.palpate fresh -o calibrated.palpate --active
   palpate calibrate a.palpate a.csv --label a --sequence-column id -o b.palpate")]
 pub(crate) struct Arguments {
     /// Compiled model
@@ -51,7 +43,7 @@ pub(crate) struct Arguments {
     /// The share of wrong names to accept, such as 1%; what is promised
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
     error_rate: f64,
-    /// Promise it on average, of each name, or of the names given to each object: average, name or object
+    /// What it is promised of: average, name or object
     #[arg(long, value_parser = per, default_value = "average", value_name = "OF")]
     per: Per,
     /// The probability that the promise is kept
@@ -63,7 +55,7 @@ pub(crate) struct Arguments {
     /// Give up after this many touches [default: the model's own limit]
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
-    /// Follow the model's plan of approaches; the promise holds for a robot that does
+    /// Follow the model's plan of approaches
     #[arg(long)]
     active: bool,
     /// Add a plan of approaches instead, with 1, 2 or 4 rolls per direction

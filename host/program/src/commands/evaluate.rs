@@ -29,12 +29,8 @@ Examples:
   palpate capture builtin -o unseen --approaches 6000 --seed 2
   palpate evaluate model.palpate unseen
   palpate evaluate ensemble.json unseen --at 10,30 --json
-  palpate evaluate model.palpate monday.mcap
   palpate evaluate model.palpate unseen --real timer=1ms,missed=2%
-  palpate evaluate model.palpate unseen --probe probe.toml
   palpate evaluate model.palpate unseen --prior fork=0.3,spoon=0.3
-  palpate evaluate model.palpate unseen --unknown others
-  palpate evaluate planned.palpate unseen --active
   palpate evaluate model.palpate rows.csv --label kind
   palpate evaluate sure.palpate rows.csv --label kind --sequence-column id")]
 pub(crate) struct Arguments {
@@ -45,8 +41,8 @@ pub(crate) struct Arguments {
     directory: PathBuf,
     #[command(flatten)]
     sequences_of_rows: SequenceArguments,
-    /// Write a page about sequences of rows
-    #[arg(long, value_name = "HTML", requires = "sequence_column")]
+    /// Write a page about the results; of sequences of rows
+    #[arg(long, value_name = "FILE", requires = "sequence_column")]
     page: Option<PathBuf>,
     /// Touches of objects that the model does not know: how many are detected
     #[arg(long, value_name = "DIR", conflicts_with = "label")]

@@ -15,7 +15,7 @@ pub(crate) struct StrangersArguments {
     /// Detect objects that the model does not know: off, likely or certain [default: off]
     #[arg(long, value_parser = held, value_name = "HOW")]
     strangers: Option<Wanted>,
-    /// Touches of many other shapes; they tell what strangers are like [default: of 200 shapes, captured as DIR was]
+    /// Touches of many other shapes; or rows [default: of 200 shapes, captured as DIR was]
     #[arg(long, value_name = "DIR", requires = "strangers")]
     background: Option<PathBuf>,
 }
