@@ -383,7 +383,7 @@ impl<'a> Plain<'a> {
         if behind > u32::MAX.into() {
             return 0;
         }
-        let bits = u64::from(self.unit_bits);
+        let bits = self.unit_bits;
         let bits = if self.weights.is_empty() { bits } else { (bits * self.factor()) >> 16 };
         let u = (u128::from(behind) * u128::from(bits)) >> self.unit_shift;
         exp2(if sharpness == 1 << 16 { u as u64 } else { ((u.min(1 << 42) * u128::from(sharpness)) >> 16) as u64 })

@@ -200,9 +200,15 @@ const C_ROWS: [(&str, &str); 5] = [
         "touches, one layout (complete), i8 leaves",
         "-DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0",
     ),
-    ("touches, all layouts and leaves", "-DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0"),
+    (
+        "touches, all layouts and leaves",
+        "-DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0",
+    ),
     ("… and a misfit test", "-DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0"),
-    ("everything: also posteriors, snapshots, names", "-DEVERYTHING -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0"),
+    (
+        "everything: also posteriors, snapshots, names",
+        "-DEVERYTHING -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0",
+    ),
 ];
 
 /// The columns of instructions: tools, flags, emulator.
