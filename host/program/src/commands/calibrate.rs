@@ -43,7 +43,7 @@ pub(crate) struct Arguments {
     /// The share of wrong names to accept, such as 1%; what is promised
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
     error_rate: f64,
-    /// What it is promised of: average, name or object
+    /// Cases that it is promised of: average, name or object
     #[arg(long, value_parser = per, default_value = "average", value_name = "OF")]
     per: Per,
     /// The probability that the promise is kept
