@@ -39,6 +39,8 @@ pub enum Tag {
     Sentinel,
     /// [`TrainedCapture`].
     Capture,
+    /// Bounds with which a class is known before all trees are walked: [`EarlyExit`](super::EarlyExit).
+    EarlyExit,
 }
 
 impl Tag {
@@ -60,6 +62,7 @@ impl Tag {
             Self::Prediction => 13,
             Self::Sentinel => 14,
             Self::Capture => 15,
+            Self::EarlyExit => 16,
         }
     }
 }

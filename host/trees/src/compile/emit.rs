@@ -87,6 +87,8 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
     let strangers = u8::from(model.strangers().is_some());
     let shared = u8::from(model.shared_leaves().is_some());
     let sentinel = u8::from(model.sentinel().is_some());
+    let has_exits = model.early_exits().next().is_some();
+    let early = if has_exits { "#ifndef PALPATE_EARLY\n#define PALPATE_EARLY 1\n#endif\n" } else { "" };
     let (objects, length) = (model.object_count(), model.bytes().len());
     format!(
         "/* {about}\n * Written by `palpate export`; not to be edited. */\n\
@@ -97,6 +99,7 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
          #ifndef PALPATE_STRANGERS\n#define PALPATE_STRANGERS {strangers}\n#endif\n\
          #ifndef PALPATE_SHARED\n#define PALPATE_SHARED {shared}\n#endif\n\
          #ifndef PALPATE_SENTINEL\n#define PALPATE_SENTINEL {sentinel}\n#endif\n\
+         {early}\
          #ifndef PALPATE_MAX_OBJECTS\n#define PALPATE_MAX_OBJECTS {objects}\n#endif\n\
          #if defined(__AVR__) && !defined(PALPATE_BYTE)\n#include <avr/pgmspace.h>\n#define PALPATE_BYTE(p) pgm_read_byte(p)\n#endif\n\
          #include \"palpate.h\"\n\n\

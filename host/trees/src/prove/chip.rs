@@ -222,6 +222,15 @@ impl<'m> Chip<'m> {
         sides(rows, rule, |side, rows| self.complete(tree, slots, 2 * slot + side, rows, see))
     }
 
+    /// Places where walks for a class alone may end: the trees before, and what those after it change at most.
+    pub(super) fn exits(&self) -> Vec<(usize, f64)> {
+        if self.is_f32() {
+            return Vec::new();
+        }
+        let trees = |groups: u16| self.groups.iter().take(groups.into()).map(|group| group.trees as usize).sum();
+        self.model.early_exits().map(|exit| (trees(exit.groups), f64::from(exit.bound) * self.unit)).collect()
+    }
+
     /// True if margins are a table's.
     pub(super) fn is_table(&self) -> bool {
         matches!(self.model.layout(), Layout::Grid | Layout::Patterns)

@@ -28,6 +28,8 @@ pub(super) struct Plain {
     pub(super) base: Vec<f64>,
     /// Trees, and the size of a step of their leaves.
     pub(super) trees: Vec<(Tree, f64)>,
+    /// Places where walks for a class alone may end: the trees before, and what those after it change at most.
+    pub(super) exits: Vec<(usize, f64)>,
     /// Cells of a table: which rows fall into each, and its margins.
     pub(super) cells: Option<Vec<(Vec<Values>, Vec<f64>)>>,
 }
@@ -139,6 +141,8 @@ struct Stated<'b> {
     link: (u8, bool),
     scales: Vec<f32>,
     feature_names: Vec<String>,
+    /// Groups before each place where a walk may end, and units.
+    exits: Vec<(usize, f64)>,
 }
 
 impl<'b> Stated<'b> {
@@ -150,6 +154,7 @@ impl<'b> Stated<'b> {
             link: (0, false),
             scales: vec![1.0; features],
             feature_names: Vec::new(),
+            exits: Vec::new(),
         };
         while !sections.0.is_empty() {
             let tag = sections.number(2)? & 0x7fff;
@@ -175,6 +180,13 @@ impl<'b> Stated<'b> {
                     stated.scale = f64::from(content.float()?);
                 }
                 14 => stated.sentinel = Some([content.signed(4)?, content.signed(4)?]),
+                16 => {
+                    while content.0.len() >= 8 {
+                        let groups = content.number(2)?;
+                        content.take(2)?;
+                        stated.exits.push((groups, content.number(4)? as f64));
+                    }
+                }
                 _ => {}
             }
         }
@@ -185,7 +197,7 @@ impl<'b> Stated<'b> {
 /// Reads a model.
 ///
 /// # Errors
-/// [`ProofProblem::Format`] if a section ends too early, or points out of the model; [`ProofProblem::Code`].
+/// [`ProofProblem::Format`] if a section ends too early, or points out of the model.
 pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let mut header = Bytes(bytes);
     header.take(4)?;
@@ -208,15 +220,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     header.take(8)?;
     let (cuts_length, splits_length, leaves_length) = (header.number(4)?, header.number(4)?, header.number(4)?);
     let sections_length = if version == 2 { header.number(4)? } else { header.take(4).map(|_| 0)? };
-    if layout == 6 {
-        return Err(ProofProblem::Code);
-    }
     let mut rest = header;
     let mut text = Bytes(rest.take(text_length)?);
     text.text()?;
     // A name is empty where the text ends too early.
     let names = (0..objects).map(|_| text.text().unwrap_or_default()).collect();
-    let Stated { shared, sentinel, scale, link, scales, feature_names } =
+    let Stated { shared, sentinel, scale, link, scales, feature_names, mut exits } =
         Stated::read(Bytes(rest.take(sections_length)?), features)?;
     let is_f32 = kind == 2;
     let leaves_of = Leaves { kind, unit: if is_f32 { scale } else { unit * scale }, shared };
@@ -231,6 +240,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let mut axis_bytes = Bytes(rest.take(4 * axis_count)?);
     let cuts_bytes = rest.take(cuts_length)?;
     let group_bytes = Bytes(rest.take(8 * group_count)?);
+    for (end, bound) in &mut exits {
+        // The number of trees is at the end of a group's record.
+        let groups = group_bytes.0.chunks(8).take(*end);
+        *end = groups.map(|group| Bytes(&group[4..]).number(4)).sum::<Result<usize, _>>()?;
+        *bound *= unit * scale;
+    }
     let splits = Bytes(rest.take(splits_length)?);
     let mut leaves = Bytes(rest.take(leaves_length)?);
     if rest.0.len() != 4 {
@@ -277,6 +292,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
         stated: error * scale,
         base: if cells.is_some() { vec![0.0; objects] } else { base },
         trees,
+        // Sums of f32 are not compared before the end.
+        exits: if is_f32 { Vec::new() } else { exits },
         cells,
     })
 }
