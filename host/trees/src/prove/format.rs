@@ -108,6 +108,23 @@ impl Leaves<'_> {
 }
 
 impl Plain {
+    /// The values without those at their ends that stand for a missing one, unless that is all of them.
+    pub(super) fn known(&self, values: Values) -> Values {
+        let Some([low, high]) = self.sentinel.filter(|_| !self.is_sentinel(&values)) else { return values };
+        let is_within = |key: i64| (low..=high).contains(&key);
+        Values {
+            low: if is_within(values.low) { high + 1 } else { values.low },
+            high: if is_within(values.high) { low - 1 } else { values.high },
+            ..values
+        }
+    }
+
+    /// True if all of these values stand for a missing one, so that no tree gets them.
+    pub(super) fn is_sentinel(&self, values: &Values) -> bool {
+        let within = |[low, high]: [i64; 2]| low <= values.low && values.low <= values.high && values.high <= high;
+        !values.missing && self.sentinel.is_some_and(within)
+    }
+
     /// Size of a unit that leaves were rounded to; 0 for f32 leaves.
     pub(super) fn rounded_to(&self) -> f64 {
         if self.most > 0.0 { self.unit } else { 0.0 }

@@ -140,9 +140,11 @@ pub(super) fn of_code(subject: Subject<'_>, order: &[Source], from_ensemble: boo
             let spans = pair.spans(rows);
             trees[pair.number].0.leaves(rows, &mut |leaf, rows| visit(leaf, &spans, rows))
         }),
-        _ => trees[pair.number]
-            .0
-            .leaves(rows, &mut |leaf, rows| pair.each_part(rows, &mut |rows| visit(leaf, &pair.spans(rows), rows))),
+        _ => trees[pair.number].0.leaves(rows, &mut |leaf, rows| {
+            // Code has its thresholds at the ends of what stands for a missing value, where the ensemble has them within.
+            let mut known: Vec<Values> = rows.iter().map(|values| subject.plain.known(*values)).collect();
+            pair.each_part(&mut known, &mut |rows| visit(leaf, &pair.spans(rows), rows))
+        }),
     })
 }
 
@@ -176,6 +178,9 @@ fn compare_all(
         let pair = Pair { number, object, step, stands_for, trees, values };
         let mut compared = Compared::new(values);
         walk(&pair, &mut plain.keys.all(plain.features), &mut |leaf, spans, rows| {
+            if rows.iter().any(|values| plain.is_sentinel(values)) {
+                return Ok(());
+            }
             found.boxes += 1;
             pair.compare(leaf, spans, rows, subject, &mut compared)
         })?;

@@ -1,15 +1,16 @@
 //! Assembly of random trees of every kind, and of other libraries' models, is proved; changed lines are refused.
 
-use super::{Stated, read};
+use super::{Code, Stated, read};
 use crate::compile::code::Chip;
 use crate::compile::code::tests::{Case, Numbers, cases};
 use crate::ensemble::Ensemble;
+use crate::prove::boxes::{Rows, Tree, Values};
 use crate::prove::{check_code, format, prove_code};
 
 const FILE: &[u8] = b"an ensemble";
 
-/// What is read, in words.
-fn meaning(bytes: &[u8], text: &str) -> Option<String> {
+/// What is read, and all rows.
+fn meaning(bytes: &[u8], text: &str) -> Option<(Code, Vec<Values>)> {
     let plain = format::read(bytes).unwrap();
     let stated = Stated {
         objects: plain.names.len(),
@@ -18,7 +19,19 @@ fn meaning(bytes: &[u8], text: &str) -> Option<String> {
         keys: &plain.keys,
         sentinel: plain.sentinel,
     };
-    read(text, &stated).ok().map(|code| format!("{:?} {:?} {:?}", code.base, code.trees, code.exits))
+    read(text, &stated).ok().map(|code| (code, plain.keys.all(plain.features)))
+}
+
+/// True if two files add the same for every row.
+fn is_same(one: &Code, other: &Code, rows: &mut Vec<Values>) -> bool {
+    let trees = one.trees.iter().zip(&other.trees);
+    let same = |(one, other): (&Tree, &Tree)| {
+        let equal = |leaf: &[f64], rows: &mut Rows| {
+            other.leaves(rows, &mut |own, _| if own == leaf { Ok(()) } else { Err(()) })
+        };
+        one.object == other.object && one.leaves(rows, &mut |leaf, rows| equal(leaf, rows)).is_ok()
+    };
+    one.base == other.base && one.trees.len() == other.trees.len() && trees.map(same).all(|same| same)
 }
 
 /// Each kind of code, with its case.
@@ -30,7 +43,7 @@ fn all() -> impl Iterator<Item = (Case, Chip, bool)> {
 
 #[test]
 fn assembly_is_proved_and_its_certificate_holds() {
-    let (mut proved, mut with_exits) = (0, 0);
+    let (mut proved, mut with_exits, mut failed) = (0, 0, Vec::new());
     for (case, chip, early_exit) in all() {
         if early_exit && !case.has_classes() {
             continue;
@@ -42,7 +55,13 @@ fn assembly_is_proved_and_its_certificate_holds() {
             assert!(error.contains("of the assembly"), "{}: {error}", case.name);
             continue;
         }
-        let (proof, certificate) = found.unwrap_or_else(|error| panic!("{} {chip:?} {early_exit}: {error}", case.name));
+        let (proof, certificate) = match found {
+            Ok(found) => found,
+            Err(error) => {
+                failed.push(format!("{} {chip:?} {early_exit}: {error}", case.name));
+                continue;
+            }
+        };
         assert!(proof.trees == certificate.trees.len());
         check_code(&certificate, &bytes, &text, &case.ensemble, FILE)
             .unwrap_or_else(|error| panic!("{} {chip:?} {early_exit}: {error}", case.name));
@@ -50,6 +69,7 @@ fn assembly_is_proved_and_its_certificate_holds() {
         with_exits += usize::from(text.contains("m_early"));
     }
     println!("{proved} files proved, {with_exits} with early exit");
+    assert!(failed.is_empty(), "{failed:#?}");
     assert!(proved > 150 && with_exits > 50, "{proved} {with_exits}");
 }
 
@@ -107,22 +127,28 @@ fn a_changed_number_condition_register_or_label_is_refused_unless_the_trees_stay
         if text.len() > 60_000 {
             continue;
         }
-        let own = meaning(&bytes, &text).unwrap();
+        let (own, mut rows) = meaning(&bytes, &text).unwrap();
         for _ in 0..60 {
             let Some(changed) = changed(&text, &mut random) else { continue };
             match meaning(&bytes, &changed) {
                 None => refused += 1,
-                Some(other) if other == own => same += 1,
+                Some((other, _)) if is_same(&own, &other, &mut rows) => {
+                    // Other bounds may hold as well.
+                    let is_other = own.exits != other.exits;
+                    let proved = !is_other || is_proved(&bytes, &changed, &case.ensemble);
+                    if proved { same += 1 } else { refused += 1 }
+                }
                 Some(_) => {
                     let proved = is_proved(&bytes, &changed, &case.ensemble);
-                    assert!(!proved, "{} {chip:?}: a changed line is proved", case.name);
+                    let lines = text.lines().zip(changed.lines()).find(|(a, b)| a != b);
+                    assert!(!proved, "{} {chip:?}: a changed line is proved: {lines:?}", case.name);
                     refused += 1;
                 }
             }
         }
     }
     println!("{refused} changed files are refused, {same} mean the same");
-    assert!(refused > 500 && 20 * same < refused, "{refused} {same}");
+    assert!(refused > 500 && 8 * same < refused, "{refused} {same}");
 }
 
 fn is_proved(bytes: &[u8], text: &str, ensemble: &Ensemble) -> bool {
