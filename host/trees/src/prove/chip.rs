@@ -2,6 +2,7 @@
 
 use super::ProofProblem;
 use super::boxes::{Rows, Rule, See, sides};
+use super::format::Exit;
 use palpate_onboard::Model;
 use palpate_shared::format::{Axis, CHECKSUM_LENGTH, Columns, Group, HEADER_LENGTH, Layout, LeafType, SharedLeaves};
 
@@ -222,13 +223,18 @@ impl<'m> Chip<'m> {
         sides(rows, rule, |side, rows| self.complete(tree, slots, 2 * slot + side, rows, see))
     }
 
-    /// Places where walks for a class alone may end: the trees before, and what those after it change at most.
-    pub(super) fn exits(&self) -> Vec<(usize, f64)> {
+    /// Places where walks for a class alone may end.
+    pub(super) fn exits(&self) -> Vec<Exit> {
         if self.is_f32() {
             return Vec::new();
         }
         let trees = |groups: u16| self.groups.iter().take(groups.into()).map(|group| group.trees as usize).sum();
-        self.model.early_exits().map(|exit| (trees(exit.groups), f64::from(exit.bound) * self.unit)).collect()
+        let exit = |exit: palpate_shared::format::EarlyExit| Exit {
+            trees: trees(exit.groups),
+            bound: f64::from(exit.bound) * self.unit,
+            later: Vec::new(),
+        };
+        self.model.early_exits().map(exit).collect()
     }
 
     /// True if margins are a table's.

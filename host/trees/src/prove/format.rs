@@ -28,10 +28,21 @@ pub(super) struct Plain {
     pub(super) base: Vec<f64>,
     /// Trees, and the size of a step of their leaves.
     pub(super) trees: Vec<(Tree, f64)>,
-    /// Places where walks for a class alone may end: the trees before, and what those after it change at most.
-    pub(super) exits: Vec<(usize, f64)>,
+    /// Places where walks for a class alone may end.
+    pub(super) exits: Vec<Exit>,
     /// Cells of a table: which rows fall into each, and its margins.
     pub(super) cells: Option<Vec<(Vec<Values>, Vec<f64>)>>,
+}
+
+/// A place where a walk for a class alone may end.
+#[derive(Clone, Debug)]
+pub(super) struct Exit {
+    /// The trees before it.
+    pub(super) trees: usize,
+    /// The most that those after it change the difference between two margins.
+    pub(super) bound: f64,
+    /// For each output, what is added after it beside trees; empty where nothing is.
+    pub(super) later: Vec<f64>,
 }
 
 struct Axis {
@@ -310,7 +321,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
         base: if cells.is_some() { vec![0.0; objects] } else { base },
         trees,
         // Sums of f32 are not compared before the end.
-        exits: if is_f32 { Vec::new() } else { exits },
+        exits: match is_f32 {
+            true => Vec::new(),
+            false => exits.into_iter().map(|(trees, bound)| Exit { trees, bound, later: Vec::new() }).collect(),
+        },
         cells,
     })
 }

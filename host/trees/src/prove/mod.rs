@@ -171,7 +171,13 @@ fn with_code(bytes: &[u8], code: &str) -> Result<(Plain, assembly::Code), ProofP
     let mut read = assembly::read(code, &stated)?;
     let unit = plain.unit;
     plain.base = read.base.iter().map(|&base| base as f64 * unit).collect();
-    plain.exits = read.exits.iter().map(|&(trees, bound)| (trees, f64::from(bound) * unit)).collect();
+    let exit = |(trees, bound, base): &(usize, u32, Vec<i64>)| format::Exit {
+        trees: *trees,
+        bound: f64::from(*bound) * unit,
+        // What trees after it have in common is added with them.
+        later: read.base.iter().zip(base).map(|(all, so_far)| (all - so_far) as f64 * unit).collect(),
+    };
+    plain.exits = read.exits.iter().map(exit).collect();
     for tree in &mut read.trees {
         for step in &mut tree.nodes {
             if let boxes::Step::Leaf(values) = step {

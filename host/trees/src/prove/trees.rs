@@ -3,6 +3,7 @@
 use super::boxes::{Rows, Step, Tree, Values, between, cuts_of};
 use super::certificate::CertifiedTree;
 use super::chip::Chip;
+use super::format::Exit;
 use super::span::{Span, spans};
 use super::{Found, ProofProblem, Subject, output_of};
 use crate::compile::Source;
@@ -156,7 +157,7 @@ fn compare_all(
     subject: Subject<'_>,
     heads: &[(Option<usize>, f64)],
     order: &[Source],
-    exits: &[(usize, f64)],
+    exits: &[Exit],
     walk: &mut Walk<'_>,
 ) -> Result<Found, ProofProblem> {
     let Subject { plain, sources, .. } = subject;
@@ -192,7 +193,7 @@ fn compare_all(
     totals.alone(&alone)?;
     found.outputs = totals.finish()?;
     in_order(&found, subject)?;
-    exits.iter().try_for_each(|&(trees, bound)| known_after(trees, bound, &changes, plain.names.len()))?;
+    exits.iter().try_for_each(|exit| known_after(exit, &changes, plain.names.len()))?;
     Ok(found)
 }
 
@@ -261,8 +262,10 @@ enum Change {
 }
 
 /// Returns an error if trees after the first ones can change the difference between two margins by more than a bound.
-fn known_after(trees: usize, bound: f64, changes: &[Change], outputs: usize) -> Result<(), ProofProblem> {
-    let (mut each, mut ranges) = (0.0, vec![[0.0_f64; 2]; outputs]);
+fn known_after(exit: &Exit, changes: &[Change], outputs: usize) -> Result<(), ProofProblem> {
+    let (trees, bound) = (exit.trees, exit.bound);
+    let later = exit.later.iter().copied().chain(std::iter::repeat(0.0));
+    let (mut each, mut ranges) = (0.0, later.take(outputs).map(|later| [later; 2]).collect::<Vec<_>>());
     for change in changes.iter().skip(trees) {
         match change {
             Change::Each(most) => each += most,
@@ -278,7 +281,7 @@ fn known_after(trees: usize, bound: f64, changes: &[Change], outputs: usize) -> 
         found = others.map(|(_, [least, _])| most - least).fold(found, f64::max);
     }
     found += each;
-    if found <= bound * (1.0 + 1e-9) { Ok(()) } else { Err(ProofProblem::Exit { trees, stated: bound, found }) }
+    if found <= bound * (1.0 + 1e-10) { Ok(()) } else { Err(ProofProblem::Exit { trees, stated: bound, found }) }
 }
 
 /// The sums of trees for each output.

@@ -23,8 +23,8 @@ pub(super) struct Code {
     pub(super) base: Vec<i64>,
     /// Trees, in the order of the file, with leaves in units.
     pub(super) trees: Vec<Tree>,
-    /// Places where the walk may end: the trees before, and the bound.
-    pub(super) exits: Vec<(usize, u32)>,
+    /// Places where the walk may end: the trees before, the bound, and the margins' base so far.
+    pub(super) exits: Vec<(usize, u32, Vec<i64>)>,
     /// True if instructions of a Cortex-M4F are in it.
     pub(super) is_m4f: bool,
     /// The most instructions that a row takes, from its features to its margins.
@@ -90,7 +90,7 @@ struct Reader<'r> {
     trees: Vec<Tree>,
     /// Trees of the object whose margin comes next.
     pending: Vec<Vec<Step>>,
-    exits: Vec<(usize, u32)>,
+    exits: Vec<(usize, u32, Vec<i64>)>,
     /// Where walks that end early go on.
     ends: Vec<usize>,
     base: Vec<Option<i64>>,
@@ -136,7 +136,9 @@ impl Reader<'_> {
                     if !self.pending.is_empty() {
                         return Err(problem(line, "the walk may end in the middle of an object's trees"));
                     }
-                    self.exits.push((self.trees.len(), bound.cast_unsigned()));
+                    let base: Option<Vec<i64>> = self.base.iter().copied().collect();
+                    let base = base.ok_or_else(|| problem(line, "margins that are compared before they are stored"))?;
+                    self.exits.push((self.trees.len(), bound.cast_unsigned(), base));
                     // Of a routine that is left at once: the function for margins walks all trees.
                     self.instructions += 7;
                     self.ends.push(self.end_of(to).ok_or_else(|| problem(line, "a walk that does not end"))?);
