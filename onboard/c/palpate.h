@@ -24,6 +24,7 @@
  *   PALPATE_SHARED       0: a model whose equal leaves stand once, in a table, is refused
  *   PALPATE_SENTINEL     0: a model over rows in which a number stands for a missing value is refused
  *   PALPATE_ROW_EVIDENCE 0: a model that states what a row adds to the evidence, or how much rows count together, is refused
+ *   PALPATE_EARLY        1: palpate_class_of is there, which gives a class without walking all trees
  *   PALPATE_STRANGERS    0: a model with a test for objects that it does not know, or with a background, is refused
  *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256: 32 by default; each takes state and stack
  *   PALPATE_BYTE(p)      how the byte of a model at `p` is read: *(p) by default, pgm_read_byte(p) for an AVR's flash
@@ -61,6 +62,8 @@
 #endif
 #ifndef PALPATE_ROW_EVIDENCE
 #define PALPATE_ROW_EVIDENCE 1
+#ifndef PALPATE_EARLY
+#define PALPATE_EARLY 0
 #endif
 #ifndef PALPATE_STRANGERS
 #define PALPATE_STRANGERS 1
@@ -174,6 +177,10 @@ typedef struct {
     const uint8_t *row_; /* what a row's margins add to the evidence, or NULL: the margins */
     int32_t row_start_;  /* the margin of that table's first value */
     uint32_t row_most_;  /* beyond it, up to the last one */
+#if PALPATE_EARLY
+    const uint8_t *exits_; /* places in the walk where a class may be known, 8 bytes each, up to `exits_end_` */
+    const uint8_t *exits_end_;
+#endif
     uint32_t wrong;          /* the place of what is wrong, in bytes from the start */
     uint32_t largest_spread; /* of touches that count, in microseconds */
     uint16_t objects;        /* that there are margins for, 1 to 256 */
@@ -475,6 +482,11 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 if (!palpate_check_row_(model, content, length)) {
                     return PALPATE_FIELD;
                 }
+#if PALPATE_EARLY
+            } else if (tag == 17) {
+                model->exits_ = content;
+                model->exits_end_ = content + (length & ~PALPATE_AS_(uint32_t, 7));
+#endif
             } else if (tag != last) {
                 return PALPATE_NOT_UNDERSTOOD;
             }
@@ -774,6 +786,10 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
         model->weights_ = NULL;
         model->row_ = NULL;
     }
+#if PALPATE_EARLY
+    model->exits_ = NULL;
+    model->exits_end_ = NULL;
+#endif
     model->known = model->objects;
     model->patterns = 0x20;
     model->largest_spread = UINT32_MAX;
@@ -1127,8 +1143,35 @@ PALPATE_APART_ void palpate_call_(const palpate_model *model, const int32_t *fea
 }
 #endif
 
-/* The sums of a row of features, in units or as the bits of f32 values. */
-static inline void palpate_sum_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums)
+/* No object. */
+#define PALPATE_NONE_ PALPATE_AS_(uint_fast16_t, 0xffff)
+
+#if PALPATE_EARLY
+/* The object whose sum, shifted and with its base, is larger than each other one by more than what the place allows; else PALPATE_NONE_. */
+static inline uint_fast16_t palpate_leader_of_(const palpate_model *model, const uint32_t *sums, uint_fast8_t shift, const uint8_t *place)
+{
+    const uint8_t *base = model->part_[PALPATE_MARGINS_];
+    int32_t most = INT32_MIN, second = INT32_MIN;
+    uint_fast16_t best = PALPATE_NONE_, i;
+    for (i = 0; i < model->known; i++) {
+        const int32_t sum = PALPATE_AS_(int32_t, (sums[i] << shift) + palpate_u32_(base + 4 * PALPATE_AS_(size_t, i)));
+        if (sum > most) {
+            second = most;
+            most = sum;
+            best = i;
+        } else if (sum > second) {
+            second = sum;
+        }
+    }
+    /* Sums are within 2^30. */
+    return PALPATE_AS_(uint32_t, most) - PALPATE_AS_(uint32_t, second) > palpate_u32_(place + 4) ? best : PALPATE_NONE_;
+}
+#endif
+
+/* The sums of a row of features, in units or as the bits of f32 values. If it may end early, and does, the object that leads,
+ * and what is summed up so far; else PALPATE_NONE_. */
+static inline uint_fast16_t palpate_sum_until_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums,
+                                              int early)
 {
     const uint8_t *group = model->part_[PALPATE_GROUPS_], *splits = model->part_[PALPATE_SPLITS_];
     const uint8_t *leaves = model->part_[PALPATE_LEAVES_], *cuts = model->cuts_, *axis = model->part_[PALPATE_AXES_];
@@ -1139,10 +1182,16 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     uint8_t *ranks = PALPATE_AT_(uint8_t *, words);
     uint_fast16_t i;
     uint_fast8_t last;
+#if PALPATE_EARLY
+    const uint8_t *place = early && !PALPATE_IS_F32_(model) ? model->exits_ : model->exits_end_;
+    uint16_t walked = 0;
+#else
+    (void)early;
+#endif
 #if PALPATE_LAYOUTS & PALPATE_CODE
     if (PALPATE_IS_CODE_(model)) {
         palpate_call_(model, features, count, PALPATE_AT_(int32_t *, sums));
-        return;
+        return PALPATE_NONE_;
     }
 #endif
     for (i = 0; i < model->objects; i++) {
@@ -1206,7 +1255,7 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
         for (i = 0; PALPATE_IS_I8_(model) && i < model->objects; i++) {
             sums[i] -= 128;
         }
-        return;
+        return PALPATE_NONE_;
     }
     last = group != splits ? PALPATE_BYTE(group + 1) : 0;
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
@@ -1250,6 +1299,16 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
                 leaves += PALPATE_AS_(size_t, all + 1) * stored;
             }
         }
+#if PALPATE_EARLY
+        walked++;
+        if (place != model->exits_end_ && walked == palpate_u16_(place)) {
+            const uint_fast16_t leader = palpate_leader_of_(model, sums, last, place);
+            if (leader != PALPATE_NONE_) {
+                return leader;
+            }
+            place += 8;
+        }
+#endif
     }
     if (!PALPATE_IS_F32_(model)) {
         palpate_shift_(model, sums, last);
@@ -1257,6 +1316,12 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
             sums[i] += palpate_u32_(base + 4 * PALPATE_AS_(size_t, i));
         }
     }
+    return PALPATE_NONE_;
+}
+
+static inline void palpate_sum_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums)
+{
+    (void)palpate_sum_until_(model, features, count, sums, 0);
 }
 
 /* An f32 value, given by its bits, in units of 2^-16, rounded half away from zero, within 2^30. */
@@ -1767,6 +1832,33 @@ static inline const uint8_t *palpate_prediction_(const palpate_model *model)
     }
     return NULL;
 }
+
+#if PALPATE_EARLY
+/* The class with the largest of the sums. */
+static inline uint16_t palpate_best_of_(const palpate_model *model, const int32_t *sums)
+{
+    const uint8_t *prediction = palpate_prediction_(model);
+    const int last_of_ties = prediction != NULL && PALPATE_BYTE(prediction + 1) != 0;
+    int32_t most = INT32_MIN;
+    uint_fast16_t best = 0, i;
+    for (i = 0; i < model->known; i++) {
+        const int32_t sum = PALPATE_IS_F32_(model) ? palpate_key(PALPATE_AS_(uint32_t, sums[i])) : sums[i];
+        if (sum > most || (last_of_ties && sum == most)) {
+            best = i;
+            most = sum;
+        }
+    }
+    return PALPATE_AS_(uint16_t, best);
+}
+
+/* The class that palpate_predict_class gives, ties and all, from no more trees than it takes, if `palpate export --early-exit`
+ * wrote the model. `room` is for `model->objects` numbers, which are no margins afterwards. */
+PALPATE_API uint16_t palpate_class_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *room)
+{
+    const uint_fast16_t leader = palpate_sum_until_(model, features, count, PALPATE_AT_(uint32_t *, room), 1);
+    return leader != PALPATE_NONE_ ? PALPATE_AS_(uint16_t, leader) : palpate_best_of_(model, room);
+}
+#endif
 
 /* The class of a row of `count` features (see palpate_margins_of): that with the largest margin, and of several the first,
  * or the last where the model says so. With f32 leaves their sums are compared as they are. `margins` has room for

@@ -55,6 +55,12 @@ pub struct Plain<'a> {
     /// Weights by the number of touches, and what a row's margins become, if the model has them.
     weights: Vec<u64>,
     row: Option<&'a [u8]>,
+    /// Places where a class may be known: the groups before, and the lead.
+    exits: Vec<(usize, i64)>,
+    /// True if the last of several largest margins names the class.
+    last_of_ties: bool,
+    /// True if the last object is a background.
+    background: bool,
     /// For each object.
     pub evidence: Vec<i64>,
     /// Number of touches counted.
@@ -118,6 +124,7 @@ impl<'a> Plain<'a> {
         });
         let (mut odds_by_object, mut sharpness, mut shared, mut sentinel) = (Vec::new(), 1 << 16, None, None);
         let (mut weights, mut row) = (Vec::new(), None);
+        let (mut exits, mut last_of_ties, mut background) = (Vec::new(), false, false);
         // What a model without the section touches was trained on.
         let (mut patterns, mut needs_pose, mut largest) = (0b10_0000, matches!(descriptor, 2 | 3 | 5 | 6), u32::MAX);
         while !optional.is_empty() {
@@ -130,6 +137,12 @@ impl<'a> Plain<'a> {
                 11 if (1 << 12..=1 << 20).contains(&number(&content[..4])) => sharpness = number(&content[..4]),
                 12 => shared = Some((content[0].into(), &content[4..])),
                 16 => row = Some(content),
+                6 => background = content[0] == 1,
+                13 => last_of_ties = content[1] == 1,
+                17 => {
+                    let exit = |exit: &[u8]| (number(&exit[..2]) as usize, number(&exit[4..]) as i64);
+                    exits = content.chunks_exact(8).map(exit).collect();
+                }
                 14 => sentinel = Some((signed(&content[..4]), signed(&content[4..8]))),
                 _ => {}
             }
@@ -160,6 +173,9 @@ impl<'a> Plain<'a> {
             shared,
             weights,
             row,
+            exits,
+            last_of_ties,
+            background,
             evidence: Vec::new(),
             touches: 0,
             decision: Decision::Undecided,
@@ -234,8 +250,28 @@ impl<'a> Plain<'a> {
         features
     }
 
+    /// The class of a row of features, where integers are added: known as early as the model says.
+    pub fn class(&self, features: &[i32]) -> usize {
+        let known = self.objects - usize::from(self.background);
+        let mut exits = self.exits.iter().peekable();
+        let sums = self.sums_until(features, &mut |groups, sums| {
+            let Some(&(_, bound)) = exits.next_if(|exit| exit.0 == groups) else { return false };
+            let mut sums: Vec<i64> = sums[..known].iter().map(|&sum| sum.into()).collect();
+            sums.sort_unstable();
+            known == 1 || sums[known - 1] - sums[known - 2] > bound
+        });
+        let most = sums[..known].iter().max().expect("an object");
+        let mut best = (0..known).filter(|&class| sums[class] == *most);
+        if self.last_of_ties { best.next_back() } else { best.next() }.expect("it is there")
+    }
+
     /// The sums of a row of features: units, or the bits of f32 numbers.
     pub fn sums(&self, features: &[i32]) -> Vec<i32> {
+        self.sums_until(features, &mut |_, _| false)
+    }
+
+    /// The same until `is_known` of the number of groups so far and their sums.
+    fn sums_until(&self, features: &[i32], is_known: &mut dyn FnMut(usize, &[i32]) -> bool) -> Vec<i32> {
         let is_missing = |value: i32| self.sentinel.is_some_and(|(low, high)| low <= value && value <= high);
         let feature =
             |index: usize| features.get(index).copied().filter(|value| !is_missing(*value)).unwrap_or(MISSING);
@@ -260,7 +296,7 @@ impl<'a> Plain<'a> {
             }
         }
         let mut splits = self.splits;
-        for group in &self.groups {
+        for (number_of_group, group) in self.groups.iter().enumerate() {
             let length = size * if group.object.is_some() { 1 } else { self.objects };
             for tree in 0..group.trees {
                 let (leaf, count) = match self.layout {
@@ -307,6 +343,9 @@ impl<'a> Plain<'a> {
             }
             if self.layout == 1 {
                 splits = &splits[(2 * group.trees) << group.depth..];
+            }
+            if is_known(number_of_group + 1, &sums) {
+                break;
             }
         }
         sums

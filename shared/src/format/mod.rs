@@ -6,6 +6,7 @@
 
 #[macro_use]
 mod codes;
+mod early;
 mod evidence;
 mod header;
 mod key;
@@ -19,6 +20,7 @@ mod trained;
 
 pub use crate::checksum::checksum;
 pub use codes::{Counted, Held, Key, Layout, LeafType, Length, Per, RAW_FEATURES};
+pub use early::EarlyExit;
 pub use evidence::{RowEvidence, Shifts, Weights};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
 pub use key::f32_key;

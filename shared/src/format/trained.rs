@@ -41,6 +41,8 @@ pub enum Tag {
     Capture,
     /// Evidence of a row by its margins: [`RowEvidence`](super::RowEvidence).
     RowEvidence,
+    /// Bounds with which a class is known before all trees are walked: [`EarlyExit`](super::EarlyExit).
+    EarlyExit,
 }
 
 impl Tag {
@@ -63,6 +65,7 @@ impl Tag {
             Self::Sentinel => 14,
             Self::Capture => 15,
             Self::RowEvidence => 16,
+            Self::EarlyExit => 17,
         }
     }
 }

@@ -4,7 +4,7 @@
 //! They are committed, and stay as they are: models that earlier releases made have to give the same. Write them again
 //! only where something must be added.
 
-use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::compile::{EarlyExit, Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node};
 use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict, exp2_negative};
 use palpate_shared::format::{Counted, PatternShares, Trained, TrainedTouches, checksum, f32_key};
@@ -25,6 +25,7 @@ fn main() {
     rows(&mut text);
     decisions(&mut text);
     shared_leaves(&mut text);
+    early_exits(&mut text);
     refused(&mut text);
     assert!(text.lines().all(|line| line.len() < 16_384), "a line is too long");
     print!("{text}");
@@ -303,6 +304,26 @@ fn play_rows(text: &mut String, name: &str, bytes: &[u8], real: bool) {
         *text += &format!("row {}\n", numbers(&row));
         let verdict = recognizer.push_features(&row).expect("it takes rows");
         known(text, &model, &recognizer, &row, verdict);
+        if model.early_exits().next().is_some() {
+            let class = model.class_of(&row, &mut vec![0; model.object_count()]).expect("as much room as classes");
+            *text += &format!("class {class}\n");
+        }
+    }
+}
+
+/// Walks for a class alone that may end early.
+fn early_exits(text: &mut String) {
+    for (layout, leaf, each) in [
+        (Layout::Compact, Leaf::I16, false),
+        (Layout::Wide, Leaf::I8, false),
+        (Layout::Complete, Leaf::I8, true),
+        (Layout::Complete, Leaf::I16, false),
+    ] {
+        let ensemble = imported(random::ensemble(Shape { trees: 24, each, ..SHAPE }, 26), 5);
+        let early_exit = Some(EarlyExit::Always);
+        let settings = Settings { leaf, layout: Some(layout), early_exit, ..Settings::default() };
+        let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
+        play_rows(text, &format!("early exit, {} {}", layout.name(), leaf.name()), &bytes, true);
     }
 }
 

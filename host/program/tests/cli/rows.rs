@@ -596,3 +596,52 @@ fn every_kind_is_proved_for_every_row_and_its_certificate_holds_or_says_what_cha
     assert_eq!((moved["rows"].as_array().unwrap().len(), moved["rows"][0].as_array().unwrap().len()), (60, 4));
     stderr(run(["verify", &model, &source, &rows, "--certificate", &proof]), 2);
 }
+
+#[test]
+fn a_class_from_fewer_trees_is_decided_by_rows_and_said_and_proved_in_data_and_in_assembly() {
+    let (_directory, path) = place();
+    let (model, proof, source) = (path("model.palpate"), path("proof.txt"), data("xgboost-3.4-softmax.json"));
+    let rows = data("xgboost-3.4-softmax.rows.csv");
+    let plain = json(run(["export", &source, "-o", &model, "--layout", "compact", "--json"]));
+    assert_eq!(plain.get("early_exit"), None);
+    let before = std::fs::read(&model).unwrap();
+    for early_exit in ["yes", rows.as_str()] {
+        let options = ["--layout", "compact", "--early-exit", early_exit, "--json"];
+        let exported = json(run(["export", source.as_str(), "-o", model.as_str()].into_iter().chain(options)));
+        let places = exported["early_exit"]["ends"].as_array().unwrap().len();
+        assert!(places > 0 || std::fs::read(&model).unwrap() == before, "{exported}");
+        assert_eq!(exported["early_exit"].get("walked").is_some(), early_exit != "yes", "{exported}");
+        stdout(run(["verify", &model, &source, &rows]));
+        stdout(run(["verify", &model, &source, "--prove", &proof]));
+        stdout(run(["verify", &model, &source, "--certificate", &proof]));
+    }
+    let text = stdout(run(["export", &source, "-o", &model, "--layout", "compact", "--early-exit", "yes"]));
+    assert!(text.contains("A class is known after at most "), "{text}");
+    for emit in ["thumb", "thumb-m4f"] {
+        for early_exit in [&[][..], &["--early-exit", "yes"]] {
+            stdout(run(["export", &source, "-o", &model, "--emit", emit].iter().chain(early_exit)));
+            let proved = json(run(["verify", &model, &source, "--prove", &proof, "--json"]));
+            assert!(proved["instructions"].as_u64().unwrap() > 50, "{proved}");
+            stdout(run(["verify", &model, &source, "--certificate", &proof]));
+        }
+    }
+    // A changed comparison, and assembly that is not there.
+    let assembly = path("model.s");
+    let text = std::fs::read_to_string(&assembly).unwrap();
+    let (head, tail) = text.rsplit_once("\tcmp r3, #").unwrap();
+    let (number, rest) = tail.split_once('\n').unwrap();
+    let other = number.parse::<u8>().unwrap() + 1;
+    std::fs::write(&assembly, format!("{head}\tcmp r3, #{other}\n{rest}")).unwrap();
+    let message = stderr(run(["verify", &model, &source, "--prove", &proof]), 1);
+    assert!(message.contains("model.palpate: "), "{message}");
+    let message = stderr(run(["verify", &model, &source, "--certificate", &proof]), 1);
+    assert!(message.contains("a file of assembly"), "{message}");
+    std::fs::remove_file(&assembly).unwrap();
+    let message = stderr(run(["verify", &model, &source, "--prove", &proof]), 1);
+    assert!(message.contains("model.s"), "{message}");
+    let message = stderr(run(["export", &source, "-o", &model, "--leaf", "f32", "--early-exit", "yes"]), 2);
+    assert!(message.contains("sums of f32"), "{message}");
+    let one = data("xgboost-2.1-squarederror.ubj");
+    let message = stderr(run(["export", &one, "-o", &model, "--early-exit", "yes"]), 2);
+    assert!(message.contains("has no class"), "{message}");
+}
