@@ -62,6 +62,7 @@
 #endif
 #ifndef PALPATE_ROW_EVIDENCE
 #define PALPATE_ROW_EVIDENCE 1
+#endif
 #ifndef PALPATE_EARLY
 #define PALPATE_EARLY 0
 #endif
