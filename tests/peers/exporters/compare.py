@@ -71,7 +71,7 @@ def image(chip, directory, source, libraries=LIBRARIES):
 
 # Chips that only our C is compared on: compiler and flags, size, emulator, nanoseconds of a tick.
 OTHERS = [
-    ("rv32imc", ["riscv64-unknown-elf-gcc", "-march=rv32imc", "-mabi=ilp32", "-ffreestanding", "-nostdlib", "-static"]),
+    ("rv32imc", ["riscv64-unknown-elf-gcc", "-march=rv32imc_zicsr", "-mabi=ilp32", "-ffreestanding", "-nostdlib", "-static"]),
     ("AVR", ["avr-gcc", "-mmcu=atmega2560"]),
 ]
 
