@@ -4,32 +4,18 @@
  * It calls no routine of the compiler's or of newlib's: what it called would be in the empty image too, and missing from the
  * bytes of an exporter whose code calls it. So numbers are printed in hexadecimal, which takes no division. */
 /* newlib's are measured, not the plain ones of bare.h. */
-#if defined(__AVR__)
-#include <avr/io.h>
-#include <avr/pgmspace.h>
-#include <stdint.h>
-#define ROWS_IN PROGMEM
-#else
 #define memcpy bare_memcpy
 #define memset bare_memset
 #include "bare.h"
 #undef memcpy
 #undef memset
-#define ROWS_IN
-#endif
 #include "rows.h" /* FEATURES, PLAIN, ROWS, rows[] */
 
 int peer_start(void);
 int peer_class(const float *row);
 
-/* The time: ticks of 40 nanoseconds on a Cortex-M, instructions on RISC-V, ticks of 62.5 nanoseconds on an AVR. */
-#if defined(__AVR__)
-static uint32_t now(void)
-{
-    return TCNT1;
-}
-#define MASK 0xffff
-#elif defined(__riscv)
+/* The time: ticks of 40 nanoseconds on a Cortex-M, instructions on RISC-V. */
+#if defined(__riscv)
 static uint32_t now(void)
 {
     uint32_t count;
@@ -46,19 +32,6 @@ static uint32_t now(void)
 #define MASK 0xffffff
 #endif
 
-static void say(const char *text)
-{
-#if defined(__AVR__)
-    for (; *text != 0; text++) {
-        while ((UCSR0A & _BV(UDRE0)) == 0) {
-        }
-        UDR0 = (uint8_t)*text;
-    }
-#else
-    bare_ask(4, text);
-#endif
-}
-
 static void print(uint32_t number)
 {
     char text[10];
@@ -69,37 +42,24 @@ static void print(uint32_t number)
         text[--at] = "0123456789abcdef"[number & 15];
         number >>= 4;
     } while (number != 0);
-    say(text + at);
+    bare_ask(4, text + at);
 }
 
-static int bare_main(void);
 static int bare_main(void)
 {
     static uint8_t classes[ROWS];
     uint32_t ticks = 0, began;
-    const float *values;
     int row;
-#if defined(__AVR__)
-    static float copy[FEATURES];
-#endif
     if (peer_start() != 0) {
         return 1;
     }
-#if defined(__AVR__)
-    TCCR1B = _BV(CS10);
-#elif defined(__arm__)
+#if defined(__arm__)
     SYSTICK[1] = 0xffffff;
     SYSTICK[0] = 5;
 #endif
     for (row = 0; row < ROWS; row++) {
-#if defined(__AVR__)
-        memcpy_P(copy, rows + row * FEATURES, sizeof copy);
-        values = copy;
-#else
-        values = rows + row * FEATURES;
-#endif
         began = now();
-        classes[row] = (uint8_t)peer_class(values);
+        classes[row] = (uint8_t)peer_class(rows + row * FEATURES);
         if (row < PLAIN) {
             ticks += (now() - began) & MASK;
         }
@@ -108,17 +68,6 @@ static int bare_main(void)
     for (row = 0; row < ROWS; row++) {
         print(classes[row]);
     }
-    say("\n");
+    bare_ask(4, "\n");
     return 0;
 }
-
-#if defined(__AVR__)
-int main(void)
-{
-    UCSR0B = _BV(TXEN0);
-    bare_main();
-    say(".");
-    for (;;) {
-    }
-}
-#endif

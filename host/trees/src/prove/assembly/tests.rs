@@ -23,7 +23,7 @@ fn meaning(bytes: &[u8], text: &str) -> Option<(Code, Vec<Values>)> {
 }
 
 /// True if two files add the same for every row.
-fn is_same(one: &Code, other: &Code, rows: &mut Vec<Values>) -> bool {
+fn is_same(one: &Code, other: &Code, rows: &mut [Values]) -> bool {
     let trees = one.trees.iter().zip(&other.trees);
     let same = |(one, other): (&Tree, &Tree)| {
         let equal = |leaf: &[f64], rows: &mut Rows| {
@@ -31,7 +31,7 @@ fn is_same(one: &Code, other: &Code, rows: &mut Vec<Values>) -> bool {
         };
         one.object == other.object && one.leaves(rows, &mut |leaf, rows| equal(leaf, rows)).is_ok()
     };
-    one.base == other.base && one.trees.len() == other.trees.len() && trees.map(same).all(|same| same)
+    one.base == other.base && one.trees.len() == other.trees.len() && trees.all(same)
 }
 
 /// Each kind of code, with its case.
