@@ -1,6 +1,6 @@
 //! Fingers that bend aside and objects that give way, found beside the probe's other numbers.
 //!
-//! What they do to a touch depends on the angles of its contacts, so simulated touches are made again for each candidate:
+//! Their effect on a touch depends on the angles of its contacts, so simulated touches are made again for each candidate:
 //! the same approaches with the same random numbers, so that candidates differ by nothing else. There are fewer of them than
 //! of the approaches that the rest of the fit uses.
 
@@ -130,7 +130,7 @@ impl Layers<'_> {
 
     fn evidence<'b>(&'b self, objects: &'b [Densities]) -> Evidence<'b> {
         Evidence {
-            recordings: self.recordings.to_vec(),
+            recordings: self.recordings,
             objects,
             of: (0..self.recordings.len()).collect(),
             plate: self.plate.cloned(),

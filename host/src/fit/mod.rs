@@ -106,7 +106,7 @@ pub const LEAST: usize = 20;
 
 /// Recordings and simulated touches: what a candidate is compared with.
 struct Evidence<'a> {
-    recordings: Vec<Recording<'a>>,
+    recordings: &'a [Recording<'a>],
     /// Simulated touches of all objects.
     objects: &'a [Densities],
     /// For each recording its object.
@@ -194,8 +194,9 @@ fn fit_to(
         in_poses: posed::in_poses(&own.name, own.touches(), &scenes[object], &layer.real, settings),
         ..Recording::without_poses(&own.name, own.touches(), kept)
     });
+    let recordings: Vec<Recording<'_>> = recordings.collect();
     let evidence = Evidence {
-        recordings: recordings.collect(),
+        recordings: &recordings,
         objects: &objects,
         of,
         plate: plate.map(|touches| Plate::new(touches.iter().map(Observed::of))),

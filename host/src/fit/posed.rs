@@ -28,7 +28,7 @@ const SMOOTHING: f64 = 0.06;
 const NEIGHBOR: usize = 3;
 
 /// Approaches in the pose of one recorded touch.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct InPose(Vec<Simulated>);
 
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,7 @@ use super::posed::{self, InPose};
 use palpate_shared::Touch;
 
 /// Recorded touches of one object.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Recording<'a> {
     pub(super) name: &'a str,
     pub(super) touches: Vec<Observed>,

@@ -56,8 +56,9 @@ impl Bench {
             ),
             kept,
         });
+        let recordings: Vec<Recording<'_>> = recordings.collect();
         let evidence = Evidence {
-            recordings: recordings.collect(),
+            recordings: &recordings,
             objects: &self.densities,
             of,
             plate: plate.map(|touches| Plate::new(touches.iter().map(Observed::of))),

@@ -107,7 +107,8 @@ fn simulated(settings: &Settings) -> Simulated {
 }
 
 static SIMULATED: LazyLock<Simulated> = LazyLock::new(|| simulated(&settings()));
-/// More of them: gaps between simulated touches are taken for noise, so that 2 ms are found as up to 3.5 ms.
+/// Touches of rigid fingers at a finer resolution: gaps between simulated touches count as noise, which is estimated at up to
+/// 3.5 ms where it is 2.
 static MANY: LazyLock<Simulated> = LazyLock::new(|| simulated(&Settings { approaches: 120_000, ..settings() }));
 
 /// The fit of a probe whose fingers are known to be rigid, and whose objects to stay.

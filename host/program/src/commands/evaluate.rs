@@ -141,7 +141,7 @@ fn rows(arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -
         ModelFile::Compiled(compiled) => feature_names(&compiled.model()),
     };
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let rows = super::verify::read_rows(&arguments.directory, &names, Some(label))?;
+    let rows = super::rows::read_rows(&arguments.directory, &names, Some(label))?;
     let evaluated = file.with(|candidate| evaluate_rows(candidate, &rows)).map_err(|error| match error.problem() {
         Some(RowsProblem::Label { .. }) => error.in_file(&arguments.directory),
         _ => error.in_file(&arguments.model),

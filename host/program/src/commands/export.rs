@@ -544,7 +544,7 @@ fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<(Option<Vec<f32>
         return Err(Error::setting("scale", format!("{files} files of rows"), "one file of rows"));
     }
     let path = arguments.rows();
-    let rows = path.map(|path| super::verify::read_rows(path, &names, None)).transpose()?;
+    let rows = path.map(|path| super::rows::read_rows(path, &names, None)).transpose()?;
     let mut scales = rows.as_ref().map_or_else(|| vec![1.0; names.len()], |rows| scales::fit(ensemble, rows));
     let mut named = Vec::new();
     for scale in &arguments.scale {

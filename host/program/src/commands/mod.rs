@@ -25,6 +25,7 @@ mod recognize;
 mod recognize_rows;
 mod renamed;
 mod report;
+mod rows;
 mod run;
 mod shell;
 mod strangers;

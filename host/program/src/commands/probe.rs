@@ -2,7 +2,7 @@
 
 use super::remark;
 use palpate::ensemble::StatedProbe;
-use palpate::error::ProbeProblem;
+use palpate::error::{Place, ProbeProblem};
 use palpate::mesh::{BACKGROUND, Object, builtin, source};
 use palpate::probe::Probe;
 use palpate::probe::file::ProbeFile;
@@ -70,7 +70,10 @@ impl ProbeArguments {
         match asked {
             None if there.is_none() => Ok(usual),
             Some(real) if there.is_none() && real.grazing.is_none() => Ok(real),
-            Some(_) if there.is_none() => Err(ProbeProblem::OnlyCaptured.into()),
+            Some(_) if there.is_none() => {
+                let error = Error::from(ProbeProblem::OnlyCaptured);
+                Err(self.path().map_or(error, |path| Error::at(Place::file(path), ProbeProblem::OnlyCaptured)))
+            }
             Some(real) if real != there => Err(ProbeProblem::Differs {
                 first: self.path().map_or_else(String::new, |path| path.display().to_string()),
                 second: "the data set".into(),

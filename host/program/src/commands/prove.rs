@@ -1,7 +1,7 @@
 //! `palpate verify` with `--prove` or `--certificate`.
 
 use super::Global;
-use super::verify::{Arguments, read_rows};
+use super::rows::read_rows;
 use palpate::Result;
 use palpate::compile::CompiledModel;
 use palpate::ensemble::import::{Options, read_with};
@@ -10,35 +10,42 @@ use palpate::output;
 use palpate::prove::{Certificate, Moves, Proof, check, moves, prove};
 use std::path::Path;
 
+/// What is proved.
+pub(super) struct Asked<'a> {
+    pub(super) model: &'a Path,
+    pub(super) ensemble: &'a Path,
+    /// Rows of which it is said how far one feature can move.
+    pub(super) rows: Option<&'a Path>,
+    /// Where the certificate is written; standard output without it.
+    pub(super) written: Option<&'a Path>,
+    /// A certificate to check instead.
+    pub(super) certificate: Option<&'a Path>,
+}
+
 /// Proves the model, or checks a certificate.
-pub(super) fn run(
-    arguments: &Arguments,
-    compiled: &CompiledModel,
-    options: &Options<'_>,
-    global: &Global,
-) -> Result<()> {
-    let path = &arguments.ensemble;
+pub(super) fn run(asked: &Asked<'_>, compiled: &CompiledModel, options: &Options<'_>, global: &Global) -> Result<()> {
+    let path = asked.ensemble;
     // The very bytes whose checksum is stated.
     let file = std::fs::read(path).map_err(|source| Error::io(path, "read the ensemble", source))?;
     let ensemble = read_with(path, &file, options)?;
-    let in_model = |error: Error| error.in_file(&arguments.model);
-    if let Some(certificate) = &arguments.certificate {
+    let in_model = |error: Error| error.in_file(asked.model);
+    if let Some(certificate) = asked.certificate {
         let proof = check(&Certificate::read(certificate)?, compiled.bytes(), &ensemble, &file).map_err(in_model)?;
         let text = proof_text(&proof, &format!("The certificate {} holds", certificate.display()));
         return if global.json { output::print_json(&proof) } else { output::print(&text) };
     }
     let names = ensemble.inputs.names();
-    let rows = match &arguments.data {
+    let rows = match asked.rows {
         Some(_) if ensemble.descriptor().is_some() => {
-            return Err(Error::at(Place::file(&arguments.model), RowsProblem::Touches));
+            return Err(Error::at(Place::file(asked.model), RowsProblem::Touches));
         }
         Some(data) => Some(read_rows(data, &names, None)?),
         None => None,
     };
     let (proof, certificate) = prove(compiled.bytes(), &ensemble, &file).map_err(in_model)?;
     let moved = rows.map(|rows| moves(compiled.bytes(), rows.iter())).transpose().map_err(in_model)?;
-    let written = arguments.prove.as_deref().unwrap_or_else(|| Path::new("-"));
-    output::refuse_input(written, [&arguments.model, path])?;
+    let written = asked.written.unwrap_or_else(|| Path::new("-"));
+    output::refuse_input(written, [asked.model, path])?;
     output::write_bytes(written, certificate.to_string().as_bytes())?;
     if global.json {
         match moved {

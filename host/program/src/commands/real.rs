@@ -1,9 +1,9 @@
 //! The option for what a real sensor, timer and robot add to touches.
 
-use palpate::Result;
-use palpate::error::ProbeProblem;
+use palpate::error::{Place, ProbeProblem};
 use palpate::probe::file::ProbeFile;
 use palpate::probe::noise::{Noise, PartialNoise};
+use palpate::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// Disturbances of touches.
@@ -38,7 +38,11 @@ impl RealArguments {
             Some(Given::Settings(settings)) => settings.over(base),
             Some(Given::File(path)) => ProbeFile::read(path)?.real,
         };
-        if noise.grazing.is_none() { Ok(noise) } else { Err(ProbeProblem::OnlyCaptured.into()) }
+        match self.real.as_ref().map(|real| &real.given) {
+            _ if noise.grazing.is_none() => Ok(noise),
+            Some(Given::File(path)) => Err(Error::at(Place::file(path), ProbeProblem::OnlyCaptured)),
+            _ => Err(ProbeProblem::OnlyCaptured.into()),
+        }
     }
 
     /// True if the option was given.

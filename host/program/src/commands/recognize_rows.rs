@@ -1,6 +1,6 @@
 //! `palpate recognize --features`: rows instead of touches.
 
-use super::verify::read_rows;
+use super::rows::read_rows;
 use palpate::Result;
 use palpate::error::RowsProblem;
 use palpate::evaluate::verify::margins;

@@ -62,13 +62,14 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let capture = size.origin(Origin::default())?;
     let real = size.probe.read()?.map(|file| file.real).filter(|real| !real.is_none());
     let noise = match real {
-        Some(Noise { grazing, .. }) if !grazing.is_none() => {
-            remark(
-                "Fingers bend aside in the simulation that recorded touches are compared with, and not where noise is added.",
-            );
-            given.over(Noise { grazing: Grazing::default(), ..real.unwrap_or_default() })?
+        Some(real) => {
+            if !real.grazing.is_none() {
+                remark(
+                    "Where noise is added to touches, fingers do not bend aside; in the comparison with recordings they do.",
+                );
+            }
+            given.over(Noise { grazing: Grazing::default(), ..real })?
         }
-        Some(real) => given.over(real)?,
         None if given.is_given() => given.over(Noise::default())?,
         None => settings.noise,
     };

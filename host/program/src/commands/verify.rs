@@ -1,5 +1,6 @@
 use super::Global;
 use super::progress::Bar;
+use super::prove::Asked;
 use super::unstated::UnstatedArguments;
 use palpate::Result;
 use palpate::compile::CompiledModel;
@@ -7,7 +8,7 @@ use palpate::ensemble::Ensemble;
 use palpate::error::{Error, Place, RowsProblem};
 use palpate::evaluate::verify::{Verified, verify};
 use palpate::output;
-use palpate::rows::{Rows, read_margins};
+use palpate::rows::read_margins;
 use std::path::PathBuf;
 
 /// Compare a compiled model with what it was exported from.
@@ -29,18 +30,18 @@ Examples:
   palpate verify model.palpate m.json --certificate proof.txt")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
-    pub(super) model: PathBuf,
+    model: PathBuf,
     /// The file that it was exported from
-    pub(super) ensemble: PathBuf,
+    ensemble: PathBuf,
     /// Touches (a directory), or rows of features (a CSV file)
     #[arg(value_name = "DATA", required_unless_present_any = ["prove", "certificate"])]
-    pub(super) data: Option<PathBuf>,
+    data: Option<PathBuf>,
     /// Prove that both match on every possible row, and write a certificate
     #[arg(long, value_name = "FILE", conflicts_with_all = ["certificate", "library_margins", "sequences"])]
-    pub(super) prove: Option<PathBuf>,
+    prove: Option<PathBuf>,
     /// Check a certificate that --prove wrote
     #[arg(long, value_name = "FILE", conflicts_with_all = ["data", "library_margins", "sequences"])]
-    pub(super) certificate: Option<PathBuf>,
+    certificate: Option<PathBuf>,
     /// Sequences of touches to draw; of all objects together
     #[arg(long, value_name = "N", default_value = "10000", value_parser = super::numbers::sequences)]
     sequences: usize,
@@ -56,7 +57,16 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let options = arguments.unstated.options(None);
     let data = match &arguments.data {
         Some(data) if arguments.prove.is_none() => data,
-        _ => return super::prove::run(&arguments, &compiled, &options, global),
+        _ => {
+            let asked = Asked {
+                model: &arguments.model,
+                ensemble: &arguments.ensemble,
+                rows: arguments.data.as_deref(),
+                written: arguments.prove.as_deref(),
+                certificate: arguments.certificate.as_deref(),
+            };
+            return super::prove::run(&asked, &compiled, &options, global);
+        }
     };
     let ensemble = Ensemble::load_with(&arguments.ensemble, &options)?;
     if ensemble.descriptor().is_some() {
@@ -74,7 +84,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             }
         };
     }
-    let rows = read_rows(data, &ensemble.inputs.names(), None)?;
+    let rows = super::rows::read_rows(data, &ensemble.inputs.names(), None)?;
     let library = arguments.library_margins.as_deref().map(read_margins).transpose()?;
     let place = |error: Error| match (&arguments.library_margins, error.problem()) {
         (Some(path), Some(problem)) if RowsProblem::is_about_margins(problem) => error.in_file(path),
@@ -87,18 +97,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         output::print(&text(&verified))?;
     }
     verified.check().map_err(|problem| Error::at(Place::file(&arguments.model), problem))
-}
-
-/// Reads rows for features with these names; says on stderr if columns are taken by their position.
-pub(super) fn read_rows(path: &std::path::Path, features: &[&str], label: Option<&str>) -> Result<Rows> {
-    let rows = Rows::read(path, features, label)?;
-    if rows.by_position {
-        super::remark(&format!(
-            "palpate: note: {}: columns are taken by their position, since the header does not name all features",
-            path.display()
-        ));
-    }
-    Ok(rows)
 }
 
 fn text(verified: &Verified) -> String {

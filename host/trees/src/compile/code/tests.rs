@@ -224,7 +224,11 @@ impl Case {
             let whole = |value: f32| if is_real || value.is_nan() { value } else { value.clamp(-1e7, 1e7).round() };
             thresholds.iter().map(|own| whole(value(own))).collect()
         };
-        (0..count).map(|_| row()).collect()
+        let mut rows: Vec<Vec<f32>> = (0..count).map(|_| row()).collect();
+        // Zeros of both signs in every column: before them there is nothing on a grid.
+        rows[0].fill(-0.0);
+        rows[1].fill(0.0);
+        rows
     }
 }
 

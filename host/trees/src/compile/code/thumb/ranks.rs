@@ -189,10 +189,11 @@ fn grid(out: &mut Assembler, bits: i8, before: bool, missing: Label) {
     out.ins("lsls r5, r4, #1", 2);
     out.ins("cmp r5, r7", 2);
     out.branch(Some(Condition::Higher), missing);
-    if before {
-        out.ins("subs r4, #1", 2);
-    }
     if out.chip == Chip::M4F {
+        if before {
+            // What is no number then, of 0 and of -0, is converted to 0.
+            out.ins("subs r4, #1", 2);
+        }
         out.ins("vmov s0, r4", 4);
         match bits {
             1.. => out.ins(&format!("vcvt.s32.f32 s0, s0, #{bits}"), 4),
@@ -206,10 +207,15 @@ fn grid(out: &mut Assembler, bits: i8, before: bool, missing: Label) {
         return;
     }
     let (whole, full) = (out.label(), out.label());
-    // What is below 0, and 0 before 0.
     out.ins("movs r5, #0", 2);
     out.ins("cmp r4, #0", 2);
-    out.branch(Some(Condition::Less), whole);
+    if before {
+        // 0 and -0, too: before them there is nothing above 0.
+        out.branch(Some(Condition::LessOrEqual), whole);
+        out.ins("subs r4, #1", 2);
+    } else {
+        out.branch(Some(Condition::Less), whole);
+    }
     out.ins("lsrs r3, r4, #23", 2);
     out.ins(&format!("movs r5, #{}", 158 - i32::from(bits)), 2);
     out.ins("subs r3, r5, r3", 2);
