@@ -425,7 +425,17 @@ fn assembly_and_c_give_the_margins_of_the_layouts_of_data_on_emulated_chips() {
     let root = Path::new(ROOT);
     let (mps2, virt) = (root.join("tests/c/mps2.ld"), root.join("tests/c/virt.ld"));
     let (mps2, virt) = (mps2.to_str().unwrap(), virt.to_str().unwrap());
-    let bare = ["-std=c99", "-w", "-Os", "-DBARE", "-nostdlib", "-static", "-Wl,--no-warn-rwx-segments", "-T"];
+    let bare = [
+        "-std=c99",
+        "-w",
+        "-Os",
+        "-DBARE",
+        "-ffreestanding",
+        "-nostdlib",
+        "-static",
+        "-Wl,--no-warn-rwx-segments",
+        "-T",
+    ];
     let m0_plus = ["-mcpu=cortex-m0plus", "-mthumb"];
     let m4f = ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"];
     for (chip, flags, machine, form) in [
