@@ -10,7 +10,7 @@ use palpate::output;
 use palpate::prove::{Certificate, Moves, Proof, check, moves, prove};
 use std::path::Path;
 
-/// What is proved.
+/// A model and its ensemble, and the files of a proof of it.
 pub(super) struct Asked<'a> {
     pub(super) model: &'a Path,
     pub(super) ensemble: &'a Path,
