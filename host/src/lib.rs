@@ -71,6 +71,7 @@
 //! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
 //! | `teach` | objects that are learned from recorded touches | `teach::teach` |
 //! | `tune` | searches for the best model that fits a chip | `tune::tune` |
+//! | [`stream`] | verdicts of streams of rows, as early as a promised error rate allows | [`stream::calibrate`](fn@stream::calibrate) |
 //! | [`play`] | objects touched one approach after the other, and models that follow: the page of `palpate view --play` | [`play::Game`] |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
 //!
@@ -117,6 +118,8 @@ pub mod tune;
 
 #[cfg(feature = "train")]
 pub mod strangers;
+
+pub mod stream;
 
 pub mod play;
 

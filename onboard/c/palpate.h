@@ -23,6 +23,8 @@
  *   PALPATE_LEAVES       which types of leaves are read, as PALPATE_I8; all of them by default
  *   PALPATE_SHARED       0: a model whose equal leaves stand once, in a table, is refused
  *   PALPATE_SENTINEL     0: a model over rows in which a number stands for a missing value is refused
+ *   PALPATE_ROW_EVIDENCE 0: a model that states what a row adds to the evidence, or how much rows count together, is refused
+ *   PALPATE_EARLY        1: palpate_class_of is there, which gives a class without walking all trees
  *   PALPATE_STRANGERS    0: a model with a test for objects that it does not know, or with a background, is refused
  *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256: 32 by default; each takes state and stack
  *   PALPATE_BYTE(p)      how the byte of a model at `p` is read: *(p) by default, pgm_read_byte(p) for an AVR's flash
@@ -57,6 +59,12 @@
 #endif
 #ifndef PALPATE_SENTINEL
 #define PALPATE_SENTINEL 1
+#endif
+#ifndef PALPATE_ROW_EVIDENCE
+#define PALPATE_ROW_EVIDENCE 1
+#endif
+#ifndef PALPATE_EARLY
+#define PALPATE_EARLY 0
 #endif
 #ifndef PALPATE_STRANGERS
 #define PALPATE_STRANGERS 1
@@ -166,6 +174,14 @@ typedef struct {
     const uint8_t *strangers_; /* what it states of objects that it does not know, or NULL */
     const uint8_t *table_; /* values of the leaves that are shared, or NULL; before them the length of their numbers */
     const uint8_t *sentinel_; /* features that stand for a missing value, or NULL */
+    const uint8_t *weights_; /* weights of evidence by the number of touches or rows, or NULL */
+    const uint8_t *row_; /* what a row's margins add to the evidence, or NULL: the margins */
+    int32_t row_start_;  /* the margin of that table's first value */
+    uint32_t row_most_;  /* beyond it, up to the last one */
+#if PALPATE_EARLY
+    const uint8_t *exits_; /* places in the walk where a class may be known, 8 bytes each, up to `exits_end_` */
+    const uint8_t *exits_end_;
+#endif
     uint32_t wrong;          /* the place of what is wrong, in bytes from the start */
     uint32_t largest_spread; /* of touches that count, in microseconds */
     uint16_t objects;        /* that there are margins for, 1 to 256 */
@@ -192,6 +208,9 @@ typedef struct {
     uint8_t verdict;      /* a palpate_verdict */
     uint8_t object;       /* the one that was recognized */
     uint32_t forgotten;   /* of the touches, the first ones that are no longer part of the evidence: of some snapshots */
+#if PALPATE_ROW_EVIDENCE
+    uint32_t unit_, from_, span_; /* bits in a unit of evidence of this number of touches, and of so many numbers */
+#endif
     int64_t evidence[PALPATE_MAX_OBJECTS];
 } palpate_recognizer;
 
@@ -361,6 +380,35 @@ static inline int palpate_check_strangers_(palpate_model *model, const uint8_t *
     return 1;
 }
 
+/* Evidence of a row by its margins; 0 if it makes no sense. */
+static inline int palpate_check_row_(palpate_model *model, const uint8_t *content, uint32_t length)
+{
+    uint32_t start, i;
+    uint8_t dropped, between, scale, last;
+    if (length < 8) {
+        return 0;
+    }
+    start = palpate_u32_(content);
+    start = start >> 31 != 0 ? 0u - start : start;
+    dropped = PALPATE_BYTE(content + 4);
+    between = PALPATE_BYTE(content + 5);
+    scale = PALPATE_BYTE(content + 6);
+    last = PALPATE_BYTE(content + 7);
+    if (last == 0 || last > 128 || length - 9 < last || start > 0x40000000u || between > 15 || dropped + between > 26 ||
+        between + scale > 22 || model->descriptor != 255) {
+        return 0;
+    }
+    for (i = 8; i < 8u + last; i++) {
+        if (PALPATE_BYTE(content + i) > PALPATE_BYTE(content + i + 1)) {
+            return 0;
+        }
+    }
+    model->row_ = content;
+    model->row_start_ = PALPATE_AS_(int32_t, palpate_u32_(content));
+    model->row_most_ = (PALPATE_AS_(uint32_t, last) << between) - 1;
+    return 1;
+}
+
 /* Sections that are whole, in order, valid, and understood where they must be. */
 static inline palpate_error palpate_check_sections_(palpate_model *model)
 {
@@ -425,6 +473,21 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                     return PALPATE_FIELD;
                 }
                 model->sentinel_ = content;
+            } else if (PALPATE_ROW_EVIDENCE && last == 4) {
+                /* Weights by the number of touches or rows. */
+                if (length < 2 || PALPATE_BYTE(content) - 1u > 63 || length - 2 < 2u * PALPATE_BYTE(content)) {
+                    return PALPATE_FIELD;
+                }
+                model->weights_ = content;
+            } else if (PALPATE_ROW_EVIDENCE && last == 16) {
+                if (!palpate_check_row_(model, content, length)) {
+                    return PALPATE_FIELD;
+                }
+#if PALPATE_EARLY
+            } else if (tag == 17) {
+                model->exits_ = content;
+                model->exits_end_ = content + (length & ~PALPATE_AS_(uint32_t, 7));
+#endif
             } else if (tag != last) {
                 return PALPATE_NOT_UNDERSTOOD;
             }
@@ -720,6 +783,14 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
     if (PALPATE_SENTINEL) {
         model->sentinel_ = NULL;
     }
+    if (PALPATE_ROW_EVIDENCE) {
+        model->weights_ = NULL;
+        model->row_ = NULL;
+    }
+#if PALPATE_EARLY
+    model->exits_ = NULL;
+    model->exits_end_ = NULL;
+#endif
     model->known = model->objects;
     model->patterns = 0x20;
     model->largest_spread = UINT32_MAX;
@@ -1073,8 +1144,35 @@ PALPATE_APART_ void palpate_call_(const palpate_model *model, const int32_t *fea
 }
 #endif
 
-/* The sums of a row of features, in units or as the bits of f32 values. */
-static inline void palpate_sum_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums)
+/* No object. */
+#define PALPATE_NONE_ PALPATE_AS_(uint_fast16_t, 0xffff)
+
+#if PALPATE_EARLY
+/* The object whose sum, shifted and with its base, is larger than each other one by more than what the place allows; else PALPATE_NONE_. */
+static inline uint_fast16_t palpate_leader_of_(const palpate_model *model, const uint32_t *sums, uint_fast8_t shift, const uint8_t *place)
+{
+    const uint8_t *base = model->part_[PALPATE_MARGINS_];
+    int32_t most = INT32_MIN, second = INT32_MIN;
+    uint_fast16_t best = PALPATE_NONE_, i;
+    for (i = 0; i < model->known; i++) {
+        const int32_t sum = PALPATE_AS_(int32_t, (sums[i] << shift) + palpate_u32_(base + 4 * PALPATE_AS_(size_t, i)));
+        if (sum > most) {
+            second = most;
+            most = sum;
+            best = i;
+        } else if (sum > second) {
+            second = sum;
+        }
+    }
+    /* Sums are within 2^30. */
+    return PALPATE_AS_(uint32_t, most) - PALPATE_AS_(uint32_t, second) > palpate_u32_(place + 4) ? best : PALPATE_NONE_;
+}
+#endif
+
+/* The sums of a row of features, in units or as the bits of f32 values. If it may end early, and does, the object that leads,
+ * and what is summed up so far; else PALPATE_NONE_. */
+static inline uint_fast16_t palpate_sum_until_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums,
+                                              int early)
 {
     const uint8_t *group = model->part_[PALPATE_GROUPS_], *splits = model->part_[PALPATE_SPLITS_];
     const uint8_t *leaves = model->part_[PALPATE_LEAVES_], *cuts = model->cuts_, *axis = model->part_[PALPATE_AXES_];
@@ -1085,10 +1183,16 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     uint8_t *ranks = PALPATE_AT_(uint8_t *, words);
     uint_fast16_t i;
     uint_fast8_t last;
+#if PALPATE_EARLY
+    const uint8_t *place = early && !PALPATE_IS_F32_(model) ? model->exits_ : model->exits_end_;
+    uint16_t walked = 0;
+#else
+    (void)early;
+#endif
 #if PALPATE_LAYOUTS & PALPATE_CODE
     if (PALPATE_IS_CODE_(model)) {
         palpate_call_(model, features, count, PALPATE_AT_(int32_t *, sums));
-        return;
+        return PALPATE_NONE_;
     }
 #endif
     for (i = 0; i < model->objects; i++) {
@@ -1152,7 +1256,7 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
         for (i = 0; PALPATE_IS_I8_(model) && i < model->objects; i++) {
             sums[i] -= 128;
         }
-        return;
+        return PALPATE_NONE_;
     }
     last = group != splits ? PALPATE_BYTE(group + 1) : 0;
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
@@ -1196,6 +1300,16 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
                 leaves += PALPATE_AS_(size_t, all + 1) * stored;
             }
         }
+#if PALPATE_EARLY
+        walked++;
+        if (place != model->exits_end_ && walked == palpate_u16_(place)) {
+            const uint_fast16_t leader = palpate_leader_of_(model, sums, last, place);
+            if (leader != PALPATE_NONE_) {
+                return leader;
+            }
+            place += 8;
+        }
+#endif
     }
     if (!PALPATE_IS_F32_(model)) {
         palpate_shift_(model, sums, last);
@@ -1203,6 +1317,12 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
             sums[i] += palpate_u32_(base + 4 * PALPATE_AS_(size_t, i));
         }
     }
+    return PALPATE_NONE_;
+}
+
+static inline void palpate_sum_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums)
+{
+    (void)palpate_sum_until_(model, features, count, sums, 0);
 }
 
 /* An f32 value, given by its bits, in units of 2^-16, rounded half away from zero, within 2^30. */
@@ -1301,15 +1421,53 @@ PALPATE_API uint64_t palpate_exp2(uint64_t u)
     return PALPATE_AS_(uint64_t, power) << 25 >> whole;
 }
 
-/* Bits by which an object is behind the leader, in Q32; the largest number where its weight is 0 at any temperature. */
-static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uint_fast16_t leader, uint_fast16_t object)
+/* Bits in a unit of the evidence of so many touches, where it is compared with a threshold: less than the model's if it states
+ * weights of rows that resemble each other. They are the same for `span` numbers of touches, from `from` on. */
+static inline uint32_t palpate_bits_(const palpate_model *model, uint32_t touches, uint32_t *from, uint32_t *span)
 {
-    const uint8_t *bytes = recognizer->model->bytes;
+    const uint32_t bits = palpate_u32_(model->bytes + 36);
+    const uint8_t *weights = PALPATE_ROW_EVIDENCE ? model->weights_ : NULL;
+    uint32_t at = 0, last;
+    *from = 0;
+    *span = UINT32_MAX;
+    if (weights == NULL) {
+        return bits;
+    }
+    /* Two for each doubling; none for what is between 1 and 2. */
+    while (touches >> at > 3) {
+        at++;
+    }
+    *from = touches >> at << at;
+    *span = PALPATE_AS_(uint32_t, 1) << at;
+    at = touches > 1 ? 2 * at + (touches >> at) : 0;
+    last = PALPATE_BYTE(weights) - 1u;
+    at = palpate_u16_(weights + 2 + 2 * (at < last ? at : last)) + 1;
+    return (bits >> 16) * at + ((bits & 0xffff) * at >> 16);
+}
+
+/* The same of the evidence so far; next to no cost while it stays. */
+static inline uint32_t palpate_unit_(palpate_recognizer *recognizer)
+{
+#if PALPATE_ROW_EVIDENCE
+    const uint32_t touches = recognizer->touches - recognizer->forgotten;
+    if (touches - recognizer->from_ >= recognizer->span_) {
+        recognizer->unit_ = palpate_bits_(recognizer->model, touches, &recognizer->from_, &recognizer->span_);
+    }
+    return recognizer->unit_;
+#else
+    return palpate_u32_(recognizer->model->bytes + 36);
+#endif
+}
+
+/* Bits by which an object is behind the leader, in Q32, by the bits in a unit; the largest number where its weight is 0 at any
+ * temperature. */
+static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uint_fast16_t leader, uint_fast16_t object, uint32_t bits)
+{
     const uint64_t units = PALPATE_AS_(uint64_t, recognizer->evidence[leader]) - PALPATE_AS_(uint64_t, recognizer->evidence[object]);
     if (units >> 32 != 0) {
         return UINT64_MAX;
     }
-    return units * palpate_u32_(bytes + 36) >> (PALPATE_BYTE(bytes + 40) & 63);
+    return units * bits >> (PALPATE_BYTE(recognizer->model->bytes + 40) & 63);
 }
 
 /* Of the first objects, the one with the most evidence; the first of several. */
@@ -1373,6 +1531,9 @@ PALPATE_API palpate_error palpate_start(palpate_recognizer *recognizer, palpate_
     recognizer->odds = palpate_u32_(bytes + 48) | PALPATE_AS_(uint64_t, palpate_u32_(bytes + 52)) << 32;
     recognizer->max_touches = palpate_u32_(bytes + 56);
     recognizer->by_object = 1;
+#if PALPATE_ROW_EVIDENCE
+    recognizer->span_ = 0;
+#endif
     palpate_reset(recognizer);
     return PALPATE_OK;
 }
@@ -1488,18 +1649,43 @@ static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recog
     return PALPATE_RECOGNIZED;
 }
 
-/* Takes in a touch or row by its margins. */
-PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int32_t *margins)
+/* Evidence of a row by its margins, of which it takes the place: by the model's table from margins to evidence. */
+static inline void palpate_evidence_of_(const palpate_model *model, int32_t *margins)
+{
+    const uint8_t *row = model->row_;
+    const int32_t *end = margins + model->objects;
+    const uint32_t most = model->row_most_;
+    const int32_t start = model->row_start_;
+    for (; margins != end; margins++) {
+        const uint8_t *value = row;
+        uint32_t beyond = 0, at, rise;
+        if (*margins > start) {
+            beyond = (PALPATE_AS_(uint32_t, *margins) - PALPATE_AS_(uint32_t, start)) >> PALPATE_BYTE(row + 4);
+            beyond = beyond < most ? beyond : most;
+        }
+        at = beyond >> PALPATE_BYTE(row + 5);
+        value += at;
+        beyond -= at << PALPATE_BYTE(row + 5);
+        at = PALPATE_BYTE(value + 8);
+        rise = (PALPATE_BYTE(value + 9) - at) * beyond;
+        at <<= PALPATE_BYTE(row + 5);
+        *margins = PALPATE_AS_(int32_t, (at + rise) << PALPATE_BYTE(row + 6));
+    }
+}
+
+/* Takes in a touch by its margins, or a row by its evidence. */
+static inline void palpate_push_evidence_(palpate_recognizer *recognizer, const int32_t *evidence)
 {
     const palpate_model *model = recognizer->model;
     uint64_t left = recognizer->odds;
     palpate_verdict verdict = PALPATE_RECOGNIZED;
+    uint32_t bits;
     uint_fast16_t best, i;
     if (recognizer->verdict != PALPATE_UNDECIDED) {
         return;
     }
     for (i = 0; i < model->objects; i++) {
-        recognizer->evidence[i] = palpate_add_(recognizer->evidence[i], margins[i]);
+        recognizer->evidence[i] = palpate_add_(recognizer->evidence[i], evidence[i]);
     }
     recognizer->touches += recognizer->touches != UINT32_MAX;
     best = palpate_best(recognizer);
@@ -1509,9 +1695,10 @@ PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int3
     if (recognizer->by_object != 0 && model->odds_ != NULL) {
         left = PALPATE_AS_(uint64_t, palpate_u32_(model->odds_ + 4 * PALPATE_AS_(size_t, best))) << 24;
     }
+    bits = palpate_unit_(recognizer);
     for (i = 0; verdict == PALPATE_RECOGNIZED && i < model->objects; i++) {
         if (i != best) {
-            const uint64_t weight = palpate_exp2(palpate_behind_(recognizer, best, i));
+            const uint64_t weight = palpate_exp2(palpate_behind_(recognizer, best, i, bits));
             if (weight > left) {
                 verdict = PALPATE_UNDECIDED;
             }
@@ -1523,6 +1710,22 @@ PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int3
     }
     recognizer->verdict = PALPATE_AS_(uint8_t, verdict);
     recognizer->object = PALPATE_AS_(uint8_t, best);
+}
+
+/* Takes in a touch or row by its margins. */
+PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int32_t *margins)
+{
+    if (PALPATE_ROW_EVIDENCE && recognizer->model->row_ != NULL) {
+        int32_t evidence[PALPATE_MAX_OBJECTS];
+        uint_fast16_t i;
+        for (i = 0; i < recognizer->model->objects; i++) {
+            evidence[i] = margins[i];
+        }
+        palpate_evidence_of_(recognizer->model, evidence);
+        palpate_push_evidence_(recognizer, evidence);
+    } else {
+        palpate_push_evidence_(recognizer, margins);
+    }
 }
 
 /* Takes in a touch; after a decision nothing changes until the reset. Cost: the ensemble's margins, a few instructions for
@@ -1537,7 +1740,7 @@ PALPATE_API palpate_answer palpate_push(palpate_recognizer *recognizer, const pa
     if (answer == PALPATE_COUNTED && recognizer->verdict == PALPATE_UNDECIDED) {
         palpate_features_(recognizer->model, touch, times, features);
         palpate_margins_of(recognizer->model, features, recognizer->model->features, margins);
-        palpate_push_margins(recognizer, margins);
+        palpate_push_evidence_(recognizer, margins);
     }
     return answer;
 }
@@ -1550,7 +1753,10 @@ PALPATE_API palpate_answer palpate_push_features(palpate_recognizer *recognizer,
         return PALPATE_NEEDS_TOUCHES;
     }
     palpate_margins_of(recognizer->model, features, count, margins);
-    palpate_push_margins(recognizer, margins);
+    if (PALPATE_ROW_EVIDENCE && recognizer->model->row_ != NULL) {
+        palpate_evidence_of_(recognizer->model, margins);
+    }
+    palpate_push_evidence_(recognizer, margins);
     return PALPATE_COUNTED;
 }
 
@@ -1582,6 +1788,8 @@ PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uin
     const palpate_model *model = recognizer->model;
     const uint8_t *p = model->part_[PALPATE_OPTIONAL_], *end = model->part_[PALPATE_MARGINS_];
     const uint_fast16_t best = palpate_leader_(recognizer, model->objects);
+    uint32_t from, span;
+    const uint32_t unit = palpate_bits_(model, recognizer->touches - recognizer->forgotten, &from, &span);
     uint32_t sharpness = 65536;
     uint64_t own = 0, others = 0, all;
     uint_fast16_t i;
@@ -1599,7 +1807,7 @@ PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uin
     for (i = 0; i < model->objects; i++) {
         if (i != best) {
             const uint64_t most = PALPATE_AS_(uint64_t, 1) << 42; /* where a weight is 0 at any temperature */
-            uint64_t bits = palpate_behind_(recognizer, best, i);
+            uint64_t bits = palpate_behind_(recognizer, best, i, unit);
             bits = palpate_exp2((bits < most ? bits : most) * sharpness >> 16);
             others += bits;
             own = i == object ? bits : own;
@@ -1625,6 +1833,33 @@ static inline const uint8_t *palpate_prediction_(const palpate_model *model)
     }
     return NULL;
 }
+
+#if PALPATE_EARLY
+/* The class with the largest of the sums. */
+static inline uint16_t palpate_best_of_(const palpate_model *model, const int32_t *sums)
+{
+    const uint8_t *prediction = palpate_prediction_(model);
+    const int last_of_ties = prediction != NULL && PALPATE_BYTE(prediction + 1) != 0;
+    int32_t most = INT32_MIN;
+    uint_fast16_t best = 0, i;
+    for (i = 0; i < model->known; i++) {
+        const int32_t sum = PALPATE_IS_F32_(model) ? palpate_key(PALPATE_AS_(uint32_t, sums[i])) : sums[i];
+        if (sum > most || (last_of_ties && sum == most)) {
+            best = i;
+            most = sum;
+        }
+    }
+    return PALPATE_AS_(uint16_t, best);
+}
+
+/* The class that palpate_predict_class gives, ties and all, from no more trees than it takes, if `palpate export --early-exit`
+ * wrote the model. `room` is for `model->objects` numbers, which are no margins afterwards. */
+PALPATE_API uint16_t palpate_class_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *room)
+{
+    const uint_fast16_t leader = palpate_sum_until_(model, features, count, PALPATE_AT_(uint32_t *, room), 1);
+    return leader != PALPATE_NONE_ ? PALPATE_AS_(uint16_t, leader) : palpate_best_of_(model, room);
+}
+#endif
 
 /* The class of a row of `count` features (see palpate_margins_of): that with the largest margin, and of several the first,
  * or the last where the model says so. With f32 leaves their sums are compared as they are. `margins` has room for

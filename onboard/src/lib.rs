@@ -49,6 +49,7 @@
 //! | `i8-leaves`, `i16-leaves`, `f32-leaves` | types of leaves that can be read |
 //! | `shared-leaves` | trees whose equal leaves are stored once |
 //! | `sentinel` | models over rows in which a number stands for a missing value |
+//! | `row-evidence` | models that state what a row adds to the evidence, and how much rows count together |
 //! | `defmt` | touches, verdicts, refusals and faults can be logged; the only one that is off by default |
 //!
 //! `no_std`, without a heap and without `unsafe`; once a model has been validated nothing here can panic.

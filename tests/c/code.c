@@ -55,6 +55,7 @@ static unsigned differences(const struct code_test *test)
         for (i = 0; i < test->objects; i++) {
             differs |= margins[i] != expected[i];
         }
+        differs |= test->class_of != 0 && test->class_of(test->values + row * test->features) != test->classes[row];
         wrong += differs != 0;
     }
     return wrong;

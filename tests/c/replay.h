@@ -17,6 +17,9 @@
 #ifndef PALPATE_MAX_OBJECTS
 #define PALPATE_MAX_OBJECTS 256
 #endif
+#ifndef PALPATE_EARLY
+#define PALPATE_EARLY 1
+#endif
 #include "palpate.h"
 
 /* One byte of the commands; -1 at their end. */
@@ -137,6 +140,9 @@ static void replay_known(palpate_answer answer, uint16_t count)
         replay_float(has_value ? palpate_predict_value(&replay_model, replay_features, count) : 0);
         replay_put('\n');
         replay_numbers("margins", replay_margins, objects);
+        replay_text("class");
+        replay_i64((int64_t)palpate_class_of(&replay_model, replay_features, count, replay_margins));
+        replay_put('\n');
     }
     replay_text("evidence");
     for (i = 0; i < objects; i++) {

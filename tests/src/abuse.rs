@@ -5,8 +5,8 @@ use crate::sections::{trained, with_sections};
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
-    Counted, HEADER_LENGTH, Header, Length, Link, MUST_UNDERSTAND, Prediction, Sentinel, Tag, Trained, TrainedNoise,
-    TrainedProbe, TrainedTouches, checksum, write_section,
+    Counted, HEADER_LENGTH, Header, Length, Link, MUST_UNDERSTAND, Prediction, RAW_FEATURES, Sentinel, Tag, Trained,
+    TrainedNoise, TrainedProbe, TrainedTouches, checksum, write_section,
 };
 use palpate_shared::{Descriptor, Patterns};
 
@@ -424,6 +424,32 @@ fn predictions(put: Put<'_>) {
     let sentinel = Sentinel { low: 1, high: 0 }.to_bytes();
     with("a sentinel that is too short", Tag::Sentinel, &sentinel[..7]);
     with("a sentinel that ends before it begins", Tag::Sentinel, &sentinel);
+    with("no weight by the number of touches", Tag::Weights, &[0, 0]);
+    with("weights by the number of touches that are cut", Tag::Weights, &[3, 0, 1, 0, 1, 0, 1]);
+    with("more weights than there are doublings", Tag::Weights, &[&[65, 0][..], &[1; 130]].concat());
+    let table = [0, 0, 0, 0, 4, 3, 0, 1, 1, 2];
+    with("evidence of a row in a model over touches", Tag::RowEvidence, &table);
+    let rows = changed_to_rows(&plain);
+    let mut with = |name: &str, content: &[u8]| {
+        let bytes = with_sections(&rows, &section(Tag::RowEvidence.code() | MUST_UNDERSTAND, content));
+        put(name, "field", optional, bytes);
+    };
+    let at = |place: usize, value: u8| {
+        let mut table = table;
+        table[place] = value;
+        table
+    };
+    with("evidence of a row that is cut", &table[..9]);
+    with("evidence of a row by one value", &at(7, 0));
+    with("evidence of a row that falls", &at(9, 0));
+    with("evidence of a row in steps that are too wide", &at(4, 24));
+    with("evidence of a row in units that are too large", &at(6, 20));
+    with("evidence of a row that starts beyond all margins", &at(3, 0x41));
+}
+
+/// The model over touches as one over rows of as many features.
+fn changed_to_rows(model: &[u8]) -> Vec<u8> {
+    changed(model, 12, &[RAW_FEATURES])
 }
 
 /// Leaves that are numbers of a table.

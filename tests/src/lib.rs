@@ -12,5 +12,6 @@ pub mod replay;
 pub mod scripts;
 pub mod sections;
 pub mod stated;
+pub mod streams;
 pub mod unaligned;
 pub mod vectors;

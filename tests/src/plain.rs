@@ -52,6 +52,15 @@ pub struct Plain<'a> {
     /// Bytes of a leaf's number, and the values of all leaves, if the model shares them.
     sentinel: Option<(i32, i32)>,
     shared: Option<(usize, &'a [u8])>,
+    /// Weights by the number of touches, and what a row's margins become, if the model has them.
+    weights: Vec<u64>,
+    row: Option<&'a [u8]>,
+    /// Places where a class may be known: the groups before, and the lead.
+    exits: Vec<(usize, i64)>,
+    /// True if the last of several largest margins names the class.
+    last_of_ties: bool,
+    /// True if the last object is a background.
+    background: bool,
     /// For each object.
     pub evidence: Vec<i64>,
     /// Number of touches counted.
@@ -114,6 +123,8 @@ impl<'a> Plain<'a> {
             trees: number(&group[4..]) as usize,
         });
         let (mut odds_by_object, mut sharpness, mut shared, mut sentinel) = (Vec::new(), 1 << 16, None, None);
+        let (mut weights, mut row) = (Vec::new(), None);
+        let (mut exits, mut last_of_ties, mut background) = (Vec::new(), false, false);
         // What a model without the section touches was trained on.
         let (mut patterns, mut needs_pose, mut largest) = (0b10_0000, matches!(descriptor, 2 | 3 | 5 | 6), u32::MAX);
         while !optional.is_empty() {
@@ -121,9 +132,17 @@ impl<'a> Plain<'a> {
             let content = &optional[8..][..length];
             match number(&optional[..2]) & 0x7fff {
                 2 => (patterns, needs_pose, largest) = (content[0], content[2] == 1, number(&content[4..8]) as u32),
+                4 => weights = content[2..][..2 * usize::from(content[0])].chunks(2).map(|w| number(w) + 1).collect(),
                 5 => odds_by_object = content[..4 * objects].chunks(4).map(|odds| number(odds) << 24).collect(),
                 11 if (1 << 12..=1 << 20).contains(&number(&content[..4])) => sharpness = number(&content[..4]),
                 12 => shared = Some((content[0].into(), &content[4..])),
+                16 => row = Some(content),
+                6 => background = content[0] == 1,
+                13 => last_of_ties = content[1] == 1,
+                17 => {
+                    let exit = |exit: &[u8]| (number(&exit[..2]) as usize, number(&exit[4..]) as i64);
+                    exits = content.chunks_exact(8).map(exit).collect();
+                }
                 14 => sentinel = Some((signed(&content[..4]), signed(&content[4..8]))),
                 _ => {}
             }
@@ -152,6 +171,11 @@ impl<'a> Plain<'a> {
             leaves,
             sentinel,
             shared,
+            weights,
+            row,
+            exits,
+            last_of_ties,
+            background,
             evidence: Vec::new(),
             touches: 0,
             decision: Decision::Undecided,
@@ -226,8 +250,28 @@ impl<'a> Plain<'a> {
         features
     }
 
+    /// The class of a row of features, where integers are added: known as early as the model says.
+    pub fn class(&self, features: &[i32]) -> usize {
+        let known = self.objects - usize::from(self.background);
+        let mut exits = self.exits.iter().peekable();
+        let sums = self.sums_until(features, &mut |groups, sums| {
+            let Some(&(_, bound)) = exits.next_if(|exit| exit.0 == groups) else { return false };
+            let mut sums: Vec<i64> = sums[..known].iter().map(|&sum| sum.into()).collect();
+            sums.sort_unstable();
+            known == 1 || sums[known - 1] - sums[known - 2] > bound
+        });
+        let most = sums[..known].iter().max().expect("an object");
+        let mut best = (0..known).filter(|&class| sums[class] == *most);
+        if self.last_of_ties { best.next_back() } else { best.next() }.expect("it is there")
+    }
+
     /// The sums of a row of features: units, or the bits of f32 numbers.
     pub fn sums(&self, features: &[i32]) -> Vec<i32> {
+        self.sums_until(features, &mut |_, _| false)
+    }
+
+    /// The same until `is_known` of the number of groups so far and their sums.
+    fn sums_until(&self, features: &[i32], is_known: &mut dyn FnMut(usize, &[i32]) -> bool) -> Vec<i32> {
         let is_missing = |value: i32| self.sentinel.is_some_and(|(low, high)| low <= value && value <= high);
         let feature =
             |index: usize| features.get(index).copied().filter(|value| !is_missing(*value)).unwrap_or(MISSING);
@@ -252,7 +296,7 @@ impl<'a> Plain<'a> {
             }
         }
         let mut splits = self.splits;
-        for group in &self.groups {
+        for (number_of_group, group) in self.groups.iter().enumerate() {
             let length = size * if group.object.is_some() { 1 } else { self.objects };
             for tree in 0..group.trees {
                 let (leaf, count) = match self.layout {
@@ -299,6 +343,9 @@ impl<'a> Plain<'a> {
             }
             if self.layout == 1 {
                 splits = &splits[(2 * group.trees) << group.depth..];
+            }
+            if is_known(number_of_group + 1, &sums) {
+                break;
             }
         }
         sums
@@ -351,6 +398,7 @@ impl<'a> Plain<'a> {
             return;
         }
         for (evidence, &margin) in self.evidence.iter_mut().zip(margins) {
+            let margin = self.row.map_or(margin, |table| of_row(table, margin));
             *evidence = evidence.saturating_add(margin.into());
         }
         self.touches += 1;
@@ -370,9 +418,22 @@ impl<'a> Plain<'a> {
     }
 
     fn weight(&self, object: usize, sharpness: u64) -> u64 {
-        let behind = self.evidence[self.leader()].abs_diff(self.evidence[object]).min(u32::MAX.into());
-        let u = (u128::from(behind) * u128::from(self.unit_bits)) >> self.unit_shift;
+        let behind = self.evidence[self.leader()].abs_diff(self.evidence[object]);
+        if behind > u32::MAX.into() {
+            return 0;
+        }
+        let bits = self.unit_bits;
+        let bits = if self.weights.is_empty() { bits } else { (bits * self.factor()) >> 16 };
+        let u = (u128::from(behind) * u128::from(bits)) >> self.unit_shift;
         exp2(if sharpness == 1 << 16 { u as u64 } else { ((u.min(1 << 42) * u128::from(sharpness)) >> 16) as u64 })
+    }
+
+    /// The weight of the evidence so far, in Q16.
+    fn factor(&self) -> u64 {
+        let doublings = self.touches.max(1).ilog2();
+        let half = if doublings == 0 { 0 } else { self.touches >> (doublings - 1) & 1 };
+        let at = (2 * doublings + half) as usize;
+        self.weights[at.min(self.weights.len() - 1)]
     }
 
     /// Sum of the weights of all objects but the leader.
@@ -391,6 +452,16 @@ impl<'a> Plain<'a> {
         let ratio = ((part << 56) / whole) as u64;
         if object == self.leader() { (1 << 56) - ratio } else { ratio }
     }
+}
+
+/// Evidence of a margin of a row, by a table.
+fn of_row(table: &[u8], margin: i32) -> i32 {
+    let (start, [p, q, v, last]) = (signed(&table[..4]), [4, 5, 6, 7].map(|at| u64::from(table[at])));
+    let value = |at: u64| u64::from(table[8 + at as usize]);
+    let beyond = ((i64::from(margin) - i64::from(start)).max(0) as u64 >> p).min((last << q) - 1);
+    let (at, rest) = (beyond >> q, beyond % (1 << q));
+    let found = (value(at) << q) + (value(at + 1) - value(at)) * rest;
+    (found << v) as i32
 }
 
 /// The pattern's code.

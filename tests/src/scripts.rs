@@ -5,8 +5,8 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-    Held, Link, MisfitTerms, ObjectMisfit, OddsByObject, Plan, Prediction, Section, Sentinel, Strangers, Tag,
-    Temperature, f32_key, write_section,
+    EarlyExit, Held, Link, MisfitTerms, ObjectMisfit, OddsByObject, Plan, Prediction, RowEvidence, Section, Sentinel,
+    Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;
@@ -40,8 +40,11 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
     let temperature = Temperature::new(rng.random_range(0.1..10.0)).expect("a temperature");
     let mut sections = Vec::new();
     let mut put = |bytes: &[u8]| sections.extend_from_slice(bytes);
-    let own = model.optional_sections().filter(|section| section.tag < Tag::ThresholdsByObject.code());
+    let own = model.optional_sections().filter(|section| section.tag < Tag::Weights.code());
     own.for_each(|section| section.write(&mut put));
+    if rng.random_bool(0.6) {
+        write_section(Tag::Weights, true, &weights(rng), &mut put);
+    }
     write_section(Tag::ThresholdsByObject, true, &odds, &mut put);
     let background = rng.random_bool(0.5) && objects > 1;
     if rng.random_bool(0.7) {
@@ -64,8 +67,43 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
         let sentinel = Sentinel { low, high: low + rng.random_range(0..100_000) };
         write_section(Tag::Sentinel, true, &sentinel.to_bytes(), &mut put);
     }
+    if model.descriptor().is_none() && rng.random_bool(0.7) {
+        write_section(Tag::RowEvidence, true, &row_evidence(rng), &mut put);
+    }
+    if rng.random_bool(0.5) {
+        // Of any leads, so that not all are those of the largest sum.
+        let groups = model.header().groups();
+        let exits = (1..groups.max(1)).filter(|_| rng.random_bool(0.5)).collect::<Vec<u16>>();
+        let exits = exits.into_iter().map(|groups| EarlyExit { groups, bound: 1 << rng.random_range(0..24) });
+        let content: Vec<u8> = exits.flat_map(EarlyExit::to_bytes).collect();
+        write_section(Tag::EarlyExit, false, &content, &mut put);
+    }
     Section { tag: 300, must_understand: false, content: b"later" }.write(&mut put);
     with_sections(bytes, &sections)
+}
+
+/// Weights by the number of touches, now and then up to the most.
+fn weights(rng: &mut SmallRng) -> Vec<u8> {
+    let mut content = Vec::new();
+    let count = [1, 2, 7, 16, Weights::MOST][rng.random_range(0..5)];
+    let weights: Vec<u32> = (0..count).map(|_| rng.random_range(1..=Weights::ONE)).collect();
+    Weights::write(&weights, &mut |part| content.extend_from_slice(part));
+    content
+}
+
+/// A table from margins to evidence, about margins that occur.
+fn row_evidence(rng: &mut SmallRng) -> Vec<u8> {
+    let mut content = Vec::new();
+    let between = rng.random_range(0..=Shifts::MOST_BETWEEN);
+    let dropped = rng.random_range(0..=Shifts::MOST_STEP - between);
+    let scale = rng.random_range(0..=Shifts::MOST_SCALE - between);
+    let mut values: Vec<u8> = (0..rng.random_range(2..=RowEvidence::MOST)).map(|_| rng.random()).collect();
+    values.sort_unstable();
+    let step = dropped + between;
+    let start = -(1_i32 << rng.random_range(0..=30)).min(1 << rng.random_range(step..27).min(30));
+    let shifts = Shifts { dropped, between, scale };
+    RowEvidence::write(start, shifts, &values, &mut |part| content.extend_from_slice(part));
+    content
 }
 
 /// A background, and mostly a misfit test, with limits that some touches pass and some do not.

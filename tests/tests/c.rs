@@ -1,12 +1,13 @@
 //! `onboard/c/palpate.h` gives the bits that the crate gives: on this machine, under sanitizers, and on emulated chips.
 
 use palpate::compile::{Language, Restated, emit, restate};
-use palpate_onboard::Model;
+use palpate_onboard::{Model, Verdict};
 use palpate_shared::format::{MUST_UNDERSTAND, Tag, Temperature};
 use palpate_tests::abuse::{forgetful, snapshot};
 use palpate_tests::replay::{Script, is_specified};
 use palpate_tests::scripts::{all_models, models, play, script, sealed};
 use palpate_tests::sections::with_sections;
+use palpate_tests::streams::{Stream, streams};
 use palpate_tests::vectors;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
@@ -75,6 +76,41 @@ fn touches_and_rows_give_the_bits_of_the_crate() {
         ["verdict 0", "verdict 1", "verdict 2", "verdict 3", "refused 1", "refused 2", "refused 3"].map(verdicts);
     assert!(counted[0] >= 100_000 && counted[1] >= counted[0] + 100_000, "{counted:?}");
     assert!(verdicts.iter().all(|&count| count > 100), "{verdicts:?}");
+}
+
+/// Verdict after verdict on a stream of rows.
+fn play_stream<'m>(script: &mut Script<'m>, stream: &'m Stream) {
+    assert!(script.open(&stream.bytes), "{}", stream.kind);
+    for row in &stream.rows {
+        script.row(row);
+        if script.recognizer().verdict() != Verdict::Undecided {
+            script.posteriors();
+            script.reset();
+        }
+    }
+}
+
+#[test]
+fn calibrated_models_of_five_kinds_give_the_same_verdicts_at_the_same_rows() {
+    let directory = tempfile::tempdir().unwrap();
+    let program = here(&[], directory.path()).unwrap();
+    let streams = streams(10_000);
+    for stream in &streams {
+        let mut script = Script::default();
+        play_stream(&mut script, stream);
+        compare(&run(&mut Command::new(&program), &script.commands), &script);
+        let given = script.expected.lines().filter(|line| line.starts_with("verdict 1")).count();
+        let model = Model::new(&stream.bytes).unwrap();
+        println!(
+            "{}: {} rows, {given} names, a table: {}",
+            stream.kind,
+            stream.rows.len(),
+            model.row_evidence().is_some()
+        );
+        assert!(given > 300 && count(&script, "verdict") >= 10_000, "{}: {given}", stream.kind);
+        // Shares of votes are no log-probabilities.
+        assert!(model.row_evidence().is_some() || stream.kind != "votes of a forest");
+    }
 }
 
 /// A model with some bytes changed, moved, cut or put in; its length and checksum nearly always right.
@@ -337,7 +373,9 @@ fn emulated_chips_give_the_bits_of_the_crate() {
     // 256 objects are hundreds of numbers to write.
     models.retain(|bytes| bytes[14] < 20);
     let touches = std::env::var("PALPATE_C_TOUCHES").map_or(2_000, |count| count.parse().expect("a number of touches"));
-    let script = script(&models, touches, touches, &mut rng);
+    let streams = streams(touches);
+    let mut script = script(&models, touches, touches, &mut rng);
+    streams.iter().for_each(|stream| play_stream(&mut script, stream));
     for (chip, compiler, flags, emulator) in CHIPS {
         let directory = tempfile::tempdir().unwrap();
         let program = directory.path().join("replay");

@@ -43,6 +43,7 @@ fn promise() -> Promise {
         per: Per::Name,
         approaches: false,
         active: false,
+        groups: false,
         sequences: 50_000,
         given: 49_000,
         wrong: 201,

@@ -1,12 +1,12 @@
 //! Proofs: every model of an ensemble is proved, and no change of a model's meaning is.
 
-use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::compile::{EarlyExit, Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node};
 use palpate::error::ProofProblem;
 use palpate::prove::{Certificate, check, moves, prove};
 use palpate::rows::Encoder;
 use palpate_onboard::Model;
-use palpate_shared::format::{Header, checksum};
+use palpate_shared::format::{Header, Tag, checksum};
 use palpate_shared::{Descriptor, MISSING_FEATURE};
 use palpate_tests::random::{self, Shape};
 use proptest::prelude::*;
@@ -50,6 +50,18 @@ fn models(ensemble: &Ensemble, scales: Option<Vec<f32>>) -> Vec<Vec<u8>> {
     let all = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
     let compiled = all.filter_map(|(leaf, layout)| {
         compile(ensemble, &Settings { leaf, layout, scales: scales.clone(), ..Settings::default() }).ok()
+    });
+    compiled.map(|compiled| compiled.bytes).collect()
+}
+
+/// Its models whose walks for a class alone may end early.
+fn early_exits(ensemble: &Ensemble, scales: Option<Vec<f32>>) -> Vec<Vec<u8>> {
+    let all = [Leaf::I8, Leaf::I16]
+        .into_iter()
+        .flat_map(|leaf| [Layout::Complete, Layout::Compact, Layout::Wide].map(|layout| (leaf, layout)));
+    let compiled = all.filter_map(|(leaf, layout)| {
+        let (layout, early_exit) = (Some(layout), Some(EarlyExit::Always));
+        compile(ensemble, &Settings { leaf, layout, early_exit, scales: scales.clone(), ..Settings::default() }).ok()
     });
     compiled.map(|compiled| compiled.bytes).collect()
 }
@@ -129,7 +141,7 @@ proptest! {
     fn models_of_rows_are_proved_by_keys_and_in_units(shape in shapes(), features in 1..=40_usize, seed: u64) {
         let ensemble = over_rows(random::ensemble(shape, seed), features);
         for scales in [None, Some(vec![100.0; features])] {
-            for bytes in models(&ensemble, scales) {
+            for bytes in models(&ensemble, scales.clone()).into_iter().chain(early_exits(&ensemble, scales)) {
                 is_proved(&bytes, &ensemble)?;
             }
         }
@@ -356,4 +368,60 @@ fn thousands_of_merged_trees_are_proved() {
         assert!(20 * proof.trees < ensemble.trees.len(), "{} trees", proof.trees);
         check(&certificate, &bytes, &ensemble, FILE).unwrap();
     }
+}
+
+#[test]
+fn changed_bounds_of_early_exits_that_change_a_class_are_refused_in_both_ways() {
+    let mut random = SmallRng::seed_from_u64(8);
+    let [mut refused, mut harmless, mut wrong] = [0; 3];
+    for each in [false, true] {
+        let shape = Shape { objects: 3, trees: 24, depth: 4, thresholds: 20, each, ..Shape::SMALL };
+        let ensemble = over_rows(random::ensemble(shape, 12), 3);
+        for bytes in early_exits(&ensemble, None).into_iter().step_by(2) {
+            let (_, certificate) = prove(&bytes, &ensemble, FILE).unwrap();
+            let model = Model::new(&bytes).unwrap();
+            let section = model.optional_sections().find(|section| section.tag == Tag::EarlyExit.code()).unwrap();
+            let at = section.content.as_ptr().addr() - bytes.as_ptr().addr();
+            let encoder = Encoder::of(&model);
+            let value = |random: &mut SmallRng| match random.random_range(0..10) {
+                0 => f64::NAN,
+                _ => f64::from(random.random_range(-40_000..40_000_i32)) / 8.0,
+            };
+            let rows: Vec<Vec<i32>> = (0..1_000).map(|_| encoder.row(&[0; 3].map(|_| value(&mut random)))).collect();
+            let mut changes: Vec<Vec<u8>> = (0..8 * section.content.len())
+                .map(|bit| {
+                    let mut changed = bytes.clone();
+                    changed[at + bit / 8] ^= 1 << (bit % 8);
+                    changed
+                })
+                .collect();
+            changes.extend((0..section.content.len() / 8).map(|place| {
+                let mut changed = bytes.clone();
+                changed[at + 8 * place + 4..][..4].fill(0);
+                changed
+            }));
+            for mut changed in changes {
+                let body = changed.len() - 4;
+                let sum = checksum(&changed[..body]);
+                changed[body..].copy_from_slice(&sum.to_le_bytes());
+                let model = Model::new(&changed).unwrap();
+                let of_changed = crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(&changed);
+                let certificate = Certificate { model: of_changed, ..certificate.clone() };
+                let is_refused = [
+                    prove(&changed, &ensemble, FILE).is_err(),
+                    check(&certificate, &changed, &ensemble, FILE).is_err(),
+                ];
+                let mut room = [0; 3];
+                let mut class =
+                    |row: &Vec<i32>| model.class_of(row, &mut room) != model.predict_class(row, &mut [0; 3]);
+                let is_wrong = rows.iter().any(&mut class);
+                assert!(!is_wrong || is_refused == [true; 2], "{is_refused:?} of {:?}", model.layout());
+                wrong += usize::from(is_wrong);
+                refused += usize::from(is_refused == [true; 2]);
+                harmless += usize::from(is_refused == [false; 2]);
+            }
+        }
+    }
+    println!("{wrong} changes change a class, {refused} are refused, {harmless} are proved");
+    assert!(wrong > 5 && refused > 40 && harmless > 100, "{wrong} {refused} {harmless}");
 }

@@ -194,15 +194,21 @@ const CHIPS: [(usize, &str, &str); 4] = [
 const C_ROWS: [(&str, &str); 5] = [
     (
         "rows, one layout (complete), i8 leaves",
-        "-DROWS -DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0",
+        "-DROWS -DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0",
     ),
     (
         "touches, one layout (complete), i8 leaves",
-        "-DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0",
+        "-DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0",
     ),
-    ("touches, all layouts and leaves", "-DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0"),
-    ("… and a misfit test", "-DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0"),
-    ("everything: also posteriors, snapshots, names", "-DEVERYTHING -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0"),
+    (
+        "touches, all layouts and leaves",
+        "-DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0",
+    ),
+    ("… and a misfit test", "-DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0"),
+    (
+        "everything: also posteriors, snapshots, names",
+        "-DEVERYTHING -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0",
+    ),
 ];
 
 /// The columns of instructions: tools, flags, emulator.

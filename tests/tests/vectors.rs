@@ -86,6 +86,10 @@ impl<'m> Both<'m> {
                 assert!(self.model.margins_of(&self.features, &mut margins));
                 assert_eq!((&margins, self.plain.margins(&sums())), (&read_numbers(words), read_numbers(words)));
             }
+            "class" => {
+                let class = self.model.class_of(&self.features, &mut vec![0; self.model.object_count()]).unwrap();
+                assert_eq!((class, self.plain.class(&self.features)), (words.parse().unwrap(), class));
+            }
             "evidence" => {
                 let evidence: Vec<i64> = words.split(' ').map(|number| number.parse().unwrap()).collect();
                 assert_eq!((self.recognizer.evidence(), &self.plain.evidence), (&evidence[..], &evidence));

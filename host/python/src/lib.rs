@@ -11,6 +11,7 @@ mod model;
 mod named;
 mod objects;
 mod recognizer;
+mod stream;
 mod surface;
 mod work;
 
@@ -29,6 +30,8 @@ mod _native {
     use crate::model::{Model, compile};
     #[pymodule_export]
     use crate::recognizer::Recognizer;
+    #[pymodule_export]
+    use crate::stream::{calibrate, evaluate_sequences};
     #[pymodule_export]
     use crate::surface::Surface;
 }

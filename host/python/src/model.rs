@@ -43,7 +43,7 @@ pub(crate) struct Model {
 }
 
 impl Model {
-    fn of(bytes: Vec<u8>) -> palpate::Result<Self> {
+    pub(crate) fn of(bytes: Vec<u8>) -> palpate::Result<Self> {
         let opened = OpenedModel::try_new(bytes, |bytes| {
             onboard::Model::new(bytes).map_err(|error| Error::from(CompileProblem::Model(error)))
         })?;

@@ -34,6 +34,7 @@ mod simulator;
 mod stages;
 pub mod statistics;
 mod strangers;
+pub mod stream;
 pub mod teach;
 pub mod view;
 

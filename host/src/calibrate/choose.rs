@@ -9,7 +9,7 @@ use rayon::prelude::*;
 /// Between two thresholds that are tried, in nats.
 const STEP: f64 = 0.01;
 /// The loosest threshold that is tried, in nats.
-const LOOSEST: f64 = 0.05;
+pub(super) const LOOSEST: f64 = 0.05;
 /// Steps at once where names have thresholds of their own.
 const NAMES_STEP: usize = 2;
 /// Steps at once where sequences are cut anew at each.
@@ -81,6 +81,26 @@ pub(super) fn chosen(
 ) -> Result<Chosen, CalibrateProblem> {
     let Terms { rate, confidence, per } = *terms;
     let count = objects.len();
+    let of = |position: usize| (per != Per::Average).then(|| objects.get(position).cloned()).flatten();
+    let (kept, tested) = kept(sequences, count, strictest, terms).map_err(|stop| match stop {
+        Stop::TooFew { position, found } => {
+            CalibrateProblem::TooFew { object: of(position), rate, found, needed: needed(rate, confidence), supplied }
+        }
+        Stop::TooMany { position, tally: Tally { wrong, all } } => {
+            CalibrateProblem::NotKept { object: of(position), rate, wrong, given: all }
+        }
+    })?;
+    Ok(summary(kept.threshold, kept.tallies, &tested, count))
+}
+
+/// The thresholds that are kept, and the sequences that they were tested on.
+fn kept<'s>(
+    sequences: &'s [Sequence],
+    count: usize,
+    strictest: f64,
+    terms: &Terms,
+) -> Result<(Kept<Odds>, Vec<&'s Sequence>), Stop> {
+    let Terms { rate, confidence, per } = *terms;
     let mut tested: Vec<&Sequence> = sequences.iter().collect();
     let kept: Result<Kept<Odds>, Stop> = match per {
         Per::Average | Per::Object => {
@@ -102,20 +122,25 @@ pub(super) fn chosen(
             walk(steps.into_iter().map(tally), rate, confidence)
         }
     };
-    let of = |position: usize| (per != Per::Average).then(|| objects.get(position).cloned()).flatten();
-    let Kept { threshold, tallies } = kept.map_err(|stop| match stop {
-        Stop::TooFew { position, found } => {
-            CalibrateProblem::TooFew { object: of(position), rate, found, needed: needed(rate, confidence), supplied }
-        }
-        Stop::TooMany { position, tally: Tally { wrong, all } } => {
-            CalibrateProblem::NotKept { object: of(position), rate, wrong, given: all }
-        }
-    })?;
-    Ok(summary(threshold, tallies, &tested, count))
+    Ok((kept?, tested))
+}
+
+/// The same of independent sequences that were not drawn from a supply; `objects` is the number of objects.
+///
+/// # Errors
+/// [`Stop`], if no threshold can be kept.
+pub fn choose_independent(
+    sequences: &[Sequence],
+    objects: usize,
+    strictest: f64,
+    terms: &Terms,
+) -> Result<Chosen, Stop> {
+    let (kept, tested) = kept(sequences, objects, strictest, terms)?;
+    Ok(summary(kept.threshold, kept.tallies, &tested, objects))
 }
 
 /// Margins from `strict` to `loose`.
-fn grid(strict: f64, loose: f64) -> impl Iterator<Item = f64> {
+pub(super) fn grid(strict: f64, loose: f64) -> impl Iterator<Item = f64> {
     let steps = ((strict - loose) / STEP).round().max(0.0) as usize;
     (0..=steps).map(move |step| strict - STEP * step as f64)
 }
@@ -151,6 +176,14 @@ pub(super) enum By {
 }
 
 impl By {
+    /// Number of cases.
+    pub(super) const fn count(self) -> usize {
+        match self {
+            Self::All => 1,
+            Self::Touched(objects) | Self::Named(objects) => objects,
+        }
+    }
+
     /// The cases that a rate is promised of.
     pub(super) fn of(per: Per, objects: usize) -> Self {
         match per {
@@ -162,10 +195,7 @@ impl By {
 }
 
 pub(super) fn tallies(sequences: &[&Sequence], odds: &Odds, by: By) -> Vec<Tally> {
-    let count = match by {
-        By::All => 1,
-        By::Touched(objects) | By::Named(objects) => objects,
-    };
+    let count = by.count();
     let none = || vec![Tally::default(); count];
     let add = |mut tallies: Vec<Tally>, sequence: &&Sequence| {
         if let Some(look) = sequence.given(odds) {
@@ -205,7 +235,7 @@ fn learned_and_tested<'s>(sequences: &[&'s Sequence]) -> (Vec<&'s Sequence>, Vec
 /// The margins at which each name seems to be wrong as often as promised. They loosen together; a name that is wrong more
 /// often stays where it was, while the others go on. What those take from it later may make it wrong more often, and
 /// then it is made stricter. Nothing is promised for them: that takes a test on other sequences.
-fn learned(sequences: &[&Sequence], count: usize, strictest: f64, rate: f64) -> Vec<f64> {
+pub(super) fn learned(sequences: &[&Sequence], count: usize, strictest: f64, rate: f64) -> Vec<f64> {
     // As if one more had been wrong: a name that was hardly ever given is not given freely.
     let seems_kept = |tally: Tally| (tally.wrong + 1) as f64 <= rate * (tally.all + 1) as f64;
     let tells = |tally: Tally| rate * (tally.all + 1) as f64 >= 1.0;
@@ -240,7 +270,7 @@ fn learned(sequences: &[&Sequence], count: usize, strictest: f64, rate: f64) -> 
 }
 
 /// Thresholds by name about the learned ones, from strict to loose: all names' by as much.
-fn around(learned: &[f64], strictest: f64) -> Vec<Odds> {
+pub(super) fn around(learned: &[f64], strictest: f64) -> Vec<Odds> {
     let [strict, loose] = AROUND;
     let steps = ((strict - loose) / (STEP * NAMES_STEP as f64)).round() as usize;
     let odds = (0..=steps).map(|step| {

@@ -33,6 +33,44 @@ pub enum CalibrateProblem {
         /// Names given.
         given: u64,
     },
+    /// There are too few sequences of rows, or groups of them, for a promise, even without any error.
+    #[error("{found} {}{} are too few to promise {} %: at least {needed} are needed, none of them wrong; {}", what(*groups, object.is_some()), of_object(object), percent(*rate), could(*possible))]
+    TooFewSequences {
+        /// The class whose names are too few, if the promise is for each.
+        object: Option<String>,
+        /// The promised rate.
+        rate: f64,
+        /// Sequences, or groups.
+        found: u64,
+        /// As many as are needed.
+        needed: u64,
+        /// The least rate that as many as there are could promise, if any below one half.
+        possible: Option<f64>,
+        /// True if it is groups that are too few.
+        groups: bool,
+    },
+    /// No threshold keeps the promise on sequences of rows.
+    #[error("no threshold keeps {} %: at the strictest {wrong} of {given} names{} are wrong, of {units} {}", percent(*rate), of_object(object), what(*groups, false))]
+    NotKeptByRows {
+        /// The class that is named, or right, if the promise is for each.
+        object: Option<String>,
+        /// The promised rate.
+        rate: f64,
+        /// Wrong names.
+        wrong: u64,
+        /// Names given.
+        given: u64,
+        /// Sequences, or groups, that there are.
+        units: u64,
+        /// True if the promise is for groups.
+        groups: bool,
+    },
+    /// Sequences of some classes are missing.
+    #[error("there is no sequence of {}", objects.join(", "))]
+    MissingSequences {
+        /// Classes that the model knows and no sequence is of.
+        objects: Vec<String>,
+    },
     /// Recordings do not support the rate.
     #[error("{}", not_supported(object, *rate, *tally, *needed, forecast))]
     NotSupported {
@@ -100,6 +138,14 @@ pub struct Enough {
 impl Problem for CalibrateProblem {
     fn fix(&self) -> String {
         match self {
+            Self::TooFewSequences { groups: true, .. } => {
+                "Record more groups, or promise a higher error rate; more sequences of the same groups do not help."
+            }
+            Self::TooFewSequences { .. } => "Record more sequences, or promise a higher error rate.",
+            Self::NotKeptByRows { .. } => {
+                "Promise a higher error rate, give sequences of more rows, or train the model on rows like these."
+            }
+            Self::MissingSequences { .. } => "Add sequences of them.",
             Self::TooFew { supplied: None, .. } => "Allow more sequences, or promise a higher error rate.",
             Self::TooFew { supplied: Some(_), .. } => "Record or capture more touches, or promise a higher error rate.",
             Self::NotKept { .. } => {
@@ -117,6 +163,21 @@ impl Problem for CalibrateProblem {
         }
         .into()
     }
+}
+
+fn what(groups: bool, names: bool) -> &'static str {
+    match (groups, names) {
+        (true, _) => "groups of sequences",
+        (false, true) => "names given",
+        (false, false) => "sequences",
+    }
+}
+
+fn could(possible: Option<f64>) -> String {
+    possible.map_or_else(
+        || "as many could promise nothing".into(),
+        |rate| format!("as many could promise {} %", percent(rate)),
+    )
 }
 
 fn percent(rate: f64) -> f64 {

@@ -38,6 +38,7 @@ mod demand;
 mod draw;
 mod error;
 mod fresh;
+mod groups;
 mod model;
 mod recorded;
 #[cfg(all(test, feature = "train"))]
@@ -48,10 +49,12 @@ mod temperature;
 mod tests;
 mod walk;
 
-pub use choose::{Chosen, Terms, choose};
+pub use choose::{Chosen, Terms, choose, choose_independent};
 pub use draw::{Moment, Supply, Until, follow, follow_plan};
 pub use error::{CalibrateProblem, Enough, Forecast, Supplied};
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
+pub use groups::{Grouped, choose_groups};
+pub(crate) use model::worse;
 pub use model::{Calibrated, OfObject, OfRecorded, Settings, Worse, added_bytes, calibrate};
 #[cfg(feature = "train")]
 pub(crate) use model::{STRICTEST, add_noise, calibrate_from};

@@ -146,7 +146,7 @@ impl Calibrated {
     }
 }
 
-pub(super) fn worse(objects: &BTreeMap<String, OfObject>, rate: f64) -> Vec<Worse> {
+pub(crate) fn worse(objects: &BTreeMap<String, OfObject>, rate: f64) -> Vec<Worse> {
     let above = |wrong: u64, all: u64| {
         let below = wrong.checked_sub(1).map_or(0.0, |wrong| binomial_tail(Tally { wrong, all }, rate));
         (all > 0 && below >= 0.99).then(|| wrong as f64 / all as f64)
@@ -370,6 +370,7 @@ pub(super) fn finished(
         per: settings.per,
         approaches,
         active: settings.active,
+        groups: false,
         sequences: count(chosen.sequences),
         given: count(chosen.given),
         wrong: count(chosen.wrong),

@@ -66,12 +66,14 @@ pub struct Sequence {
     /// Approaches at its end.
     pub approaches: u32,
     looks: Vec<Look>,
+    /// True if it ended since it fits no object that the model knows.
+    unknown: bool,
 }
 
 impl Sequence {
     /// A sequence of touches of an object, by its index in the model, without any touch yet.
     pub fn new(object: usize) -> Self {
-        Self { object, touches: 0, approaches: 0, looks: Vec::new() }
+        Self { object, touches: 0, approaches: 0, looks: Vec::new(), unknown: false }
     }
 
     /// Takes in what a recognizer knows after the approach with this number. `may_name` is false where a verdict would be
@@ -96,6 +98,16 @@ impl Sequence {
     /// Takes in that the sequence ended after this approach, whose touch was no evidence.
     pub fn end(&mut self, approaches: u32) {
         self.approaches = self.approaches.max(approaches);
+    }
+
+    /// Takes in that a test for unknown objects ended it here.
+    pub fn make_unknown(&mut self) {
+        self.unknown = true;
+    }
+
+    /// True if a test for unknown objects ended it, if no threshold gave a name before.
+    pub fn is_unknown(&self) -> bool {
+        self.unknown
     }
 
     /// The first moment at which a threshold is passed, as a recognizer with these thresholds would stop.

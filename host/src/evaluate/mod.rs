@@ -45,7 +45,7 @@ pub mod model_file;
 mod noisy;
 pub mod parity;
 mod plan;
-mod promise;
+pub(crate) mod promise;
 mod sequential;
 mod strangers;
 mod switch;

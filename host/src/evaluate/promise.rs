@@ -26,7 +26,7 @@ pub enum Finding {
 }
 
 /// The probability of errors that a promise just kept is taken to be able to make.
-const BY_CHANCE: f64 = 0.01;
+pub(crate) const BY_CHANCE: f64 = 0.01;
 
 /// Check of a model's promise on test touches. Shares are of the names that are given; a sequence that ends undecided
 /// counts as neither right nor wrong.
@@ -231,7 +231,7 @@ impl Wrong {
 }
 
 /// The probability of at least `errors`, of which there is at least one, in `trials` at a rate: the binomial upper tail.
-fn at_least(errors: f64, trials: f64, rate: f64) -> f64 {
+pub(crate) fn at_least(errors: f64, trials: f64, rate: f64) -> f64 {
     let ln_choose = libm::lgamma(trials + 1.0) - libm::lgamma(errors + 1.0) - libm::lgamma(trials - errors + 1.0);
     let mut term = (ln_choose + errors * rate.ln() + (trials - errors) * (1.0 - rate).ln()).exp();
     let (mut tail, mut count) = (term, errors);

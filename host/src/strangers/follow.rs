@@ -136,7 +136,7 @@ fn one<'r>(
         evidence.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += i64::from(margin));
         let misfit = model.misfit(&evidence, touches).filter(|_| touches >= FIRST);
         let level = misfit.map_or(f64::NEG_INFINITY, |misfit| misfit as f64 / NAT - early(touches));
-        let look = Look { level, is_decided: is_decided(model, &evidence) };
+        let look = Look { level, is_decided: is_decided(model, &evidence, touches) };
         looks.push(look);
         match policy.until {
             Until::Named { level } if touches >= policy.least && look.is_decided && look.level <= level => break,
@@ -147,10 +147,12 @@ fn one<'r>(
 }
 
 /// True if the leader's posterior passes the model's threshold.
-fn is_decided(model: &Model<'_>, evidence: &[i64]) -> bool {
+fn is_decided(model: &Model<'_>, evidence: &[i64], touches: u32) -> bool {
     let known = 0..model.known_count();
     let leader = known.reduce(|best, other| if evidence[other] > evidence[best] { other } else { best }).unwrap_or(0);
-    let ahead = |other: i64| (other - evidence[leader]) as f64 * f64::from(model.unit());
+    // A weight of 1 changes nothing.
+    let weight = f64::from(model.weight_of(touches)) / 65_536.0;
+    let ahead = |other: i64| (other - evidence[leader]) as f64 * f64::from(model.unit()) * weight;
     let others = evidence.iter().enumerate().filter(|(object, _)| *object != leader);
     let rivals: f64 = others.map(|(_, &other)| ahead(other).exp()).sum();
     rivals <= Stopping::from_model(model).odds_of(leader, model) as f64 / 2.0_f64.powi(56)

@@ -65,6 +65,9 @@ impl Moments {
             (mean, covariance)
         };
         let of = supplies.par_iter().enumerate().map(|(object, supply)| {
+            if supply.is_short {
+                return of_short(&supply.pools, objects, unit);
+            }
             let recorded = recorded.and_then(|recorded| recorded.get(object)).map(|supply| supply.pools.concat());
             let pools: Vec<(DVector<f64>, DMatrix<f64>)> =
                 supply.pools.iter().chain(&recorded).filter(|rows| !rows.is_empty()).map(of_rows).collect();
@@ -147,6 +150,38 @@ impl Moments {
         }
         rivals
     }
+}
+
+/// Mean and covariance of one row, from short sequences: what differs between these, less what their length makes of the
+/// spread within them (analysis of variance), is in the covariance as it is in the mean of [`AT`] rows.
+fn of_short(pools: &[Vec<i32>], objects: usize, unit: f64) -> (DVector<f64>, DMatrix<f64>) {
+    let row = |row: &[i32]| DVector::from_iterator(objects, row.iter().map(|&margin| f64::from(margin) * unit));
+    let pools: Vec<Vec<DVector<f64>>> = pools
+        .iter()
+        .map(|rows| rows.chunks_exact(objects).map(row).collect::<Vec<_>>())
+        .filter(|rows| !rows.is_empty())
+        .collect();
+    let sum = |rows: &Vec<DVector<f64>>| rows.iter().fold(DVector::zeros(objects), |sum: DVector<f64>, row| sum + row);
+    let means: Vec<DVector<f64>> = pools.iter().map(|rows| sum(rows) / rows.len() as f64).collect();
+    let count = pools.len().max(1) as f64;
+    let mean = sum(&means) / count;
+    let mut within = DMatrix::zeros(objects, objects);
+    let mut freedom = 0.0;
+    for (rows, own) in pools.iter().zip(&means) {
+        rows.iter().map(|row| row - own).for_each(|away| within.ger(1.0, &away, &away, 1.0));
+        freedom += rows.len() as f64 - 1.0;
+    }
+    let mut between = DMatrix::zeros(objects, objects);
+    means.iter().map(|own| own - &mean).for_each(|away| between.ger(1.0 / count, &away, &away, 1.0));
+    if freedom < 1.0 {
+        return (mean, between);
+    }
+    within /= freedom;
+    between -= &within * (pools.iter().map(|rows| 1.0 / rows.len() as f64).sum::<f64>() / count);
+    // What is left below 0 is chance.
+    let mut parts = between.symmetric_eigen();
+    parts.eigenvalues.iter_mut().for_each(|value| *value = value.max(0.0));
+    (mean, within + parts.recompose() * AT)
 }
 
 /// The misfit of every known object; none if one has none.

@@ -69,6 +69,8 @@ const MOST_HELD: u32 = 120;
 /// Between two thresholds that are tried, in nats, and how many are.
 const STEP: f64 = 0.05;
 const STEPS: usize = 400;
+/// Above the loosest threshold, in nats: the most that is tried.
+const MOST_BEYOND: f64 = 1_000.0;
 /// 2^-16 nats.
 const NAT: f64 = 65_536.0;
 
@@ -115,14 +117,21 @@ pub struct Calibrated {
 
 /// The margins of one object's touches that are evidence, in the order in which they are used.
 #[derive(Debug, Default)]
-struct Supply {
+pub(crate) struct Supply {
     /// For each source, such as an instance, and each robot one row after the other, in units.
     pools: Vec<Vec<i32>>,
     /// True if a pool is a robot's, which makes one sequence.
     is_once: bool,
+    /// True if pools are short: how far their means are apart says more of their length than of what differs between them.
+    is_short: bool,
 }
 
 impl Supply {
+    /// Of sequences of rows: the evidence of each, row after row, in units.
+    pub(crate) fn of_rows(pools: Vec<Vec<i32>>) -> Self {
+        Self { pools, is_once: true, is_short: true }
+    }
+
     /// A quarter of the touches, or of the robots, to learn from, and the rest to test on.
     fn divided(mut self, objects: usize) -> [Self; 2] {
         let is_once = self.is_once;
@@ -131,7 +140,8 @@ impl Supply {
         } else {
             self.pools.iter_mut().map(|rows| rows.split_off(rows.len() / objects / 4 * objects)).collect()
         };
-        [self, Self { pools: rest, is_once }]
+        let is_short = self.is_short;
+        [self, Self { pools: rest, is_once, is_short }]
     }
 }
 
@@ -183,13 +193,25 @@ fn calibrate_on(
 ) -> Result<Calibrated> {
     check(settings)?;
     let given = supplies(model, dataset, settings.seed)?;
+    let recorded = recorded.map(|recorded| supplies(model, recorded, settings.seed)).transpose()?;
+    calibrate_supplies(model, given, recorded, &of_shapes(model, shapes), settings)
+}
+
+/// The same of margins: of each known object, recorded ones too if there are some, and the mean ones of other shapes.
+pub(crate) fn calibrate_supplies(
+    model: &Model<'_>,
+    given: Vec<Supply>,
+    recorded: Option<Vec<Supply>>,
+    shapes: &[Vec<f64>],
+    settings: &Settings,
+) -> Result<Calibrated> {
+    check(settings)?;
     let objects = model.object_count();
     let unit = f64::from(model.unit());
     let (learn, test) = learned_and_tested(given, objects);
     let known = model.known_count();
-    let recorded = recorded.map(|recorded| supplies(model, recorded, settings.seed)).transpose()?;
     let (recorded_learn, recorded_test) = recorded.map(|all| recorded::halves(all, objects)).unzip();
-    let moments = Moments::new(&learn, recorded_learn.as_deref(), &of_shapes(model, shapes), known, objects, unit);
+    let moments = Moments::new(&learn, recorded_learn.as_deref(), shapes, known, objects, unit);
     let misfits = misfit::misfits(&moments, None)
         .ok_or(EvaluateProblem::TooFewForMisfit { found: learn_count(&learn, objects) })?;
     let terms = |threshold: f64, least: u32| terms(settings, &misfits, threshold, least);
@@ -206,10 +228,13 @@ fn calibrate_on(
         Held::Certain => found_out(&left_out).min(free.last()).max(FIRST),
     };
     let loosest = rough - below(settings.held);
+    let to_the_end = Policy { until: follow::Until::Touches(model.header().max_touches()), least: FIRST };
+    let is_short = learn.iter().any(|supply| supply.is_short);
+    let strictest = strictest(is_short.then(|| follow(&learn, &to_the_end)), settings, loosest);
     let policy = Policy { until: follow::Until::Named { level: loosest - doubt(settings.held) }, least };
     let sequences = follow(&test, &policy);
     let all = equally_many(&sequences);
-    let tried = Tried { loosest, least, gap: doubt(settings.held) };
+    let tried = Tried { loosest, strictest, least, gap: doubt(settings.held) };
     let simulated = tried.threshold(&all, settings.alarms, settings.confidence).ok_or_else(|| {
         let needed = needed(settings.alarms, settings.confidence).div_ceil(known.max(1) as u64);
         EvaluateProblem::TooFewForAlarms { object_sequences: all.len() / known.max(1), needed }
@@ -328,7 +353,7 @@ fn supplies(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Vec<Suppl
             }
             margins_of_touches(model, &touches)
         };
-        Ok(Supply { pools: (0..).zip(touched.pools()).map(pool).collect(), is_once })
+        Ok(Supply { pools: (0..).zip(touched.pools()).map(pool).collect(), is_once, is_short: false })
     };
     known.iter().map(supply).collect()
 }
@@ -410,9 +435,18 @@ fn found_out(left_out: &[Vec<f64>]) -> u32 {
     (0..longest).position(|touches| mean(touches) >= FOUND_OUT).map_or(MOST_HELD, |touches| touches as u32 + 1)
 }
 
+/// The threshold from which looser ones are tested. Rows of a sequence that depend on each other make a misfit that goes on
+/// growing: then where those that were learned from have half as many false alarms as are allowed, if that is beyond.
+fn strictest(learned: Option<Vec<Vec<Sequence>>>, settings: &Settings, loosest: f64) -> f64 {
+    let own = loosest + STEP * STEPS as f64;
+    let few = learned.map_or(own, |learned| follow::quantile(&learned, 1.0 - 0.5 * settings.alarms));
+    few.max(own).min(loosest + MOST_BEYOND)
+}
+
 /// Thresholds that are tried, from strict to loose.
 struct Tried {
     loosest: f64,
+    strictest: f64,
     least: u32,
     /// By how much a misfit must be below the threshold for a name, in nats.
     gap: f64,
@@ -430,7 +464,8 @@ impl Tried {
     /// sequences, or too many alarms at the strictest.
     fn threshold(&self, sequences: &[&Sequence], alarms: f64, confidence: f64) -> Option<f64> {
         let allowed = allowed(sequences.len() as u64, alarms, confidence)?;
-        let thresholds = (0..STEPS).map(|step| self.loosest + STEP * (STEPS - 1 - step) as f64);
+        let steps = ((self.strictest - self.loosest) / STEP).round() as usize;
+        let thresholds = (0..steps).map(|step| self.loosest + STEP * (steps - 1 - step) as f64);
         thresholds.take_while(|&threshold| self.ends(sequences, threshold)[0] <= allowed).last()
     }
 }

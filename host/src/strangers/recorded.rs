@@ -48,7 +48,7 @@ pub(super) fn halves(supplies: Vec<Supply>, objects: usize) -> (Vec<Supply>, Vec
     let of = |mut supply: Supply| {
         let half = |rows: &mut Vec<i32>| rows.split_off(rows.len() / objects / 2 * objects);
         let pools = supply.pools.iter_mut().map(half).collect();
-        let test = Supply { pools, is_once: supply.is_once };
+        let test = Supply { pools, is_once: supply.is_once, is_short: supply.is_short };
         (supply, test)
     };
     supplies.into_iter().map(of).unzip()

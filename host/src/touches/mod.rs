@@ -72,6 +72,8 @@ pub use log::{Log, LogWriter, Logged, begins_log, is_log, read_touches};
 pub use logged::{Channels, LoggedVerdict, Message, Said};
 pub use object::{ObjectTouches, Pool, Source};
 pub use origin::Origin;
+#[cfg(feature = "parquet")]
+pub(crate) use parquet::table as parquet_table;
 pub use recording::{Recorded, Recording};
 pub use seconds::touch_of_seconds;
 pub use shard::Shard;

@@ -1,6 +1,7 @@
 //! Evidence of the touches so far for each object.
 
 use crate::exponential::exp2_negative;
+use palpate_shared::format::Weights;
 
 /// A posterior probability, in Q56: fine enough to distinguish 1 − 1e-16 from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,6 +71,16 @@ pub(crate) const SHARPNESS: u32 = 1 << 16;
 const MOST_BITS: u64 = 1 << 42;
 
 impl Unit {
+    /// The same of evidence with a weight in Q16 that is at most 1, rounded down: in products of 32 bits.
+    pub(crate) const fn weighed(self, weight: u32) -> Self {
+        if !cfg!(feature = "row-evidence") || weight >= Weights::ONE {
+            return self;
+        }
+        // Below 2^32 each, and together.
+        let (high, low) = ((self.bits >> 16).wrapping_mul(weight), (self.bits & 0xffff).wrapping_mul(weight) >> 16);
+        Self { bits: high.wrapping_add(low), ..self }
+    }
+
     /// e^-(`ahead` units) in Q56.
     pub(super) fn weight(self, ahead: u64) -> u64 {
         // 2^32 units are at least 256 nats.
@@ -180,6 +191,24 @@ mod tests {
                 assert!((posterior - weight / sum).abs() < 2e-8, "{posterior} for {} at {sharpness}", weight / sum);
             }
         }
+    }
+
+    #[test]
+    fn weighed_units_are_the_product_rounded_down() {
+        for bits in [0, 1, 65_535, 65_536, 65_537, 123_456_789, 1 << 31, u32::MAX] {
+            for weight in [1, 2, 3_333, 32_768, 65_535, 65_536] {
+                let exact = (u64::from(bits) * u64::from(weight)) >> 16;
+                assert_eq!(u64::from(Unit { bits, ..unit() }.weighed(weight).bits), exact, "{bits} {weight}");
+            }
+        }
+    }
+
+    #[test]
+    fn posteriors_of_weighed_evidence_are_those_of_its_part() {
+        let unit = unit().weighed(6_554);
+        let posterior = posterior(&[46_000, 0], 0, unit).to_f64();
+        let exact = 1.0 / (1.0 + (-46.0 * 6_554.0 / 65_536.0_f64).exp());
+        assert!((posterior - exact).abs() < 2e-5, "{posterior} for {exact}");
     }
 
     #[test]

@@ -95,11 +95,38 @@ impl<const N: usize> Recognizer<'_, N> {
         self.model().accepts(touch)?;
         let mut margins = [0; N];
         self.model().margins(touch, &mut margins);
+        Ok(self.add_forgetting(&margins, forgetting))
+    }
+
+    /// The same of a row of features, as [`push_features`](Self::push_features).
+    ///
+    /// # Errors
+    /// As `push_features`.
+    pub fn push_features_forgetting(
+        &mut self,
+        features: &[i32],
+        forgetting: &mut Forgetting<N>,
+    ) -> Result<Verdict, Refused> {
+        if self.model().descriptor().is_some() {
+            return Err(Refused::NeedsTouches);
+        }
+        let mut margins = [0; N];
+        self.model().margins_of(features, &mut margins);
         Ok(self.push_margins_forgetting(&margins, forgetting))
     }
 
     /// The same with margins that were computed beforehand, as [`push_margins`](Self::push_margins).
     pub fn push_margins_forgetting(&mut self, margins: &[i32; N], forgetting: &mut Forgetting<N>) -> Verdict {
+        if self.model().row_evidence().is_none() {
+            return self.add_forgetting(margins, forgetting);
+        }
+        let mut evidence = *margins;
+        self.model().make_evidence(&mut evidence);
+        self.add_forgetting(&evidence, forgetting)
+    }
+
+    /// The same with evidence: margins, or what the model's table makes of them.
+    fn add_forgetting(&mut self, margins: &[i32; N], forgetting: &mut Forgetting<N>) -> Verdict {
         if self.verdict() != Verdict::Undecided {
             return self.verdict();
         }
@@ -122,9 +149,9 @@ impl<const N: usize> Recognizer<'_, N> {
             self.state_mut().set(restarted, touches, forgotten, Verdict::Undecided);
             forgetting.reset();
             forgetting.restarts = forgetting.restarts.saturating_add(1);
-            return self.push_margins(&[]);
+            return self.add(&[]);
         }
-        let verdict = self.push_margins(margins);
+        let verdict = self.add(margins);
         if self.best() != leader {
             forgetting.reset();
         }

@@ -159,13 +159,20 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         }
         let mut margins = [0; N];
         self.model.margins_of(features, &mut margins);
+        self.model.make_evidence(&mut margins);
         Ok(self.add(&margins))
     }
 
     /// Takes in a touch by its margins, computed beforehand with [`Model::margins`]; missing ones count as 0. For
     /// replaying the same touches in many orders.
     pub fn push_margins(&mut self, margins: &[i32]) -> Verdict {
-        self.add(margins)
+        if self.model.row_evidence().is_none() {
+            return self.add(margins);
+        }
+        let mut evidence = [0; N];
+        evidence.iter_mut().zip(margins).for_each(|(evidence, &margin)| *evidence = margin);
+        self.model.make_evidence(&mut evidence);
+        self.add(evidence.get(..margins.len()).unwrap_or(&evidence))
     }
 
     /// The verdict after the last touch.
@@ -205,7 +212,10 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         let best = strangers::leader(&self.model, evidence);
         match strangers::is_background(&self.model, evidence, best.1) {
             true => u64::MAX,
-            false => evidence::rivals(evidence, best, u64::MAX, unit(&self.model)).map_or(u64::MAX, Rivals::q56),
+            false => {
+                let unit = unit_of(&self.model, self.state.covered());
+                evidence::rivals(evidence, best, u64::MAX, unit).map_or(u64::MAX, Rivals::q56)
+            }
         }
     }
 
@@ -268,7 +278,8 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         &mut self.state
     }
 
-    fn add(&mut self, margins: &[i32]) -> Verdict {
+    /// Takes in a touch by its evidence: its margins, or what the model's table makes of them.
+    pub(super) fn add(&mut self, margins: &[i32]) -> Verdict {
         match self.state.decided {
             Decided::Fresh => {
                 start(&self.model, &mut self.state.evidence);
@@ -286,7 +297,8 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         let odds = self.state.stopping.odds_of(best.0, &self.model);
         let may_be_named =
             familiarity == Familiarity::Known && !strangers::is_background(&self.model, self.evidence(), best.1);
-        let rivals = if may_be_named { evidence::rivals(self.evidence(), best, odds, unit(&self.model)) } else { None };
+        let unit = unit_of(&self.model, self.state.covered());
+        let rivals = if may_be_named { evidence::rivals(self.evidence(), best, odds, unit) } else { None };
         if familiarity == Familiarity::Stranger {
             self.state.decided = Decided::Unknown;
         } else if let Some(rivals) = rivals {
@@ -310,7 +322,7 @@ impl<const N: usize> State<N> {
     }
 
     pub(crate) fn posterior(&self, model: &Model<'_>, object: usize) -> Posterior {
-        let unit = Unit { sharpness: model.temperature().sharpness(), ..unit(model) };
+        let unit = Unit { sharpness: model.temperature().sharpness(), ..unit_of(model, self.covered()) };
         evidence::posterior(self.evidence_or_priors(model, &mut [0; N]), object, unit)
     }
 
@@ -348,11 +360,11 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Weights of all other objects, relative to one that was recognized with this evidence.
-    pub(crate) fn rivals(model: &Model<'_>, evidence: &[i64; N], object: usize) -> Option<Rivals> {
+    /// Weights of all other objects, relative to one that was recognized with this evidence of so many touches.
+    pub(crate) fn rivals(model: &Model<'_>, evidence: &[i64; N], object: usize, covered: u32) -> Option<Rivals> {
         let evidence = evidence.get(..model.object_count())?;
         let best = strangers::leader(model, evidence);
-        if best.0 == object { evidence::rivals(evidence, best, u64::MAX, unit(model)) } else { None }
+        if best.0 == object { evidence::rivals(evidence, best, u64::MAX, unit_of(model, covered)) } else { None }
     }
 
     /// Takes over a state: evidence, touches so far, how many of these are no longer part of the evidence, and the verdict.
@@ -382,4 +394,9 @@ fn start(model: &Model<'_>, evidence: &mut [i64]) {
 pub(super) fn unit(model: &Model<'_>) -> Unit {
     let header = model.header();
     Unit { bits: header.unit_bits(), shift: header.unit_shift(), sharpness: SHARPNESS }
+}
+
+/// The unit of evidence of so many touches.
+fn unit_of(model: &Model<'_>, touches: u32) -> Unit {
+    unit(model).weighed(model.weight_of(touches))
 }

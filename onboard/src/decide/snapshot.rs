@@ -88,7 +88,9 @@ impl<const N: usize> Recognizer<'_, N> {
             0 => Verdict::Undecided,
             _ if touches == 0 => return Err(SnapshotError::Damaged),
             1 => {
-                let rivals = State::rivals(self.model(), &evidence, object.into()).ok_or(SnapshotError::Damaged)?;
+                let covered = touches.saturating_sub(forgotten);
+                let rivals = State::rivals(self.model(), &evidence, object.into(), covered);
+                let rivals = rivals.ok_or(SnapshotError::Damaged)?;
                 Verdict::Recognized { object, touches, rivals }
             }
             2 => Verdict::Unknown,

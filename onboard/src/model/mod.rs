@@ -3,6 +3,7 @@
 mod check;
 #[cfg(feature = "code")]
 mod code;
+mod early;
 mod fixed;
 mod header;
 mod margins;
@@ -20,9 +21,9 @@ pub use refused::Refused;
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
-    Counted, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan, Promise,
-    Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature, TrainedCapture, TrainedNoise, TrainedProbe,
-    TrainedTouches, take_feature, take_section,
+    Counted, EarlyExit, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan,
+    Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature, TrainedCapture, TrainedNoise,
+    TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
 };
 use palpate_shared::{Descriptor, Patterns};
 
@@ -48,8 +49,9 @@ pub(crate) struct Stated {
     counted: Counted,
     needs_pose: bool,
     largest_spread: u32,
-    /// Where thresholds by object stand; 0 if there are none. The three highest bits: whether there are
-    /// sections about strangers, of shared leaves and of features that stand for a missing value.
+    /// Where thresholds by object stand; 0 if there are none. The five highest bits: whether there are
+    /// sections about strangers, of shared leaves, of features that stand for a missing value, of weights by the number of
+    /// touches, and of the evidence of a row.
     by_object: u32,
 }
 
@@ -59,8 +61,12 @@ const HAS_STRANGERS: u32 = 1 << 31;
 const HAS_SHARED_LEAVES: u32 = 1 << 30;
 /// The same.
 const HAS_SENTINEL: u32 = 1 << 29;
+/// The same.
+const HAS_WEIGHTS: u32 = 1 << 28;
+/// The same.
+const HAS_ROW_EVIDENCE: u32 = 1 << 27;
 /// Flags that are not a place in [`Stated::by_object`].
-const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_SENTINEL;
+const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_SENTINEL | HAS_WEIGHTS | HAS_ROW_EVIDENCE;
 
 impl Stated {
     /// Statements of a model without optional sections.
@@ -196,6 +202,39 @@ impl<'a> Model<'a> {
         Sentinel::from_bytes(optional::find(self.optional(), Tag::Sentinel))
     }
 
+    /// The table that makes evidence of a row's margins, if the model has one; otherwise margins are evidence.
+    ///
+    /// Cost: next to none if there is none, otherwise a few instructions for each optional section. Cannot fail.
+    pub fn row_evidence(&self) -> Option<RowEvidence<'a>> {
+        if !cfg!(feature = "row-evidence") || self.stated.by_object & HAS_ROW_EVIDENCE == 0 {
+            return None;
+        }
+        RowEvidence::opened(optional::find(self.optional(), Tag::RowEvidence))
+    }
+
+    /// Makes evidence of a row's margins, in units: what the row adds for each object. Without a
+    /// [table](Model::row_evidence) margins stay as they are.
+    ///
+    /// Cost: with a table some 30 instructions for each object, and a few for each optional section. Cannot fail.
+    pub fn make_evidence(&self, margins: &mut [i32]) {
+        if let Some(table) = self.row_evidence() {
+            margins.iter_mut().take(self.object_count()).for_each(|margin| *margin = table.of(*margin));
+        }
+    }
+
+    /// The weight of the evidence of so many touches or rows where it is compared with a threshold, in Q16: 65,536, which is 1,
+    /// unless the model states [others](Weights).
+    ///
+    /// Cost: next to none if it states none, otherwise some twenty instructions, and a few for each optional section.
+    /// Cannot fail.
+    pub fn weight_of(&self, touches: u32) -> u32 {
+        if !cfg!(feature = "row-evidence") || self.stated.by_object & HAS_WEIGHTS == 0 {
+            return Weights::ONE;
+        }
+        Weights::from_bytes(optional::find(self.optional(), Tag::Weights))
+            .map_or(Weights::ONE, |weights| weights.of(touches))
+    }
+
     /// The section about what margins become; empty if there is none.
     fn stated_prediction(&self) -> &'a [u8] {
         optional::find(self.optional(), Tag::Prediction)
@@ -309,6 +348,13 @@ impl<'a> Model<'a> {
     /// Kind of touches that the model was trained on, if it states it.
     pub fn trained_capture(&self) -> Option<TrainedCapture<'a>> {
         TrainedCapture::from_bytes(optional::find(self.optional(), Tag::Capture), self.object_count())
+    }
+
+    /// Places in the walk where a class may be known: see [`Model::class_of`].
+    ///
+    /// Cost: a few instructions for each optional section.
+    pub fn early_exits(&self) -> impl Iterator<Item = EarlyExit> {
+        EarlyExit::all(optional::find(self.optional(), Tag::EarlyExit))
     }
 
     /// The plan of approaches, if the model has one: what [`Recognizer::next_approach`](crate::Recognizer::next_approach)

@@ -1,11 +1,11 @@
 //! The optional sections: checked once, then found by their tags.
 
-use super::{HAS_SENTINEL, HAS_SHARED_LEAVES, HAS_STRANGERS, MARKS, Stated};
+use super::{HAS_ROW_EVIDENCE, HAS_SENTINEL, HAS_SHARED_LEAVES, HAS_STRANGERS, HAS_WEIGHTS, MARKS, Stated};
 use crate::bytes::Wrong;
 use crate::layouts::{Sections, built_in};
 use palpate_shared::format::{
-    Layout, OddsByObject, Plan, Prediction, Section, Sentinel, SharedLeaves, Strangers, Tag, TrainedNoise,
-    TrainedProbe, TrainedTouches, take_section,
+    Layout, OddsByObject, Plan, Prediction, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, TrainedNoise,
+    TrainedProbe, TrainedTouches, Weights, take_section,
 };
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.
@@ -51,6 +51,15 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
             _ if cfg!(feature = "sentinel") && tag == Tag::Sentinel.code() => {
                 stated.by_object |= HAS_SENTINEL;
                 Sentinel::from_bytes(content).is_some()
+            }
+            _ if cfg!(feature = "row-evidence") && tag == Tag::Weights.code() => {
+                stated.by_object |= HAS_WEIGHTS;
+                Weights::from_bytes(content).is_some()
+            }
+            // Touches have margins that are log-probabilities.
+            _ if cfg!(feature = "row-evidence") && tag == Tag::RowEvidence.code() => {
+                stated.by_object |= HAS_ROW_EVIDENCE;
+                RowEvidence::from_bytes(content).is_some() && stated.descriptor.is_none()
             }
             _ if must_understand => return Err(Wrong::NotUnderstood(offset)),
             _ => true,

@@ -16,16 +16,23 @@ impl Model<'_> {
         let margins = margins.get_mut(..self.object_count())?;
         margins.fill(0);
         self.sum(features, margins);
+        let best = self.best(margins);
+        self.make_fixed(margins);
+        Some(best)
+    }
+
+    /// The class with the largest sum.
+    #[inline(always)]
+    pub(super) fn best(&self, sums: &[i32]) -> usize {
         let last_of_ties = self.prediction().last_of_ties;
         let (mut best, mut most) = (0, i32::MIN);
-        for (class, &sum) in margins.iter().take(self.known_count()).enumerate() {
+        for (class, &sum) in sums.iter().take(self.known_count()).enumerate() {
             let sum = if self.is_float() { f32_key(f32::from_bits(sum.cast_unsigned())) } else { sum };
             if sum > most || last_of_ties && sum == most {
                 (best, most) = (class, sum);
             }
         }
-        self.make_fixed(margins);
-        Some(best)
+        best
     }
 
     /// The value of a row before the inverse link: the margin of a model with one output, times

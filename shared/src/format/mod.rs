@@ -6,6 +6,8 @@
 
 #[macro_use]
 mod codes;
+mod early;
+mod evidence;
 mod header;
 mod key;
 mod leaves;
@@ -18,6 +20,8 @@ mod trained;
 
 pub use crate::checksum::checksum;
 pub use codes::{Counted, Held, Key, Layout, LeafType, Length, Per, RAW_FEATURES};
+pub use early::EarlyExit;
+pub use evidence::{RowEvidence, Shifts, Weights};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
 pub use key::f32_key;
 pub use leaves::SharedLeaves;

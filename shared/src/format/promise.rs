@@ -48,6 +48,9 @@ pub struct Promise {
     pub approaches: bool,
     /// True if each approach was in the pose that the model's plan proposed.
     pub active: bool,
+    /// True if sequences came in groups, such as persons or machines, and the promise is for new groups; otherwise
+    /// sequences were independent of each other.
+    pub groups: bool,
     /// Sequences that it rests on.
     pub sequences: u32,
     /// Names given in these.
@@ -118,7 +121,8 @@ impl Promise {
     pub fn write<T>(&self, put: impl FnOnce(&[u8]) -> T) -> T {
         let billionths = |share: f64| (share * BILLION + 0.5) as u32;
         let Self { sequences, given, wrong, mean_thousandths, max_touches, noise, .. } = *self;
-        let codes = u32::from_le_bytes([self.per.code(), self.approaches.into(), self.active.into(), 0]);
+        let codes =
+            u32::from_le_bytes([self.per.code(), self.approaches.into(), self.active.into(), self.groups.into()]);
         let TrainedNoise { least, largest, timer, pose } = noise.touch;
         let [first, second, third] = noise.bent.map(i32::cast_unsigned);
         let head = [billionths(self.rate), billionths(self.confidence), codes, sequences, given, wrong];
@@ -145,7 +149,7 @@ impl Promise {
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let words = bytes.as_chunks::<4>().0;
         let (head, rest) = words.split_first_chunk::<12>()?;
-        let [_, _, [per, approaches, active, _], ..] = *head;
+        let [_, _, [per, approaches, active, groups], ..] = *head;
         let [rate, confidence, _, sequences, given, wrong, mean, touches, least, largest, timer, pose] =
             head.map(u32::from_le_bytes);
         let more = rest.first_chunk::<9>().map_or([0; 9], |more| more.map(u32::from_le_bytes));
@@ -156,7 +160,7 @@ impl Promise {
             let share = f64::from(billionths) / BILLION;
             (billionths > 0 && share < 1.0).then_some(share)
         };
-        if wrong > given || given > sequences || approaches > 1 || active > 1 || least > largest {
+        if wrong > given || given > sequences || approaches > 1 || active > 1 || groups > 1 || least > largest {
             return None;
         }
         Some(Self {
@@ -165,6 +169,7 @@ impl Promise {
             per: Per::from_code(per)?,
             approaches: approaches == 1,
             active: active == 1,
+            groups: groups == 1,
             sequences,
             given,
             wrong,
@@ -240,6 +245,7 @@ mod tests {
         per: Per::Name,
         approaches: true,
         active: true,
+        groups: true,
         sequences: 100_000,
         given: 99_321,
         wrong: 900,
@@ -286,13 +292,14 @@ mod tests {
 
     #[test]
     fn promises_that_promise_nothing_are_refused() {
-        let wrong: [(usize, &[u8]); 8] = [
+        let wrong: [(usize, &[u8]); 9] = [
             (0, &[0; 4]),
             (0, &[0xff; 4]),
             (4, &[0; 4]),
             (8, &[3]),
             (9, &[2]),
             (10, &[2]),
+            (11, &[2]),
             (16, &[0xff; 4]),
             (20, &[0xff; 4]),
         ];

@@ -15,8 +15,8 @@ pub enum Tag {
     Touches,
     /// [`TrainedNoise`].
     Noise,
-    /// Reserved: stopping thresholds by the number of touches.
-    ThresholdsByTouches,
+    /// Weights of evidence by the number of touches: [`Weights`](super::Weights).
+    Weights,
     /// Stopping thresholds by object: [`OddsByObject`](super::OddsByObject).
     ThresholdsByObject,
     /// A test for objects that the model does not know: [`Strangers`](super::Strangers).
@@ -39,6 +39,10 @@ pub enum Tag {
     Sentinel,
     /// [`TrainedCapture`].
     Capture,
+    /// Evidence of a row by its margins: [`RowEvidence`](super::RowEvidence).
+    RowEvidence,
+    /// Bounds with which a class is known before all trees are walked: [`EarlyExit`](super::EarlyExit).
+    EarlyExit,
 }
 
 impl Tag {
@@ -48,7 +52,7 @@ impl Tag {
             Self::Probe => 1,
             Self::Touches => 2,
             Self::Noise => 3,
-            Self::ThresholdsByTouches => 4,
+            Self::Weights => 4,
             Self::ThresholdsByObject => 5,
             Self::Strangers => 6,
             Self::Plan => 7,
@@ -60,6 +64,8 @@ impl Tag {
             Self::Prediction => 13,
             Self::Sentinel => 14,
             Self::Capture => 15,
+            Self::RowEvidence => 16,
+            Self::EarlyExit => 17,
         }
     }
 }

@@ -10,9 +10,12 @@ Prints a table in Markdown: about ten minutes.
 *Bytes* are those of the whole image less one whose peer_class is empty: model, code, and what it calls of newlib and of the
 compiler's routines (such as comparisons of floats on a chip without a float unit), all for size (-Os). The empty image is linked
 without libraries, so that it holds no such routine. *Instructions* are of a row: class and all, f32 values in. *Wrong* are
-classes that differ from the library's own among 200 plain rows, 200 whose values equal thresholds, 200 with missing values.
+classes that differ from the library's own among 200 plain rows, 200 whose values equal thresholds, 200 with missing values. No
+row is of the training; early exit is chosen on others again. *Seconds* are those that compiling and assembling an image's own files
+take, of processor time, on both chips together.
 """
 
+import resource
 import subprocess
 import sys
 import tempfile
@@ -44,13 +47,16 @@ def image(chip, directory, source, libraries=LIBRARIES):
     _, target, _, flags = chip
     common = ["-mthumb", *flags, "-Os", "-ffunction-sections", "-fdata-sections", "-DNDEBUG", "-w", *source.flags]
     common += ["-I", directory, "-I", ROOT / "onboard/c"]
-    objects = []
+    objects, seconds = [], []
     for path in [*source.files, *source.by_chip.get(chip[0], []), HERE / "harness.c"]:
         objects.append(directory / f"{target}-{path.name}.o")
         is_cpp = path.suffix == ".cc"
         compiler = ["arm-none-eabi-g++", "-std=c++17", "-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics"]
         compiler = compiler if is_cpp else ["arm-none-eabi-gcc", "-std=gnu99", "-I", ROOT / "tests/c"]
+        began = processor()
         subprocess.run([*compiler, *common, "-c", path, "-o", objects[-1]], check=True)
+        if path.name != "harness.c":
+            seconds.append(processor() - began)
     if source.library:
         objects.append(source.library(target))
     program = directory / f"{target}.elf"
@@ -59,7 +65,38 @@ def image(chip, directory, source, libraries=LIBRARIES):
     subprocess.run(link, check=True)
     size = subprocess.run(["arm-none-eabi-size", program], check=True, capture_output=True, text=True).stdout
     text, data = size.splitlines()[1].split()[:2]
-    return program, int(text) + int(data)
+    return program, int(text) + int(data), sum(seconds)
+
+
+def on_risc_v(ensemble, directory, source):
+    """Instructions of a row, and wrong classes, of our C on rv32imc."""
+    program = directory / "rv32imc.elf"
+    compiler = ["riscv64-unknown-elf-gcc", "-march=rv32imc_zicsr", "-mabi=ilp32", "-ffreestanding", "-nostdlib", "-static"]
+    flags = ["-std=gnu99", "-Os", "-w", "-I", directory, "-I", ROOT / "onboard/c", "-I", ROOT / "tests/c"]
+    flags += ["-T", ROOT / "tests/c/virt.ld", "-Wl,--no-warn-rwx-segments"]
+    files = [*source.by_chip["M0+"], HERE / "harness.c"]
+    subprocess.run([*compiler, *flags, *files, "-lgcc", "-o", program], check=True)
+    command = ["qemu-system-riscv32", "-machine", "virt", "-bios", "none", "-nographic", "-icount", "shift=0"]
+    command += ["-semihosting-config", "enable=on,target=native", "-kernel", program]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=900, stdin=subprocess.DEVNULL)
+    instructions, *classes = [int(number, 16) for number in (done.stdout + done.stderr).split()]
+    wrong = sum(found != expected for found, expected in zip(classes, ensemble.classes, strict=True))
+    return f"rv32imc: {instructions // len(ensemble.kinds[0][1]):,} instructions, {wrong} of {len(classes)} classes wrong"
+
+
+def processor():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def clang(chip, directory, source):
+    """Seconds that clang takes for the files."""
+    _, target, _, flags = chip
+    began = processor()
+    for path in source.by_chip[chip[0]]:
+        command = ["clang", f"--target={target}", *flags, "-Os", "-w", "-ffreestanding", "-I", directory, "-I", ROOT / "onboard/c"]
+        subprocess.run([*command, "-c", path, "-o", directory / "clang.o"], check=True)
+    return processor() - began
 
 
 def run(chip, program):
@@ -92,13 +129,15 @@ def measure(ensemble, name, exporter, scratch):
         return None if str(refused) == "see touches" else f"refused: {refused}"
     except Exception as error:  # whatever an exporter fails with is a result
         return f"fails: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
-    cells = []
+    cells, seconds = [], [0.0, 0.0]
     for chip in CHIPS:
         empty = image(chip, directory, Source([HERE / "nothing.c"]), libraries=[])[1]
         try:
-            program, size = image(chip, directory, source)
+            program, size, taken = image(chip, directory, source)
         except subprocess.CalledProcessError:
             return "its code does not compile"
+        seconds[0] += taken
+        seconds[1] += clang(chip, directory, source) if source.clang else 0.0
         ticks, classes = run(chip, program)
         instructions = ticks * 40 // len(ensemble.kinds[0][1])
         expected = ensemble.classes if source.expected is None else source.expected
@@ -108,7 +147,12 @@ def measure(ensemble, name, exporter, scratch):
             wrong.append(str(sum(classes[row] != expected[row] for row in part)))
             at += len(rows)
         cells += [f"{size - empty:,}", f"{instructions:,}"]
-    return " | ".join([*cells, " / ".join(wrong)])
+    others = []
+    if source.clang and "(C)" in name and ensemble.name in ("wine", "digits"):
+        others = [on_risc_v(ensemble, directory, source)]
+    by_clang = f", clang {seconds[1]:.1f}" if source.clang else ""
+    by_gcc = "–" if source.library else f"{seconds[0]:.1f}{by_clang}"
+    return " | ".join([*cells, " / ".join(wrong), "; ".join([by_gcc, *others])])
 
 
 def main():
@@ -123,8 +167,14 @@ def main():
         for leaf, goal in [("i16", "speed"), ("i16", "size"), ("i8", "balanced"), ("f32", "balanced")]
         for language, function in [("Rust", exporters.ours_rust), ("C", exporters.ours_c)]
     }
-    ours["ours i16, code (assembly)"] = partial(exporters.ours_code, palpate=palpate, is_assembly=True)
-    ours["ours i16, code (C)"] = partial(exporters.ours_code, palpate=palpate, is_assembly=False)
+    for goal in ("speed", "size"):
+        for language, function in [("Rust", exporters.ours_rust), ("C", exporters.ours_c)]:
+            name = f"ours i16, for {goal}, early exit ({language})"
+            ours[name] = partial(function, palpate=palpate, leaf="i16", goal=goal, early=True)
+    for early in (False, True):
+        for language in ("assembly", "C"):
+            name = f"ours i16, code{', early exit' if early else ''} ({language})"
+            ours[name] = partial(exporters.ours_code, palpate=palpate, is_assembly=language == "assembly", early=early)
     peers = {
         "TL2cgen": partial(exporters.tl2cgen, quantize=False),
         "TL2cgen, quantized": partial(exporters.tl2cgen, quantize=True),
@@ -138,15 +188,15 @@ def main():
         "YDF (its own model)": exporters.ydf,
         "irithyll-core": exporters.irithyll,
     }
-    print("| ensemble | exporter | bytes M4F | instructions | bytes M0+ | instructions | wrong: plain / tied / missing |")
-    print("|---|---|---|---|---|---|---|", flush=True)
+    print("| ensemble | exporter | bytes M4F | instructions | bytes M0+ | instructions | wrong: plain / tied / missing | seconds |")
+    print("|---|---|---|---|---|---|---|---|", flush=True)
     with tempfile.TemporaryDirectory() as scratch:
         scratch = Path(scratch)
         for ensemble in all_of(palpate, scratch, wanted):
             for name, exporter in {**ours, **peers}.items():
                 row = measure(ensemble, name, exporter, scratch)
                 if row is not None:
-                    cells = row if " | " in row else f"{row} | | | |"
+                    cells = row if " | " in row else f"{row} | | | | |"
                     print(f"| {ensemble.name} | {name} | {cells} |", flush=True)
 
 

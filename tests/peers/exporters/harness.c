@@ -14,7 +14,23 @@
 int peer_start(void);
 int peer_class(const float *row);
 
+/* The time: ticks of 40 nanoseconds on a Cortex-M, instructions on RISC-V. */
+#if defined(__riscv)
+static uint32_t now(void)
+{
+    uint32_t count;
+    __asm__ volatile("csrr %0, minstret" : "=r"(count));
+    return count;
+}
+#define MASK 0xffffffff
+#else
 #define SYSTICK ((volatile uint32_t *)0xe000e010)
+static uint32_t now(void)
+{
+    return 0xffffff - SYSTICK[2];
+}
+#define MASK 0xffffff
+#endif
 
 static void print(uint32_t number)
 {
@@ -37,13 +53,15 @@ static int bare_main(void)
     if (peer_start() != 0) {
         return 1;
     }
+#if defined(__arm__)
     SYSTICK[1] = 0xffffff;
     SYSTICK[0] = 5;
+#endif
     for (row = 0; row < ROWS; row++) {
-        began = SYSTICK[2];
+        began = now();
         classes[row] = (uint8_t)peer_class(rows + row * FEATURES);
         if (row < PLAIN) {
-            ticks += (began - SYSTICK[2]) & 0xffffff;
+            ticks += (now() - began) & MASK;
         }
     }
     print(ticks);

@@ -4,7 +4,7 @@
 //! They are committed, and stay as they are: models that earlier releases made have to give the same. Write them again
 //! only where something must be added.
 
-use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::compile::{EarlyExit, Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node};
 use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict, exp2_negative};
 use palpate_shared::format::{Counted, PatternShares, Trained, TrainedTouches, checksum, f32_key};
@@ -25,6 +25,7 @@ fn main() {
     rows(&mut text);
     decisions(&mut text);
     shared_leaves(&mut text);
+    early_exits(&mut text);
     refused(&mut text);
     assert!(text.lines().all(|line| line.len() < 16_384), "a line is too long");
     print!("{text}");
@@ -267,6 +268,13 @@ fn rows(text: &mut String) {
         play_rows(text, &format!("rows of f32 features, {} {}", layout.name(), leaf.name()), &bytes, true);
         play_rows(text, &format!("rows of whole features, {}", layout.name()), &changed(&bytes, 13, &[0]), false);
     }
+    let weights = [65_535_u16, 0, 20_000, 9_000].map(u16::to_le_bytes).concat();
+    let values: Vec<u8> = (0..33).map(|value| 7 * value).collect();
+    let table = [&(-(1_i32 << 17)).to_le_bytes()[..], &[3, 10, 2, 32], &values].concat();
+    let sections = [section(4 | 1 << 15, &[&[4, 0][..], &weights].concat()), section(16 | 1 << 15, &table)].concat();
+    let settings = Settings { leaf: Leaf::I16, layout: Some(Layout::Compact), ..Settings::default() };
+    let bytes = compile(&imported(random::ensemble(SHAPE, 14), 5), &settings).expect("it fits").bytes;
+    play_rows(text, "rows whose evidence is weighed, by a table", &with_sections(&bytes, &sections), true);
 }
 
 fn play_rows(text: &mut String, name: &str, bytes: &[u8], real: bool) {
@@ -296,6 +304,26 @@ fn play_rows(text: &mut String, name: &str, bytes: &[u8], real: bool) {
         *text += &format!("row {}\n", numbers(&row));
         let verdict = recognizer.push_features(&row).expect("it takes rows");
         known(text, &model, &recognizer, &row, verdict);
+        if model.early_exits().next().is_some() {
+            let class = model.class_of(&row, &mut vec![0; model.object_count()]).expect("as much room as classes");
+            *text += &format!("class {class}\n");
+        }
+    }
+}
+
+/// Walks for a class alone that may end early.
+fn early_exits(text: &mut String) {
+    for (layout, leaf, each) in [
+        (Layout::Compact, Leaf::I16, false),
+        (Layout::Wide, Leaf::I8, false),
+        (Layout::Complete, Leaf::I8, true),
+        (Layout::Complete, Leaf::I16, false),
+    ] {
+        let ensemble = imported(random::ensemble(Shape { trees: 24, each, ..SHAPE }, 26), 5);
+        let early_exit = Some(EarlyExit::Always);
+        let settings = Settings { leaf, layout: Some(layout), early_exit, ..Settings::default() };
+        let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
+        play_rows(text, &format!("early exit, {} {}", layout.name(), leaf.name()), &bytes, true);
     }
 }
 

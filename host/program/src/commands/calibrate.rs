@@ -4,6 +4,7 @@ use super::plan::{self, Wanted};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
+use super::sequences::{self, Calibration, SequenceArguments};
 use super::strangers::StrangersArguments;
 use palpate::Result;
 use palpate::calibrate::{self, Calibrated, OfRecorded, Per, Settings, Worse};
@@ -20,26 +21,21 @@ use std::path::PathBuf;
 /// Set a model's thresholds so that it keeps a promised error rate, and uses it up.
 #[derive(clap::Args)]
 #[command(after_help = "\
-The promise holds for touches like those of DIR, which the model was not trained on, or with --recorded for touches like the recorded ones. A sequence without a name is neither right nor wrong. docs/reference/options.md has the method.
-
-With --plan the model gets a plan of approaches instead, and DIR holds approaches with pose.
+The promise holds for touches like those of DIR, which the model was not trained on, or with --recorded for touches like the recorded ones. A sequence without a name is neither right nor wrong. With --plan DIR holds approaches with pose. Of a model over rows DIR is a CSV or Parquet file: rows of a sequence may depend on each other; sequences, or with --group-column groups, must not. docs/reference/options.md has the method.
 
 Examples:
   palpate capture builtin -o fresh --approaches 100000 --seed 3
   palpate calibrate model.palpate fresh -o calibrated.palpate
-  palpate calibrate model.palpate fresh -o names.palpate --per name
-  palpate calibrate model.palpate fresh -o robot.palpate --recorded robot
-  palpate calibrate model.palpate fresh -o wary.palpate --strangers certain
   palpate calibrate model.palpate posed -o planned.palpate --plan 4
-  palpate calibrate planned.palpate fresh -o calibrated.palpate --active")]
+  palpate calibrate a.palpate a.csv --label a --sequence-column id -o b.palpate")]
 pub(crate) struct Arguments {
     /// Compiled model
     model: PathBuf,
-    /// Touches to calibrate on: a directory that `palpate capture` filled
+    /// Touches to calibrate on: a directory that `palpate capture` filled; or a file of sequences of rows
     #[arg(value_name = "DIR")]
     directory: PathBuf,
     /// Recorded touches of the objects; thresholds, or --strangers, are tested on them
-    #[arg(long, value_name = "DIR", conflicts_with = "plan")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["plan", "label"])]
     recorded: Option<PathBuf>,
     /// Where to write; the calibrated model
     #[arg(short, long, value_name = "PATH")]
@@ -47,7 +43,7 @@ pub(crate) struct Arguments {
     /// The share of wrong names to accept, such as 1%; what is promised
     #[arg(long, default_value = "0.01", value_name = "RATE", value_parser = error_rate)]
     error_rate: f64,
-    /// Promise it on average, of each name, or of the names given to each object: average, name or object
+    /// Cases that it is promised of: average, name or object
     #[arg(long, value_parser = per, default_value = "average", value_name = "OF")]
     per: Per,
     /// The probability that the promise is kept
@@ -59,12 +55,14 @@ pub(crate) struct Arguments {
     /// Give up after this many touches [default: the model's own limit]
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
-    /// Follow the model's plan of approaches; the promise holds for a robot that does
+    /// Follow the model's plan of approaches
     #[arg(long)]
     active: bool,
     /// Add a plan of approaches instead, with 1, 2 or 4 rolls per direction
     #[arg(long, value_name = "ROLLS", conflicts_with_all = PROMISE)]
     plan: Option<u8>,
+    #[command(flatten)]
+    rows: SequenceArguments,
     #[command(flatten)]
     strangers: StrangersArguments,
     #[command(flatten)]
@@ -74,13 +72,16 @@ pub(crate) struct Arguments {
 }
 
 /// The options that a plan has no use for.
-const PROMISE: [&str; 8] =
-    ["error_rate", "per", "confidence", "sequences", "max_touches", "active", "strangers", "background"];
+const PROMISE: [&str; 9] =
+    ["error_rate", "per", "confidence", "sequences", "max_touches", "active", "strangers", "background", "label"];
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if let Some(rolls) = arguments.plan {
         let Arguments { model, directory, output, probe, real, .. } = &arguments;
         return plan::run(&Wanted { model, directory, output, rolls, probe, real }, global);
+    }
+    if arguments.rows.label.is_some() {
+        return rows(&arguments, global);
     }
     output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
     if let Some(recorded) = &arguments.recorded {
@@ -139,6 +140,26 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let strangers = found.map_or_else(String::new, |found| super::strangers::text(&found) + "\n");
     let text = format!("{}{strangers}{}\n", text(&calibrated), written(&arguments.output, &calibrated));
     output::print_about(&arguments.output, &text)
+}
+
+/// Calibrates on sequences of rows.
+fn rows(arguments: &Arguments, global: &Global) -> Result<()> {
+    let Some(columns) = arguments.rows.columns() else {
+        let allowed = "it with --sequence-column, which says which rows are of one sequence";
+        return Err(Error::setting("label", arguments.rows.label.as_deref().unwrap_or_default(), allowed));
+    };
+    let Arguments { error_rate, per, confidence, sequences, max_touches, .. } = *arguments;
+    let settings = sequences::settings(error_rate, per, confidence, sequences, max_touches, global.seed());
+    let asked = Calibration {
+        model: &arguments.model,
+        rows: &arguments.directory,
+        output: &arguments.output,
+        columns,
+        settings,
+        held: arguments.strangers.held(),
+        background: arguments.strangers.background(),
+    };
+    sequences::calibrate(asked, global)
 }
 
 /// Touches that the model was not trained on.
@@ -201,8 +222,12 @@ fn text(calibrated: &Calibrated) -> String {
         _ = writeln!(text, "Uncalibrated, names are given at {:.2} nats.", calibrated.uncalibrated_margin);
     }
     _ = writeln!(text, "Temperature of the posteriors that are shown: {:.2}", calibrated.temperature);
+    let hidden = calibrated
+        .objects
+        .values()
+        .any(|of| 2 * of.given < calibrated.sequences as u64 / calibrated.objects.len() as u64);
     text + &calibrated.recorded.as_ref().map_or_else(String::new, |recorded| of_recorded(recorded, calibrated))
-        + &worse(calibrated)
+        + &worse(&calibrated.worse(), calibrated.promised, calibrated.promise.per, hidden)
 }
 
 /// Statements about a promise that was tested on recordings.
@@ -224,26 +249,21 @@ fn of_recorded(recorded: &OfRecorded, calibrated: &Calibrated) -> String {
     }
 }
 
-/// A warning of objects that a rate of other names hides.
-fn worse(calibrated: &Calibrated) -> String {
+/// A warning of objects that a rate of other names hides; `hidden` if one has few names.
+pub(super) fn worse(worse: &[Worse], rate: f64, per: Per, hidden: bool) -> String {
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    let worse = calibrated.worse();
     let given = |of: &Worse| of.given.map(|share| format!("{} of those given to {}", percent(share), of.object));
     let named = |of: &Worse| of.named.map(|share| format!("{} where {} is named", percent(share), of.object));
     let shares: Vec<String> = worse.iter().flat_map(|of| [given(of), named(of)]).flatten().collect();
     if shares.is_empty() {
         return String::new();
     }
-    let rate = super::percent(calibrated.promised);
-    let what = match calibrated.promise.per {
+    let rate = super::percent(rate);
+    let what = match per {
         Per::Average => "of all names, and not of each object's",
         Per::Name => "of each name when it is given, and not of those given to each object",
         Per::Object => "of the names given to each object, and not of each name",
     };
-    let hidden = calibrated
-        .objects
-        .values()
-        .any(|of| 2 * of.given < calibrated.sequences as u64 / calibrated.objects.len() as u64);
     let undecided = if hidden { " An object that mostly stays undecided has few names among all." } else { "" };
     format!(
         "warning: the {rate} % are {what}: {} are wrong.{undecided} Promise it of each with --per object or --per name.\n",

@@ -5,13 +5,15 @@ use super::numbers::{error_rate, sequences};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
+use super::sequences::{self, Evaluation, SequenceArguments};
 use palpate::error::RowsProblem;
 use palpate::evaluate::model_file::ModelFile;
 use palpate::evaluate::{self, Classes, Confusion, Evaluated, Regression, RowsEvaluation, Wanted, evaluate_rows};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
-use palpate::rows::feature_names;
+use palpate::rows::{SequenceColumns, feature_names};
+use palpate::stream;
 use palpate::touches::Dataset;
 use palpate::{Error, Result};
 use palpate_shared::format::Counted;
@@ -27,30 +29,29 @@ Examples:
   palpate capture builtin -o unseen --approaches 6000 --seed 2
   palpate evaluate model.palpate unseen
   palpate evaluate ensemble.json unseen --at 10,30 --json
-  palpate evaluate model.palpate monday.mcap
   palpate evaluate model.palpate unseen --real timer=1ms,missed=2%
-  palpate evaluate model.palpate unseen --probe probe.toml
   palpate evaluate model.palpate unseen --prior fork=0.3,spoon=0.3
-  palpate evaluate model.palpate unseen --unknown others
-  palpate evaluate planned.palpate unseen --active
-  palpate evaluate model.palpate rows.csv --label kind")]
+  palpate evaluate model.palpate rows.csv --label kind
+  palpate evaluate sure.palpate rows.csv --label kind --sequence-column id")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
-    /// Touches: a directory, or a robot's log (MCAP); with --label a CSV file of rows
+    /// Touches: a directory, or a robot's log (MCAP); with --label a file of rows
     #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// Column of the rows' classes, or a regression's numbers
-    #[arg(long, value_name = "COLUMN", conflicts_with_all = ["at", "confusion"])]
-    label: Option<String>,
+    #[command(flatten)]
+    sequences_of_rows: SequenceArguments,
+    /// Write a page about the results; of sequences of rows
+    #[arg(long, value_name = "FILE", requires = "sequence_column")]
+    page: Option<PathBuf>,
     /// Touches of objects that the model does not know: how many are detected
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "label")]
     unknown: Option<PathBuf>,
     /// Give the accuracy after these touches [default: 5,10,20,30,60]
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
+    #[arg(long, value_delimiter = ',', value_name = "N,…", conflicts_with = "label")]
     at: Option<Vec<usize>>,
     /// Sequences of touches to draw; of each object, and as many groups
-    #[arg(long, value_name = "N", default_value = "1000", value_parser = sequences)]
+    #[arg(long, value_name = "N", default_value = "1000", value_parser = sequences, conflicts_with = "label")]
     sequences: usize,
     /// The share of wrong names to accept, such as 1%; stops there [default: the model's own thresholds]
     #[arg(long, value_name = "RATE", value_parser = error_rate)]
@@ -59,7 +60,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
     /// Show the confusion matrix after this many touches
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", conflicts_with = "label")]
     confusion: Option<usize>,
     /// Follow the model's plan of approaches
     #[arg(long)]
@@ -75,6 +76,13 @@ pub(crate) struct Arguments {
     real: RealArguments,
 }
 
+impl Arguments {
+    /// True if there is an option for sequences of touches or rows.
+    fn stops(&self) -> bool {
+        self.error_rate.is_some() || self.max_touches.is_some() || self.switch.is_some() || self.expected.is_given()
+    }
+}
+
 /// True if the pattern of touching fingers is evidence to the model.
 fn counts_patterns(file: &ModelFile) -> bool {
     let counted = match file {
@@ -86,8 +94,14 @@ fn counts_patterns(file: &ModelFile) -> bool {
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let file = ModelFile::load(&arguments.model)?;
-    if let Some(label) = &arguments.label {
-        return rows(&arguments, &file, label, global);
+    if let Some(label) = &arguments.sequences_of_rows.label {
+        return match arguments.sequences_of_rows.columns() {
+            Some(columns) => sequences_of(&arguments, &file, columns, global),
+            None if arguments.stops() => {
+                Err(Error::setting("label", label, "it with --sequence-column, or without options of sequences"))
+            }
+            None => rows(&arguments, &file, label, global),
+        };
     }
     let mut dataset = super::dataset(&arguments.directory)?;
     let touches = || dataset.touches();
@@ -129,6 +143,22 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return output::print_json(&evaluated);
     }
     output::print(&text(&evaluated))
+}
+
+/// Evaluates a model on sequences of rows.
+fn sequences_of(arguments: &Arguments, file: &ModelFile, columns: SequenceColumns<'_>, global: &Global) -> Result<()> {
+    let ModelFile::Compiled(compiled) = file else { return Err(sequences::needs_compiled(&arguments.model)) };
+    let model = compiled.model();
+    let weights = arguments.expected.weights(&compiled.names(), &evaluate::own_weights(&model))?;
+    let Arguments { error_rate, max_touches, switch, .. } = *arguments;
+    let asked = Evaluation {
+        model: &arguments.model,
+        rows: &arguments.directory,
+        columns,
+        wanted: stream::Wanted { error_rate, max_rows: max_touches, weights, switch },
+        page: arguments.page.as_deref(),
+    };
+    sequences::evaluate(asked, compiled, global)
 }
 
 /// Evaluates a model on labeled rows.

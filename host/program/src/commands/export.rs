@@ -6,7 +6,8 @@ use super::unstated::UnstatedArguments;
 use palpate::Result;
 use palpate::compile::code::{Form, Program};
 use palpate::compile::{
-    self, Candidate, Compiled, CompiledModel, Goal, Instructions, Language, Layout, Leaf, Settings,
+    self, Candidate, Compiled, CompiledModel, EarlyExit, EarlyExitFound, Goal, Instructions, Language, Layout, Leaf,
+    Settings,
 };
 use palpate::ensemble::{Ensemble, Inputs};
 use palpate::error::Error;
@@ -65,6 +66,9 @@ pub(crate) struct Arguments {
     /// From a regression's margin to its value: identity, logistic, exponential, square or softplus [default: the file's]
     #[arg(long, value_parser = link, value_name = "LINK")]
     link: Option<Link>,
+    /// Classes without walking all trees: yes, or a CSV file of rows not trained on, for where that takes fewer instructions
+    #[arg(long, value_name = "ROWS")]
+    early_exit: Option<PathBuf>,
     #[command(flatten)]
     unstated: UnstatedArguments,
     #[command(flatten)]
@@ -167,6 +171,9 @@ struct Exported {
     /// Effects of whole numbers on each feature.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     scales: Vec<Effect>,
+    /// Where walks for a class alone may end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    early_exit: Option<EarlyExitFound>,
     /// Files with source code.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     sources: Vec<PathBuf>,
@@ -209,6 +216,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         max_touches: arguments.max_touches,
         scales,
         priors: arguments.prior.of(&ensemble.objects)?,
+        early_exit: early_exit(&arguments, &ensemble)?,
         ..Settings::default()
     };
     let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {
@@ -228,6 +236,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         leaves: compiled.leaves,
         margin_error: compiled.margin_error,
         instructions: compiled.instructions,
+        early_exit: compiled.early_exit,
         candidates: compiled.candidates,
         features: match &ensemble.inputs {
             Inputs::Rows(names) => Some(names.clone()),
@@ -280,7 +289,8 @@ impl Arguments {
 
     /// The files that are read, none of which may be written.
     fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
-        std::iter::once(&self.ensemble).chain(self.rows())
+        let held_out = self.early_exit.iter().filter(|path| path.as_os_str() != "yes");
+        std::iter::once(&self.ensemble).chain(self.rows()).chain(held_out)
     }
 
     /// The rows that scales are fitted to.
@@ -314,6 +324,7 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
         ("layout", arguments.layout.layout().is_some() || arguments.layout.goal() != usual.goal),
         ("shared_leaves", arguments.shared_leaves.0.is_some()),
         ("scale", !arguments.scale.is_empty()),
+        ("early_exit", arguments.early_exit.is_some()),
         ("error_rate", arguments.error_rate != usual.error_rate),
         ("max_touches", arguments.max_touches != usual.max_touches),
         ("prior", arguments.prior.of(&compiled.names())?.is_some()),
@@ -533,6 +544,25 @@ fn link(name: &str) -> Result<Link, String> {
     found.ok_or_else(|| "use one of identity, logistic, exponential, square, softplus".to_owned())
 }
 
+/// Classes from fewer trees, if they are asked for.
+fn early_exit(arguments: &Arguments, ensemble: &Ensemble) -> Result<Option<EarlyExit>> {
+    let Some(path) = &arguments.early_exit else { return Ok(None) };
+    if path.as_os_str() == "yes" {
+        return Ok(Some(EarlyExit::Always));
+    }
+    super::rows::read_rows(path, &ensemble.inputs.names(), None).map(|rows| Some(EarlyExit::IfItPays(rows)))
+}
+
+fn early_exit_text(found: &EarlyExitFound) -> String {
+    let trees = found.trees;
+    let ends: Vec<String> = found.ends.iter().map(ToString::to_string).collect();
+    let walked = found.walked.map_or(String::new(), |walked| format!(", on these rows after {walked:.1} on average"));
+    match ends.as_slice() {
+        [] => "Early exit: left out, since it would take more instructions\n".into(),
+        ends => format!("A class is known after at most {trees} trees{walked}; looked for after {}\n", ends.join(", ")),
+    }
+}
+
 /// The scale of each feature, if whole numbers are asked for, and the rows that they were fitted to.
 fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<(Option<Vec<f32>>, Option<Rows>)> {
     if arguments.scale.is_empty() {
@@ -600,6 +630,7 @@ fn text(path: &Path, exported: &Exported) -> String {
     }
     let each = if exported.features.is_some() { "row" } else { "touch" };
     _ = writeln!(text, "Instructions per {each}, estimated: {}", instructions(exported.instructions));
+    text += &exported.early_exit.as_ref().map_or(String::new(), early_exit_text);
     text += &exported.predicts.as_ref().map_or(String::new(), Predicts::text);
     for Merged { feature, thresholds, different } in &exported.merged {
         _ = writeln!(

@@ -323,10 +323,15 @@ fn strangers_table(strangers: &Strangers) -> String {
 
 /// Shares in percent: one row per touched object, one column per object that it was taken for.
 pub(super) fn confusion_table(confusion: &Confusion) -> String {
+    let s = if confusion.touches == 1 { "" } else { "es" };
+    shares_table(&format!("Taken for, after {} touch{s}", confusion.touches), confusion)
+}
+
+/// A confusion matrix in shares of its rows, under a title.
+pub(super) fn shares_table(title: &str, confusion: &Confusion) -> String {
     let names = confusion.touched.iter().chain(&confusion.recognized);
     let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max("7.1 %".len() + 2);
-    let s = if confusion.touches == 1 { "" } else { "es" };
-    let mut text = format!("\nTaken for, after {} touch{s}\n{:width$}", confusion.touches, "");
+    let mut text = format!("\n{title}\n{:width$}", "");
     // Writing to a string cannot fail.
     confusion.recognized.iter().for_each(|name| _ = write!(text, " {name:>width$}"));
     text.push('\n');

@@ -136,13 +136,14 @@ fn promise_lines(lines: &mut Lines, promise: &Promised, temperature: f64) {
     lines.line(
         "promise",
         format!(
-            "at most {} % of {} wrong, {} % sure; {} sequences of {:.1} {}, {} names given, {} wrong, {:.2} % undecided",
+            "at most {} % of {} wrong{}, {} % sure; {} sequences of {:.1} {}, {} names given, {} wrong, {:.2} % undecided",
             super::percent(promise.error_rate),
             match promise.per {
                 "name" => "each name, when it is given,",
                 "object" => "the names given to each object",
                 _ => "all names given",
             },
+            if promise.groups { " in new groups" } else { "" },
             super::percent(promise.confidence),
             promise.sequences,
             promise.mean,
@@ -152,7 +153,13 @@ fn promise_lines(lines: &mut Lines, promise: &Promised, temperature: f64) {
             100.0 * promise.undecided,
         ),
     );
-    lines.line("", format!("for touches with {}, at most {} of them", promise.noise, promise.max_touches));
+    lines.line(
+        "",
+        match promise.counted {
+            "rows" => format!("at most {} rows", promise.max_touches),
+            _ => format!("for touches with {}, at most {} of them", promise.noise, promise.max_touches),
+        },
+    );
     let margins: Vec<f64> = promise.margins.values().copied().collect();
     let is_one = margins.iter().all(|margin| *margin == margins[0]);
     let margin = |(name, margin): (&String, &f64)| format!("{name} {margin:.2}");

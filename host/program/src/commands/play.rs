@@ -46,7 +46,7 @@ pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
     refuse_unstated(&size)?;
     let objects = size.objects(&sources, seed)?;
     let stated = file.map(|file| file.real).filter(|real| !real.is_none());
-    let noise = real.over(stated.unwrap_or_else(Noise::switch))?;
+    let noise = real.over(stated.unwrap_or_else(Noise::switch)).map_err(|error| size.probe.named(error))?;
     let progress = Bar::new();
     let surfaces = play::surfaces(&objects, &origin)?;
     let contenders = if model.is_empty() {

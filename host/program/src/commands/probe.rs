@@ -2,7 +2,7 @@
 
 use super::remark;
 use palpate::ensemble::StatedProbe;
-use palpate::error::{Place, ProbeProblem};
+use palpate::error::ProbeProblem;
 use palpate::mesh::{BACKGROUND, Object, builtin, source};
 use palpate::probe::Probe;
 use palpate::probe::file::ProbeFile;
@@ -28,6 +28,14 @@ impl ProbeArguments {
     /// The probe file; none for the published probe.
     fn path(&self) -> Option<&PathBuf> {
         Some(&self.probe).filter(|path| path.as_os_str() != PUBLISHED)
+    }
+
+    /// The error, with the probe file's name unless it names a file.
+    pub(crate) fn named(&self, error: Error) -> Error {
+        match self.path() {
+            Some(path) => error.in_file(path),
+            None => error,
+        }
     }
 
     /// Contents of the file, if one is given.
@@ -70,10 +78,7 @@ impl ProbeArguments {
         match asked {
             None if there.is_none() => Ok(usual),
             Some(real) if there.is_none() && real.grazing.is_none() => Ok(real),
-            Some(_) if there.is_none() => {
-                let error = Error::from(ProbeProblem::OnlyCaptured);
-                Err(self.path().map_or(error, |path| Error::at(Place::file(path), ProbeProblem::OnlyCaptured)))
-            }
+            Some(_) if there.is_none() => Err(self.named(ProbeProblem::OnlyCaptured.into())),
             Some(real) if real != there => Err(ProbeProblem::Differs {
                 first: self.path().map_or_else(String::new, |path| path.display().to_string()),
                 second: "the data set".into(),

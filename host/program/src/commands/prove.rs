@@ -5,9 +5,10 @@ use super::rows::read_rows;
 use palpate::Result;
 use palpate::compile::CompiledModel;
 use palpate::ensemble::import::{Options, read_with};
-use palpate::error::{Error, Place, RowsProblem};
+use palpate::error::{CompileProblem, Error, Place, RowsProblem};
 use palpate::output;
-use palpate::prove::{Certificate, Moves, Proof, check, moves, prove};
+use palpate::prove::{Certificate, Moves, Proof, check, check_code, moves, prove, prove_code};
+use palpate_onboard::ModelError;
 use std::path::Path;
 
 /// A model and its ensemble, and the files of a proof of it.
@@ -23,14 +24,20 @@ pub(super) struct Asked<'a> {
 }
 
 /// Proves the model, or checks a certificate.
-pub(super) fn run(asked: &Asked<'_>, compiled: &CompiledModel, options: &Options<'_>, global: &Global) -> Result<()> {
+pub(super) fn run(asked: &Asked<'_>, options: &Options<'_>, global: &Global) -> Result<()> {
     let path = asked.ensemble;
+    let model = Proved::read(asked.model)?;
     // The very bytes whose checksum is stated.
     let file = std::fs::read(path).map_err(|source| Error::io(path, "read the ensemble", source))?;
     let ensemble = read_with(path, &file, options)?;
     let in_model = |error: Error| error.in_file(asked.model);
     if let Some(certificate) = asked.certificate {
-        let proof = check(&Certificate::read(certificate)?, compiled.bytes(), &ensemble, &file).map_err(in_model)?;
+        let certificate_read = Certificate::read(certificate)?;
+        let proof = match &model {
+            Proved::Data(compiled) => check(&certificate_read, compiled.bytes(), &ensemble, &file),
+            Proved::Code(bytes, code) => check_code(&certificate_read, bytes, code, &ensemble, &file),
+        }
+        .map_err(in_model)?;
         let text = proof_text(&proof, &format!("The certificate {} holds", certificate.display()));
         return if global.json { output::print_json(&proof) } else { output::print(&text) };
     }
@@ -42,8 +49,17 @@ pub(super) fn run(asked: &Asked<'_>, compiled: &CompiledModel, options: &Options
         Some(data) => Some(read_rows(data, &names, None)?),
         None => None,
     };
-    let (proof, certificate) = prove(compiled.bytes(), &ensemble, &file).map_err(in_model)?;
-    let moved = rows.map(|rows| moves(compiled.bytes(), rows.iter())).transpose().map_err(in_model)?;
+    let ((proof, certificate), moved) = match &model {
+        Proved::Data(compiled) => {
+            let proved = prove(compiled.bytes(), &ensemble, &file).map_err(in_model)?;
+            (proved, rows.map(|rows| moves(compiled.bytes(), rows.iter())).transpose().map_err(in_model)?)
+        }
+        Proved::Code(..) if rows.is_some() => {
+            let allowed = "no rows with a model whose trees are code; a layout of data has the same margins";
+            return Err(Error::setting("data", "given", allowed));
+        }
+        Proved::Code(bytes, code) => (prove_code(bytes, code, &ensemble, &file).map_err(in_model)?, None),
+    };
     let written = asked.written.unwrap_or_else(|| Path::new("-"));
     output::refuse_input(written, [asked.model, path])?;
     output::write_bytes(written, certificate.to_string().as_bytes())?;
@@ -55,6 +71,29 @@ pub(super) fn run(asked: &Asked<'_>, compiled: &CompiledModel, options: &Options
     } else {
         let moved = moved.map_or_else(String::new, |rows| moves_text(&rows, &names, &ensemble.objects));
         output::print_about(written, &(proof_text(&proof, "Proved") + &moved))
+    }
+}
+
+/// A model, with the assembly beside it if its trees are there.
+enum Proved {
+    Data(CompiledModel),
+    Code(Vec<u8>, String),
+}
+
+impl Proved {
+    fn read(path: &Path) -> Result<Self> {
+        let needs_code = |error: &Error| matches!(error.problem(), Some(CompileProblem::Model(ModelError::NeedsCode)));
+        match CompiledModel::read(path) {
+            Err(error) if needs_code(&error) => {
+                let io = |path: &Path, source| Error::io(path, "read", source);
+                let assembly = path.with_extension("s");
+                let bytes = std::fs::read(path).map_err(|source| io(path, source))?;
+                let text = std::fs::read_to_string(&assembly);
+                text.map(|text| Self::Code(bytes, text))
+                    .map_err(|source| Error::io(&assembly, "read the trees", source))
+            }
+            other => other.map(Self::Data),
+        }
     }
 }
 
@@ -80,7 +119,7 @@ fn moves_text(rows: &[Vec<Moves>], names: &[&str], classes: &[String]) -> String
 }
 
 fn proof_text(proof: &Proof, what: &str) -> String {
-    let Proof { trees, ensemble_trees, boxes, largest_difference, margin_error, stated, ranges } = proof;
+    let Proof { trees, ensemble_trees, boxes, largest_difference, margin_error, stated, ranges, .. } = proof;
     let compared = match trees {
         0 => format!("the model's table equals the sum of the ensemble's {ensemble_trees} trees"),
         _ => format!("the model's {trees} trees equal the ensemble's {ensemble_trees}"),
@@ -94,9 +133,16 @@ fn proof_text(proof: &Proof, what: &str) -> String {
         text +=
             "The model states less than the sum of its trees' largest differences, which no single row need reach.\n";
     }
-    text += "Bounds of each margin, which no row need reach:\n";
-    for (name, least, most) in ranges {
-        text += &format!("  {name}: {least:.4} to {most:.4}\n");
+    text += "Bounds of each margin, and how near to them a search for rows came:\n";
+    for ((name, least, most), (from, to)) in ranges.iter().zip(&proof.found) {
+        let near = |bound: f64, found: f64| match (bound - found).abs() <= 1e-9 * bound.abs().max(1.0) {
+            true => "attained".to_owned(),
+            false => format!("not known to be attained; {found:.4} is"),
+        };
+        text += &format!("  {name}: {least:.4} ({}) to {most:.4} ({})\n", near(*least, *from), near(*most, *to));
+    }
+    if let Some(instructions) = proof.instructions {
+        text += &format!("A row takes at most {instructions} instructions from its features to its margins.\n");
     }
     text
 }

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and six numbers of the probe's direction and alignment if the model needs them. Each line out is the verdict so far: undecided, recognized, unknown or gave-up. After a verdict, and after an empty line, the next touch is the first of another object. FILE may be a robot's log (MCAP) as well.
 
-With --features each line in is a row of features for a model of another library: CSV with the features' names in the header; out is the class of each row, or a regression's value.
+With --features each line in is a row of features for a model of another library: CSV with the features' names in the header; out is the class of each row, or a regression's value. With --add-up out is the verdict so far; after one the next row is the first of another object.
 
 Examples:
   palpate recognize model.palpate data/fork.txt
@@ -104,8 +104,13 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         Error::at(Place::file(&arguments.model), problem)
     };
     let recognizer = Recognizer::<256>::new(&model, stopping).map_err(too_many)?;
+    let weights = arguments.expected.weights(&compiled.names(), &palpate::evaluate::own_weights(&model))?;
     if arguments.features {
-        return super::recognize_rows::run(recognizer, &arguments.file, arguments.add_up, global.json)
+        if arguments.expected.is_given() && !arguments.add_up {
+            return Err(Error::setting("features", "each row alone", "--only and --prior with --add-up only"));
+        }
+        let rows = super::recognize_rows::Asked { adds_up: arguments.add_up, json: global.json, weights };
+        return super::recognize_rows::run(recognizer, &arguments.file, &rows)
             .map_err(|error| error.in_file(&arguments.model));
     }
     if model.descriptor().is_none() {
@@ -114,7 +119,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if arguments.active && model.plan().is_none() {
         return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
     }
-    let weights = arguments.expected.weights(&compiled.names(), &palpate::evaluate::own_weights(&model))?;
     let longest = compile::longest_time(&model);
     let (active, json) = (arguments.active, global.json);
     let log = arguments.mcap.as_deref().map(|log| log_to(log, &arguments, &compiled.names())).transpose()?;

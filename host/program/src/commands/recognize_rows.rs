@@ -31,8 +31,18 @@ struct Line<'a> {
     margins: Vec<f64>,
 }
 
-/// Prints the class or the value of each row; where `adds_up` a verdict, of it and those before it since the last verdict.
-pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, adds_up: bool, json: bool) -> Result<()> {
+/// Options for rows.
+pub(super) struct Asked {
+    /// True if evidence is added up: a verdict, of a row and those before it since the last verdict.
+    pub(super) adds_up: bool,
+    pub(super) json: bool,
+    /// Frequencies of the classes, if they are not the model's.
+    pub(super) weights: Option<Vec<u32>>,
+}
+
+/// Prints the class or the value of each row, or the verdict so far.
+pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked) -> Result<()> {
+    let &Asked { adds_up, json, ref weights } = asked;
     let mut recognizer = recognizer;
     let model = *recognizer.model();
     if model.descriptor().is_some() {
@@ -47,8 +57,12 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, adds_up: bool, j
     let mut scratch = vec![0; model.object_count()];
     for (number, row) in (1..).zip(rows.iter()) {
         let encoded = encoder.row(row);
-        if !adds_up || recognizer.verdict() != Verdict::Undecided {
-            recognizer.reset();
+        if number == 1 || !adds_up || recognizer.verdict() != Verdict::Undecided {
+            match weights {
+                // One of them is above 0.
+                Some(weights) => _ = recognizer.reset_to(weights),
+                None => recognizer.reset(),
+            }
         }
         recognizer.push_features(&encoded).map_err(|_| RowsProblem::Touches)?;
         let own = model.predict_class(&encoded, &mut scratch).unwrap_or_default();

@@ -76,7 +76,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
                 .chain(["--approaches", &approaches.to_string(), "--seed", &seed.to_string()])
                 .chain(size.words().iter().chain(&real.words()).map(String::as_str)),
         ),
-        noise: real.over(stated.filter(|real| !real.is_none()).unwrap_or_else(Noise::switch))?,
+        noise: real
+            .over(stated.filter(|real| !real.is_none()).unwrap_or_else(Noise::switch))
+            .map_err(|error| size.probe.named(error))?,
         sources: sources.clone(),
         // As many as 21,000 touches are worth it for; enough to promise anything at least.
         sequences: usize::try_from(touches / 2).unwrap_or(usize::MAX).clamp(300, run::Settings::default().sequences),

@@ -15,7 +15,7 @@ pub(crate) struct StrangersArguments {
     /// Detect objects that the model does not know: off, likely or certain [default: off]
     #[arg(long, value_parser = held, value_name = "HOW")]
     strangers: Option<Wanted>,
-    /// Touches of many other shapes; they tell what strangers are like [default: of 200 shapes, captured as DIR was]
+    /// Touches of many other shapes; or rows [default: of 200 shapes, captured as DIR was]
     #[arg(long, value_name = "DIR", requires = "strangers")]
     background: Option<PathBuf>,
 }
@@ -27,6 +27,11 @@ impl StrangersArguments {
     /// The test that is wanted, if one is.
     pub(crate) fn held(&self) -> Option<Held> {
         self.strangers.and_then(|Wanted(held)| held)
+    }
+
+    /// The data of others, if it is given.
+    pub(crate) fn background(&self) -> Option<&PathBuf> {
+        self.background.as_ref()
     }
 
     /// The other shapes: those that are given, or as the data set was captured; none for one of unknown origin.

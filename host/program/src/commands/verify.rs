@@ -18,7 +18,7 @@ Of a model of touches, every touch of DATA, a directory, goes through model and 
 
 Of a model of another library, every row of DATA, a CSV file, goes through the model and the file's own trees, and so do rows that are made at every split: at the threshold, one step to each side, missing. Columns are matched by name, or by position. With --library-margins the model is also compared with the library's own raw scores: no header, one row per line, one column per output.
 
---prove needs no data: each tree of the model is compared with its trees in ENSEMBLE on every possible row, and a certificate is written. With a CSV file of rows it also says how far one feature can move before the class changes. --certificate checks a certificate with an independent reader of the model.
+--prove needs no data: each tree of the model is compared with its trees in ENSEMBLE on every possible row, and a certificate is written. With a CSV file of rows it also says how far one feature can move before the class changes. --certificate checks a certificate with an independent reader of the model. Of a model whose trees are assembly, that is read back from the file beside it (.s).
 
 The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class where the stated rounding does not explain it.
 
@@ -53,7 +53,6 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
-    let compiled = CompiledModel::read(&arguments.model)?;
     let options = arguments.unstated.options(None);
     let data = match &arguments.data {
         Some(data) if arguments.prove.is_none() => data,
@@ -65,9 +64,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
                 written: arguments.prove.as_deref(),
                 certificate: arguments.certificate.as_deref(),
             };
-            return super::prove::run(&asked, &compiled, &options, global);
+            return super::prove::run(&asked, &options, global);
         }
     };
+    let compiled = CompiledModel::read(&arguments.model)?;
     let ensemble = Ensemble::load_with(&arguments.ensemble, &options)?;
     if ensemble.descriptor().is_some() {
         return match (&arguments.library_margins, data.is_file()) {

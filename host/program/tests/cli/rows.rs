@@ -456,6 +456,97 @@ fn targets_of_millions_are_no_object_of_a_million_nats() {
     }
 }
 
+/// Sequences of rows of a model's own classes, five of six rows such that the model itself takes for the class; as CSV.
+fn sequences(model: &str, file: &str, count: usize, first: usize) -> String {
+    let text = std::fs::read_to_string(file).unwrap();
+    let (header, rows) = text.split_once('\n').unwrap();
+    let rows: Vec<&str> = rows.lines().collect();
+    let said = stdout(run(["recognize", model, file, "--features", "--json"]));
+    let class = |line: &str| serde_json::from_str::<Value>(line).unwrap()["class"].as_str().unwrap().to_owned();
+    let classes: Vec<String> = said.lines().map(class).collect();
+    let mut text = format!("id,kind,{header}\n");
+    for number in first..first + count {
+        let name = ["cup", "jug", "pan"][number % 3];
+        let own: Vec<usize> = (0..rows.len()).filter(|&row| classes[row] == name).collect();
+        for step in 0..6 {
+            let row =
+                if step == 3 { (number * 7 + step) % rows.len() } else { own[(number * 5 + step * 3) % own.len()] };
+            text += &format!("{number},{name},{}\n", rows[row]);
+        }
+    }
+    text
+}
+
+#[test]
+fn sequences_of_rows_are_calibrated_evaluated_and_recognized_verdict_after_verdict() {
+    let (_directory, path) = place();
+    let (model, sure, page) = (path("model.palpate"), path("sure.palpate"), path("page.html"));
+    let rows = data("xgboost-3.4-softprob.rows.csv");
+    stdout(run(["export", &data("xgboost-3.4-softprob.ubj"), "-o", &model, "--names", "cup,jug,pan"]));
+    std::fs::write(path("fresh.csv"), sequences(&model, &rows, 300, 0)).unwrap();
+    std::fs::write(path("unseen.csv"), sequences(&model, &rows, 300, 300)).unwrap();
+    let columns = ["--label", "kind", "--sequence-column", "id"];
+    let fresh = path("fresh.csv");
+    let calibrate = |more: &[&str]| run([&["calibrate", &model, &fresh, "-o", &sure][..], &columns, more].concat());
+    let found = json(calibrate(&["--error-rate", "10%", "--json"]));
+    assert_eq!(
+        (&found["promised"], &found["per"], &found["learned"]),
+        (&Value::from(0.1), &"average".into(), &75.into())
+    );
+    assert_eq!(found["sequences"], 225);
+    let text = stdout(calibrate(&["--error-rate", "10%"]));
+    assert!(text.starts_with("Promised: at most 10 % of all names given, on average, wrong"), "{text}");
+    let unseen = path("unseen.csv");
+    let evaluate = |more: &[&str]| run([&["evaluate", &sure, &unseen][..], &columns, more].concat());
+    let found = json(evaluate(&["--json", "--page", &page]));
+    assert!(found["error"].as_f64() < Some(0.15) && found["promise"]["promised"] == 0.1, "{found}");
+    assert_eq!(found["confusion"].as_array().unwrap().len(), 3);
+    let html = std::fs::read_to_string(&page).unwrap();
+    for part in ["Rows to a verdict", "early stopping", "majority vote", "Confusion", "as it grows"] {
+        assert!(html.contains(part), "{part}");
+    }
+    let text = stdout(evaluate(&[]));
+    assert!(text.contains("promised: at most 10 % wrong") && text.contains("no name"), "{text}");
+    let said = stdout(run(["recognize", &sure, &unseen, "--features", "--add-up"]));
+    assert!(said.lines().filter(|line| line.contains("recognized")).count() > 100, "{said}");
+    let only = stdout(run(["recognize", &sure, &unseen, "--features", "--add-up", "--only", "cup,pan"]));
+    assert!(!only.lines().any(|line| line.contains("recognized") && line.contains("jug")), "{only}");
+}
+
+#[test]
+fn what_is_wrong_with_sequences_of_rows_names_the_line_and_what_to_do() {
+    let (_directory, path) = place();
+    let model = path("model.palpate");
+    let rows = data("xgboost-3.4-softprob.rows.csv");
+    stdout(run(["export", &data("xgboost-3.4-softprob.ubj"), "-o", &model, "--names", "cup,jug,pan"]));
+    let good = sequences(&model, &rows, 240, 0);
+    let file = path("rows.csv");
+    let refused = |text: &str, more: &[&str]| {
+        std::fs::write(&file, text).unwrap();
+        let output = path("no.palpate");
+        let words = ["calibrate", &model, &file, "-o", &output, "--label", "kind", "--sequence-column", "id"];
+        let complaint = stderr(run([&words[..], more].concat()), 1);
+        assert!(!Path::new(&output).exists());
+        complaint
+    };
+    let few = refused(&good, &[]);
+    assert!(few.contains("240 sequences are too few to promise 1 %: at least 299 are needed"), "{few}");
+    assert!(few.contains("as many could promise 1.3 %"), "{few}");
+    let two = refused(&good.replacen("0,cup", "0,jug", 1), &[]);
+    assert!(two.contains(":3: the sequence \"0\" has the labels"), "{two}");
+    let unknown = refused(&good.replacen("0,cup", "0,bowl", 6), &[]);
+    assert!(unknown.contains(":2: the label \"bowl\""), "{unknown}");
+    let again = refused(&format!("{good}{}", good.lines().nth(1).unwrap()), &[]);
+    assert!(again.contains(":1442: the sequence \"0\" comes back"), "{again}");
+    let group = refused(&good, &["--group-column", "person"]);
+    assert!(group.contains(":1: it has no column \"person\""), "{group}");
+    let alone = stderr(run(["calibrate", &model, &file, "-o", &path("no.palpate"), "--label", "kind"]), 2);
+    assert!(alone.contains("--sequence-column"), "{alone}");
+    stdout(run(["export", &data("xgboost-2.1-squarederror.ubj"), "-o", &model]));
+    let regression = refused(&good, &[]);
+    assert!(regression.contains("predicts a value"), "{regression}");
+}
+
 #[test]
 fn every_kind_is_proved_for_every_row_and_its_certificate_holds_or_says_what_changed() {
     let (_directory, path) = place();
@@ -504,4 +595,53 @@ fn every_kind_is_proved_for_every_row_and_its_certificate_holds_or_says_what_cha
     let moved = json(run(["verify", &model, &source, &rows, "--prove", &proof, "--json"]));
     assert_eq!((moved["rows"].as_array().unwrap().len(), moved["rows"][0].as_array().unwrap().len()), (60, 4));
     stderr(run(["verify", &model, &source, &rows, "--certificate", &proof]), 2);
+}
+
+#[test]
+fn a_class_from_fewer_trees_is_decided_by_rows_and_said_and_proved_in_data_and_in_assembly() {
+    let (_directory, path) = place();
+    let (model, proof, source) = (path("model.palpate"), path("proof.txt"), data("xgboost-3.4-softmax.json"));
+    let rows = data("xgboost-3.4-softmax.rows.csv");
+    let plain = json(run(["export", &source, "-o", &model, "--layout", "compact", "--json"]));
+    assert_eq!(plain.get("early_exit"), None);
+    let before = std::fs::read(&model).unwrap();
+    for early_exit in ["yes", rows.as_str()] {
+        let options = ["--layout", "compact", "--early-exit", early_exit, "--json"];
+        let exported = json(run(["export", source.as_str(), "-o", model.as_str()].into_iter().chain(options)));
+        let places = exported["early_exit"]["ends"].as_array().unwrap().len();
+        assert!(places > 0 || std::fs::read(&model).unwrap() == before, "{exported}");
+        assert_eq!(exported["early_exit"].get("walked").is_some(), early_exit != "yes", "{exported}");
+        stdout(run(["verify", &model, &source, &rows]));
+        stdout(run(["verify", &model, &source, "--prove", &proof]));
+        stdout(run(["verify", &model, &source, "--certificate", &proof]));
+    }
+    let text = stdout(run(["export", &source, "-o", &model, "--layout", "compact", "--early-exit", "yes"]));
+    assert!(text.contains("A class is known after at most "), "{text}");
+    for emit in ["thumb", "thumb-m4f"] {
+        for early_exit in [&[][..], &["--early-exit", "yes"]] {
+            stdout(run(["export", &source, "-o", &model, "--emit", emit].iter().chain(early_exit)));
+            let proved = json(run(["verify", &model, &source, "--prove", &proof, "--json"]));
+            assert!(proved["instructions"].as_u64().unwrap() > 50, "{proved}");
+            stdout(run(["verify", &model, &source, "--certificate", &proof]));
+        }
+    }
+    // A changed comparison, and assembly that is not there.
+    let assembly = path("model.s");
+    let text = std::fs::read_to_string(&assembly).unwrap();
+    let (head, tail) = text.rsplit_once("\tcmp r3, #").unwrap();
+    let (number, rest) = tail.split_once('\n').unwrap();
+    let other = number.parse::<u8>().unwrap() + 1;
+    std::fs::write(&assembly, format!("{head}\tcmp r3, #{other}\n{rest}")).unwrap();
+    let message = stderr(run(["verify", &model, &source, "--prove", &proof]), 1);
+    assert!(message.contains("model.palpate: "), "{message}");
+    let message = stderr(run(["verify", &model, &source, "--certificate", &proof]), 1);
+    assert!(message.contains("a file of assembly"), "{message}");
+    std::fs::remove_file(&assembly).unwrap();
+    let message = stderr(run(["verify", &model, &source, "--prove", &proof]), 1);
+    assert!(message.contains("model.s"), "{message}");
+    let message = stderr(run(["export", &source, "-o", &model, "--leaf", "f32", "--early-exit", "yes"]), 2);
+    assert!(message.contains("sums of f32"), "{message}");
+    let one = data("xgboost-2.1-squarederror.ubj");
+    let message = stderr(run(["export", &one, "-o", &model, "--early-exit", "yes"]), 2);
+    assert!(message.contains("has no class"), "{message}");
 }

@@ -16,10 +16,13 @@ from ._errors import FileError, InputError, PalpateError, SettingError
 from ._evaluate import Evaluation, Parity, Sequential, evaluate, parity
 from ._import import compile, to_ensemble
 from ._native import DataSet, Ensemble, Model, Recognizer, Surface, capture, train
+from ._stream import Calibrated, Ends, SequenceRecognizer, calibrate, evaluate_sequences
 from ._types import Meshes, Probe, Progress, Touch, Verdict
 
 __all__ = [
+    "Calibrated",
     "DataSet",
+    "Ends",
     "Ensemble",
     "Evaluation",
     "FileError",
@@ -31,14 +34,17 @@ __all__ = [
     "Probe",
     "Progress",
     "Recognizer",
+    "SequenceRecognizer",
     "Sequential",
     "SettingError",
     "Surface",
     "Touch",
     "Verdict",
+    "calibrate",
     "capture",
     "compile",
     "evaluate",
+    "evaluate_sequences",
     "parity",
     "to_ensemble",
     "train",

@@ -10,7 +10,7 @@ from palpate._types import Meshes, Probe, Progress, Touch, Verdict
 from pandas import DataFrame
 from typing import SupportsFloat, SupportsIndex, final
 
-__all__ = ["DataSet", "Ensemble", "Model", "Recognizer", "Surface", "capture", "checksums", "compile", "evaluate", "parity", "sources", "train"]
+__all__ = ["DataSet", "Ensemble", "Model", "Recognizer", "Surface", "calibrate", "capture", "checksums", "compile", "evaluate", "evaluate_sequences", "parity", "sources", "train"]
 
 @final
 class DataSet:
@@ -388,6 +388,11 @@ class Surface:
         The number of triangles.
         """
 
+def calibrate(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], sequence: SupportsGetItem[int, str], *, groups: SupportsGetItem[int, str] | None = None, error_rate: SupportsFloat | SupportsIndex = 0.01, per: str = "average", confidence: SupportsFloat | SupportsIndex = 0.95, max_rows: SupportsIndex | None = None, strangers: str | None = None, background: ArrayLike | None = None, background_sequence: SupportsGetItem[int, str] | None = None, seed: SupportsIndex = 1, progress: Progress | None = None) -> tuple[Model, str]:
+    """
+    Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
+    """
+
 def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, shard: str = "1/1", out: str | PathLike[str] | None = None, format: str = "text", resume: bool = False, add: bool = False, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
     """
     Touches objects with a simulated probe.
@@ -440,6 +445,11 @@ def compile(ensemble: Ensemble, *, max_bytes: SupportsIndex | None = None, leaf:
 def evaluate(model: Model | Ensemble, data: DataSet, *, at: SupportsGetItem[int, SupportsIndex] | None = None, groups: SupportsIndex = 1000, error_rate: SupportsFloat | SupportsIndex | None = None, max_touches: SupportsIndex | None = None, noise: str = "", timer: str = "", seed: SupportsIndex = 1) -> str:
     """
     Evaluates a model on touches that it was not trained on, and returns what `palpate evaluate --json` prints.
+    """
+
+def evaluate_sequences(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], sequence: SupportsGetItem[int, str], *, groups: SupportsGetItem[int, str] | None = None, error_rate: SupportsFloat | SupportsIndex | None = None, max_rows: SupportsIndex | None = None) -> str:
+    """
+    Measures a model on sequences of rows, and returns what `palpate evaluate --json` prints.
     """
 
 def parity(ensemble: Ensemble, model: Model, data: DataSet, *, sequences: SupportsIndex = 10000, seed: SupportsIndex = 1, progress: Progress | None = None) -> str:

@@ -34,10 +34,12 @@ pub struct Promised {
     pub per: &'static str,
     /// The probability that the promise is kept.
     pub confidence: f64,
-    /// "touches" or "approaches".
+    /// "touches", "approaches" or "rows".
     pub counted: &'static str,
     /// True if each approach was in the pose that the plan proposed.
     pub active: bool,
+    /// True if the promise is for new groups of sequences, such as persons.
+    pub groups: bool,
     /// The sequences that it rests on.
     pub sequences: u32,
     /// Names given in these sequences.
@@ -46,7 +48,7 @@ pub struct Promised {
     pub wrong: u32,
     /// The share of sequences that ended without a name.
     pub undecided: f64,
-    /// Touches, or approaches, of a sequence on average.
+    /// Touches, approaches or rows of a sequence on average.
     pub mean: f64,
     /// The touches after which they give up.
     pub max_touches: u32,
@@ -201,8 +203,13 @@ pub(super) fn promised(model: &Model<'_>) -> Option<Promised> {
         error_rate: promise.rate,
         per: promise.per.name(),
         confidence: promise.confidence,
-        counted: if promise.approaches { "approaches" } else { "touches" },
+        counted: match () {
+            () if model.descriptor().is_none() => "rows",
+            () if promise.approaches => "approaches",
+            () => "touches",
+        },
         active: promise.active,
+        groups: promise.groups,
         sequences: promise.sequences,
         given: promise.given,
         wrong: promise.wrong,

@@ -19,6 +19,7 @@ use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::record::Field;
 use std::cell::Cell;
 use std::fs::File;
 use std::io::BufReader;
@@ -130,6 +131,39 @@ pub fn read(path: &Path) -> Result<Vec<Touch>> {
         return Err(wrong(TouchesProblem::NoTouches));
     }
     Ok(touches)
+}
+
+/// A table of any columns, as text, null where it is empty: its header and its rows, in their order.
+///
+/// # Errors
+/// When the file cannot be read, or as `wrong` says for one that is no Parquet.
+pub(crate) fn table(path: &Path, wrong: impl Fn(String) -> Error) -> Result<(Vec<String>, Vec<Vec<String>>)> {
+    let io = |error| Error::io(path, "read the rows", error);
+    let file = File::open(path).map_err(io)?;
+    let length = file.metadata().map_err(io)?.len();
+    let read = || {
+        let reader = SerializedFileReader::new(Bounded { file, length }).map_err(|error| not_parquet(&error))?;
+        check_ranges(reader.metadata(), length)?;
+        let schema = reader.metadata().file_metadata().schema_descr();
+        let header = schema.root_schema().get_fields().iter().map(|field| field.name().to_owned()).collect();
+        let rows = reader.get_row_iter(None).map_err(|error| not_parquet(&error))?;
+        let cells = |row: parquet::record::Row| row.get_column_iter().map(|(_, field)| cell(field)).collect();
+        let rows: Result<Vec<Vec<String>>, TouchesProblem> =
+            rows.map(|row| row.map(cells).map_err(|error| not_parquet(&error))).collect();
+        Ok((header, rows?))
+    };
+    contained(read).map_err(|problem| wrong(problem.to_string()))
+}
+
+/// A value as text that reads as the same number.
+fn cell(field: &Field) -> String {
+    match field {
+        Field::Null => String::new(),
+        Field::Str(text) => text.clone(),
+        Field::Float(number) => number.to_string(),
+        Field::Double(number) => number.to_string(),
+        other => other.to_string(),
+    }
 }
 
 fn read_touches(file: Bounded, object: &str) -> Result<Vec<Touch>, TouchesProblem> {

@@ -4,6 +4,7 @@ use super::code::{Form, Program};
 use super::model::open_any;
 use crate::error::Result;
 use palpate_onboard::Model;
+use palpate_shared::format::Tag;
 use std::fmt::Write as _;
 
 /// A language that a model is written in.
@@ -87,6 +88,9 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
     let strangers = u8::from(model.strangers().is_some());
     let shared = u8::from(model.shared_leaves().is_some());
     let sentinel = u8::from(model.sentinel().is_some());
+    let row_evidence = u8::from(has_row_evidence(model));
+    let has_exits = model.early_exits().next().is_some();
+    let early = if has_exits { "#ifndef PALPATE_EARLY\n#define PALPATE_EARLY 1\n#endif\n" } else { "" };
     let (objects, length) = (model.object_count(), model.bytes().len());
     format!(
         "/* {about}\n * Written by `palpate export`; not to be edited. */\n\
@@ -97,6 +101,8 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
          #ifndef PALPATE_STRANGERS\n#define PALPATE_STRANGERS {strangers}\n#endif\n\
          #ifndef PALPATE_SHARED\n#define PALPATE_SHARED {shared}\n#endif\n\
          #ifndef PALPATE_SENTINEL\n#define PALPATE_SENTINEL {sentinel}\n#endif\n\
+         #ifndef PALPATE_ROW_EVIDENCE\n#define PALPATE_ROW_EVIDENCE {row_evidence}\n#endif\n\
+         {early}\
          #ifndef PALPATE_MAX_OBJECTS\n#define PALPATE_MAX_OBJECTS {objects}\n#endif\n\
          #if defined(__AVR__) && !defined(PALPATE_BYTE)\n#include <avr/pgmspace.h>\n#define PALPATE_BYTE(p) pgm_read_byte(p)\n#endif\n\
          #include \"palpate.h\"\n\n\
@@ -106,7 +112,7 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
          #if defined(__AVR__)\n    PROGMEM\n#elif defined(__GNUC__)\n    __attribute__((aligned(4)))\n#endif\n    = {{\n\
          {array}}};\n\n{functions}#endif\n",
         about = about(model).replace("*/", "* /"),
-        checks = checks(&name.to_uppercase(), &layout, &leaf, [strangers, shared, sentinel], objects),
+        checks = checks(&name.to_uppercase(), &layout, &leaf, [strangers, shared, sentinel, row_evidence], objects),
         array = array(model.bytes()),
         open = match functions {
             "" => format!("palpate_open(&model, {name}_model, sizeof {name}_model)"),
@@ -117,7 +123,8 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
 
 /// Compile-time check that names the line that makes room for all models, where another model or the program itself has
 /// left out what this one needs.
-fn checks(name: &str, layout: &str, leaf: &str, [strangers, shared, sentinel]: [u8; 3], objects: usize) -> String {
+fn checks(name: &str, layout: &str, leaf: &str, needed: [u8; 4], objects: usize) -> String {
+    let [strangers, shared, sentinel, row_evidence] = needed;
     let several =
         |all: &str, own: &str| (format!("({all} & {own}) == 0"), format!("{all} ({own} | those of the others)"));
     let number = |all: &str, own: usize| (format!("{all} < {own}"), format!("{all} {own}"));
@@ -129,6 +136,7 @@ fn checks(name: &str, layout: &str, leaf: &str, [strangers, shared, sentinel]: [
     checks.extend((strangers == 1).then(|| number("PALPATE_STRANGERS", 1)));
     checks.extend((shared == 1).then(|| number("PALPATE_SHARED", 1)));
     checks.extend((sentinel == 1).then(|| number("PALPATE_SENTINEL", 1)));
+    checks.extend((row_evidence == 1).then(|| number("PALPATE_ROW_EVIDENCE", 1)));
     let check = |(fails, line): (String, String)| {
         format!("#if {fails}\n#error \"model {name}: before the first model is included, #define {line}\"\n#endif\n")
     };
@@ -137,7 +145,7 @@ fn checks(name: &str, layout: &str, leaf: &str, [strangers, shared, sentinel]: [
 
 fn rust(model: &Model<'_>, name: &str) -> String {
     format!(
-        "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}{sentinel}.\n\n\
+        "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}{sentinel}{row}.\n\n\
          /// The model: `Model::new(&{constant}.0)`.\n\
          #[rustfmt::skip]\n\
          pub static {constant}: palpate_onboard::Aligned<[u8; {length}]> = palpate_onboard::Aligned([\n\
@@ -147,10 +155,17 @@ fn rust(model: &Model<'_>, name: &str) -> String {
         leaf = model.leaf_type().name(),
         shared = if model.shared_leaves().is_some() { ", shared-leaves" } else { "" },
         sentinel = if model.sentinel().is_some() { ", sentinel" } else { "" },
+        row = if has_row_evidence(model) { ", row-evidence" } else { "" },
         constant = name.to_uppercase(),
         length = model.bytes().len(),
         array = array(model.bytes()),
     )
+}
+
+/// True if the model states what a row adds to the evidence, or how much rows count together.
+fn has_row_evidence(model: &Model<'_>) -> bool {
+    let tags = [Tag::Weights, Tag::RowEvidence].map(Tag::code);
+    model.optional_sections().any(|section| tags.contains(&section.tag))
 }
 
 /// Description of the model, in one line.

@@ -19,6 +19,14 @@ pub(super) fn groups_and_splits<'m>(model: &Model<'m>) -> (Vec<Group>, &'m [u8])
     (found, bytes.get(splits..splits + length(header.nodes_length())).unwrap_or_default())
 }
 
+/// Numbers of trees after which a walk for a class alone may end.
+pub fn ends_of_walks(model: &Model<'_>) -> Vec<usize> {
+    let groups = groups_and_splits(model).0;
+    let trees = |groups: &[Group]| groups.iter().map(|group| group.trees as usize).sum();
+    let exits = model.early_exits().map(|exit| groups.len().min(exit.groups.into()));
+    exits.map(|end| trees(&groups[..end])).collect()
+}
+
 /// The groups of a model, and how many leaves each of their trees has, in the model's order. Tables have no groups.
 pub fn leaves_of_trees(model: &Model<'_>) -> Vec<(Group, Vec<usize>)> {
     let (groups, mut rest) = groups_and_splits(model);

@@ -2,9 +2,9 @@
 
 use super::axes::Axes;
 use super::cells::Cells;
-use super::code::Program;
-use super::code::Statements;
+use super::code::{Form, Program, Statements};
 use super::cost::{Instructions, Shape};
+use super::early::{self, EarlyExitFound, Plan, Work};
 use super::forest::Forest;
 use super::merge::{Merged, merge};
 use super::parts::Parts;
@@ -12,9 +12,9 @@ use super::quantize::Scale;
 use super::rounding;
 use super::share::share;
 use super::table;
-use super::trees::{self, Leaves, Run, Sections};
+use super::trees::{self, Leaves, Sections};
 use crate::error::{CompileProblem, Result};
-use palpate_shared::format::{Layout, LeafType};
+use palpate_shared::format::{EarlyExit, Layout, LeafType, Sentinel};
 use std::cell::OnceCell;
 
 /// Layouts of a forest: the one that was asked for, or all that fit.
@@ -43,12 +43,8 @@ pub(super) fn candidates(
         *error.get_or_init(|| scale.as_ref().map_or(0.0, bound))
     };
     for layout in layouts {
-        let walked =
-            |write: &dyn Fn(&[Run], &mut Leaves<'_>) -> Option<Sections>| walked(&walk, layout, &error, leaf, write);
         let parts = match layout {
-            Layout::Complete => walked(&|runs, leaves| trees::complete(walk.forest, axes, runs, leaves)),
-            Layout::Compact => walked(&|runs, leaves| trees::compact(walk.forest, axes, runs, leaves)),
-            Layout::Wide => walked(&|runs, leaves| trees::wide(walk.forest, runs, leaves)),
+            Layout::Complete | Layout::Compact | Layout::Wide => walk.parts(layout, axes, leaf, None, &error),
             Layout::Code => None,
             Layout::Grid => cells.and_then(|cells| table::grid(forest, cells, leaf)),
             Layout::Patterns => cells.and_then(|cells| table::patterns(forest, cells, leaf)),
@@ -93,6 +89,7 @@ pub(super) fn code(
         nodes: Vec::new(),
         leaves: Vec::new(),
         shared: None,
+        exits: Vec::new(),
         base: vec![0; forest.objects()],
         unit: scale.unit,
         margin_error: rounding::margin_error(forest, cells, leaf, &scale),
@@ -120,39 +117,102 @@ impl<'f> Walk<'f> {
     }
 }
 
-/// The parts of a layout that walks trees; `write` writes its sections and leaves.
-fn walked(
-    walk: &Walk<'_>,
-    layout: Layout,
-    margin_error: &impl Fn() -> f32,
-    leaf: LeafType,
-    write: &dyn Fn(&[Run], &mut Leaves<'_>) -> Option<Sections>,
-) -> Option<Parts> {
-    let (forest, scale) = (walk.forest, walk.scale?);
-    let mut leaves = Leaves::new(leaf, scale);
-    let runs = trees::runs(forest, leaf, scale);
-    let Sections { axes, cuts, groups, nodes } = write(&runs, &mut leaves)?;
-    if groups.len() > usize::from(u16::MAX) {
-        return None;
+impl Walk<'_> {
+    /// The parts of a layout that walks trees, in the order of a plan if there is one.
+    fn parts(
+        &self,
+        layout: Layout,
+        axes: &Axes,
+        leaf: LeafType,
+        plan: Option<&Plan>,
+        margin_error: &dyn Fn() -> f32,
+    ) -> Option<Parts> {
+        let (forest, scale) = (self.forest, self.scale?);
+        let mut leaves = Leaves::new(leaf, scale);
+        let walked_in =
+            plan.map_or_else(Vec::new, |plan| early::parts(&plan.order, plan.ends.iter().map(|(end, _)| *end)));
+        let runs = trees::runs(forest, leaf, scale, &walked_in);
+        let Sections { axes, cuts, groups, nodes } = match layout {
+            Layout::Complete => trees::complete(forest, axes, &runs, &mut leaves)?,
+            Layout::Compact => trees::compact(forest, axes, &runs, &mut leaves)?,
+            Layout::Wide => trees::wide(forest, &runs, &mut leaves)?,
+            Layout::Code | Layout::Grid | Layout::Patterns => return None,
+        };
+        if groups.len() > usize::from(u16::MAX) {
+            return None;
+        }
+        let ends = plan.into_iter().flat_map(|plan| &plan.ends);
+        let exits = trees::groups_before(&runs, &walked_in).into_iter().zip(ends);
+        let mut parts = Parts {
+            axes,
+            cuts,
+            groups,
+            nodes,
+            leaves: leaves.into_bytes(),
+            shared: None,
+            exits: exits.map(|(groups, &(_, bound))| EarlyExit { groups, bound }).collect(),
+            base: self.base.clone(),
+            unit: scale.unit,
+            margin_error: margin_error(),
+            instructions: Instructions { m4f: 0, m0_plus: None },
+        };
+        parts.instructions = instructions(layout, leaf, forest.objects(), &parts);
+        Some(parts)
     }
-    let base = walk.base.clone();
-    let (unit, margin_error) = (scale.unit, margin_error());
-    let leaves_bytes = leaves.into_bytes();
-    let none = Instructions { m4f: 0, m0_plus: None };
-    let mut parts = Parts {
-        axes,
-        cuts,
-        groups,
-        nodes,
-        leaves: leaves_bytes,
-        shared: None,
-        base,
-        unit,
-        margin_error,
-        instructions: none,
-    };
+
+    /// Plan of a walk that may end early.
+    fn plan(
+        &self,
+        layout: Layout,
+        wanted: &super::EarlyExit,
+        features: (Option<&[f32]>, Option<Sentinel>),
+    ) -> Option<Plan> {
+        let place = PLACE + PLACE_OF_OBJECT * self.forest.objects() as f64;
+        let work = Work { trees: &|trees| early::walk_cost(self.forest, layout, trees), place };
+        early::plan(self.forest, self.scale?, &self.base, wanted, &work, features)
+    }
+}
+
+/// Instructions of a place where a walk may end: the comparison of the margins, in all and for each.
+const PLACE: f64 = 30.0;
+const PLACE_OF_OBJECT: f64 = 9.0;
+
+/// The parts of a layout with places where walks for a class alone may end, and which these are; `None` where there are none.
+pub(super) fn with_early_exit(
+    forest: &Forest<'_>,
+    leaf: LeafType,
+    layout: Layout,
+    before: &Parts,
+    wanted: &super::EarlyExit,
+    features: (Option<&[f32]>, Option<Sentinel>),
+) -> Option<(Parts, EarlyExitFound)> {
+    let scale = Scale::for_trees(forest, leaf)?;
+    let merged = merge(forest, leaf, &scale);
+    let walk = Walk::new(forest, leaf, Some(&scale), merged.as_ref());
+    let plan = walk.plan(layout, wanted, features)?;
+    let parts = walk.parts(layout, &Axes::new(walk.forest), leaf, Some(&plan), &|| before.margin_error)?;
+    let mut parts = if before.shared.is_some() { share(&parts, leaf, forest.objects())? } else { parts };
     parts.instructions = instructions(layout, leaf, forest.objects(), &parts);
-    Some(parts)
+    Some((parts, plan.found))
+}
+
+/// The same of code.
+pub(super) fn code_with_early_exit(
+    forest: &Forest<'_>,
+    leaf: LeafType,
+    (program, form): (Program, Form),
+    wanted: &super::EarlyExit,
+    features: (Option<&[f32]>, Option<Sentinel>),
+) -> (Program, Option<EarlyExitFound>) {
+    let plan = || {
+        let scale = Scale::for_trees(forest, leaf)?;
+        let merged = merge(forest, leaf, &scale);
+        Walk::new(forest, leaf, Some(&scale), merged.as_ref()).plan(Layout::Code, wanted, features)
+    };
+    match plan().filter(|_| program.may_exit(form)) {
+        Some(plan) => (program.with_exits(&plan.order, plan.ends), Some(plan.found)),
+        None => (program, None),
+    }
 }
 
 /// Instructions of a touch in a layout that walks trees.

@@ -40,6 +40,7 @@ mod budget;
 mod cells;
 pub mod code;
 mod cost;
+mod early;
 mod emit;
 mod error;
 mod forest;
@@ -61,11 +62,12 @@ mod write;
 
 pub use budget::compile_within;
 pub use cost::{Core, Instructions, Memory};
+pub use early::{EarlyExit, EarlyExitFound};
 pub use emit::{Language, emit, emit_code};
 pub use error::CompileProblem;
-pub use groups::leaves_of_trees;
+pub use groups::{ends_of_walks, leaves_of_trees};
 pub use merge::Source;
-pub use model::{CompiledModel, longest_time, names, open};
+pub use model::{CompiledModel, longest_time, names, open, open_with_code};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
 pub use share::{different_leaves, unshared};
@@ -101,6 +103,8 @@ pub struct Settings {
     /// For an ensemble over rows: compares features as whole numbers, each of which is a feature's value times the
     /// feature's scale; `None` compares f32 values.
     pub scales: Option<Vec<f32>>,
+    /// For classes of rows: walks for a class alone end where the class is known. Nothing else changes.
+    pub early_exit: Option<EarlyExit>,
     /// For an ensemble over touches: what the model states of them. The crate `palpate` fills it in from the ensemble.
     pub stated: Stated,
 }
@@ -139,6 +143,7 @@ impl Default for Settings {
             priors: None,
             forms: Vec::new(),
             scales: None,
+            early_exit: None,
             stated: Stated::default(),
         }
     }
@@ -213,6 +218,8 @@ pub struct Compiled {
     pub candidates: Vec<Candidate>,
     /// The trees as code, and its form, if that was chosen: the bytes are a model without trees then.
     pub code: Option<(Program, Form)>,
+    /// Where walks for a class alone may end, if that was asked for.
+    pub early_exit: Option<EarlyExitFound>,
 }
 
 /// When recognizers stop.
@@ -238,6 +245,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let ensemble = &*range::scaled(ensemble);
     let stopping = stopping(settings.error_rate, settings.max_touches)?;
     let forest = Forest::new(ensemble, settings.scales.as_deref())?;
+    check_early_exit(ensemble, settings)?;
     write::check_sentinel(ensemble, settings)?;
     let cells = Cells::new(&forest);
     let wants_code = settings.layout == Some(Layout::Code);
@@ -277,20 +285,66 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
             false => CompileProblem::FitsNoLayout.into(),
         });
     };
-    let instructions = candidates[chosen].instructions;
+    let mut instructions = candidates[chosen].instructions;
     let form = settings.forms.iter().copied().find(|form| Some(form.name()) == candidates[chosen].form);
     let (layout, mut parts, code) = match (code.zip(form), made.into_iter().nth(chosen)) {
         (Some(((program, parts), form)), _) => (Layout::Code, parts, Some((program, form))),
         (None, Some((layout, parts))) => (layout, parts, None),
         (None, None) => return Err(CompileProblem::FitsNoLayout.into()),
     };
+    let (mut code, mut early_exit) = (code, None);
+    if let Some(wanted) = &settings.early_exit {
+        let features = (settings.scales.as_deref(), write::sentinel(ensemble, settings));
+        if let Some((program, form)) = code {
+            let (program, found) =
+                layout::code_with_early_exit(&forest, settings.leaf, (program, form), wanted, features);
+            instructions = program.cost(form).instructions;
+            (code, early_exit) = (Some((program, form)), found);
+        } else if let Some((planned, found)) =
+            layout::with_early_exit(&forest, settings.leaf, layout, &parts, wanted, features)
+        {
+            // Groups of their own cost bytes only where they are used.
+            if !planned.exits.is_empty() {
+                (parts, instructions) = (planned.clone(), planned.instructions);
+            }
+            early_exit = Some(found);
+        }
+        early_exit = Some(early_exit.unwrap_or_default());
+    }
     let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding);
     parts.margin_error = rounding::round_up(f64::from(parts.margin_error) + rounding / scale);
     let bytes = write::write(ensemble, write::hash(original), settings, &forest, stopping, layout, &parts)?;
     let (splits, leaves) = (forest.splits(), forest.leaves());
     let shared_leaves = open(&bytes).ok().and_then(|model| different_leaves(&model));
     let margin_error = rounding::round_up(f64::from(parts.margin_error) * scale);
-    Ok(Compiled { bytes, splits, leaves, margin_error, layout, shared_leaves, instructions, candidates, code })
+    Ok(Compiled {
+        bytes,
+        splits,
+        leaves,
+        margin_error,
+        layout,
+        shared_leaves,
+        instructions,
+        candidates,
+        code,
+        early_exit,
+    })
+}
+
+/// Returns an error where a walk may not end early.
+fn check_early_exit(ensemble: &Ensemble, settings: &Settings) -> Result<()> {
+    let why = if settings.early_exit.is_none() {
+        return Ok(());
+    } else if ensemble.descriptor().is_some() {
+        "none with a model of touches, whose recognizer takes all margins"
+    } else if ensemble.objects.len() < 2 {
+        "none with a model of one output, which has no class"
+    } else if settings.leaf == Leaf::F32 {
+        "leaves of i8 or i16 with it: sums of f32 depend on their order"
+    } else {
+        return Ok(());
+    };
+    Err(Error::setting("early_exit", "given", why))
 }
 
 /// Statements of the model that code depends on.
@@ -323,19 +377,56 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
     best.map(|(index, _)| index)
 }
 
-/// The trees of a model with such leaves, in its order, and which trees of the ensemble each stands for.
+/// The trees of a model with such leaves, in its order, and which trees of the ensemble each stands for. `ends` are the
+/// numbers of trees after which a walk may end.
 ///
 /// # Errors
 /// As [`compile`].
-pub fn order_of_trees(ensemble: &Ensemble, leaf: Leaf) -> Result<Vec<Source>> {
+pub fn order_of_trees(ensemble: &Ensemble, leaf: Leaf, ends: &[usize]) -> Result<Vec<Source>> {
     let ensemble = range::scaled(ensemble);
     let forest = Forest::new(&ensemble, None)?;
     let scale = quantize::Scale::for_trees(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?;
+    let parts = |forest: &Forest<'_>, scale: &quantize::Scale| match ends {
+        [] => Vec::new(),
+        _ => early::parts(&early::order(forest, scale), ends.iter().copied()),
+    };
     Ok(match merge::merge(&forest, leaf, &scale) {
         Some(merged) => {
-            let order = trees::order(&merged.forest, leaf, &merged.scale);
+            let parts = parts(&merged.forest, &merged.scale);
+            let order = trees::order(&merged.forest, leaf, &merged.scale, &parts);
             order.into_iter().map(|tree| merged.sources[tree].clone()).collect()
         }
-        None => trees::order(&forest, leaf, &scale).into_iter().map(Source::of).collect(),
+        None => trees::order(&forest, leaf, &scale, &parts(&forest, &scale)).into_iter().map(Source::of).collect(),
     })
+}
+
+/// The trees of code with such leaves, in the order in which assembly has them, and which trees of the ensemble each stands for.
+/// `ends` are the numbers of trees after which a walk may end; `is_m4f` says for which processor it is.
+///
+/// # Errors
+/// As [`compile`].
+pub fn order_of_code(ensemble: &Ensemble, leaf: Leaf, ends: &[usize], is_m4f: bool) -> Result<Vec<Source>> {
+    let ensemble = range::scaled(ensemble);
+    let forest = Forest::new(&ensemble, None)?;
+    let scale = quantize::Scale::for_trees(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?;
+    let merged = merge::merge(&forest, leaf, &scale);
+    let (forest, scale) = merged.as_ref().map_or((&forest, &scale), |merged| (&merged.forest, &merged.scale));
+    let stated = Statements { sentinel: None, known: forest.objects(), last_of_ties: false };
+    let program = Program::new(forest, scale, vec![0; forest.objects()], &stated);
+    let program = program.ok_or(CompileProblem::DoesNotFit { layout: Layout::Code })?;
+    let (order, program) = match ends {
+        [] => ((0..forest.trees.len()).collect(), program),
+        _ => {
+            let order = early::order(forest, scale);
+            let program = program.with_exits(&order, ends.iter().map(|&end| (end, 0)).collect());
+            (order, program)
+        }
+    };
+    let source = |(tree, zero): (usize, i32)| {
+        let tree = order[tree];
+        let source = merged.as_ref().map_or_else(|| Source::of(tree), |merged| merged.sources[tree].clone());
+        Source { offset: source.offset + (zero >> scale.shifts[tree]), ..source }
+    };
+    let chip = if is_m4f { code::Chip::M4F } else { code::Chip::M0Plus };
+    Ok(program.in_assembly(chip).into_iter().map(source).collect())
 }

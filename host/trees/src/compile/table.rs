@@ -62,6 +62,7 @@ fn table(
         nodes: Vec::new(),
         leaves: leaves.into_bytes(),
         shared: None,
+        exits: Vec::new(),
         base: vec![0; objects],
         unit: scale.unit,
         margin_error: round_up(worst),

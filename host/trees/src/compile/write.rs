@@ -31,6 +31,7 @@ pub(super) fn write(
         parts.section(),
         of_rows(ensemble, settings),
         captured(ensemble, settings),
+        parts.exits_section(),
     ]
     .concat();
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();

@@ -11,6 +11,7 @@ use std::path::Path;
 /// palpate certificate 1
 /// model CHECKSUM
 /// ensemble CHECKSUM
+/// code CHECKSUM
 /// tree ERROR OFFSET SOURCE...
 /// table ERROR
 /// output ERROR LEAST MOST
@@ -19,13 +20,15 @@ use std::path::Path;
 /// `tree` is there for each of the model's trees, in its order: the largest difference of a leaf in the library's margins,
 /// what the base has instead of the tree in steps of its leaves, and the ensemble's trees that it stands for, counted from
 /// 0. A table has `table` instead. `output` is there for each output: the largest difference of its margin, and the ends of
-/// its range. Checksums are CRC-64 (XZ) of both files.
+/// its range. Checksums are CRC-64 (XZ) of the files; `code` is there for a model whose trees are assembly.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Certificate {
     /// Checksum of the model's bytes.
     pub model: u64,
     /// Checksum of the ensemble's file.
     pub ensemble: u64,
+    /// Checksum of the file of assembly, if trees are in one.
+    pub code: Option<u64>,
     /// The model's trees.
     pub trees: Vec<CertifiedTree>,
     /// The largest difference in a cell, if the model is a table.
@@ -50,6 +53,9 @@ const FIRST: &str = "palpate certificate 1";
 impl fmt::Display for Certificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{FIRST}\nmodel {:016x}\nensemble {:016x}", self.model, self.ensemble)?;
+        if let Some(code) = self.code {
+            writeln!(f, "code {code:016x}")?;
+        }
         for CertifiedTree { error, offset, sources } in &self.trees {
             write!(f, "tree {error:e} {offset}")?;
             sources.iter().try_for_each(|source| write!(f, " {source}"))?;
@@ -92,6 +98,7 @@ impl Certificate {
         match words.next()? {
             "model" => self.model = u64::from_str_radix(words.next()?, 16).ok()?,
             "ensemble" => self.ensemble = u64::from_str_radix(words.next()?, 16).ok()?,
+            "code" => self.code = Some(u64::from_str_radix(words.next()?, 16).ok()?),
             "tree" => {
                 let (error, offset) = (words.next()?.parse().ok()?, words.next()?.parse().ok()?);
                 let sources: Option<Vec<usize>> = words.by_ref().map(|word| word.parse().ok()).collect();

@@ -2,6 +2,7 @@
 
 use super::ProofProblem;
 use super::boxes::{Rows, Rule, See, sides};
+use super::format::Exit;
 use palpate_onboard::Model;
 use palpate_shared::format::{Axis, CHECKSUM_LENGTH, Columns, Group, HEADER_LENGTH, Layout, LeafType, SharedLeaves};
 
@@ -220,6 +221,20 @@ impl<'m> Chip<'m> {
         }
         let rule = self.ranked(slots[0][slot], slots[1][slot]);
         sides(rows, rule, |side, rows| self.complete(tree, slots, 2 * slot + side, rows, see))
+    }
+
+    /// Places where walks for a class alone may end.
+    pub(super) fn exits(&self) -> Vec<Exit> {
+        if self.is_f32() {
+            return Vec::new();
+        }
+        let trees = |groups: u16| self.groups.iter().take(groups.into()).map(|group| group.trees as usize).sum();
+        let exit = |exit: palpate_shared::format::EarlyExit| Exit {
+            trees: trees(exit.groups),
+            bound: f64::from(exit.bound) * self.unit,
+            later: Vec::new(),
+        };
+        self.model.early_exits().map(exit).collect()
     }
 
     /// True if margins are a table's.

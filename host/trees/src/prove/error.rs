@@ -70,9 +70,26 @@ pub enum ProofProblem {
         /// The largest difference.
         found: f64,
     },
-    /// The model has no trees in it.
-    #[error("the model has the layout code: its trees are not in it")]
-    Code,
+    /// A walk may end although a class is not known yet.
+    #[error(
+        "after {trees} trees a walk may end with a lead of {stated:e}, although the other trees can change {found:e}"
+    )]
+    Exit {
+        /// Trees before it.
+        trees: usize,
+        /// The lead with which it ends, in the library's margins.
+        stated: f64,
+        /// The most that the following trees change.
+        found: f64,
+    },
+    /// Assembly that is not understood, or does something else than adding up trees.
+    #[error("line {line} of the assembly: {what}")]
+    Assembly {
+        /// The line.
+        line: usize,
+        /// The fault.
+        what: String,
+    },
     /// The model has one output.
     #[error("the model has one output, and no class that could change")]
     NoClass,
@@ -113,7 +130,7 @@ pub enum ProofProblem {
 impl Problem for ProofProblem {
     fn fix(&self) -> String {
         match self {
-            Self::Code => "Prove a model of the same ensemble with a data layout: export without --emit thumb or c-code.",
+            Self::Assembly { .. } => "Export the code again. Leaves with a value for each class are read only where they are votes.",
             Self::Line { .. } => "Give the file that `palpate verify --prove FILE` wrote, unchanged.",
             Self::OtherFile { .. } | Self::Understated { .. } => {
                 "Give the files that the certificate was made of, or make another with `palpate verify --prove FILE`."

@@ -28,8 +28,21 @@ pub(super) struct Plain {
     pub(super) base: Vec<f64>,
     /// Trees, and the size of a step of their leaves.
     pub(super) trees: Vec<(Tree, f64)>,
+    /// Places where walks for a class alone may end.
+    pub(super) exits: Vec<Exit>,
     /// Cells of a table: which rows fall into each, and its margins.
     pub(super) cells: Option<Vec<(Vec<Values>, Vec<f64>)>>,
+}
+
+/// A place where a walk for a class alone may end.
+#[derive(Clone, Debug)]
+pub(super) struct Exit {
+    /// The trees before it.
+    pub(super) trees: usize,
+    /// The most that those after it change the difference between two margins.
+    pub(super) bound: f64,
+    /// For each output, what is added after it beside trees; empty where nothing is.
+    pub(super) later: Vec<f64>,
 }
 
 struct Axis {
@@ -106,6 +119,23 @@ impl Leaves<'_> {
 }
 
 impl Plain {
+    /// The values without those at their ends that stand for a missing one, unless that is all of them.
+    pub(super) fn known(&self, values: Values) -> Values {
+        let Some([low, high]) = self.sentinel.filter(|_| !self.is_sentinel(&values)) else { return values };
+        let is_within = |key: i64| (low..=high).contains(&key);
+        Values {
+            low: if is_within(values.low) { high + 1 } else { values.low },
+            high: if is_within(values.high) { low - 1 } else { values.high },
+            ..values
+        }
+    }
+
+    /// True if all of these values stand for a missing one, so that no tree gets them.
+    pub(super) fn is_sentinel(&self, values: &Values) -> bool {
+        let within = |[low, high]: [i64; 2]| low <= values.low && values.low <= values.high && values.high <= high;
+        !values.missing && self.sentinel.is_some_and(within)
+    }
+
     /// Size of a unit that leaves were rounded to; 0 for f32 leaves.
     pub(super) fn rounded_to(&self) -> f64 {
         if self.most > 0.0 { self.unit } else { 0.0 }
@@ -139,6 +169,8 @@ struct Stated<'b> {
     link: (u8, bool),
     scales: Vec<f32>,
     feature_names: Vec<String>,
+    /// Groups before each place where a walk may end, and units.
+    exits: Vec<(usize, f64)>,
 }
 
 impl<'b> Stated<'b> {
@@ -150,6 +182,7 @@ impl<'b> Stated<'b> {
             link: (0, false),
             scales: vec![1.0; features],
             feature_names: Vec::new(),
+            exits: Vec::new(),
         };
         while !sections.0.is_empty() {
             let tag = sections.number(2)? & 0x7fff;
@@ -175,6 +208,13 @@ impl<'b> Stated<'b> {
                     stated.scale = f64::from(content.float()?);
                 }
                 14 => stated.sentinel = Some([content.signed(4)?, content.signed(4)?]),
+                17 => {
+                    while content.0.len() >= 8 {
+                        let groups = content.number(2)?;
+                        content.take(2)?;
+                        stated.exits.push((groups, content.number(4)? as f64));
+                    }
+                }
                 _ => {}
             }
         }
@@ -185,7 +225,7 @@ impl<'b> Stated<'b> {
 /// Reads a model.
 ///
 /// # Errors
-/// [`ProofProblem::Format`] if a section ends too early, or points out of the model; [`ProofProblem::Code`].
+/// [`ProofProblem::Format`] if a section ends too early, or points out of the model.
 pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let mut header = Bytes(bytes);
     header.take(4)?;
@@ -208,15 +248,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     header.take(8)?;
     let (cuts_length, splits_length, leaves_length) = (header.number(4)?, header.number(4)?, header.number(4)?);
     let sections_length = if version == 2 { header.number(4)? } else { header.take(4).map(|_| 0)? };
-    if layout == 6 {
-        return Err(ProofProblem::Code);
-    }
     let mut rest = header;
     let mut text = Bytes(rest.take(text_length)?);
     text.text()?;
     // A name is empty where the text ends too early.
     let names = (0..objects).map(|_| text.text().unwrap_or_default()).collect();
-    let Stated { shared, sentinel, scale, link, scales, feature_names } =
+    let Stated { shared, sentinel, scale, link, scales, feature_names, mut exits } =
         Stated::read(Bytes(rest.take(sections_length)?), features)?;
     let is_f32 = kind == 2;
     let leaves_of = Leaves { kind, unit: if is_f32 { scale } else { unit * scale }, shared };
@@ -231,6 +268,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let mut axis_bytes = Bytes(rest.take(4 * axis_count)?);
     let cuts_bytes = rest.take(cuts_length)?;
     let group_bytes = Bytes(rest.take(8 * group_count)?);
+    for (end, bound) in &mut exits {
+        // The number of trees is at the end of a group's record.
+        let groups = group_bytes.0.chunks(8).take(*end);
+        *end = groups.map(|group| Bytes(&group[4..]).number(4)).sum::<Result<usize, _>>()?;
+        *bound *= unit * scale;
+    }
     let splits = Bytes(rest.take(splits_length)?);
     let mut leaves = Bytes(rest.take(leaves_length)?);
     if rest.0.len() != 4 {
@@ -277,6 +320,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
         stated: error * scale,
         base: if cells.is_some() { vec![0.0; objects] } else { base },
         trees,
+        // Sums of f32 are not compared before the end.
+        exits: match is_f32 {
+            true => Vec::new(),
+            false => exits.into_iter().map(|(trees, bound)| Exit { trees, bound, later: Vec::new() }).collect(),
+        },
         cells,
     })
 }

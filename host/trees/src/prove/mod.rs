@@ -11,12 +11,14 @@
 //!
 //! Not proved: what is not the ensemble's, such as priors and thresholds for stopping; and that the chip executes its code.
 
+mod assembly;
 mod boxes;
 mod certificate;
 mod chip;
 mod error;
 mod format;
 mod moves;
+mod near;
 mod span;
 mod tables;
 mod trees;
@@ -52,6 +54,12 @@ pub struct Proof {
     pub stated: f64,
     /// For each output its name, and bounds of its margin.
     pub ranges: Vec<(String, f64, f64)>,
+    /// For each output the least and the largest margin of a row that a search found: what a bound is worth.
+    pub found: Vec<(f64, f64)>,
+    /// The most instructions that a row takes from its features to its margins, each tree's longest way counted; only of
+    /// assembly.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instructions: Option<usize>,
 }
 
 /// CRC-64 (XZ) of a file.
@@ -82,7 +90,8 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
     let found = if chip.is_table() {
         tables::of_chip(&chip, subject)?
     } else {
-        trees::of_chip(&chip, subject, &compile::order_of_trees(ensemble, model.leaf_type())?)?
+        let order = compile::order_of_trees(ensemble, model.leaf_type(), &compile::ends_of_walks(&model))?;
+        trees::of_chip(&chip, subject, &order)?
     };
     let mut proof = subject.proof(&found);
     if proof.margin_error > proof.stated
@@ -95,7 +104,100 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
         proof.margin_error = exact;
     }
     let Found { trees, table, outputs, .. } = found;
-    Ok((proof, Certificate { model: checksum(bytes), ensemble: checksum(file), trees, table, outputs }))
+    Ok((proof, Certificate { model: checksum(bytes), ensemble: checksum(file), code: None, trees, table, outputs }))
+}
+
+/// The same of a model of the layout code, whose trees are assembly that [`emit_code`](compile::emit_code) wrote.
+///
+/// # Errors
+/// As [`prove`]; [`ProofProblem::Assembly`] for what is not understood.
+pub fn prove_code(bytes: &[u8], code: &str, ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, Certificate)> {
+    let model = compile::open_with_code(bytes)?;
+    let (plain, read) = with_code(bytes, code)?;
+    statements(&plain, ensemble)?;
+    let sources = of_ensemble(ensemble, &plain.keys)?;
+    let subject = Subject { plain: &plain, sources: &sources, ensemble };
+    let ends: Vec<usize> = read.exits.iter().map(|exit| exit.0).collect();
+    let order = compile::order_of_code(ensemble, model.leaf_type(), &ends, read.is_m4f)?;
+    let found = trees::of_code(subject, &order, true)?;
+    let proof = Proof { instructions: Some(read.instructions), ..subject.proof(&found) };
+    let Found { trees, table, outputs, .. } = found;
+    let code = Some(checksum(code.as_bytes()));
+    Ok((proof, Certificate { model: checksum(bytes), ensemble: checksum(file), code, trees, table, outputs }))
+}
+
+/// Checks a certificate of a model of the layout code, from the leaves of its assembly on.
+///
+/// # Errors
+/// As [`check`] and [`prove_code`].
+pub fn check_code(
+    certificate: &Certificate,
+    bytes: &[u8],
+    code: &str,
+    ensemble: &Ensemble,
+    file: &[u8],
+) -> Result<Proof> {
+    let found = checksum(code.as_bytes());
+    let stated = certificate.code.unwrap_or_default();
+    if certificate.code != Some(found) {
+        return Err(ProofProblem::OtherFile { what: "a file of assembly", stated, found }.into());
+    }
+    compile::open_with_code(bytes)?;
+    let (plain, read) = with_code(bytes, code)?;
+    is_about(certificate, bytes, file)?;
+    statements(&plain, ensemble)?;
+    let sources = of_ensemble(ensemble, &plain.keys)?;
+    let subject = Subject { plain: &plain, sources: &sources, ensemble };
+    let order: Vec<compile::Source> = certificate
+        .trees
+        .iter()
+        .map(|tree| compile::Source { trees: tree.sources.clone(), offset: tree.offset })
+        .collect();
+    let found = trees::of_code(subject, &order, false)?;
+    holds(certificate, &found, ensemble)?;
+    Ok(Proof { instructions: Some(read.instructions), ..subject.proof(&found) })
+}
+
+/// A model of the layout code with the trees of its assembly.
+fn with_code(bytes: &[u8], code: &str) -> Result<(Plain, assembly::Code), ProofProblem> {
+    let mut plain = format::read(bytes)?;
+    let stated = assembly::Stated {
+        objects: plain.names.len(),
+        known: plain.names.len(),
+        features: plain.features,
+        keys: &plain.keys,
+        sentinel: plain.sentinel,
+    };
+    let mut read = assembly::read(code, &stated)?;
+    let unit = plain.unit;
+    plain.base = read.base.iter().map(|&base| base as f64 * unit).collect();
+    let exit = |(trees, bound, base): &(usize, u32, Vec<i64>)| format::Exit {
+        trees: *trees,
+        bound: f64::from(*bound) * unit,
+        // What trees after it have in common is added with them.
+        later: read.base.iter().zip(base).map(|(all, so_far)| (all - so_far) as f64 * unit).collect(),
+    };
+    plain.exits = read.exits.iter().map(exit).collect();
+    for tree in &mut read.trees {
+        for step in &mut tree.nodes {
+            if let boxes::Step::Leaf(values) = step {
+                values.iter_mut().for_each(|value| *value *= unit);
+            }
+        }
+    }
+    plain.trees = std::mem::take(&mut read.trees).into_iter().map(|tree| (tree, 0.0)).collect();
+    Ok((plain, read))
+}
+
+/// Returns an error unless a certificate is about these files.
+fn is_about(certificate: &Certificate, bytes: &[u8], file: &[u8]) -> Result<(), ProofProblem> {
+    for (what, stated, bytes) in [("a model", certificate.model, bytes), ("an ensemble", certificate.ensemble, file)] {
+        let found = checksum(bytes);
+        if found != stated {
+            return Err(ProofProblem::OtherFile { what, stated, found });
+        }
+    }
+    Ok(())
 }
 
 /// Checks a certificate of a model, given by its bytes, and of `ensemble`, which was read from `file`, in another way than
@@ -105,12 +207,7 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
 /// [`CompileProblem::Model`](crate::error::CompileProblem::Model) if the bytes are no model; [`ProofProblem`] that says what
 /// is not as the certificate states.
 pub fn check(certificate: &Certificate, bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<Proof> {
-    for (what, stated, bytes) in [("a model", certificate.model, bytes), ("an ensemble", certificate.ensemble, file)] {
-        let found = checksum(bytes);
-        if found != stated {
-            return Err(ProofProblem::OtherFile { what, stated, found }.into());
-        }
-    }
+    is_about(certificate, bytes, file)?;
     // Only what may run on a chip is certified.
     compile::open(bytes)?;
     let plain = format::read(bytes)?;
@@ -121,6 +218,12 @@ pub fn check(certificate: &Certificate, bytes: &[u8], ensemble: &Ensemble, file:
         Some(cells) => tables::of_format(subject, cells)?,
         None => trees::of_format(subject, &certificate.trees)?,
     };
+    holds(certificate, &found, ensemble)?;
+    Ok(subject.proof(&found))
+}
+
+/// Returns an error if a certificate states less than was found.
+fn holds(certificate: &Certificate, found: &Found, ensemble: &Ensemble) -> Result<(), ProofProblem> {
     let understated = |what: String, stated: f64, found: f64| {
         let is_within = found <= stated + 1e-9 * stated.abs() + 1e-12;
         if is_within { Ok(()) } else { Err(ProofProblem::Understated { what, stated, found }) }
@@ -139,7 +242,7 @@ pub fn check(certificate: &Certificate, bytes: &[u8], ensemble: &Ensemble, file:
         understated(format!("the largest margin of {name}"), stated[2], most)?;
         understated(format!("the smallest margin of {name}, negated,"), -stated[1], -least)?;
     }
-    Ok(subject.proof(&found))
+    Ok(())
 }
 
 /// A model's meaning, and the ensemble that it is compared with.
@@ -168,6 +271,8 @@ impl Subject<'_> {
                 .zip(&found.outputs)
                 .map(|(name, &[_, least, most])| (name.clone(), least, most))
                 .collect(),
+            found: near::found(plain),
+            instructions: None,
         }
     }
 

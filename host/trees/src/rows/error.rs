@@ -15,6 +15,12 @@ pub enum RowsProblem {
         /// The parser's message.
         detail: String,
     },
+    /// The file is no table in another format than CSV.
+    #[error("not rows of features: {detail}")]
+    NotTable {
+        /// The reader's message.
+        detail: String,
+    },
     /// There is no row.
     #[error("it has no rows")]
     Empty,
@@ -107,6 +113,45 @@ pub enum RowsProblem {
         /// The classes.
         known: Vec<String>,
     },
+    /// A sequence has two labels.
+    #[error("the sequence {sequence:?} has the labels {:?} and {:?}", labels[0], labels[1])]
+    TwoLabels {
+        /// The sequence.
+        sequence: String,
+        /// Its labels.
+        labels: [String; 2],
+    },
+    /// A sequence is of two groups.
+    #[error("the sequence {sequence:?} belongs to the groups {:?} and {:?}", groups[0], groups[1])]
+    TwoGroups {
+        /// The sequence.
+        sequence: String,
+        /// Its groups.
+        groups: [String; 2],
+    },
+    /// A sequence's rows do not follow each other.
+    #[error("the sequence {sequence:?} comes back after another one")]
+    ComesBack {
+        /// The sequence.
+        sequence: String,
+    },
+    /// A problem with a row of an array.
+    #[error("row {row}: {problem}")]
+    InRow {
+        /// The row, counted from 1.
+        row: usize,
+        /// The problem.
+        problem: Box<RowsProblem>,
+    },
+    /// Only a compiled model stops by itself.
+    #[error("an ensemble has no thresholds to stop at")]
+    NotCompiled,
+    /// The model has one output, so there is nothing to decide.
+    #[error("the model predicts a value ({output}), and not classes: its rows are no evidence for any")]
+    Regression {
+        /// The name of its output.
+        output: String,
+    },
 }
 
 fn of([features, outputs, trees]: [usize; 3]) -> String {
@@ -124,6 +169,7 @@ impl Problem for RowsProblem {
     fn fix(&self) -> String {
         match self {
             Self::NotRows { .. } => "Give a header line with the features' names, then one row per line.",
+            Self::NotTable { .. } => "Give a Parquet file with a column for each feature, numbers or text.",
             Self::Empty => "Give at least one row below the header.",
             Self::Columns { .. } => {
                 "Name the columns as the features (`palpate inspect` lists them), or give as many columns as features."
@@ -143,6 +189,11 @@ impl Problem for RowsProblem {
             Self::Beyond { .. } => {
                 "Check that the model was exported from this file, with the same --missing and --all-trees, and the margins are the library's raw scores of these rows."
             }
+            Self::TwoLabels { .. } | Self::TwoGroups { .. } => "A sequence is of one class and one group: give the rows of another one another id.",
+            Self::ComesBack { .. } => "Sort the rows by sequence, each in its order, or give each stretch of rows an id of its own.",
+            Self::InRow { problem, .. } => return problem.fix(),
+            Self::NotCompiled => "Compile it with `palpate export`, and give the model.",
+            Self::Regression { .. } => "Give a model of two or more classes.",
             Self::Label { .. } => "Correct the label, or name the model's classes with `export --names`.",
         }
         .into()

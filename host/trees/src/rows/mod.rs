@@ -1,11 +1,14 @@
-//! Rows of features, for models that other libraries trained: CSV files, and what a chip gets of a row.
+//! Rows of features, for models that other libraries trained: CSV files, sequences, and what a chip gets of a row.
 
 mod error;
 mod generate;
 pub mod scales;
+mod sequences;
 
 pub use error::{ClassDiffers, RowsProblem};
 pub use generate::generate;
+pub(crate) use sequences::class;
+pub use sequences::{RowOf, RowSequence, SequenceColumns, Sequences, SequencesBuilder};
 
 use crate::error::{Error, Place, Result};
 use palpate_onboard::Model;
@@ -54,15 +57,8 @@ impl Rows {
             Some(name) => Some(position(name).ok_or_else(|| wrong(RowsProblem::NoColumn { name: name.into() }))?),
             None => None,
         };
-        let by_name: Option<Vec<usize>> = features.iter().map(|name| position(name)).collect();
-        let mut others = (0..header.len()).filter(|column| Some(*column) != label).collect::<Vec<_>>();
-        let by_position = by_name.is_none();
-        if by_position && others.len() != features.len() {
-            let missing = features.iter().find(|name| position(name).is_none()).map_or("", |name| name);
-            let (found, wanted) = (others.len(), features.len());
-            return Err(wrong(RowsProblem::Columns { found, wanted, missing: missing.into() }));
-        }
-        let columns = by_name.unwrap_or_else(|| std::mem::take(&mut others));
+        let names: Vec<&str> = header.iter().collect();
+        let (columns, by_position) = columns(&names, features, label.as_slice()).map_err(wrong)?;
         let (mut values, mut labels) = (Vec::new(), Vec::new());
         let mut record = csv::StringRecord::new();
         while reader.read_record(&mut record).map_err(|error| not_rows(path, &error))? {
@@ -97,6 +93,23 @@ impl Rows {
     pub fn iter(&self) -> std::slice::ChunksExact<'_, f64> {
         self.values.chunks_exact(self.features.max(1))
     }
+}
+
+/// The column of each feature: by name if the header holds the names of all, otherwise by position, if there are as many
+/// columns but the `others`; whether it is by position.
+fn columns(header: &[&str], features: &[&str], others: &[usize]) -> Result<(Vec<usize>, bool), RowsProblem> {
+    let position = |name: &str| header.iter().position(|column| *column == name);
+    let by_name: Option<Vec<usize>> = features.iter().map(|name| position(name)).collect();
+    if let Some(columns) = by_name {
+        return Ok((columns, false));
+    }
+    let columns: Vec<usize> = (0..header.len()).filter(|column| !others.contains(column)).collect();
+    if columns.len() != features.len() {
+        let missing = features.iter().find(|name| position(name).is_none()).map_or("", |name| name);
+        let (found, wanted) = (columns.len(), features.len());
+        return Err(RowsProblem::Columns { found, wanted, missing: missing.into() });
+    }
+    Ok((columns, true))
 }
 
 /// Reads a CSV file of margins: no header, one row per line, as many numbers in each.

@@ -85,9 +85,7 @@ pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvalua
     };
     let mut confusion = vec![vec![0; names.len()]; names.len()];
     for (row, &class) in classes.iter().enumerate() {
-        let by_name = names.iter().position(|name| name == label(row));
-        let by_number = || label(row).parse().ok().filter(|number| *number < names.len());
-        let truth = by_name.or_else(by_number).ok_or_else(|| wrong(row, &names))?;
+        let truth = crate::rows::class(&names, label(row)).ok_or_else(|| wrong(row, &names))?;
         confusion[truth][class] += 1;
     }
     let right: usize = (0..names.len()).map(|class| confusion[class][class]).sum();

@@ -117,6 +117,20 @@ pub fn margins_of_touches<T: Borrow<Touch> + Sync>(model: &Model<'_>, touches: &
     margins
 }
 
+/// The margins of rows of features in the model's units, as [`Model::margins_of`] gives them: one row for each, on all
+/// threads.
+pub fn units_of_rows<V: Copy + Into<f64> + Sync>(model: &Model<'_>, encoder: &Encoder, values: &[V]) -> Vec<i32> {
+    let (objects, width) = (model.object_count(), model.feature_count());
+    let mut margins = vec![0; values.len() / width * objects];
+    let tasks = margins.par_chunks_mut(AT_ONCE * objects).zip(values.par_chunks(AT_ONCE * width));
+    tasks.for_each_init(Box::<Batch>::default, |batch, (margins, values)| {
+        let features: Vec<i32> = values.chunks_exact(width).flat_map(|row| encoder.row(row)).collect();
+        let is_whole = model.margins_of_rows(&features, margins, batch);
+        debug_assert!(is_whole, "a row of margins for each row");
+    });
+    margins
+}
+
 /// The margins of rows of features in nats (see [`Together::rows`]), one row for each, on all threads.
 pub fn margins_of_rows<V: Copy + Into<f64> + Sync>(model: &Model<'_>, encoder: &Encoder, values: &[V]) -> Vec<f64> {
     let (objects, width) = (model.object_count(), model.feature_count());

@@ -31,14 +31,24 @@ pub(super) fn text(program: &Program, name: &str) -> String {
     let mut writer = Writer::new(program, name);
     writer.head();
     writer.ranks();
-    let body = writer.functions(&program.trees.iter().collect::<Vec<_>>(), "");
+    let calls = writer.functions();
     writer.line(&format!("{}\n{{", signature(program, name)));
-    writer.columns();
-    let (base, objects) = (base(program), program.base.len());
-    writer.line(&format!("    static const int32_t base[{objects}] = {{{base}}};\n    int i;"));
-    writer.line(&format!("    for (i = 0; i < {objects}; i++) {{\n        margins[i] = base[i];\n    }}"));
-    writer.line(&body);
+    writer.start();
+    writer.line(&calls.concat());
     writer.line("}");
+    if !program.exits.is_empty() {
+        writer.best();
+        writer.class(&calls);
+    }
+    writer.text
+}
+
+/// The function that gives a class, of functions that are elsewhere.
+fn class_elsewhere(program: &Program, name: &str) -> String {
+    let mut writer = Writer::new(program, name);
+    writer.best();
+    writer.class_head();
+    writer.line(&format!("    {name}_early(row, margins);\n    return {name}_best_(margins);\n}}"));
     writer.text
 }
 
@@ -50,10 +60,15 @@ pub(super) fn base(program: &Program) -> String {
 /// The declaration of functions that are elsewhere.
 pub(super) fn declaration(program: &Program, name: &str) -> String {
     let row = row(program);
-    let text = format!(
+    let mut text = format!(
         "#if defined(__cplusplus)\nextern \"C\" {{\n#endif\nvoid {name}_margins(const {row} *row, int32_t *margins);\n"
     );
-    text + "#if defined(__cplusplus)\n}\n#endif\n"
+    let has_exits = !program.exits.is_empty();
+    if has_exits {
+        text += &format!("void {name}_early(const {row} *row, int32_t *margins);\n");
+    }
+    text += "#if defined(__cplusplus)\n}\n#endif\n";
+    if has_exits { text + &class_elsewhere(program, name) } else { text }
 }
 
 /// The function that opens the model and gives it the function that adds up its trees.
@@ -247,25 +262,95 @@ impl<'p> Writer<'p> {
         lines
     }
 
-    /// Makes the columns' numbers in a function that has the row.
-    pub(super) fn columns(&mut self) {
-        let count = self.program.columns.len();
+    /// Makes the columns' numbers, and begins the margins, in a function that has the row.
+    fn start(&mut self) {
+        let (count, name) = (self.program.columns.len(), self.name);
         if count > 0 {
-            let (number, name) = (self.number(), self.name);
+            let number = self.number();
             self.line(&format!("    {number} x[{count}];"));
             // Declarations come first.
             self.line(&format!("    const int made = ({name}_ranks(row, x), 0);"));
         } else {
             self.line("    const int made = ((void)row, 0);");
         }
+        let (base, objects) = (base(self.program), self.program.objects());
+        self.line(&format!("    static const int32_t base[{objects}] = {{{base}}};\n    int i;"));
+        self.line(&format!("    for (i = 0; i < {objects}; i++) {{\n        margins[i] = base[i];\n    }}"));
     }
 
-    /// Writes functions for trees, and gives the statements that call them all, for margins that are there.
-    pub(super) fn functions(&mut self, trees: &[&CodeTree], part: &str) -> String {
-        let mut calls = String::from("    (void)made;\n");
-        if self.program.columns.is_empty() && !trees.is_empty() {
-            return calls;
+    /// The function that finds the largest margin.
+    fn best(&mut self) {
+        let (name, known) = (self.name, self.program.known);
+        let larger = if self.program.last_of_ties { ">=" } else { ">" };
+        self.line(&format!(
+            "static inline int {name}_best_(const int32_t *margins)\n{{\n    int best = 0, i;\n    \
+             for (i = 1; i < {known}; i++) {{\n        if (margins[i] {larger} margins[best]) {{\n            \
+             best = i;\n        }}\n    }}\n    return best;\n}}"
+        ));
+    }
+
+    fn class_head(&mut self) {
+        let (name, objects, row) = (self.name, self.program.objects(), row(self.program));
+        self.line(&format!(
+            "/* The class of a row, from no more trees than it takes: that with the largest of its margins. */\n\
+             static inline int {name}_class(const {row} *row)\n{{\n    int32_t margins[{objects}];"
+        ));
+    }
+
+    /// The function that gives a class, from the calls of each part of the walk.
+    fn class(&mut self, calls: &[String]) {
+        let (name, known) = (self.name, self.program.known);
+        self.line(&format!(
+            "PALPATE_APART_CODE_ int {name}_leads(const int32_t *margins, uint32_t bound)\n{{\n    \
+             int32_t most = INT32_MIN, second = INT32_MIN;\n    int i;\n    for (i = 0; i < {known}; i++) {{\n        \
+             if (margins[i] > most) {{\n            second = most;\n            most = margins[i];\n        \
+             }} else if (margins[i] > second) {{\n            second = margins[i];\n        }}\n    }}\n    \
+             return (uint32_t)most - (uint32_t)second > bound;\n}}"
+        ));
+        self.class_head();
+        self.start();
+        let bounds: Vec<Option<u32>> = self.program.parts().map(|(_, bound)| bound).collect();
+        for (calls, bound) in calls.iter().zip(bounds) {
+            self.text += calls;
+            if let Some(bound) = bound {
+                self.line(&format!(
+                    "    if ({name}_leads(margins, {bound}u)) {{\n        return {name}_best_(margins);\n    }}"
+                ));
+            }
         }
+        self.line(&format!("    return {name}_best_(margins);\n}}"));
+    }
+
+    /// Writes functions for all trees, and gives for each part of the walk the statements that call its own, for margins that
+    /// are there.
+    fn functions(&mut self) -> Vec<String> {
+        let parts: Vec<Vec<&CodeTree>> = self.program.parts().map(|(trees, _)| trees.iter().collect()).collect();
+        let mut calls = Vec::new();
+        for (number, trees) in parts.iter().enumerate() {
+            let part = if parts.len() == 1 { String::new() } else { format!("{number}_") };
+            let start = if number == 0 { "    (void)made;\n" } else { "" };
+            calls.push(String::from(start));
+            if !self.program.columns.is_empty() || trees.is_empty() {
+                calls[number] += &self.ones(trees, &part);
+            }
+        }
+        let vectors = |trees: &[&'p CodeTree]| -> Vec<&'p CodeTree> {
+            trees.iter().copied().filter(|tree| tree.object.is_none()).collect()
+        };
+        let all = vectors(&parts.concat());
+        if !all.is_empty() && !self.program.columns.is_empty() {
+            let numbers = self.leaves(&all);
+            for (number, trees) in parts.iter().enumerate() {
+                let part = if parts.len() == 1 { String::new() } else { format!("{number}_") };
+                calls[number] += &self.vectors(&vectors(trees), &part, &numbers);
+            }
+        }
+        calls
+    }
+
+    /// Functions for trees of one object each.
+    fn ones(&mut self, trees: &[&CodeTree], part: &str) -> String {
+        let mut calls = String::new();
         for object in 0..self.program.objects() {
             let own: Vec<&&CodeTree> = trees.iter().filter(|tree| tree.object == Some(object)).collect();
             let mut chunks: Vec<Vec<&CodeTree>> = Vec::new();
@@ -297,16 +382,12 @@ impl<'p> Writer<'p> {
                 _ = writeln!(calls, "    margins[{object}] += {function}(x);");
             }
         }
-        let vectors: Vec<&CodeTree> = trees.iter().copied().filter(|tree| tree.object.is_none()).collect();
-        if !vectors.is_empty() {
-            calls += &self.vectors(&vectors, part);
-        }
         calls
     }
 
-    /// Functions that give the number of a leaf, a table of leaves, and the calls.
-    fn vectors(&mut self, trees: &[&CodeTree], part: &str) -> String {
-        let (name, objects) = (self.name, self.program.objects());
+    /// A table of leaves with a value for each object, and the number of each.
+    fn leaves(&mut self, trees: &[&CodeTree]) -> HashMap<Vec<i32>, usize> {
+        let objects = self.program.objects();
         let mut numbers: HashMap<Vec<i32>, usize> = HashMap::new();
         let mut rows: Vec<Vec<i32>> = Vec::new();
         let vote = self.program.vote();
@@ -327,20 +408,26 @@ impl<'p> Writer<'p> {
                 });
             });
         }
-        self.table(&rows, vote, part);
+        self.table(&rows, vote);
+        numbers
+    }
+
+    /// Functions that give the number of a leaf, and the calls.
+    fn vectors(&mut self, trees: &[&CodeTree], part: &str, numbers: &HashMap<Vec<i32>, usize>) -> String {
+        let name = self.name;
         let mut calls = String::new();
         for (index, tree) in trees.iter().enumerate() {
             let function = format!("{name}_tree{part}{index}");
             self.line(&format!("PALPATE_APART_CODE_ uint16_t {function}(const {} *x)\n{{", self.number()));
             self.ifs(&tree.root, 1, &|leaf| format!("return {};", numbers[leaf]));
             self.line("}");
-            _ = writeln!(calls, "    {name}_add{part}(margins, {function}(x));");
+            _ = writeln!(calls, "    {name}_add(margins, {function}(x));");
         }
         calls
     }
 
     /// The function that adds a leaf by its number.
-    fn table(&mut self, rows: &[Vec<i32>], vote: Option<i32>, part: &str) {
+    fn table(&mut self, rows: &[Vec<i32>], vote: Option<i32>) {
         let (name, objects) = (self.name, self.program.objects());
         let Some(vote) = vote else {
             let fits = rows.iter().flatten().all(|value| i8::try_from(*value).is_ok());
@@ -350,9 +437,9 @@ impl<'p> Writer<'p> {
                 .map(|row| format!("    {{{}}}", row.iter().map(ToString::to_string).collect::<Vec<_>>().join(",")));
             let all = all.collect::<Vec<_>>().join(",\n");
             self.line(&format!(
-                "static const {kind} {name}_leaves{part}[{}][{objects}] = {{\n{all}}};\n\
-                 PALPATE_APART_CODE_ void {name}_add{part}(int32_t *margins, uint16_t leaf)\n{{\n    int i;\n    \
-                 for (i = 0; i < {objects}; i++) {{\n        margins[i] += {name}_leaves{part}[leaf][i];\n    }}\n}}",
+                "static const {kind} {name}_leaves[{}][{objects}] = {{\n{all}}};\n\
+                 PALPATE_APART_CODE_ void {name}_add(int32_t *margins, uint16_t leaf)\n{{\n    int i;\n    \
+                 for (i = 0; i < {objects}; i++) {{\n        margins[i] += {name}_leaves[leaf][i];\n    }}\n}}",
                 rows.len(),
             ));
             return;
@@ -377,11 +464,11 @@ impl<'p> Writer<'p> {
         }
         let lines = |all: &[String]| all.chunks(20).map(|part| part.join(",")).collect::<Vec<_>>().join(",\n    ");
         self.line(&format!(
-            "static const uint16_t {name}_starts{part}[] = {{\n    {}}};\n\
-             static const uint16_t {name}_lists{part}[] = {{\n    {}}};\n\
-             PALPATE_APART_CODE_ void {name}_add{part}(int32_t *margins, uint16_t leaf)\n{{\n    const uint16_t *list;\n    \
+            "static const uint16_t {name}_starts[] = {{\n    {}}};\n\
+             static const uint16_t {name}_lists[] = {{\n    {}}};\n\
+             PALPATE_APART_CODE_ void {name}_add(int32_t *margins, uint16_t leaf)\n{{\n    const uint16_t *list;\n    \
              if (leaf < {objects}) {{\n        margins[leaf] += {vote};\n        return;\n    }}\n    \
-             list = {name}_lists{part} + 2 * {name}_starts{part}[leaf - {objects}];\n    do {{\n        \
+             list = {name}_lists + 2 * {name}_starts[leaf - {objects}];\n    do {{\n        \
              margins[list[0] & 0x7fff] += list[1];\n        list += 2;\n    }} while (list[-2] < 0x8000);\n}}",
             lines(&starts),
             lines(&entries),

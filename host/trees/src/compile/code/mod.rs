@@ -10,7 +10,7 @@ mod columns;
 mod program;
 mod rust;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod thumb;
 
 pub use program::Program;
@@ -71,6 +71,11 @@ impl Program {
     /// Size and speed in every form.
     pub fn costs(&self) -> Vec<CodeCost> {
         Form::ALL.map(|form| self.cost(form)).into()
+    }
+
+    /// The trees in the order of assembly, and what the base has instead of each, in units.
+    pub(super) fn in_assembly(&self, chip: Chip) -> Vec<(usize, i32)> {
+        thumb::order(self, chip)
     }
 
     /// The files of assembly, and of Rust that makes a safe function of it: their extensions and texts; `name`, an

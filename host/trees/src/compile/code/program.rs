@@ -3,6 +3,7 @@
 use super::super::axes::Axes;
 use super::super::forest::{Branch, Forest};
 use super::super::quantize::Scale;
+use super::Form;
 use super::columns::{Column, Columns};
 use crate::ensemble::Output;
 use palpate_shared::format::{Key, Sentinel};
@@ -24,8 +25,11 @@ pub struct Program {
     pub(super) last_of_ties: bool,
     /// Columns that splits compare, in the order in which it is stored.
     pub(super) columns: Vec<Column>,
-    /// The trees, in any order.
+    /// The trees, in the order of the walk.
     pub(super) trees: Vec<CodeTree>,
+    /// After so many trees the following change a difference between two margins by at most so many units: where a walk for a
+    /// class alone may end.
+    pub(super) exits: Vec<(usize, u32)>,
 }
 
 /// A tree.
@@ -93,7 +97,54 @@ impl Program {
             last_of_ties: stated.last_of_ties,
             columns: columns.columns,
             trees,
+            exits: Vec::new(),
         })
+    }
+
+    /// The same with its trees in this order, and with places where a walk for a class alone may end.
+    pub(in super::super) fn with_exits(mut self, order: &[usize], exits: Vec<(usize, u32)>) -> Self {
+        if !exits.is_empty() {
+            self.trees = order.iter().map(|&tree| self.trees[tree].clone()).collect();
+            self.exits = exits;
+        }
+        self
+    }
+
+    /// True if a walk may end early in this form: in assembly, sums of leaves with a value for each object are two to a register
+    /// until the end, unless they are votes.
+    pub(in super::super) fn may_exit(&self, form: Form) -> bool {
+        let is_each = |tree: &CodeTree| tree.object.is_none();
+        form == Form::C || !self.trees.iter().any(is_each) || self.trees.iter().all(is_each) && self.vote().is_some()
+    }
+
+    /// The trees between the places where a walk may end, each part with what the following may change after it, if any do.
+    pub(super) fn parts(&self) -> impl Iterator<Item = (&[CodeTree], Option<u32>)> {
+        let ends = self.exits.iter().map(|&(end, bound)| (end, Some(bound))).chain([(self.trees.len(), None)]);
+        ends.scan(0, |start, (end, bound)| {
+            let part = &self.trees[*start..end];
+            *start = end;
+            Some((part, bound))
+        })
+    }
+
+    /// The class of a row of keys, as the code finds it: from no more trees than it takes.
+    pub fn class(&self, keys: &[i32]) -> usize {
+        let ranks = self.ranks(keys);
+        let mut margins = self.base.clone();
+        for (trees, bound) in self.parts() {
+            trees.iter().for_each(|tree| tree.add(&ranks, &mut margins));
+            let mut sorted = margins[..self.known].to_vec();
+            sorted.sort_unstable_by_key(|&margin| std::cmp::Reverse(margin));
+            let lead = sorted.first().zip(sorted.get(1)).map_or(u32::MAX, |(most, second)| most.abs_diff(*second));
+            if bound.is_some_and(|bound| lead > bound) {
+                break;
+            }
+        }
+        let known = margins[..self.known].iter();
+        let best = known
+            .enumerate()
+            .max_by_key(|&(class, &margin)| (margin, if self.last_of_ties { class } else { usize::MAX - class }));
+        best.map_or(0, |(class, _)| class)
     }
 
     /// Number of objects.

@@ -24,6 +24,26 @@ pub(super) fn text(program: &Program, name: &str, file: &str) -> String {
     } else {
         String::new()
     };
+    let (early, class) = if program.exits.is_empty() {
+        (String::new(), String::new())
+    } else {
+        let larger = if program.last_of_ties { ">=" } else { ">" };
+        (
+            format!(
+                "\n    /// The same, until a class is known: no other margin is as large as that one then, and all may be others.\n    \
+                 pub safe fn {name}_early(row: &[{row}; {features}], margins: &mut [i32; {objects}]);\n"
+            ),
+            format!(
+                "\n/// The class of a row, from no more trees than it takes: that with the largest of its margins.\n\
+                 pub fn class(row: &[{row}; {features}]) -> usize {{\n    \
+                 let (mut margins, mut class, mut most) = ([0; {objects}], 0, i32::MIN);\n    \
+                 {name}_early(row, &mut margins);\n    \
+                 for (number, &margin) in margins.iter().take({known}).enumerate() {{\n        \
+                 if margin {larger} most {{\n            (class, most) = (number, margin);\n        }}\n    }}\n    class\n}}\n",
+                known = program.known,
+            ),
+        )
+    };
     let function = if real { "bits::margins".to_owned() } else { format!("{name}_margins") };
     format!(
         "// {trees} trees as instructions, beside `{file}.s`. Written by `palpate export`; not to be edited. Features of palpate-onboard: code.\n\
@@ -32,12 +52,12 @@ pub(super) fn text(program: &Program, name: &str, file: &str) -> String {
          // SAFETY: the assembly reads {features} features, writes {objects} margins, and keeps to the calling convention.\n\
          unsafe extern \"C\" {{\n    \
          /// The margins of a row of {what}, in units.\n    \
-         pub safe fn {name}_margins(row: &[{row}; {features}], margins: &mut [i32; {objects}]);\n\
+         pub safe fn {name}_margins(row: &[{row}; {features}], margins: &mut [i32; {objects}]);\n{early}\
          }}\n{bits}\n\
          /// The function that [`Model::with_code`](palpate_onboard::Model::with_code) takes.\n\
          pub fn margins(row: &[i32], margins: &mut [i32]) {{\n    \
          if let (Some(row), Some(margins)) = (row.first_chunk(), margins.first_chunk_mut()) {{\n        \
-         {function}(row, margins);\n    }}\n}}\n",
+         {function}(row, margins);\n    }}\n}}\n{class}",
         trees = program.trees.len(),
     )
 }

@@ -2,8 +2,9 @@
 
 use super::super::{Leaf, Settings, compile, emit_code, open};
 use super::{Chip, Form, Program};
-use crate::compile::{Compiled, Language, Layout};
+use crate::compile::{Compiled, EarlyExit, Language, Layout};
 use crate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
+use crate::rows::Rows;
 use palpate_shared::Descriptor;
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Key, f32_key};
@@ -14,10 +15,10 @@ use std::process::{Command, Stdio};
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
 /// Numbers that look random (SplitMix64).
-struct Numbers(u64);
+pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
-    fn below(&mut self, most: u64) -> u64 {
+    pub(crate) fn below(&mut self, most: u64) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -31,9 +32,9 @@ impl Numbers {
 }
 
 /// Ensembles that code is written of in different ways.
-struct Case {
-    name: String,
-    ensemble: Ensemble,
+pub(crate) struct Case {
+    pub(crate) name: String,
+    pub(crate) ensemble: Ensemble,
     leaf: Leaf,
 }
 
@@ -98,7 +99,7 @@ impl Random {
 }
 
 /// Thresholds of every kind of column, leaves of every kind of sum.
-fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<Case> {
     let anywhere: fn(&mut Numbers) -> f32 = |numbers| numbers.value(100.0);
     let usual = || Random {
         inputs: Inputs::unnamed(6),
@@ -181,9 +182,35 @@ fn imported() -> Vec<Case> {
 
 impl Case {
     fn compiled(&self, form: Option<Form>) -> Compiled {
+        self.compiled_with(form, None)
+    }
+
+    /// True if it has classes of rows.
+    pub(crate) fn has_classes(&self) -> bool {
+        self.ensemble.descriptor().is_none() && self.ensemble.objects.len() > 1
+    }
+
+    /// True if assembly of it has leaves that are added two to a register, or row by row.
+    pub(crate) fn has_packed_leaves(&self) -> bool {
+        let compiled = self.compiled(Some(Form::C));
+        let program = program(&compiled);
+        program.has_vectors() && program.vote().is_none()
+    }
+
+    /// Its model and assembly.
+    pub(crate) fn assembly(&self, chip: Chip, early_exit: bool) -> (Vec<u8>, String) {
+        let wanted = early_exit.then_some(EarlyExit::Always);
+        let compiled = self.compiled_with(Some(Form::Thumb(chip)), wanted);
+        let files = emit_code(&compiled.bytes, program(&compiled), Form::Thumb(chip), "m", &[]).unwrap();
+        let text = files.into_iter().find(|file| file.0 == "s").unwrap().1;
+        (compiled.bytes, text)
+    }
+
+    fn compiled_with(&self, form: Option<Form>, early_exit: Option<EarlyExit>) -> Compiled {
         let layout = if form.is_some() { Some(Layout::Code) } else { None };
         let forms = form.into_iter().collect();
-        let compiled = compile(&self.ensemble, &Settings { layout, forms, leaf: self.leaf, ..Settings::default() });
+        let settings = Settings { layout, forms, leaf: self.leaf, early_exit, ..Settings::default() };
+        let compiled = compile(&self.ensemble, &settings);
         if form.is_some() || self.ensemble.trees.is_empty() {
             return compiled.unwrap_or_else(|error| panic!("{}: {error}", self.name));
         }
@@ -266,6 +293,157 @@ fn programs_give_the_margins_of_the_layouts_of_data_at_every_threshold() {
     }
 }
 
+/// Cases whose margins are often equal, and the others that have classes.
+fn with_ties() -> Vec<Case> {
+    let coarse: fn(&mut Numbers) -> f32 = |numbers| numbers.below(5) as f32;
+    let random = |each: bool, objects: usize, seed: u64| {
+        let inputs = Inputs::unnamed(4);
+        let random = Random { inputs, objects, trees: 30, depth: 3, each, votes: 40, largest: 0.5, threshold: coarse };
+        Ensemble { base_margins: vec![0.0; objects], ..random.ensemble(seed) }
+    };
+    let mut cases: Vec<Case> = [(true, 2), (true, 5), (false, 2), (false, 3), (false, 12)]
+        .into_iter()
+        .zip(50..)
+        .map(|((each, objects), seed)| Case {
+            name: format!("ties of {objects}, {each}"),
+            ensemble: random(each, objects, seed),
+            leaf: Leaf::I16,
+        })
+        .collect();
+    cases.extend(self::cases());
+    cases.retain(Case::has_classes);
+    cases
+}
+
+/// How far the largest margin is ahead.
+fn lead(margins: &[i32]) -> u32 {
+    let mut sorted = margins.to_vec();
+    sorted.sort_unstable();
+    sorted[sorted.len() - 1].abs_diff(sorted[sorted.len() - 2])
+}
+
+/// Rows that are changed, feature by feature, until their largest margins are close to each other.
+fn close_rows(case: &Case, program: &Program, count: usize) -> Vec<Vec<i32>> {
+    let rows: Vec<Vec<i32>> = case.rows(40).iter().map(|row| keys(row, program.key)).collect();
+    let mut numbers = Numbers(11);
+    let close = |start: &Vec<i32>| {
+        let mut row = start.clone();
+        for _ in 0..60 {
+            let feature = numbers.below(row.len() as u64) as usize;
+            let before = row[feature];
+            let was = lead(&program.margins(&row));
+            row[feature] = rows[numbers.below(rows.len() as u64) as usize][feature];
+            if lead(&program.margins(&row)) > was {
+                row[feature] = before;
+            }
+        }
+        row
+    };
+    rows.iter().take(count).map(close).collect()
+}
+
+#[test]
+fn walks_that_end_early_give_the_class_of_all_trees_and_the_others_change_no_difference_by_more_than_their_bound() {
+    let (mut ended, mut ties, mut walked) = (0, 0, 0);
+    for case in with_ties() {
+        let compiled = case.compiled_with(Some(Form::C), Some(EarlyExit::Always));
+        let program = program(&compiled);
+        let plain = case.compiled(None);
+        let last_of_ties = open(&plain.bytes).unwrap().prediction().last_of_ties;
+        let mut rows: Vec<Vec<i32>> = case.rows(60).iter().map(|row| keys(row, program.key)).collect();
+        rows.extend(close_rows(&case, program, 20));
+        let data: Vec<Compiled> = [Layout::Complete, Layout::Compact, Layout::Wide]
+            .into_iter()
+            .flat_map(|layout| [false, true].map(|shared| (layout, shared)))
+            .filter_map(|(layout, shared)| {
+                let early_exit = Some(EarlyExit::Always);
+                let (layout, shared_leaves) = (Some(layout), Some(shared));
+                let settings = Settings { layout, shared_leaves, leaf: case.leaf, early_exit, ..Settings::default() };
+                compile(&case.ensemble, &settings).ok()
+            })
+            .collect();
+        for (row, expected) in rows.iter().zip(expected(&plain, &rows)) {
+            let most = expected.iter().max().unwrap();
+            let mut best = (0..expected.len()).filter(|&class| expected[class] == *most);
+            let class = if last_of_ties { best.next_back() } else { best.next() }.unwrap();
+            ties += usize::from(lead(&expected) == 0);
+            assert_eq!(program.class(row), class, "{}: {row:?}", case.name);
+            assert_eq!(program.margins(row), expected, "{}: {row:?}", case.name);
+            let ranks = program.ranks(row);
+            let mut margins = program.base.clone();
+            for (trees, bound) in program.parts() {
+                trees.iter().for_each(|tree| tree.add(&ranks, &mut margins));
+                walked += 1;
+                let Some(bound) = bound else { break };
+                ended += usize::from(lead(&margins) > bound);
+                let changes: Vec<i32> = expected.iter().zip(&margins).map(|(all, so_far)| all - so_far).collect();
+                let most = changes.iter().max().unwrap().abs_diff(*changes.iter().min().unwrap());
+                assert!(most <= bound, "{}: {most} of {bound}, {row:?}", case.name);
+            }
+            for compiled in &data {
+                let model = open(&compiled.bytes).unwrap();
+                let mut margins = vec![0; model.object_count()];
+                assert_eq!(model.class_of(row, &mut margins), Some(class), "{}: {row:?}", case.name);
+                model.margins_of(row, &mut margins);
+                assert_eq!(margins, expected, "{}: {row:?}", case.name);
+            }
+        }
+    }
+    println!("{walked} parts, {ended} ends of which a class was known at, {ties} rows with a tie");
+    assert!(ended > walked / 40 && ties > 100, "{walked} {ended} {ties}");
+}
+
+#[test]
+fn rows_decide_where_walks_may_end_and_models_without_a_place_are_as_before() {
+    let mut case = cases().remove(0);
+    // As of a boosted ensemble: later trees change less.
+    for (number, tree) in case.ensemble.trees.iter_mut().enumerate() {
+        for node in &mut tree.nodes {
+            if let Node::Leaf(values) = node {
+                values.iter_mut().for_each(|value| *value *= 0.8_f32.powi(number as i32));
+            }
+        }
+    }
+    let rows = |values: Vec<Vec<f32>>| Rows {
+        features: values[0].len(),
+        values: values.into_iter().flatten().map(f64::from).collect(),
+        labels: Vec::new(),
+        by_position: false,
+    };
+    let some = rows(case.rows(100));
+    let of = |ensemble: &Ensemble, early_exit| {
+        let settings = Settings { layout: Some(Layout::Compact), early_exit, ..Settings::default() };
+        compile(ensemble, &settings).unwrap()
+    };
+    let with = of(&case.ensemble, Some(EarlyExit::IfItPays(some.clone())));
+    let found = with.early_exit.clone().unwrap();
+    assert!(!found.ends.is_empty() && found.walked.unwrap() < 0.95 * found.trees as f64, "{found:?}");
+    let places: Vec<usize> = crate::compile::ends_of_walks(&open(&with.bytes).unwrap());
+    assert_eq!(places, found.ends);
+    // Two classes with the same trees: nothing is ever known.
+    let mut level =
+        Ensemble { objects: vec!["a".into(), "b".into()], base_margins: vec![0.0; 2], ..case.ensemble.clone() };
+    level.trees = (level.trees.iter())
+        .flat_map(|tree| [0, 1].map(|object| Tree { output: Output::One(object), ..tree.clone() }))
+        .collect();
+    let tried = of(&level, Some(EarlyExit::IfItPays(some)));
+    let found = tried.early_exit.clone().unwrap();
+    assert_eq!((found.ends, found.walked), (Vec::new(), Some(found.trees as f64)));
+    assert_eq!(tried.bytes, of(&level, None).bytes);
+    for (leaf, outputs) in [(Leaf::F32, 3), (Leaf::I16, 1)] {
+        let random = Random { objects: outputs, ..random_of(outputs) };
+        let settings = Settings { leaf, early_exit: Some(EarlyExit::Always), ..Settings::default() };
+        let error = compile(&random.ensemble(1), &settings).unwrap_err().to_string();
+        assert!(error.contains("early_exit"), "{error}");
+    }
+}
+
+/// Random trees of one output each.
+fn random_of(objects: usize) -> Random {
+    let threshold: fn(&mut Numbers) -> f32 = |numbers| numbers.value(100.0);
+    Random { inputs: Inputs::unnamed(6), objects, trees: 40, depth: 5, each: false, votes: 0, largest: 0.5, threshold }
+}
+
 #[test]
 fn columns_are_made_by_conversion_where_thresholds_are_on_a_grid() {
     let kinds = |name: &str| {
@@ -305,13 +483,15 @@ fn the_firmware_has_the_code_that_is_exported_now() {
 }
 
 /// The files of a test program: `models.h`, and assembly of every model if the form is assembly.
-fn write(directory: &Path, cases: &[Case], form: Form, rows: usize) -> Vec<PathBuf> {
+fn write(directory: &Path, cases: &[Case], form: Form, rows: usize, early_exit: bool) -> Vec<PathBuf> {
     let (mut head, mut body, mut table, mut sources) = (String::new(), String::new(), String::new(), Vec::new());
     head += "#include \"palpate.h\"\nstruct code_test {\n    palpate_error (*open)(palpate_model *);\n    \
-             void (*margins)(const void *, int32_t *);\n    const int32_t *keys, *values, *expected;\n    \
+             void (*margins)(const void *, int32_t *);\n    int (*class_of)(const void *);\n    \
+             const int32_t *keys, *values, *expected, *classes;\n    \
              unsigned rows, features, objects;\n};\n";
     for (index, case) in cases.iter().enumerate() {
-        let compiled = case.compiled(Some(form));
+        let wanted = (early_exit && case.has_classes()).then_some(EarlyExit::Always);
+        let compiled = case.compiled_with(Some(form), wanted);
         let (program, name) = (program(&compiled), format!("m{index}"));
         let values = case.rows(rows);
         let rows: Vec<Vec<i32>> = values.iter().map(|row| keys(row, program.key)).collect();
@@ -331,8 +511,14 @@ fn write(directory: &Path, cases: &[Case], form: Form, rows: usize) -> Vec<PathB
         };
         let kind = if program.key == Key::Real { "float" } else { "int32_t" };
         _ = writeln!(body, "#include \"{name}.h\"");
+        let plain = case.compiled(None);
+        let class = |row: &Vec<i32>| {
+            let model = open(&plain.bytes).unwrap();
+            vec![model.predict_class(row, &mut vec![0; model.object_count()]).unwrap() as i32]
+        };
+        let classes: Vec<Vec<i32>> = rows.iter().map(class).collect();
         for (what, numbers) in
-            [("keys", &rows), ("values", &bits), ("expected", &expected(&case.compiled(None), &rows))]
+            [("keys", &rows), ("values", &bits), ("expected", &expected(&plain, &rows)), ("classes", &classes)]
         {
             // The least number is written as a difference, since a compiler takes its digits as a larger type's.
             let number = |number: &i32| match *number {
@@ -346,9 +532,18 @@ fn write(directory: &Path, cases: &[Case], form: Form, rows: usize) -> Vec<PathB
             body,
             "static void {name}_call(const void *row, int32_t *margins) {{ {name}_margins((const {kind} *)row, margins); }}"
         );
+        let class_of = if program.exits.is_empty() {
+            "0".to_owned()
+        } else {
+            _ = writeln!(
+                body,
+                "static int {name}_known(const void *row) {{ return {name}_class((const {kind} *)row); }}"
+            );
+            format!("{name}_known")
+        };
         _ = writeln!(
             table,
-            "    {{{name}_open, {name}_call, {name}_keys, {name}_values, {name}_expected, {}, {}, {}}},",
+            "    {{{name}_open, {name}_call, {class_of}, {name}_keys, {name}_values, {name}_expected, {name}_classes, {}, {}, {}}},",
             rows.len(),
             program.features,
             program.objects(),
@@ -399,12 +594,14 @@ fn check(output: &str, cases: &[Case]) {
 fn c_gives_the_margins_of_the_layouts_of_data_on_this_machine_without_a_warning() {
     let directory = tempfile::tempdir().unwrap();
     let cases = few();
-    write(directory.path(), &cases, Form::C, 20);
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
     let flags = ["-std=c99", "-O0", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-Wno-unused-function"];
-    let program = build(&compiler, &flags, directory.path(), &[], &[]).unwrap();
-    let output = Command::new(program).output().unwrap();
-    check(&String::from_utf8(output.stdout).unwrap(), &cases);
+    for early_exit in [false, true] {
+        write(directory.path(), &cases, Form::C, 20, early_exit);
+        let program = build(&compiler, &flags, directory.path(), &[], &[]).unwrap();
+        let output = Command::new(program).output().unwrap();
+        check(&String::from_utf8(output.stdout).unwrap(), &cases);
+    }
 }
 
 /// Runs an image of Cortex-M or RISC-V.
@@ -438,25 +635,27 @@ fn assembly_and_c_give_the_margins_of_the_layouts_of_data_on_emulated_chips() {
     ];
     let m0_plus = ["-mcpu=cortex-m0plus", "-mthumb"];
     let m4f = ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"];
-    for (chip, flags, machine, form) in [
-        ("Cortex-M0+", &m0_plus[..], "mps2-an385", Form::Thumb(Chip::M0Plus)),
-        ("Cortex-M4F", &m4f, "mps2-an386", Form::Thumb(Chip::M4F)),
-        ("Cortex-M4F, the subset", &m4f, "mps2-an386", Form::Thumb(Chip::M0Plus)),
-        ("Cortex-M0+, C", &m0_plus, "mps2-an385", Form::C),
-        ("Cortex-M4F, C", &m4f, "mps2-an386", Form::C),
+    for (chip, flags, machine, form, early_exit) in [
+        ("Cortex-M0+", &m0_plus[..], "mps2-an385", Form::Thumb(Chip::M0Plus), false),
+        ("Cortex-M0+, early exit", &m0_plus[..], "mps2-an385", Form::Thumb(Chip::M0Plus), true),
+        ("Cortex-M4F", &m4f, "mps2-an386", Form::Thumb(Chip::M4F), false),
+        ("Cortex-M4F, early exit", &m4f, "mps2-an386", Form::Thumb(Chip::M4F), true),
+        ("Cortex-M4F, the subset", &m4f, "mps2-an386", Form::Thumb(Chip::M0Plus), false),
+        ("Cortex-M0+, C", &m0_plus, "mps2-an385", Form::C, false),
+        ("Cortex-M4F, C, early exit", &m4f, "mps2-an386", Form::C, true),
     ] {
         println!("{chip}");
         let directory = tempfile::tempdir().unwrap();
         // An assembler takes less time.
         let cases = if form == Form::C { &few } else { &all };
-        let sources = write(directory.path(), cases, form, 15);
+        let sources = write(directory.path(), cases, form, 15, early_exit);
         let flags = [flags, &bare, &[mps2]].concat();
         let program = build("arm-none-eabi-gcc", &flags, directory.path(), &sources, &["-lgcc"]).unwrap();
         check(&emulate("qemu-system-arm", &["-machine", machine], &program), cases);
     }
     println!("rv32imc");
     let directory = tempfile::tempdir().unwrap();
-    write(directory.path(), &few, Form::C, 15);
+    write(directory.path(), &few, Form::C, 15, false);
     let flags = [&["-march=rv32imc", "-mabi=ilp32"][..], &bare, &[virt]].concat();
     let program = build("riscv64-unknown-elf-gcc", &flags, directory.path(), &[], &["-lgcc"]).unwrap();
     check(&emulate("qemu-system-riscv32", &["-machine", "virt", "-bios", "none"], &program), &few);

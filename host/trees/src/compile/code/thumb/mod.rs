@@ -5,6 +5,7 @@
 //! in registers. Of two subtrees the smaller one comes first, so that few branches are far.
 
 mod assembler;
+mod exits;
 mod ranks;
 mod trees;
 mod vectors;
@@ -12,6 +13,7 @@ mod walk;
 
 use super::program::Program;
 use assembler::Assembler;
+use exits::Exits;
 use std::fmt::Write as _;
 
 /// A processor whose instructions are written.
@@ -41,6 +43,12 @@ pub(super) fn text(program: &Program, name: &str, chip: Chip) -> String {
         program.features,
         program.base.len(),
     );
+    if !program.exits.is_empty() {
+        _ = writeln!(
+            text,
+            "@ {name}_early has the same arguments; where a class is known it ends, and no other margin is larger than that one."
+        );
+    }
     _ = writeln!(text, "\t.syntax unified\n\t.thumb\n\t.section .text.{name}_margins,\"ax\",%progbits\n\t.balign 4");
     written.print(name, &mut text);
     text
@@ -52,14 +60,36 @@ pub(super) fn cost(program: &Program, chip: Chip) -> (usize, u64) {
     (written.bytes(), written.instructions.round() as u64)
 }
 
+/// The trees in the order in which they are written, and what the base has instead of each, in units.
+pub(super) fn order(program: &Program, chip: Chip) -> Vec<(usize, i32)> {
+    trees::order(program, chip)
+}
+
 fn write(program: &Program, chip: Chip) -> Assembler {
     let mut out = Assembler::new(chip);
     let frame = Frame::new(program);
-    out.global("margins");
+    let exits = (!program.exits.is_empty()).then(|| Exits::new(&mut out));
+    if exits.is_some() {
+        let body = out.label();
+        out.global("early");
+        out.ins("movs r2, #1", 2);
+        out.branch(None, body);
+        out.global("margins");
+        out.ins("movs r2, #0", 2);
+        out.place(body);
+    } else {
+        out.global("margins");
+    }
     frame.enter(&mut out, chip);
     ranks::write(&mut out, program, &frame);
-    trees::write(&mut out, program, &frame);
-    frame.leave(&mut out, chip);
+    trees::write(&mut out, program, &frame, exits.as_ref());
+    if let Some(exits) = exits {
+        out.place(exits.end);
+        frame.leave(&mut out, chip);
+        exits.write(&mut out, program, &frame);
+    } else {
+        frame.leave(&mut out, chip);
+    }
     out.finish();
     out
 }
@@ -71,19 +101,23 @@ pub(super) struct Frame {
     pub(super) columns: usize,
     /// All bytes.
     pub(super) length: usize,
+    /// True if above the margins' address is a word that says whether the walk may end early.
+    pub(super) has_exits: bool,
 }
 
 impl Frame {
     fn new(program: &Program) -> Self {
         let columns = program.columns.len().next_multiple_of(4);
-        Self { columns, length: columns.next_multiple_of(8).max(8) }
+        let (length, has_exits) = (columns.next_multiple_of(8).max(8), !program.exits.is_empty());
+        // With a register more on the stack.
+        Self { columns, length: if has_exits { length + 4 } else { length }, has_exits }
     }
 
     /// Saves registers and makes room. The second argument, the margins' address, stays on the stack.
     pub(super) fn enter(&self, out: &mut Assembler, chip: Chip) {
         match chip {
             Chip::M0Plus => {
-                out.ins("push {r1, r4-r7, lr}", 2);
+                out.ins(if self.has_exits { "push {r1, r2, r4-r7, lr}" } else { "push {r1, r4-r7, lr}" }, 2);
                 // Six registers so far: with these two it is a multiple of eight bytes, too.
                 out.ins("mov r4, r8", 2);
                 out.ins("mov r5, r9", 2);
@@ -91,7 +125,9 @@ impl Frame {
                 out.ins("mov r7, r11", 2);
                 out.ins("push {r4-r7}", 2);
             }
-            Chip::M4F => out.ins("push.w {r1, r4-r11, lr}", 4),
+            Chip::M4F => {
+                out.ins(if self.has_exits { "push.w {r1, r2, r4-r11, lr}" } else { "push.w {r1, r4-r11, lr}" }, 4);
+            }
         }
         self.room(out, "sub");
     }
@@ -106,9 +142,11 @@ impl Frame {
                 out.ins("mov r9, r5", 2);
                 out.ins("mov r10, r6", 2);
                 out.ins("mov r11, r7", 2);
-                out.ins("pop {r1, r4-r7, pc}", 2);
+                out.ins(if self.has_exits { "pop {r1, r2, r4-r7, pc}" } else { "pop {r1, r4-r7, pc}" }, 2);
             }
-            Chip::M4F => out.ins("pop.w {r1, r4-r11, pc}", 4),
+            Chip::M4F => {
+                out.ins(if self.has_exits { "pop.w {r1, r2, r4-r11, pc}" } else { "pop.w {r1, r4-r11, pc}" }, 4)
+            }
         }
     }
 

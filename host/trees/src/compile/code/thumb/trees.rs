@@ -2,14 +2,18 @@
 
 use super::super::program::{CodeNode, CodeTree, Program};
 use super::assembler::Assembler;
+use super::exits::Exits;
 use super::walk::{Pins, Walk, node};
 use super::{Chip, Frame, vectors};
 
 /// Adds up all trees: those of each object, then those with a value for each. The columns are at the stack pointer.
-pub(in super::super) fn write(out: &mut Assembler, program: &Program, frame: &Frame) {
+pub(in super::super) fn write(out: &mut Assembler, program: &Program, frame: &Frame, exits: Option<&Exits>) {
     let address = frame.margins(out.chip);
+    let mut parts = program.parts();
+    let first = if program.has_vectors() { None } else { parts.next() };
+    let first_trees = first.map_or(program.trees.as_slice(), |(trees, _)| trees);
     for object in 0..program.objects() {
-        let trees: Vec<&CodeTree> = program.trees.iter().filter(|tree| tree.object == Some(object)).collect();
+        let trees: Vec<&CodeTree> = first_trees.iter().filter(|tree| tree.object == Some(object)).collect();
         one(out, program, &trees, program.base[object]);
         out.ins(&format!("ldr r3, [sp, #{address}]"), 2);
         out.ins("stmia r3!, {r1}", 2);
@@ -23,7 +27,58 @@ pub(in super::super) fn write(out: &mut Assembler, program: &Program, frame: &Fr
         out.ins("subs r1, r1, r3", 2);
         out.ins(&format!("str r1, [sp, #{address}]"), 2);
         let trees: Vec<&CodeTree> = program.trees.iter().filter(|tree| tree.object.is_none()).collect();
-        vectors::write(out, program, &trees, address);
+        vectors::write(out, program, &trees, address, exits);
+    } else if let (Some(exits), Some((_, Some(bound)))) = (exits, first) {
+        // Back to the first margin.
+        out.ins(&format!("ldr r1, [sp, #{address}]"), 2);
+        out.number("r3", 4 * program.objects() as u32);
+        out.ins("subs r1, r1, r3", 2);
+        out.ins(&format!("str r1, [sp, #{address}]"), 2);
+        out.instructions += 4.0;
+        exits.place(out, bound);
+        for (trees, bound) in parts {
+            later(out, program, trees, address);
+            if let Some(bound) = bound {
+                exits.place(out, bound);
+            }
+        }
+    }
+}
+
+/// The trees in the order in which they are written, and what the base has instead of each.
+pub(super) fn order(program: &Program, chip: Chip) -> Vec<(usize, i32)> {
+    let mut order = Vec::new();
+    let mut first = 0;
+    for (trees, _) in program.parts() {
+        for object in 0..program.objects() {
+            let own = trees.iter().zip(first..).filter(|(tree, _)| tree.object == Some(object));
+            order.extend(own.map(|(tree, number)| (number, zero(tree, chip))));
+        }
+        first += trees.len();
+    }
+    let each = program.trees.iter().zip(0..).filter(|(tree, _)| tree.object.is_none());
+    order.extend(each.map(|(_, number)| (number, 0)));
+    order
+}
+
+/// Adds trees of one object each to margins that are there.
+fn later(out: &mut Assembler, program: &Program, trees: &[CodeTree], address: usize) {
+    for object in 0..program.objects() {
+        let trees: Vec<&CodeTree> = trees.iter().filter(|tree| tree.object == Some(object)).collect();
+        if trees.is_empty() {
+            continue;
+        }
+        one(out, program, &trees, 0);
+        let count = out.count();
+        out.ins(&format!("ldr r3, [sp, #{address}]"), 2);
+        if object > 0 {
+            out.number("r2", 4 * object as u32);
+            out.ins("adds r3, r3, r2", 2);
+        }
+        out.ins("ldr r2, [r3]", 2);
+        out.ins("adds r1, r1, r2", 2);
+        out.ins("str r1, [r3]", 2);
+        out.instructions += (out.count() - count) as f64;
     }
 }
 

@@ -3,6 +3,7 @@
 use super::super::program::{CodeTree, Program};
 use super::Chip;
 use super::assembler::{Assembler, Condition, Label};
+use super::exits::Exits;
 use super::walk::{self, Pins};
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
@@ -13,10 +14,16 @@ const LANES: usize = 10;
 const MOST: usize = 256;
 
 /// Adds up trees with a value for each object, to margins whose address is on the stack.
-pub(super) fn write(out: &mut Assembler, program: &Program, trees: &[&CodeTree], address: usize) {
+pub(super) fn write(
+    out: &mut Assembler,
+    program: &Program,
+    trees: &[&CodeTree],
+    address: usize,
+    exits: Option<&Exits>,
+) {
     out.ins(&format!("ldr r7, [sp, #{address}]"), 2);
     if let Some(vote) = program.vote() {
-        return votes(out, program, trees, vote);
+        return votes(out, program, trees, vote, exits);
     }
     let mut rest = Vec::new();
     let mut by_shift: BTreeMap<u32, Vec<&CodeTree>> = BTreeMap::new();
@@ -46,13 +53,16 @@ fn shift(tree: &CodeTree) -> Option<u32> {
 }
 
 /// Leaves of one class add a value to its margin at r7; the others are lists.
-fn votes(out: &mut Assembler, program: &Program, trees: &[&CodeTree], vote: i32) {
+fn votes(out: &mut Assembler, program: &Program, trees: &[&CodeTree], vote: i32, exits: Option<&Exits>) {
     out.number("r6", vote as u32);
     let free: &[_] = if out.chip == Chip::M4F { &["r5", "r8", "r9", "r10", "r11", "r12"] } else { &["r5"] };
     let pins = Pins::new(out, program, trees, free);
     let list = out.label();
     let lists: RefCell<Lists> = RefCell::default();
-    for tree in trees {
+    for (index, tree) in trees.iter().enumerate() {
+        if let (Some(exits), Some((_, bound))) = (exits, program.exits.iter().find(|(end, _)| *end == index)) {
+            exits.place(out, *bound);
+        }
         let (end, next, mixed) = (out.label(), out.label(), out.label());
         let highs: RefCell<BTreeMap<usize, Label>> = RefCell::default();
         let put = |out: &mut Assembler, values: &[i32], _: bool, end: Label| {

@@ -1,0 +1,305 @@
+//! Sequences of rows of features: calibrating and evaluating on them.
+
+use super::Global;
+use super::figures::shares_table;
+use super::progress::Bar;
+use palpate::Result;
+use palpate::calibrate::{Per, of_what};
+use palpate::compile::{self, CompiledModel};
+use palpate::error::{Error, Place, RowsProblem};
+use palpate::evaluate::{Confusion, Finding};
+use palpate::output;
+use palpate::rows::{SequenceColumns, Sequences, feature_names};
+use palpate::strangers;
+use palpate::stream::{self, Calibrated, Evaluated, Gain, Strangers};
+use palpate_onboard::Model;
+use palpate_shared::format::Held;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Columns of a file of rows that are no features.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub(crate) struct SequenceArguments {
+    /// Column of the classes, or a regression's numbers
+    #[arg(long, value_name = "COL", conflicts_with_all = ["active", "probe", "real"])]
+    pub(crate) label: Option<String>,
+    /// Column that says which rows are one sequence
+    #[arg(long, value_name = "COL", requires = "label")]
+    pub(crate) sequence_column: Option<String>,
+    /// Column of groups of sequences, such as persons
+    #[arg(long, value_name = "COL", requires = "sequence_column")]
+    pub(crate) group_column: Option<String>,
+}
+
+impl SequenceArguments {
+    /// The columns, if the file has sequences.
+    pub(crate) fn columns(&self) -> Option<SequenceColumns<'_>> {
+        let (label, sequence) = (self.label.as_deref(), self.sequence_column.as_deref()?);
+        Some(SequenceColumns { label, sequence, group: self.group_column.as_deref() })
+    }
+}
+
+/// Reads sequences for a model; says on stderr if columns are taken by their position.
+pub(crate) fn read(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>) -> Result<Sequences> {
+    let names = feature_names(model);
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let mut classes = compile::names(model);
+    classes.truncate(model.known_count());
+    let sequences = stream::read(path, &names, columns, &classes)?;
+    if sequences.by_position {
+        super::remark(&format!(
+            "palpate: note: {}: columns are taken by their position, since the header does not name all features",
+            path.display()
+        ));
+    }
+    Ok(sequences)
+}
+
+/// A calibration on sequences of rows that is asked for.
+pub(crate) struct Calibration<'a> {
+    pub(crate) model: &'a Path,
+    pub(crate) rows: &'a Path,
+    pub(crate) output: &'a Path,
+    pub(crate) columns: SequenceColumns<'a>,
+    pub(crate) settings: stream::Settings,
+    /// The test for what the model does not know, and rows of others.
+    pub(crate) held: Option<Held>,
+    pub(crate) background: Option<&'a PathBuf>,
+}
+
+/// Calibrates a model on sequences of rows.
+pub(crate) fn calibrate(asked: Calibration<'_>, global: &Global) -> Result<()> {
+    let Calibration { model: path, rows, output: written, columns, mut settings, held, background } = asked;
+    output::refuse_input(written, [path, rows].into_iter().chain(background.map(PathBuf::as_path)))?;
+    let compiled = CompiledModel::read(path)?;
+    let model = compiled.model();
+    stream::check(&model).map_err(|error| error.in_file(path))?;
+    let sequences = read(rows, &model, &columns)?;
+    settings.strangers = held
+        .map(|held| {
+            let test = strangers::Settings {
+                held,
+                confidence: settings.confidence,
+                seed: settings.seed,
+                ..Default::default()
+            };
+            let others = background.map(|path| others(path, &model, &columns)).transpose()?;
+            Strangers::new(test, &model, others.as_ref())
+        })
+        .transpose()?;
+    let calibrated =
+        stream::calibrate(&model, &sequences, &settings, &Bar::new()).map_err(|error| error.in_file(rows))?;
+    output::write_bytes(written, &calibrated.model)?;
+    if global.json {
+        return output::print_json_about(written, &calibrated);
+    }
+    output::print_about(written, &calibrated_text(written, &calibrated))
+}
+
+/// Sequences of what the model does not know: any column of labels is as good as another.
+fn others(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>) -> Result<Sequences> {
+    let names = feature_names(model);
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let columns = SequenceColumns { label: None, group: None, ..*columns };
+    stream::read(path, &names, &columns, &[String::new()])
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.2} %", 100.0 * share)
+}
+
+fn calibrated_text(path: &Path, calibrated: &Calibrated) -> String {
+    let Calibrated { sequences, learned, error, undecided, mean_rows, max_rows, .. } = calibrated;
+    let of = calibrated.groups.map_or_else(String::new, |_| " in new groups".into());
+    let mut text = format!(
+        "Promised: at most {} % of {} wrong{of}, with a probability of {} %.\n",
+        super::percent(calibrated.promised),
+        of_what(calibrated.promise.per),
+        super::percent(calibrated.confidence),
+    );
+    let groups = calibrated.groups.map_or_else(String::new, |groups| format!(" of {groups} groups"));
+    // Writing to a string cannot fail.
+    _ = writeln!(
+        text,
+        "{sequences} sequences{groups}: of the names given {} wrong, {} without a name; {mean_rows:.1} rows each, at most \
+         {max_rows}. {learned} others were learned from.",
+        percent(*error),
+        percent(*undecided),
+    );
+    _ = writeln!(
+        text,
+        "What a row adds: {}",
+        gain(calibrated.row_evidence, "a table from margins to evidence", "the margins")
+    );
+    _ = writeln!(
+        text,
+        "How much rows count together: {}{}",
+        gain(calibrated.weights, "less the more there are", "each as much as the first"),
+        calibrated.weights_by_doubling.as_ref().map_or_else(String::new, |weights| weights_text(weights)),
+    );
+    let width = calibrated.margins.keys().map(|name| name.chars().count()).max().unwrap_or(0);
+    if calibrated.errors.is_empty() {
+        let margin = calibrated.margins.values().next().copied().unwrap_or(f64::NAN);
+        _ = writeln!(
+            text,
+            "Names are given {margin:.2} nats ahead of all others; uncalibrated it would be {:.2}.",
+            calibrated.uncalibrated_margin
+        );
+    } else {
+        _ = writeln!(text, "\n{:width$} {:>8} {:>8}", "", "wrong", "nats");
+        for (name, margin) in &calibrated.margins {
+            let error = calibrated.errors.get(name).map_or("–".into(), |&error| percent(error));
+            _ = writeln!(text, "{name:width$} {error:>8} {margin:>8.2}");
+        }
+    }
+    text += &calibrated.strangers.as_ref().map_or_else(String::new, |found| super::strangers::text(found) + "\n");
+    text += &super::calibrate::worse(
+        &calibrated.worse(),
+        calibrated.promised,
+        calibrated.promise.per,
+        calibrated.objects.values().any(|of| 2 * of.given < *sequences as u64 / calibrated.objects.len() as u64),
+    );
+    text + &format!("{}: {} bytes\n", path.display(), calibrated.model.len())
+}
+
+fn gain(gain: Option<Gain>, with: &str, without: &str) -> String {
+    let Some(Gain { kept, rows_without, rows_with }) = gain else {
+        return format!("{without}; too few sequences to learn more from");
+    };
+    let rows = |rows: Option<f64>| rows.map_or_else(|| "no threshold".into(), |rows| format!("{rows:.1} rows"));
+    let what = if kept { with } else { without };
+    format!("{what} ({} with, {} without, on sequences that were learned from)", rows(rows_with), rows(rows_without))
+}
+
+fn weights_text(weights: &[f64]) -> String {
+    let all: Vec<String> =
+        (0..).zip(weights).map(|(doubling, weight)| format!("{} × {weight:.2}", 1_u32 << doubling)).collect();
+    format!("\n  rows × weight: {}", all.join(", "))
+}
+
+/// An evaluation on sequences of rows.
+pub(crate) struct Evaluation<'a> {
+    pub(crate) model: &'a Path,
+    pub(crate) rows: &'a Path,
+    pub(crate) columns: SequenceColumns<'a>,
+    pub(crate) wanted: stream::Wanted,
+    /// Where to write a page.
+    pub(crate) page: Option<&'a Path>,
+}
+
+/// Evaluates a compiled model on sequences of rows.
+pub(crate) fn evaluate(asked: Evaluation<'_>, compiled: &CompiledModel, global: &Global) -> Result<()> {
+    let model = compiled.model();
+    stream::check(&model).map_err(|error| error.in_file(asked.model))?;
+    let sequences = read(asked.rows, &model, &asked.columns)?;
+    let evaluated = stream::evaluate(&model, &sequences, &asked.wanted).map_err(|error| error.in_file(asked.rows))?;
+    if let Some(page) = asked.page {
+        output::refuse_input(page, [asked.rows, asked.model])?;
+        let SequenceColumns { label, sequence, group } = asked.columns;
+        let group = group.map_or_else(String::new, |group| format!(" --group-column {group}"));
+        let command = format!(
+            "palpate evaluate {} {} --label {} --sequence-column {sequence}{group} --page {}",
+            asked.model.display(),
+            asked.rows.display(),
+            label.unwrap_or_default(),
+            page.display()
+        );
+        palpate_report::stream::page(&evaluated, &command)?.write(page)?;
+    }
+    if global.json {
+        return output::print_json(&evaluated);
+    }
+    let text = evaluated_text(&evaluated);
+    match asked.page {
+        Some(page) => output::print_about(page, &text),
+        None => output::print(&text),
+    }
+}
+
+fn evaluated_text(evaluated: &Evaluated) -> String {
+    let Evaluated { sequences, rows, error, wrong, undecided, unknown, mean_rows, median_rows, .. } = evaluated;
+    let groups = evaluated.groups.map_or_else(String::new, |groups| format!(" of {groups} groups"));
+    let mut text = format!(
+        "{sequences} sequences{groups}, {rows} rows\n\
+         of the names given {} wrong; of all sequences {} wrong, {} undecided, {} unknown\n\
+         {mean_rows:.1} rows to the end on average, half of the sequences within {median_rows}\n",
+        percent(*error),
+        percent(*wrong),
+        percent(*undecided),
+        percent(*unknown),
+    );
+    if let Some(promise) = &evaluated.promise {
+        let of = promise.of.as_ref().map_or_else(String::new, |of| format!(" ({of})"));
+        let groups = if promise.groups { ", each group weighing the same" } else { "" };
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "promised: at most {} % wrong; {} were{of}{groups}: {}",
+            super::percent(promise.promised),
+            percent(promise.found),
+            match promise.finding {
+                Finding::Broken => "BROKEN, by more than chance explains",
+                Finding::Unclear => "above it, but no more than chance explains",
+                Finding::Kept => "kept",
+                Finding::Untested => "no name was given",
+            },
+        );
+    }
+    let fixed = |rows: Option<f64>, what: &str| match rows {
+        Some(rows) => format!("{rows:.1} rows ({:.0} % fewer)", 100.0 * (1.0 - mean_rows / rows)),
+        None => format!("no number of rows ({what})"),
+    };
+    let comparison = &evaluated.comparison;
+    _ = writeln!(
+        text,
+        "as few wrong with a fixed number of rows: {}",
+        fixed(comparison.fixed_rows, "all of each sequence are not enough")
+    );
+    _ = writeln!(
+        text,
+        "as few wrong by a majority of rows: {}",
+        fixed(comparison.vote_rows, "all of each sequence are not enough")
+    );
+    if let Some(switched) = evaluated.switched {
+        let [plain, forgetting] = switched.changed;
+        let [before, cost] = switched.unchanged;
+        _ = writeln!(
+            text,
+            "where the class changes: {} wrong after {:.1} rows; with forgetting at {} nats {} after {:.1}\n\
+             where it does not: {} after {:.1} rows; with forgetting {} after {:.1}",
+            percent(plain.error),
+            plain.rows,
+            switched.nats,
+            percent(forgetting.error),
+            forgetting.rows,
+            percent(before.error),
+            before.rows,
+            percent(cost.error),
+            cost.rows,
+        );
+    }
+    let mut recognized = evaluated.names.clone();
+    recognized.push("no name".into());
+    text + &shares_table(
+        "Taken for",
+        &Confusion { touches: 0, touched: evaluated.names.clone(), recognized, counts: evaluated.confusion.clone() },
+    )
+}
+
+/// Settings of a calibration on rows, from the options.
+pub(crate) fn settings(
+    rate: f64,
+    per: Per,
+    confidence: f64,
+    sequences: u64,
+    max_rows: Option<u32>,
+    seed: u64,
+) -> stream::Settings {
+    let sequences = usize::try_from(sequences).unwrap_or(usize::MAX);
+    stream::Settings { rate, per, confidence, sequences, max_rows, seed, ..stream::Settings::default() }
+}
+
+/// Refuses sequences of an ensemble: only a compiled model stops.
+pub(crate) fn needs_compiled(path: &Path) -> Error {
+    Error::at(Place::file(path), RowsProblem::NotCompiled)
+}

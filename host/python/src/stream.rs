@@ -1,0 +1,127 @@
+//! Sequences of rows: thresholds that keep a promise, and verdicts. Results come as JSON, which `palpate` turns into values of
+//! its own classes.
+
+use crate::arrays::Input;
+use crate::failure::Failure;
+use crate::model::Model;
+use crate::work::{Callback, long};
+use numpy::ndarray::Ix2;
+use palpate::calibrate::Per;
+use palpate::compile;
+use palpate::error::{Error, RowsProblem};
+use palpate::rows::{RowOf, Sequences, SequencesBuilder};
+use palpate::shared::format::Held;
+use palpate::strangers;
+use palpate::stream::{self, Settings, Strangers, Wanted};
+use pyo3::prelude::*;
+
+/// Sequences of an array's rows.
+fn sequences(
+    model: &palpate::onboard::Model<'_>,
+    rows: &Input<'_, f64, Ix2>,
+    labels: Option<&[String]>,
+    ids: &[String],
+    groups: Option<&[String]>,
+) -> Result<Sequences, Failure> {
+    let (values, columns) = rows.rows()?;
+    let wanted = model.feature_count();
+    if columns != wanted {
+        return Err(Error::from(RowsProblem::Columns { found: columns, wanted, missing: String::new() }).into());
+    }
+    let count = values.len() / wanted;
+    let lengths =
+        [("y", labels.map(<[String]>::len)), ("sequence", Some(ids.len())), ("groups", groups.map(<[String]>::len))];
+    for (name, length) in lengths {
+        if let Some(length) = length.filter(|length| *length != count) {
+            return Err(Error::setting(name, format!("{length} values"), format!("{count}, one for each row")).into());
+        }
+    }
+    let mut classes = compile::names(model);
+    classes.truncate(model.known_count());
+    let mut builder = SequencesBuilder::new(wanted, &classes);
+    for (number, row) in values.chunks_exact(wanted).enumerate() {
+        let of = |texts: &'_ [String]| texts.get(number).map(String::as_str).unwrap_or_default().to_owned();
+        let (label, group) = (labels.map_or_else(|| "0".into(), of), groups.map(of));
+        let own = RowOf { label: &label, sequence: &ids[number], group: group.as_deref() };
+        builder
+            .push(row, own)
+            .map_err(|problem| Error::from(RowsProblem::InRow { row: number + 1, problem: Box::new(problem) }))?;
+    }
+    Ok(builder.finish().map_err(Error::from)?)
+}
+
+/// Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
+#[pyo3::pyfunction]
+#[pyo3(signature = (model, rows, labels, sequence, *, groups=None, error_rate=0.01, per="average", confidence=0.95,
+    max_rows=None, strangers=None, background=None, background_sequence=None, seed=1, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+pub(crate) fn calibrate(
+    py: Python<'_>,
+    model: Bound<'_, Model>,
+    rows: Input<'_, f64, Ix2>,
+    labels: Vec<String>,
+    sequence: Vec<String>,
+    groups: Option<Vec<String>>,
+    error_rate: f64,
+    per: &str,
+    confidence: f64,
+    max_rows: Option<u32>,
+    strangers: Option<&str>,
+    background: Option<Input<'_, f64, Ix2>>,
+    background_sequence: Option<Vec<String>>,
+    seed: u64,
+    progress: Option<Callback>,
+) -> Result<(Model, String), Failure> {
+    let opened = model.get().model();
+    stream::check(opened)?;
+    let rows = sequences(opened, &rows, Some(&labels), &sequence, groups.as_deref())?;
+    let known = Per::ALL.iter().copied().find(|own| own.name() == per);
+    let per = known.ok_or_else(|| Error::setting("per", per, "average, name or object"))?;
+    let held = strangers.map(|name| {
+        let held = Held::ALL.iter().copied().find(|held| held.name() == name);
+        held.ok_or_else(|| Error::setting("strangers", name, "likely, certain or None"))
+    });
+    let others = background
+        .map(|rows| sequences(opened, &rows, None, background_sequence.as_deref().unwrap_or_default(), None))
+        .transpose()?;
+    let held = held.transpose()?;
+    let calibrated = long(py, progress.as_ref(), |progress| {
+        let strangers = held
+            .map(|held| {
+                let test = strangers::Settings { held, confidence, seed, ..Default::default() };
+                Strangers::new(test, opened, others.as_ref())
+            })
+            .transpose()?;
+        let settings = Settings { rate: error_rate, per, confidence, max_rows, strangers, seed, ..Settings::default() };
+        stream::calibrate(opened, &rows, &settings, progress)
+    })?;
+    let text = json(&calibrated);
+    Ok((Model::of(calibrated.model)?, text))
+}
+
+/// Measures a model on sequences of rows, and returns what `palpate evaluate --json` prints.
+#[pyo3::pyfunction]
+#[pyo3(signature = (model, rows, labels, sequence, *, groups=None, error_rate=None, max_rows=None))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+pub(crate) fn evaluate_sequences(
+    py: Python<'_>,
+    model: Bound<'_, Model>,
+    rows: Input<'_, f64, Ix2>,
+    labels: Vec<String>,
+    sequence: Vec<String>,
+    groups: Option<Vec<String>>,
+    error_rate: Option<f64>,
+    max_rows: Option<u32>,
+) -> Result<String, Failure> {
+    let opened = model.get().model();
+    stream::check(opened)?;
+    let rows = sequences(opened, &rows, Some(&labels), &sequence, groups.as_deref())?;
+    let wanted = Wanted { error_rate, max_rows, ..Wanted::default() };
+    let found = long(py, None, |_| stream::evaluate(opened, &rows, &wanted))?;
+    Ok(json(&found))
+}
+
+fn json(value: &impl serde::Serialize) -> String {
+    // Numbers, names and lists are always JSON.
+    serde_json::to_string(value).unwrap_or_default()
+}

@@ -1,0 +1,182 @@
+//! The page of verdicts on sequences of rows: rows to a verdict against the error rate, confusion, and how evidence grows.
+
+use crate::page::axis::{Axis, number};
+use crate::page::chart::{Chart, Shape};
+use crate::page::color;
+use crate::page::document::{Figure, Page, Section};
+use crate::page::table::{Cell, Records, Table};
+use palpate::error::Result;
+use palpate::evaluate::Finding;
+use palpate::stream::{Evaluated, Grown, Point};
+
+/// The most classes whose posteriors are drawn.
+const MOST_CLASSES: usize = 8;
+
+/// The page. `command` is what remakes it.
+///
+/// # Errors
+/// If a chart cannot be drawn.
+pub fn page(evaluated: &Evaluated, command: &str) -> Result<Page> {
+    let mut rows = Section::new("rows", "Rows to a verdict");
+    rows.text(promise(evaluated)).figure(curves(evaluated, command)?).text(fewer(evaluated));
+    let mut confusion = Section::new("confusion", "Confusion");
+    confusion.table(matrix(evaluated, command));
+    let mut sections = vec![rows, confusion];
+    if let Some(grown) = &evaluated.grown {
+        let mut one = Section::new("one", "One sequence");
+        one.figure(posteriors(evaluated, grown, command)?);
+        sections.push(one);
+    }
+    let groups = evaluated.groups.map_or_else(String::new, |groups| format!(" of {groups} groups"));
+    Ok(Page {
+        title: "Verdicts on streams of rows".into(),
+        summary: format!(
+            "{} sequences{groups}: {} % of the names given are wrong, after {} rows on average.",
+            evaluated.sequences,
+            number(100.0 * evaluated.error, 2),
+            number(evaluated.mean_rows, 1),
+        ),
+        sections,
+        facts: vec![("Command".into(), command.into()), ("palpate".into(), env!("CARGO_PKG_VERSION").into())],
+        files: false,
+    })
+}
+
+fn promise(evaluated: &Evaluated) -> String {
+    let percent = |share: f64| number(100.0 * share, 2);
+    let ends = format!(
+        "Of all sequences {} % end with a wrong name, {} % without a verdict, and {} % as unknown.",
+        percent(evaluated.wrong),
+        percent(evaluated.undecided),
+        percent(evaluated.unknown)
+    );
+    let Some(promise) = &evaluated.promise else {
+        return format!("{ends} The model was not calibrated for these thresholds, and promises nothing.");
+    };
+    let of = promise.of.as_ref().map_or_else(String::new, |of| format!(" ({of})"));
+    let kept = match promise.finding {
+        Finding::Broken => "That breaks the promise, by more than chance explains.",
+        Finding::Unclear => "That is above it, but no more than chance explains.",
+        Finding::Kept => "The promise is kept.",
+        Finding::Untested => "No name was given.",
+    };
+    format!(
+        "The model promises at most {} % of wrong names; found here: {} %{of}. {kept} {ends}",
+        percent(promise.promised),
+        percent(promise.found)
+    )
+}
+
+fn fewer(evaluated: &Evaluated) -> String {
+    let of = |rows: Option<f64>| match rows {
+        Some(rows) => {
+            format!("{} ({} % fewer)", number(rows, 1), number(100.0 * (1.0 - evaluated.mean_rows / rows), 0))
+        }
+        None => "more than these sequences have".into(),
+    };
+    format!(
+        "To be wrong as rarely, a fixed number of rows has to be {}, and a majority vote has to be over {}.",
+        of(evaluated.comparison.fixed_rows),
+        of(evaluated.comparison.vote_rows)
+    )
+}
+
+/// An error rate of nothing has no place on a logarithmic axis: half an error.
+fn shown(evaluated: &Evaluated, error: f64) -> f64 {
+    error.max(0.5 / evaluated.sequences.max(1) as f64)
+}
+
+fn curves(evaluated: &Evaluated, command: &str) -> Result<Figure> {
+    let comparison = &evaluated.comparison;
+    let early: Vec<Point> = comparison.early.iter().copied().filter(|point| point.named > 0.0).collect();
+    let all = [("early stopping", &early), ("fixed number", &comparison.fixed), ("majority vote", &comparison.vote)];
+    let mut data = Records::new(["method", "rows", "error", "named"]);
+    let points = || all.iter().flat_map(|(_, points)| points.iter());
+    let most = points().map(|point| point.rows).fold(1.0, f64::max);
+    let worst = points().map(|point| point.error).fold(0.1, f64::max).min(1.0);
+    let least = shown(evaluated, 0.0);
+    let mut chart = Chart::new(
+        "rows, on average",
+        Axis::logarithmic(0.9, 1.1 * most.max(2.0)),
+        "wrong names",
+        Axis::logarithmic(0.8 * least, (1.3 * worst).min(1.0)),
+    )
+    .sized(760, 440);
+    for (index, (name, points)) in all.iter().enumerate() {
+        let line: Vec<(f64, f64)> = points.iter().map(|point| (point.rows, shown(evaluated, point.error))).collect();
+        chart.series(name, color::series(index), Shape::Disc, &line);
+        for point in points.iter() {
+            data.push([
+                (*name).into(),
+                Cell::Number(point.rows, 2),
+                Cell::Percent(point.error, 2),
+                Cell::Percent(point.named, 1),
+            ]);
+        }
+    }
+    let own = [(evaluated.mean_rows, shown(evaluated, evaluated.error))];
+    chart.series("this model", color::series(3), Shape::Disc, &own);
+    Ok(Figure {
+        id: "rows-to-a-verdict".into(),
+        title: "Wrong names against rows".into(),
+        caption: "Early stopping at thresholds from strict to loose, the same for all names; the class with the most evidence after \
+                  a fixed number of rows, and the class that most of as many rows are recognized as, each row taken alone. A \
+                  sequence with fewer rows uses all that it has. No error at all is drawn as half of one."
+            .into(),
+        command: command.into(),
+        panels: vec![chart.svg()?],
+        data,
+    })
+}
+
+fn matrix(evaluated: &Evaluated, command: &str) -> Table {
+    let head = std::iter::once("class".to_owned()).chain(evaluated.names.iter().cloned()).chain(["no name".to_owned()]);
+    let mut data = Records::new(head);
+    for (name, counts) in evaluated.names.iter().zip(&evaluated.confusion) {
+        let row = std::iter::once(name.as_str().into()).chain(counts.iter().map(|&count| Cell::count(count)));
+        data.push(row);
+    }
+    Table {
+        id: "confusion".into(),
+        title: "Sequences of each class, by the name that they were given".into(),
+        caption: "Row by row the class, column by column the name.".into(),
+        command: command.into(),
+        data,
+    }
+}
+
+fn posteriors(evaluated: &Evaluated, grown: &Grown, command: &str) -> Result<Figure> {
+    let rows = grown.posteriors.len().max(2);
+    let mut chart = Chart::new("rows", Axis::linear(1.0, rows as f64, 8), "posterior", Axis::share()).sized(760, 380);
+    let mut data = Records::new(["rows", "class", "posterior"]);
+    // The classes that matter most, in the model's order.
+    let mut order: Vec<usize> = (0..evaluated.names.len()).collect();
+    let most = |class: usize| grown.posteriors.iter().map(|row| row[class]).fold(0.0, f64::max);
+    order.sort_by(|&a, &b| most(b).total_cmp(&most(a)));
+    order.truncate(MOST_CLASSES);
+    for (index, &class) in order.iter().enumerate() {
+        let name = &evaluated.names[class];
+        let line: Vec<(f64, f64)> =
+            (1_u32..).map(f64::from).zip(grown.posteriors.iter().map(|row| row[class])).collect();
+        chart.series(name, color::series(index), Shape::Disc, &line);
+        for (row, posterior) in &line {
+            data.push([Cell::Number(*row, 0), name.as_str().into(), Cell::Percent(*posterior, 2)]);
+        }
+    }
+    let name = |class: usize| evaluated.names.get(class).map_or("", String::as_str);
+    let ended = match grown.ended {
+        Some((row, Some(class))) => format!("After row {row} it is recognized as {}.", name(class)),
+        Some((row, None)) => format!("After row {row} it is taken for something that the model does not know."),
+        None => "It ends without a verdict.".into(),
+    };
+    Ok(Figure {
+        id: "one-sequence".into(),
+        title: format!("The evidence of one sequence of {} as it grows", name(grown.class)),
+        caption: format!(
+            "{ended} What comes after is shown as if there had been no verdict. It is the sequence at three quarters of those with a name, by their rows."
+        ),
+        command: command.into(),
+        panels: vec![chart.svg()?],
+        data,
+    })
+}

@@ -1,0 +1,83 @@
+//! A test of whether rows fit any class that the model knows, with a false alarm rate that is kept on sequences.
+
+use super::Rows;
+use super::begin::Begin;
+use super::calibrate::{Parts, Settings, grouped_once};
+use crate::calibrate::odds_of;
+use crate::compile::{self, Restated, restate};
+use crate::error::Result;
+use crate::strangers::{self, Found, Supply};
+use palpate_onboard::Model;
+use palpate_shared::format::Tag;
+use palpate_trees::rows::{RowSequence, Sequences};
+
+/// A test for what the model does not know.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Strangers {
+    /// Its settings.
+    pub settings: strangers::Settings,
+    /// The margins of rows of others, a list for each sequence of them, in the model's units; there may be none.
+    pub background: Vec<Vec<i32>>,
+}
+
+impl Strangers {
+    /// A test with a background of these sequences, whose classes do not matter.
+    ///
+    /// # Errors
+    /// As [`Rows::new`].
+    pub fn new(settings: strangers::Settings, model: &Model<'_>, others: Option<&Sequences>) -> Result<Self> {
+        let Some(others) = others else { return Ok(Self { settings, background: Vec::new() }) };
+        let rows = Rows::new(model, others)?;
+        let of = |sequence: &RowSequence| sequence.rows.clone().flat_map(|row| rows.row(row)).copied().collect();
+        Ok(Self { settings, background: others.sequences.iter().map(of).collect() })
+    }
+}
+
+/// The share of the sequences that are not learned from on which the false alarm rate is tested; the promise rests on the
+/// others.
+pub(super) const TESTED: f64 = 3.0 / 7.0;
+/// Adds the test to a model, if one is wanted: its bytes, the parts of the sequences without those that the test used, where
+/// the thresholds begin, and what was found. The test is made under the thresholds at which the walk begins: under looser
+/// ones no sequence is longer, so that there are no more false alarms.
+pub(super) fn test<'s>(
+    shaped: &[u8],
+    rows: &Rows<'_>,
+    parts: Parts<'s>,
+    settings: &Settings,
+    begin: Begin,
+) -> Result<(Vec<u8>, Parts<'s>, f64, Option<Found>)> {
+    let Some(wanted) = &settings.strangers else { return Ok((shaped.to_vec(), parts, begin.strictest, None)) };
+    let model = compile::open(shaped)?;
+    let begin = begin.loosest;
+    let restated =
+        Restated { odds: Some(odds_of(begin)), sections: vec![(Tag::ThresholdsByObject, None)], ..Restated::default() };
+    let begun = restate(&model, &restated)?;
+    let begun = compile::open(&begun)?;
+    let (alarms, parts) = parts.divided(TESTED);
+    // Of groups one sequence each: these are independent.
+    let alarms = grouped_once(&alarms);
+    let evidence = |margins: Vec<i32>| {
+        let mut margins = margins;
+        margins.chunks_exact_mut(begun.object_count()).for_each(|row| begun.make_evidence(row));
+        margins
+    };
+    let pools = |class: usize| {
+        let own = alarms.iter().filter(|sequence| sequence.class == class);
+        let of =
+            |sequence: &&RowSequence| evidence(sequence.rows.clone().flat_map(|row| rows.row(row)).copied().collect());
+        Supply::of_rows(own.map(of).collect())
+    };
+    let supplies = (0..begun.known_count()).map(pools).collect();
+    let objects = begun.object_count();
+    let mean = |margins: &Vec<i32>| {
+        let margins = evidence(margins.clone());
+        let count = (margins.len() / objects).max(1) as f64;
+        (0..objects)
+            .map(|object| margins.iter().skip(object).step_by(objects).map(|&m| f64::from(m)).sum::<f64>() / count)
+            .collect()
+    };
+    let shapes: Vec<Vec<f64>> = wanted.background.iter().filter(|margins| !margins.is_empty()).map(mean).collect();
+    let tested = strangers::calibrate_supplies(&begun, supplies, None, &shapes, &wanted.settings)?;
+    let found = Found::new(&wanted.settings, &tested);
+    Ok((tested.bytes, parts, begin, Some(found)))
+}

@@ -1,0 +1,426 @@
+//! A model's shape, thresholds and promise, from sequences of rows.
+
+use super::begin::Begin;
+use super::shape::{self, Fitted, Gain, STRICTEST};
+use super::{Rows, check, follow};
+use crate::calibrate::{
+    Chosen, Grouped, Odds, OfObject, Per, Sequence, Stop, Tally, Terms, Until, Worse, choose_groups,
+    choose_independent, margin_of, needed, worse,
+};
+use crate::compile::{self, Restated, restate};
+use crate::error::{CalibrateProblem, Error, Result};
+use crate::progress::Progress;
+use crate::random::{self, Purpose};
+#[cfg(feature = "train")]
+use crate::strangers;
+use palpate_onboard::{Model, Stopping};
+use palpate_shared::format::{OddsByObject, Promise, PromisedNoise, Tag};
+use palpate_trees::rows::{RowSequence, Sequences};
+use rand::seq::SliceRandom;
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// One sequence, or group, in this many is learned from, and not tested on.
+const LEARNED: usize = 4;
+/// Thresholds by name are tested on this share of independent sequences: [`choose_independent`] learns them on the others.
+const SHARE_OF_NAMES: f64 = 2.0 / 3.0;
+
+/// Settings of a promise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// The error rate: wrong names of those that are given.
+    pub rate: f64,
+    /// Of what the rate is promised.
+    pub per: Per,
+    /// The probability that the rate is kept.
+    pub confidence: f64,
+    /// The most sequences that are used.
+    pub sequences: usize,
+    /// Rows after which a sequence ends undecided; `None` takes the model's own limit.
+    pub max_rows: Option<u32>,
+    /// A test for what the model does not know, if one is wanted.
+    #[cfg(feature = "train")]
+    pub strangers: Option<super::Strangers>,
+    /// Seed of which sequences are learned from.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            rate: 0.01,
+            per: Per::Average,
+            confidence: 0.95,
+            sequences: 1_000_000,
+            max_rows: None,
+            #[cfg(feature = "train")]
+            strangers: None,
+            seed: 1,
+        }
+    }
+}
+
+/// A calibrated model, and what its calibration found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Calibrated {
+    /// Bytes of the model, as the chip reads them.
+    #[serde(skip)]
+    pub model: Vec<u8>,
+    /// Its promise.
+    #[serde(skip)]
+    pub promise: Promise,
+    /// The promised error rate.
+    pub promised: f64,
+    /// Of what: "average", "name" or "object".
+    pub per: &'static str,
+    /// The probability that it is kept.
+    pub confidence: f64,
+    /// Sequences that the promise rests on.
+    pub sequences: usize,
+    /// Groups that the promise rests on, and is for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub groups: Option<usize>,
+    /// Sequences that were learned from, which the promise does not rest on.
+    pub learned: usize,
+    /// Share of the names given that were wrong.
+    pub error: f64,
+    /// Share of the sequences that ended without a name.
+    pub undecided: f64,
+    /// Rows used on average, also where no name was given.
+    pub mean_rows: f64,
+    /// The limit of rows.
+    pub max_rows: u32,
+    /// Where an uncalibrated recognizer stops at this rate: nats of evidence ahead of all other classes.
+    pub uncalibrated_margin: f64,
+    /// Where this one stops, in weighed evidence: for each name.
+    pub margins: BTreeMap<String, f64>,
+    /// For each name, or class, that the rate is promised for: the share that was wrong. Empty for an average.
+    pub errors: BTreeMap<String, f64>,
+    /// Each class, whatever the rate is promised of.
+    pub objects: BTreeMap<String, OfObject>,
+    /// Gain of a table from margins to evidence; `None` where there are too few sequences to know.
+    pub row_evidence: Option<Gain>,
+    /// Gain of weights of evidence by the number of rows; likewise.
+    pub weights: Option<Gain>,
+    /// The weights that are kept: of 1, 2, 4, 8 and so on rows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights_by_doubling: Option<Vec<f64>>,
+    /// The test for what the model does not know.
+    #[cfg(feature = "train")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub strangers: Option<strangers::Found>,
+}
+
+impl Calibrated {
+    /// The classes whose names are wrong more often than promised, though the promise is kept; see
+    /// [`calibrate::Calibrated::worse`](crate::calibrate::Calibrated::worse).
+    pub fn worse(&self) -> Vec<Worse> {
+        worse(&self.objects, self.promised)
+    }
+}
+
+/// Sets a model's thresholds so that it keeps a promised error rate and uses it up, on sequences of rows that nothing was
+/// trained on; also what a row adds to the evidence, and how much rows count together, where that saves rows. Sequences of a
+/// group are used together, and the promise is then for new groups; without groups they must be independent of each other.
+///
+/// # Errors
+/// [`CalibrateProblem`], if no threshold keeps the promise, too few names are given to know, or there are too few sequences;
+/// [`RowsProblem`](crate::error::RowsProblem) for a model without classes of rows; [`Setting`](crate::error::Setting) for
+/// settings out of their ranges.
+pub fn calibrate(
+    model: &Model<'_>,
+    sequences: &Sequences,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Calibrated> {
+    progress.begin("computing margins", None);
+    let rows = Rows::new(model, sequences)?;
+    progress.begin("calibrating", None);
+    calibrate_margins(model, &rows, &sequences.sequences, settings)
+}
+
+/// The same of margins that were computed before.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_margins(
+    model: &Model<'_>,
+    rows: &Rows<'_>,
+    sequences: &[RowSequence],
+    settings: &Settings,
+) -> Result<Calibrated> {
+    check(model)?;
+    check_settings(settings)?;
+    let max_rows = settings.max_rows.unwrap_or(Stopping::from_model(model).max_touches());
+    compile::stopping(settings.rate, max_rows)?;
+    let names = names(model);
+    let missing = (0..names.len()).filter(|class| !sequences.iter().any(|sequence| sequence.class == *class));
+    let missing: Vec<String> = missing.map(|class| names[class].clone()).collect();
+    if !missing.is_empty() {
+        return Err(CalibrateProblem::MissingSequences { objects: missing }.into());
+    }
+    let parts = Parts::new(sequences, settings)?;
+    let terms = terms(settings);
+    let fitted = shape::fit(rows, &parts.learned, settings.rate, max_rows);
+    let shaped = shaped(model, &fitted, max_rows)?;
+    let begin = begin(&compile::open(&shaped)?, rows, &parts, settings, max_rows);
+    #[cfg(not(feature = "train"))]
+    let strictest = begin.strictest;
+    #[cfg(feature = "train")]
+    let (shaped, parts, strictest, tested) = super::background::test(&shaped, rows, parts, settings, begin)?;
+    let shaped_model = compile::open(&shaped)?;
+    let until = Until { margin: strictest, max_touches: max_rows };
+    let tested_on = follow(&shaped_model, rows, &parts.tested, until);
+    let chosen = if parts.has_groups {
+        let learned_on = follow(&shaped_model, rows, &parts.learned, until);
+        let [learned_on, tested_on] = [(&learned_on, &parts.learned), (&tested_on, &parts.tested)].map(grouped);
+        choose_groups(&learned_on, &tested_on, names.len(), strictest, &terms)
+    } else {
+        choose_independent(&tested_on, names.len(), strictest, &terms)
+    };
+    let chosen = chosen.map_err(|stop| parts.problem(stop, &names, settings))?;
+    let calibrated = finished(&shaped_model, &chosen, &parts, settings, max_rows, &fitted)?;
+    #[cfg(feature = "train")]
+    let calibrated = Calibrated { strangers: tested, ..calibrated };
+    Ok(calibrated)
+}
+
+fn names(model: &Model<'_>) -> Vec<String> {
+    let mut names = compile::names(model);
+    names.truncate(model.known_count());
+    names
+}
+
+fn grouped<'s>((followed, of): (&'s Vec<Sequence>, &Vec<&RowSequence>)) -> Vec<Grouped<'s>> {
+    let group = |(sequence, of): (&'s Sequence, &&RowSequence)| Grouped { sequence, group: of.group.unwrap_or(0) };
+    followed.iter().zip(of).map(group).collect()
+}
+
+fn check_settings(settings: &Settings) -> Result<()> {
+    let Settings { rate, confidence, sequences, .. } = *settings;
+    if !(1e-9..0.5).contains(&rate) {
+        return Err(Error::setting("error_rate", rate, "a number of at least 1e-9 and below 0.5"));
+    }
+    if !((0.5..=0.999_999).contains(&confidence)) {
+        return Err(Error::setting("confidence", confidence, "a number from 0.5 to 0.999999"));
+    }
+    if sequences == 0 {
+        return Err(Error::setting("sequences", sequences, "at least 1"));
+    }
+    Ok(())
+}
+
+/// Sequences that are learned from, and those that are tested on: whole groups, in a random order.
+#[derive(Clone, Debug)]
+pub(super) struct Parts<'s> {
+    pub(super) learned: Vec<&'s RowSequence>,
+    pub(super) tested: Vec<&'s RowSequence>,
+    pub(super) has_groups: bool,
+    /// Groups, or sequences without groups, of both parts.
+    units: usize,
+}
+
+impl<'s> Parts<'s> {
+    fn new(sequences: &'s [RowSequence], settings: &Settings) -> Result<Self> {
+        let mut all: Vec<&RowSequence> = sequences.iter().collect();
+        let mut random = random::generator(settings.seed, Purpose::Calibration, "sequences", 0);
+        all.shuffle(&mut random);
+        let has_groups = all.iter().any(|sequence| sequence.group.is_some());
+        let mut order: Vec<usize> = if has_groups {
+            let groups: BTreeSet<usize> = all.iter().filter_map(|sequence| sequence.group).collect();
+            let mut groups: Vec<usize> = groups.into_iter().collect();
+            groups.shuffle(&mut random);
+            groups
+        } else {
+            (0..all.len()).collect()
+        };
+        // Whole groups, whatever their size: as many as have so many sequences on average.
+        order.truncate((order.len() as u128 * settings.sequences as u128 / all.len().max(1) as u128) as usize);
+        if has_groups {
+            let taken: BTreeSet<usize> = order.iter().copied().collect();
+            all.retain(|sequence| sequence.group.is_some_and(|group| taken.contains(&group)));
+        } else {
+            all.truncate(order.len());
+        }
+        let units = order.len();
+        let least = needed(settings.rate, settings.confidence) as usize;
+        if units < least {
+            return Err(Self::too_few(units, has_groups, None, settings).into());
+        }
+        // As many as a promise takes are tested on, if there are no more.
+        let learned = (units / LEARNED).min(units - least);
+        let (learned, tested) = if has_groups {
+            let own: BTreeSet<usize> = order.into_iter().take(learned).collect();
+            all.into_iter().partition(|sequence| sequence.group.is_some_and(|group| own.contains(&group)))
+        } else {
+            let tested = all.split_off(learned);
+            (all, tested)
+        };
+        Ok(Self { learned, tested, has_groups, units })
+    }
+
+    /// Groups, or sequences without groups, that are tested on.
+    fn units_tested(&self) -> usize {
+        let groups: BTreeSet<usize> = self.tested.iter().filter_map(|sequence| sequence.group).collect();
+        if self.has_groups { groups.len() } else { self.tested.len() }
+    }
+
+    /// A share of what is tested, and the parts without it: whole groups.
+    #[cfg(feature = "train")]
+    pub(super) fn divided(self, share: f64) -> (Vec<&'s RowSequence>, Self) {
+        let mut units: Vec<Option<usize>> = Vec::new();
+        let mut seen = BTreeSet::new();
+        let groups = self.tested.iter().map(|sequence| sequence.group).filter(|group| seen.insert(*group));
+        units.extend(groups);
+        let count = |all: usize| (all as f64 * share) as usize;
+        let (taken, tested) = if self.has_groups {
+            let own: BTreeSet<Option<usize>> = units.iter().take(count(units.len())).copied().collect();
+            self.tested.into_iter().partition(|sequence| own.contains(&sequence.group))
+        } else {
+            let mut taken = self.tested;
+            let tested = taken.split_off(count(taken.len()));
+            (taken, tested)
+        };
+        (taken, Self { tested, ..self })
+    }
+
+    fn too_few(found: usize, groups: bool, object: Option<String>, settings: &Settings) -> CalibrateProblem {
+        let Settings { rate, confidence, .. } = *settings;
+        // The rate that as many could promise without an error, rounded up to two digits.
+        let possible = 1.0 - (1.0 - confidence).powf(1.0 / found.max(1) as f64);
+        let digit = 10.0_f64.powf(possible.log10().floor() - 1.0);
+        let possible = Some((possible / digit).ceil() * digit).filter(|rate| *rate < 0.5);
+        let needed = needed(rate, confidence);
+        CalibrateProblem::TooFewSequences { found: found as u64, needed, rate, possible, groups, object }
+    }
+
+    /// The problem that a walk ended with.
+    fn problem(&self, stop: Stop, names: &[String], settings: &Settings) -> CalibrateProblem {
+        let of = |position: usize| (settings.per != Per::Average).then(|| names.get(position).cloned()).flatten();
+        match stop {
+            Stop::TooFew { position, found } => {
+                Self::too_few(usize::try_from(found).unwrap_or(usize::MAX), self.has_groups, of(position), settings)
+            }
+            Stop::TooMany { position, tally: Tally { wrong, all } } => CalibrateProblem::NotKeptByRows {
+                object: of(position),
+                rate: settings.rate,
+                wrong,
+                given: all,
+                units: self.units as u64,
+                groups: self.has_groups,
+            },
+        }
+    }
+}
+
+/// The model with what a row adds and how much rows count together, and without what an earlier calibration stated.
+fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Result<Vec<u8>> {
+    let unit = f64::from(model.unit());
+    let shape = &fitted.shape;
+    let sections = vec![
+        (Tag::Weights, shape.weights.as_ref().map(|weights| (true, shape::weights_section(weights)))),
+        (Tag::RowEvidence, shape.table.as_ref().map(|table| (true, table.section(unit)))),
+        (Tag::ThresholdsByObject, None),
+        (Tag::Promise, None),
+        (Tag::Temperature, None),
+    ];
+    let restated = Restated { max_touches: Some(max_rows), sections, ..Restated::default() };
+    let shaped = restate(model, &restated)?;
+    #[cfg(feature = "train")]
+    let shaped = strangers::without(&compile::open(&shaped)?)?;
+    Ok(shaped)
+}
+
+/// The threshold at which a walk begins.
+fn begin(model: &Model<'_>, rows: &Rows<'_>, parts: &Parts<'_>, settings: &Settings, max_rows: u32) -> Begin {
+    let until = Until { margin: STRICTEST, max_touches: max_rows };
+    let followed = follow(model, rows, &parts.learned, until);
+    let mut share = 1.0;
+    #[cfg(feature = "train")]
+    if settings.strangers.is_some() {
+        share -= super::background::TESTED;
+    }
+    if settings.per == Per::Name && !parts.has_groups {
+        share *= SHARE_OF_NAMES;
+    }
+    let tested = (share * parts.units_tested() as f64) as usize;
+    Begin::new(&followed, &parts.learned, tested, &terms(settings), STRICTEST)
+}
+
+fn terms(settings: &Settings) -> Terms {
+    Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per }
+}
+
+/// The first sequence of each group; all of those without one.
+#[cfg(feature = "train")]
+pub(super) fn grouped_once<'s>(sequences: &[&'s RowSequence]) -> Vec<&'s RowSequence> {
+    let mut seen = BTreeSet::new();
+    sequences.iter().copied().filter(|sequence| sequence.group.is_none_or(|group| seen.insert(group))).collect()
+}
+
+fn finished(
+    model: &Model<'_>,
+    chosen: &Chosen,
+    parts: &Parts<'_>,
+    settings: &Settings,
+    max_rows: u32,
+    fitted: &Fitted,
+) -> Result<Calibrated> {
+    let names = names(model);
+    let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+    let promise = Promise {
+        rate: settings.rate,
+        confidence: settings.confidence,
+        per: settings.per,
+        approaches: false,
+        active: false,
+        groups: parts.has_groups,
+        sequences: count(chosen.sequences),
+        given: count(chosen.given),
+        wrong: count(chosen.wrong),
+        mean_thousandths: (1e3 * chosen.mean_touches).round() as u32,
+        max_touches: max_rows,
+        noise: PromisedNoise::default(),
+    };
+    let by_object = match &chosen.odds {
+        Odds::All(_) => None,
+        Odds::ByObject(odds) => {
+            // A background, which is never named, has a place too.
+            let all = odds.iter().copied().chain(std::iter::repeat(0)).take(model.object_count());
+            Some((true, all.flat_map(OddsByObject::to_bytes).collect()))
+        }
+    };
+    let sections =
+        vec![(Tag::ThresholdsByObject, by_object), (Tag::Promise, Some((false, promise.write(<[u8]>::to_vec))))];
+    let restated = Restated { odds: Some(chosen.odds.strictest()), sections, ..Restated::default() };
+    let share = |tally: &Tally| tally.wrong as f64 / tally.all.max(1) as f64;
+    let is_each = settings.per != Per::Average;
+    let of_object = |(name, (touched, named)): (&String, (&Tally, &Tally))| {
+        let of = OfObject { given: touched.all, wrong: touched.wrong, named: named.all, named_wrongly: named.wrong };
+        (name.clone(), of)
+    };
+    let margin = |(object, name): (usize, &String)| (name.clone(), margin_of(chosen.odds.of(object)));
+    Ok(Calibrated {
+        model: restate(model, &restated)?,
+        promise,
+        promised: settings.rate,
+        per: settings.per.name(),
+        confidence: settings.confidence,
+        sequences: chosen.sequences,
+        groups: parts.has_groups.then(|| parts.units_tested()),
+        learned: parts.learned.len(),
+        error: chosen.wrong as f64 / chosen.given.max(1) as f64,
+        undecided: 1.0 - chosen.given as f64 / chosen.sequences.max(1) as f64,
+        mean_rows: chosen.mean_touches,
+        max_rows,
+        uncalibrated_margin: ((1.0 - settings.rate) / settings.rate).ln(),
+        margins: names.iter().enumerate().map(margin).collect(),
+        errors: names.iter().cloned().zip(chosen.tallies.iter().map(share)).filter(|_| is_each).collect(),
+        objects: names.iter().zip(chosen.touched.iter().zip(&chosen.named)).map(of_object).collect(),
+        row_evidence: fitted.table,
+        weights: fitted.weights,
+        weights_by_doubling: shape::stated(model),
+        #[cfg(feature = "train")]
+        strangers: None,
+    })
+}

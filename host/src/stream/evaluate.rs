@@ -1,0 +1,466 @@
+//! Verdicts on sequences of rows: how often they are wrong, after how many rows, and what a fixed number of rows would give.
+
+use super::{Rows, check};
+use crate::compile;
+use crate::error::{Error, Result};
+use crate::evaluate::Finding;
+use crate::evaluate::promise::{BY_CHANCE, at_least};
+use palpate_onboard::{Forgetting, Model, Recognizer, Stopping, Verdict};
+use palpate_shared::format::{Per, Promise};
+use palpate_trees::rows::{RowSequence, Sequences};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The most numbers of rows at which fixed numbers and votes are compared.
+const MOST_POINTS: usize = 60;
+/// Thresholds between the strictest and the loosest of the curve of early stopping.
+const THRESHOLDS: usize = 40;
+/// The strictest and the loosest of them, in nats.
+const CURVE: [f64; 2] = [14.0, 0.1];
+/// The most rows of a sequence whose evidence is shown.
+const MOST_SHOWN: usize = 200;
+
+/// Settings of an evaluation.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wanted {
+    /// The posterior at which to stop is 1 less this; `None` takes the model's own thresholds.
+    pub error_rate: Option<f64>,
+    /// Rows after which a sequence ends; `None` takes the model's own limit.
+    pub max_rows: Option<u32>,
+    /// A weight for each class, if not the model's priors.
+    pub weights: Option<Vec<u32>>,
+    /// Also follow streams in which the class changes, with and without forgetting at so many nats.
+    pub switch: Option<f32>,
+}
+
+/// Results on sequences of rows; as JSON, `palpate evaluate --json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evaluated {
+    /// Sequences.
+    pub sequences: usize,
+    /// Groups that they belong to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub groups: Option<usize>,
+    /// Rows of all sequences.
+    pub rows: usize,
+    /// Of the names given, the share that was wrong: what a promise is about.
+    pub error: f64,
+    /// Of all sequences, the share that ended with a wrong name.
+    pub wrong: f64,
+    /// Of all sequences, the share that ended without a verdict.
+    pub undecided: f64,
+    /// Of all sequences, the share that was taken for something that the model does not know.
+    pub unknown: f64,
+    /// Rows used on average.
+    pub mean_rows: f64,
+    /// The rows after which half of the sequences had ended.
+    pub median_rows: u32,
+    /// Check of the promise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub promise: Option<PromiseOfSequences>,
+    /// The same sequences with as many rows for each.
+    pub comparison: Comparison,
+    /// The classes, in the model's order.
+    pub names: Vec<String>,
+    /// Number of sequences of each class (outer) that were given each name (inner), and last without one.
+    pub confusion: Vec<Vec<usize>>,
+    /// Streams in which the class changes half way.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub switched: Option<Switched>,
+    /// The evidence of one sequence as it grows.
+    #[serde(skip)]
+    pub grown: Option<Grown>,
+}
+
+/// A promise of a model, held against sequences.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PromiseOfSequences {
+    /// The promised error rate.
+    pub promised: f64,
+    /// Of what: "average", "name" or "object".
+    pub per: &'static str,
+    /// True if it is for new groups.
+    pub groups: bool,
+    /// The largest error rate that it is about: of all names, or of the worst name or class; each group weighing the same,
+    /// if it is for groups.
+    pub found: f64,
+    /// The name or class with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+    /// Result of a test of significance of that error rate: binomial, or for groups by their standard error.
+    pub finding: Finding,
+}
+
+/// A number of rows, and the error rate with it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Point {
+    /// Rows used on average.
+    pub rows: f64,
+    /// Of the names given, the share that was wrong.
+    pub error: f64,
+    /// Share of the sequences that got a name.
+    pub named: f64,
+}
+
+/// Early stopping against fixed numbers of rows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Early stopping at thresholds from strict to loose.
+    pub early: Vec<Point>,
+    /// The class with the most evidence after a fixed number of rows; a sequence with fewer uses all.
+    pub fixed: Vec<Point>,
+    /// The class that most rows are recognized as, among as many.
+    pub vote: Vec<Point>,
+    /// The least fixed number of rows with which no more names are wrong than by the model's verdicts.
+    pub fixed_rows: Option<f64>,
+    /// The same of votes.
+    pub vote_rows: Option<f64>,
+}
+
+/// A sequence's evidence, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grown {
+    /// Its class.
+    pub class: usize,
+    /// The posterior of each class after each row.
+    pub posteriors: Vec<Vec<f64>>,
+    /// The row after which there was a verdict, and the name if one was given.
+    pub ended: Option<(u32, Option<usize>)>,
+}
+
+/// Streams of two sequences of different classes, one after the other, the second of which comes in the middle of the first's
+/// evidence.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Switched {
+    /// Nats at which evidence is forgotten.
+    pub nats: f32,
+    /// Without a change: error rate and mean rows, without and with forgetting.
+    pub unchanged: [Point; 2],
+    /// With a change after half of the rows that a verdict takes: names of the class that came first are wrong.
+    pub changed: [Point; 2],
+}
+
+/// End of a sequence.
+#[derive(Clone, Copy, Debug)]
+struct End {
+    name: Option<usize>,
+    unknown: bool,
+    rows: u32,
+}
+
+/// Measures a model on sequences of rows.
+///
+/// # Errors
+/// As [`Rows::new`]; [`Setting`](crate::error::Setting) for settings out of their ranges.
+pub fn evaluate(model: &Model<'_>, sequences: &Sequences, wanted: &Wanted) -> Result<Evaluated> {
+    let rows = Rows::new(model, sequences)?;
+    evaluate_margins(model, &rows, &sequences.sequences, wanted)
+}
+
+/// The same of margins that were computed before.
+///
+/// # Errors
+/// As [`evaluate`].
+pub fn evaluate_margins(
+    model: &Model<'_>,
+    rows: &Rows<'_>,
+    sequences: &[RowSequence],
+    wanted: &Wanted,
+) -> Result<Evaluated> {
+    measured(model, rows, sequences, wanted, true)
+}
+
+/// The same, without the comparison and a sequence's evidence unless these are wanted.
+pub(super) fn measured(
+    model: &Model<'_>,
+    rows: &Rows<'_>,
+    sequences: &[RowSequence],
+    wanted: &Wanted,
+    compares: bool,
+) -> Result<Evaluated> {
+    check(model)?;
+    let own = Stopping::from_model(model);
+    let max_rows = wanted.max_rows.unwrap_or(own.max_touches());
+    let stopping = match wanted.error_rate {
+        Some(rate) => compile::stopping(rate, max_rows)?,
+        None if max_rows == 0 => return Err(Error::setting("max_touches", 0, "at least 1")),
+        None => own.with_max_touches(max_rows),
+    };
+    let run = Run { model, rows, weights: wanted.weights.as_deref() };
+    let ends = run.ends(sequences, stopping);
+    let mut names = compile::names(model);
+    names.truncate(model.known_count());
+    let mut confusion = vec![vec![0; names.len() + 1]; names.len()];
+    for (sequence, end) in sequences.iter().zip(&ends) {
+        confusion[sequence.class][end.name.unwrap_or(names.len())] += 1;
+    }
+    let all = sequences.len().max(1) as f64;
+    let share = |is: &dyn Fn(&RowSequence, &End) -> bool| {
+        sequences.iter().zip(&ends).filter(|(sequence, end)| is(sequence, end)).count() as f64 / all
+    };
+    let mut lengths: Vec<u32> = ends.iter().map(|end| end.rows).collect();
+    lengths.sort_unstable();
+    let groups: std::collections::BTreeSet<usize> = sequences.iter().filter_map(|sequence| sequence.group).collect();
+    let at = point(sequences, &ends);
+    let is_own = wanted.error_rate.is_none() && wanted.weights.is_none() && max_rows == own.max_touches();
+    Ok(Evaluated {
+        sequences: sequences.len(),
+        groups: (!groups.is_empty()).then_some(groups.len()),
+        rows: sequences.iter().map(|sequence| sequence.rows.len()).sum(),
+        error: at.error,
+        wrong: share(&|sequence, end| end.name.is_some_and(|name| name != sequence.class)),
+        undecided: share(&|_, end| end.name.is_none() && !end.unknown),
+        unknown: share(&|_, end| end.unknown),
+        mean_rows: at.rows,
+        median_rows: lengths.get(lengths.len() / 2).copied().unwrap_or(0),
+        promise: model.promise().filter(|_| is_own).map(|promise| check_promise(&promise, sequences, &ends, &names)),
+        comparison: if compares { run.compared(sequences, max_rows, at) } else { Comparison::default() },
+        confusion,
+        switched: wanted.switch.map(|nats| run.switched(sequences, stopping, nats, at.rows)),
+        grown: if compares { run.grown(sequences, &ends, stopping) } else { None },
+        names,
+    })
+}
+
+/// Names, errors and rows of sequences.
+fn point(sequences: &[RowSequence], ends: &[End]) -> Point {
+    let (mut given, mut wrong, mut rows) = (0_u64, 0_u64, 0_u64);
+    for (sequence, end) in sequences.iter().zip(ends) {
+        given += u64::from(end.name.is_some());
+        wrong += u64::from(end.name.is_some_and(|name| name != sequence.class));
+        rows += u64::from(end.rows);
+    }
+    let all = sequences.len().max(1) as f64;
+    Point { rows: rows as f64 / all, error: wrong as f64 / given.max(1) as f64, named: given as f64 / all }
+}
+
+/// Holds a promise against the ends of sequences.
+fn check_promise(promise: &Promise, sequences: &[RowSequence], ends: &[End], names: &[String]) -> PromiseOfSequences {
+    let case = |sequence: &RowSequence, end: &End| match promise.per {
+        Per::Average => Some(0),
+        Per::Object => Some(sequence.class),
+        Per::Name => end.name,
+    };
+    let cases = if promise.per == Per::Average { 1 } else { names.len() };
+    let mut units = vec![BTreeMap::<usize, Unit>::new(); cases];
+    for (number, (sequence, end)) in sequences.iter().zip(ends).enumerate() {
+        let Some(case) = case(sequence, end).and_then(|case| units.get_mut(case)) else { continue };
+        let unit = case.entry(sequence.group.filter(|_| promise.groups).unwrap_or(number)).or_default();
+        unit.all += 1.0;
+        unit.named += f64::from(u8::from(end.name.is_some()));
+        unit.wrong += f64::from(u8::from(end.name.is_some_and(|name| name != sequence.class)));
+    }
+    let found: Vec<(f64, f64)> = units.iter().map(|units| Unit::error(units, promise)).collect();
+    let is_above = |(error, _): &&(f64, f64)| *error > promise.rate;
+    let finding = match () {
+        () if found.iter().all(|(error, _)| error.is_nan()) => Finding::Untested,
+        () if found.iter().filter(is_above).any(|(_, chance)| *chance < BY_CHANCE / cases as f64) => Finding::Broken,
+        () if found.iter().any(|(error, _)| *error > promise.rate) => Finding::Unclear,
+        () => Finding::Kept,
+    };
+    let given = found.iter().enumerate().filter(|(_, (error, _))| !error.is_nan());
+    let worst = given.max_by(|(_, a), (_, b)| a.0.total_cmp(&b.0));
+    let (own, found) = worst.map_or((0, 0.0), |(own, (error, _))| (own, *error));
+    let of = (promise.per != Per::Average).then(|| names.get(own).cloned()).flatten();
+    PromiseOfSequences { promised: promise.rate, per: promise.per.name(), groups: promise.groups, found, of, finding }
+}
+
+/// Names of a sequence, or of a group of them.
+#[derive(Clone, Copy, Debug, Default)]
+struct Unit {
+    wrong: f64,
+    named: f64,
+    all: f64,
+}
+
+impl Unit {
+    /// The error rate of units that weigh the same, and the probability of one as high if the promise is just kept; not a
+    /// number if there is no name.
+    fn error(units: &BTreeMap<usize, Self>, promise: &Promise) -> (f64, f64) {
+        let sum = |of: &dyn Fn(&Self) -> f64| units.values().map(|unit| of(unit) / unit.all).sum::<f64>();
+        let (wrong, named) = (sum(&|unit| unit.wrong), sum(&|unit| unit.named));
+        if named == 0.0 {
+            return (f64::NAN, 1.0);
+        }
+        if !promise.groups {
+            return (wrong / named, if wrong > 0.0 { at_least(wrong, named, promise.rate) } else { 1.0 });
+        }
+        // Of a ratio of means: its residuals, at the promised rate.
+        let count = units.len() as f64;
+        let residual = |unit: &Self| unit.wrong - promise.rate * unit.named;
+        let mean = sum(&residual) / count;
+        let variance = units.values().map(|unit| (residual(unit) / unit.all - mean).powi(2)).sum::<f64>() / count;
+        let errors = mean / (variance / count).sqrt().max(f64::MIN_POSITIVE);
+        (wrong / named, 0.5 * libm::erfc(errors * std::f64::consts::FRAC_1_SQRT_2))
+    }
+}
+
+/// A model and rows.
+struct Run<'r> {
+    model: &'r Model<'r>,
+    rows: &'r Rows<'r>,
+    weights: Option<&'r [u32]>,
+}
+
+impl Run<'_> {
+    fn recognizer(&self, stopping: Stopping) -> Option<Recognizer<'_, 256>> {
+        // A model has at most 256 classes.
+        Recognizer::new(self.model, stopping).ok()
+    }
+
+    fn reset(&self, recognizer: &mut Recognizer<'_, 256>) {
+        match self.weights {
+            // One of them is above 0, which whoever made them saw to; otherwise the priors stay.
+            Some(weights) => _ = recognizer.reset_to(weights),
+            None => recognizer.reset(),
+        }
+    }
+
+    /// Verdicts on all sequences, as the chip gives them.
+    fn ends(&self, sequences: &[RowSequence], stopping: Stopping) -> Vec<End> {
+        let chunk = |sequences: &[RowSequence]| -> Vec<End> {
+            let Some(mut recognizer) = self.recognizer(stopping) else { return Vec::new() };
+            let one = |sequence: &RowSequence| {
+                self.reset(&mut recognizer);
+                let rows = sequence.rows.clone().map(|row| self.rows.row(row));
+                end(rows.map(|row| recognizer.push_margins(row)))
+            };
+            sequences.iter().map(one).collect()
+        };
+        sequences.par_chunks(64).map(chunk).collect::<Vec<_>>().concat()
+    }
+
+    /// The curves of early stopping, of fixed numbers of rows, and of votes.
+    fn compared(&self, sequences: &[RowSequence], max_rows: u32, own: Point) -> Comparison {
+        let [strict, loose] = CURVE;
+        let thresholds = (0..THRESHOLDS).map(|step| strict - (strict - loose) * step as f64 / (THRESHOLDS - 1) as f64);
+        let early = thresholds.map(|margin| {
+            let stopping = Stopping::from_odds(crate::calibrate::odds_of(margin), max_rows);
+            point(sequences, &self.ends(sequences, stopping))
+        });
+        let early = early.collect();
+        let numbers = numbers(sequences, max_rows);
+        let last = numbers.last().copied().unwrap_or(1);
+        // For each number of rows whether the class with the most evidence, and that with the most rows, is wrong.
+        let chunk = |sequences: &[RowSequence]| {
+            let mut wrong = vec![(0_u64, 0_u64, 0_u64); last];
+            let Some(mut recognizer) = self.recognizer(Stopping::from_odds(0, u32::MAX)) else { return wrong };
+            for sequence in sequences {
+                self.reset(&mut recognizer);
+                let mut votes = vec![0_u32; self.model.known_count()];
+                let (mut by_evidence, mut by_vote, mut used) = (0, 0, 0);
+                for count in 1..=last {
+                    if let Some(row) = sequence.rows.clone().nth(count - 1).map(|row| self.rows.row(row)) {
+                        recognizer.push_margins(row);
+                        by_evidence = recognizer.best();
+                        votes[largest(&row[..self.model.known_count()])] += 1;
+                        by_vote = largest(&votes);
+                        used = count;
+                    }
+                    let of = &mut wrong[count - 1];
+                    of.0 += u64::from(by_evidence != sequence.class);
+                    of.1 += u64::from(by_vote != sequence.class);
+                    of.2 += used as u64;
+                }
+            }
+            wrong
+        };
+        let add = |mut a: Vec<(u64, u64, u64)>, b: Vec<(u64, u64, u64)>| {
+            a.iter_mut().zip(b).for_each(|(a, b)| *a = (a.0 + b.0, a.1 + b.1, a.2 + b.2));
+            a
+        };
+        let wrong = sequences.par_chunks(64).map(chunk).reduce(|| vec![(0, 0, 0); last], add);
+        let all = sequences.len().max(1) as f64;
+        let of = |(wrong, rows): (u64, u64)| Point { rows: rows as f64 / all, error: wrong as f64 / all, named: 1.0 };
+        let fixed: Vec<Point> = wrong.iter().map(|of| (of.0, of.2)).map(of).collect();
+        let vote: Vec<Point> = wrong.iter().map(|of| (of.1, of.2)).map(of).collect();
+        let least = |points: &[Point]| points.iter().find(|point| point.error <= own.error).map(|point| point.rows);
+        let (fixed_rows, vote_rows) = (least(&fixed), least(&vote));
+        let shown = |points: Vec<Point>| numbers.iter().map(|number| points[number - 1]).collect();
+        Comparison { early, fixed: shown(fixed), vote: shown(vote), fixed_rows, vote_rows }
+    }
+
+    /// The sequence of about the median length, with a verdict if there is one.
+    fn grown(&self, sequences: &[RowSequence], ends: &[End], stopping: Stopping) -> Option<Grown> {
+        let mut order: Vec<usize> = (0..ends.len()).filter(|&at| ends[at].name.is_some()).collect();
+        order.sort_by_key(|&at| (ends[at].rows, at));
+        let at = order.get(order.len() * 3 / 4).copied().or((!sequences.is_empty()).then_some(0))?;
+        let sequence = &sequences[at];
+        let mut recognizer = self.recognizer(Stopping::from_odds(0, stopping.max_touches()))?;
+        self.reset(&mut recognizer);
+        let mut posteriors = Vec::new();
+        for row in sequence.rows.clone().take(MOST_SHOWN) {
+            recognizer.push_margins(self.rows.row(row));
+            posteriors.push((0..self.model.known_count()).map(|class| recognizer.posterior(class).to_f64()).collect());
+        }
+        let end = &ends[at];
+        let ended = (end.name.is_some() || end.unknown).then_some((end.rows, end.name));
+        Some(Grown { class: sequence.class, posteriors, ended })
+    }
+
+    /// Streams in which the class changes, without and with forgetting. Streams are of a sequence, cut where half of the
+    /// rows of a verdict are over, and the next one of another class.
+    fn switched(&self, sequences: &[RowSequence], stopping: Stopping, nats: f32, mean_rows: f64) -> Switched {
+        let cut = ((mean_rows / 2.0).round() as usize).max(1);
+        let of = |changed: bool, forgets: bool| {
+            let Some(mut recognizer) = self.recognizer(stopping) else { return Vec::new() };
+            let mut forgetting = Forgetting::<256>::new(self.model, nats);
+            let one = |number: usize| {
+                let last = &sequences[number];
+                let first = (1..sequences.len())
+                    .map(|step| &sequences[(number + step) % sequences.len()])
+                    .find(|other| other.class != last.class)
+                    .filter(|_| changed);
+                let first = first.map_or(0..0, |first| first.rows.start..first.rows.end.min(first.rows.start + cut));
+                self.reset(&mut recognizer);
+                forgetting.reset();
+                let push = |row: usize| {
+                    let mut margins = [0; 256];
+                    margins.iter_mut().zip(self.rows.row(row)).for_each(|(to, from)| *to = *from);
+                    match forgets {
+                        true => recognizer.push_margins_forgetting(&margins, &mut forgetting),
+                        false => recognizer.push_margins(self.rows.row(row)),
+                    }
+                };
+                end(first.chain(last.rows.clone()).map(push))
+            };
+            (0..sequences.len()).map(one).collect()
+        };
+        let both = |changed| [false, true].map(|forgets| point(sequences, &of(changed, forgets)));
+        Switched { nats, unchanged: both(false), changed: both(true) }
+    }
+}
+
+/// The end of a sequence of which verdicts come, row by row.
+fn end(verdicts: impl Iterator<Item = Verdict>) -> End {
+    let mut rows = 0;
+    for verdict in verdicts {
+        rows += 1;
+        match verdict {
+            Verdict::Undecided => {}
+            Verdict::Recognized { object, .. } => return End { name: Some(object.into()), unknown: false, rows },
+            Verdict::Unknown => return End { name: None, unknown: true, rows },
+            Verdict::GaveUp => return End { name: None, unknown: false, rows },
+        }
+    }
+    End { name: None, unknown: false, rows }
+}
+
+/// The position of the largest number, the first of several.
+fn largest<N: PartialOrd>(numbers: &[N]) -> usize {
+    (1..numbers.len()).fold(0, |best, other| if numbers[other] > numbers[best] { other } else { best })
+}
+
+/// Numbers of rows to compare: all up to the longest sequence or the limit, or [`MOST_POINTS`] of them.
+fn numbers(sequences: &[RowSequence], max_rows: u32) -> Vec<usize> {
+    let longest = sequences.iter().map(|sequence| sequence.rows.len()).max().unwrap_or(1).clamp(1, max_rows as usize);
+    let mut numbers: Vec<usize> = if longest <= MOST_POINTS {
+        (1..=longest).collect()
+    } else {
+        let of = |step: usize| (longest as f64).powf(step as f64 / (MOST_POINTS - 1) as f64).round() as usize;
+        (0..MOST_POINTS).map(of).collect()
+    };
+    numbers.dedup();
+    numbers
+}

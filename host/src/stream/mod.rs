@@ -1,0 +1,120 @@
+//! Streams of rows: verdicts as early as a promised error rate allows, of any model over rows of features.
+//!
+//! ```text
+//! sequences of rows ──► margins ─┬─ a quarter ──► what a row adds, how much rows count together (shape)
+//!                                └─ the rest ───► sequences (follow) ──► thresholds, by Learn-then-Test
+//! ```
+//!
+//! A sequence is the rows of one object in their order, with one class. It is used once, from its first row, as a whole: so
+//! the promise holds whatever the dependence of its rows is. What it costs is rows, and that is what the shape saves:
+//!
+//! - *Evidence of a row.* A table from a class's margin to evidence, the same for all classes, monotone and bounded, with which
+//!   a softmax of one row explains the classes best. It makes evidence of forests' votes, of one-against-all models and of
+//!   margins of a hinge loss, which are no log-probabilities, and tames those of a model that is too sure of itself.
+//! - *Weights.* Evidence of n rows counts as that of fewer independent ones: for each n the factor with which the posteriors
+//!   after n rows explain the classes best. With it the threshold stays where a posterior's is, however long the rows are.
+//!
+//! Both are kept only if they save 5 % of the rows at the same error rate on sequences that they were not fitted to, or if
+//! no threshold that a model can store keeps the rate without them. Nothing of the promise depends on that choice: it rests on
+//! the other three quarters alone.
+//!
+//! Without groups sequences must be independent of each other; the test is binomial. With groups, such as persons or machines,
+//! the promise is for new groups, and the test is a bet ([`choose_groups`]).
+
+#[cfg(feature = "train")]
+mod background;
+mod begin;
+mod calibrate;
+mod evaluate;
+mod follow;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod shape;
+#[cfg(all(test, feature = "train"))]
+mod tests;
+
+#[cfg(feature = "train")]
+pub use background::Strangers;
+pub use calibrate::{Calibrated, Settings, calibrate, calibrate_margins};
+pub use evaluate::{
+    Comparison, Evaluated, Grown, Point, PromiseOfSequences, Switched, Wanted, evaluate, evaluate_margins,
+};
+pub use follow::follow;
+pub use shape::Gain;
+
+use crate::error::{Result, RowsProblem};
+use crate::evaluate::together::units_of_rows;
+use palpate_onboard::Model;
+use palpate_trees::rows::{Encoder, SequenceColumns, Sequences};
+use std::borrow::Cow;
+use std::path::Path;
+
+/// The margins of rows, in a model's units.
+#[derive(Clone, Debug)]
+pub struct Rows<'r> {
+    /// Row after row, one margin for each class.
+    margins: Cow<'r, [i32]>,
+    objects: usize,
+    /// Number of classes that can be named.
+    known: usize,
+    /// Nats in a unit.
+    unit: f64,
+    /// Evidence before any row, in nats.
+    priors: Vec<f64>,
+}
+
+impl Rows<'_> {
+    /// The margins of all rows of sequences, on all threads.
+    ///
+    /// # Errors
+    /// [`RowsProblem::Touches`] for a model over touches, [`RowsProblem::Regression`] for one with a single output,
+    /// [`RowsProblem::Columns`] for rows of another number of features.
+    pub fn new(model: &Model<'_>, sequences: &Sequences) -> Result<Self> {
+        check(model)?;
+        let (found, wanted) = (sequences.features, model.feature_count());
+        if found != wanted {
+            return Err(RowsProblem::Columns { found, wanted, missing: "features".into() }.into());
+        }
+        Ok(Self::of(model, units_of_rows(model, &Encoder::of(model), &sequences.values).into()))
+    }
+}
+
+impl<'r> Rows<'r> {
+    /// Margins that were computed before, row after row, one for each of the model's classes, in its units.
+    pub fn of(model: &Model<'_>, margins: Cow<'r, [i32]>) -> Self {
+        let unit = f64::from(model.unit());
+        let priors = (0..model.object_count()).map(|object| f64::from(model.prior(object)) * unit).collect();
+        Self { margins, objects: model.object_count(), known: model.known_count(), unit, priors }
+    }
+
+    /// The margins of a row; nothing beyond the rows that there are.
+    pub fn row(&self, row: usize) -> &[i32] {
+        self.margins.get(row * self.objects..(row + 1) * self.objects).unwrap_or_default()
+    }
+}
+
+/// Refuses a model that has no classes of rows.
+///
+/// # Errors
+/// [`RowsProblem::Touches`] and [`RowsProblem::Regression`].
+pub fn check(model: &Model<'_>) -> Result<()> {
+    if model.descriptor().is_some() {
+        return Err(RowsProblem::Touches.into());
+    }
+    if model.known_count() < 2 {
+        return Err(RowsProblem::Regression { output: model.object_name(0).into() }.into());
+    }
+    Ok(())
+}
+
+/// Reads sequences from CSV, or from Parquet if the file ends in `.parquet`.
+///
+/// # Errors
+/// As [`Sequences::read`]; in Parquet rows are counted as lines of a CSV file, from 2.
+pub fn read(path: &Path, features: &[&str], columns: &SequenceColumns<'_>, classes: &[String]) -> Result<Sequences> {
+    #[cfg(feature = "parquet")]
+    if path.extension().is_some_and(|extension| extension == "parquet") {
+        return parquet::read(path, features, columns, classes);
+    }
+    Sequences::read(path, features, columns, classes)
+}

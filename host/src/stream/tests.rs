@@ -1,0 +1,394 @@
+//! Promises on simulated streams, whose error rates are known: a population of sequences, from which calibrations draw with
+//! replacement, so that its own error rate is the true one.
+
+use super::*;
+use crate::calibrate::Per;
+use crate::compile::{self, Settings as Compilation, compile};
+use crate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
+use crate::error::CalibrateProblem;
+use crate::evaluate::Finding;
+use crate::random::{Purpose, generator};
+use crate::tests::repetitions::{assert_rare, repetitions};
+use palpate_onboard::Stopping;
+use palpate_shared::format::Weights;
+use palpate_trees::rows::RowSequence;
+use rand::RngExt;
+use rand_distr::{Distribution, StandardNormal};
+use std::sync::LazyLock;
+
+const CLASSES: usize = 3;
+/// Where the classes' rows are, on a line each.
+const PLACES: [f64; CLASSES] = [0.0, 1.2, 3.0];
+
+/// Trees that are exact for rows which are normal about the classes' places: steps of the log-density.
+fn ensemble() -> Ensemble {
+    let cuts: Vec<f64> = (-20..=28).map(|step| f64::from(step) * 0.25).collect();
+    let leaf = |x: f64| Node::Leaf(PLACES.iter().map(|place| (-0.5 * (x - place).powi(2)) as f32).collect());
+    // A chain of splits: below the first cut, between it and the next, and so on.
+    let mut nodes = Vec::new();
+    for (at, cut) in cuts.iter().enumerate() {
+        let here = nodes.len();
+        nodes.push(Node::Split {
+            feature: 0,
+            threshold: *cut as f32,
+            missing_left: true,
+            left: here + 1,
+            right: here + 2,
+        });
+        nodes.push(leaf(if at == 0 { cuts[0] - 0.125 } else { cut - 0.125 }));
+    }
+    nodes.push(leaf(cuts[cuts.len() - 1] + 0.125));
+    Ensemble {
+        inputs: Inputs::unnamed(1),
+        objects: ["a", "b", "c"].map(String::from).to_vec(),
+        base_margins: vec![0.0; CLASSES],
+        trees: vec![Tree { nodes, output: Output::Each }],
+        origin: Origin::default(),
+    }
+}
+
+static MODEL: LazyLock<Vec<u8>> = LazyLock::new(|| compile(&ensemble(), &Compilation::default()).unwrap().bytes);
+
+/// Dependence of the rows of a sequence on each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Independent,
+    /// An AR(1) process.
+    Autoregressive(f64),
+    /// Groups with an offset of their own, each of three sequences.
+    Groups(f64),
+}
+
+const IN_GROUP: usize = 3;
+
+/// Sequences of so many rows, classes in turn.
+fn sequences(kind: Kind, count: usize, length: usize, seed: u64) -> Sequences {
+    let mut made = Sequences { features: 1, ..Sequences::default() };
+    for number in 0..count {
+        let mut random = generator(seed, Purpose::Synthetic, "rows", number as u64);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let group = number / IN_GROUP;
+        let class = number % CLASSES;
+        let offset = match kind {
+            Kind::Groups(spread) => {
+                let own: f64 = StandardNormal.sample(&mut generator(seed, Purpose::Synthetic, "groups", group as u64));
+                spread * own
+            }
+            _ => 0.0,
+        };
+        let start = made.values.len();
+        let mut state = normal();
+        for _ in 0..length {
+            state = match kind {
+                Kind::Autoregressive(rho) => rho * state + (1.0 - rho * rho).sqrt() * normal(),
+                _ => normal(),
+            };
+            made.values.push(PLACES[class] + offset + state);
+        }
+        let group = matches!(kind, Kind::Groups(_)).then_some(group);
+        made.sequences.push(RowSequence { rows: start..start + length, class, group });
+    }
+    made
+}
+
+/// A population, and its margins.
+struct Population {
+    rows: Rows<'static>,
+    sequences: Vec<RowSequence>,
+    kind: Kind,
+}
+
+impl Population {
+    fn new(kind: Kind, count: usize, length: usize) -> Self {
+        let made = sequences(kind, count, length, 7);
+        let rows = Rows::new(&compile::open(&MODEL).unwrap(), &made).unwrap();
+        Self { rows, sequences: made.sequences, kind }
+    }
+
+    /// Sequences drawn with replacement; of groups whole ones, which get new numbers.
+    fn drawn(&self, count: usize, seed: u64) -> Vec<RowSequence> {
+        let mut random = generator(seed, Purpose::Synthetic, "drawn", 0);
+        let all = self.sequences.len();
+        match self.kind {
+            Kind::Groups(_) => (0..count)
+                .flat_map(|group| {
+                    let own = random.random_range(0..all / IN_GROUP);
+                    (0..IN_GROUP).map(move |at| (own * IN_GROUP + at, group))
+                })
+                .map(|(at, group)| RowSequence { group: Some(group), ..self.sequences[at].clone() })
+                .collect(),
+            _ => (0..count).map(|_| self.sequences[random.random_range(0..all)].clone()).collect(),
+        }
+    }
+
+    /// The true error rate of a model.
+    fn error(&self, model: &[u8]) -> Evaluated {
+        let model = compile::open(model).unwrap();
+        evaluate_ends(&model, &self.rows, &self.sequences)
+    }
+}
+
+/// Without curves, which are not needed here.
+fn evaluate_ends(model: &Model<'_>, rows: &Rows<'_>, sequences: &[RowSequence]) -> Evaluated {
+    super::evaluate::measured(model, rows, sequences, &Wanted::default(), false).unwrap()
+}
+
+/// Figures of repeated calibrations.
+#[derive(Debug, Default)]
+struct Figures {
+    broken: u64,
+    used: Vec<f64>,
+    rows: Vec<f64>,
+}
+
+impl Figures {
+    fn median(numbers: &[f64]) -> f64 {
+        let mut sorted = numbers.to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+    }
+}
+
+/// Calibrates again and again on fresh draws, and counts how often the true error rate is above the promised one.
+fn repeated(population: &Population, count: usize, rate: f64, repetitions: u64) -> Figures {
+    let model = compile::open(&MODEL).unwrap();
+    let mut figures = Figures::default();
+    for run in 0..repetitions {
+        let drawn = population.drawn(count, run);
+        let settings = Settings { rate, max_rows: Some(200), seed: run, ..Settings::default() };
+        let calibrated = calibrate_margins(&model, &population.rows, &drawn, &settings).unwrap();
+        let found = population.error(&calibrated.model);
+        // Every group of the population has as many sequences, and every sequence is named or nearly so.
+        figures.broken += u64::from(found.error > rate);
+        figures.used.push(found.error / rate);
+        figures.rows.push(found.mean_rows);
+    }
+    figures
+}
+
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::promises -- --nocapture` repeats it as often.
+#[test]
+fn promises_are_kept_for_independent_rows_dependent_rows_and_new_groups() {
+    let repetitions = repetitions(8);
+    for (kind, count, length) in
+        [(Kind::Independent, 6_667, 60), (Kind::Autoregressive(0.9), 6_667, 160), (Kind::Groups(0.2), 1_400, 60)]
+    {
+        let population = Population::new(kind, 9_000, length);
+        for (rate, least) in [(0.01, 0.6), (0.05, 0.8), (0.1, 0.8)] {
+            let figures = repeated(&population, count, rate, repetitions);
+            let [used, rows] = [&figures.used, &figures.rows].map(|numbers| Figures::median(numbers));
+            println!(
+                "{kind:?}, {rate}: {} of {repetitions} broken, median {used:.2} of the rate used, {rows:.1} rows",
+                figures.broken
+            );
+            assert_rare(&format!("{kind:?} at {rate}"), figures.broken, repetitions, 0.05);
+            // For groups the aim is the number of those that are broken.
+            let least = if matches!(kind, Kind::Groups(_)) { 0.3 } else { least };
+            assert!(used >= least - 0.05, "{kind:?} at {rate}: {used}");
+        }
+    }
+}
+
+#[test]
+fn too_few_sequences_or_groups_say_how_many_it_takes_and_what_these_could_promise() {
+    let model = compile::open(&MODEL).unwrap();
+    let few = |kind: Kind, count: usize, rate: f64| {
+        let made = sequences(kind, count, 40, 1);
+        let settings = Settings { rate, ..Settings::default() };
+        calibrate(&model, &made, &settings, &()).map(|_| ()).unwrap_err().to_string()
+    };
+    assert_eq!(
+        few(Kind::Independent, 298, 0.01),
+        "298 sequences are too few to promise 1 %: at least 299 are needed, none of them wrong; as many could promise 1.1 %. \
+         Record more sequences, or promise a higher error rate."
+    );
+    for (rate, least, stated) in [(0.01, 299, "1 %"), (0.05, 59, "5 %"), (0.1, 29, "10 %")] {
+        let complaint = few(Kind::Groups(0.1), IN_GROUP * (least - 1), rate);
+        let expected =
+            format!("{} groups of sequences are too few to promise {stated}: at least {least} are needed", least - 1);
+        assert!(complaint.starts_with(&expected), "{complaint}");
+    }
+}
+
+#[test]
+fn weights_are_kept_where_rows_resemble_each_other_and_not_where_they_are_independent() {
+    let model = compile::open(&MODEL).unwrap();
+    let of = |kind: Kind, length: usize| {
+        let made = sequences(kind, 3_000, length, 3);
+        let settings = Settings { rate: 0.05, ..Settings::default() };
+        calibrate(&model, &made, &settings, &()).unwrap()
+    };
+    let independent = of(Kind::Independent, 60);
+    assert!(!independent.weights.unwrap().kept, "{independent:?}");
+    assert!(!independent.row_evidence.unwrap().kept, "{independent:?}");
+    assert_eq!(compile::open(&independent.model).unwrap().weight_of(8), Weights::ONE);
+    let dependent = of(Kind::Autoregressive(0.9), 160);
+    let gain = dependent.weights.unwrap();
+    println!("{gain:?} {:?}", dependent.weights_by_doubling);
+    assert!(gain.kept, "{gain:?}");
+    let stated = compile::open(&dependent.model).unwrap();
+    assert!(stated.weight_of(64) < stated.weight_of(1));
+}
+
+#[test]
+fn a_promise_is_kept_per_class_and_per_name() {
+    let model = compile::open(&MODEL).unwrap();
+    for per in [Per::Object, Per::Name] {
+        for (kind, count) in [(Kind::Independent, 9_000), (Kind::Groups(0.2), 4_500)] {
+            let made = sequences(kind, count, 60, 3);
+            let settings = Settings { rate: 0.05, per, max_rows: Some(60), ..Settings::default() };
+            let calibrated = calibrate(&model, &made, &settings, &()).unwrap();
+            let fresh = sequences(kind, 9_000, 60, 4);
+            let found = evaluate(&compile::open(&calibrated.model).unwrap(), &fresh, &Wanted::default()).unwrap();
+            let promise = found.promise.unwrap();
+            assert!(promise.finding != Finding::Broken && promise.found > 0.01, "{per:?} {kind:?}: {promise:?}");
+            assert_eq!((promise.per, promise.groups), (per.name(), kind != Kind::Independent));
+        }
+    }
+}
+
+#[test]
+fn early_stopping_takes_at_least_two_fifths_fewer_rows_than_a_fixed_number() {
+    let model = compile::open(&MODEL).unwrap();
+    let made = sequences(Kind::Independent, 6_000, 60, 3);
+    let calibrated = calibrate(&model, &made, &Settings::default(), &()).unwrap();
+    let fresh = sequences(Kind::Independent, 6_000, 60, 4);
+    let found = evaluate(&compile::open(&calibrated.model).unwrap(), &fresh, &Wanted::default()).unwrap();
+    let (fixed, vote) = (found.comparison.fixed_rows.unwrap(), found.comparison.vote_rows);
+    println!("{:.1} rows, fixed {fixed}, vote {vote:?}", found.mean_rows);
+    assert!(found.mean_rows < 0.6 * fixed, "{} {fixed}", found.mean_rows);
+    assert!(vote.is_none_or(|vote| vote > fixed));
+    let counts: usize = found.confusion.iter().flatten().sum();
+    assert_eq!(counts, 6_000);
+}
+
+#[test]
+fn a_regression_and_a_model_over_touches_are_refused_by_name() {
+    let mut one = ensemble();
+    one.objects = vec!["weight".into()];
+    one.base_margins = vec![0.0];
+    one.trees.iter_mut().for_each(|tree| {
+        tree.nodes.iter_mut().for_each(|node| {
+            if let Node::Leaf(values) = node {
+                values.truncate(1);
+            }
+        });
+    });
+    let bytes = compile(&one, &Compilation::default()).unwrap().bytes;
+    let made = sequences(Kind::Independent, 300, 5, 1);
+    let refused = calibrate(&compile::open(&bytes).unwrap(), &made, &Settings::default(), &()).unwrap_err();
+    assert!(refused.to_string().starts_with("the model predicts a value (weight), and not classes"), "{refused}");
+}
+
+#[test]
+fn a_class_without_a_sequence_is_named() {
+    let model = compile::open(&MODEL).unwrap();
+    let mut made = sequences(Kind::Independent, 900, 5, 1);
+    made.sequences.retain(|sequence| sequence.class != 1);
+    let refused = calibrate(&model, &made, &Settings::default(), &()).unwrap_err();
+    assert_eq!(
+        refused.problem::<CalibrateProblem>(),
+        Some(&CalibrateProblem::MissingSequences { objects: vec!["b".into()] })
+    );
+}
+
+#[test]
+fn the_same_seed_gives_the_same_model_on_any_number_of_threads() {
+    let model = compile::open(&MODEL).unwrap();
+    let made = sequences(Kind::Autoregressive(0.9), 1_000, 60, 3);
+    let with = |threads, seed| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let settings = Settings { rate: 0.1, seed, ..Settings::default() };
+        pool.install(|| calibrate(&model, &made, &settings, &()).unwrap().model)
+    };
+    assert_eq!(with(1, 1), with(3, 1));
+    assert_ne!(with(1, 1), with(1, 2));
+}
+
+#[test]
+fn a_calibrated_model_is_calibrated_again_as_if_it_had_not_been() {
+    let model = compile::open(&MODEL).unwrap();
+    let made = sequences(Kind::Autoregressive(0.9), 1_000, 60, 3);
+    let settings = Settings { rate: 0.1, ..Settings::default() };
+    let once = calibrate(&model, &made, &settings, &()).unwrap().model;
+    let twice = calibrate(&compile::open(&once).unwrap(), &made, &settings, &()).unwrap().model;
+    assert_eq!(once, twice);
+    assert_eq!(Stopping::from_model(&compile::open(&once).unwrap()).max_touches(), 200);
+}
+
+/// A test for what the model does not know, with a background of sequences at `place` if there is one.
+fn strangers(place: Option<f64>) -> Strangers {
+    let model = compile::open(&MODEL).unwrap();
+    let others = place.map(|place| at(place, 300, 40));
+    Strangers::new(crate::strangers::Settings::default(), &model, others.as_ref()).unwrap()
+}
+
+/// Sequences of rows about a place where no class is.
+fn at(place: f64, count: usize, length: usize) -> Sequences {
+    let mut made = sequences(Kind::Independent, count, length, 11);
+    for sequence in &mut made.sequences {
+        let own = PLACES[sequence.class];
+        made.values[sequence.rows.clone()].iter_mut().for_each(|value| *value += place - own);
+        sequence.class = 0;
+    }
+    made
+}
+
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::false_alarms -- --nocapture` repeats it as often.
+#[test]
+fn false_alarms_stay_below_the_stated_rate_on_sequences() {
+    let repetitions = repetitions(8);
+    let model = compile::open(&MODEL).unwrap();
+    for (kind, count, length) in
+        [(Kind::Independent, 6_667, 60), (Kind::Autoregressive(0.9), 6_667, 160), (Kind::Groups(0.2), 2_200, 60)]
+    {
+        let population = Population::new(kind, 9_000, length);
+        let test = strangers(None);
+        let (mut broken, mut alarms) = (0, Vec::new());
+        for run in 0..repetitions {
+            let drawn = population.drawn(count, run);
+            let strangers = Some(test.clone());
+            let settings = Settings { rate: 0.05, max_rows: Some(200), strangers, seed: run, ..Settings::default() };
+            let calibrated = calibrate_margins(&model, &population.rows, &drawn, &settings).unwrap();
+            let found = population.error(&calibrated.model);
+            broken += u64::from(found.unknown > test.settings.alarms);
+            alarms.push(found.unknown);
+            assert!(found.error < 0.06, "{found:?}");
+        }
+        println!("{kind:?}: {broken} of {repetitions} above, median {:.4}", Figures::median(&alarms));
+        assert_rare(&format!("{kind:?}"), broken, repetitions, 0.05);
+    }
+}
+
+#[test]
+fn rows_of_no_class_are_detected_with_a_background_and_without() {
+    let model = compile::open(&MODEL).unwrap();
+    let made = sequences(Kind::Independent, 6_000, 60, 3);
+    for place in [None, Some(5.0)] {
+        let settings = Settings { rate: 0.05, strangers: Some(strangers(place)), ..Settings::default() };
+        let calibrated = calibrate(&model, &made, &settings, &()).unwrap();
+        let found = calibrated.strangers.as_ref().unwrap();
+        assert!(found.false_alarms <= 0.02, "{found:?}");
+        let tested = compile::open(&calibrated.model).unwrap();
+        let others = evaluate(&tested, &at(5.0, 600, 60), &Wanted::default()).unwrap();
+        println!("{place:?}: {:.3} unknown after {:.1} rows", others.unknown, others.mean_rows);
+        // The first test is after five rows, which is where names are given.
+        assert!(others.unknown > 0.4, "{}", others.unknown);
+        let known = evaluate(&tested, &sequences(Kind::Independent, 3_000, 60, 5), &Wanted::default()).unwrap();
+        assert!(known.unknown < 0.035 && known.promise.unwrap().finding != Finding::Broken, "{}", known.unknown);
+    }
+}
+
+#[test]
+fn forgetting_finds_the_class_that_comes_later() {
+    let model = compile::open(&MODEL).unwrap();
+    let made = sequences(Kind::Independent, 6_000, 60, 3);
+    let calibrated = calibrate(&model, &made, &Settings::default(), &()).unwrap();
+    let fresh = sequences(Kind::Independent, 3_000, 60, 4);
+    let wanted = Wanted { switch: Some(5.0), ..Wanted::default() };
+    let found = evaluate(&compile::open(&calibrated.model).unwrap(), &fresh, &wanted).unwrap().switched.unwrap();
+    println!("{found:?}");
+    let [plain, forgetting] = found.changed;
+    assert!(forgetting.error < plain.error, "{found:?}");
+    assert!(found.unchanged[1].rows < 1.3 * found.unchanged[0].rows, "{found:?}");
+}

@@ -1,0 +1,270 @@
+//! Sequences of rows: the rows of one object, in their order, with the object's class.
+
+use super::{RowsProblem, columns, not_rows, number};
+use crate::error::{Error, Place, Result};
+use std::collections::HashMap;
+use std::ops::Range;
+use std::path::Path;
+
+/// The rows of one object, in their order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RowSequence {
+    /// Its rows among all.
+    pub rows: Range<usize>,
+    /// Its class: the position in the model's.
+    pub class: usize,
+    /// The group that it belongs to, such as a person or a machine: a position in [`Sequences::groups`].
+    pub group: Option<usize>,
+}
+
+/// Sequences of rows of features, NaN where one is missing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sequences {
+    /// Features of a row.
+    pub features: usize,
+    /// Row after row.
+    pub values: Vec<f64>,
+    /// The sequences, in their order.
+    pub sequences: Vec<RowSequence>,
+    /// The names of the groups, if sequences belong to some.
+    pub groups: Vec<String>,
+    /// True if columns were taken by their position, since the header does not hold all of the features' names.
+    pub by_position: bool,
+}
+
+/// Columns of a table of rows that are no features.
+#[derive(Clone, Copy, Debug)]
+pub struct SequenceColumns<'c> {
+    /// The class of the row, by name or number: the same for all rows of a sequence. Without it all are of class 0.
+    pub label: Option<&'c str>,
+    /// The sequence that the row belongs to; its rows follow each other.
+    pub sequence: &'c str,
+    /// The group that the sequence belongs to, such as a person or a machine.
+    pub group: Option<&'c str>,
+}
+
+/// Statements of a row beside its features.
+#[derive(Clone, Copy, Debug)]
+pub struct RowOf<'r> {
+    /// The class, by name or number.
+    pub label: &'r str,
+    /// The sequence.
+    pub sequence: &'r str,
+    /// The group.
+    pub group: Option<&'r str>,
+}
+
+/// Sequences, put together row by row.
+#[derive(Clone, Debug, Default)]
+pub struct SequencesBuilder {
+    classes: Vec<String>,
+    built: Sequences,
+    /// The positions of sequences and groups, by name.
+    seen: HashMap<String, usize>,
+    groups: HashMap<String, usize>,
+    /// Of the last sequence.
+    last: Option<[String; 2]>,
+}
+
+impl SequencesBuilder {
+    /// For rows of so many features, and these classes.
+    pub fn new(features: usize, classes: &[String]) -> Self {
+        Self { classes: classes.to_vec(), built: Sequences { features, ..Sequences::default() }, ..Self::default() }
+    }
+
+    /// Takes in a row; `values` are as many as there are features.
+    ///
+    /// # Errors
+    /// [`RowsProblem`]: a label that is no class, another label or group than that of the rows before in the same
+    /// sequence, a sequence that comes back after another.
+    pub fn push(&mut self, values: &[f64], row: RowOf<'_>) -> Result<(), RowsProblem> {
+        let number = self.built.len() + 1;
+        let group = row.group.unwrap_or_default();
+        match &self.last {
+            Some([sequence, label]) if sequence == row.sequence => {
+                if label != row.label {
+                    let labels = [label.clone(), row.label.into()];
+                    return Err(RowsProblem::TwoLabels { sequence: row.sequence.into(), labels });
+                }
+                let last = self.built.sequences.last_mut().filter(|_| row.group.is_some());
+                let own = last.and_then(|last| self.built.groups.get(last.group?));
+                if let Some(own) = own.filter(|own| *own != group) {
+                    let groups = [own.clone(), group.into()];
+                    return Err(RowsProblem::TwoGroups { sequence: row.sequence.into(), groups });
+                }
+            }
+            _ => {
+                let count = self.built.sequences.len();
+                if self.seen.insert(row.sequence.into(), count).is_some() {
+                    return Err(RowsProblem::ComesBack { sequence: row.sequence.into() });
+                }
+                let class = class(&self.classes, row.label).ok_or_else(|| RowsProblem::Label {
+                    label: row.label.into(),
+                    row: number,
+                    known: self.classes.clone(),
+                })?;
+                let group = row.group.map(|name| {
+                    *self.groups.entry(name.into()).or_insert_with(|| {
+                        self.built.groups.push(name.into());
+                        self.built.groups.len() - 1
+                    })
+                });
+                self.built.sequences.push(RowSequence { rows: number - 1..number - 1, class, group });
+                self.last = Some([row.sequence.into(), row.label.into()]);
+            }
+        }
+        self.built.values.extend_from_slice(values);
+        if let Some(last) = self.built.sequences.last_mut() {
+            last.rows.end = number;
+        }
+        Ok(())
+    }
+
+    /// The sequences.
+    ///
+    /// # Errors
+    /// [`RowsProblem::Empty`].
+    pub fn finish(self) -> Result<Sequences, RowsProblem> {
+        if self.built.sequences.is_empty() { Err(RowsProblem::Empty) } else { Ok(self.built) }
+    }
+}
+
+/// The position of a class by its name, or by its number.
+pub(crate) fn class(classes: &[String], label: &str) -> Option<usize> {
+    let by_number = || label.parse().ok().filter(|number| *number < classes.len());
+    classes.iter().position(|name| name == label).or_else(by_number)
+}
+
+impl Sequences {
+    /// Reads a CSV file with a header, then one row per line; a cell that is empty or NaN is missing. Columns are matched
+    /// as by [`Rows::read`](super::Rows::read).
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`RowsProblem`] naming the line, as [`SequencesBuilder::push`], and for a column that is not there
+    /// or a cell that is no number.
+    pub fn read(path: &Path, features: &[&str], names: &SequenceColumns<'_>, classes: &[String]) -> Result<Self> {
+        let file = std::fs::File::open(path).map_err(|source| Error::io(path, "read the rows", source))?;
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(std::io::BufReader::new(file));
+        let header = reader.headers().map_err(|error| not_rows(path, &error))?.clone();
+        let header: Vec<&str> = header.iter().collect();
+        let records = reader.into_records().map(|record| {
+            let record = record.map_err(|error| not_rows(path, &error))?;
+            let line = record.position().map_or(0, csv::Position::line);
+            Ok((line, record.iter().map(String::from).collect()))
+        });
+        Self::from_table(&header, records, features, names, classes, |line| Place::line(path, line))
+    }
+
+    /// Sequences of the rows of a table of any kind: its header, and its records with their numbers, of which `place` says
+    /// where they are. Line 1 is the header's.
+    ///
+    /// # Errors
+    /// As [`Sequences::read`], and what the records end with.
+    pub fn from_table(
+        header: &[&str],
+        records: impl Iterator<Item = Result<(u64, Vec<String>)>>,
+        features: &[&str],
+        names: &SequenceColumns<'_>,
+        classes: &[String],
+        place: impl Fn(u64) -> Place,
+    ) -> Result<Self> {
+        let position = |name: &str| {
+            let found = header.iter().position(|column| *column == name);
+            found.ok_or_else(|| Error::at(place(1), RowsProblem::NoColumn { name: name.into() }))
+        };
+        let [label, group] = [names.label.map(&position).transpose()?, names.group.map(&position).transpose()?];
+        let sequence = position(names.sequence)?;
+        let others: Vec<usize> = [sequence].into_iter().chain(label).chain(group).collect();
+        let (columns, by_position) =
+            columns(header, features, &others).map_err(|problem| Error::at(place(1), problem))?;
+        let mut builder = SequencesBuilder::new(features.len(), classes);
+        let mut values = vec![0.0; features.len()];
+        for record in records {
+            let (line, record) = record?;
+            let cell = |column: usize| record.get(column).map_or("", String::as_str);
+            for (value, &column) in values.iter_mut().zip(&columns) {
+                *value = number(cell(column)).ok_or_else(|| {
+                    let name = header.get(column).copied().unwrap_or_default().to_owned();
+                    Error::at(place(line), RowsProblem::Number { column: name, text: cell(column).into() })
+                })?;
+            }
+            let row = RowOf { label: label.map_or("0", cell), sequence: cell(sequence), group: group.map(cell) };
+            builder.push(&values, row).map_err(|problem| Error::at(place(line), problem))?;
+        }
+        let built = builder.finish().map_err(|problem| Error::at(place(1), problem))?;
+        Ok(Self { by_position, ..built })
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.values.len() / self.features.max(1)
+    }
+
+    /// True if there are none.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COLUMNS: SequenceColumns<'_> = SequenceColumns { label: Some("kind"), sequence: "id", group: Some("who") };
+
+    fn read(text: &str, columns: &SequenceColumns<'_>) -> Result<Sequences, String> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        let classes = ["cup", "jug"].map(String::from);
+        Sequences::read(file.path(), &["a", "b"], columns, &classes).map_err(|error| {
+            let error = error.to_string();
+            error.trim_start_matches(&file.path().display().to_string()).to_owned()
+        })
+    }
+
+    #[test]
+    fn rows_that_follow_each_other_with_one_id_are_a_sequence() {
+        let text = "id,b,who,kind,a\n7,1,ann,cup,2\n7,3,ann,cup,\nx,5,bo,1,6\ny,7,ann,jug,8\n";
+        let read = read(text, &COLUMNS).unwrap();
+        assert_eq!((read.len(), read.features, read.by_position), (4, 2, false));
+        assert_eq!((&read.values[..2], read.values[2].is_nan(), read.values[3]), (&[2.0, 1.0][..], true, 3.0));
+        let of = |rows, class, group| RowSequence { rows, class, group: Some(group) };
+        assert_eq!(read.sequences, [of(0..2, 0, 0), of(2..3, 1, 1), of(3..4, 1, 0)]);
+        assert_eq!(read.groups, ["ann", "bo"]);
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_sequence_is_said_with_its_line() {
+        let own = SequenceColumns { group: None, ..COLUMNS };
+        for (text, columns, expected) in [
+            ("id,a,b,kind\n1,1,2,cup\n1,1,2,jug\n", &own, ":3: the sequence \"1\" has the labels \"cup\" and \"jug\""),
+            ("id,a,b,kind\n1,1,2,cup\n2,1,2,cup\n1,1,2,cup\n", &own, ":4: the sequence \"1\" comes back after another"),
+            (
+                "id,a,b,kind\n1,1,2,pan\n",
+                &own,
+                ":2: the label \"pan\" in row 1 is none of the model's classes: cup, jug",
+            ),
+            ("id,a,x,y,kind\n1,1,2,3,cup\n", &own, ":1: it has 3 columns for 2 features, and no column \"b\""),
+            ("id,a,b\n1,1,2\n", &own, ":1: it has no column \"kind\""),
+            ("a,b,kind\n1,2,cup\n", &own, ":1: it has no column \"id\""),
+            ("id,a,b,kind\n1,1,2,cup\n", &COLUMNS, ":1: it has no column \"who\""),
+            ("id,a,b,kind\n1,1,x,cup\n", &own, ":2: \"x\" in the column b is not a number"),
+            ("id,a,b,kind\n1,1,cup\n", &own, ":2: "),
+            ("id,a,b,kind\n", &own, ":1: it has no rows"),
+            (
+                "id,a,b,kind,who\n1,1,2,cup,ann\n1,1,2,cup,bo\n",
+                &COLUMNS,
+                ":3: the sequence \"1\" belongs to the groups \"ann\" and \"bo\"",
+            ),
+        ] {
+            let complaint = read(text, columns).unwrap_err();
+            assert!(complaint.starts_with(expected), "{complaint}");
+        }
+    }
+
+    #[test]
+    fn columns_that_are_no_features_do_not_count_by_position() {
+        let read = read("id,p,kind,q\n1,1,cup,2\n", &SequenceColumns { group: None, ..COLUMNS }).unwrap();
+        assert_eq!((read.values, read.by_position), (vec![1.0, 2.0], true));
+    }
+}
