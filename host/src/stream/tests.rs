@@ -169,7 +169,7 @@ fn repeated(population: &Population, count: usize, rate: f64, repetitions: u64) 
 /// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::promises -- --nocapture` repeats it as often.
 #[test]
 fn promises_are_kept_for_independent_rows_dependent_rows_and_new_groups() {
-    let repetitions = repetitions(8);
+    let repetitions = repetitions(3);
     for (kind, count, length) in
         [(Kind::Independent, 6_667, 60), (Kind::Autoregressive(0.9), 6_667, 160), (Kind::Groups(0.2), 1_400, 60)]
     {
@@ -337,7 +337,7 @@ fn at(place: f64, count: usize, length: usize) -> Sequences {
 /// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::false_alarms -- --nocapture` repeats it as often.
 #[test]
 fn false_alarms_stay_below_the_stated_rate_on_sequences() {
-    let repetitions = repetitions(8);
+    let repetitions = repetitions(3);
     let model = compile::open(&MODEL).unwrap();
     for (kind, count, length) in
         [(Kind::Independent, 6_667, 60), (Kind::Autoregressive(0.9), 6_667, 160), (Kind::Groups(0.2), 2_200, 60)]

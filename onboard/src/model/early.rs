@@ -13,7 +13,7 @@ impl Model<'_> {
     ///
     /// `room` is for numbers on the way, one for each class; `None` if it is shorter. They are no margins afterwards.
     ///
-    /// Cost: that of the trees that are walked, and some ten instructions for each class at each place. Cannot fail otherwise.
+    /// Cost: that of the trees that are walked, and two passes over the classes at each place. Cannot fail otherwise.
     pub fn class_of(&self, features: &[i32], room: &mut [i32]) -> Option<usize> {
         let is_walked = self.has_trees() && !self.is_float() && self.layout() != Layout::Code;
         if !is_walked || self.early_exits().next().is_none() {

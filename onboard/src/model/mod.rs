@@ -215,7 +215,8 @@ impl<'a> Model<'a> {
     /// Makes evidence of a row's margins, in units: what the row adds for each object. Without a
     /// [table](Model::row_evidence) margins stay as they are.
     ///
-    /// Cost: with a table some 30 instructions for each object, and a few for each optional section. Cannot fail.
+    /// Cost: with a table two of its values and a multiplication for each object, and a search among the optional sections.
+    /// Cannot fail.
     pub fn make_evidence(&self, margins: &mut [i32]) {
         if let Some(table) = self.row_evidence() {
             margins.iter_mut().take(self.object_count()).for_each(|margin| *margin = table.of(*margin));
@@ -225,7 +226,7 @@ impl<'a> Model<'a> {
     /// The weight of the evidence of so many touches or rows where it is compared with a threshold, in Q16: 65,536, which is 1,
     /// unless the model states [others](Weights).
     ///
-    /// Cost: next to none if it states none, otherwise some twenty instructions, and a few for each optional section.
+    /// Cost: next to none if it states none, otherwise leading zeros, and a search among the optional sections.
     /// Cannot fail.
     pub fn weight_of(&self, touches: u32) -> u32 {
         if !cfg!(feature = "row-evidence") || self.stated.by_object & HAS_WEIGHTS == 0 {

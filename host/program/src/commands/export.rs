@@ -23,11 +23,11 @@ use std::path::{Path, PathBuf};
 /// Compile an ensemble to the bytes that the chip reads.
 #[derive(clap::Args)]
 #[command(after_help = "\
-ENSEMBLE is what `palpate train` saved, or a model of another library: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx). `palpate verify` compares the model with it.
+ENSEMBLE is what `palpate train` saved, or a model of another library: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx).
 
 Without a layout of its own (compact, complete, grid, wide, patterns, code), --layout says what it is chosen for: balanced, m4f or m0+ for the fastest of at most three times the smallest, speed, or size.
 
-With --emit thumb, thumb-m4f or c-code the trees are code, and the model has none: docs/guide/code.md.
+--emit thumb, thumb-m4f, c-code: the trees are code, the model has none (docs/guide/code.md).
 
 Examples:
   palpate export ensemble.json -o model.palpate

@@ -7,7 +7,7 @@ pub(super) struct UnstatedArguments {
     /// The number that stood for a missing value in training, such as 0
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     missing: Option<f32>,
-    /// Take all trees where training stopped early, not those up to the best iteration
+    /// Take all trees, not those up to the best iteration
     #[arg(long)]
     all_trees: bool,
 }

@@ -315,7 +315,7 @@ fn with_ties() -> Vec<Case> {
     cases
 }
 
-/// How far the largest margin is ahead.
+/// The largest margin less the second largest.
 fn lead(margins: &[i32]) -> u32 {
     let mut sorted = margins.to_vec();
     sorted.sort_unstable();

@@ -366,7 +366,7 @@ struct Ways<'w, 'r> {
     /// Instructions of the longest way.
     longest: usize,
     nodes: Vec<Step>,
-    /// What is the same after each of them.
+    /// The state that is the same after each of them.
     after: Option<State>,
 }
 

@@ -9,7 +9,7 @@ use crate::prove::{check_code, format, prove_code};
 
 const FILE: &[u8] = b"an ensemble";
 
-/// What is read, and all rows.
+/// The code as it is read, and all rows.
 fn meaning(bytes: &[u8], text: &str) -> Option<(Code, Vec<Values>)> {
     let plain = format::read(bytes).unwrap();
     let stated = Stated {

@@ -115,7 +115,7 @@ impl Instruction {
     }
 }
 
-/// What commas outside of brackets and braces separate.
+/// Parts that commas outside of brackets and braces separate.
 fn operands(text: &str) -> Vec<String> {
     let (mut all, mut own, mut depth) = (Vec::new(), String::new(), 0);
     for character in text.chars() {
