@@ -4,7 +4,7 @@
 //! the same approaches with the same random numbers, so that candidates differ by nothing else. There are fewer of them than
 //! of the approaches that the rest of the fit uses.
 
-use super::candidate::Candidate;
+use super::candidate::{Candidate, NUMBERS};
 use super::density::Densities;
 use super::likelihood::Plate;
 use super::recording::Recording;
@@ -21,7 +21,7 @@ use crate::probe::sweep::Contact;
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use crate::touches::Origin;
-use nalgebra::{Matrix3, SymmetricEigen};
+use nalgebra::{Matrix3, SMatrix, SymmetricEigen};
 use palpate_shared::Touch;
 use rand_distr::{Distribution, Exp1};
 use rayon::prelude::*;
@@ -31,6 +31,8 @@ const APPROACHES: u64 = 20_000;
 /// Gain of log-likelihood from which fingers bend and objects give way: a fit to touches without either finds a little of
 /// them by chance.
 const CERTAIN: f64 = 4.0;
+/// Gain from which they may do so: the probe's intervals allow for it.
+const POSSIBLE: f64 = 1.0;
 
 /// Approaches to an object, and what would be touched if nothing gave way.
 pub(super) struct Samples<'a> {
@@ -93,6 +95,8 @@ pub(super) struct Layer {
     pub(super) ends: Option<[Noise; 2]>,
     /// The probe that explains the recordings best with them; none if nothing was searched.
     pub(super) candidate: Option<Candidate>,
+    /// What their uncertainty adds to the intervals of the probe's numbers: half widths, on the scale of a search.
+    pub(super) adds: [f64; NUMBERS],
 }
 
 /// A search for the best probe near another one.
@@ -173,31 +177,42 @@ impl Layers<'_> {
         Ok((numbers, best))
     }
 
-    /// Half the widths of the intervals, from the curvatures of the likelihood.
-    fn widths(&self, numbers: Numbers, best: &Best) -> Result<Numbers> {
+    /// Half the widths of the intervals, from the curvatures of the likelihood, and what they add to those of the probe's
+    /// numbers: these move with the layer, by slopes that are measured along the way.
+    fn widths(&self, numbers: Numbers, best: &Best) -> Result<(Numbers, [f64; NUMBERS])> {
         // Differences of maxima: exact ones, since each of a quick climb may be a tenth of a nat too low.
         let at = |ways: &[(usize, f64)]| {
             let mut there = numbers;
             ways.iter().for_each(|(index, way)| there[*index] += way * CURVATURE);
-            Ok(self.explained(there, &best.candidate, search::near)?.log_likelihood) as Result<f64>
+            self.explained(there, &best.candidate, search::near)
         };
-        let center = at(&[])?;
+        let center = at(&[])?.log_likelihood;
         let mut curvatures = Matrix3::identity();
         let mut up = [0.0; 3];
+        let mut slopes = SMatrix::<f64, NUMBERS, 3>::zeros();
         for index in 0..3 {
-            up[index] = at(&[(index, 1.0)])?;
+            let [above, below] = [at(&[(index, 1.0)])?, at(&[(index, -1.0)])?];
+            up[index] = above.log_likelihood;
             // A give of less than nothing is none.
-            curvatures[(index, index)] = 2.0 * center - up[index] - at(&[(index, -1.0)])?;
+            curvatures[(index, index)] = 2.0 * center - up[index] - below.log_likelihood;
+            let [above, below] = [above, below].map(|best| best.candidate.numbers());
+            slopes
+                .set_column(index, &SMatrix::from_fn(|number, _| (above[number] - below[number]) / (2.0 * CURVATURE)));
         }
         for (one, other) in [(0, 1), (0, 2), (1, 2)] {
-            let both = up[one] + up[other] - at(&[(one, 1.0), (other, 1.0)])? - center;
+            let both = up[one] + up[other] - at(&[(one, 1.0), (other, 1.0)])?.log_likelihood - center;
             (curvatures[(one, other)], curvatures[(other, one)]) = (both, both);
         }
         let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(curvatures);
         let spread = eigenvectors
             * Matrix3::from_diagonal(&eigenvalues.map(|curved| CURVATURE.powi(2) / curved.max(0.05)))
             * eigenvectors.transpose();
-        Ok([0, 1, 2].map(|index| (search::QUANTILE * spread[(index, index)]).sqrt()))
+        let adds = slopes * spread * slopes.transpose();
+        let half = |variance: f64| (search::QUANTILE * variance.max(0.0)).sqrt();
+        Ok((
+            [0, 1, 2].map(|index| half(spread[(index, index)])),
+            std::array::from_fn(|number| half(adds[(number, number)])),
+        ))
     }
 }
 
@@ -222,10 +237,16 @@ pub(super) fn layer(
         search::best(&|candidate: &Candidate| evidence.log_likelihood(candidate, |_| true), None)
     };
     let (numbers, best) = layers.best(&plain)?;
-    if best.log_likelihood < plain.log_likelihood + CERTAIN {
-        return Ok(Layer { real: Noise::default(), ends: None, candidate: Some(plain.candidate) });
+    let gain = best.log_likelihood - plain.log_likelihood;
+    if gain < POSSIBLE {
+        return Ok(Layer { candidate: Some(plain.candidate), ..Layer::default() });
     }
-    let widths = layers.widths(numbers, &best)?;
+    let (widths, adds) = layers.widths(numbers, &best)?;
+    if gain < CERTAIN {
+        let [bent, rigid] = [best.candidate.numbers(), plain.candidate.numbers()];
+        let adds = std::array::from_fn(|number| adds[number].hypot(bent[number] - rigid[number]));
+        return Ok(Layer { candidate: Some(plain.candidate), adds, ..Layer::default() });
+    }
     let ends = [-1.0, 1.0].map(|side| real_of(std::array::from_fn(|index| numbers[index] + side * widths[index])));
-    Ok(Layer { real: real_of(numbers), ends: Some(ends), candidate: Some(best.candidate) })
+    Ok(Layer { real: real_of(numbers), ends: Some(ends), candidate: Some(best.candidate), adds })
 }

@@ -206,6 +206,10 @@ fn fit_to(
     evidence.of.par_iter().for_each(|&object| evidence.objects[object].prepare());
     let timer = timer::timer(recorded.touches().chain(plate.into_iter().flatten()));
     let (best, ends) = searched(&evidence, layer.candidate, progress)?;
+    // The intervals of the search suppose the layer as it was found.
+    let center = best.candidate.numbers();
+    let widened = |(index, ends): (usize, search::Ends)| ends.widened(index, center[index], layer.adds[index]);
+    let ends: Vec<search::Ends> = ends.into_iter().enumerate().map(widened).collect();
     progress.begin("checking the recordings", None);
     let suspects = suspects::suspects(&evidence, &best, progress)?;
     let mut fit = outcome::outcome(&evidence, &best, &ends, layer, timer, suspects, settings);

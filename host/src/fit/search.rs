@@ -125,6 +125,24 @@ pub(super) struct Ends {
     pub(super) better: Option<Best>,
 }
 
+impl Ends {
+    /// The interval of number `index`, widened by another source of uncertainty that is independent of it: half widths add
+    /// up in quadrature.
+    pub(super) fn widened(mut self, index: usize, center: f64, adds: f64) -> Self {
+        for (end, sign) in self.ends.iter_mut().zip([-1.0, 1.0]) {
+            let Some(end) = end else { continue };
+            let mut numbers = end.numbers();
+            numbers[index] = center + sign * (numbers[index] - center).hypot(adds);
+            // A share of missed contacts cannot be below 0.
+            if index >= 4 {
+                numbers[index] = numbers[index].max(0.0);
+            }
+            *end = Candidate::of(&numbers);
+        }
+        self
+    }
+}
+
 /// The interval of number `index` by profile likelihood: as far as the best candidates with other values of it explain the
 /// touches nearly as well. Method: Venzon and Moolgavkar, A method for computing profile-likelihood-based confidence
 /// intervals, Applied Statistics 37 (1988), here by secants.
