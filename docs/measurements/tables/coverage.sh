@@ -4,7 +4,7 @@
 #   docs/measurements/tables/coverage.sh MESHES PROBE FITS DIR
 #
 # PROBE is a probe file with what the probe adds under [real], such as one that was fitted to a robot; it makes 75 approaches
-# to each of four objects, FITS times. DIR is filled. The program is $PALPATE, or target/release/palpate.
+# to each of four objects, FITS times, with the seeds from 1001 ($SEED + 1) on. DIR is filled. The program is $PALPATE, or target/release/palpate.
 set -eu
 meshes=$1
 probe=$2
@@ -23,7 +23,7 @@ offsets=$(number offsets)
 run=1
 while [ "$run" -le "$fits" ]; do
     # shellcheck disable=SC2086
-    "$palpate" capture $known -o "$out/recorded" --approaches 75 --seed $((1000 + run)) --probe "$probe" --force \
+    "$palpate" capture $known -o "$out/recorded" --approaches 75 --seed $((${SEED:-1000} + run)) --probe "$probe" --force \
         >/dev/null 2>>"$out/log"
     # What a recording does not state.
     rm "$out/recorded/dataset.json"

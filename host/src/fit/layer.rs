@@ -109,6 +109,9 @@ type Numbers = [f64; 3];
 const START: Numbers = [2.0, 2.0, 1.0];
 /// The first and the last step of the search.
 const STEPS: [f64; 2] = [1.0, 0.2];
+/// Factor of what a layer adds to the intervals of the probe's numbers: slopes and curvatures come from simulated touches,
+/// and are those of one maximum. With 1, intervals of 21 simulated probes held the speed and the offsets in 18, 18 and 17.
+const WIDER: f64 = 1.5;
 /// Distance to either side over which curvatures are measured.
 const CURVATURE: f64 = 0.5;
 
@@ -207,7 +210,7 @@ impl Layers<'_> {
         let spread = eigenvectors
             * Matrix3::from_diagonal(&eigenvalues.map(|curved| CURVATURE.powi(2) / curved.max(0.05)))
             * eigenvectors.transpose();
-        let adds = slopes * spread * slopes.transpose();
+        let adds = WIDER.powi(2) * slopes * spread * slopes.transpose();
         let half = |variance: f64| (search::QUANTILE * variance.max(0.0)).sqrt();
         Ok((
             [0, 1, 2].map(|index| half(spread[(index, index)])),
@@ -244,7 +247,7 @@ pub(super) fn layer(
     let (widths, adds) = layers.widths(numbers, &best)?;
     if gain < CERTAIN {
         let [bent, rigid] = [best.candidate.numbers(), plain.candidate.numbers()];
-        let adds = std::array::from_fn(|number| adds[number].hypot(bent[number] - rigid[number]));
+        let adds = std::array::from_fn(|number| adds[number].hypot(WIDER * (bent[number] - rigid[number])));
         return Ok(Layer { candidate: Some(plain.candidate), adds, ..Layer::default() });
     }
     let ends = [-1.0, 1.0].map(|side| real_of(std::array::from_fn(|index| numbers[index] + side * widths[index])));

@@ -133,7 +133,7 @@ fn finely(recorded: &Dataset, plate: &[Touch]) -> Fit {
 
 /// The fit of a probe of which nothing is known.
 fn layered(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
-    fit(recorded, &objects(), plate, &settings(), &()).unwrap()
+    fit(recorded, &objects(), plate, &Settings { approaches: 12_000, ..settings() }, &()).unwrap()
 }
 
 /// That the values are near those of the probe, and the intervals hold them but for an error of the simulation.
@@ -179,7 +179,7 @@ fn fingers_that_bend_aside_are_found_and_rigid_ones_are_not_said_to_bend() {
         |object: &Object| ObjectTouches::new(&object.name, approaches_of(object, 300, 21, &BENT, real), Source::Object);
     let soft = Dataset::new(objects().iter().map(one).collect());
     let found =
-        fit(&soft, &objects(), Some(&plate(60, &BENT)), &Settings { approaches: 100_000, ..settings() }, &()).unwrap();
+        fit(&soft, &objects(), Some(&plate(60, &BENT)), &Settings { approaches: 40_000, ..settings() }, &()).unwrap();
     // Noise and bend are hardly told apart: the one makes up for the other.
     near(&found, &BENT, [0.05, 1.5, 1.2]);
     assert!(found.speed_factor.holds(1.0 / BENT.longer), "{:?}", found.speed_factor);
