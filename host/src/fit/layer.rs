@@ -95,7 +95,7 @@ pub(super) struct Layer {
     pub(super) ends: Option<[Noise; 2]>,
     /// The probe that explains the recordings best with them; none if nothing was searched.
     pub(super) candidate: Option<Candidate>,
-    /// What their uncertainty adds to the intervals of the probe's numbers: half widths, on the scale of a search.
+    /// Widths that their uncertainty adds to the intervals of the probe's numbers: half widths, on the scale of a search.
     pub(super) adds: [f64; NUMBERS],
 }
 
