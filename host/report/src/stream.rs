@@ -173,7 +173,7 @@ fn posteriors(evaluated: &Evaluated, grown: &Grown, command: &str) -> Result<Fig
         id: "one-sequence".into(),
         title: format!("The evidence of one sequence of {} as it grows", name(grown.class)),
         caption: format!(
-            "{ended} What comes after is shown as if there had been no verdict. It is the sequence at three quarters of those with a name, by their rows."
+            "{ended} Later rows are shown as if there had been no verdict. Of the sequences with a name, a quarter take longer."
         ),
         command: command.into(),
         panels: vec![chart.svg()?],

@@ -122,18 +122,18 @@ fn calibrated_text(path: &Path, calibrated: &Calibrated) -> String {
     _ = writeln!(
         text,
         "{sequences} sequences{groups}: of the names given {} wrong, {} without a name; {mean_rows:.1} rows each, at most \
-         {max_rows}. {learned} others were learned from.",
+         {max_rows}. The shape of evidence was learned from {learned} others.",
         percent(*error),
         percent(*undecided),
     );
     _ = writeln!(
         text,
-        "What a row adds: {}",
+        "Evidence of a row: {}",
         gain(calibrated.row_evidence, "a table from margins to evidence", "the margins")
     );
     _ = writeln!(
         text,
-        "How much rows count together: {}{}",
+        "Weight of rows: {}{}",
         gain(calibrated.weights, "less the more there are", "each as much as the first"),
         calibrated.weights_by_doubling.as_ref().map_or_else(String::new, |weights| weights_text(weights)),
     );
@@ -168,7 +168,7 @@ fn gain(gain: Option<Gain>, with: &str, without: &str) -> String {
     };
     let rows = |rows: Option<f64>| rows.map_or_else(|| "no threshold".into(), |rows| format!("{rows:.1} rows"));
     let what = if kept { with } else { without };
-    format!("{what} ({} with, {} without, on sequences that were learned from)", rows(rows_with), rows(rows_without))
+    format!("{what} ({} with, {} without, on sequences that the promise does not rest on)", rows(rows_with), rows(rows_without))
 }
 
 fn weights_text(weights: &[f64]) -> String {
