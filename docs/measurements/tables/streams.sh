@@ -4,7 +4,7 @@
 #   docs/measurements/tables/streams.sh DIR
 #
 # DIR is filled with two Python packages that ship data, JapaneseVowels in aeon and recordings of a wrist in seglearn, and with
-# their rows as CSV; nothing of either is run. Repetitions are 200 ($REPETITIONS): half an hour of processor time.
+# their rows as CSV; nothing of either is run. Needs numpy. Repetitions are 200 ($REPETITIONS): half an hour of processor time.
 set -eu
 [ $# -eq 1 ] || { sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 out=$1
