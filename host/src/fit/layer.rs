@@ -1,4 +1,4 @@
-//! Fingers that bend aside and objects that give way, found beside the probe's other numbers.
+//! Fingers that bend aside, found beside the probe's other numbers.
 //!
 //! Their effect on a touch depends on the angles of its contacts, so simulated touches are made again for each candidate:
 //! the same approaches with the same random numbers, so that candidates differ by nothing else. There are fewer of them than
@@ -21,20 +21,19 @@ use crate::probe::sweep::Contact;
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use crate::touches::Origin;
-use nalgebra::{Matrix3, SMatrix, SymmetricEigen};
+use nalgebra::{Matrix2, SMatrix, SymmetricEigen};
 use palpate_shared::Touch;
 use rand_distr::{Distribution, Exp1};
 use rayon::prelude::*;
 
 /// Simulated approaches to each object.
 const APPROACHES: u64 = 20_000;
-/// Gain of log-likelihood from which fingers bend and objects give way: a fit to touches without either finds a little of
-/// them by chance.
+/// Gain of log-likelihood from which fingers bend: a fit to touches of rigid ones finds a little of it by chance.
 const CERTAIN: f64 = 4.0;
-/// Gain from which they may do so: the probe's intervals allow for it.
+/// Gain from which they may bend: the probe's intervals allow for it.
 const POSSIBLE: f64 = 1.0;
 
-/// Approaches to an object, and what would be touched if nothing gave way.
+/// Approaches to an object, and what rigid fingers would touch.
 pub(super) struct Samples<'a> {
     name: &'a str,
     probe: Probe,
@@ -45,9 +44,8 @@ pub(super) struct Samples<'a> {
 struct Sample {
     approach: Approach,
     contacts: [Option<Contact>; FINGERS],
-    /// Exponential numbers of mean 1: by how much each finger bends, and the object gives way at its contact.
+    /// Exponential numbers of mean 1: by how much each finger bends.
     bends: [f64; FINGERS],
-    gives: [f64; FINGERS],
 }
 
 impl<'a> Samples<'a> {
@@ -64,14 +62,13 @@ impl<'a> Samples<'a> {
                 approach,
                 contacts: approach.fingers(probe.spacing).map(contact),
                 bends: std::array::from_fn(|_| Exp1.sample(&mut random)),
-                gives: std::array::from_fn(|_| Exp1.sample(&mut random)),
             }
         };
         let approaches = (0..APPROACHES.min(settings.approaches)).into_par_iter().map(one).collect();
         Self { name, probe, scenes, approaches }
     }
 
-    /// The touches of fingers that bend and objects that give way like that.
+    /// The touches of fingers that bend like that.
     pub(super) fn touches(&self, real: &Noise) -> Vec<Touch> {
         let one = |(index, sample): (usize, &Sample)| {
             let scene = &self.scenes[index % self.scenes.len()];
@@ -81,17 +78,17 @@ impl<'a> Samples<'a> {
                 let contact = sample.contacts[finger].as_ref()?;
                 real.grazing.distance(cast, contact, sample.bends[finger], scene, &self.probe)
             });
-            real.given(&sample.approach.touch(distances, &self.probe), sample.gives)
+            sample.approach.touch(distances, &self.probe)
         };
         self.approaches.par_iter().enumerate().map(one).collect()
     }
 }
 
-/// Fingers that bend and objects that give way; by default neither.
+/// Fingers that bend; by default rigid ones.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Layer {
     pub(super) real: Noise,
-    /// The ends of the intervals; none where nothing bends or gives way.
+    /// The ends of the intervals; none where nothing bends.
     pub(super) ends: Option<[Noise; 2]>,
     /// The probe that explains the recordings best with them; none if nothing was searched.
     pub(super) candidate: Option<Candidate>,
@@ -102,11 +99,13 @@ pub(super) struct Layer {
 /// A search for the best probe near another one.
 type Climb = fn(search::Likelihood<'_>, &Candidate) -> Best;
 
-/// Angle, bend and give as numbers of about the same scale.
-type Numbers = [f64; 3];
+/// Angle and bend as numbers of about the same scale.
+type Numbers = [f64; LAYER];
+/// How many numbers a layer has.
+const LAYER: usize = 2;
 
-/// Numbers from which the search starts: 20°, 4 ms and 1 ms.
-const START: Numbers = [2.0, 2.0, 1.0];
+/// Numbers from which the search starts: 20° and 4 ms.
+const START: Numbers = [2.0, 2.0];
 /// The first and the last step of the search.
 const STEPS: [f64; 2] = [1.0, 0.2];
 /// Factor of what a layer adds to the intervals of the probe's numbers: slopes and curvatures come from simulated touches,
@@ -115,9 +114,9 @@ const WIDER: f64 = 1.5;
 /// Distance to either side over which curvatures are measured.
 const CURVATURE: f64 = 0.5;
 
-fn real_of([angle, bend, give]: Numbers) -> Noise {
+fn real_of([angle, bend]: Numbers) -> Noise {
     let grazing = Grazing { angle: 10.0 * angle.clamp(0.0, 8.0), bend: 1e3 * bend.clamp(-4.0, 8.0).exp2() };
-    Noise { grazing, give: 1e3 * give.max(0.0).powi(2), ..Noise::default() }
+    Noise { grazing, ..Noise::default() }
 }
 
 /// Recordings and approaches to their objects.
@@ -163,7 +162,7 @@ impl Layers<'_> {
                 for way in [step, -step] {
                     let mut there = numbers;
                     there[index] += way;
-                    if there[0] < 0.0 || there[2] < 0.0 || there[1] < -4.0 {
+                    if there[0] < 0.0 || there[1] < -4.0 {
                         continue;
                     }
                     let found = self.explained(there, &best.candidate, slopes::again)?;
@@ -190,30 +189,27 @@ impl Layers<'_> {
             self.explained(there, &best.candidate, search::near)
         };
         let center = at(&[])?.log_likelihood;
-        let mut curvatures = Matrix3::identity();
-        let mut up = [0.0; 3];
-        let mut slopes = SMatrix::<f64, NUMBERS, 3>::zeros();
-        for index in 0..3 {
+        let mut curvatures = Matrix2::identity();
+        let mut up = [0.0; LAYER];
+        let mut slopes = SMatrix::<f64, NUMBERS, LAYER>::zeros();
+        for index in 0..LAYER {
             let [above, below] = [at(&[(index, 1.0)])?, at(&[(index, -1.0)])?];
             up[index] = above.log_likelihood;
-            // A give of less than nothing is none.
             curvatures[(index, index)] = 2.0 * center - up[index] - below.log_likelihood;
             let [above, below] = [above, below].map(|best| best.candidate.numbers());
             slopes
                 .set_column(index, &SMatrix::from_fn(|number, _| (above[number] - below[number]) / (2.0 * CURVATURE)));
         }
-        for (one, other) in [(0, 1), (0, 2), (1, 2)] {
-            let both = up[one] + up[other] - at(&[(one, 1.0), (other, 1.0)])?.log_likelihood - center;
-            (curvatures[(one, other)], curvatures[(other, one)]) = (both, both);
-        }
+        let both = up[0] + up[1] - at(&[(0, 1.0), (1, 1.0)])?.log_likelihood - center;
+        (curvatures[(0, 1)], curvatures[(1, 0)]) = (both, both);
         let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(curvatures);
         let spread = eigenvectors
-            * Matrix3::from_diagonal(&eigenvalues.map(|curved| CURVATURE.powi(2) / curved.max(0.05)))
+            * Matrix2::from_diagonal(&eigenvalues.map(|curved| CURVATURE.powi(2) / curved.max(0.05)))
             * eigenvectors.transpose();
         let adds = WIDER.powi(2) * slopes * spread * slopes.transpose();
         let half = |variance: f64| (search::QUANTILE * variance.max(0.0)).sqrt();
         Ok((
-            [0, 1, 2].map(|index| half(spread[(index, index)])),
+            [0, 1].map(|index| half(spread[(index, index)])),
             std::array::from_fn(|number| half(adds[(number, number)])),
         ))
     }
@@ -224,8 +220,7 @@ pub(super) fn samples<'a>(objects: &[(&'a str, &'a [Scene])], settings: &Setting
     objects.iter().map(|(name, scenes)| Samples::new(name, scenes, settings)).collect()
 }
 
-/// Finds fingers that bend and objects that give way, if the recordings show them. `samples` are of the recordings' objects,
-/// in their order.
+/// Finds fingers that bend, if the recordings show them. `samples` are of the recordings' objects, in their order.
 pub(super) fn layer(
     recordings: &[Recording<'_>],
     samples: Vec<Samples<'_>>,

@@ -1,5 +1,5 @@
 //! Fit of a probe to recorded touches: its speed, its fingers' offsets, its noise, what it misses, its timer; fingers that
-//! bend aside at flat angles, and objects that give way.
+//! bend aside at flat angles.
 //!
 //! The recorded touches are of objects whose meshes are known. Each object is touched in the simulator once, many
 //! times, with the probe as it should be; a candidate probe's distortion is then applied to the simulated touches'
@@ -245,8 +245,7 @@ fn scenes(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> R
     capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)
 }
 
-/// Each object, touched by the probe as it should be whose hand goes on past it, but for fingers that bend and objects that
-/// give way.
+/// Each object, touched by the probe as it should be whose hand goes on past it, but for fingers that bend.
 struct Simulated {
     touches: Vec<ObjectTouches>,
     scenes: Vec<Vec<Scene>>,

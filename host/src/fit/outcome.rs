@@ -58,9 +58,6 @@ pub struct Fit {
     pub stroke: Option<Estimate>,
     /// Fingers that bend aside at flat angles; none where the recordings do not show it.
     pub grazing: Option<GrazingEstimate>,
-    /// By how much an object that gives way makes later contacts late, in the mean; none where the recordings do not show
-    /// it.
-    pub give: Option<Estimate>,
     /// The timer's resolution; none if it is finer than 0.02 ms, or there are too few times to tell.
     pub timer: Option<f64>,
     /// Recorded touches and approaches.
@@ -124,7 +121,6 @@ pub(super) fn outcome(
             angle: layered(&|real| real.grazing.angle),
             bend: layered(&|real| real.grazing.bend / 1e3),
         }),
-        give: (layer.real.give > 0.0).then_some(layered(&|real| real.give / 1e3)),
         timer: resolution,
         recorded: evidence.recordings.iter().map(|own| own.touches.len()).sum(),
         contacts: super::counts(evidence),
@@ -145,7 +141,6 @@ impl Fit {
             missed: self.missed.map_or([0.0; FINGERS], |missed| missed.map(|share| share.value)),
             bent: [0.0, middle, third],
             speed: self.speed_factor.value,
-            give: self.give.map_or(0.0, |give| 1e3 * give.value),
             grazing: self.grazing.map_or_else(Grazing::default, |GrazingEstimate { angle, bend }| Grazing {
                 angle: angle.value,
                 bend: 1e3 * bend.value,
@@ -210,10 +205,6 @@ impl Fit {
         }
         // Lengths, as offsets are.
         let length = speed / 1e3;
-        if let Some(give) = &self.give {
-            let unit = if self.unit == Length::Millimeter { " mm" } else { "" };
-            _ = writeln!(text, "give = {:.5}  # {}{unit}", give.value * length, between(give, length, 4));
-        }
         if let Some(GrazingEstimate { angle, bend }) = &self.grazing {
             _ = writeln!(
                 text,

@@ -66,7 +66,7 @@ pub(super) fn in_poses(
                 true => approach.distances(scene, probe),
                 false => layer.grazing.distances(&approach, scene, probe, &mut random),
             };
-            let touch = layer.given_way(&approach.touch(distances, probe), &mut random);
+            let touch = approach.touch(distances, probe);
             let times = touch.times().map(|time| time.micros().map_or(0.0, |micros| micros as f32 / 1e3));
             Simulated { touched: Observed::of(&touch).fingers, times, gap: 0.0 }
         });

@@ -121,9 +121,6 @@ fn table(found: &Fit) -> String {
         let unit = if found.unit == Length::Tenth { "" } else { " mm" };
         line("stroke", format!("{:.3}{unit}", stroke.value), between(stroke, 1.0, 3) + unit);
     }
-    if let Some(give) = &found.give {
-        line("object gives way", format!("{:.2} ms", give.value), between(give, 1.0, 2) + " ms");
-    }
     if let Some(grazing) = &found.grazing {
         let GrazingEstimate { angle, bend } = grazing;
         line("fingers bend beyond", format!("{:.0}°", angle.value), between(angle, 1.0, 0) + "°");

@@ -20,7 +20,6 @@
 //! speed_bias = "1%"               # off per robot
 //! pose_noise = "2deg"
 //! pose_bias = "1deg"
-//! give = 0.2                      # how far the object gives way at a contact, in the mean
 //! grazing = { angle = "30deg", bend = 0.5 } # beyond this angle, fingers bend aside by bend · tan(angle − this)
 //! ```
 //!
@@ -85,7 +84,6 @@ struct Real {
     pose_noise: Option<f64>,
     #[serde(deserialize_with = "angle")]
     pose_bias: Option<f64>,
-    give: f64,
     grazing: Option<Aside>,
 }
 
@@ -148,7 +146,6 @@ impl ProbeFile {
             pose: real.pose_noise.unwrap_or_default(),
             pose_bias: real.pose_bias.unwrap_or_default(),
             // Lengths become the times that the probe takes for them.
-            give: real.give / speed * 1e6,
             grazing: real.grazing.map_or_else(Grazing::default, |Aside { angle, bend }| Grazing {
                 angle: angle.unwrap_or_default(),
                 bend: bend / speed * 1e6,
@@ -230,7 +227,7 @@ mod tests {
         let text = format!(
             "unit = \"mm\"\n{MEASURES}tilt = 0\ntimer = \"1ms\"\n[real]\nspeed_factor = 0.98\noffsets = [0, 0.3, -0.1]\n\
              noise = \"0..5ms\"\ndebounce = \"2ms\"\nmissed = \"2%\"\nspeed_error = \"5%\"\nspeed_bias = \"1%\"\n\
-             pose_noise = \"2deg\"\npose_bias = \"1deg\"\ngive = 0.2\ngrazing = {{ angle = \"30deg\", bend = 0.5 }}\n"
+             pose_noise = \"2deg\"\npose_bias = \"1deg\"\ngrazing = {{ angle = \"30deg\", bend = 0.5 }}\n"
         );
         let file = parse(&text).unwrap();
         assert_eq!((file.unit, file.probe.tilt), (Length::Millimeter, 0.0));
@@ -245,7 +242,6 @@ mod tests {
             speed_bias: 0.01,
             pose: 2.0,
             pose_bias: 1.0,
-            give: 2_000.0,
             grazing: Grazing { angle: 30.0, bend: 5_000.0 },
         };
         assert_eq!(file.real, real);

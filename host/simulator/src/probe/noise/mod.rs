@@ -32,7 +32,7 @@ use palpate_shared::format::{PromisedNoise, TrainedNoise};
 use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
-use rand_distr::{Distribution, Exp1, StandardNormal};
+use rand_distr::{Distribution, StandardNormal};
 use std::fmt;
 use std::str::FromStr;
 
@@ -63,17 +63,9 @@ pub struct Noise {
     pub pose: f64,
     /// The same for a robot: every pose of its touches is turned alike.
     pub pose_bias: f64,
-    /// An object that gives way: after each contact of an approach, the later ones are later by an exponential time of this
-    /// mean.
-    #[serde(skip_serializing_if = "is_zero")]
-    pub give: f64,
     /// Fingers that bend aside at flat angles. Only a capture adds it: a data set does not hold the angles of contacts.
     #[serde(skip_serializing_if = "Grazing::is_none")]
     pub grazing: Grazing,
-}
-
-fn is_zero(number: &f64) -> bool {
-    *number == 0.0
 }
 
 impl Default for Noise {
@@ -89,7 +81,6 @@ impl Default for Noise {
             speed_bias: 0.0,
             pose: 0.0,
             pose_bias: 0.0,
-            give: 0.0,
             grazing: Grazing::default(),
         }
     }
@@ -169,7 +160,6 @@ impl fmt::Display for Noise {
         say(self.speed_bias > 0.0, format!("speed off by up to {} % per robot", percent(self.speed_bias)));
         say(self.pose > 0.0, format!("a pose turned by {}° per touch", self.pose));
         say(self.pose_bias > 0.0, format!("a pose turned by {}° per robot", self.pose_bias));
-        say(self.give > 0.0, format!("later contacts late by {} ms, as the object gives way", ms(self.give)));
         let Grazing { angle, bend } = self.grazing;
         say(bend > 0.0, format!("fingers that bend aside by {} ms beyond {angle}°", ms(bend)));
         f.write_str(&if parts.is_empty() { "no noise".into() } else { parts.join(", ") })
@@ -262,7 +252,7 @@ impl Noise {
             return Err(Error::setting("noise", value, "a duration of at least 0"));
         }
         for (name, value) in
-            [("timer", self.timer), ("debounce", self.debounce), ("give", self.give), ("grazing", self.grazing.bend)]
+            [("timer", self.timer), ("debounce", self.debounce), ("grazing", self.grazing.bend)]
         {
             if !(value >= 0.0 && value.is_finite()) {
                 return Err(Error::setting(name, value, "a duration of at least 0"));
@@ -315,29 +305,7 @@ impl Noise {
     pub fn add_to(&self, touch: &Touch, random: &mut ChaCha8Rng) -> Touch {
         let normal = std::array::from_fn(|_| StandardNormal.sample(random));
         let [own, robot] = [Draw::new(random), Draw::new(random)];
-        self.one(&self.given_way(touch, random), normal, &own, &robot)
-    }
-
-    /// The touch of an object that gives way. Random numbers are drawn only if it does.
-    pub fn given_way(&self, touch: &Touch, random: &mut ChaCha8Rng) -> Touch {
-        if self.give == 0.0 {
-            return *touch;
-        }
-        self.given(touch, std::array::from_fn(|_| Exp1.sample(random)))
-    }
-
-    /// The same with these exponential numbers of mean 1: by how much the object gives way at each contact.
-    pub fn given(&self, touch: &Touch, gives: [f64; FINGERS]) -> Touch {
-        if self.give == 0.0 {
-            return *touch;
-        }
-        let times = touch.times().map(|time| time.micros());
-        let earlier =
-            |finger: usize, other: usize| times[other].is_some() && (times[other], other) < (times[finger], finger);
-        timed(touch, |finger, time| {
-            let given = (0..FINGERS).filter(|other| earlier(finger, *other)).map(|other| gives[other]);
-            time + self.give * given.sum::<f64>()
-        })
+        self.one(touch, normal, &own, &robot)
     }
 
     /// This noise and `more` added after it, as far as one noise can say it: variances and shares of missed contacts add
@@ -361,7 +329,6 @@ impl Noise {
             speed_bias: (self.speed_bias + more.speed_bias).min(0.9),
             pose: self.pose.hypot(more.pose),
             pose_bias: self.pose_bias.hypot(more.pose_bias),
-            give: self.give + more.give,
             // Added by a capture, and so by no second one.
             grazing: if self.grazing.is_none() { more.grazing } else { self.grazing },
         }
@@ -401,7 +368,7 @@ impl Noise {
         let mut sensor = random::generator(seed, Purpose::Sensor, name, index);
         let own = Draw::new(&mut sensor);
         let robot = self.has_bias().then(|| Draw::new(&mut random::generator(seed, Purpose::Robot, "", robot())));
-        self.one(&self.given_way(touch, &mut sensor), normal, &own, &robot.unwrap_or_default())
+        self.one(touch, normal, &own, &robot.unwrap_or_default())
     }
 
     fn one(&self, touch: &Touch, normal: [f64; FINGERS], own: &Draw, robot: &Draw) -> Touch {

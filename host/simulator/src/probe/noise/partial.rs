@@ -9,7 +9,7 @@ use std::str::FromStr;
 /// Some settings of [`Noise`], as one text of `key=value` with commas between them; the others are left open.
 ///
 /// The keys are those of `[real]` in a probe file: `noise`, `timer`, `debounce`, `missed`, `bent`, `speed_factor`,
-/// `speed_error`, `speed_bias`, `pose_noise`, `pose_bias` and `give`, which is a time here. Fingers that bend aside have no
+/// `speed_error`, `speed_bias`, `pose_noise` and `pose_bias`. Fingers that bend aside have no
 /// key: only a capture adds that, from a probe file. `missed` and `bent` also take a value for each finger, such as
 /// `bent=3ms/0ms/-1ms`; `bent` says how much earlier a finger touches. `none`, which comes first, sets everything to
 /// nothing. [`Display`](fmt::Display) writes a text that reads as the same.
@@ -45,8 +45,6 @@ pub struct PartialNoise {
     pub pose: Option<f64>,
     /// See [`Noise::pose_bias`].
     pub pose_bias: Option<f64>,
-    /// See [`Noise::give`].
-    pub give: Option<f64>,
 }
 
 /// A text that is no noise: the key, its value, and what to write instead.
@@ -62,7 +60,7 @@ pub struct BadNoise {
 }
 
 /// All keys, in the order in which they are written.
-const KEYS: [&str; 11] = [
+const KEYS: [&str; 10] = [
     "noise",
     "timer",
     "debounce",
@@ -73,7 +71,6 @@ const KEYS: [&str; 11] = [
     "speed_bias",
     "pose_noise",
     "pose_bias",
-    "give",
 ];
 
 impl From<Noise> for PartialNoise {
@@ -89,7 +86,6 @@ impl From<Noise> for PartialNoise {
             speed_bias: Some(noise.speed_bias),
             pose: Some(noise.pose),
             pose_bias: Some(noise.pose_bias),
-            give: Some(noise.give),
         }
     }
 }
@@ -109,7 +105,6 @@ impl PartialNoise {
             speed_bias: self.speed_bias.unwrap_or(base.speed_bias),
             pose: self.pose.unwrap_or(base.pose),
             pose_bias: self.pose_bias.unwrap_or(base.pose_bias),
-            give: self.give.unwrap_or(base.give),
             grazing: if self.is_whole() { super::Grazing::default() } else { base.grazing },
         }
     }
@@ -132,7 +127,6 @@ impl PartialNoise {
             "speed_bias" => self.speed_bias.is_some(),
             "pose_noise" => self.pose.is_some(),
             "pose_bias" => self.pose_bias.is_some(),
-            "give" => self.give.is_some(),
             _ => false,
         }
     }
@@ -160,8 +154,7 @@ impl PartialNoise {
             "speed_error" => self.speed_error = Some(quantity::share(value).map_err(bad)?),
             "speed_bias" => self.speed_bias = Some(quantity::share(value).map_err(bad)?),
             "pose_noise" => self.pose = Some(quantity::angle(value).map_err(bad)?),
-            "pose_bias" => self.pose_bias = Some(quantity::angle(value).map_err(bad)?),
-            _ => self.give = Some(quantity::duration(value).map_err(bad)?),
+            _ => self.pose_bias = Some(quantity::angle(value).map_err(bad)?),
         }
         // Ranges are those of any noise.
         match self.over(Noise::default()).check() {
@@ -261,8 +254,7 @@ fn value_of(noise: &Noise, key: &str) -> String {
         "speed_error" => share(noise.speed_error),
         "speed_bias" => share(noise.speed_bias),
         "pose_noise" => format!("{}deg", noise.pose),
-        "pose_bias" => format!("{}deg", noise.pose_bias),
-        _ => duration(noise.give),
+        _ => format!("{}deg", noise.pose_bias),
     }
 }
 
@@ -308,7 +300,6 @@ mod tests {
             ("speed-bias=0.1", PartialNoise { speed_bias: Some(0.1), ..PartialNoise::default() }),
             ("pose-noise=5deg", PartialNoise { pose: Some(5.0), ..PartialNoise::default() }),
             (" pose_bias = 1.5° ", PartialNoise { pose_bias: Some(1.5), ..PartialNoise::default() }),
-            ("give=4ms", PartialNoise { give: Some(4_000.0), ..PartialNoise::default() }),
         ] {
             assert_eq!(read(text), expected, "{text}");
         }
@@ -343,7 +334,6 @@ mod tests {
                 speed_bias: 0.9 * number(),
                 pose: 180.0 * number(),
                 pose_bias: number(),
-                give: 1e4 * number(),
                 grazing: super::super::Grazing::default(),
             };
             let given = PartialNoise::from(noise);

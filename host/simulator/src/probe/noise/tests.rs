@@ -190,7 +190,6 @@ fn noise_that_cannot_be_is_refused_by_the_name_of_its_setting() {
         (Noise { speed_bias: -0.1, ..base }, "speed_bias"),
         (Noise { pose: 181.0, ..base }, "pose_noise"),
         (Noise { pose_bias: f64::NAN, ..base }, "pose_bias"),
-        (Noise { give: -1.0, ..base }, "give"),
         (Noise { grazing: Grazing { angle: 20.0, bend: f64::NAN }, ..base }, "grazing"),
         (Noise { grazing: Grazing { angle: 90.0, bend: 1.0 }, ..base }, "grazing"),
     ] {
@@ -236,25 +235,6 @@ fn levels_and_ranges_are_read() {
     for text in ["", "5", "..", "0..", "..5ms", "5ms..1ms", "0..10", "-1ms..2ms", "x..2ms"] {
         assert!(text.parse::<Deviation>().is_err(), "{text}");
     }
-}
-
-#[test]
-fn an_object_that_gives_way_is_touched_later_by_every_finger_but_the_first() {
-    let noise = Noise { give: 2_000.0, ..Noise::default() };
-    let clean = vec![Touch::from_micros([30_000, 0, 60_000]); 20_000];
-    let touches = noise.add("fork", &clean, 1);
-    let mean = |finger: usize| {
-        let times = touches.iter().map(|touch| f64::from(touch.times()[finger].micros().unwrap()));
-        times.sum::<f64>() / touches.len() as f64
-    };
-    assert_eq!(mean(1), 0.0);
-    // Exponential times: the standard error of a mean is 2 ms / √20,000.
-    assert!((mean(0) - 32_000.0).abs() < 60.0, "{}", mean(0));
-    assert!((mean(2) - 64_000.0).abs() < 85.0, "{}", mean(2));
-    // A contact that is missing moves nothing.
-    let pair =
-        noise.add("fork", &[Touch::new([ContactTime::MISSING, ContactTime::from_micros(0), ContactTime::MISSING])], 1);
-    assert_eq!(pair[0].times()[1].micros(), Some(0));
 }
 
 /// A square of 40 units whose normal is tilted by this angle from the motion along z.
