@@ -101,7 +101,7 @@ type Climb = fn(search::Likelihood<'_>, &Candidate) -> Best;
 
 /// Angle and bend as numbers of about the same scale.
 type Numbers = [f64; LAYER];
-/// How many numbers a layer has.
+/// Count of these numbers.
 const LAYER: usize = 2;
 
 /// Numbers from which the search starts: 20° and 4 ms.

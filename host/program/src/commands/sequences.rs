@@ -168,7 +168,11 @@ fn gain(gain: Option<Gain>, with: &str, without: &str) -> String {
     };
     let rows = |rows: Option<f64>| rows.map_or_else(|| "no threshold".into(), |rows| format!("{rows:.1} rows"));
     let what = if kept { with } else { without };
-    format!("{what} ({} with, {} without, on sequences that the promise does not rest on)", rows(rows_with), rows(rows_without))
+    format!(
+        "{what} ({} with, {} without, on sequences that the promise does not rest on)",
+        rows(rows_with),
+        rows(rows_without)
+    )
 }
 
 fn weights_text(weights: &[f64]) -> String {

@@ -251,9 +251,7 @@ impl Noise {
             let value = if least == largest { least.to_string() } else { format!("{least}..{largest}") };
             return Err(Error::setting("noise", value, "a duration of at least 0"));
         }
-        for (name, value) in
-            [("timer", self.timer), ("debounce", self.debounce), ("grazing", self.grazing.bend)]
-        {
+        for (name, value) in [("timer", self.timer), ("debounce", self.debounce), ("grazing", self.grazing.bend)] {
             if !(value >= 0.0 && value.is_finite()) {
                 return Err(Error::setting(name, value, "a duration of at least 0"));
             }
