@@ -4,7 +4,8 @@
 #   docs/measurements/tables/coverage.sh MESHES PROBE FITS DIR
 #
 # PROBE is a probe file with what the probe adds under [real], such as one that was fitted to a robot; it makes 75 approaches
-# to each of four objects, FITS times, with the seeds from 1001 ($SEED + 1) on. DIR is filled. The program is $PALPATE, or target/release/palpate.
+# to each of four objects, FITS times, with the seeds from 1001 ($SEED + 1) on. DIR is filled. The program is $PALPATE, or
+# target/release/palpate.
 set -eu
 meshes=$1
 probe=$2

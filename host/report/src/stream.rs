@@ -166,7 +166,7 @@ fn posteriors(evaluated: &Evaluated, grown: &Grown, command: &str) -> Result<Fig
     let name = |class: usize| evaluated.names.get(class).map_or("", String::as_str);
     let ended = match grown.ended {
         Some((row, Some(class))) => format!("After row {row} it is recognized as {}.", name(class)),
-        Some((row, None)) => format!("After row {row} it is taken for something that the model does not know."),
+        Some((row, None)) => format!("After row {row} it is called unknown."),
         None => "It ends without a verdict.".into(),
     };
     Ok(Figure {

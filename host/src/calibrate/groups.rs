@@ -71,14 +71,14 @@ fn losses(sequences: &[Grouped<'_>], odds: &Odds, by: By, rate: f64) -> Vec<Loss
     losses
 }
 
-/// The fraction to bet on so many groups, by the losses of others: with it the most errors of their size are allowed.
+/// The fraction to bet, for a number of groups, from the losses of others: it tolerates the most errors of their size.
 fn fraction(losses: &[f64], groups: f64, rate: f64, confidence: f64) -> f64 {
     let enough = -(1.0 - confidence).ln() / groups.max(1.0);
     let most = 1.0 / (1.0 - rate);
     // With less than that no number of groups without an error would do.
     let least = (enough.exp_m1() / rate).min(most);
     if losses.iter().any(|loss| *loss > -0.999 * rate) {
-        // With their spread: the fraction by which the least is lost to reach the level in so many groups.
+        // With their variance: the fraction with which this number of groups reaches the level at the smallest advantage.
         let count = losses.len() as f64;
         let mean = losses.iter().sum::<f64>() / count;
         let variance = losses.iter().map(|loss| (loss - mean).powi(2)).sum::<f64>() / count;

@@ -2,40 +2,19 @@
 
 use super::Rows;
 use super::begin::Begin;
-use super::calibrate::{Parts, Settings, grouped_once};
+use super::parts::Parts;
+use super::settings::Settings;
 use crate::calibrate::odds_of;
 use crate::compile::{self, Restated, restate};
 use crate::error::Result;
 use crate::strangers::{self, Found, Supply};
-use palpate_onboard::Model;
 use palpate_shared::format::Tag;
-use palpate_trees::rows::{RowSequence, Sequences};
-
-/// A test for what the model does not know.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Strangers {
-    /// Its settings.
-    pub settings: strangers::Settings,
-    /// The margins of rows of others, a list for each sequence of them, in the model's units; there may be none.
-    pub background: Vec<Vec<i32>>,
-}
-
-impl Strangers {
-    /// A test with a background of these sequences, whose classes do not matter.
-    ///
-    /// # Errors
-    /// As [`Rows::new`].
-    pub fn new(settings: strangers::Settings, model: &Model<'_>, others: Option<&Sequences>) -> Result<Self> {
-        let Some(others) = others else { return Ok(Self { settings, background: Vec::new() }) };
-        let rows = Rows::new(model, others)?;
-        let of = |sequence: &RowSequence| sequence.rows.clone().flat_map(|row| rows.row(row)).copied().collect();
-        Ok(Self { settings, background: others.sequences.iter().map(of).collect() })
-    }
-}
+use palpate_trees::rows::RowSequence;
 
 /// The share of the sequences that are not learned from on which the false alarm rate is tested; the promise rests on the
 /// others.
 pub(super) const TESTED: f64 = 3.0 / 7.0;
+
 /// Adds the test to a model, if one is wanted: its bytes, the parts of the sequences without those that the test used, where
 /// the thresholds begin, and what was found. The test is made under the thresholds at which the walk begins: under looser
 /// ones no sequence is longer, so that there are no more false alarms.
@@ -55,7 +34,7 @@ pub(super) fn test<'s>(
     let begun = compile::open(&begun)?;
     let (alarms, parts) = parts.divided(TESTED);
     // Of groups one sequence each: these are independent.
-    let alarms = grouped_once(&alarms);
+    let alarms = Parts::once(&alarms);
     let evidence = |margins: Vec<i32>| {
         let mut margins = margins;
         margins.chunks_exact_mut(begun.object_count()).for_each(|row| begun.make_evidence(row));

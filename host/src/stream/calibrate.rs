@@ -1,64 +1,27 @@
 //! A model's shape, thresholds and promise, from sequences of rows.
 
 use super::begin::Begin;
+use super::parts::Parts;
+use super::settings::Settings;
 use super::shape::{self, Fitted, Gain, STRICTEST};
 use super::{Rows, check, follow};
 use crate::calibrate::{
-    Chosen, Grouped, Odds, OfObject, Per, Sequence, Stop, Tally, Terms, Until, Worse, choose_groups,
-    choose_independent, margin_of, needed, worse,
+    Chosen, Grouped, Odds, OfObject, Per, Sequence, Tally, Terms, Until, Worse, choose_groups, choose_independent,
+    margin_of, worse,
 };
 use crate::compile::{self, Restated, restate};
-use crate::error::{CalibrateProblem, Error, Result};
+use crate::error::{CalibrateProblem, Result};
 use crate::progress::Progress;
-use crate::random::{self, Purpose};
 #[cfg(feature = "train")]
 use crate::strangers;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{OddsByObject, Promise, PromisedNoise, Tag};
 use palpate_trees::rows::{RowSequence, Sequences};
-use rand::seq::SliceRandom;
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-/// One sequence, or group, in this many is learned from, and not tested on.
-const LEARNED: usize = 4;
 /// Thresholds by name are tested on this share of independent sequences: [`choose_independent`] learns them on the others.
 const SHARE_OF_NAMES: f64 = 2.0 / 3.0;
-
-/// Settings of a promise.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
-    /// The error rate: wrong names of those that are given.
-    pub rate: f64,
-    /// Of what the rate is promised.
-    pub per: Per,
-    /// The probability that the rate is kept.
-    pub confidence: f64,
-    /// The most sequences that are used.
-    pub sequences: usize,
-    /// Rows after which a sequence ends undecided; `None` takes the model's own limit.
-    pub max_rows: Option<u32>,
-    /// A test for what the model does not know, if one is wanted.
-    #[cfg(feature = "train")]
-    pub strangers: Option<super::Strangers>,
-    /// Seed of which sequences are learned from.
-    pub seed: u64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            rate: 0.01,
-            per: Per::Average,
-            confidence: 0.95,
-            sequences: 1_000_000,
-            max_rows: None,
-            #[cfg(feature = "train")]
-            strangers: None,
-            seed: 1,
-        }
-    }
-}
 
 /// A calibrated model, and what its calibration found.
 #[derive(Clone, Debug, Serialize)]
@@ -150,7 +113,7 @@ pub fn calibrate_margins(
     settings: &Settings,
 ) -> Result<Calibrated> {
     check(model)?;
-    check_settings(settings)?;
+    settings.check()?;
     let max_rows = settings.max_rows.unwrap_or(Stopping::from_model(model).max_touches());
     compile::stopping(settings.rate, max_rows)?;
     let names = names(model);
@@ -196,123 +159,6 @@ fn grouped<'s>((followed, of): (&'s Vec<Sequence>, &Vec<&RowSequence>)) -> Vec<G
     followed.iter().zip(of).map(group).collect()
 }
 
-fn check_settings(settings: &Settings) -> Result<()> {
-    let Settings { rate, confidence, sequences, .. } = *settings;
-    if !(1e-9..0.5).contains(&rate) {
-        return Err(Error::setting("error_rate", rate, "a number of at least 1e-9 and below 0.5"));
-    }
-    if !((0.5..=0.999_999).contains(&confidence)) {
-        return Err(Error::setting("confidence", confidence, "a number from 0.5 to 0.999999"));
-    }
-    if sequences == 0 {
-        return Err(Error::setting("sequences", sequences, "at least 1"));
-    }
-    Ok(())
-}
-
-/// Sequences that are learned from, and those that are tested on: whole groups, in a random order.
-#[derive(Clone, Debug)]
-pub(super) struct Parts<'s> {
-    pub(super) learned: Vec<&'s RowSequence>,
-    pub(super) tested: Vec<&'s RowSequence>,
-    pub(super) has_groups: bool,
-    /// Groups, or sequences without groups, of both parts.
-    units: usize,
-}
-
-impl<'s> Parts<'s> {
-    fn new(sequences: &'s [RowSequence], settings: &Settings) -> Result<Self> {
-        let mut all: Vec<&RowSequence> = sequences.iter().collect();
-        let mut random = random::generator(settings.seed, Purpose::Calibration, "sequences", 0);
-        all.shuffle(&mut random);
-        let has_groups = all.iter().any(|sequence| sequence.group.is_some());
-        let mut order: Vec<usize> = if has_groups {
-            let groups: BTreeSet<usize> = all.iter().filter_map(|sequence| sequence.group).collect();
-            let mut groups: Vec<usize> = groups.into_iter().collect();
-            groups.shuffle(&mut random);
-            groups
-        } else {
-            (0..all.len()).collect()
-        };
-        // Whole groups, whatever their size: as many as have so many sequences on average.
-        order.truncate((order.len() as u128 * settings.sequences as u128 / all.len().max(1) as u128) as usize);
-        if has_groups {
-            let taken: BTreeSet<usize> = order.iter().copied().collect();
-            all.retain(|sequence| sequence.group.is_some_and(|group| taken.contains(&group)));
-        } else {
-            all.truncate(order.len());
-        }
-        let units = order.len();
-        let least = needed(settings.rate, settings.confidence) as usize;
-        if units < least {
-            return Err(Self::too_few(units, has_groups, None, settings).into());
-        }
-        // As many as a promise takes are tested on, if there are no more.
-        let learned = (units / LEARNED).min(units - least);
-        let (learned, tested) = if has_groups {
-            let own: BTreeSet<usize> = order.into_iter().take(learned).collect();
-            all.into_iter().partition(|sequence| sequence.group.is_some_and(|group| own.contains(&group)))
-        } else {
-            let tested = all.split_off(learned);
-            (all, tested)
-        };
-        Ok(Self { learned, tested, has_groups, units })
-    }
-
-    /// Groups, or sequences without groups, that are tested on.
-    fn units_tested(&self) -> usize {
-        let groups: BTreeSet<usize> = self.tested.iter().filter_map(|sequence| sequence.group).collect();
-        if self.has_groups { groups.len() } else { self.tested.len() }
-    }
-
-    /// A share of what is tested, and the parts without it: whole groups.
-    #[cfg(feature = "train")]
-    pub(super) fn divided(self, share: f64) -> (Vec<&'s RowSequence>, Self) {
-        let mut units: Vec<Option<usize>> = Vec::new();
-        let mut seen = BTreeSet::new();
-        let groups = self.tested.iter().map(|sequence| sequence.group).filter(|group| seen.insert(*group));
-        units.extend(groups);
-        let count = |all: usize| (all as f64 * share) as usize;
-        let (taken, tested) = if self.has_groups {
-            let own: BTreeSet<Option<usize>> = units.iter().take(count(units.len())).copied().collect();
-            self.tested.into_iter().partition(|sequence| own.contains(&sequence.group))
-        } else {
-            let mut taken = self.tested;
-            let tested = taken.split_off(count(taken.len()));
-            (taken, tested)
-        };
-        (taken, Self { tested, ..self })
-    }
-
-    fn too_few(found: usize, groups: bool, object: Option<String>, settings: &Settings) -> CalibrateProblem {
-        let Settings { rate, confidence, .. } = *settings;
-        // The rate that as many could promise without an error, rounded up to two digits.
-        let possible = 1.0 - (1.0 - confidence).powf(1.0 / found.max(1) as f64);
-        let digit = 10.0_f64.powf(possible.log10().floor() - 1.0);
-        let possible = Some((possible / digit).ceil() * digit).filter(|rate| *rate < 0.5);
-        let needed = needed(rate, confidence);
-        CalibrateProblem::TooFewSequences { found: found as u64, needed, rate, possible, groups, object }
-    }
-
-    /// The problem that a walk ended with.
-    fn problem(&self, stop: Stop, names: &[String], settings: &Settings) -> CalibrateProblem {
-        let of = |position: usize| (settings.per != Per::Average).then(|| names.get(position).cloned()).flatten();
-        match stop {
-            Stop::TooFew { position, found } => {
-                Self::too_few(usize::try_from(found).unwrap_or(usize::MAX), self.has_groups, of(position), settings)
-            }
-            Stop::TooMany { position, tally: Tally { wrong, all } } => CalibrateProblem::NotKeptByRows {
-                object: of(position),
-                rate: settings.rate,
-                wrong,
-                given: all,
-                units: self.units as u64,
-                groups: self.has_groups,
-            },
-        }
-    }
-}
-
 /// The model with what a row adds and how much rows count together, and without what an earlier calibration stated.
 fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Result<Vec<u8>> {
     let unit = f64::from(model.unit());
@@ -349,13 +195,6 @@ fn begin(model: &Model<'_>, rows: &Rows<'_>, parts: &Parts<'_>, settings: &Setti
 
 fn terms(settings: &Settings) -> Terms {
     Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per }
-}
-
-/// The first sequence of each group; all of those without one.
-#[cfg(feature = "train")]
-pub(super) fn grouped_once<'s>(sequences: &[&'s RowSequence]) -> Vec<&'s RowSequence> {
-    let mut seen = BTreeSet::new();
-    sequences.iter().copied().filter(|sequence| sequence.group.is_none_or(|group| seen.insert(group))).collect()
 }
 
 fn finished(

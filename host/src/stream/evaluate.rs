@@ -50,7 +50,7 @@ pub struct Evaluated {
     pub wrong: f64,
     /// Of all sequences, the share that ended without a verdict.
     pub undecided: f64,
-    /// Of all sequences, the share that was taken for something that the model does not know.
+    /// Of all sequences, the share that was called unknown.
     pub unknown: f64,
     /// Rows used on average.
     pub mean_rows: f64,

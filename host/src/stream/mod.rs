@@ -29,17 +29,20 @@ mod evaluate;
 mod follow;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod parts;
+mod settings;
 mod shape;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 
-#[cfg(feature = "train")]
-pub use background::Strangers;
-pub use calibrate::{Calibrated, Settings, calibrate, calibrate_margins};
+pub use calibrate::{Calibrated, calibrate, calibrate_margins};
 pub use evaluate::{
     Comparison, Evaluated, Grown, Point, PromiseOfSequences, Switched, Wanted, evaluate, evaluate_margins,
 };
 pub use follow::follow;
+pub use settings::Settings;
+#[cfg(feature = "train")]
+pub use settings::Strangers;
 pub use shape::Gain;
 
 use crate::error::{Result, RowsProblem};

@@ -238,7 +238,7 @@ def run_export(ensemble, command, early):
     command = [*command, "--json", *(["--early-exit", ensemble.choosing] if early else [])]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
-        raise Refused(done.stderr.strip().splitlines()[0])
+        raise Refused(done.stderr.strip().splitlines()[-1])
     exported = json.loads(done.stdout)
     if early and not exported["early_exit"]["ends"]:
         raise Refused("early exit does not pay")

@@ -6,8 +6,9 @@ use super::progress::Bar;
 use super::real::RealArguments;
 use super::sequences::{self, Calibration, SequenceArguments};
 use super::strangers::StrangersArguments;
+use super::thresholds;
 use palpate::Result;
-use palpate::calibrate::{self, Calibrated, OfRecorded, Per, Settings, Worse};
+use palpate::calibrate::{self, Calibrated, OfRecorded, Per, Settings};
 use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, EvaluateProblem, Place};
@@ -205,29 +206,14 @@ fn text(calibrated: &Calibrated) -> String {
         calibrated.mean_approaches.unwrap_or(calibrated.mean_touches),
         calibrated.counted,
     );
-    let width = calibrated.margins.keys().map(|name| name.chars().count()).max().unwrap_or(0);
-    if calibrated.errors.is_empty() {
-        let margin = calibrated.margins.values().next().copied().unwrap_or(f64::NAN);
-        _ = writeln!(
-            text,
-            "Names are given {margin:.2} nats ahead of all others; uncalibrated it would be {:.2}.",
-            calibrated.uncalibrated_margin
-        );
-    } else {
-        _ = writeln!(text, "\n{:width$} {:>8} {:>8}", "", "wrong", "nats");
-        for (name, margin) in &calibrated.margins {
-            let error = calibrated.errors.get(name).map_or("–".into(), |&error| percent(error));
-            _ = writeln!(text, "{name:width$} {error:>8} {margin:>8.2}");
-        }
-        _ = writeln!(text, "Uncalibrated, names are given at {:.2} nats.", calibrated.uncalibrated_margin);
-    }
+    text += &thresholds::text(&calibrated.margins, &calibrated.errors, calibrated.uncalibrated_margin);
     _ = writeln!(text, "Temperature of the posteriors that are shown: {:.2}", calibrated.temperature);
     let hidden = calibrated
         .objects
         .values()
         .any(|of| 2 * of.given < calibrated.sequences as u64 / calibrated.objects.len() as u64);
     text + &calibrated.recorded.as_ref().map_or_else(String::new, |recorded| of_recorded(recorded, calibrated))
-        + &worse(&calibrated.worse(), calibrated.promised, calibrated.promise.per, hidden)
+        + &thresholds::worse(&calibrated.worse(), calibrated.promised, calibrated.promise.per, hidden)
 }
 
 /// Statements about a promise that was tested on recordings.
@@ -247,28 +233,6 @@ fn of_recorded(recorded: &OfRecorded, calibrated: &Calibrated) -> String {
         ),
         None => text,
     }
-}
-
-/// A warning of objects that a rate of other names hides; `hidden` if one has few names.
-pub(super) fn worse(worse: &[Worse], rate: f64, per: Per, hidden: bool) -> String {
-    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    let given = |of: &Worse| of.given.map(|share| format!("{} of those given to {}", percent(share), of.object));
-    let named = |of: &Worse| of.named.map(|share| format!("{} where {} is named", percent(share), of.object));
-    let shares: Vec<String> = worse.iter().flat_map(|of| [given(of), named(of)]).flatten().collect();
-    if shares.is_empty() {
-        return String::new();
-    }
-    let rate = super::percent(rate);
-    let what = match per {
-        Per::Average => "of all names, and not of each object's",
-        Per::Name => "of each name when it is given, and not of those given to each object",
-        Per::Object => "of the names given to each object, and not of each name",
-    };
-    let undecided = if hidden { " An object that mostly stays undecided has few names among all." } else { "" };
-    format!(
-        "warning: the {rate} % are {what}: {} are wrong.{undecided} Promise it of each with --per object or --per name.\n",
-        shares.join(", ")
-    )
 }
 
 fn per(name: &str) -> Result<Per, String> {

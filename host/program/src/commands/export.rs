@@ -25,9 +25,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 ENSEMBLE is what `palpate train` saved, or a model of another library: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx).
 
-Without a layout of its own (compact, complete, grid, wide, patterns, code), --layout says what it is chosen for: balanced, m4f or m0+ for the fastest of at most three times the smallest, speed, or size.
-
---emit thumb, thumb-m4f, c-code: the trees are code, the model has none (docs/guide/code.md).
+--layout: compact, complete, grid, wide, patterns or code; or a goal, which is balanced, speed, size, m4f or m0+ (the fastest of at most three times the smallest). With --emit thumb, thumb-m4f or c-code the trees are code: docs/guide/code.md.
 
 Examples:
   palpate export ensemble.json -o model.palpate

@@ -31,6 +31,7 @@ mod sequences;
 mod shell;
 mod strangers;
 mod teach;
+mod thresholds;
 mod train;
 mod trees;
 mod tune;

@@ -137,23 +137,9 @@ fn calibrated_text(path: &Path, calibrated: &Calibrated) -> String {
         gain(calibrated.weights, "less the more there are", "each as much as the first"),
         calibrated.weights_by_doubling.as_ref().map_or_else(String::new, |weights| weights_text(weights)),
     );
-    let width = calibrated.margins.keys().map(|name| name.chars().count()).max().unwrap_or(0);
-    if calibrated.errors.is_empty() {
-        let margin = calibrated.margins.values().next().copied().unwrap_or(f64::NAN);
-        _ = writeln!(
-            text,
-            "Names are given {margin:.2} nats ahead of all others; uncalibrated it would be {:.2}.",
-            calibrated.uncalibrated_margin
-        );
-    } else {
-        _ = writeln!(text, "\n{:width$} {:>8} {:>8}", "", "wrong", "nats");
-        for (name, margin) in &calibrated.margins {
-            let error = calibrated.errors.get(name).map_or("–".into(), |&error| percent(error));
-            _ = writeln!(text, "{name:width$} {error:>8} {margin:>8.2}");
-        }
-    }
+    text += &super::thresholds::text(&calibrated.margins, &calibrated.errors, calibrated.uncalibrated_margin);
     text += &calibrated.strangers.as_ref().map_or_else(String::new, |found| super::strangers::text(found) + "\n");
-    text += &super::calibrate::worse(
+    text += &super::thresholds::worse(
         &calibrated.worse(),
         calibrated.promised,
         calibrated.promise.per,
@@ -285,7 +271,7 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
     let mut recognized = evaluated.names.clone();
     recognized.push("no name".into());
     text + &shares_table(
-        "Taken for",
+        "Confusion matrix",
         &Confusion { touches: 0, touched: evaluated.names.clone(), recognized, counts: evaluated.confusion.clone() },
     )
 }

@@ -48,7 +48,7 @@ class Ends:
     undecided: float
     """Of all sequences, the share without a verdict."""
     unknown: float
-    """Of all sequences, the share taken for something that the model does not know."""
+    """Of all sequences, the share that was called unknown."""
     mean_rows: float
     """Rows used on average."""
     fixed_rows: float | None

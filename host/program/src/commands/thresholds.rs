@@ -1,0 +1,46 @@
+//! Thresholds of a calibration, as text.
+
+use palpate::calibrate::{Per, Worse};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// Where names are given, and uncalibrated would be: in nats ahead of all others; with the share of wrong ones of each case that
+/// the rate is promised for, if it is of cases.
+pub(super) fn text(margins: &BTreeMap<String, f64>, errors: &BTreeMap<String, f64>, uncalibrated: f64) -> String {
+    if errors.is_empty() {
+        let margin = margins.values().next().copied().unwrap_or(f64::NAN);
+        return format!(
+            "Names are given {margin:.2} nats ahead of all others; uncalibrated it would be {uncalibrated:.2}.\n"
+        );
+    }
+    let width = margins.keys().map(|name| name.chars().count()).max().unwrap_or(0);
+    let mut text = format!("\n{:width$} {:>8} {:>8}\n", "", "wrong", "nats");
+    for (name, margin) in margins {
+        let error = errors.get(name).map_or("–".into(), |error| format!("{:.2} %", 100.0 * error));
+        // Writing to a string cannot fail.
+        _ = writeln!(text, "{name:width$} {error:>8} {margin:>8.2}");
+    }
+    text + &format!("Uncalibrated, names are given at {uncalibrated:.2} nats.\n")
+}
+
+/// A warning of objects that a rate of other names hides; `hidden` if one has few names.
+pub(super) fn worse(worse: &[Worse], rate: f64, per: Per, hidden: bool) -> String {
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let given = |of: &Worse| of.given.map(|share| format!("{} of those given to {}", percent(share), of.object));
+    let named = |of: &Worse| of.named.map(|share| format!("{} where {} is named", percent(share), of.object));
+    let shares: Vec<String> = worse.iter().flat_map(|of| [given(of), named(of)]).flatten().collect();
+    if shares.is_empty() {
+        return String::new();
+    }
+    let rate = super::percent(rate);
+    let what = match per {
+        Per::Average => "of all names, and not of each object's",
+        Per::Name => "of each name when it is given, and not of those given to each object",
+        Per::Object => "of the names given to each object, and not of each name",
+    };
+    let undecided = if hidden { " An object that mostly stays undecided has few names among all." } else { "" };
+    format!(
+        "warning: the {rate} % are {what}: {} are wrong.{undecided} Promise it of each with --per object or --per name.\n",
+        shares.join(", ")
+    )
+}

@@ -1,0 +1,122 @@
+//! The sequences of a calibration, divided into those that are learned from and those that are tested on.
+
+use super::settings::Settings;
+use crate::calibrate::{Per, Stop, Tally, needed};
+use crate::error::{CalibrateProblem, Result};
+use crate::random::{self, Purpose};
+use palpate_trees::rows::RowSequence;
+use rand::seq::SliceRandom;
+use std::collections::BTreeSet;
+
+/// One sequence, or group, in this many is learned from, and not tested on.
+const LEARNED: usize = 4;
+
+/// Sequences that are learned from, and those that are tested on: whole groups, in a random order.
+#[derive(Clone, Debug)]
+pub(super) struct Parts<'s> {
+    pub(super) learned: Vec<&'s RowSequence>,
+    pub(super) tested: Vec<&'s RowSequence>,
+    pub(super) has_groups: bool,
+    /// Groups, or sequences without groups, of both parts.
+    units: usize,
+}
+
+impl<'s> Parts<'s> {
+    pub(super) fn new(sequences: &'s [RowSequence], settings: &Settings) -> Result<Self> {
+        let mut all: Vec<&RowSequence> = sequences.iter().collect();
+        let mut random = random::generator(settings.seed, Purpose::Calibration, "sequences", 0);
+        all.shuffle(&mut random);
+        let has_groups = all.iter().any(|sequence| sequence.group.is_some());
+        let mut order: Vec<usize> = if has_groups {
+            let groups: BTreeSet<usize> = all.iter().filter_map(|sequence| sequence.group).collect();
+            let mut groups: Vec<usize> = groups.into_iter().collect();
+            groups.shuffle(&mut random);
+            groups
+        } else {
+            (0..all.len()).collect()
+        };
+        // Whole groups, whatever their size: as many as have so many sequences on average.
+        order.truncate((order.len() as u128 * settings.sequences as u128 / all.len().max(1) as u128) as usize);
+        if has_groups {
+            let taken: BTreeSet<usize> = order.iter().copied().collect();
+            all.retain(|sequence| sequence.group.is_some_and(|group| taken.contains(&group)));
+        } else {
+            all.truncate(order.len());
+        }
+        let units = order.len();
+        let least = needed(settings.rate, settings.confidence) as usize;
+        if units < least {
+            return Err(Self::too_few(units, has_groups, None, settings).into());
+        }
+        // As many as a promise takes are tested on, if there are no more.
+        let learned = (units / LEARNED).min(units - least);
+        let (learned, tested) = if has_groups {
+            let own: BTreeSet<usize> = order.into_iter().take(learned).collect();
+            all.into_iter().partition(|sequence| sequence.group.is_some_and(|group| own.contains(&group)))
+        } else {
+            let tested = all.split_off(learned);
+            (all, tested)
+        };
+        Ok(Self { learned, tested, has_groups, units })
+    }
+
+    /// Groups, or sequences without groups, that are tested on.
+    pub(super) fn units_tested(&self) -> usize {
+        let groups: BTreeSet<usize> = self.tested.iter().filter_map(|sequence| sequence.group).collect();
+        if self.has_groups { groups.len() } else { self.tested.len() }
+    }
+
+    /// A share of what is tested, and the parts without it: whole groups.
+    #[cfg(feature = "train")]
+    pub(super) fn divided(self, share: f64) -> (Vec<&'s RowSequence>, Self) {
+        let mut units: Vec<Option<usize>> = Vec::new();
+        let mut seen = BTreeSet::new();
+        let groups = self.tested.iter().map(|sequence| sequence.group).filter(|group| seen.insert(*group));
+        units.extend(groups);
+        let count = |all: usize| (all as f64 * share) as usize;
+        let (taken, tested) = if self.has_groups {
+            let own: BTreeSet<Option<usize>> = units.iter().take(count(units.len())).copied().collect();
+            self.tested.into_iter().partition(|sequence| own.contains(&sequence.group))
+        } else {
+            let mut taken = self.tested;
+            let tested = taken.split_off(count(taken.len()));
+            (taken, tested)
+        };
+        (taken, Self { tested, ..self })
+    }
+
+    fn too_few(found: usize, groups: bool, object: Option<String>, settings: &Settings) -> CalibrateProblem {
+        let Settings { rate, confidence, .. } = *settings;
+        // The rate that as many could promise without an error, rounded up to two digits.
+        let possible = 1.0 - (1.0 - confidence).powf(1.0 / found.max(1) as f64);
+        let digit = 10.0_f64.powf(possible.log10().floor() - 1.0);
+        let possible = Some((possible / digit).ceil() * digit).filter(|rate| *rate < 0.5);
+        let needed = needed(rate, confidence);
+        CalibrateProblem::TooFewSequences { found: found as u64, needed, rate, possible, groups, object }
+    }
+
+    /// The problem that a walk ended with.
+    pub(super) fn problem(&self, stop: Stop, names: &[String], settings: &Settings) -> CalibrateProblem {
+        let of = |position: usize| (settings.per != Per::Average).then(|| names.get(position).cloned()).flatten();
+        match stop {
+            Stop::TooFew { position, found } => {
+                Self::too_few(usize::try_from(found).unwrap_or(usize::MAX), self.has_groups, of(position), settings)
+            }
+            Stop::TooMany { position, tally: Tally { wrong, all } } => CalibrateProblem::NotKeptByRows {
+                object: of(position),
+                rate: settings.rate,
+                wrong,
+                given: all,
+                units: self.units as u64,
+                groups: self.has_groups,
+            },
+        }
+    }
+
+    /// The first sequence of each group; all of those without one.
+    #[cfg(feature = "train")]
+    pub(super) fn once(sequences: &[&'s RowSequence]) -> Vec<&'s RowSequence> {
+        let mut seen = BTreeSet::new();
+        sequences.iter().copied().filter(|sequence| sequence.group.is_none_or(|group| seen.insert(group))).collect()
+    }
+}

@@ -1,0 +1,88 @@
+//! Settings of a promise on sequences of rows.
+
+#[cfg(feature = "train")]
+use super::Rows;
+use crate::calibrate::Per;
+use crate::error::{Error, Result};
+#[cfg(feature = "train")]
+use crate::strangers;
+#[cfg(feature = "train")]
+use palpate_onboard::Model;
+#[cfg(feature = "train")]
+use palpate_trees::rows::{RowSequence, Sequences};
+
+/// Settings of a promise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// The error rate: wrong names of those that are given.
+    pub rate: f64,
+    /// Of what the rate is promised.
+    pub per: Per,
+    /// The probability that the rate is kept.
+    pub confidence: f64,
+    /// The most sequences that are used.
+    pub sequences: usize,
+    /// Rows after which a sequence ends undecided; `None` takes the model's own limit.
+    pub max_rows: Option<u32>,
+    /// A test for what the model does not know, if one is wanted.
+    #[cfg(feature = "train")]
+    pub strangers: Option<Strangers>,
+    /// Seed of which sequences are learned from.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            rate: 0.01,
+            per: Per::Average,
+            confidence: 0.95,
+            sequences: 1_000_000,
+            max_rows: None,
+            #[cfg(feature = "train")]
+            strangers: None,
+            seed: 1,
+        }
+    }
+}
+
+impl Settings {
+    /// Refuses settings out of their ranges.
+    pub(super) fn check(&self) -> Result<()> {
+        let Self { rate, confidence, sequences, .. } = *self;
+        if !(1e-9..0.5).contains(&rate) {
+            return Err(Error::setting("error_rate", rate, "a number of at least 1e-9 and below 0.5"));
+        }
+        if !((0.5..=0.999_999).contains(&confidence)) {
+            return Err(Error::setting("confidence", confidence, "a number from 0.5 to 0.999999"));
+        }
+        if sequences == 0 {
+            return Err(Error::setting("sequences", sequences, "at least 1"));
+        }
+        Ok(())
+    }
+}
+
+/// A test for what the model does not know.
+#[cfg(feature = "train")]
+#[derive(Clone, Debug, PartialEq)]
+pub struct Strangers {
+    /// Its settings.
+    pub settings: strangers::Settings,
+    /// The margins of rows of others, a list for each sequence of them, in the model's units; there may be none.
+    pub background: Vec<Vec<i32>>,
+}
+
+#[cfg(feature = "train")]
+impl Strangers {
+    /// A test with a background of these sequences, whose classes do not matter.
+    ///
+    /// # Errors
+    /// As [`Rows::new`].
+    pub fn new(settings: strangers::Settings, model: &Model<'_>, others: Option<&Sequences>) -> Result<Self> {
+        let Some(others) = others else { return Ok(Self { settings, background: Vec::new() }) };
+        let rows = Rows::new(model, others)?;
+        let of = |sequence: &RowSequence| sequence.rows.clone().flat_map(|row| rows.row(row)).copied().collect();
+        Ok(Self { settings, background: others.sequences.iter().map(of).collect() })
+    }
+}
