@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 ENSEMBLE is what `palpate train` saved, or a model of another library: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx).
 
---layout: compact, complete, grid, wide, patterns or code; or a goal, which is balanced, speed, size, m4f or m0+ (the fastest of at most three times the smallest). With --emit thumb, thumb-m4f or c-code the trees are code: docs/guide/code.md.
+A --layout is compact, complete, grid, wide, patterns or code, or a goal, which is balanced, speed, size, m4f or m0+ (the fastest of at most three times the smallest). With --emit thumb, thumb-m4f or c-code the trees are code (docs/guide/code.md).
 
 Examples:
   palpate export ensemble.json -o model.palpate
