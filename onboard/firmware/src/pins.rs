@@ -118,8 +118,10 @@ pub fn play() {
 /// The timer's interrupt: one edge.
 pub fn tick() {
     // The pin interrupt comes soon after an edge; edges are further apart than that, also where the emulator is halted on
-    // the way and this timer runs on. And a main loop that has fallen behind catches up between touches.
-    let busy = EDGE.load(Ordering::Relaxed) || with(|watcher| watcher.waiting() > 32).unwrap_or(true);
+    // the way and this timer runs on. And a main loop that has fallen behind catches up between touches. The signal lasts
+    // longer than any pass through the main loop, so it does not change again before the main loop has looked.
+    let unseen = EDGE.load(Ordering::Relaxed) || SIGNALED.load(Ordering::Relaxed);
+    let busy = unseen || with(|watcher| watcher.waiting() > 32).unwrap_or(true);
     let wait = critical_section::with(|cs| {
         let mut player = PLAYER.borrow_ref_mut(cs);
         let player = player.as_mut()?;
