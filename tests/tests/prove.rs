@@ -1,7 +1,7 @@
 //! Proofs: every model of an ensemble is proved, and no change of a model's meaning is.
 
-use palpate::compile::{EarlyExit, Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Inputs, Node};
+use palpate::compile::{EarlyExit, Instructions, Layout, Leaf, Settings, compile};
+use palpate::ensemble::{Ensemble, Inputs, Node, Tree};
 use palpate::error::ProofProblem;
 use palpate::prove::{Certificate, check, moves, prove};
 use palpate::rows::Encoder;
@@ -81,6 +81,14 @@ fn is_proved(bytes: &[u8], ensemble: &Ensemble) -> Result<(), TestCaseError> {
     let checked = check(&read, bytes, ensemble, FILE)
         .map_err(|error| TestCaseError::fail(format!("the certificate of {layout:?}: {error}")))?;
     prop_assert!(proof.margin_error <= checked.margin_error + 1e-9, "{proof:?} {checked:?}");
+    let average = Instructions::of_model(&Model::new(bytes).unwrap());
+    let longest = proof.estimated.unwrap();
+    prop_assert!(longest.m4f >= average.m4f && longest.m0_plus >= average.m0_plus, "{longest:?} {average:?}");
+    prop_assert_eq!((proof.splits, proof.estimated), (checked.splits, checked.estimated));
+    // Trees of one split over one feature may be one deeper tree, with as many splits or fewer.
+    let splits = |tree: &Tree| tree.nodes.iter().filter(|node| matches!(node, Node::Split { .. })).count();
+    let all: usize = ensemble.trees.iter().map(splits).sum();
+    prop_assert!(proof.splits <= all.max(ensemble.trees.len() * 6), "{} of {all}", proof.splits);
     Ok(())
 }
 

@@ -1,6 +1,7 @@
 //! `palpate verify` with `--prove` or `--certificate`.
 
 use super::Global;
+use super::chips::instructions;
 use super::rows::read_rows;
 use palpate::Result;
 use palpate::compile::CompiledModel;
@@ -141,8 +142,14 @@ fn proof_text(proof: &Proof, what: &str) -> String {
         };
         text += &format!("  {name}: {least:.4} ({}) to {most:.4} ({})\n", near(*least, *from), near(*most, *to));
     }
-    if let Some(instructions) = proof.instructions {
-        text += &format!("A row takes at most {instructions} instructions from its features to its margins.\n");
+    if proof.splits > 0 {
+        text += &format!("A row passes at most {} splits.\n", proof.splits);
+    }
+    if let Some(exact) = proof.instructions {
+        text += &format!("A row takes at most {exact} instructions from its features to its margins.\n");
+    }
+    if let Some(estimated) = proof.estimated {
+        text += &format!("Instructions of the longest way, estimated: {}.\n", instructions(estimated));
     }
     text
 }

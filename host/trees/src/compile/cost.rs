@@ -56,14 +56,23 @@ impl Core {
 }
 
 impl Instructions {
-    /// Instructions of a touch in a compiled model.
+    /// Instructions of a touch in a compiled model, with the steps to a leaf of each tree on average.
     pub fn of_model(model: &Model<'_>) -> Self {
+        Self::with_steps(model, on_average)
+    }
+
+    /// Instructions of the touch that takes most, if one goes the longest way through every tree.
+    pub fn of_longest_ways(model: &Model<'_>) -> Self {
+        Self::with_steps(model, f64::max)
+    }
+
+    fn with_steps(model: &Model<'_>, below: fn(f64, f64) -> f64) -> Self {
         let objects = model.object_count();
         let axes = usize::from(model.header().axes());
         let (groups, nodes) = groups_and_splits(model);
         let is_shared = model.shared_leaves().is_some();
         let (layout, leaf) = (model.layout(), model.leaf_type());
-        Self::new(&Shape { layout, leaf, objects, axes, groups: &groups, nodes, is_shared })
+        Self::new(&Shape { layout, leaf, objects, axes, groups: &groups, nodes, is_shared, below })
     }
 
     pub(super) fn new(shape: &Shape<'_>) -> Self {
@@ -134,6 +143,13 @@ pub(super) struct Shape<'a> {
     pub(super) nodes: &'a [u8],
     /// True if leaves are indices into a table.
     pub(super) is_shared: bool,
+    /// Steps below a split in preorder, of those below its two sides.
+    pub(super) below: fn(f64, f64) -> f64,
+}
+
+/// Steps below a split if either side is as likely.
+pub(super) fn on_average(left: f64, right: f64) -> f64 {
+    (left + right) / 2.0
 }
 
 /// The costs of the evaluator's parts on one processor, in instructions.
@@ -246,7 +262,7 @@ impl Costs {
         together * (values / few) + self.leaf.alone * (values % few)
     }
 
-    /// Trees in preorder, each after its number of splits: steps to the leaf that is reached on average, and its values.
+    /// Trees in preorder, each after its number of splits: steps to the leaf that is reached, and its values.
     fn preorder_trees(&self, shape: &Shape<'_>, length: usize, step: f64, left: impl Fn(&[u8]) -> usize) -> usize {
         let (start, tree, value) = self.preorder;
         let mut rest = shape.nodes;
@@ -262,7 +278,7 @@ impl Costs {
                 let splits = length * usize::from(u16::from_le_bytes(*splits));
                 let Some((splits, after)) = after.split_at_checked(splits) else { return sum };
                 rest = after;
-                let steps = expected_steps(splits, length, &left);
+                let steps = steps_to_leaf(splits, length, &left, shape.below);
                 sum += (start + step * steps).round() as usize + leaf;
             }
         }
@@ -275,15 +291,16 @@ fn values(group: &Group, shape: &Shape<'_>) -> usize {
     if group.object.is_some() { 1 } else { shape.objects }
 }
 
-/// Steps to a leaf of a tree in preorder, if either side of a split is as likely; `left` gives the splits in a split's
+/// Steps to a leaf of a tree in preorder, where `below` joins those of a split's sides; `left` gives the splits in a split's
 /// left subtree.
-fn expected_steps(splits: &[u8], length: usize, left: &impl Fn(&[u8]) -> usize) -> f64 {
+fn steps_to_leaf(splits: &[u8], length: usize, left: &impl Fn(&[u8]) -> usize, below: fn(f64, f64) -> f64) -> f64 {
     if splits.is_empty() {
         return 0.0;
     }
-    let (root, below) = splits.split_at(length);
-    let (left_splits, right_splits) = below.split_at((length * left(root)).min(below.len()));
-    1.0 + (expected_steps(left_splits, length, left) + expected_steps(right_splits, length, left)) / 2.0
+    let (root, rest) = splits.split_at(length);
+    let (left_splits, right_splits) = rest.split_at((length * left(root)).min(rest.len()));
+    let steps = |splits| steps_to_leaf(splits, length, left, below);
+    1.0 + below(steps(left_splits), steps(right_splits))
 }
 
 #[cfg(test)]
@@ -326,6 +343,7 @@ mod tests {
                 groups: &groups,
                 nodes: &[],
                 is_shared: false,
+                below: on_average,
             };
             let estimate = Instructions::new(&shape);
             for (estimate, counted) in [estimate.m4f, estimate.m0_plus.unwrap()].into_iter().zip(counted) {
@@ -337,7 +355,16 @@ mod tests {
         }
         let table = |layout, axes| {
             let (leaf, objects, groups, nodes) = (LeafType::I8, 10, &[], &[]);
-            Instructions::new(&Shape { layout, leaf, objects, axes, groups, nodes, is_shared: false })
+            Instructions::new(&Shape {
+                layout,
+                leaf,
+                objects,
+                axes,
+                groups,
+                nodes,
+                is_shared: false,
+                below: on_average,
+            })
         };
         assert_eq!(table(Layout::Grid, 2), Instructions { m4f: 330, m0_plus: Some(375) });
         assert_eq!(table(Layout::Patterns, 3), Instructions { m4f: 598, m0_plus: Some(685) });
@@ -353,16 +380,19 @@ mod tests {
             groups: &[],
             nodes: &[],
             is_shared: false,
+            below: on_average,
         };
         assert_eq!(Instructions::new(&shape).on(Core::M0Plus), None);
         assert!(Instructions::new(&shape).on(Core::M4F).is_some());
     }
 
     #[test]
-    fn steps_are_weighted_by_the_chance_of_each_side() {
+    fn steps_are_weighted_by_the_chance_of_each_side_or_those_of_the_longest_way() {
         let left = |node: &[u8]| usize::from(node[2]);
         // A root, one split on its left, which has one on its right.
-        assert_eq!(expected_steps(&[0, 0, 2, 0, 0, 0, 0, 0, 0], 3, &left), 1.75);
-        assert_eq!(expected_steps(&[], 3, &left), 0.0);
+        let splits = [0, 0, 2, 0, 0, 0, 0, 0, 0];
+        assert_eq!(steps_to_leaf(&splits, 3, &left, on_average), 1.75);
+        assert_eq!(steps_to_leaf(&splits, 3, &left, f64::max), 3.0);
+        assert_eq!(steps_to_leaf(&[], 3, &left, on_average), 0.0);
     }
 }

@@ -3,7 +3,7 @@
 use super::axes::Axes;
 use super::cells::Cells;
 use super::code::{Form, Program, Statements};
-use super::cost::{Instructions, Shape};
+use super::cost::{Instructions, Shape, on_average};
 use super::early::{self, EarlyExitFound, Plan, Work};
 use super::forest::Forest;
 use super::merge::{Merged, merge};
@@ -219,7 +219,7 @@ pub(super) fn code_with_early_exit(
 fn instructions(layout: Layout, leaf: LeafType, objects: usize, parts: &Parts) -> Instructions {
     let Parts { axes, groups, nodes, shared, .. } = parts;
     let is_shared = shared.is_some();
-    Instructions::new(&Shape { layout, leaf, objects, axes: axes.len(), groups, nodes, is_shared })
+    Instructions::new(&Shape { layout, leaf, objects, axes: axes.len(), groups, nodes, is_shared, below: on_average })
 }
 
 fn base_bits(base: f32, leaf: LeafType, scale: &Scale) -> i32 {

@@ -2,7 +2,7 @@
 
 use super::axes::{cuts_bytes, width};
 use super::cells::Cells;
-use super::cost::{Instructions, Shape};
+use super::cost::{Instructions, Shape, on_average};
 use super::forest::Forest;
 use super::parts::Parts;
 use super::quantize::Scale;
@@ -53,7 +53,8 @@ fn table(
         }
     }
     let (axes, cuts) = axes(dimensions);
-    let shape = Shape { layout, leaf, objects, axes: axes.len(), groups: &[], nodes: &[], is_shared: false };
+    let shape =
+        Shape { layout, leaf, objects, axes: axes.len(), groups: &[], nodes: &[], is_shared: false, below: on_average };
     Some(Parts {
         instructions: Instructions::new(&shape),
         axes,

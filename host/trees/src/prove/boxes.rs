@@ -114,6 +114,18 @@ impl Tree {
         Ok(Self { nodes, object })
     }
 
+    /// The most splits above a leaf.
+    pub(super) fn depth(&self) -> usize {
+        let (mut open, mut deepest) = (vec![(0, 0)], 0);
+        while let Some((at, depth)) = open.pop() {
+            deepest = deepest.max(depth);
+            if let Step::Split(_, children) = &self.nodes[at] {
+                open.extend(children.map(|child| (child, depth + 1)));
+            }
+        }
+        deepest
+    }
+
     /// Calls `see` on each leaf that some of `rows` reach, with these.
     pub(super) fn leaves<E>(&self, rows: &mut Rows, see: &mut See<'_, E>) -> Result<(), E> {
         self.below(0, rows, see)

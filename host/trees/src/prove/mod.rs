@@ -27,7 +27,7 @@ pub use certificate::{Certificate, CertifiedTree};
 pub use error::ProofProblem;
 pub use moves::{Moves, moves};
 
-use crate::compile;
+use crate::compile::{self, Instructions};
 use crate::ensemble::{Ensemble, Inputs};
 use crate::error::Result;
 use crate::verify::unit;
@@ -56,10 +56,15 @@ pub struct Proof {
     pub ranges: Vec<(String, f64, f64)>,
     /// For each output the least and the largest margin of a row that a search found: what a bound is worth.
     pub found: Vec<(f64, f64)>,
+    /// The most splits that a row passes: the sum of each tree's longest way; 0 for a table.
+    pub splits: usize,
     /// The most instructions that a row takes from its features to its margins, each tree's longest way counted; only of
     /// assembly.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instructions: Option<usize>,
+    /// The same of a layout of data, estimated: see [`Instructions`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub estimated: Option<Instructions>,
 }
 
 /// CRC-64 (XZ) of a file.
@@ -103,6 +108,7 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
         }
         proof.margin_error = exact;
     }
+    proof.estimated = Some(Instructions::of_longest_ways(&model));
     let Found { trees, table, outputs, .. } = found;
     Ok((proof, Certificate { model: checksum(bytes), ensemble: checksum(file), code: None, trees, table, outputs }))
 }
@@ -209,7 +215,7 @@ fn is_about(certificate: &Certificate, bytes: &[u8], file: &[u8]) -> Result<(), 
 pub fn check(certificate: &Certificate, bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<Proof> {
     is_about(certificate, bytes, file)?;
     // Only what may run on a chip is certified.
-    compile::open(bytes)?;
+    let model = compile::open(bytes)?;
     let plain = format::read(bytes)?;
     statements(&plain, ensemble)?;
     let sources = of_ensemble(ensemble, &plain.keys)?;
@@ -219,7 +225,7 @@ pub fn check(certificate: &Certificate, bytes: &[u8], ensemble: &Ensemble, file:
         None => trees::of_format(subject, &certificate.trees)?,
     };
     holds(certificate, &found, ensemble)?;
-    Ok(subject.proof(&found))
+    Ok(Proof { estimated: Some(Instructions::of_longest_ways(&model)), ..subject.proof(&found) })
 }
 
 /// Returns an error if a certificate states less than was found.
@@ -272,7 +278,9 @@ impl Subject<'_> {
                 .map(|(name, &[_, least, most])| (name.clone(), least, most))
                 .collect(),
             found: near::found(plain),
+            splits: plain.trees.iter().map(|(tree, _)| tree.depth()).sum(),
             instructions: None,
+            estimated: None,
         }
     }
 
