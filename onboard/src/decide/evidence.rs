@@ -5,14 +5,19 @@ use palpate_shared::format::Weights;
 
 /// A posterior probability, in Q56: fine enough to distinguish 1 − 1e-16 from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Posterior(u64);
+pub struct Posterior(pub(super) u64);
 
-const ONE: u64 = 1 << 56;
+pub(super) const ONE: u64 = 1 << 56;
 
 impl Posterior {
     /// The probability in Q56: 2^56 is 1.
     pub const fn q56(self) -> u64 {
         self.0
+    }
+
+    /// 1 for true, 0 for false.
+    pub(super) const fn of(is_certain: bool) -> Self {
+        Self(if is_certain { ONE } else { 0 })
     }
 
     /// The probability, rounded to f32. Cost: a conversion; in software on a chip without an FPU.
@@ -139,7 +144,7 @@ pub(crate) fn posterior(evidence: &[i64], object: usize, unit: Unit) -> Posterio
 /// `part` / `whole` in Q56, rounded down, for a part that is at most the whole: long division.
 // By this name a test finds out whether an image holds it.
 #[inline(never)]
-fn ratio(part: u64, whole: u64) -> u64 {
+pub(super) fn ratio(part: u64, whole: u64) -> u64 {
     let (mut rest, mut quotient) = (part, 0_u64);
     if rest >= whole {
         return ONE;

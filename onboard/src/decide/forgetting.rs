@@ -2,6 +2,7 @@
 
 use super::expected::{IMPOSSIBLE, is_possible};
 use super::recognizer::{Recognizer, Verdict};
+use super::strangers;
 use crate::model::{Model, Refused};
 use palpate_shared::Touch;
 
@@ -136,7 +137,7 @@ impl<const N: usize> Recognizer<'_, N> {
             forgetting.reset();
             forgetting.start.iter_mut().zip(evidence).for_each(|(start, &evidence)| *start = evidence);
         }
-        let leader = self.best();
+        let leader = strangers::leader(self.model(), evidence).0;
         if forgetting.add(margins, evidence, leader) {
             let mut restarted = [0; N];
             let sums = forgetting.start.iter().zip(&forgetting.recent).zip(evidence);
@@ -152,7 +153,7 @@ impl<const N: usize> Recognizer<'_, N> {
             return self.add(&[]);
         }
         let verdict = self.add(margins);
-        if self.best() != leader {
+        if strangers::leader(self.model(), self.evidence()).0 != leader {
             forgetting.reset();
         }
         verdict

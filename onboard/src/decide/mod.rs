@@ -9,6 +9,7 @@ mod recognizer;
 mod snapshot;
 mod stopping;
 mod strangers;
+mod together;
 
 pub use approach::Proposal;
 pub use evidence::{Posterior, Rivals};

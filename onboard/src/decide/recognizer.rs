@@ -4,10 +4,12 @@ use super::evidence::{self, Posterior, Rivals, SHARPNESS, Unit};
 use super::expected::{self, NothingExpected};
 use super::stopping::Stopping;
 use super::strangers::{self, Familiarity};
+use super::together::{self, Leading};
 use crate::bytes::AlignedTo8;
 use crate::model::{Model, Refused};
 use core::fmt;
 use palpate_shared::Touch;
+use palpate_shared::format::Outputs;
 
 /// Result of the touches so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +19,8 @@ pub enum Verdict {
     Undecided,
     /// An object was recognized. Further touches change nothing until [`Recognizer::reset`].
     Recognized {
-        /// The object's index in the model.
+        /// The object's index in the model; of an object with several [outputs](Model::outputs), that of the one with the most
+        /// evidence: how the object lies, if outputs are placements.
         object: u8,
         /// Number of touches taken.
         touches: u32,
@@ -185,7 +188,10 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.touches
     }
 
-    /// Of the objects that can be named, the one with the most evidence; the first of several.
+    /// Of the objects that can be named, the one with the most evidence; the first of several. Of an object with several
+    /// [outputs](Model::outputs), whose weights add up, the output with the most evidence.
+    ///
+    /// Cost: a few instructions for each object; with several outputs an exponential for each.
     pub fn best(&self) -> usize {
         self.state.best(&self.model)
     }
@@ -197,7 +203,10 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     pub fn familiarity(&self) -> Familiarity {
         match self.state.covered() {
             0 => Familiarity::Known,
-            touches => strangers::familiarity(&self.model, self.evidence(), self.best(), touches),
+            touches => {
+                let leader = strangers::leader(&self.model, self.evidence()).0;
+                strangers::familiarity(&self.model, self.evidence(), leader, touches)
+            }
         }
     }
 
@@ -209,13 +218,15 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     pub fn rivals(&self) -> u64 {
         let mut priors = [0; N];
         let evidence = self.state.evidence_or_priors(&self.model, &mut priors);
+        let unit = unit_of(&self.model, self.state.covered());
+        if let Some(outputs) = self.model.outputs() {
+            let leading = Leading::of(evidence, self.model.known_count(), outputs, unit);
+            return leading.rivals().map_or(u64::MAX, Rivals::q56);
+        }
         let best = strangers::leader(&self.model, evidence);
         match strangers::is_background(&self.model, evidence, best.1) {
             true => u64::MAX,
-            false => {
-                let unit = unit_of(&self.model, self.state.covered());
-                evidence::rivals(evidence, best, u64::MAX, unit).map_or(u64::MAX, Rivals::q56)
-            }
+            false => evidence::rivals(evidence, best, u64::MAX, unit).map_or(u64::MAX, Rivals::q56),
         }
     }
 
@@ -225,6 +236,16 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// Cost: an exponential for each object, and a long division.
     pub fn posterior(&self, object: usize) -> Posterior {
         self.state.posterior(&self.model, object)
+    }
+
+    /// The posterior of the object that an output belongs to, and the share of it that is the output's: how likely the object
+    /// lies as this placement says, if it is the object. Without [outputs](Model::outputs) that belong together the share
+    /// is 1. Both are of the evidence divided by the model's [temperature](Model::temperature); 0 for an output that the
+    /// model does not have.
+    ///
+    /// Cost: an exponential for each output, and two long divisions. Cannot fail.
+    pub fn posterior_together(&self, output: usize) -> (Posterior, Posterior) {
+        self.state.posterior_together(&self.model, output)
     }
 
     /// The evidence for each object: margins summed over touches, and the prior, in [units](Model::unit). Empty before the
@@ -244,22 +265,32 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// object is touched, in any common unit, and replace the model's priors until the next [`reset`](Self::reset). An
     /// object of weight 0, or beyond the end of `weights`, cannot be recognized; a background keeps its prior. What the
     /// model promises was determined for its own priors, and its misfit test takes the weights' for evidence. The
-    /// weights `&[3, 0, 1]` say that there are three of the first object for each of the third, and none of the second.
+    /// weights `&[3, 0, 1]` say that there are three of the first object for each of the third, and none of the second. An
+    /// object with several [outputs](Model::outputs) has one weight, of which each output has the share that the model
+    /// states.
     ///
     /// Cost: two logarithms for each object, bit by bit.
     ///
     /// # Errors
     /// [`NothingExpected`], if all weights are 0; nothing changes then.
     pub fn reset_to(&mut self, weights: &[u32]) -> Result<(), NothingExpected> {
-        let weights = weights.get(..self.model.known_count()).unwrap_or(weights);
+        let (known, outputs) = (self.model.known_count(), self.model.outputs());
+        let object = |output: usize| match outputs {
+            Some(outputs) => outputs.object(output).map_or(usize::MAX, usize::from),
+            None => output,
+        };
+        let objects = known.checked_sub(1).map_or(0, |last| object(last).saturating_add(1));
+        let weights = weights.get(..objects).unwrap_or(weights);
         let most = weights.iter().copied().max().filter(|&most| most > 0).ok_or(NothingExpected)?;
         let unit = unit(&self.model);
         self.reset();
         // A background's stays.
         start(&self.model, &mut self.state.evidence);
-        let mut weights = weights.iter();
-        for evidence in self.state.evidence.iter_mut().take(self.model.known_count()) {
-            *evidence = expected::prior(weights.next().copied().unwrap_or(0), most, unit);
+        for (output, evidence) in self.state.evidence.iter_mut().take(known).enumerate() {
+            *evidence = expected::prior(weights.get(object(output)).copied().unwrap_or(0), most, unit);
+            if let Some(outputs) = outputs {
+                *evidence = evidence.saturating_add(expected::prior(outputs.share(output), 1 << 16, unit));
+            }
         }
         self.state.decided = Decided::Nothing;
         Ok(())
@@ -294,15 +325,37 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.touches = self.state.touches.saturating_add(1);
         let best = strangers::leader(&self.model, self.evidence());
         let familiarity = strangers::familiarity(&self.model, self.evidence(), best.0, self.state.covered());
+        if let Some(outputs) = self.model.outputs() {
+            let named = if familiarity == Familiarity::Known { self.named_together(outputs) } else { None };
+            return self.decide(familiarity, named);
+        }
         let odds = self.state.stopping.odds_of(best.0, &self.model);
         let may_be_named =
             familiarity == Familiarity::Known && !strangers::is_background(&self.model, self.evidence(), best.1);
         let unit = unit_of(&self.model, self.state.covered());
         let rivals = if may_be_named { evidence::rivals(self.evidence(), best, odds, unit) } else { None };
+        self.decide(familiarity, rivals.map(|rivals| (best.0, rivals)))
+    }
+
+    /// The object that may be named by the sums over its outputs: its output with the most evidence, and its rivals.
+    fn named_together(&self, outputs: Outputs<'_>) -> Option<(usize, Rivals)> {
+        let (model, evidence) = (&self.model, self.evidence());
+        let (unit, known) = (unit_of(model, self.state.covered()), model.known_count());
+        if together::is_undecided(evidence, known, outputs, self.state.stopping.loosest(model), unit) {
+            return None;
+        }
+        let leading = Leading::of(evidence, known, outputs, unit);
+        let odds = self.state.stopping.odds_of(leading.output, model);
+        let rivals = leading.rivals().filter(|rivals| rivals.q56() <= odds)?;
+        Some((leading.output, rivals))
+    }
+
+    /// Sets the verdict after a touch.
+    fn decide(&mut self, familiarity: Familiarity, named: Option<(usize, Rivals)>) -> Verdict {
         if familiarity == Familiarity::Stranger {
             self.state.decided = Decided::Unknown;
-        } else if let Some(rivals) = rivals {
-            self.state.decided = Decided::Object(u8::try_from(best.0).unwrap_or(u8::MAX));
+        } else if let Some((object, rivals)) = named {
+            self.state.decided = Decided::Object(u8::try_from(object).unwrap_or(u8::MAX));
             self.state.rivals = rivals;
         } else if self.state.touches >= self.state.stopping.max_touches {
             self.state.decided = Decided::GaveUp;
@@ -318,12 +371,28 @@ impl<const N: usize> State<N> {
     }
 
     pub(crate) fn best(&self, model: &Model<'_>) -> usize {
-        strangers::leader(model, self.evidence_or_priors(model, &mut [0; N])).0
+        let mut priors = [0; N];
+        let evidence = self.evidence_or_priors(model, &mut priors);
+        match model.outputs() {
+            Some(outputs) => Leading::of(evidence, model.known_count(), outputs, unit_of(model, self.covered())).output,
+            None => strangers::leader(model, evidence).0,
+        }
     }
 
     pub(crate) fn posterior(&self, model: &Model<'_>, object: usize) -> Posterior {
         let unit = Unit { sharpness: model.temperature().sharpness(), ..unit_of(model, self.covered()) };
         evidence::posterior(self.evidence_or_priors(model, &mut [0; N]), object, unit)
+    }
+
+    pub(crate) fn posterior_together(&self, model: &Model<'_>, output: usize) -> (Posterior, Posterior) {
+        let Some(outputs) = model.outputs() else {
+            let posterior = self.posterior(model, output);
+            return (posterior, Posterior::of(output < model.object_count()));
+        };
+        let unit = Unit { sharpness: model.temperature().sharpness(), ..unit_of(model, self.covered()) };
+        let mut priors = [0; N];
+        let evidence = self.evidence_or_priors(model, &mut priors);
+        together::posterior(evidence, model.known_count(), output, outputs, unit)
     }
 
     /// The evidence, which before the first touch is the priors; they are put into `priors`.
@@ -363,6 +432,10 @@ impl<const N: usize> State<N> {
     /// Weights of all other objects, relative to one that was recognized with this evidence of so many touches.
     pub(crate) fn rivals(model: &Model<'_>, evidence: &[i64; N], object: usize, covered: u32) -> Option<Rivals> {
         let evidence = evidence.get(..model.object_count())?;
+        if let Some(outputs) = model.outputs() {
+            let leading = Leading::of(evidence, model.known_count(), outputs, unit_of(model, covered));
+            return leading.rivals().filter(|_| leading.output == object);
+        }
         let best = strangers::leader(model, evidence);
         if best.0 == object { evidence::rivals(evidence, best, u64::MAX, unit_of(model, covered)) } else { None }
     }

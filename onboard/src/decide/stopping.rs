@@ -62,6 +62,12 @@ impl Stopping {
         self.odds
     }
 
+    /// The loosest of all thresholds: see [`odds_of`](Self::odds_of).
+    pub(crate) fn loosest(&self, model: &Model<'_>) -> u64 {
+        let own = if self.by_object { model.loosest_odds() } else { None };
+        own.unwrap_or(self.odds)
+    }
+
     /// The same for an object of `model`, which may have a threshold of its own.
     ///
     /// Cost: a few instructions. Cannot fail.

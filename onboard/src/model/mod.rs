@@ -21,8 +21,8 @@ pub use refused::Refused;
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
-    Counted, EarlyExit, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, PatternShares, Plan,
-    Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature, TrainedCapture, TrainedNoise,
+    Counted, EarlyExit, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, Outputs, PatternShares,
+    Plan, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature, TrainedCapture, TrainedNoise,
     TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
 };
 use palpate_shared::{Descriptor, Patterns};
@@ -49,9 +49,9 @@ pub(crate) struct Stated {
     counted: Counted,
     needs_pose: bool,
     largest_spread: u32,
-    /// Where thresholds by object stand; 0 if there are none. The five highest bits: whether there are
+    /// Where thresholds by object stand; 0 if there are none. The six highest bits: whether there are
     /// sections about strangers, of shared leaves, of features that stand for a missing value, of weights by the number of
-    /// touches, and of the evidence of a row.
+    /// touches, of the evidence of a row, and of outputs that belong together.
     by_object: u32,
 }
 
@@ -65,8 +65,10 @@ const HAS_SENTINEL: u32 = 1 << 29;
 const HAS_WEIGHTS: u32 = 1 << 28;
 /// The same.
 const HAS_ROW_EVIDENCE: u32 = 1 << 27;
+/// The same.
+const HAS_OUTPUTS: u32 = 1 << 26;
 /// Flags that are not a place in [`Stated::by_object`].
-const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_SENTINEL | HAS_WEIGHTS | HAS_ROW_EVIDENCE;
+const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_SENTINEL | HAS_WEIGHTS | HAS_ROW_EVIDENCE | HAS_OUTPUTS;
 
 impl Stated {
     /// Statements of a model without optional sections.
@@ -155,9 +157,32 @@ impl<'a> Model<'a> {
     }
 
     /// Number of objects that the model has margins for: 1 to 256. The last of them may be the
-    /// [background](Model::background).
+    /// [background](Model::background). Where several outputs belong to one object, this is the number of outputs: see
+    /// [`outputs`](Model::outputs).
     pub fn object_count(&self) -> usize {
         self.sections.objects()
+    }
+
+    /// The objects that the model's outputs belong to, where several belong to one: such as an object's placements on a table.
+    /// Otherwise each output is an object. The background's entry means nothing: it is an object of its own.
+    ///
+    /// Cost: next to none if the model has none, otherwise a few instructions for each optional section. Cannot fail.
+    pub fn outputs(&self) -> Option<Outputs<'a>> {
+        if !cfg!(feature = "outputs") || self.stated.by_object & HAS_OUTPUTS == 0 {
+            return None;
+        }
+        Outputs::opened(optional::find(self.optional(), Tag::Outputs), self.object_count())
+    }
+
+    /// True if two outputs belong to the same object.
+    ///
+    /// Cost: as [`outputs`](Model::outputs). Cannot fail.
+    pub fn is_same_object(&self, one: usize, other: usize) -> bool {
+        let is_background = |output| output >= self.known_count();
+        one == other
+            || self.outputs().is_some_and(|outputs| {
+                !is_background(one) && !is_background(other) && outputs.object(one) == outputs.object(other)
+            })
     }
 
     /// Statements of the model about objects that it does not know, if it has any.
@@ -319,9 +344,19 @@ impl<'a> Model<'a> {
     ///
     /// Cost: a few instructions. Cannot fail.
     pub fn odds_of(&self, object: usize) -> Option<u64> {
+        self.thresholds()?.odds(object)
+    }
+
+    /// The loosest threshold, if objects have their own.
+    pub(crate) fn loosest_odds(&self) -> Option<u64> {
+        let thresholds = self.thresholds()?;
+        (0..self.object_count()).filter_map(|object| thresholds.odds(object)).max()
+    }
+
+    fn thresholds(&self) -> Option<OddsByObject<'a>> {
         let start = usize::try_from(self.stated.by_object & !MARKS).ok().filter(|&start| start > 0)?;
         let section = self.sections.bytes.get(start..)?;
-        OddsByObject::from_bytes(section.get(..OddsByObject::LENGTH * self.object_count())?).odds(object)
+        Some(OddsByObject::from_bytes(section.get(..OddsByObject::LENGTH * self.object_count())?))
     }
 
     /// Promise of the model about its verdicts, if it was calibrated.

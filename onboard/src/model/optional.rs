@@ -1,10 +1,10 @@
 //! The optional sections: checked once, then found by their tags.
 
-use super::{HAS_ROW_EVIDENCE, HAS_SENTINEL, HAS_SHARED_LEAVES, HAS_STRANGERS, HAS_WEIGHTS, MARKS, Stated};
+use super::{HAS_OUTPUTS, HAS_ROW_EVIDENCE, HAS_SENTINEL, HAS_SHARED_LEAVES, HAS_STRANGERS, HAS_WEIGHTS, MARKS, Stated};
 use crate::bytes::Wrong;
 use crate::layouts::{Sections, built_in};
 use palpate_shared::format::{
-    Layout, OddsByObject, Plan, Prediction, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, TrainedNoise,
+    Layout, OddsByObject, Outputs, Plan, Prediction, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, TrainedNoise,
     TrainedProbe, TrainedTouches, Weights, take_section,
 };
 
@@ -60,6 +60,10 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
             _ if cfg!(feature = "row-evidence") && tag == Tag::RowEvidence.code() => {
                 stated.by_object |= HAS_ROW_EVIDENCE;
                 RowEvidence::from_bytes(content).is_some() && stated.descriptor.is_none()
+            }
+            _ if cfg!(feature = "outputs") && tag == Tag::Outputs.code() => {
+                stated.by_object |= HAS_OUTPUTS;
+                Outputs::from_bytes(content, model.objects()).is_some()
             }
             _ if must_understand => return Err(Wrong::NotUnderstood(offset)),
             _ => true,

@@ -43,6 +43,8 @@ pub enum Tag {
     RowEvidence,
     /// Bounds with which a class is known before all trees are walked: [`EarlyExit`](super::EarlyExit).
     EarlyExit,
+    /// Outputs that belong to one object: [`Outputs`](super::Outputs).
+    Outputs,
 }
 
 impl Tag {
@@ -66,6 +68,7 @@ impl Tag {
             Self::Capture => 15,
             Self::RowEvidence => 16,
             Self::EarlyExit => 17,
+            Self::Outputs => 18,
         }
     }
 }

@@ -1,0 +1,136 @@
+//! Objects to which several outputs belong: their weights are sums over their outputs.
+
+use super::evidence::{ONE, Posterior, Rivals, Unit, best, ratio};
+use core::num::NonZeroU64;
+use palpate_shared::format::Outputs;
+
+/// The object that leads, and the weights of all, in units in which the output with the most evidence weighs 2^56.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leading {
+    /// Of its outputs, the one with the most evidence.
+    pub(super) output: usize,
+    /// The sum over its outputs.
+    own: u64,
+    /// The sum over all others.
+    others: u64,
+    /// The background's.
+    background: u64,
+}
+
+impl Leading {
+    /// The object, of those with an output below `known`, with the largest weight; the first of several.
+    ///
+    /// Cost: an exponential for each output.
+    pub(super) fn of(evidence: &[i64], known: usize, outputs: Outputs<'_>, unit: Unit) -> Self {
+        let (_, most) = best(evidence);
+        let weight = |evidence: i64| unit.weight(most.abs_diff(evidence));
+        let background = evidence.get(known).copied().map_or(0, weight);
+        let mut leading = Self { output: 0, own: 0, others: background, background };
+        let mut object = Object::default();
+        let mut last = 0;
+        let known = evidence.get(..known).unwrap_or(evidence);
+        for ((output, &evidence), number) in known.iter().enumerate().zip(outputs.objects()) {
+            if number != last {
+                leading.meet(object);
+                object = Object::default();
+                last = number;
+            }
+            if object.sum == 0 || evidence > object.evidence {
+                (object.output, object.evidence) = (output, evidence);
+            }
+            object.sum = object.sum.saturating_add(weight(evidence));
+        }
+        leading.meet(object);
+        leading
+    }
+
+    /// Compares the leader so far with the next object.
+    fn meet(&mut self, object: Object) {
+        if object.sum > self.own {
+            self.others = self.others.saturating_add(self.own);
+            (self.output, self.own) = (object.output, object.sum);
+        } else {
+            self.others = self.others.saturating_add(object.sum);
+        }
+    }
+
+    /// The weight of all other objects, the leader's being 1, rounded up; `None` where the background weighs more than the
+    /// leader.
+    ///
+    /// Cost: a long division.
+    pub(super) fn rivals(self) -> Option<Rivals> {
+        let own = NonZeroU64::new(self.own).filter(|own| self.background <= own.get())?;
+        Some(Rivals::from_q56(quotient(self.others, own)))
+    }
+}
+
+/// An object's weight, and its output with the most evidence.
+#[derive(Clone, Copy, Default)]
+struct Object {
+    output: usize,
+    evidence: i64,
+    sum: u64,
+}
+
+/// `part` / `whole` in Q56, rounded up, at most 2^64 − 1.
+fn quotient(mut part: u64, whole: NonZeroU64) -> u64 {
+    let whole = whole.get();
+    let mut times = 0_u64;
+    // The leader is not below any other object: at most 255 times.
+    while part >= whole && times < 255 {
+        part -= whole;
+        times += 1;
+    }
+    let down = ratio(part, whole);
+    // Not exact unless nothing is left: a part of the unit more, which no decision depends on but at equality.
+    let is_exact = part == 0;
+    (times << 56).saturating_add(down).saturating_add(u64::from(!is_exact))
+}
+
+/// True if no object can be recognized, by one exponential: the strongest output that does not belong to the strongest one's
+/// object weighs more than `odds`, the loosest threshold, times the most outputs of an object.
+pub(super) fn is_undecided(evidence: &[i64], known: usize, outputs: Outputs<'_>, odds: u64, unit: Unit) -> bool {
+    let (leader, most) = best(evidence);
+    let object = |output: usize| if output < known { outputs.object(output) } else { None };
+    let own = object(leader);
+    let mut second = None;
+    for (output, &evidence) in evidence.iter().enumerate() {
+        let is_other = object(output) != own || (own.is_none() && output != leader);
+        if is_other && second.is_none_or(|second| evidence > second) {
+            second = Some(evidence);
+        }
+    }
+    let Some(second) = second else { return false };
+    // Any leader's rivals weigh at least what the second output does, and its own outputs at most one each.
+    unit.weight(most.abs_diff(second)) > odds.saturating_mul(outputs.most().into())
+}
+
+/// The posterior of the object that an output belongs to, and the part of it that is the output's.
+///
+/// Cost: an exponential for each output, and two long divisions.
+pub(super) fn posterior(
+    evidence: &[i64],
+    known: usize,
+    output: usize,
+    outputs: Outputs<'_>,
+    unit: Unit,
+) -> (Posterior, Posterior) {
+    let (_, most) = best(evidence);
+    let (mut own, mut object, mut all) = (0_u64, 0_u64, 0_u64);
+    let number = |output: usize| if output < known { outputs.object(output) } else { None };
+    for (other, &evidence) in evidence.iter().enumerate() {
+        let weight = unit.weight(most.abs_diff(evidence));
+        if other == output {
+            own = weight;
+        }
+        if other == output || (number(other).is_some() && number(other) == number(output)) {
+            object = object.saturating_add(weight);
+        }
+        all = all.saturating_add(weight);
+    }
+    let part = |part: u64, whole: u64| if whole == 0 { 0 } else { ratio(part, whole) };
+    // Of the smaller one, so that 1 − 1e-16 is not 1.
+    let rest = all - object;
+    let posterior = if rest < object { ONE - part(rest, all) } else { part(object, all) };
+    (Posterior(posterior), Posterior(part(own, object)))
+}
