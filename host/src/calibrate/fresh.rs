@@ -10,7 +10,7 @@ use crate::evaluate::{Candidate, OfTouches};
 use crate::mesh::Object;
 use crate::probe::scene::Scene;
 use crate::progress::Progress;
-use crate::touches::{Dataset, ObjectTouches, Origin};
+use crate::touches::{Dataset, ObjectTouches, Origin, Source};
 use palpate_onboard::{Model, Refused, Stopping};
 use palpate_shared::Touch;
 use std::sync::OnceLock;
@@ -58,7 +58,7 @@ pub struct Captured<'a> {
     /// The first samples of each object, on which nothing is calibrated.
     first: Dataset,
     demands: Vec<Demand<'a>>,
-    instances: Vec<Vec<String>>,
+    sources: Vec<Vec<Source>>,
     window: Option<u32>,
 }
 
@@ -70,10 +70,10 @@ impl Captured<'_> {
 
     /// Captures all of them.
     fn all(self) -> Result<Dataset> {
-        let all = |(demand, instances): (&Demand<'_>, &Vec<String>)| -> Result<ObjectTouches> {
-            Ok(ObjectTouches::in_turn(demand.name(), demand.all()?, instances, FIRST).of_stroke(self.window))
+        let all = |(demand, sources): (&Demand<'_>, &Vec<Source>)| -> Result<ObjectTouches> {
+            Ok(ObjectTouches::in_turn(demand.name(), demand.all()?, sources, FIRST).of_stroke(self.window))
         };
-        let objects = self.demands.iter().zip(&self.instances).map(all).collect::<Result<_>>()?;
+        let objects = self.demands.iter().zip(&self.sources).map(all).collect::<Result<_>>()?;
         Ok(Dataset { objects, ..self.first })
     }
 }
@@ -146,8 +146,8 @@ pub fn fresh<'a>(
         let sampler = Sampler::of_instances(scenes, name, origin);
         demands.push(Demand::new(sampler, FIRST, scenes.len(), origin.probe.window(), &kept[..count]));
     }
-    let instances = objects.iter().map(|(_, scenes)| capture::numbered(scenes)).collect();
-    Ok(Captured { first, demands, instances, window: origin.probe.window() })
+    let sources = objects.iter().map(|(_, scenes)| capture::numbered(scenes)).collect();
+    Ok(Captured { first, demands, sources, window: origin.probe.window() })
 }
 
 /// Lengths of the sequences of an object.

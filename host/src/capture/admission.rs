@@ -2,7 +2,7 @@
 
 use super::Settings;
 use crate::error::{CaptureProblem, Error, Place, Result};
-use crate::touches::{Entry, Listing, Origin, files};
+use crate::touches::{Entry, Listing, Lying, Origin, files};
 use std::path::Path;
 
 /// State that a capture begins with.
@@ -119,6 +119,16 @@ fn meshes(there: &Listing, here: &Listing) -> Vec<String> {
             differences.push(format!("{name} has {} instances there and {} here", count(other), count(own)));
         } else if own.instances != other.instances {
             differences.push(format!("{name} has other instances there than here"));
+        }
+        if own.placements != other.placements {
+            let said = |entry: &Entry| {
+                let of = |one: &Lying| match &one.instance {
+                    Some(instance) => format!("{instance} {}={}", one.name, one.weight),
+                    None => format!("{}={}", one.name, one.weight),
+                };
+                entry.placements.iter().map(of).collect::<Vec<_>>().join(", ")
+            };
+            differences.push(format!("{name}'s placements are {} there and {} here", said(other), said(own)));
         }
         // Earlier versions stated no checksums.
         let is_known = own.meshes.len() == other.meshes.len();

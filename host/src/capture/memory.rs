@@ -1,6 +1,6 @@
 //! A capture that stays in memory.
 
-use super::{Sampler, Settings, entry, scenes};
+use super::{Sampler, Settings, entry, scenes, sources};
 use crate::error::{CaptureProblem, Result};
 use crate::in_order::in_order;
 use crate::mesh::Object;
@@ -52,10 +52,9 @@ fn touch(objects: &[&Object], settings: &Settings, progress: &dyn Progress) -> R
         approaches.push(drawn.iter().flatten().map(|(_, approaches)| approaches).sum());
         let kept = |(touch, _): (Touch, u64)| if origin.writes_pose() { touch } else { Touch::new(touch.times()) };
         let touches = drawn.into_iter().flatten().map(kept).collect();
-        let instances: Vec<String> = object.instances().map(|instance| instance.name.clone()).collect();
-        let entry = entry(object, origin);
+        let (sources, entry) = (sources(object, scenes), entry(object, scenes, origin));
         let meshes = Meshes { checksums: entry.meshes, millimeters: entry.millimeters };
-        let object = ObjectTouches::in_turn(&object.name, touches, &instances, samples.start);
+        let object = ObjectTouches::in_turn(&object.name, touches, &sources, samples.start);
         touched.push(object.of_meshes(Some(meshes)).of_stroke(origin.probe.window()));
     }
     Ok((Dataset { origin: Some(origin.clone()), ..Dataset::new(touched) }, approaches))

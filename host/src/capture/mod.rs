@@ -36,11 +36,11 @@ mod tests;
 
 use crate::error::{Error, Result};
 use crate::in_order::in_order;
-use crate::mesh::{Instance, Object};
+use crate::mesh::{Instance, Object, placements};
 use crate::probe::approach::FINGERS;
-use crate::probe::scene::Scene;
+use crate::probe::scene::{Scene, Table};
 use crate::progress::{self, Progress};
-use crate::touches::{Entry, ObjectTouches, Origin};
+use crate::touches::{Entry, Lying, ObjectTouches, Origin, Source};
 pub use error::CaptureProblem;
 use palpate_shared::format::Length;
 use rayon::prelude::*;
@@ -111,6 +111,8 @@ pub struct ObjectSummary {
     pub approaches_now: u64,
     /// Contacts of each finger in this run that came later than the stroke, and are missing; see [`Drawn::late`].
     pub late: [u64; FINGERS],
+    /// Number of approaches in this run in which a finger touched; where only full touches are kept, those.
+    pub touching: u64,
     /// Number of approaches in this run that ended before the first contact, at the end of the travel.
     pub turned_back: u64,
     /// Duration of this run for the object, in seconds.
@@ -146,7 +148,8 @@ pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progre
         .zip(&scenes)
         .map(|(object, scenes)| Sampler::of_instances(scenes, &object.name, &settings.origin))
         .collect();
-    let entries: Vec<Entry> = objects.iter().map(|object| entry(object, &settings.origin)).collect();
+    let entries: Vec<Entry> =
+        objects.iter().zip(&scenes).map(|(object, scenes)| entry(object, scenes, &settings.origin)).collect();
     let mut store = store::Store::open(directory, settings, &entries)?;
     let objects = pipeline::run(&samplers, settings, &mut store, progress)?;
     store.finish()?;
@@ -154,40 +157,87 @@ pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progre
 }
 
 /// Entry of the listing for an object before it is touched.
-fn entry(object: &Object, origin: &Origin) -> Entry {
-    let has_several = object.instances().len() > 1;
+fn entry(object: &Object, scenes: &[Scene], origin: &Origin) -> Entry {
     Entry {
         name: object.name.clone(),
-        instances: object.instances().filter(|_| has_several).map(|instance| instance.name.clone()).collect(),
+        instances: named(object),
+        placements: sources(object, scenes).iter().filter_map(Lying::of).collect(),
         meshes: object.instances().map(|instance| format!("{:016x}", instance.mesh.checksum())).collect(),
         millimeters: object.millimeters.filter(|_| origin.unit == Length::Millimeter),
         ..Entry::default()
     }
 }
 
-/// The scenes of each object's instances, built side by side.
+/// The names of an object's instances, if it has several.
+fn named(object: &Object) -> Vec<String> {
+    let has_several = object.instances().len() > 1;
+    object.instances().filter(|_| has_several).map(|instance| instance.name.clone()).collect()
+}
+
+/// The scenes of each object, built side by side: one for each instance or, on a table, for each placement of each instance.
+///
+/// # Errors
+/// A mesh that makes no scene, by its object's name.
 pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
-    let scene = |(object, instance): (&Object, &Instance)| {
-        progress::check(progress)?;
+    let in_object = |object: &Object, error: Error| match error {
+        Error::At { problem, .. } => {
+            let (detail, fix) = (problem.to_string(), problem.fix());
+            CaptureProblem::Object { name: object.name.clone(), detail, fix }.into()
+        }
+        other => other.in_file(&object.name),
+    };
+    let length = |(object, instance): (&Object, &Instance)| -> Result<f64> {
         let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
         let length = origin.length_of(object, instance).ok_or_else(unknown)?;
-        // A mesh without extent is refused below, with a better reason.
+        // A mesh without extent is refused below, with a better reason. Rotated, its box may be longer.
         if length > 0.0 {
-            origin.probe.check(length)?;
+            let longest = if origin.scene.is_floating() { length } else { length * 3_f64.sqrt() };
+            origin.probe.check(longest)?;
         }
-        Scene::new(&instance.mesh, length).map_err(|error| match error {
-            Error::At { problem, .. } => {
-                let (detail, fix) = (problem.to_string(), problem.fix());
-                CaptureProblem::Object { name: object.name.clone(), detail, fix }.into()
-            }
-            other => other.in_file(&object.name),
-        })
+        Ok(length)
     };
-    let of = |object: &&Object| {
-        let instances: Vec<&Instance> = object.instances().collect();
-        in_order(instances.into_par_iter().map(|instance| scene((object, instance))))
+    let floating = |(object, instance): (&Object, &Instance)| {
+        progress::check(progress)?;
+        Scene::new(&instance.mesh, length((object, instance))?).map_err(|error| in_object(object, error))
+    };
+    let on_table = |object: &Object, cone: f64| -> Result<Vec<Scene>> {
+        let placements = placements::of_object(object).map_err(|error| in_object(object, error))?;
+        let mut scenes = Vec::new();
+        for (number, (instance, placements)) in object.instances().zip(&placements).enumerate() {
+            progress::check(progress)?;
+            let length = length((object, instance))?;
+            for placements::Placement { name, weight, rotation } in &placements.placements {
+                let table = Table { instance: number, placement: name.clone(), weight: *weight, cone };
+                let scene = Scene::on_table(&instance.mesh, length, *rotation, table);
+                scenes.push(scene.map_err(|error| in_object(object, error))?);
+            }
+        }
+        Ok(scenes)
+    };
+    let of = |object: &&Object| match origin.scene.cone() {
+        None => {
+            let instances: Vec<&Instance> = object.instances().collect();
+            in_order(instances.into_par_iter().map(|instance| floating((object, instance))))
+        }
+        Some(cone) => on_table(object, cone),
     };
     in_order(objects.par_iter().map(of))
+}
+
+/// What the touches of an object's scenes are of, in turn: its instances, if it has several, or its placements.
+pub fn sources(object: &Object, scenes: &[Scene]) -> Vec<Source> {
+    sources_of(&named(object), scenes)
+}
+
+fn sources_of(instances: &[String], scenes: &[Scene]) -> Vec<Source> {
+    let placement = |scene: &Scene| {
+        scene.table().map(|table| {
+            let (instance, name) = (instances.get(table.instance).cloned(), table.placement.clone());
+            Lying { instance, name, weight: table.weight }.source()
+        })
+    };
+    let placements: Vec<Source> = scenes.iter().filter_map(placement).collect();
+    if placements.is_empty() { instances.iter().cloned().map(Source::Instance).collect() } else { placements }
 }
 
 /// The touches of one object with these sample numbers, in memory: the same that [`capture`] writes. The object's
@@ -203,7 +253,11 @@ pub fn touches(scenes: &[Scene], name: &str, origin: &Origin, samples: Range<u64
     Ok(ObjectTouches::in_turn(name, touches, &numbered(scenes), first).of_stroke(origin.probe.window()))
 }
 
-/// Names for an object's instances of which only the scenes are known.
-pub fn numbered(scenes: &[Scene]) -> Vec<String> {
-    (1..=scenes.len()).map(|number| number.to_string()).collect()
+/// What the touches of an object's scenes are of, in turn, where the names of its instances are not known: they are called by
+/// their numbers.
+pub fn numbered(scenes: &[Scene]) -> Vec<Source> {
+    let instance = |(index, scene): (usize, &Scene)| scene.table().map_or(index, |table| table.instance);
+    let count = scenes.iter().enumerate().map(instance).max().map_or(0, |last| last + 1);
+    let names: Vec<String> = (1..=count).filter(|_| count > 1).map(|number| number.to_string()).collect();
+    sources_of(&names, scenes)
 }

@@ -11,6 +11,7 @@ use crate::probe::approach::FINGERS;
 use crate::progress::{self, Progress};
 use crate::touches::write_touch;
 use crossbeam_channel::{Receiver, Sender, bounded};
+use palpate_shared::ContactPattern;
 use std::ops::Range;
 use std::time::Instant;
 
@@ -28,6 +29,7 @@ struct Chunk {
     text: String,
     approaches: u64,
     late: [u64; FINGERS],
+    touching: u64,
     turned_back: u64,
 }
 
@@ -74,7 +76,7 @@ pub(super) fn run(
         for (object, samples) in &jobs {
             let start = Instant::now();
             let before = store.entry(*object).clone();
-            let (mut late, mut turned_back) = ([0; FINGERS], 0);
+            let (mut late, mut touching, mut turned_back) = ([0; FINGERS], 0, 0);
             progress.advance(before.touches);
             for part in split(samples) {
                 let turn = turns.next().unwrap_or(0);
@@ -82,6 +84,7 @@ pub(super) fn run(
                 let touches = part.end - part.start;
                 store.append(*object, chunk.text.as_bytes(), touches, chunk.approaches)?;
                 late.iter_mut().zip(chunk.late).for_each(|(late, more)| *late += more);
+                touching += chunk.touching;
                 turned_back += chunk.turned_back;
                 progress::advance(progress, touches)?;
             }
@@ -93,6 +96,7 @@ pub(super) fn run(
                 approaches: entry.approaches,
                 approaches_now: entry.approaches - before.approaches,
                 late,
+                touching,
                 turned_back,
                 seconds: start.elapsed().as_secs_f64(),
             });
@@ -130,13 +134,14 @@ fn produce(
 }
 
 fn compute(sampler: &Sampler<'_>, settings: &Settings, samples: Range<u64>, progress: &dyn Progress) -> Result<Chunk> {
-    let mut chunk = Chunk { text: String::new(), approaches: 0, late: [0; FINGERS], turned_back: 0 };
+    let mut chunk = Chunk { text: String::new(), approaches: 0, late: [0; FINGERS], touching: 0, turned_back: 0 };
     for sample in samples {
         progress::check(progress)?;
         let drawn = sampler.drawn(sample)?;
         write_touch(&mut chunk.text, &drawn.touch, settings.origin.writes_pose());
         chunk.approaches += drawn.approaches;
         chunk.late.iter_mut().zip(drawn.late).for_each(|(late, more)| *late += more);
+        chunk.touching += u64::from(drawn.touch.pattern() != ContactPattern::None);
         chunk.turned_back += drawn.turned_back;
     }
     Ok(chunk)

@@ -35,7 +35,7 @@ pub struct Drawn {
 /// Draws the samples of one object.
 #[derive(Debug)]
 pub struct Sampler<'a> {
-    /// One for each instance.
+    /// One for each instance, or placement of each.
     scenes: &'a [Scene],
     name: &'a str,
     origin: &'a Origin,
@@ -48,7 +48,7 @@ impl<'a> Sampler<'a> {
         Self::of_instances(std::slice::from_ref(scene), name, origin)
     }
 
-    /// The samples of the object with these instances' scenes: sample i is of instance i modulo their number. Without a
+    /// The samples of the object with these scenes, of its instances or placements: sample i is of scene i modulo their number. Without a
     /// scene there is no sample: [`sample`](Self::sample) finds the object untouchable.
     pub fn of_instances(scenes: &'a [Scene], name: &'a str, origin: &'a Origin) -> Self {
         let stream = name.bytes().fold(mix(origin.seed), |hash, byte| mix(hash ^ u64::from(byte)));
@@ -79,7 +79,7 @@ impl<'a> Sampler<'a> {
         let untouchable = || CaptureProblem::Untouchable { name: self.name.into(), approaches: MOST_ATTEMPTS };
         let turn = index % self.scenes.len().max(1) as u64;
         let scene = usize::try_from(turn).ok().and_then(|turn| self.scenes.get(turn)).ok_or_else(untouchable)?;
-        let (bounds, clearance) = (scene.bounds(), self.origin.clearance(scene.bounds()));
+        let clearance = self.origin.clearance(scene.bounds());
         // What the real probe adds has a stream of its own, so that the approaches stay the same with it and without.
         let mut added = (!self.origin.real.is_none())
             .then(|| random::generator(self.origin.seed, Purpose::Capture, self.name, index));
@@ -87,7 +87,7 @@ impl<'a> Sampler<'a> {
         let (window, mut late, mut turned_back) = (probe.window(), [0; FINGERS], 0);
         for approaches in 1..=MOST_ATTEMPTS {
             let target = self.origin.aim.target(scene);
-            let approach = Approach::draw_at(&mut rng, bounds, target, probe.tilt, clearance);
+            let approach = Approach::draw_to(&mut rng, scene, target, probe.tilt, clearance);
             let distances = match &mut added {
                 Some(random) if !grazing.is_none() => grazing.distances(&approach, scene, probe, random),
                 _ if self.origin.approaches => approach.distances(scene, probe),
@@ -114,9 +114,9 @@ impl<'a> Sampler<'a> {
     /// The first approach that sample `index` draws, to this scene of the object: the sample itself where every approach is
     /// kept.
     pub fn approach(&self, scene: &Scene, index: u64) -> Approach {
-        let (bounds, origin) = (scene.bounds(), self.origin);
-        let target = origin.aim.target(scene);
-        Approach::draw_at(&mut self.rng(index), bounds, target, origin.probe.tilt, origin.clearance(bounds))
+        let origin = self.origin;
+        let (target, clearance) = (origin.aim.target(scene), origin.clearance(scene.bounds()));
+        Approach::draw_to(&mut self.rng(index), scene, target, origin.probe.tilt, clearance)
     }
 
     fn rng(&self, index: u64) -> Xoshiro256PlusPlus {

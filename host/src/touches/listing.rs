@@ -42,10 +42,14 @@ pub struct Entry {
     /// otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub instances: Vec<String>,
-    /// Number of touches of each instance, one instance after the other in the file, where they are not in turn, such
+    /// Number of touches of each instance, or of each placement, one after the other in the file, where they are not in turn, such
     /// as after a split.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub counts: Vec<u64>,
+    /// The placements on a table that it was touched in, those of one instance after those of another: sample i is of number i
+    /// modulo their number, unless `counts` has a number of touches for each of them. Empty if it floats.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub placements: Vec<Lying>,
     /// The [checksum](crate::mesh::Mesh::checksum) of each instance's mesh, as it was read, in hexadecimal digits. Versions
     /// before 0.3.0 wrote none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -53,6 +57,49 @@ pub struct Entry {
     /// Number of millimeters in a unit of its meshes, if it was touched at its true size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub millimeters: Option<f64>,
+}
+
+/// A placement that an object was touched in.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lying {
+    /// The instance, if the object has several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instance: Option<String>,
+    /// The placement's name.
+    pub name: String,
+    /// Its weight among the placements of the object, or of the instance: from 0 to 1, with up to six decimals.
+    pub weight: f64,
+}
+
+impl Lying {
+    /// The source of its touches.
+    pub fn source(&self) -> Source {
+        let millionths = (self.weight * 1e6).round().clamp(0.0, 1e6) as u32;
+        Source::Placement { instance: self.instance.clone(), placement: self.name.clone(), millionths }
+    }
+
+    /// The placement that is a source of touches, if it is one.
+    pub fn of(source: &Source) -> Option<Self> {
+        match source {
+            Source::Placement { instance, placement, millionths } => Some(Self {
+                instance: instance.clone(),
+                name: placement.clone(),
+                weight: f64::from(*millionths) / 1e6,
+            }),
+            _ => None,
+        }
+    }
+}
+
+impl Entry {
+    /// What its touches are of in turn: placements, instances, or nothing.
+    pub fn sources(&self) -> Vec<Source> {
+        match self.placements.is_empty() {
+            true => self.instances.iter().cloned().map(Source::Instance).collect(),
+            false => self.placements.iter().map(Lying::source).collect(),
+        }
+    }
 }
 
 impl Listing {
@@ -140,20 +187,21 @@ impl Listing {
         if entry.counts.is_empty() {
             let meshes = Meshes { checksums: entry.meshes.clone(), millimeters: entry.millimeters };
             let object =
-                ObjectTouches::in_turn(name, touches, &entry.instances, self.origin.samples().start).of_stroke(window);
+                ObjectTouches::in_turn(name, touches, &entry.sources(), self.origin.samples().start).of_stroke(window);
             return Ok(object.of_meshes(Some(meshes).filter(|meshes| !meshes.checksums.is_empty())));
         }
         let stated = entry.counts.iter().try_fold(0_u64, |sum, &count| sum.checked_add(count));
-        if entry.counts.len() != entry.instances.len() || stated != Some(touches.len() as u64) {
+        let sources = entry.sources();
+        if entry.counts.len() != sources.len() || stated != Some(touches.len() as u64) {
             let message = format!(
-                "{name} has {} instances and {} touches, and counts that are not for these",
-                entry.instances.len(),
+                "{name} has {} {} and {} touches, and counts that are not for these",
+                sources.len(),
+                if entry.placements.is_empty() { "instances" } else { "placements" },
                 touches.len()
             );
             return Err(TouchesProblem::BadListing { message }.into());
         }
-        let instances = entry.instances.iter().cloned().map(Source::Instance);
-        let runs = instances.zip(entry.counts.iter().copied()).collect();
+        let runs = sources.into_iter().zip(entry.counts.iter().copied()).collect();
         Ok(ObjectTouches::in_runs(name, touches, runs).of_stroke(window))
     }
 

@@ -14,10 +14,26 @@ pub enum Source {
     Object,
     /// One of its instances, by name.
     Instance(String),
+    /// One of its placements on a table, or of those of one of its instances.
+    Placement {
+        /// The instance, if the object has several.
+        instance: Option<String>,
+        /// The placement's name.
+        placement: String,
+        /// Its weight among the placements of the object, or of the instance, in millionths.
+        millionths: u32,
+    },
     /// One of its recordings, as its data set lists it.
     Recording(Recorded),
     /// A robot's log.
     Log(PathBuf),
+}
+
+impl From<String> for Source {
+    /// An instance of this name.
+    fn from(instance: String) -> Self {
+        Self::Instance(instance)
+    }
 }
 
 /// The touches of one object. Each keeps the source that it is of, and the robot that made it, through everything that is
@@ -64,16 +80,23 @@ impl ObjectTouches {
         }
     }
 
-    /// Touches of instances in turn: touch i is of instance `first` + i modulo their number. Without names, or with one,
-    /// all touches are of [`Source::Object`].
-    pub fn in_turn(name: impl Into<String>, touches: Vec<Touch>, instances: &[String], first: u64) -> Self {
-        let count = instances.len() as u64;
-        if count <= 1 {
-            return Self::new(name, touches, Source::Object);
+    /// Touches of instances or placements in turn: touch i is of number `first` + i modulo their number. Without any, and of one
+    /// instance alone, all touches are of [`Source::Object`].
+    pub fn in_turn(
+        name: impl Into<String>,
+        touches: Vec<Touch>,
+        sources: &[impl Clone + Into<Source>],
+        first: u64,
+    ) -> Self {
+        let sources: Vec<Source> = sources.iter().cloned().map(Into::into).collect();
+        let count = sources.len() as u64;
+        match &sources[..] {
+            [] | [Source::Instance(_)] => return Self::new(name, touches, Source::Object),
+            [one] => return Self::new(name, touches, one.clone()),
+            _ => {}
         }
         // Below the number of the instances.
         let source_of = (0..touches.len() as u64).map(|touch| ((first % count + touch) % count) as u32).collect();
-        let sources = instances.iter().cloned().map(Source::Instance).collect();
         Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), meshes: None, window: None }
             .tidied()
     }
@@ -120,6 +143,14 @@ impl ObjectTouches {
             let named = |source: &Source| match source {
                 Source::Object => Source::Instance(object.name.clone()),
                 Source::Instance(instance) => Source::Instance(format!("{}/{instance}", object.name)),
+                Source::Placement { instance, placement, millionths } => Source::Placement {
+                    instance: Some(match instance {
+                        Some(instance) => format!("{}/{instance}", object.name),
+                        None => object.name.clone(),
+                    }),
+                    placement: placement.clone(),
+                    millionths: *millionths,
+                },
                 other => other.clone(),
             };
             let sources = object.sources.iter().map(named).collect();
@@ -232,6 +263,42 @@ impl ObjectTouches {
     /// The position of a touch's source among [`sources`](Self::sources).
     pub fn source_of(&self, touch: usize) -> usize {
         self.source_of.get(touch).map_or(0, |source| *source as usize)
+    }
+
+    /// The placement of a source among [`sources`](Self::sources), by name; none if it is of none.
+    pub fn placement_of_source(&self, source: usize) -> Option<&str> {
+        match self.sources.get(source)? {
+            Source::Placement { placement, .. } => Some(placement),
+            _ => None,
+        }
+    }
+
+    /// The share that each source has of the object: of placements their weights, each instance counting the same; equal shares
+    /// of other sources. They sum to 1.
+    pub fn source_weights(&self) -> Vec<f64> {
+        let weight = |source: &Source| match source {
+            Source::Placement { millionths, .. } => f64::from(*millionths),
+            _ => 1e6,
+        };
+        let whole: f64 = self.sources.iter().map(weight).sum();
+        // Every placement has a weight, unless a file was changed by hand.
+        if whole > 0.0 {
+            self.sources.iter().map(|source| weight(source) / whole).collect()
+        } else {
+            vec![1.0 / self.sources.len().max(1) as f64; self.sources.len()]
+        }
+    }
+
+    /// The weights of the object's placements by name, over all of its instances; the greatest first, equal ones by name. They
+    /// sum to 1. None if the object was not touched in placements.
+    pub fn placement_weights(&self) -> Option<Vec<(String, f64)>> {
+        let mut sums = std::collections::BTreeMap::<&str, f64>::new();
+        for (source, weight) in self.source_weights().into_iter().enumerate() {
+            *sums.entry(self.placement_of_source(source)?).or_default() += weight;
+        }
+        let mut weights: Vec<_> = sums.into_iter().map(|(name, weight)| (name.to_owned(), weight)).collect();
+        weights.sort_by(|a, b| b.1.total_cmp(&a.1));
+        (!weights.is_empty()).then_some(weights)
     }
 
     /// For each source its touches' positions, ascending.

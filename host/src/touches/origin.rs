@@ -1,6 +1,6 @@
 //! Origin of touches.
 
-use super::{Format, Shard};
+use super::{Format, Shard, Surroundings};
 use crate::error::{Error, Result};
 use crate::mesh::{Instance, Object};
 use crate::probe::approach::{Aim, CLEARANCE, Probe};
@@ -30,6 +30,9 @@ pub struct Origin {
     /// Where approaches aim.
     #[serde(default, skip_serializing_if = "Aim::is_box")]
     pub aim: Aim,
+    /// Surroundings of the objects: floating, or on a table.
+    #[serde(default, skip_serializing_if = "Surroundings::is_floating")]
+    pub scene: Surroundings,
     /// True if the probe's direction and alignment are written too.
     pub pose: bool,
     /// True if every approach is kept, not only full touches: sample i is then approach i.
@@ -52,6 +55,7 @@ impl Default for Origin {
             length: 10.0,
             probe: Probe::default(),
             aim: Aim::Box,
+            scene: Surroundings::Floating,
             pose: false,
             approaches: false,
             format: Format::Text,
@@ -79,6 +83,7 @@ impl Origin {
             return Err(Error::setting("format", self.format.name(), "text, or build with the feature parquet"));
         }
         self.real.check()?;
+        self.scene.check()?;
         match self.unit {
             Length::Tenth => self.probe.check(self.length),
             // Each object is checked when its size is known.

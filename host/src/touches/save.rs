@@ -1,6 +1,6 @@
 //! A data set in memory, to the disk.
 
-use super::{Dataset, Entry, Format, Listing, ObjectTouches, Source, checksum, files, write_touch};
+use super::{Dataset, Entry, Format, Listing, Lying, ObjectTouches, Source, checksum, files, write_touch};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
 use std::path::Path;
@@ -92,13 +92,18 @@ fn arranged(object: &ObjectTouches, first: u64, entry: &mut Entry) -> ObjectTouc
     let name = |source: &Source| match source {
         Source::Object => object.name.clone(),
         Source::Instance(name) => name.clone(),
+        Source::Placement { instance, .. } => instance.clone().unwrap_or_default(),
         Source::Log(path) => path.display().to_string(),
         Source::Recording(_) => String::new(),
     };
     let count = object.sources().len() as u64;
     let is_recorded = object.sources().iter().any(|source| matches!(source, Source::Recording(_)));
+    entry.placements = object.sources().iter().filter_map(Lying::of).collect();
     if count > 1 && !is_recorded {
-        entry.instances = object.sources().iter().map(name).collect();
+        entry.instances = object.sources().iter().map(name).filter(|name| !name.is_empty()).collect();
+        if !entry.placements.is_empty() {
+            entry.instances.dedup();
+        }
         let is_in_turn = |touch: usize| object.source_of(touch) as u64 == (first % count + touch as u64) % count;
         if (0..object.len()).all(is_in_turn) {
             return object.clone();

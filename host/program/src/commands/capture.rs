@@ -1,8 +1,9 @@
 use super::numbers::count;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
+use super::scene::{SceneArguments, described};
 use super::{Global, remark};
-use palpate::capture::{self, Settings, Summary};
+use palpate::capture::{self, ObjectSummary, Settings, Summary};
 use palpate::error::{CaptureProblem, Problem, TouchesProblem};
 use palpate::mesh::facts::Facts;
 use palpate::output;
@@ -26,6 +27,9 @@ Examples:
   palpate capture meshes/ -o data --true-size mm --probe probe.toml
                                                    as large as they are
   palpate capture meshes/ -o data --instances      a directory for each object
+  palpate capture meshes/ -o data --scene table    as they lie, from above
+  palpate capture winebottle -o data --scene table --placements winebottle/+z=1
+                                                   only standing
   palpate capture meshes/ -o part2 --shard 2/8     the second of eight parts")]
 pub(crate) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
@@ -45,6 +49,8 @@ pub(crate) struct Arguments {
     length: Option<f64>,
     #[command(flatten)]
     size: SizeArguments,
+    #[command(flatten)]
+    scene: SceneArguments,
     /// Where approaches aim: box (the bounding box), middle or mass [default: box]
     #[arg(long, value_name = "WHERE", value_parser = aim)]
     aim: Option<Aim>,
@@ -78,7 +84,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         threads: global.threads,
     };
     settings.check()?;
-    let objects = arguments.size.objects(&arguments.sources, settings.origin.seed)?;
+    let mut objects = arguments.size.objects(&arguments.sources, settings.origin.seed)?;
+    arguments.scene.weigh(&mut objects)?;
     for object in &objects {
         for instance in object.instances() {
             let complaints = Facts::of(&instance.mesh).complaints(object.millimeters);
@@ -93,7 +100,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return output::print_json(&summary);
     }
     let text = if settings.origin.approaches { kept(&summary) } else { table(&summary) };
-    output::print(&(text + &unreached(&summary, &settings.origin)))
+    let placements = if settings.origin.scene.is_floating() { String::new() } else { described(&objects)? };
+    output::print(&(text + &unreached(&summary, &settings.origin) + &placements))
 }
 
 /// Contacts that are missing because the hand had stopped, by finger, and why.
@@ -138,6 +146,7 @@ impl Arguments {
             seed: seed.unwrap_or(base.seed),
             length: self.length.unwrap_or(base.length),
             aim: self.aim.unwrap_or(base.aim),
+            scene: self.scene.scene(base.scene)?,
             pose: self.pose || base.pose,
             approaches: self.approaches.is_some() || base.approaches,
             format: self.format.unwrap_or(base.format),
@@ -176,16 +185,17 @@ pub(super) fn hint(error: &Error) -> Option<&'static str> {
 /// Counts of a capture that keeps every approach: none of them has to be a touch.
 fn kept(summary: &Summary) -> String {
     let width = summary.objects.iter().map(|object| object.name.len()).max().unwrap_or(0).max(6);
-    let mut text = format!("{:width$}  {:>12}  {:>14}\n", "object", "approaches", "approaches/s");
-    let mut row = |name: &str, approaches: u64, now: u64, seconds: f64| {
+    let mut text = format!("{:width$}  {:>12}  {:>8}  {:>14}\n", "object", "approaches", "touching", "approaches/s");
+    let mut row = |name: &str, approaches: u64, [now, touching]: [u64; 2], seconds: f64| {
+        let share = 100.0 * touching as f64 / now.max(1) as f64;
         // Writing to a string cannot fail.
-        _ = writeln!(text, "{name:width$}  {approaches:>12}  {:>14.0}", now as f64 / seconds);
+        _ = writeln!(text, "{name:width$}  {approaches:>12}  {share:>7.1}%  {:>14.0}", now as f64 / seconds);
     };
     for object in &summary.objects {
-        row(&object.name, object.approaches, object.approaches_now, object.seconds);
+        row(&object.name, object.approaches, [object.approaches_now, object.touching], object.seconds);
     }
-    let now = summary.objects.iter().map(|object| object.approaches_now).sum();
-    row("all", summary.approaches(), now, summary.seconds);
+    let sum = |of: fn(&ObjectSummary) -> u64| summary.objects.iter().map(of).sum();
+    row("all", summary.approaches(), [sum(|object| object.approaches_now), sum(|object| object.touching)], summary.seconds);
     text + "Every approach was kept, also those that touched nothing: `palpate data check` counts which fingers touched.\n"
 }
 

@@ -27,6 +27,7 @@ mod renamed;
 mod report;
 mod rows;
 mod run;
+mod scene;
 mod sequences;
 mod shell;
 mod strangers;

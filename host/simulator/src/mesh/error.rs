@@ -133,6 +133,26 @@ pub enum MeshProblem {
         /// The index, counted from 0.
         index: u32,
     },
+    /// An object has no placement of a name.
+    #[error("{object} has no placement {name}: it has {}", known.join(", "))]
+    NoSuchPlacement {
+        /// The object.
+        object: String,
+        /// The name.
+        name: String,
+        /// The names of its placements.
+        known: Vec<String>,
+    },
+    /// None of the placements that an instance of an object has is to be used.
+    #[error("no placement of {object}{} has a weight above 0: it has {}", of_instance(object, instance), known.join(", "))]
+    NoPlacement {
+        /// The object.
+        object: String,
+        /// The instance.
+        instance: String,
+        /// The names of its placements.
+        known: Vec<String>,
+    },
     /// A built-in object cannot be meshed without gaps at any resolution that is tried.
     #[error("the built-in object {name} {} has no closed mesh", variation(seed))]
     NotMeshed {
@@ -141,6 +161,10 @@ pub enum MeshProblem {
         /// The seed of its proportions; none for the canonical ones.
         seed: Option<u64>,
     },
+}
+
+fn of_instance(object: &str, instance: &str) -> String {
+    if object == instance { String::new() } else { format!(", instance {instance},") }
 }
 
 fn variation(seed: &Option<u64>) -> String {
@@ -172,6 +196,9 @@ impl Problem for MeshProblem {
             }
             Self::MissingVertex { .. } | Self::VertexNotFinite { .. } => {
                 "Give a mesh whose faces have finite vertices.".into()
+            }
+            Self::NoSuchPlacement { .. } | Self::NoPlacement { .. } => {
+                "Give the weights of placements that it has; those that are not named are left out.".into()
             }
             Self::NotMeshed { seed: Some(_), .. } => "Use another seed.".into(),
             Self::NotMeshed { seed: None, .. } => "Report this as a bug.".into(),

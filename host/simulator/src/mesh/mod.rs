@@ -45,6 +45,7 @@ pub mod file;
 mod gltf;
 pub mod obj;
 mod placed;
+pub mod placements;
 mod ply;
 mod polygon;
 pub mod source;
@@ -68,6 +69,9 @@ pub struct Object {
     pub name: String,
     /// Number of millimeters in a unit of its meshes, where that is known: what touching it at its true size needs.
     pub millimeters: Option<f64>,
+    /// Weights of its placements on a table that replace those of their solid angles, by name: a placement that is not among
+    /// them is left out. Empty: solid angles.
+    pub placement_weights: Vec<(String, f64)>,
     /// Notes for the user on how it was found and read: other files of its name that were passed over.
     pub notes: Vec<String>,
     first: Instance,
@@ -88,14 +92,14 @@ impl Object {
     pub fn new(name: impl Into<String>, mesh: Mesh) -> Self {
         let name = name.into();
         let first = Instance { name: name.clone(), mesh };
-        Self { name, millimeters: None, notes: Vec::new(), first, others: Vec::new() }
+        Self { name, millimeters: None, placement_weights: Vec::new(), notes: Vec::new(), first, others: Vec::new() }
     }
 
     /// An object with several meshes of unknown units; none if there is no instance.
     pub fn of_instances(name: impl Into<String>, instances: Vec<Instance>) -> Option<Self> {
         let mut instances = instances.into_iter();
         let first = instances.next()?;
-        Some(Self { name: name.into(), millimeters: None, notes: Vec::new(), first, others: instances.collect() })
+        Some(Self { name: name.into(), millimeters: None, placement_weights: Vec::new(), notes: Vec::new(), first, others: instances.collect() })
     }
 
     /// Its mesh, or that of its first instance.

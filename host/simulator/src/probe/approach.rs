@@ -158,11 +158,42 @@ impl Approach {
         let [low, high] = target;
         let aim = low + (high - low) * DVec3::new(unit(rng), unit(rng), unit(rng));
         let direction = (aim - start).normalize();
-        let across = direction.any_orthonormal_vector();
-        let [roll_cos, roll_sin] = on_circle(rng);
-        let row = across * roll_cos + direction.cross(across) * roll_sin;
-        let (tilt_sin, tilt_cos) = libm::sincos((tilt * (2.0 * unit(rng) - 1.0)).to_radians());
-        Self { start, direction, alignment: row * tilt_cos + direction * tilt_sin }
+        Self { start, direction, alignment: row(rng, direction, tilt) }
+    }
+
+    /// Draws an approach to this scene, with the aim uniform in the `target`: to a floating object as [`draw_at`](Self::draw_at)
+    /// does, to one on a table as [`draw_above`](Self::draw_above) does.
+    pub fn draw_to(rng: &mut impl Rng, scene: &Scene, target: [DVec3; 2], tilt: f64, clearance: f64) -> Self {
+        match scene.table() {
+            None => Self::draw_at(rng, scene.bounds(), target, tilt, clearance),
+            Some(table) => Self::draw_above(rng, scene.bounds(), target, tilt, clearance, table.cone),
+        }
+    }
+
+    /// Draws an approach from above. Direction: uniform within `cone` degrees of straight down. Aim: uniform in the `target`; the
+    /// middle finger moves to the aim, from the sphere about the box's center with half the box's diagonal plus `clearance` as
+    /// its radius. Row: as [`draw_at`](Self::draw_at).
+    pub fn draw_above(
+        rng: &mut impl Rng,
+        [low, high]: [DVec3; 2],
+        target: [DVec3; 2],
+        tilt: f64,
+        clearance: f64,
+        cone: f64,
+    ) -> Self {
+        let (center, radius) = ((low + high) / 2.0, (high - low).length() / 2.0 + clearance);
+        let down = 1.0 - unit(rng) * (1.0 - libm::cos(cone.to_radians()));
+        let [x, y] = on_circle(rng);
+        let level = (1.0 - down * down).max(0.0).sqrt();
+        let direction = DVec3::new(x * level, y * level, -down);
+        let [low, high] = target;
+        let aim = low + (high - low) * DVec3::new(unit(rng), unit(rng), unit(rng));
+        // Back from the aim to the sphere, which it is inside of.
+        let off = aim - center;
+        let along = off.dot(direction);
+        let back = along + (along * along + radius * radius - off.length_squared()).max(0.0).sqrt();
+        let alignment = row(rng, direction, tilt);
+        Self { start: aim - direction * back, direction, alignment }
     }
 
     /// Where the fingers start, first to third, in units.
@@ -170,14 +201,36 @@ impl Approach {
         [-1.0, 0.0, 1.0].map(|place| self.start + self.alignment * (place * spacing))
     }
 
-    /// Distance that the probe has moved when each finger first touches, in units; none for a finger that never does.
+    /// Distance that the probe has moved when each finger first touches, in units; none for a finger that never does, or only
+    /// after one of them has reached the table.
     pub fn distances(&self, scene: &Scene, probe: &Probe) -> [Option<f64>; FINGERS] {
-        self.fingers(probe.spacing).map(|finger| scene.first_contact(finger, self.direction, probe.radius))
+        let distances =
+            self.fingers(probe.spacing).map(|finger| scene.first_contact(finger, self.direction, probe.radius));
+        self.above_table(distances, scene, probe)
     }
 
     /// The same if all three fingers touch, else none: as soon as one finger misses, no other is cast.
     pub fn full_distances(&self, scene: &Scene, probe: &Probe) -> Option<[f64; FINGERS]> {
-        scene.all_contacts(self.fingers(probe.spacing), self.direction, probe.radius)
+        let distances = scene.all_contacts(self.fingers(probe.spacing), self.direction, probe.radius)?;
+        let end = self.end_at_table(scene, probe);
+        distances.iter().all(|distance| *distance <= end).then_some(distances)
+    }
+
+    /// Distance that the probe has moved when the first of its fingers reaches the table; infinite where there is none.
+    pub fn end_at_table(&self, scene: &Scene, probe: &Probe) -> f64 {
+        let reached = |finger| scene.reaches_table(finger, self.direction, probe.radius);
+        self.fingers(probe.spacing).map(reached).into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Distances of an approach without those behind its end at the table.
+    pub fn above_table(
+        &self,
+        distances: [Option<f64>; FINGERS],
+        scene: &Scene,
+        probe: &Probe,
+    ) -> [Option<f64>; FINGERS] {
+        let end = self.end_at_table(scene, probe);
+        distances.map(|distance| distance.filter(|distance| *distance <= end))
     }
 
     /// The touch that these distances give: times in whole microseconds after the first contact, and the pose.
@@ -199,6 +252,15 @@ impl Approach {
 pub fn to_q15(cosine: f64) -> i16 {
     let one = f64::from(Q15_ONE);
     (cosine * one).round().clamp(-one, one) as i16
+}
+
+/// The direction of the row of fingers: perpendicular to the motion, rolled uniformly about it, then tilted.
+fn row(rng: &mut impl Rng, direction: DVec3, tilt: f64) -> DVec3 {
+    let across = direction.any_orthonormal_vector();
+    let [roll_cos, roll_sin] = on_circle(rng);
+    let row = across * roll_cos + direction.cross(across) * roll_sin;
+    let (tilt_sin, tilt_cos) = libm::sincos((tilt * (2.0 * unit(rng) - 1.0)).to_radians());
+    row * tilt_cos + direction * tilt_sin
 }
 
 /// Uniform in [0, 1), of 53 bits.

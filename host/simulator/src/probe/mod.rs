@@ -48,7 +48,7 @@ pub mod unit;
 
 pub use approach::{Aim, Approach, Probe};
 pub use error::ProbeProblem;
-pub use scene::Scene;
+pub use scene::{Scene, Table};
 
 /// The vectors in this room's signatures: [`DVec3`](glam::DVec3) for positions and directions, in units.
 pub use glam;

@@ -3,13 +3,27 @@
 use crate::error::{MeshProblem, Result};
 use crate::mesh::Mesh;
 use crate::probe::sweep::{Contact, Surface, narrow::Triangle};
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 
 /// A mesh in the units of the probe, with what makes casting spheres at it fast.
 #[derive(Clone, Debug)]
 pub struct Scene {
     surface: Surface,
     bounds: [DVec3; 2],
+    table: Option<Table>,
+}
+
+/// A table under an object, and how the object lies on it. Its top is level with the object's lowest point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// The number of the mesh among the object's instances, from 0.
+    pub instance: usize,
+    /// The name of the placement.
+    pub placement: String,
+    /// The placement's weight among all of the instance.
+    pub weight: f64,
+    /// Largest angle between approaches and straight down, in degrees.
+    pub cone: f64,
 }
 
 impl Scene {
@@ -20,18 +34,23 @@ impl Scene {
     /// vertices are at the same point.
     pub fn new(mesh: &Mesh, length: f64) -> Result<Self> {
         let mut triangles = corners(mesh)?;
-        let [low, high] = bounds(&triangles);
-        let longest = (high - low).max_element();
-        if longest <= 0.0 {
-            return Err(MeshProblem::NoExtent.into());
-        }
-        let (center, scale) = ((low + high) / 2.0, length / longest);
-        for triangle in &mut triangles {
-            for corner in triangle {
-                *corner = (*corner - center) * scale;
-            }
-        }
+        scale(&mut triangles, length)?;
         Ok(Self::of(triangles))
+    }
+
+    /// The mesh as it lies on a table: scaled so that the longest side of its bounding box in its own frame has `length` units,
+    /// rotated, and centered on the center of its box then. The z axis points up.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn on_table(mesh: &Mesh, length: f64, rotation: DMat3, table: Table) -> Result<Self> {
+        let mut triangles = corners(mesh)?;
+        scale(&mut triangles, length)?;
+        triangles.iter_mut().flatten().for_each(|corner| *corner = rotation * *corner);
+        let [low, high] = bounds(&triangles);
+        let center = (low + high) / 2.0;
+        triangles.iter_mut().flatten().for_each(|corner| *corner -= center);
+        Ok(Self { table: Some(table), ..Self::of(triangles) })
     }
 
     /// The mesh in its own units and place.
@@ -44,7 +63,29 @@ impl Scene {
 
     fn of(triangles: Vec<Triangle>) -> Self {
         let (surface, bounds) = Surface::with_bounds(triangles);
-        Self { surface, bounds }
+        Self { surface, bounds, table: None }
+    }
+
+    /// The table that the object lies on; none if it floats.
+    pub fn table(&self) -> Option<&Table> {
+        self.table.as_ref()
+    }
+
+    /// Distance at which a sphere that moves from `origin` in a direction, a unit vector, reaches the table: 0 if it starts
+    /// there, infinite if there is no table or the sphere does not come down to it.
+    pub fn reaches_table(&self, origin: DVec3, direction: DVec3, radius: f64) -> f64 {
+        if self.table.is_none() {
+            return f64::INFINITY;
+        }
+        let [low, _] = self.bounds;
+        let above = origin.z - radius - low.z;
+        if above <= 0.0 {
+            0.0
+        } else if direction.z < 0.0 {
+            above / -direction.z
+        } else {
+            f64::INFINITY
+        }
     }
 
     /// The surface itself.
@@ -106,6 +147,18 @@ fn corners(mesh: &Mesh) -> Result<Vec<Triangle>, MeshProblem> {
         triangles.push([corner(a)?, corner(b)?, corner(c)?]);
     }
     Ok(triangles)
+}
+
+/// Scales triangles so that the longest side of their bounding box has `length` units, and moves its center to the origin.
+fn scale(triangles: &mut [Triangle], length: f64) -> Result<(), MeshProblem> {
+    let [low, high] = bounds(triangles);
+    let longest = (high - low).max_element();
+    if longest <= 0.0 {
+        return Err(MeshProblem::NoExtent);
+    }
+    let (center, scale) = ((low + high) / 2.0, length / longest);
+    triangles.iter_mut().flatten().for_each(|corner| *corner = (*corner - center) * scale);
+    Ok(())
 }
 
 fn bounds(triangles: &[Triangle]) -> [DVec3; 2] {

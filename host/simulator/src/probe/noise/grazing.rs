@@ -36,11 +36,12 @@ impl Grazing {
         probe: &Probe,
         random: &mut impl Rng,
     ) -> [Option<f64>; FINGERS] {
-        approach.fingers(probe.spacing).map(|finger| {
+        let distances = approach.fingers(probe.spacing).map(|finger| {
             let draw = Exp1.sample(random);
             let cast = [finger, approach.direction];
             self.distance(cast, &scene.contact(finger, approach.direction, probe.radius)?, draw, scene, probe)
-        })
+        });
+        approach.above_table(distances, scene, probe)
     }
 
     /// Distance at which a finger touches that would do so at `contact` on its way from start in a direction; with an
