@@ -32,6 +32,8 @@ mod pipeline;
 mod sample;
 mod store;
 #[cfg(test)]
+mod table_tests;
+#[cfg(test)]
 mod tests;
 
 use crate::error::{Error, Result};

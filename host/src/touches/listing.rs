@@ -82,11 +82,9 @@ impl Lying {
     /// The placement that is a source of touches, if it is one.
     pub fn of(source: &Source) -> Option<Self> {
         match source {
-            Source::Placement { instance, placement, millionths } => Some(Self {
-                instance: instance.clone(),
-                name: placement.clone(),
-                weight: f64::from(*millionths) / 1e6,
-            }),
+            Source::Placement { instance, placement, millionths } => {
+                Some(Self { instance: instance.clone(), name: placement.clone(), weight: f64::from(*millionths) / 1e6 })
+            }
             _ => None,
         }
     }

@@ -68,7 +68,7 @@ pub(crate) use dataset::logs;
 pub use error::TouchesProblem;
 pub use files::files;
 pub use format::Format;
-pub use listing::{Entry, Lying, Listing};
+pub use listing::{Entry, Listing, Lying};
 pub use log::{Log, LogWriter, Logged, begins_log, is_log, read_touches};
 pub use logged::{Channels, LoggedVerdict, Message, Said};
 pub use object::{ObjectTouches, Pool, Source};

@@ -67,7 +67,9 @@ mod tests {
         for cone in [0.0, -1.0, 90.1, f64::NAN, f64::INFINITY] {
             assert!(Surroundings::Table { cone }.check().is_err(), "{cone}");
         }
-        for surroundings in [Surroundings::Floating, Surroundings::Table { cone: 90.0 }, Surroundings::Table { cone: 0.1 }] {
+        for surroundings in
+            [Surroundings::Floating, Surroundings::Table { cone: 90.0 }, Surroundings::Table { cone: 0.1 }]
+        {
             assert!(surroundings.check().is_ok());
             let text = serde_json::to_string(&surroundings).unwrap();
             assert_eq!(serde_json::from_str::<Surroundings>(&text).unwrap(), surroundings);

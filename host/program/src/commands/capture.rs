@@ -195,7 +195,12 @@ fn kept(summary: &Summary) -> String {
         row(&object.name, object.approaches, [object.approaches_now, object.touching], object.seconds);
     }
     let sum = |of: fn(&ObjectSummary) -> u64| summary.objects.iter().map(of).sum();
-    row("all", summary.approaches(), [sum(|object| object.approaches_now), sum(|object| object.touching)], summary.seconds);
+    row(
+        "all",
+        summary.approaches(),
+        [sum(|object| object.approaches_now), sum(|object| object.touching)],
+        summary.seconds,
+    );
     text + "Every approach was kept, also those that touched nothing: `palpate data check` counts which fingers touched.\n"
 }
 

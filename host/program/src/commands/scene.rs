@@ -111,7 +111,8 @@ fn weight(text: &str) -> Result<Weight, String> {
         let weight = weight.parse().ok().filter(|weight: &f64| weight.is_finite() && *weight >= 0.0)?;
         Some(Weight { object: object.into(), placement: placement.into(), weight })
     };
-    parts().ok_or_else(|| "give an object, one of its placements and a weight of 0 or more, such as mug/+z=3".to_owned())
+    parts()
+        .ok_or_else(|| "give an object, one of its placements and a weight of 0 or more, such as mug/+z=3".to_owned())
 }
 
 #[cfg(test)]

@@ -99,7 +99,14 @@ impl Object {
     pub fn of_instances(name: impl Into<String>, instances: Vec<Instance>) -> Option<Self> {
         let mut instances = instances.into_iter();
         let first = instances.next()?;
-        Some(Self { name: name.into(), millimeters: None, placement_weights: Vec::new(), notes: Vec::new(), first, others: instances.collect() })
+        Some(Self {
+            name: name.into(),
+            millimeters: None,
+            placement_weights: Vec::new(),
+            notes: Vec::new(),
+            first,
+            others: instances.collect(),
+        })
     }
 
     /// Its mesh, or that of its first instance.

@@ -31,7 +31,8 @@ impl Shape {
     /// The surface of a mesh whose vertices are `at` these places about the center of mass.
     pub(super) fn new(mesh: &Mesh, at: &[DVec3], longest: f64) -> Self {
         let points = points(mesh, at, longest);
-        let corner = |pick: fn(DVec3, DVec3) -> DVec3, start: f64| points.iter().copied().fold(DVec3::splat(start), pick);
+        let corner =
+            |pick: fn(DVec3, DVec3) -> DVec3, start: f64| points.iter().copied().fold(DVec3::splat(start), pick);
         let margin = TOLERANCE + 2.0 / CELLS;
         let low = corner(DVec3::min, f64::INFINITY) - margin;
         let high = corner(DVec3::max, f64::NEG_INFINITY) + margin;
@@ -59,8 +60,7 @@ impl Shape {
 
     fn index(&self, [x, y, z]: [i64; 3]) -> Option<usize> {
         let [x, y, z] = [usize::try_from(x).ok()?, usize::try_from(y).ok()?, usize::try_from(z).ok()?];
-        (x < self.size[0] && y < self.size[1] && z < self.size[2])
-            .then(|| (x * self.size[1] + y) * self.size[2] + z)
+        (x < self.size[0] && y < self.size[1] && z < self.size[2]).then(|| (x * self.size[1] + y) * self.size[2] + z)
     }
 
     fn is_near(&self, point: DVec3) -> bool {

@@ -214,8 +214,7 @@ fn facets(mesh: &Mesh, at: &[DVec3]) -> Vec<hull::Facet> {
 /// The stable facets: which direction points up on each, and with what weight the object ends on it. `corners` are about the
 /// center of mass.
 fn settled(facets: &[hull::Facet], corners: &[[DVec3; 3]]) -> Vec<(DVec3, f64)> {
-    let normals: Vec<DVec3> =
-        corners.iter().map(|&[a, b, c]| (b - a).cross(c - a).normalize_or(DVec3::Z)).collect();
+    let normals: Vec<DVec3> = corners.iter().map(|&[a, b, c]| (b - a).cross(c - a).normalize_or(DVec3::Z)).collect();
     let next = |facet: usize| -> Option<usize> {
         let normal = normals[facet];
         let beyond = |edge: usize| {
@@ -252,16 +251,16 @@ fn settled(facets: &[hull::Facet], corners: &[[DVec3; 3]]) -> Vec<(DVec3, f64)> 
         weights[end] += solid_angle(corners[start]);
     }
     let whole: f64 = weights.iter().sum();
-    (0..facets.len()).filter(|&facet| weights[facet] > 0.0).map(|facet| (-normals[facet], weights[facet] / whole)).collect()
+    (0..facets.len())
+        .filter(|&facet| weights[facet] > 0.0)
+        .map(|facet| (-normals[facet], weights[facet] / whole))
+        .collect()
 }
 
 /// The solid angle of a triangle seen from the origin (Van Oosterom and Strackee 1983).
 fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
     let lengths = [a, b, c].map(DVec3::length);
-    let below = lengths.iter().product::<f64>()
-        + a.dot(b) * lengths[2]
-        + b.dot(c) * lengths[0]
-        + c.dot(a) * lengths[1];
+    let below = lengths.iter().product::<f64>() + a.dot(b) * lengths[2] + b.dot(c) * lengths[0] + c.dot(a) * lengths[1];
     2.0 * libm::atan2(a.dot(b.cross(c)), below).abs()
 }
 

@@ -3,7 +3,8 @@ use std::collections::BTreeMap;
 
 /// A box, closed and right side out.
 fn cuboid(sides: [f32; 3]) -> Mesh {
-    let vertices = (0..8_u32).map(|i| std::array::from_fn(|axis| if i >> axis & 1 == 1 { sides[axis] } else { 0.0 })).collect();
+    let vertices =
+        (0..8_u32).map(|i| std::array::from_fn(|axis| if i >> axis & 1 == 1 { sides[axis] } else { 0.0 })).collect();
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     Mesh { vertices, triangles: quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect() }
 }
@@ -137,9 +138,15 @@ fn an_unstable_face_rolls_over_to_the_face_that_it_ends_on() {
 
 #[test]
 fn weights_do_not_depend_on_how_the_file_turns_the_mesh() {
-    let solids = [cuboid([1.0, 2.0, 3.0]), bottle(), turned(&[[1.0, 0.0], [1.0, 2.0]], 64), Mesh::globe(9).stretched([1.0, 0.6, 0.3])];
+    let solids = [
+        cuboid([1.0, 2.0, 3.0]),
+        bottle(),
+        turned(&[[1.0, 0.0], [1.0, 2.0]], 64),
+        Mesh::globe(9).stretched([1.0, 0.6, 0.3]),
+    ];
     for mesh in &solids {
-        let sorted = |mesh: &Mesh| placements(mesh).unwrap().placements.iter().map(|one| one.weight).collect::<Vec<_>>();
+        let sorted =
+            |mesh: &Mesh| placements(mesh).unwrap().placements.iter().map(|one| one.weight).collect::<Vec<_>>();
         let expected = sorted(mesh);
         for (x, y) in [(0.3, 1.1), (2.0, -0.7), (-1.3, 0.4)] {
             let found = sorted(&rotated(mesh, DMat3::from_rotation_x(x) * DMat3::from_rotation_y(y)));
@@ -192,12 +199,9 @@ fn a_sheet_lies_on_both_sides() {
 
 #[test]
 fn names_are_the_nearest_of_the_axes_and_diagonals() {
-    for (up, expected) in [
-        ([0.0, 0.0, 1.0], "+z"),
-        ([0.1, -0.2, -1.0], "-z"),
-        ([1.0, -0.9, 0.1], "+x-y"),
-        ([-1.0, -1.1, 0.8], "-x-y+z"),
-    ] {
+    for (up, expected) in
+        [([0.0, 0.0, 1.0], "+z"), ([0.1, -0.2, -1.0], "-z"), ([1.0, -0.9, 0.1], "+x-y"), ([-1.0, -1.1, 0.8], "-x-y+z")]
+    {
         assert_eq!(name(DVec3::from(up).normalize()), expected);
     }
 }
