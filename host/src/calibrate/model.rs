@@ -212,6 +212,9 @@ pub(super) struct Material {
 /// Refuses settings, models and data sets of which there is no calibration.
 pub(super) fn material(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Material> {
     check(settings)?;
+    if model.outputs().is_some() && settings.per == Per::Name {
+        return Err(Error::setting("per", "name", "average or object with a model whose objects have several outputs"));
+    }
     let own = Stopping::from_model(model).max_touches();
     let max_touches = settings.max_touches.unwrap_or(own);
     compile::stopping(settings.rate, max_touches)?;

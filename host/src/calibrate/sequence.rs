@@ -81,7 +81,10 @@ impl Sequence {
     /// by itself. The answer is the sum of the weights of the others, as [`Look::odds`].
     pub fn push<const N: usize>(&mut self, recognizer: &Recognizer<'_, N>, approaches: u32, may_name: bool) -> u64 {
         let odds = recognizer.rivals();
-        let look = Look { name: recognizer.best(), odds, touches: recognizer.touches(), approaches };
+        let (best, model) = (recognizer.best(), recognizer.model());
+        // Of several outputs of the object that is touched, each is right.
+        let name = if model.is_same_object(best, self.object) { self.object } else { best };
+        let look = Look { name, odds, touches: recognizer.touches(), approaches };
         self.look(look, may_name);
         odds
     }

@@ -25,6 +25,8 @@ pub struct TouchOrigin {
     pub adjusted: BTreeMap<String, u64>,
     /// The capture that made them, where that is known.
     pub captured: Option<Captured>,
+    /// For outputs that are placements of objects, called `object/placement`: the weight of each among those of its object.
+    pub placements: BTreeMap<String, f64>,
 }
 
 impl TouchOrigin {
@@ -33,6 +35,7 @@ impl TouchOrigin {
     const TOUCHES: &str = "palpate_touches";
     const ADJUSTED: &str = "palpate_adjusted";
     const CAPTURED: &str = "palpate_captured";
+    const PLACEMENTS: &str = "palpate_placements";
 
     /// Statements of touches about themselves, and the probe that they were made with.
     pub fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
@@ -60,6 +63,7 @@ impl TouchOrigin {
             touches: numbers(Self::TOUCHES)?,
             adjusted: numbers(Self::ADJUSTED)?,
             captured: parsed(attributes, Self::CAPTURED, "a JSON object of settings, samples and objects")?,
+            placements: parsed(attributes, Self::PLACEMENTS, "a JSON object of weights")?.unwrap_or_default(),
         })
     }
 
@@ -70,6 +74,7 @@ impl TouchOrigin {
             let numbers = Some(numbers.collect::<BTreeMap<_, _>>()).filter(|touches| !touches.is_empty());
             numbers.and_then(|numbers| serde_json::to_string(&numbers).ok())
         };
+        let placements = Some(&self.placements).filter(|placements| !placements.is_empty());
         // Numbers and strings are always JSON.
         let statements = [
             (Self::PROBE, self.probe.and_then(|probe| serde_json::to_string(&probe).ok())),
@@ -77,6 +82,7 @@ impl TouchOrigin {
             (Self::TOUCHES, hexadecimal(&self.touches)),
             (Self::ADJUSTED, hexadecimal(&self.adjusted)),
             (Self::CAPTURED, self.captured.as_ref().and_then(|captured| serde_json::to_string(captured).ok())),
+            (Self::PLACEMENTS, placements.and_then(|placements| serde_json::to_string(placements).ok())),
         ];
         for (name, statement) in statements {
             match statement {
@@ -103,7 +109,23 @@ impl TouchOrigin {
             probe: self.probe.map(|stated| stated.trained()),
             noise: self.noise.map(|noise| noise.trained()),
             capture: self.section(objects),
+            outputs: self.outputs(objects),
         }
+    }
+
+    /// For each of an ensemble's outputs the number of its object, and its share of it; none if each is an object.
+    pub fn outputs(&self, names: &[String]) -> Option<Vec<(u8, f64)>> {
+        if self.placements.is_empty() {
+            return None;
+        }
+        let (mut before, mut number) = (None, 0_u8);
+        let of = |name: &String| {
+            let object = object_of(name);
+            number = number.saturating_add(u8::from(before.as_deref().is_some_and(|before| before != object)));
+            before = Some(object.to_owned());
+            (number, self.placements.get(name).copied().unwrap_or(1.0))
+        };
+        Some(names.iter().map(of).collect())
     }
 
     /// The content of the section that says which touches they were, for a model of these objects; none where nothing is known.
@@ -139,6 +161,11 @@ impl TouchOrigin {
         let same = |name: &&str| begins(name) || shared.iter().any(|shared| shared == name);
         dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
     }
+}
+
+/// The object that an output belongs to, by its name: what stands before the last slash.
+fn object_of(output: &str) -> &str {
+    output.rsplit_once('/').map_or(output, |(object, _)| object)
 }
 
 /// The probe that a data set was made with, and the size of its objects.

@@ -167,7 +167,7 @@ impl Margins<'_> {
                     is_evidence = true;
                 }
                 for (count, _) in correct.iter_mut().zip(at).filter(|(_, at)| **at == index + 1) {
-                    *count += usize::from(is_evidence && self.best(&evidence) == tested.object);
+                    *count += usize::from(is_evidence && self.best(position, &evidence) == tested.object);
                 }
             }
             correct

@@ -2,7 +2,7 @@
 
 use super::Candidate;
 use super::Estimate;
-use super::margins::{Margins, rivals};
+use super::margins::Margins;
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 
@@ -36,7 +36,7 @@ impl Margins<'_> {
         let correct = (0..self.tested.len()).map(|position| {
             let group = |mut correct: Vec<usize>, group| {
                 self.follow(position, group, most, seed, |touches, evidence| {
-                    correct[touches - 1] += usize::from(self.best(evidence) == self.tested[position].object);
+                    correct[touches - 1] += usize::from(self.best(position, evidence) == self.tested[position].object);
                 });
                 correct
             };
@@ -56,7 +56,7 @@ impl Margins<'_> {
         self.check(touches, groups)?;
         let row = |position| {
             let mut row = vec![0; self.objects().len()];
-            self.ends(position, touches, groups, seed, |evidence| self.best(evidence))
+            self.ends(position, touches, groups, seed, |evidence| self.best(position, evidence))
                 .into_iter()
                 .for_each(|object| row[object] += 1);
             row
@@ -78,8 +78,8 @@ impl Margins<'_> {
         let confidences = |position: usize| {
             let right = self.tested[position].object;
             self.ends(position, touches, groups, seed, move |evidence| {
-                let best = self.best(evidence);
-                Confidence { posterior: 1.0 / (1.0 + rivals(evidence, best, unit)), correct: best == right }
+                let (best, rivals) = self.leading(position, evidence, unit);
+                Confidence { posterior: 1.0 / (1.0 + rivals), correct: best == right }
             })
         };
         Ok((0..self.tested.len()).flat_map(confidences).collect())

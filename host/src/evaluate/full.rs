@@ -1,6 +1,6 @@
 //! The full model's recognizer.
 
-use super::margins::{best, rivals};
+use super::margins::leading;
 use palpate_onboard::{Model, Rivals, Stopping, Verdict};
 
 /// Recognizes with a full model: f32 margins, evidence in f64, and the stopping rule of the chip's recognizer.
@@ -12,17 +12,24 @@ pub(super) struct FullRecognizer {
     odds: Vec<f64>,
     /// Number of objects that can be named.
     known: usize,
+    /// The number of each output's object, where several belong to one.
+    numbers: Option<Vec<u8>>,
     touches: u32,
     verdict: Verdict,
 }
 
 impl FullRecognizer {
     /// A recognizer that has touched nothing yet; `prior` is the evidence for each object, in nats, of which the first
-    /// `known` can be named. Objects have thresholds of their own if the model that it is compared with has them.
-    pub(super) fn new(prior: Vec<f64>, known: usize, stopping: Stopping, compiled: Option<&Model<'_>>) -> Self {
+    /// `known` can be named; `numbers` are those of their objects, where several outputs belong to one. Objects have thresholds of their own if the model that it is compared with has them.
+    pub(super) fn new(
+        prior: Vec<f64>,
+        (known, numbers): (usize, Option<Vec<u8>>),
+        stopping: Stopping,
+        compiled: Option<&Model<'_>>,
+    ) -> Self {
         let odds = |object| compiled.map_or(stopping.odds(), |model| stopping.odds_of(object, model));
         let odds = (0..prior.len()).map(|object| odds(object) as f64 / 72_057_594_037_927_936.0).collect();
-        Self { evidence: prior, stopping, odds, known, touches: 0, verdict: Verdict::Undecided }
+        Self { evidence: prior, stopping, odds, known, numbers, touches: 0, verdict: Verdict::Undecided }
     }
 
     /// Takes in a touch by its margins, one for each object. After a verdict touches change nothing.
@@ -32,8 +39,7 @@ impl FullRecognizer {
         }
         self.evidence.iter_mut().zip(margins).for_each(|(evidence, &margin)| *evidence += f64::from(margin));
         self.touches += 1;
-        let best = best(&self.evidence[..self.known]);
-        let weight = rivals(&self.evidence, best, 1.0);
+        let (best, weight) = leading(&self.evidence, self.known, self.numbers.as_deref(), 1.0);
         if weight <= self.odds[best] {
             // There are at most 256 objects, and each weighs 1 at most; a conversion saturates.
             let rivals = Rivals::from_q56((weight * (1_u64 << 56) as f64) as u64);

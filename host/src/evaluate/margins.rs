@@ -22,6 +22,8 @@ pub struct Margins<'m> {
     objects: Vec<String>,
     /// Number of them that can be named: all but a background.
     known: usize,
+    /// The number of each output's object, where several belong to one.
+    numbers: Option<Vec<u8>>,
     /// The data set's objects.
     pub(super) tested: Vec<Tested<'m>>,
     tested_names: Vec<String>,
@@ -74,6 +76,8 @@ pub(crate) trait OfTouches {
     fn probe(&self) -> Result<Option<TrainedProbe>>;
     /// The descriptor, if the data set's touches can be evidence; see [`Margins::new`].
     fn takes(&self, dataset: &Dataset) -> Result<Descriptor>;
+    /// The number of each output's object, where several belong to one.
+    fn numbers(&self) -> Option<Vec<u8>>;
     /// The same, and for each object of a data set its index in the model.
     fn of(&self, dataset: &Dataset) -> Result<(Descriptor, Vec<usize>)>;
 }
@@ -84,6 +88,16 @@ impl OfTouches for Candidate<'_> {
             Self::Full(ensemble) => TouchOrigin::of(&ensemble.origin)?.probe.as_ref().map(StatedProbe::trained),
             Self::Compiled(model) => model.probe(),
         })
+    }
+
+    fn numbers(&self) -> Option<Vec<u8>> {
+        match self {
+            Self::Full(ensemble) => {
+                let outputs = TouchOrigin::of(&ensemble.origin).ok()?.outputs(&ensemble.objects)?;
+                Some(outputs.into_iter().map(|(number, _)| number).collect())
+            }
+            Self::Compiled(model) => model.outputs().map(|outputs| outputs.objects().collect()),
+        }
     }
 
     fn takes(&self, dataset: &Dataset) -> Result<Descriptor> {
@@ -175,6 +189,7 @@ impl<'m> Margins<'m> {
             descriptor,
             objects,
             known,
+            numbers: candidate.numbers(),
             tested,
             tested_names,
             hold_approaches,
@@ -213,8 +228,15 @@ impl<'m> Margins<'m> {
         match (&self.weights, self.candidate) {
             (Some(weights), _) => weights.get(object).copied().unwrap_or(0).into(),
             (None, Candidate::Compiled(model)) => (f64::from(model.prior(object)) * f64::from(model.unit())).exp(),
-            (None, Candidate::Full(_)) => 1.0,
+            (None, Candidate::Full(_)) => self.full_shares().get(object).copied().unwrap_or(1.0),
         }
+    }
+
+    /// Shares of an ensemble's outputs of their objects; empty where each is an object.
+    fn full_shares(&self) -> Vec<f64> {
+        let Candidate::Full(ensemble) = self.candidate else { return Vec::new() };
+        let outputs = TouchOrigin::of(&ensemble.origin).ok().and_then(|origin| origin.outputs(&ensemble.objects));
+        outputs.into_iter().flatten().map(|(_, share)| share).collect()
     }
 
     /// The model's descriptor.
@@ -227,9 +249,35 @@ impl<'m> Margins<'m> {
         &self.objects
     }
 
-    /// Of the objects that can be named, the one with the most evidence.
-    pub(super) fn best(&self, evidence: &[f64]) -> usize {
-        best(&evidence[..self.known])
+    /// The object that the model would name, as the right one's output if it is the tested object; and the sum of the weights of
+    /// the others, its own being 1.
+    pub(super) fn leading(&self, position: usize, evidence: &[f64], unit: f64) -> (usize, f64) {
+        let (best, rivals) = leading(evidence, self.known, self.numbers.as_deref(), unit);
+        (self.named(position, best), rivals)
+    }
+
+    /// The output that stands for an object that was named: that of the touched placement, if it is one of the tested object.
+    pub(super) fn named(&self, position: usize, output: usize) -> usize {
+        let touched = self.tested[position].object;
+        let is_same = self
+            .numbers
+            .as_ref()
+            .is_some_and(|numbers| output < self.known && touched < self.known && numbers[output] == numbers[touched]);
+        if is_same { touched } else { output }
+    }
+
+    /// The number of each output's object, where several belong to one.
+    pub(super) fn numbers(&self) -> Option<&[u8]> {
+        self.numbers.as_deref()
+    }
+
+    /// Of the objects that can be named, the one with the most evidence; as the right output, if it is that of the tested
+    /// object.
+    pub(super) fn best(&self, position: usize, evidence: &[f64]) -> usize {
+        match self.numbers {
+            None => best(&evidence[..self.known]),
+            Some(_) => self.leading(position, evidence, self.unit()).0,
+        }
     }
 
     /// The objects of the data set, in its order.
@@ -341,8 +389,10 @@ impl<'m> Margins<'m> {
                 }
             };
         }
+        let shares = self.full_shares();
+        let share = |object: usize| shares.get(object).copied().unwrap_or(1.0);
         let prior = |object| match self.candidate {
-            Candidate::Full(_) => 0.0,
+            Candidate::Full(_) => share(object).ln(),
             Candidate::Compiled(model) => f64::from(model.prior(object)),
         };
         (0..self.objects.len()).map(prior).collect()
@@ -416,6 +466,26 @@ fn values<'m>(candidate: Candidate<'m>, descriptor: Descriptor, touches: &[&Touc
 /// The object with the most evidence; the first of several, as on the chip.
 pub(crate) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
     (0..evidence.len()).fold(0, |best, object| if evidence[object] > evidence[best] { object } else { best })
+}
+
+/// The output with the most evidence of the object that leads, and the sum of the other objects' weights, its own being 1. The
+/// first `known` outputs can be named; `numbers` are those of their objects, where several belong to one.
+pub(super) fn leading(evidence: &[f64], known: usize, numbers: Option<&[u8]>, unit: f64) -> (usize, f64) {
+    let Some(numbers) = numbers else {
+        let best = best(&evidence[..known]);
+        return (best, rivals(evidence, best, unit));
+    };
+    let most = evidence.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weight = |output: usize| ((evidence[output] - most) * unit).exp();
+    let object = |number: u8| (0..known).filter(move |&output| numbers[output] == number);
+    let last = numbers[..known].last().copied().unwrap_or(0);
+    let sum = |number: u8| object(number).map(weight).sum::<f64>();
+    let sums: Vec<f64> = (0..=last).map(sum).collect();
+    let leader = best(&sums);
+    let outputs: Vec<usize> = object(leader as u8).collect();
+    let strongest = best(&outputs.iter().map(|&output| evidence[output]).collect::<Vec<_>>());
+    let all: f64 = (0..evidence.len()).map(weight).sum();
+    (outputs[strongest], (all - sums[leader]) / sums[leader])
 }
 
 /// Sum of the other objects' weights, the best one's being 1: its posterior is 1 / (1 + this).

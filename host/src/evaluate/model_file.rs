@@ -32,6 +32,14 @@ impl ModelFile {
         Ok(Self::Full(Box::new(ensemble)))
     }
 
+    /// The names of its outputs, in order.
+    pub fn names(&self) -> Vec<String> {
+        match self {
+            Self::Full(ensemble) => ensemble.objects.clone(),
+            Self::Compiled(compiled) => compiled.names(),
+        }
+    }
+
     /// The objects whose touches in `dataset` the model was trained on, as far as it states that.
     pub fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
         match self {

@@ -194,7 +194,10 @@ fn compare_verdicts<'t, const N: usize>(
         .map_err(|error| EvaluateProblem::TooManyObjects { objects: error.objects, capacity: error.capacity })?;
     let prior = |object| f64::from(model.prior(object)) * f64::from(model.unit());
     let priors = (0..ensemble.objects.len()).map(prior).collect();
-    let mut full = FullRecognizer::new(priors, ensemble.known_count(), stopping, Some(model));
+    let mut full = {
+        let numbers = model.outputs().map(|outputs| outputs.objects().collect());
+        FullRecognizer::new(priors, (ensemble.known_count(), numbers), stopping, Some(model))
+    };
     // Both take the same touches for as long as one of them wants more; afterwards each keeps its verdict. Where hardly
     // any touch is one that the model was trained for, there may never be a verdict.
     let mut draws = 100 * u64::from(stopping.max_touches());

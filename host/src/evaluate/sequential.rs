@@ -63,6 +63,9 @@ pub struct Sequential {
     pub error_of_given_per_object: BTreeMap<String, f64>,
     /// Objects of whose names more are wrong than [`Sequential::error_rate`], by more than chance.
     pub above: Vec<String>,
+    /// Share of right names with which the placement that was touched was named; none where outputs are objects.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub placement: Option<f64>,
     /// Share of wrong names among those given of each name; without names that were never given.
     pub error_per_name: BTreeMap<String, f64>,
     /// For each tested object, how it went for every sequence.
@@ -79,6 +82,8 @@ pub struct Outcome {
     pub approaches: usize,
     /// The object recognized (its index in the model), or none.
     pub recognized: Option<usize>,
+    /// The output that was recognized: how the object lies, if outputs are placements.
+    pub output: Option<usize>,
     /// True if the touches fitted no object. Neither this nor recognized: the recognizer gave up.
     pub unknown: bool,
 }
@@ -128,8 +133,24 @@ impl Margins<'_> {
             error_of_given_per_object: self.wrong_by_object(&outcomes),
             above: self.objects_above(&outcomes, error_rate),
             error_per_name: self.wrong_by_name(&outcomes),
+            placement: self.placement_named(&outcomes),
             outcomes,
         }
+    }
+
+    /// Share of right names with the right placement, each tested placement weighted by its frequency.
+    fn placement_named(&self, outcomes: &[Vec<Outcome>]) -> Option<f64> {
+        self.numbers()?;
+        let (mut right, mut placed) = (0.0, 0.0);
+        for (position, outcomes) in outcomes.iter().enumerate() {
+            let (touched, weight) = (self.tested[position].object, self.frequency(position));
+            let named = outcomes.iter().filter(|outcome| outcome.recognized == Some(touched));
+            for outcome in named {
+                right += weight;
+                placed += if outcome.output == Some(touched) { weight } else { 0.0 };
+            }
+        }
+        (right > 0.0).then(|| placed / right)
     }
 
     /// The share of sequences with a wrong verdict.
@@ -228,6 +249,17 @@ impl Margins<'_> {
         stopping: Stopping,
         approaches: impl Iterator<Item = Option<u32>>,
     ) -> Outcome {
+        let mut outcome = self.outcome_of_outputs(position, stopping, approaches);
+        outcome.recognized = outcome.recognized.map(|output| self.named(position, output));
+        outcome
+    }
+
+    fn outcome_of_outputs(
+        &self,
+        position: usize,
+        stopping: Stopping,
+        approaches: impl Iterator<Item = Option<u32>>,
+    ) -> Outcome {
         let (objects, weights) = (self.objects().len(), self.weights.as_deref());
         match &self.tested[position].values {
             Values::Compiled(model, values) => {
@@ -240,7 +272,8 @@ impl Margins<'_> {
             }
             Values::Full(values) => {
                 let known = self.candidate.known_count();
-                let mut recognizer = FullRecognizer::new(self.prior(), known, stopping, None);
+                let numbers = self.numbers().map(<[u8]>::to_vec);
+                let mut recognizer = FullRecognizer::new(self.prior(), (known, numbers), stopping, None);
                 let rows = approaches.map(|touch| touch.map(|touch| &values[row(touch as usize, objects)]));
                 until_sure(rows.map(|margins| margins.map(|margins| recognizer.push(margins))))
             }
@@ -269,7 +302,7 @@ fn onboard<'r, const N: usize>(
 ) -> Outcome {
     let Ok(mut recognizer) = Recognizer::<N>::new(model, stopping) else {
         // Room was made for at least as many objects as the model has.
-        return Outcome { touches: 0, approaches: 0, recognized: None, unknown: false };
+        return Outcome { touches: 0, approaches: 0, recognized: None, output: None, unknown: false };
     };
     if let Some(weights) = weights {
         // Of which one is above 0.
@@ -280,14 +313,14 @@ fn onboard<'r, const N: usize>(
 
 /// Counts approaches, and touches that are evidence, up to the first verdict.
 pub(super) fn until_sure(verdicts: impl Iterator<Item = Option<Verdict>>) -> Outcome {
-    let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None, unknown: false };
+    let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None, output: None, unknown: false };
     for verdict in verdicts {
         outcome.approaches += 1;
         outcome.touches += usize::from(verdict.is_some());
         match verdict {
             None | Some(Verdict::Undecided) => {}
             Some(Verdict::Recognized { object, .. }) => {
-                outcome.recognized = Some(object.into());
+                (outcome.recognized, outcome.output) = (Some(object.into()), Some(object.into()));
                 break;
             }
             Some(Verdict::Unknown) => {

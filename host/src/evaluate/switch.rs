@@ -162,7 +162,7 @@ fn follow<const N: usize>(
 ) -> Outcome {
     let Ok(mut recognizer) = Recognizer::<N>::new(model, stopping) else {
         // Room was made for at least as many objects as the model has.
-        return Outcome { touches: 0, approaches: 0, recognized: None, unknown: false };
+        return Outcome { touches: 0, approaches: 0, recognized: None, output: None, unknown: false };
     };
     until_sure(rows.map(|margins| {
         let margins = margins?;

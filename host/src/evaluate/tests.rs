@@ -122,7 +122,10 @@ fn a_compiled_model_stops_as_the_recognizer_that_sees_the_touches() {
                 _ => None,
             };
             let touches = usize::try_from(recognizer.touches()).unwrap();
-            assert_eq!(*outcome, Outcome { touches, approaches: touches, recognized, unknown: false });
+            assert_eq!(
+                *outcome,
+                Outcome { touches, approaches: touches, recognized, output: recognized, unknown: false }
+            );
         }
     }
 }

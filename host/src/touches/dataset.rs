@@ -42,6 +42,37 @@ impl Dataset {
         Self { objects, origin: self.origin.clone(), warnings: Vec::new() }
     }
 
+    /// The same touches, with each placement of an object as an object of its own, called `object/placement`: what a model with
+    /// an output for each placement is trained on. Objects without placements stay as they are.
+    #[must_use]
+    pub fn by_placement(&self) -> Self {
+        let objects = self.objects.iter().flat_map(ObjectTouches::by_placement).collect();
+        Self { objects, origin: self.origin.clone(), warnings: Vec::new() }
+    }
+
+    /// The same for a model with outputs of these names, if they are placements of these objects; otherwise as it is.
+    #[must_use]
+    pub fn matching(self, outputs: &[String]) -> Self {
+        let is_placement = |object: &ObjectTouches| {
+            let names =
+                object.placement_weights().into_iter().flatten().map(|(name, _)| format!("{}/{name}", object.name));
+            !outputs.contains(&object.name) && names.into_iter().any(|name| outputs.contains(&name))
+        };
+        match self.objects.iter().any(is_placement) {
+            true => Self { warnings: self.warnings.clone(), ..self.by_placement() },
+            false => self,
+        }
+    }
+
+    /// The weight of each placement among those of its object, by the name of its output; empty where objects have none.
+    pub fn placement_shares(&self) -> BTreeMap<String, f64> {
+        let of = |object: &ObjectTouches| {
+            let named = |(placement, weight): (String, f64)| (format!("{}/{placement}", object.name), weight);
+            object.placement_weights().unwrap_or_default().into_iter().map(named).collect::<Vec<_>>()
+        };
+        self.objects.iter().flat_map(of).collect()
+    }
+
     /// Adds noise to all touches, made by `robots` robots in turn (see [`ObjectTouches::noisy`]); the origin then states it
     /// too.
     pub fn add_noise(&mut self, noise: &Noise, seed: u64, robots: usize) {

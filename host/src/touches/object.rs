@@ -301,6 +301,44 @@ impl ObjectTouches {
         (!weights.is_empty()).then_some(weights)
     }
 
+    /// The touches of each placement as an object of its own, called `object/placement`, in the order of these names; the object
+    /// itself without placements.
+    pub fn by_placement(&self) -> Vec<Self> {
+        let Some(mut weights) = self.placement_weights() else { return vec![self.clone()] };
+        weights.sort_by(|a, b| a.0.cmp(&b.0));
+        let of = |(placement, _): (String, f64)| {
+            let is_own = |touch: &usize| self.placement_of_source(self.source_of(*touch)) == Some(&placement);
+            let mut own = self.select((0..self.len()).filter(is_own));
+            own.name = format!("{}/{placement}", self.name);
+            for source in &mut own.sources {
+                if let Source::Placement { instance, .. } = source {
+                    *source = instance.take().map_or(Source::Object, Source::Instance);
+                }
+            }
+            own
+        };
+        weights.into_iter().map(of).collect()
+    }
+
+    /// The same touches, of which each placement has as many as its weight says, compared with the others: as an object that is
+    /// put down at random is touched. All of them without placements.
+    #[must_use]
+    pub fn as_often_as_placed(&self) -> Self {
+        if self.placement_weights().is_none() {
+            return self.clone();
+        }
+        let (by_source, weights) = (self.by_source(), self.source_weights());
+        let most = by_source.iter().zip(&weights).map(|(touches, weight)| touches.len() as f64 / weight);
+        let all = most.fold(f64::INFINITY, f64::min);
+        let kept = by_source.iter().zip(&weights).flat_map(|(touches, weight)| {
+            let count = (all * weight).round() as usize;
+            touches.iter().copied().take(count.max(1))
+        });
+        let mut kept: Vec<usize> = kept.collect();
+        kept.sort_unstable();
+        self.select(kept)
+    }
+
     /// For each source its touches' positions, ascending.
     pub fn by_source(&self) -> Vec<Vec<usize>> {
         let mut by_source = vec![Vec::new(); self.sources.len()];

@@ -267,7 +267,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// model promises was determined for its own priors, and its misfit test takes the weights' for evidence. The
     /// weights `&[3, 0, 1]` say that there are three of the first object for each of the third, and none of the second. An
     /// object with several [outputs](Model::outputs) has one weight, of which each output has the share that the model
-    /// states.
+    /// states; or there is a weight for each output.
     ///
     /// Cost: two logarithms for each object, bit by bit.
     ///
@@ -280,7 +280,11 @@ impl<'m, const N: usize> Recognizer<'m, N> {
             None => output,
         };
         let objects = known.checked_sub(1).map_or(0, |last| object(last).saturating_add(1));
-        let weights = weights.get(..objects).unwrap_or(weights);
+        // More of them than objects: one for each output, whose shares they hold.
+        let is_by_output = outputs.is_some() && weights.len() > objects;
+        let outputs = outputs.filter(|_| !is_by_output);
+        let object = |output: usize| if is_by_output { output } else { object(output) };
+        let weights = weights.get(..if is_by_output { known } else { objects }).unwrap_or(weights);
         let most = weights.iter().copied().max().filter(|&most| most > 0).ok_or(NothingExpected)?;
         let unit = unit(&self.model);
         self.reset();

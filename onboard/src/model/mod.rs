@@ -22,8 +22,8 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
     Counted, EarlyExit, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, Outputs, PatternShares,
-    Plan, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature, TrainedCapture, TrainedNoise,
-    TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
+    Plan, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature, TrainedCapture,
+    TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
 };
 use palpate_shared::{Descriptor, Patterns};
 

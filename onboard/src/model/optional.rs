@@ -1,11 +1,13 @@
 //! The optional sections: checked once, then found by their tags.
 
-use super::{HAS_OUTPUTS, HAS_ROW_EVIDENCE, HAS_SENTINEL, HAS_SHARED_LEAVES, HAS_STRANGERS, HAS_WEIGHTS, MARKS, Stated};
+use super::{
+    HAS_OUTPUTS, HAS_ROW_EVIDENCE, HAS_SENTINEL, HAS_SHARED_LEAVES, HAS_STRANGERS, HAS_WEIGHTS, MARKS, Stated,
+};
 use crate::bytes::Wrong;
 use crate::layouts::{Sections, built_in};
 use palpate_shared::format::{
-    Layout, OddsByObject, Outputs, Plan, Prediction, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, TrainedNoise,
-    TrainedProbe, TrainedTouches, Weights, take_section,
+    Layout, OddsByObject, Outputs, Plan, Prediction, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag,
+    TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_section,
 };
 
 /// The content of the section with this tag; empty if there is none, which no section that is read is.

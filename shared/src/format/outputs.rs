@@ -93,9 +93,10 @@ mod tests {
         let outputs = Outputs::from_bytes(&content, 6).unwrap();
         assert!(outputs.objects().eq(written.map(|(object, _)| object)));
         assert_eq!(outputs.most(), 3);
-        assert_eq!((0..7).map(|output| outputs.share(output)).collect::<std::vec::Vec<_>>(), [
-            49_152, 16_384, 65_536, 1, 32_768, 32_768, 1
-        ]);
+        assert_eq!(
+            (0..7).map(|output| outputs.share(output)).collect::<std::vec::Vec<_>>(),
+            [49_152, 16_384, 65_536, 1, 32_768, 32_768, 1]
+        );
         assert_eq!((outputs.object(5), outputs.object(6)), (Some(2), None));
     }
 

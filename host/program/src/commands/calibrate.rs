@@ -165,7 +165,7 @@ fn rows(arguments: &Arguments, global: &Global) -> Result<()> {
 
 /// Touches that the model was not trained on.
 fn untrained(compiled: &CompiledModel, directory: &PathBuf) -> Result<Dataset> {
-    let dataset = super::dataset(directory)?;
+    let dataset = super::dataset(directory)?.matching(&compiled.names());
     let trained_on = compiled_trained_on(compiled, &dataset);
     if trained_on.is_empty() {
         return Ok(dataset);

@@ -16,7 +16,7 @@ pub(super) fn run(
     (data, sequences): (&Path, usize),
     global: &Global,
 ) -> Result<()> {
-    let dataset = super::dataset(data)?;
+    let dataset = super::dataset(data)?.matching(&ensemble.objects);
     let parity = parity::parity(ensemble, &compiled.model(), &dataset, sequences, global.seed(), &Bar::new())
         .map_err(|error| error.in_file(model))?;
     if global.json {

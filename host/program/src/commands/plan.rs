@@ -38,7 +38,7 @@ pub(super) fn run(wanted: &Wanted<'_>, global: &Global) -> Result<()> {
     let inputs = super::files_of(directory);
     output::refuse_input(path, inputs.iter().chain([wanted.model]))?;
     let compiled = CompiledModel::read(wanted.model)?;
-    let mut dataset = super::dataset(directory)?;
+    let mut dataset = super::dataset(directory)?.matching(&compiled.names());
     let file = wanted.probe.read()?;
     wanted.probe.of_dataset(file.as_ref(), &dataset)?;
     let noise = wanted.real.over(wanted.probe.noise(file.as_ref(), &dataset, Noise::default())?)?;

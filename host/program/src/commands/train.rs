@@ -5,7 +5,7 @@ use super::real::RealArguments;
 use super::teach::TeachArguments;
 use super::trees::Trees;
 use palpate::ensemble::Ensemble;
-use palpate::ensemble::train::{self, Settings};
+use palpate::ensemble::train::{self, Outputs, Settings};
 use palpate::evaluate::{self, CostOfNoise};
 use palpate::mesh::BACKGROUND;
 use palpate::output;
@@ -56,6 +56,9 @@ pub(crate) struct Arguments {
     /// Approaches that are evidence: full, contacts (at least one) or all [default: as the data set has]
     #[arg(long, value_parser = evidence, value_name = "WHICH")]
     evidence: Option<Counted>,
+    /// Outputs for objects on a table: placements (one for each) or objects
+    #[arg(long, value_parser = outputs, default_value = "placements", value_name = "OF")]
+    outputs: Outputs,
     /// Settings of the trees, such as rounds=30,depth=6,eta=0.3 [default: the preset's]
     #[arg(long, value_name = "SETTINGS")]
     trees: Option<Trees>,
@@ -202,7 +205,9 @@ fn simulated(arguments: &Arguments, global: &Global, directory: &PathBuf, record
             train::train_with_background(&dataset, background, &settings, &Bar::new()).map_err(in_directory)?
         }
     };
-    let is_clean = recorded.is_none() && dataset.real().and(&settings.noise).is_none();
+    // What noise costs is measured with outputs that are objects.
+    let is_placed = !dataset.placement_shares().is_empty();
+    let is_clean = recorded.is_none() && !is_placed && dataset.real().and(&settings.noise).is_none();
     let Some(recorded) = recorded else {
         return Ok(Made { ensemble, dataset, taught: None, adjusted: None, is_clean, settings });
     };
@@ -290,6 +295,7 @@ impl Arguments {
             seed: global.seed(),
             threads: global.threads,
             probe: None,
+            outputs: self.outputs,
             ..preset
         };
         self.trees.as_ref().map_or_else(|| settings.clone(), |trees| trees.over(settings.clone()))
@@ -307,6 +313,14 @@ fn preset(name: &str) -> Result<Preset, String> {
 pub(super) fn evidence(name: &str) -> Result<Counted, String> {
     let found = Counted::ALL.iter().copied().find(|counted| counted.name() == name);
     found.ok_or_else(|| "use one of full, contacts, all".to_owned())
+}
+
+fn outputs(name: &str) -> Result<Outputs, String> {
+    match name {
+        "placements" => Ok(Outputs::Placements),
+        "objects" => Ok(Outputs::Objects),
+        _ => Err("use one of placements, objects".to_owned()),
+    }
 }
 
 pub(super) fn descriptor(name: &str) -> Result<Descriptor, String> {

@@ -88,6 +88,18 @@ pub struct Settings {
     pub trainer: Engine,
     /// The probe that made the touches, to be stated by the ensemble and every model compiled from it; changes no tree.
     pub probe: Option<StatedProbe>,
+    /// Outputs of objects that were touched in placements on a table.
+    pub outputs: Outputs,
+}
+
+/// Outputs of an ensemble, where objects were touched in several placements.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Outputs {
+    /// One for each placement, called `object/placement`.
+    #[default]
+    Placements,
+    /// One for each object, of touches in placements that are as frequent as their weights say.
+    Objects,
 }
 
 impl Settings {
@@ -110,6 +122,7 @@ impl Settings {
             threads: None,
             trainer: Engine::Palpate,
             probe: None,
+            outputs: Outputs::Placements,
         }
     }
 
@@ -159,6 +172,23 @@ impl Settings {
 /// fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
 /// needs a pose that no touch has. All of it is found before the training starts. [`Error::Cancelled`].
 pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
+    let shares = dataset.placement_shares();
+    if shares.is_empty() {
+        return train_outputs(dataset, settings, progress);
+    }
+    match settings.outputs {
+        Outputs::Objects => train_outputs(&dataset.each(ObjectTouches::as_often_as_placed), settings, progress),
+        Outputs::Placements => {
+            let mut ensemble = train_outputs(&dataset.by_placement(), settings, progress)?;
+            let stated = TouchOrigin { placements: shares, ..TouchOrigin::of(&ensemble.origin)? };
+            stated.state(&mut ensemble.origin);
+            Ok(ensemble)
+        }
+    }
+}
+
+/// Trains one output for each object.
+fn train_outputs(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
     if let Some(Small { leaves, threshold_cost }) = settings.small {
         let stop = (settings.rounds, leaves);
         let mut ensembles = train_small(dataset, settings, threshold_cost, &[stop], progress)?;

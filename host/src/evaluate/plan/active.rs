@@ -126,7 +126,7 @@ impl Margins<'_> {
 
     /// Outcome of a sequence of approaches under the plan's policy.
     pub(super) fn active_outcome(&self, active: &Active, which: (usize, usize), rule: (Stopping, u64)) -> Outcome {
-        let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None, unknown: false };
+        let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None, output: None, unknown: false };
         self.follow_plan(active, which, rule, &mut |moment| {
             (outcome.touches, outcome.approaches) = (moment.touches, moment.approaches);
             if let Verdict::Recognized { object, .. } = moment.verdict {

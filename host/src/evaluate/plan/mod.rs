@@ -65,6 +65,10 @@ pub struct Hardest {
 /// a pose.
 pub fn plan(model: &Model<'_>, dataset: &Dataset, rolls: u8) -> Result<Planned> {
     let poses = Poses::with_rolls(rolls).ok_or_else(|| Error::setting("rolls", rolls, "1, 2 or 4"))?;
+    if model.outputs().is_some() {
+        let allowed = "none with a model whose objects have several outputs: on a table the yaw is not known";
+        return Err(Error::setting("plan", "given", allowed));
+    }
     if model.known_count() < 2 {
         return Err(EvaluateProblem::OneObjectToPlan.into());
     }

@@ -122,12 +122,15 @@ pub struct Stated {
     pub noise: Option<TrainedNoise>,
     /// The capture that made the touches: the content of the section [`Tag::Capture`](palpate_shared::format::Tag::Capture).
     pub capture: Option<Vec<u8>>,
+    /// For each output the number of its object, and its share of the object's prior, where several belong to one: the content
+    /// of the section [`Tag::Outputs`](palpate_shared::format::Tag::Outputs).
+    pub outputs: Option<Vec<(u8, f64)>>,
 }
 
 /// The published probe: a spacing of 1.5, and 10 units per second.
 impl Default for Stated {
     fn default() -> Self {
-        Self { spacing: 1.5, speed: 10.0, probe: None, noise: None, capture: None }
+        Self { spacing: 1.5, speed: 10.0, probe: None, noise: None, capture: None, outputs: None }
     }
 }
 

@@ -8,8 +8,8 @@ use crate::error::{CompileProblem, Error, Result};
 use crate::rows::whole;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{
-    CHECKSUM_LENGTH, HeaderBuilder, Layout, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, checksum,
-    f32_key, write_section,
+    CHECKSUM_LENGTH, HeaderBuilder, Layout, Outputs, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained,
+    checksum, f32_key, write_section,
 };
 
 /// The model's bytes; `hash` is that of the ensemble as it was read.
@@ -32,6 +32,7 @@ pub(super) fn write(
         of_rows(ensemble, settings),
         captured(ensemble, settings),
         parts.exits_section(),
+        outputs(settings),
     ]
     .concat();
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
@@ -89,7 +90,8 @@ pub(super) fn write(
 pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<usize> {
     let sections = optional(ensemble, settings, forest)?.len()
         + of_rows(ensemble, settings).len()
-        + captured(ensemble, settings).len();
+        + captured(ensemble, settings).len()
+        + outputs(settings).len();
     Ok(text(ensemble)?.len().next_multiple_of(4) + sections + CHECKSUM_LENGTH)
 }
 
@@ -161,6 +163,17 @@ fn captured(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
     let mut bytes = Vec::new();
     if let Some(content) = settings.stated.capture.as_ref().filter(|_| ensemble.descriptor().is_some()) {
         write_section(Tag::Capture, false, content, &mut |part| bytes.extend_from_slice(part));
+    }
+    bytes
+}
+
+/// The section about outputs that belong together.
+fn outputs(settings: &Settings) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    if let Some(outputs) = &settings.stated.outputs {
+        let mut content = Vec::new();
+        Outputs::write(outputs.iter().copied(), &mut |part| content.extend_from_slice(part));
+        write_section(Tag::Outputs, true, &content, &mut |part| bytes.extend_from_slice(part));
     }
     bytes
 }
