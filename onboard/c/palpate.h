@@ -25,6 +25,7 @@
  *   PALPATE_SENTINEL     0: a model over rows in which a number stands for a missing value is refused
  *   PALPATE_ROW_EVIDENCE 0: a model that states what a row adds to the evidence, or how much rows count together, is refused
  *   PALPATE_EARLY        1: palpate_class_of is there, which gives a class without walking all trees
+ *   PALPATE_OUTPUTS      1: models of which several outputs belong to one object are read, which are refused by default
  *   PALPATE_STRANGERS    0: a model with a test for objects that it does not know, or with a background, is refused
  *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256: 32 by default; each takes state and stack
  *   PALPATE_BYTE(p)      how the byte of a model at `p` is read: *(p) by default, pgm_read_byte(p) for an AVR's flash
@@ -65,6 +66,9 @@
 #endif
 #ifndef PALPATE_EARLY
 #define PALPATE_EARLY 0
+#endif
+#ifndef PALPATE_OUTPUTS
+#define PALPATE_OUTPUTS 0
 #endif
 #ifndef PALPATE_STRANGERS
 #define PALPATE_STRANGERS 1
@@ -178,6 +182,9 @@ typedef struct {
     const uint8_t *row_; /* what a row's margins add to the evidence, or NULL: the margins */
     int32_t row_start_;  /* the margin of that table's first value */
     uint32_t row_most_;  /* beyond it, up to the last one */
+#if PALPATE_OUTPUTS
+    const uint8_t *outputs_; /* the objects that outputs belong to; NULL if each is an object */
+#endif
 #if PALPATE_EARLY
     const uint8_t *exits_; /* places in the walk where a class may be known, 8 bytes each, up to `exits_end_` */
     const uint8_t *exits_end_;
@@ -213,6 +220,15 @@ typedef struct {
 #endif
     int64_t evidence[PALPATE_MAX_OBJECTS];
 } palpate_recognizer;
+
+/* True if several outputs may belong to one object. */
+#if PALPATE_OUTPUTS
+#define PALPATE_HAS_OUTPUTS_(model) ((model)->outputs_ != NULL)
+#else
+#define PALPATE_HAS_OUTPUTS_(model) 0
+#endif
+/* No object. */
+#define PALPATE_NONE_ PALPATE_AS_(uint_fast16_t, 0xffff)
 
 /* Parts of a model. */
 enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPATE_GROUPS_, PALPATE_SPLITS_, PALPATE_LEAVES_, PALPATE_END_ };
@@ -409,6 +425,27 @@ static inline int palpate_check_row_(palpate_model *model, const uint8_t *conten
     return 1;
 }
 
+#if PALPATE_OUTPUTS
+/* Outputs of objects that are numbered in their order, and the most of one. */
+static inline int palpate_check_outputs_(const palpate_model *model, const uint8_t *content, uint32_t length)
+{
+    uint_fast16_t most = 0, count = 0, before = 0, i;
+    if (length < 4 + 4 * PALPATE_AS_(uint32_t, model->objects)) {
+        return 0;
+    }
+    for (i = 0; i < model->objects; i++) {
+        const uint_fast16_t object = PALPATE_BYTE(content + 4 + 4 * PALPATE_AS_(size_t, i));
+        if (object != before && (count == 0 || object != before + 1u)) {
+            return 0;
+        }
+        count = object == before ? count + 1u : 1u;
+        before = object;
+        most = count > most ? count : most;
+    }
+    return most == PALPATE_BYTE(content) + 1u;
+}
+#endif
+
 /* Sections that are whole, in order, valid, and understood where they must be. */
 static inline palpate_error palpate_check_sections_(palpate_model *model)
 {
@@ -483,6 +520,13 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 if (!palpate_check_row_(model, content, length)) {
                     return PALPATE_FIELD;
                 }
+#if PALPATE_OUTPUTS
+            } else if (last == 18) {
+                if (!palpate_check_outputs_(model, content, length)) {
+                    return PALPATE_FIELD;
+                }
+                model->outputs_ = content;
+#endif
 #if PALPATE_EARLY
             } else if (tag == 17) {
                 model->exits_ = content;
@@ -787,6 +831,9 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
         model->weights_ = NULL;
         model->row_ = NULL;
     }
+#if PALPATE_OUTPUTS
+    model->outputs_ = NULL;
+#endif
 #if PALPATE_EARLY
     model->exits_ = NULL;
     model->exits_end_ = NULL;
@@ -1144,9 +1191,6 @@ PALPATE_APART_ void palpate_call_(const palpate_model *model, const int32_t *fea
 }
 #endif
 
-/* No object. */
-#define PALPATE_NONE_ PALPATE_AS_(uint_fast16_t, 0xffff)
-
 #if PALPATE_EARLY
 /* The object whose sum, shifted and with its base, is larger than each other one by more than what the place allows; else PALPATE_NONE_. */
 static inline uint_fast16_t palpate_leader_of_(const palpate_model *model, const uint32_t *sums, uint_fast8_t shift, const uint8_t *place)
@@ -1482,12 +1526,6 @@ static inline uint_fast16_t palpate_leader_(const palpate_recognizer *recognizer
     return best;
 }
 
-/* Of the objects that can be named, the one with the most evidence; the first of several. */
-PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
-{
-    return PALPATE_AS_(uint16_t, palpate_leader_(recognizer, recognizer->model->known));
-}
-
 /* The prior of an object, in units. */
 static inline int32_t palpate_prior_(const palpate_model *model, uint_fast16_t object)
 {
@@ -1673,6 +1711,168 @@ static inline void palpate_evidence_of_(const palpate_model *model, int32_t *mar
     }
 }
 
+/* part / whole in Q56, rounded down, for a part that is at most the whole. */
+static inline uint64_t palpate_ratio_(uint64_t part, uint64_t whole)
+{
+    uint64_t quotient = 0;
+    uint_fast8_t i;
+    if (part >= whole) {
+        return PALPATE_ONE;
+    }
+    for (i = 0; i < 56; i++) {
+        quotient <<= 1;
+        /* Twice the rest may not fit, but less the whole it does. */
+        if (part >= whole - part) {
+            part -= whole - part;
+            quotient |= 1;
+        } else {
+            part <<= 1;
+        }
+    }
+    return quotient;
+}
+
+/* One over the model's temperature, in Q16. */
+static inline uint32_t palpate_sharpness_(const palpate_model *model)
+{
+    const uint8_t *p = model->part_[PALPATE_OPTIONAL_], *end = model->part_[PALPATE_MARGINS_];
+    uint32_t sharpness = 65536;
+    while (p != end) {
+        const uint8_t *content = p + 8;
+        uint32_t length = 0;
+        if ((palpate_section_(&p, end, &length) & 0x7fff) == 11 && length >= 4) {
+            const uint32_t stated = palpate_u32_(content);
+            sharpness = stated >= 4096 && stated <= 1048576u ? stated : sharpness;
+        }
+    }
+    return sharpness;
+}
+
+/* A weight at this sharpness, of so many bits behind. */
+static inline uint64_t palpate_sharp_(uint64_t bits, uint32_t sharpness)
+{
+    const uint64_t most = PALPATE_AS_(uint64_t, 1) << 42; /* where a weight is 0 at any temperature */
+    return palpate_exp2((bits < most ? bits : most) * sharpness >> 16);
+}
+
+#if PALPATE_OUTPUTS
+/* The object that an output belongs to; the background, and an output that there is not, have none. */
+static inline uint_fast16_t palpate_object_of_(const palpate_model *model, uint_fast16_t output)
+{
+    return output < model->known ? PALPATE_BYTE(model->outputs_ + 4 + 4 * PALPATE_AS_(size_t, output)) : PALPATE_NONE_;
+}
+
+static inline uint64_t palpate_plus_(uint64_t a, uint64_t b)
+{
+    return a > UINT64_MAX - b ? UINT64_MAX : a + b;
+}
+
+/* Whether no object can be recognized, by one exponential: the strongest output of another object than the strongest output's
+ * weighs more than the loosest threshold times the most outputs of an object. */
+static inline int palpate_undecided_(const palpate_recognizer *recognizer, uint64_t loosest, uint32_t bits)
+{
+    const palpate_model *model = recognizer->model;
+    const uint_fast16_t best = palpate_leader_(recognizer, model->objects), own = palpate_object_of_(model, best);
+    const uint64_t most = PALPATE_BYTE(model->outputs_) + PALPATE_AS_(uint64_t, 1);
+    uint_fast16_t second = PALPATE_NONE_, i;
+    for (i = 0; i < model->objects; i++) {
+        const uint_fast16_t object = palpate_object_of_(model, i);
+        if ((object != own || (own == PALPATE_NONE_ && i != best)) &&
+            (second == PALPATE_NONE_ || recognizer->evidence[i] > recognizer->evidence[second])) {
+            second = i;
+        }
+    }
+    if (second == PALPATE_NONE_ || loosest > UINT64_MAX / most) {
+        return 0;
+    }
+    return palpate_exp2(palpate_behind_(recognizer, best, second, bits)) > loosest * most;
+}
+
+/* The object with the largest sum of its outputs' weights: its output with the most evidence, and what the others weigh in Q56,
+ * its own weight being 1; the largest number where it may not be named. */
+static inline uint_fast16_t palpate_together_(const palpate_recognizer *recognizer, uint32_t bits, uint64_t *rivals)
+{
+    const palpate_model *model = recognizer->model;
+    const uint_fast16_t best = palpate_leader_(recognizer, model->objects);
+    uint64_t own = 0, others = 0, background = 0, sum = 0;
+    uint_fast16_t leader = 0, output = 0, i, times = 0;
+    if (model->known != model->objects) {
+        background = palpate_exp2(palpate_behind_(recognizer, best, model->known, bits));
+        others = background;
+    }
+    for (i = 0; i < model->known; i++) {
+        if (i == 0 || palpate_object_of_(model, i) != palpate_object_of_(model, i - 1)) {
+            sum = 0;
+        }
+        if (sum == 0 || recognizer->evidence[i] > recognizer->evidence[output]) {
+            output = i;
+        }
+        sum = palpate_plus_(sum, palpate_exp2(palpate_behind_(recognizer, best, i, bits)));
+        if (i + 1u == model->known || palpate_object_of_(model, i) != palpate_object_of_(model, i + 1u)) {
+            if (sum > own) {
+                others = palpate_plus_(others, own);
+                own = sum;
+                leader = output;
+            } else {
+                others = palpate_plus_(others, sum);
+            }
+        }
+    }
+    *rivals = UINT64_MAX;
+    if (own != 0 && background <= own) {
+        while (others >= own && times < 255) {
+            others -= own;
+            times++;
+        }
+        *rivals = palpate_plus_(PALPATE_AS_(uint64_t, times) << 56, palpate_ratio_(others, own));
+        *rivals = palpate_plus_(*rivals, others != 0);
+    }
+    return leader;
+}
+
+/* The posterior of the object that an output belongs to, in Q56, and the share of it that is the output's: how likely the object
+ * lies as this placement says, if it is the object. Of the evidence divided by the model's temperature; 0 for an output that the model does
+ * not have. Cost: an exponential for each output, and two long divisions. */
+PALPATE_API uint64_t palpate_posterior_together(const palpate_recognizer *recognizer, uint16_t output, uint64_t *share)
+{
+    const palpate_model *model = recognizer->model;
+    uint32_t from, span;
+    const uint32_t bits = palpate_bits_(model, recognizer->touches - recognizer->forgotten, &from, &span);
+    const uint_fast16_t best = palpate_leader_(recognizer, model->objects);
+    const uint32_t sharpness = palpate_sharpness_(model);
+    uint64_t own = 0, object = 0, all = 0, rest;
+    uint_fast16_t i;
+    for (i = 0; i < model->objects; i++) {
+        const uint64_t weight = palpate_sharp_(palpate_behind_(recognizer, best, i, bits), sharpness);
+        const int is_own = i == output;
+        own = is_own ? weight : own;
+        if (is_own || (palpate_object_of_(model, i) != PALPATE_NONE_ &&
+                       palpate_object_of_(model, i) == palpate_object_of_(model, output))) {
+            object = palpate_plus_(object, weight);
+        }
+        all = palpate_plus_(all, weight);
+    }
+    rest = all - object;
+    *share = object == 0 ? 0 : palpate_ratio_(own, object);
+    return all == 0 ? 0 : rest < object ? PALPATE_ONE - palpate_ratio_(rest, all) : palpate_ratio_(object, all);
+}
+#endif
+
+/* Of the objects that can be named, the one with the most evidence; the first of several. Of an object with several outputs, whose
+ * weights add up, the output with the most evidence. */
+PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
+{
+#if PALPATE_OUTPUTS
+    if (recognizer->model->outputs_ != NULL) {
+        uint32_t from, span;
+        uint64_t rivals;
+        const uint32_t bits = palpate_bits_(recognizer->model, recognizer->touches - recognizer->forgotten, &from, &span);
+        return PALPATE_AS_(uint16_t, palpate_together_(recognizer, bits, &rivals));
+    }
+#endif
+    return PALPATE_AS_(uint16_t, palpate_leader_(recognizer, recognizer->model->known));
+}
+
 /* Takes in a touch by its margins, or a row by its evidence. */
 static inline void palpate_push_evidence_(palpate_recognizer *recognizer, const int32_t *evidence)
 {
@@ -1688,7 +1888,7 @@ static inline void palpate_push_evidence_(palpate_recognizer *recognizer, const 
         recognizer->evidence[i] = palpate_add_(recognizer->evidence[i], evidence[i]);
     }
     recognizer->touches += recognizer->touches != UINT32_MAX;
-    best = palpate_best(recognizer);
+    best = palpate_leader_(recognizer, model->known);
     if (PALPATE_STRANGERS) {
         verdict = palpate_by_misfit_(recognizer, best);
     }
@@ -1696,6 +1896,25 @@ static inline void palpate_push_evidence_(palpate_recognizer *recognizer, const 
         left = PALPATE_AS_(uint64_t, palpate_u32_(model->odds_ + 4 * PALPATE_AS_(size_t, best))) << 24;
     }
     bits = palpate_unit_(recognizer);
+#if PALPATE_OUTPUTS
+    if (model->outputs_ != NULL && verdict == PALPATE_RECOGNIZED) {
+        uint64_t loosest = recognizer->odds, rivals;
+        if (recognizer->by_object != 0 && model->odds_ != NULL) {
+            for (loosest = 0, i = 0; i < model->objects; i++) {
+                const uint64_t own = PALPATE_AS_(uint64_t, palpate_u32_(model->odds_ + 4 * PALPATE_AS_(size_t, i))) << 24;
+                loosest = own > loosest ? own : loosest;
+            }
+        }
+        verdict = PALPATE_UNDECIDED;
+        if (!palpate_undecided_(recognizer, loosest, bits)) {
+            best = palpate_together_(recognizer, bits, &rivals);
+            if (recognizer->by_object != 0 && model->odds_ != NULL) {
+                left = PALPATE_AS_(uint64_t, palpate_u32_(model->odds_ + 4 * PALPATE_AS_(size_t, best))) << 24;
+            }
+            verdict = rivals <= left && rivals != UINT64_MAX ? PALPATE_RECOGNIZED : PALPATE_UNDECIDED;
+        }
+    } else
+#endif
     for (i = 0; verdict == PALPATE_RECOGNIZED && i < model->objects; i++) {
         if (i != best) {
             const uint64_t weight = palpate_exp2(palpate_behind_(recognizer, best, i, bits));
@@ -1760,57 +1979,25 @@ PALPATE_API palpate_answer palpate_push_features(palpate_recognizer *recognizer,
     return PALPATE_COUNTED;
 }
 
-/* part / whole in Q56, rounded down, for a part that is at most the whole. */
-static inline uint64_t palpate_ratio_(uint64_t part, uint64_t whole)
-{
-    uint64_t quotient = 0;
-    uint_fast8_t i;
-    if (part >= whole) {
-        return PALPATE_ONE;
-    }
-    for (i = 0; i < 56; i++) {
-        quotient <<= 1;
-        /* Twice the rest may not fit, but less the whole it does. */
-        if (part >= whole - part) {
-            part -= whole - part;
-            quotient |= 1;
-        } else {
-            part <<= 1;
-        }
-    }
-    return quotient;
-}
-
 /* The posterior of an object in Q56 (PALPATE_ONE is 1), of the evidence divided by the model's temperature; 0 for an object
  * that the model does not know. Cost: an exponential for each object, and a long division. */
 PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uint16_t object)
 {
     const palpate_model *model = recognizer->model;
-    const uint8_t *p = model->part_[PALPATE_OPTIONAL_], *end = model->part_[PALPATE_MARGINS_];
     const uint_fast16_t best = palpate_leader_(recognizer, model->objects);
     uint32_t from, span;
     const uint32_t unit = palpate_bits_(model, recognizer->touches - recognizer->forgotten, &from, &span);
-    uint32_t sharpness = 65536;
+    const uint32_t sharpness = palpate_sharpness_(model);
     uint64_t own = 0, others = 0, all;
     uint_fast16_t i;
     if (object >= model->objects) {
         return 0;
     }
-    while (p != end) {
-        const uint8_t *content = p + 8;
-        uint32_t length = 0;
-        if ((palpate_section_(&p, end, &length) & 0x7fff) == 11 && length >= 4) {
-            const uint32_t stated = palpate_u32_(content);
-            sharpness = stated >= 4096 && stated <= 1048576u ? stated : sharpness;
-        }
-    }
     for (i = 0; i < model->objects; i++) {
         if (i != best) {
-            const uint64_t most = PALPATE_AS_(uint64_t, 1) << 42; /* where a weight is 0 at any temperature */
-            uint64_t bits = palpate_behind_(recognizer, best, i, unit);
-            bits = palpate_exp2((bits < most ? bits : most) * sharpness >> 16);
-            others += bits;
-            own = i == object ? bits : own;
+            const uint64_t weight = palpate_sharp_(palpate_behind_(recognizer, best, i, unit), sharpness);
+            others += weight;
+            own = i == object ? weight : own;
         }
     }
     /* 256 objects that are level are as much as does not fit. */
@@ -2114,9 +2301,24 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
         }
     }
     if (at != length || verdict > PALPATE_GAVE_UP || (verdict != PALPATE_UNDECIDED && touches == 0) ||
-        (verdict == PALPATE_RECOGNIZED && object != best)) {
+        (verdict == PALPATE_RECOGNIZED && object != best && !PALPATE_HAS_OUTPUTS_(model))) {
         return PALPATE_DAMAGED;
     }
+#if PALPATE_OUTPUTS
+    if (verdict == PALPATE_RECOGNIZED && model->outputs_ != NULL) {
+        palpate_recognizer tried = *recognizer;
+        uint64_t rivals;
+        uint32_t from, span;
+        size_t place = start;
+        for (i = 0; i < model->objects; i++) {
+            const uint64_t number = palpate_take_(snapshot, &place, length, 10, 1);
+            tried.evidence[i] = PALPATE_AS_(int64_t, number >> 1 ^ (0u - (number & 1)));
+        }
+        if (palpate_together_(&tried, palpate_bits_(model, touches - forgotten, &from, &span), &rivals) != object || rivals == UINT64_MAX) {
+            return PALPATE_DAMAGED;
+        }
+    }
+#endif
     palpate_reset(recognizer);
     recognizer->touches = touches;
     recognizer->forgotten = forgotten;

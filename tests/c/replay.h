@@ -20,6 +20,9 @@
 #ifndef PALPATE_EARLY
 #define PALPATE_EARLY 1
 #endif
+#ifndef PALPATE_OUTPUTS
+#define PALPATE_OUTPUTS 1
+#endif
 #include "palpate.h"
 
 /* One byte of the commands; -1 at their end. */
@@ -237,6 +240,19 @@ static int replay(void)
                     replay_put(' ');
                     replay_u64(palpate_posterior(&replay_recognizer, i));
                 }
+#if PALPATE_OUTPUTS
+                if (replay_model.outputs_ != NULL) {
+                    replay_text("\ntogether");
+                    for (i = 0; i <= replay_model.objects; i++) {
+                        uint64_t share;
+                        const uint64_t posterior = palpate_posterior_together(&replay_recognizer, i, &share);
+                        replay_put(' ');
+                        replay_u64(posterior);
+                        replay_put(' ');
+                        replay_u64(share);
+                    }
+                }
+#endif
                 replay_put('\n');
             }
             break;

@@ -427,6 +427,15 @@ fn predictions(put: Put<'_>) {
     with("no weight by the number of touches", Tag::Weights, &[0, 0]);
     with("weights by the number of touches that are cut", Tag::Weights, &[3, 0, 1, 0, 1, 0, 1]);
     with("more weights than there are doublings", Tag::Weights, &[&[65, 0][..], &[1; 130]].concat());
+    let outputs = |most: u8, numbers: &[u8]| {
+        let records = numbers.iter().flat_map(|&number| [number, 0, 0, 0]);
+        [most, 0, 0, 0].into_iter().chain(records).collect::<Vec<u8>>()
+    };
+    let objects = usize::from(plain[14]) + 1;
+    let each: Vec<u8> = (0..objects as u8).collect();
+    with("outputs that are cut", Tag::Outputs, &outputs(0, &each[1..]));
+    with("outputs whose numbers do not begin with 0", Tag::Outputs, &outputs(objects as u8 - 1, &vec![1; objects]));
+    with("more outputs of an object than are stated", Tag::Outputs, &outputs(0, &vec![0; objects]));
     let table = [0, 0, 0, 0, 4, 3, 0, 1, 1, 2];
     with("evidence of a row in a model over touches", Tag::RowEvidence, &table);
     let rows = changed_to_rows(&plain);

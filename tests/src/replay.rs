@@ -85,6 +85,13 @@ impl<'m> Script<'m> {
         let posteriors: Vec<u64> = objects.map(|object| recognizer.posterior(object).q56()).collect();
         self.say(&format!("best {:x}", self.recognizer().best()));
         self.numbers("posteriors", &posteriors);
+        let recognizer = self.recognizer();
+        if recognizer.model().outputs().is_some() {
+            let outputs = 0..=recognizer.model().object_count();
+            let together = outputs.map(|output| recognizer.posterior_together(output));
+            let numbers: Vec<u64> = together.flat_map(|(object, share)| [object.q56(), share.q56()]).collect();
+            self.numbers("together", &numbers);
+        }
     }
 
     /// The objects' names.

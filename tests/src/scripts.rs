@@ -5,8 +5,8 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-    EarlyExit, Held, Link, MisfitTerms, ObjectMisfit, OddsByObject, Plan, Prediction, RowEvidence, Section, Sentinel,
-    Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
+    EarlyExit, Held, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Prediction, RowEvidence, Section,
+    Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;
@@ -27,6 +27,20 @@ pub fn models() -> Vec<Vec<u8>> {
     assert!(models.len() > 60, "{} models", models.len());
     models.push(std::fs::read(Path::new(ROOT).join("models/household.palpate")).expect("the committed model"));
     models
+}
+
+/// Objects that outputs belong to: some of one output, some of several.
+fn outputs(outputs: usize, rng: &mut SmallRng) -> Vec<u8> {
+    let mut number = 0;
+    let objects: Vec<(u8, f64)> = (0..outputs)
+        .map(|output| {
+            number += u8::from(output > 0 && rng.random_bool(0.4));
+            (number, rng.random_range(0.0..1.0))
+        })
+        .collect();
+    let mut content = Vec::new();
+    Outputs::write(objects.into_iter(), &mut |bytes| content.extend_from_slice(bytes));
+    content
 }
 
 /// The model with sections that the header has to understand or to leave alone.
@@ -77,6 +91,9 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
         let exits = exits.into_iter().map(|groups| EarlyExit { groups, bound: 1 << rng.random_range(0..24) });
         let content: Vec<u8> = exits.flat_map(EarlyExit::to_bytes).collect();
         write_section(Tag::EarlyExit, false, &content, &mut put);
+    }
+    if rng.random_bool(0.5) {
+        write_section(Tag::Outputs, true, &outputs(objects, rng), &mut put);
     }
     Section { tag: 300, must_understand: false, content: b"later" }.write(&mut put);
     with_sections(bytes, &sections)

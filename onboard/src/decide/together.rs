@@ -134,3 +134,119 @@ pub(super) fn posterior(
     let posterior = if rest < object { ONE - part(rest, all) } else { part(object, all) };
     (Posterior(posterior), Posterior(part(own, object)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decide::evidence::SHARPNESS;
+    use std::vec::Vec;
+
+    /// A unit of a thousandth of a nat.
+    fn unit() -> Unit {
+        let bits = core::f64::consts::LOG2_E / 1000.0 * 4_294_967_296.0;
+        Unit { bits: (bits * 256.0).round() as u32, shift: 8, sharpness: SHARPNESS }
+    }
+
+    fn section(objects: &[u8]) -> Vec<u8> {
+        let mut content = Vec::new();
+        let outputs = objects.iter().map(|&object| (object, 0.5));
+        Outputs::write(outputs, &mut |bytes| content.extend_from_slice(bytes));
+        content
+    }
+
+    /// The weights of objects, the background last, by a softmax.
+    fn weights(evidence: &[i64], objects: &[u8], known: usize) -> Vec<f64> {
+        let most = evidence.iter().max().unwrap();
+        let weight = |evidence: i64| ((evidence - most) as f64 / 1000.0).exp();
+        let mut sums = std::vec![0.0; usize::from(objects[known - 1]) + 1];
+        objects[..known].iter().zip(evidence).for_each(|(&object, &own)| sums[usize::from(object)] += weight(own));
+        sums.extend(evidence[known..].iter().map(|&own| weight(own)));
+        sums
+    }
+
+    /// Every evidence of four outputs, of few values, with every way of belonging together.
+    fn cases() -> impl Iterator<Item = ([i64; 4], [u8; 4], usize)> {
+        let values = [0, 600, 700, 4_000, -90_000];
+        let objects = [[0, 0, 1, 1], [0, 0, 0, 1], [0, 1, 1, 2], [0, 1, 2, 3], [0, 0, 0, 0]];
+        (0..625_usize).flat_map(move |case| {
+            let evidence = [1, 5, 25, 125].map(|place| values[case / place % 5]);
+            objects.into_iter().flat_map(move |objects| [(evidence, objects, 4), (evidence, objects, 3)])
+        })
+    }
+
+    #[test]
+    fn objects_lead_by_the_sum_of_their_outputs_and_rivals_are_the_others_sums() {
+        for (evidence, objects, known) in cases() {
+            let content = section(&objects);
+            let outputs = Outputs::from_bytes(&content, 4).unwrap();
+            let leading = Leading::of(&evidence, known, outputs, unit());
+            let weights = weights(&evidence, &objects, known);
+            let named = weights.len() - (4 - known);
+            let own = weights[usize::from(objects[leading.output])];
+            let most = weights[..named].iter().copied().fold(0.0, f64::max);
+            if most < 1e-16 {
+                assert_eq!(leading.rivals(), None, "only the background has a weight");
+                continue;
+            }
+            assert!(own >= most * (1.0 - 1e-7), "{evidence:?} {objects:?} {known}");
+            let strongest = (0..known).filter(|&output| objects[output] == objects[leading.output]);
+            assert_eq!(Some(evidence[leading.output]), strongest.map(|output| evidence[output]).max());
+            let exact = (weights.iter().sum::<f64>() - own) / own;
+            match leading.rivals() {
+                Some(rivals) => {
+                    let found = rivals.q56() as f64 / ONE as f64;
+                    assert!((found - exact).abs() <= 1e-7 * exact + 1e-16, "{found} for {exact}: {evidence:?}");
+                }
+                None => assert!(known == 3 && weights[named] > own * (1.0 - 1e-7), "{evidence:?} {objects:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn what_one_exponential_leaves_undecided_is_never_recognized() {
+        let mut found = 0;
+        for (evidence, objects, known) in cases() {
+            let content = section(&objects);
+            let outputs = Outputs::from_bytes(&content, 4).unwrap();
+            for odds in [0, 1 << 40, ONE / 100, ONE / 3, ONE - 1, u64::MAX] {
+                if is_undecided(&evidence, known, outputs, odds, unit()) {
+                    found += 1;
+                    let rivals = Leading::of(&evidence, known, outputs, unit()).rivals();
+                    assert!(rivals.is_none_or(|rivals| rivals.q56() > odds), "{evidence:?} {objects:?} {odds}");
+                }
+            }
+        }
+        assert!(found > 1_000, "{found}");
+    }
+
+    #[test]
+    fn posteriors_of_objects_are_sums_and_shares_are_parts_of_them() {
+        for (evidence, objects, known) in cases() {
+            let content = section(&objects);
+            let outputs = Outputs::from_bytes(&content, 4).unwrap();
+            let weights = weights(&evidence, &objects, known);
+            let all: f64 = weights.iter().sum();
+            let most = evidence.iter().max().unwrap();
+            for output in 0..known {
+                let own = weights[usize::from(objects[output])];
+                let (posterior, share) = posterior(&evidence, known, output, outputs, unit());
+                assert!((posterior.to_f64() - own / all).abs() < 1e-7, "{evidence:?} {objects:?}");
+                let part = ((evidence[output] - most) as f64 / 1000.0).exp();
+                assert!(own < 1e-9 || (share.to_f64() - part / own).abs() < 1e-6, "{evidence:?} {objects:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_hundred_and_fifty_six_level_outputs_overflow_nothing() {
+        let evidence = [-5; 256];
+        let objects: Vec<u8> = (0..=255).collect();
+        for objects in [std::vec![0; 256], objects] {
+            let content = section(&objects);
+            let outputs = Outputs::from_bytes(&content, 256).unwrap();
+            let leading = Leading::of(&evidence, 256, outputs, unit());
+            let rivals = leading.rivals().unwrap().q56();
+            assert_eq!((leading.output, rivals >> 48), (0, if objects[255] == 0 { 0 } else { 255 << 8 }));
+        }
+    }
+}
