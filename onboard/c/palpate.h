@@ -1681,7 +1681,8 @@ static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recog
             return PALPATE_UNDECIDED;
         }
     }
-    if (model->known != model->objects && recognizer->evidence[model->known] > recognizer->evidence[leader]) {
+    if (!PALPATE_HAS_OUTPUTS_(model) && model->known != model->objects &&
+        recognizer->evidence[model->known] > recognizer->evidence[leader]) {
         return PALPATE_UNDECIDED; /* the background has more */
     }
     return PALPATE_RECOGNIZED;
