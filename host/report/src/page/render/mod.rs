@@ -27,8 +27,7 @@ pub(crate) fn on_table(mesh: &Mesh, size: u32) -> Vec<u8> {
     let (middle, longest) = ((low + high) / 2.0, (high - low).max_element());
     let mut shown = mesh.clone();
     // The table's top is a little below, so that nothing that lies on it shows through.
-    let corner =
-        |x: f32, y: f32| [middle.x + x * 0.75 * longest, middle.y + y * 0.75 * longest, low.z - 0.004 * longest];
+    let corner = |x: f32, y: f32| [middle.x + x * 0.6 * longest, middle.y + y * 0.6 * longest, low.z - 0.004 * longest];
     let first = shown.vertices.len() as u32;
     shown.vertices.extend([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
     shown.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|triangle| triangle.map(|index| first + index)));
