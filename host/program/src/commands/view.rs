@@ -4,11 +4,12 @@ use super::Global;
 use super::play;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::real::RealArguments;
+use super::scene::{SceneArguments, described};
 use glam::DVec3;
 use palpate::error::CaptureProblem;
 use palpate::mesh::facts::Facts;
 use palpate::output;
-use palpate::touches::Origin;
+use palpate::touches::{Origin, Surroundings};
 use palpate::{Error, Result};
 use palpate_report::view;
 use std::path::PathBuf;
@@ -25,6 +26,7 @@ Examples:
   palpate view fork -o fork.html --touches 60   more touches
   palpate view cup.obj -o cup.html --true-size mm --probe probe.toml
                                                 as large as it is, your probe
+  palpate view fork -o fork.html --scene table  as it lies on a table
   palpate view --play -o play.html              ten objects, four models
   palpate view --play meshes/ -o play.html      your own meshes
   palpate view --play --model models/household.palpate -o play.html")]
@@ -53,6 +55,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     size: SizeArguments,
     #[command(flatten)]
+    scene: SceneArguments,
+    #[command(flatten)]
     real: RealArguments,
 }
 
@@ -68,7 +72,11 @@ struct Shown<'a> {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let scene = arguments.scene.scene(Surroundings::Floating)?;
     if arguments.play {
+        if !scene.is_floating() {
+            return Err(Error::setting("scene", "table", "it without --play: the game's objects float"));
+        }
         let Arguments { sources, model, output, touches, trace, size, real, .. } = arguments;
         return play::run(play::Wanted { sources, model, output, touches, trace, size, real }, global);
     }
@@ -82,7 +90,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     output::refuse_input(output, [source])?;
     let origin = size.origin(Origin::default())?;
     refuse_unstated(size)?;
-    let object = size.object(source)?;
+    let mut object = [size.object(source)?];
+    arguments.scene.weigh(&mut object)?;
+    let [object] = object;
     let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
     let length = object.instances().next().and_then(|first| origin.length_of(&object, first)).ok_or_else(unknown)?;
     let probe = origin.probe;
@@ -90,7 +100,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let touches = touches.map_or(view::Settings::default().touches, |touches| touches as usize);
     let page = view::page(
         &object,
-        &view::Settings { touches, misses: *misses, seed: global.seed(), length, clearance, probe },
+        &view::Settings { touches, misses: *misses, seed: global.seed(), length, clearance, probe, cone: scene.cone() },
     )?;
     output::write_bytes(output, page.as_bytes())?;
     let facts = Facts::of(object.mesh());
@@ -105,5 +115,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         false => complaints.iter().for_each(|complaint| text += &format!("{}: {complaint}\n", object.name)),
     }
     text += &format!("{}: {}\n", object.name, verdict);
+    if !scene.is_floating() {
+        text += &described(std::slice::from_ref(&object))?;
+    }
     output::print_about(output, &text)
 }

@@ -168,6 +168,47 @@ fn a_capture_that_is_killed_again_and_again_ends_with_the_same_bytes() {
 }
 
 #[test]
+fn objects_on_a_table_are_captured_in_their_placements_which_the_output_and_the_data_set_name() {
+    let directory = meshes();
+    let table = ["--scene", "table", "--approaches", "300", "--pose"];
+    let said = stdout(capture(directory.path(), "out", &[&table[..], &["--cone", "45"]].concat()).output().unwrap());
+    assert!(said.contains("globe: ") && said.contains(" placement") && said.contains("of its volume"), "{said}");
+    let out = directory.path().join("out");
+    let text = std::fs::read_to_string(out.join("dataset.json")).unwrap();
+    let listing: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(listing["settings"]["scene"], serde_json::json!({"table": {"cone": 45.0}}));
+    let first = &listing["objects"][1]["placements"][0];
+    let name = first["name"].as_str().unwrap();
+    assert!(first["weight"].as_f64().unwrap() > 0.0 && said.contains(&format!(": {name} ")), "{said}");
+    // What is added is touched as the rest, and cannot be touched otherwise.
+    std::fs::remove_file(directory.path().join("meshes/globe.obj")).unwrap();
+    globe(&directory.path().join("meshes"), "pear", 9);
+    std::fs::remove_file(directory.path().join("meshes/apple.obj")).unwrap();
+    let error = stderr(capture(directory.path(), "out", &["--add", "--cone", "30"]).output().unwrap(), 1);
+    assert!(error.contains("cannot add to these touches: other settings: scene"), "{error}");
+    stdout(capture(directory.path(), "out", &["--add"]).output().unwrap());
+    assert!(out.join("pear.txt").exists());
+}
+
+#[test]
+fn options_of_a_table_are_refused_where_there_is_none_or_where_they_name_nothing() {
+    let directory = meshes();
+    for (more, code, what) in [
+        (&["--cone", "30"][..], 2, "--scene table"),
+        (&["--placements", "globe/+z=1"], 2, "--scene table"),
+        (&["--scene", "table", "--cone", "91"], 2, "at most 90 degrees"),
+        (&["--scene", "moon"], 2, "use one of floating, table"),
+        (&["--scene", "table", "--placements", "globe/+q=1"], 1, "globe has no placement +q: it has "),
+        (&["--scene", "table", "--placements", "cup/+z=1"], 2, "the name of an object: apple, globe"),
+        (&["--scene", "table", "--placements", "globe"], 2, "such as mug/+z=3"),
+    ] {
+        let error = stderr(capture(directory.path(), "out", more).output().unwrap(), code);
+        assert!(error.contains(what), "{more:?}: {error}");
+        assert!(!directory.path().join("out/globe.txt").exists());
+    }
+}
+
+#[test]
 fn resuming_with_other_arguments_is_refused() {
     let directory = meshes();
     stdout(capture(directory.path(), "out", &["--touches", "20"]).output().unwrap());

@@ -5,14 +5,18 @@
 //! fingers touch it.
 
 use crate::page::html;
+use crate::page::render;
 use crate::page::scene::{self, Line, SimplifiedMesh};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use glam::DVec3;
 use maud::html;
 use palpate::error::Result;
 use palpate::mesh::Object;
 use palpate::mesh::facts::Facts;
+use palpate::mesh::placements::{self, Placement, Placements};
 use palpate::probe::approach::{Approach, CLEARANCE, FINGERS, Probe};
-use palpate::probe::scene::Scene;
+use palpate::probe::scene::{Scene, Table};
 use palpate::random::{self, Purpose};
 
 /// Settings of a page.
@@ -30,12 +34,22 @@ pub struct Settings {
     pub clearance: f64,
     /// The probe.
     pub probe: Probe,
+    /// Largest angle between approaches and straight down, in degrees, to an object on a table; none if it floats.
+    pub cone: Option<f64>,
 }
 
 /// Two dozen touches and a dozen misses of the published probe.
 impl Default for Settings {
     fn default() -> Self {
-        Self { touches: 24, misses: 12, seed: 1, length: 10.0, clearance: CLEARANCE, probe: Probe::default() }
+        Self {
+            touches: 24,
+            misses: 12,
+            seed: 1,
+            length: 10.0,
+            clearance: CLEARANCE,
+            probe: Probe::default(),
+            cone: None,
+        }
     }
 }
 
@@ -52,16 +66,25 @@ const MOST_APPROACHES: u64 = 200_000;
 /// shown (the touches are those of the whole mesh). The same settings give the same page.
 ///
 /// # Errors
-/// As [`Scene::new`] and [`Probe::check`].
+/// As [`Scene::new`], [`Probe::check`] and [`placements::of_object`].
 pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     settings.probe.check(settings.length)?;
-    let scene = Scene::new(object.mesh(), settings.length)?;
     let facts = Facts::of(object.mesh());
-    let mesh = SimplifiedMesh::new(object.mesh(), settings.length);
+    let lying = settings.cone.map(|cone| Lying::new(object, cone)).transpose()?;
+    let (scene, mesh) = match lying.as_ref().and_then(Lying::first) {
+        None => (Scene::new(object.mesh(), settings.length)?, SimplifiedMesh::new(object.mesh(), settings.length)),
+        Some((placement, table)) => {
+            let scene = Scene::on_table(object.mesh(), settings.length, placement.rotation, table)?;
+            let [low, high] = scene.bounds();
+            let mesh = SimplifiedMesh::new(&placement.placed(object.mesh()), (high - low).max_element());
+            (scene, mesh)
+        }
+    };
     let shown_triangles = mesh.triangles.len();
     let drawn = draw(&scene, settings);
     let own = serde_json::json!({
         "length": settings.length,
+        "table": lying.is_some(),
         "full": drawn.approaches.iter().map(Drawn::is_full).collect::<Vec<_>>(),
         "approaches": drawn.approaches,
     });
@@ -69,7 +92,58 @@ pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     let [low, high] = scene.bounds().map(|corner| corner.to_array());
     let scene = scene::Scene { mesh, low, high, radius: settings.probe.radius, lines: lines.collect() };
     let json = scene.json(own.as_object().cloned().unwrap_or_default())?;
-    Ok(html(object, settings, &facts, shown_triangles, &drawn, &json))
+    Ok(html(object, settings, &facts, lying.as_ref(), shown_triangles, &drawn, &json))
+}
+
+/// An object on a table: its placements.
+struct Lying {
+    placements: Placements,
+    /// A picture of each, as PNG.
+    pictures: Vec<Vec<u8>>,
+    cone: f64,
+}
+
+impl Lying {
+    fn new(object: &Object, cone: f64) -> Result<Self> {
+        let mut all = placements::of_object(object)?;
+        // Its first instance is shown.
+        let placements = all.swap_remove(0);
+        let picture = |placement: &Placement| render::on_table(&placement.placed(object.mesh()), 176);
+        let pictures = placements.placements.iter().map(picture).collect();
+        Ok(Self { placements, pictures, cone })
+    }
+
+    /// The most frequent one, in which the object is shown.
+    fn first(&self) -> Option<(&Placement, Table)> {
+        let first = self.placements.placements.first()?;
+        let (placement, weight) = (first.name.clone(), first.weight);
+        Some((first, Table { instance: 0, placement, weight, cone: self.cone }))
+    }
+
+    fn html(&self) -> maud::Markup {
+        let left_out: Vec<String> = self.placements.left_out.iter().map(captioned).collect();
+        html! {
+            ul.placements aria-label="Placements" {
+                @for (index, (placement, picture)) in self.placements.placements.iter().zip(&self.pictures).enumerate() {
+                    li.shown[index == 0] {
+                        img alt={ (placement.name) " points up" } width="88" height="88"
+                            src={ "data:image/png;base64," (STANDARD.encode(picture)) };
+                        span { (captioned(placement)) }
+                    }
+                }
+            }
+            p.note {
+                "Placements on a table, named after the axis of the mesh that points up, with the share in which the object \
+                 comes to rest in each if it is dropped; the first one is shown. The center of mass is "
+                (self.placements.center) "."
+                @if !left_out.is_empty() { " Left out: " (left_out.join(", ")) "." }
+            }
+        }
+    }
+}
+
+fn captioned(placement: &Placement) -> String {
+    format!("{} {:.1} %", placement.name, 100.0 * placement.weight)
 }
 
 /// One approach, for the page's script.
@@ -82,6 +156,9 @@ struct Drawn {
     distances: [Option<f64>; FINGERS],
     /// When each finger touches, in seconds after the first; null if it misses.
     times: [Option<f64>; FINGERS],
+    /// Where the approach ends at the table; infinite if it floats.
+    #[serde(skip)]
+    end: f64,
 }
 
 impl Drawn {
@@ -96,7 +173,7 @@ impl Drawn {
         let direction = DVec3::from(self.direction);
         (0..FINGERS).map(move |finger| {
             let start = DVec3::from(self.starts[finger]);
-            let distance = self.distances[finger].unwrap_or(-2.0 * start.dot(direction));
+            let distance = self.distances[finger].unwrap_or(self.end.min(-2.0 * start.dot(direction)));
             let ball = self.distances[finger].is_some();
             Line {
                 group,
@@ -121,8 +198,7 @@ fn draw(scene: &Scene, settings: &Settings) -> Approaches {
     let (mut touches, mut misses) = (Vec::new(), Vec::new());
     let (mut tried, mut full) = (0, 0);
     while tried < MOST_APPROACHES && (touches.len() < settings.touches || misses.len() < settings.misses) {
-        let approach =
-            Approach::draw_at(&mut rng, scene.bounds(), scene.bounds(), settings.probe.tilt, settings.clearance);
+        let approach = Approach::draw_to(&mut rng, scene, scene.bounds(), settings.probe.tilt, settings.clearance);
         let distances = approach.distances(scene, &settings.probe);
         let times = approach.touch(distances, &settings.probe).times();
         let drawn = Drawn {
@@ -130,6 +206,7 @@ fn draw(scene: &Scene, settings: &Settings) -> Approaches {
             direction: approach.direction.to_array(),
             distances,
             times: times.map(|time| time.micros().map(|micros| f64::from(micros) / 1e6)),
+            end: approach.end_at_table(scene, &settings.probe),
         };
         tried += 1;
         let is_full = drawn.is_full();
@@ -147,6 +224,7 @@ fn html(
     object: &Object,
     settings: &Settings,
     facts: &Facts,
+    lying: Option<&Lying>,
     shown_triangles: usize,
     drawn: &Approaches,
     json: &str,
@@ -181,6 +259,7 @@ fn html(
                 }
                 @for complaint in facts.complaints(object.millimeters) { p.warning { (complaint) } }
                 p { (object.name) ": " (verdict(facts, settings.length, &settings.probe)) "." }
+                @if let Some(lying) = lying { (lying.html()) }
                 fieldset {
                     legend { "Show" }
                     @for (id, label, on) in [

@@ -62,6 +62,32 @@ fn a_page_has_the_touches_and_misses_that_were_asked_for() {
 }
 
 #[test]
+fn a_page_of_an_object_on_a_table_shows_its_placements_and_approaches_from_above_that_end_at_the_table() {
+    let bowl = builtin::one("bowl").unwrap();
+    let floating = page(&bowl, &Settings::default()).unwrap();
+    assert_eq!(data(&floating)["table"], false);
+    assert!(!floating.contains("aria-label=\"Placements\""));
+    let shown = page(&bowl, &Settings { cone: Some(40.0), ..Settings::default() }).unwrap();
+    let data = data(&shown);
+    assert_eq!(data["table"], true);
+    let found = placements::of_object(&bowl).unwrap().remove(0);
+    assert_eq!(shown.matches("points up\"").count(), found.placements.len());
+    for placement in found.placements.iter().chain(&found.left_out) {
+        assert!(shown.contains(&captioned(placement)), "{}", placement.name);
+    }
+    let lowest = data["low"][2].as_f64().unwrap();
+    let lines = data["lines"].as_array().unwrap();
+    assert!(!lines.is_empty());
+    for line in lines {
+        let [start, end] =
+            ["start", "end"].map(|end| DVec3::from_array([0, 1, 2].map(|axis| line[end][axis].as_f64().unwrap())));
+        assert!(end.z >= lowest, "{line} goes through the table at {lowest}");
+        let down = -(end - start).normalize().z;
+        assert!(down >= 40_f64.to_radians().cos() - 1e-9, "{line}");
+    }
+}
+
+#[test]
 fn an_objects_name_cannot_break_out_of_the_page() {
     let page = page(&object("</script><script>alert(1)</script>", cube()), &Settings::default()).unwrap();
     assert!(!page.contains("<script>alert"));

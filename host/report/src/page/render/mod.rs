@@ -20,6 +20,22 @@ pub fn thumbnail(mesh: &Mesh, size: u32) -> Vec<u8> {
     picture.png()
 }
 
+/// A picture of `mesh` as it lies on a table, z pointing up, `size` pixels wide and high, as PNG on a transparent ground: all
+/// placements of an object are seen from the same side.
+pub(crate) fn on_table(mesh: &Mesh, size: u32) -> Vec<u8> {
+    let [low, high] = mesh.bounds();
+    let (middle, longest) = ((low + high) / 2.0, (high - low).max_element());
+    let mut shown = mesh.clone();
+    // The table's top is a little below, so that nothing that lies on it shows through.
+    let corner = |x: f32, y: f32| [middle.x + x * 0.6 * longest, middle.y + y * 0.6 * longest, low.z - 0.004 * longest];
+    let first = shown.vertices.len() as u32;
+    shown.vertices.extend([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
+    shown.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|triangle| triangle.map(|index| first + index)));
+    let mut picture = Picture::new(size, size);
+    picture.draw(&raster::render(&shown, size, Viewpoint::above()), 0, 0);
+    picture.png()
+}
+
 /// A contact sheet of `objects` with their names, five in a row, `width` pixels wide, as PNG on a light ground.
 pub fn sheet(objects: &[Object], width: u32) -> Vec<u8> {
     const COLUMNS: u32 = 5;

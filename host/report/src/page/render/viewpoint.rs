@@ -22,6 +22,11 @@ impl Viewpoint {
         Self { turn: Mat3::from_cols(right, up, toward).transpose() }
     }
 
+    /// From the front, right and above, with z up.
+    pub(super) fn above() -> Self {
+        Self::new(-50.0, 32.0)
+    }
+
     /// From the front, right and above; the flatter the mesh lies, the more from above. A mesh that is thin in x or y
     /// is first turned onto its side.
     pub(super) fn three_quarter(mesh: &Mesh) -> Self {

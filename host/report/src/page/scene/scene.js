@@ -45,6 +45,17 @@ function drawScene(data, { hover, choose }) {
     }
   });
 
+  // The table under the object, if there is one.
+  if (data.table) {
+    const side = 3 * Math.max(size.x, size.y);
+    const table = new THREE.Mesh(
+      new THREE.BoxGeometry(side, side, 0.01 * side),
+      new THREE.MeshBasicMaterial({ color: color("missed"), transparent: true, opacity: 0.25 }),
+    );
+    table.position.set(middle.x, middle.y, low.z - 0.006 * side);
+    scene.add(table);
+  }
+
   // A line's color is dimmed toward the ground unless it is lit.
   const vector = (place) => new THREE.Vector3(...place);
   const lines = data.lines.map((line) => ({ ...line, start: vector(line.start), end: vector(line.end), hue: color(line.color) }));

@@ -55,6 +55,15 @@ pub struct Placement {
     pub rotation: DMat3,
 }
 
+impl Placement {
+    /// The mesh as it lies on the table, z pointing up.
+    #[must_use]
+    pub fn placed(&self, mesh: &Mesh) -> Mesh {
+        let place = |&vertex: &[f32; 3]| (self.rotation * Vec3::from(vertex).as_dvec3()).as_vec3().to_array();
+        Mesh { vertices: mesh.vertices.iter().map(place).collect(), triangles: mesh.triangles.clone() }
+    }
+}
+
 /// The placements of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placements {
