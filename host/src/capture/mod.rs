@@ -226,7 +226,7 @@ pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> 
     in_order(objects.par_iter().map(of))
 }
 
-/// What the touches of an object's scenes are of, in turn: its instances, if it has several, or its placements.
+/// Sources of the touches of an object's scenes, in turn: its instances, if it has several, or its placements.
 pub fn sources(object: &Object, scenes: &[Scene]) -> Vec<Source> {
     sources_of(&named(object), scenes)
 }
@@ -255,7 +255,7 @@ pub fn touches(scenes: &[Scene], name: &str, origin: &Origin, samples: Range<u64
     Ok(ObjectTouches::in_turn(name, touches, &numbered(scenes), first).of_stroke(origin.probe.window()))
 }
 
-/// What the touches of an object's scenes are of, in turn, where the names of its instances are not known: they are called by
+/// Sources of the touches of an object's scenes, in turn, where the names of its instances are not known: they are called by
 /// their numbers.
 pub fn numbered(scenes: &[Scene]) -> Vec<Source> {
     let instance = |(index, scene): (usize, &Scene)| scene.table().map_or(index, |table| table.instance);

@@ -91,7 +91,7 @@ impl Lying {
 }
 
 impl Entry {
-    /// What its touches are of in turn: placements, instances, or nothing.
+    /// Sources of its touches in turn: placements, instances, or none.
     pub fn sources(&self) -> Vec<Source> {
         match self.placements.is_empty() {
             true => self.instances.iter().cloned().map(Source::Instance).collect(),

@@ -71,11 +71,11 @@ pub struct Placements {
     pub placements: Vec<Placement>,
     /// Those that are left out since they are rare, with the weights that they would have among all.
     pub left_out: Vec<Placement>,
-    /// What the center of mass is of.
+    /// Basis of the center of mass.
     pub center: Center,
 }
 
-/// What the center of mass is of.
+/// Basis of the center of mass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub enum Center {
     /// The volume that the mesh encloses.
