@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# The table of docs/measurements/table.md: table.sh PALPATE OBJECTS DIRECTORY, with a built program, meshes (a directory, or
+# `builtin`), and where to work. Some ten minutes on two cores.
+set -euo pipefail
+palpate=$1 objects=$2
+mkdir -p "$3"
+cd "$3"
+noise=noise=0..5ms,timer=1ms
+capture() { "$palpate" capture "$objects" -o "$1" --scene table --approaches "$2" --pose --seed "$3" >"$1.log" 2>&1; }
+capture trained 60000 1
+capture calibrated 200000 2
+capture tested 60000 3
+one() { # one NAME "options of train" "options of export"
+    # shellcheck disable=SC2086
+    "$palpate" train trained -o "$1.json" $2 --evidence all --real "$noise" >"$1.log" 2>&1
+    # shellcheck disable=SC2086
+    "$palpate" export "$1.json" -o "$1.palpate" $3 >>"$1.log" 2>&1
+    if ! "$palpate" calibrate "$1.palpate" calibrated -o "$1.kept" --error-rate 0.01 --max-touches 200 --sequences 20000 \
+        --real "$noise" >>"$1.log" 2>&1; then
+        tail -1 "$1.log"
+        cp "$1.palpate" "$1.kept"
+    fi
+    echo "$1: $(wc -c <"$1.kept") bytes"
+    "$palpate" evaluate "$1.kept" tested --sequences 2000 --real "$noise"
+}
+one gravity-placements "--descriptor gravity --trees rounds=25" "--leaf i8"
+one gravity-placements-small "--descriptor gravity --trees rounds=20,depth=5,leaf_bits=8" "--leaf i8"
+one curvature-placements "--descriptor curvature --trees rounds=25" "--leaf i8"
+one gravity-objects "--descriptor gravity --outputs objects" ""
+one curvature-objects "--descriptor curvature --outputs objects" ""

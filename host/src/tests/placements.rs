@@ -1,0 +1,98 @@
+//! Models with an output for each placement of objects on a table.
+
+use crate::calibrate::{self, Per, calibrate};
+use crate::capture::{self, Settings};
+use crate::compile::{self, CompiledModel, compile};
+use crate::ensemble::train::{self, Outputs, train};
+use crate::ensemble::{Ensemble, TouchOrigin};
+use crate::evaluate::{Candidate, Margins, SequentialSettings, parity};
+use crate::mesh::{Mesh, Object};
+use crate::touches::{Dataset, Origin, Surroundings};
+use palpate_shared::Descriptor;
+
+/// Touches of two objects that lie in several ways and of one that lies in one.
+fn touched(seed: u64, touches: u64) -> Dataset {
+    let shapes = [("brick", [1.0, 0.6, 0.3]), ("disc", [1.0, 1.0, 0.2]), ("rod", [1.0, 0.3, 0.3])];
+    let objects = shapes.map(|(name, sides)| Object::new(name, Mesh::globe(12).stretched(sides)));
+    let scene = Surroundings::Table { cone: 60.0 };
+    let origin = Origin { touches, seed, scene, approaches: true, pose: true, ..Origin::default() };
+    capture::in_memory(&objects, &Settings { origin, ..Settings::default() }, &()).unwrap().0
+}
+
+fn trained(outputs: Outputs) -> Ensemble {
+    let settings = train::Settings { descriptor: Descriptor::Gravity, rounds: 12, outputs, ..train::Settings::compact() };
+    train(&touched(1, 12_000), &settings, &()).unwrap()
+}
+
+fn compiled(ensemble: &Ensemble) -> CompiledModel {
+    let bytes = compile(ensemble, &compile::Settings::default()).unwrap().bytes;
+    CompiledModel::from_bytes(bytes).unwrap()
+}
+
+#[test]
+fn outputs_are_placements_of_objects_with_their_weights_as_priors() {
+    let dataset = touched(1, 12_000);
+    let shares = dataset.placement_shares();
+    assert!(shares.len() > 3, "{shares:?}");
+    let ensemble = trained(Outputs::Placements);
+    assert_eq!(ensemble.objects, shares.keys().cloned().collect::<Vec<_>>());
+    assert_eq!(TouchOrigin::of(&ensemble.origin).unwrap().placements, shares);
+    let compiled = compiled(&ensemble);
+    let model = compiled.model();
+    let outputs = model.outputs().unwrap();
+    for (output, (name, share)) in shares.iter().enumerate() {
+        let object = name.split('/').next().unwrap();
+        let expected = ["brick", "disc", "rod"].iter().position(|own| *own == object).unwrap();
+        assert_eq!(outputs.object(output), Some(expected as u8), "{name}");
+        assert!((f64::from(outputs.share(output)) / 65_536.0 - share).abs() < 1e-4);
+        let prior = (f64::from(model.prior(output)) * f64::from(model.unit())).exp();
+        let most = shares.values().copied().fold(0.0, f64::max);
+        assert!((prior - share / most).abs() < 1e-3, "{name}: {prior} for {share}");
+    }
+    let single = self::compiled(&trained(Outputs::Objects));
+    assert_eq!(single.names(), ["brick", "disc", "rod"]);
+    assert!(single.model().outputs().is_none());
+}
+
+#[test]
+fn names_are_of_objects_and_placements_are_named_beside_them() {
+    let ensemble = trained(Outputs::Placements);
+    let compiled = compiled(&ensemble);
+    let model = compiled.model();
+    let tested = touched(3, 20_000);
+    let by_output = tested.clone().matching(&compiled.names());
+    let settings = SequentialSettings { error_rate: Some(0.01), max_touches: Some(200), sequences: 300, seed: 1 };
+    let full = Margins::new(Candidate::Full(&ensemble), &by_output).unwrap().sequential(&settings).unwrap();
+    let onboard = Margins::new(Candidate::Compiled(&model), &by_output).unwrap().sequential(&settings).unwrap();
+    for found in [&full, &onboard] {
+        assert!(found.error < 0.05 && found.undecided < 0.5, "{found:?}");
+        let placement = found.placement.unwrap();
+        assert!(placement > 0.4, "{placement}");
+    }
+    let parity = parity::parity(&ensemble, &model, &by_output, 300, 1, &()).unwrap();
+    assert_eq!((parity.verdict_differs, parity.touches_differ), (0, 0));
+    // A model of objects takes the same touches as they are.
+    let single = self::compiled(&trained(Outputs::Objects));
+    let names = single.names();
+    assert_eq!(tested.matching(&names).names(), names);
+}
+
+#[test]
+fn a_promise_of_each_placement_is_kept_on_fresh_touches_whatever_their_shares() {
+    let compiled = compiled(&trained(Outputs::Placements));
+    let model = compiled.model();
+    let dataset = touched(2, 60_000).matching(&compiled.names());
+    let settings = |per| calibrate::Settings { rate: 0.05, per, sequences: 4_000, ..Default::default() };
+    let refused = calibrate(&model, dataset.clone(), &settings(Per::Name), &()).unwrap_err();
+    assert!(refused.to_string().contains("several outputs"), "{refused}");
+    let calibrated = calibrate(&model, dataset, &settings(Per::Object), &()).unwrap();
+    let kept = compile::open(&calibrated.model).unwrap();
+    let fresh = touched(4, 60_000).matching(&compiled.names());
+    let margins = Margins::new(Candidate::Compiled(&kept), &fresh).unwrap();
+    let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 2_000, seed: 1 };
+    let found = margins.sequential(&settings).unwrap();
+    for (placement, wrong) in &found.error_of_given_per_object {
+        // Two standard errors of 2,000 sequences above the promise.
+        assert!(*wrong < 0.05 + 2.0 * (0.05_f64 * 0.95 / 2_000.0).sqrt(), "{placement}: {wrong}");
+    }
+}
