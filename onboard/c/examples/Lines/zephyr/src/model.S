@@ -1,0 +1,6 @@
+    .section .rodata.model, "a"
+    .balign 4
+    .globl model_start, model_end
+model_start:
+    .incbin "model.palpate"
+model_end:
