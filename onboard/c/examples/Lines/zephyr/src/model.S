@@ -1,3 +1,4 @@
+    .section .note.GNU-stack, "", %progbits
     .section .rodata.model, "a"
     .balign 4
     .globl model_start, model_end
