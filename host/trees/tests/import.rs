@@ -25,6 +25,9 @@ fn models() -> Vec<PathBuf> {
     models
 }
 
+/// Files of models that no compiled model can be.
+const REFUSED: [&str; 3] = ["lightgbm-4.7-linear", "catboost-1.2-one-hot-words", "catboost-1.2-statistics"];
+
 fn numbers<T: std::str::FromStr>(path: &Path, header: usize, missing: impl Fn() -> T) -> Vec<Vec<T>> {
     let text = std::fs::read_to_string(path).unwrap();
     let number =
@@ -53,7 +56,7 @@ fn margins_are_the_librarys_own_on_plain_tied_and_missing_rows() {
     for path in models() {
         let name = path.file_stem().unwrap().to_str().unwrap();
         // What is refused; and numbers that f32 does not hold.
-        if name.ends_with("-categorical") || name.ends_with("-linear") || name.ends_with("-seconds") {
+        if REFUSED.contains(&name) || name.ends_with("-seconds") {
             continue;
         }
         let ensemble = load(&path);
@@ -108,6 +111,7 @@ fn what_is_saved_as_xgboosts_json_has_the_same_margins_bit_for_bit() {
         *objectives.entry(objective.to_owned()).or_default() += 1;
         let expected = match ensemble.objects.len() {
             1 => objective == "reg:squarederror",
+            _ if ensemble.prediction().targets => objective == "reg:squarederror",
             2 => objective.starts_with("binary:") || objective == "multi:softprob",
             _ => objective == "multi:softprob",
         };
