@@ -228,7 +228,7 @@ struct Run {
     missing: bool,
 }
 
-/// What is known of the features of sets on the way to a node.
+/// Values that the features of sets may have at a node.
 #[derive(Clone, Default)]
 struct Reaches(Rc<BTreeMap<usize, Reach>>);
 
