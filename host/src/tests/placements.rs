@@ -20,7 +20,8 @@ fn touched(seed: u64, touches: u64) -> Dataset {
 }
 
 fn trained(outputs: Outputs) -> Ensemble {
-    let settings = train::Settings { descriptor: Descriptor::Gravity, rounds: 12, outputs, ..train::Settings::compact() };
+    let settings =
+        train::Settings { descriptor: Descriptor::Gravity, rounds: 12, outputs, ..train::Settings::compact() };
     train(&touched(1, 12_000), &settings, &()).unwrap()
 }
 
