@@ -250,7 +250,11 @@ pub(super) fn calibrate_drawn(
     progress.begin("calibrating", Some((settings.sequences + settings.sequences / PILOT) as u64));
     let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
     let naive = ((1.0 - settings.rate) / settings.rate).ln();
-    let shares = shares(model, known);
+    // Each placement has a promise of its own, however rare it is.
+    let shares = match model.outputs() {
+        Some(_) if settings.per == Per::Object => vec![1.0 / known.len() as f64; known.len()],
+        _ => shares(model, known),
+    };
     let wanted = |count: usize| -> Vec<usize> {
         shares.iter().map(|share| (share * count as f64).round().max(1.0) as usize).collect()
     };

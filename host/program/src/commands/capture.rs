@@ -28,8 +28,6 @@ Examples:
                                                    as large as they are
   palpate capture meshes/ -o data --instances      a directory for each object
   palpate capture meshes/ -o data --scene table    as they lie, from above
-  palpate capture winebottle -o data --scene table --placements winebottle/+z=1
-                                                   only standing
   palpate capture meshes/ -o part2 --shard 2/8     the second of eight parts")]
 pub(crate) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
@@ -54,22 +52,22 @@ pub(crate) struct Arguments {
     /// Where approaches aim: box (the bounding box), middle or mass [default: box]
     #[arg(long, value_name = "WHERE", value_parser = aim)]
     aim: Option<Aim>,
-    /// With the probe's direction and alignment; six more numbers in each line
+    /// With the probe's direction and alignment
     #[arg(long)]
     pose: bool,
-    /// Format of the touches: text or parquet [default: text]
+    /// Format: text or parquet [default: text]
     #[arg(long, value_name = "KIND", value_parser = parsed::<Format>)]
     format: Option<Format>,
-    /// Capture only the K-th of N parts, which together are the whole [default: 1/1]
+    /// Capture the K-th of N parts only [default: 1/1]
     #[arg(long, value_name = "K/N", value_parser = parsed::<Shard>)]
     shard: Option<Shard>,
-    /// Continue what was interrupted, with the same program, settings and objects
+    /// Continue a capture that was interrupted
     #[arg(long, conflicts_with = "force")]
     resume: bool,
-    /// Add the objects to the data set in the directory, touched as the others were
+    /// Add the objects to the data set that is there
     #[arg(long, conflicts_with = "force")]
     add: bool,
-    /// Write all the same; replaces the data set in the directory
+    /// Write all the same; replaces what is there
     #[arg(long)]
     force: bool,
 }

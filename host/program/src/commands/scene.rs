@@ -8,14 +8,14 @@ use std::fmt::Write as _;
 /// The scene, and how objects lie in it.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct SceneArguments {
-    /// Surroundings of the objects: floating, or table [default: floating]
+    /// Scene: floating or table [default: floating]
     #[arg(long, value_name = "WHERE", value_parser = scene)]
     scene: Option<Surroundings>,
-    /// Approaches to objects on a table are within this angle of straight down [default: 60]
+    /// Table: most degrees from straight down [default: 60]
     #[arg(long, value_name = "DEGREES")]
     cone: Option<f64>,
-    /// Weights of an object's placements on a table; those that are not named are left out
-    #[arg(long, value_name = "OBJECT/NAME=WEIGHT,…", value_delimiter = ',', value_parser = weight)]
+    /// Weights of placements, such as mug/+z=3; the rest of the object's are left out
+    #[arg(long, value_name = "WEIGHTS", value_delimiter = ',', value_parser = weight)]
     placements: Vec<Weight>,
 }
 
