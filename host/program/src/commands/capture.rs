@@ -21,7 +21,6 @@ Examples:
   palpate capture builtin -o data                  21,000 touches per object
   palpate capture cup.stl bowls/ builtin -o data   your meshes beside them
   palpate capture jug.obj -o data --add            one more, touched alike
-  palpate capture meshes/ -o data --pose           with the probe's direction
   palpate capture meshes/ -o data --approaches 60000
                                                    also those that miss
   palpate capture meshes/ -o data --true-size mm --probe probe.toml
