@@ -139,7 +139,7 @@ pub struct Noise {
 /// The prediction of a model over rows.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Predicts {
-    /// "class", "value" or "targets".
+    /// "class" or "value".
     pub what: &'static str,
     /// Function from a margin to a value.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -154,14 +154,10 @@ pub struct Predicts {
 }
 
 pub(super) fn predicts(model: &Model<'_>) -> Option<Predicts> {
+    let is_value = model.object_count() == 1;
     let prediction = model.prediction();
-    let is_value = model.object_count() == 1 || prediction.targets;
     model.descriptor().is_none().then(|| Predicts {
-        what: match (prediction.targets, is_value) {
-            (true, _) => "targets",
-            (false, true) => "value",
-            (false, false) => "class",
-        },
+        what: if is_value { "value" } else { "class" },
         link: is_value.then(|| prediction.link.name()),
         scale: prediction.scale,
         last_of_ties: prediction.last_of_ties,
