@@ -72,7 +72,7 @@ struct Object {
     sum: u64,
 }
 
-/// `part` / `whole` in Q56, rounded up, at most 2^64 − 1.
+/// `part` / `whole` in Q56, rounded down, and one more unless it is whole; at most 2^64 − 1. A decision errs toward undecided.
 fn quotient(mut part: u64, whole: NonZeroU64) -> u64 {
     let whole = whole.get();
     let mut times = 0_u64;
@@ -82,9 +82,7 @@ fn quotient(mut part: u64, whole: NonZeroU64) -> u64 {
         times += 1;
     }
     let down = ratio(part, whole);
-    // Not exact unless nothing is left: a part of the unit more, which no decision depends on but at equality.
-    let is_exact = part == 0;
-    (times << 56).saturating_add(down).saturating_add(u64::from(!is_exact))
+    (times << 56).saturating_add(down).saturating_add(u64::from(part != 0))
 }
 
 /// True if no object can be recognized, by one exponential: the strongest output that does not belong to the strongest one's
