@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
     /// Capture the K-th of N parts only [default: 1/1]
     #[arg(long, value_name = "K/N", value_parser = parsed::<Shard>)]
     shard: Option<Shard>,
-    /// Continue a capture that was interrupted
+    /// Continue what was interrupted
     #[arg(long, conflicts_with = "force")]
     resume: bool,
     /// Add the objects to the data set that is there

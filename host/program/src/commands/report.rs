@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     /// Recorded touches of the objects; simulated ones are compared with them by the probe of --probe, as it really is
     #[arg(long, value_name = "DIR")]
     recorded: Option<PathBuf>,
-    /// Continue what was interrupted, with the same program, settings and objects
+    /// Continue what was interrupted; with the same program, settings and objects
     #[arg(long)]
     resume: bool,
     /// Write all the same; replaces results of another report or run
