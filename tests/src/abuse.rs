@@ -111,6 +111,7 @@ pub const TRAINED: Trained = Trained {
         length: Length::Millimeter,
         stroke: None,
         travel: None,
+        cone: 0,
     }),
     touches: Some(TrainedTouches {
         patterns: Patterns::CONTACTS,

@@ -57,6 +57,8 @@ pub struct Plain<'a> {
     row: Option<&'a [u8]>,
     /// Places where a class may be known: the groups before, and the lead.
     exits: Vec<(usize, i64)>,
+    /// For each output the number of its object, if several belong together.
+    together: Vec<u8>,
     /// True if the last of several largest margins names the class.
     last_of_ties: bool,
     /// True if the last object is a background.
@@ -125,6 +127,7 @@ impl<'a> Plain<'a> {
         let (mut odds_by_object, mut sharpness, mut shared, mut sentinel) = (Vec::new(), 1 << 16, None, None);
         let (mut weights, mut row) = (Vec::new(), None);
         let (mut exits, mut last_of_ties, mut background) = (Vec::new(), false, false);
+        let mut together = Vec::new();
         // What a model without the section touches was trained on.
         let (mut patterns, mut needs_pose, mut largest) = (0b10_0000, matches!(descriptor, 2 | 3 | 5 | 6), u32::MAX);
         while !optional.is_empty() {
@@ -143,6 +146,7 @@ impl<'a> Plain<'a> {
                     let exit = |exit: &[u8]| (number(&exit[..2]) as usize, number(&exit[4..]) as i64);
                     exits = content.chunks_exact(8).map(exit).collect();
                 }
+                18 => together = content[4..][..4 * objects].chunks(4).map(|output| output[0]).collect(),
                 14 => sentinel = Some((signed(&content[..4]), signed(&content[4..8]))),
                 _ => {}
             }
@@ -176,6 +180,7 @@ impl<'a> Plain<'a> {
             exits,
             last_of_ties,
             background,
+            together,
             evidence: Vec::new(),
             touches: 0,
             decision: Decision::Undecided,
@@ -402,9 +407,10 @@ impl<'a> Plain<'a> {
             *evidence = evidence.saturating_add(margin.into());
         }
         self.touches += 1;
-        let leader = self.leader();
+        let (leader, rivals) =
+            if self.together.is_empty() { (self.leader(), Some(self.rivals(1 << 16))) } else { self.leading() };
         let odds = self.odds_by_object.get(leader).copied().unwrap_or(self.odds);
-        if self.rivals(1 << 16) <= u128::from(odds) {
+        if rivals.is_some_and(|rivals| rivals <= u128::from(odds)) {
             self.decision = Decision::Recognized(leader, self.touches);
         } else if self.touches >= self.limit {
             self.decision = Decision::GaveUp;
@@ -441,6 +447,47 @@ impl<'a> Plain<'a> {
         let leader = self.leader();
         let others = (0..self.objects).filter(|&object| object != leader);
         others.map(|object| u128::from(self.weight(object, sharpness))).sum()
+    }
+
+    /// The sums of the weights of objects with several outputs, held within 64 bits.
+    fn sums_together(&self, sharpness: u64) -> Vec<u64> {
+        let mut sums = vec![0_u64; 256];
+        for (output, &object) in self.together.iter().enumerate() {
+            let sum = &mut sums[usize::from(object)];
+            *sum = sum.saturating_add(self.weight(output, sharpness));
+        }
+        sums
+    }
+
+    /// The output that stands for the leader where several belong together, and the weight of its rivals in Q56; none where
+    /// nothing is recognized. Without backgrounds.
+    fn leading(&self) -> (usize, Option<u128>) {
+        let sums = self.sums_together(1 << 16);
+        let own = *sums.iter().max().expect("an object");
+        let object = sums.iter().position(|&sum| sum == own).expect("it is there");
+        let outputs = || (0..self.objects).filter(|&output| usize::from(self.together[output]) == object);
+        let most = outputs().map(|output| self.evidence[output]).max().expect("an output");
+        let output = outputs().find(|&output| self.evidence[output] == most).expect("it is there");
+        let others = sums.iter().enumerate().filter(|other| other.0 != object);
+        let others = others.fold(0_u64, |all, other| all.saturating_add(*other.1));
+        let rivals = |own: u64| {
+            let whole = u128::from(others / own).min(255) << 56;
+            let down = (u128::from(others % own) << 56) / u128::from(own);
+            whole + down + u128::from(!others.is_multiple_of(own))
+        };
+        (output, (own > 0).then(|| rivals(own).min(u64::MAX.into())))
+    }
+
+    /// The posterior of an output's object, and the output's share of it, in Q56.
+    pub fn posterior_together(&self, output: usize) -> (u64, u64) {
+        let ratio =
+            |part: u64, whole: u64| if whole == 0 { 0 } else { ((u128::from(part) << 56) / u128::from(whole)) as u64 };
+        let sums = self.sums_together(self.sharpness);
+        let object = sums[usize::from(self.together[output])];
+        let all = sums.iter().fold(0_u64, |all, &sum| all.saturating_add(sum));
+        let rest = all - object;
+        let posterior = if rest < object { (1 << 56) - ratio(rest, all) } else { ratio(object, all) };
+        (posterior, ratio(self.weight(output, self.sharpness), object))
     }
 
     /// An object's posterior in Q56.

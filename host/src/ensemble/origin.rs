@@ -6,7 +6,7 @@ use crate::probe::approach::Probe;
 use crate::probe::hand;
 use crate::probe::noise::Noise;
 use crate::probe::unit::{self, tenth};
-use crate::touches::{self, Captured, Dataset, short};
+use crate::touches::{self, Captured, Dataset, Surroundings, short};
 use palpate_shared::format::{Length, TrainedProbe};
 use palpate_trees::compile::{self, CompiledModel};
 use serde::{Deserialize, Serialize};
@@ -179,12 +179,15 @@ pub struct StatedProbe {
     pub unit: Length,
     /// The longest side of an object's bounding box, in units; of no meaning in millimeters.
     pub length: f64,
+    /// Surroundings of the objects.
+    #[serde(default, skip_serializing_if = "Surroundings::is_floating")]
+    pub scene: Surroundings,
 }
 
 /// The probe that a model of unknown origin is for: the published one.
 impl Default for StatedProbe {
     fn default() -> Self {
-        Self { probe: Probe::default(), unit: Length::Tenth, length: 10.0 }
+        Self { probe: Probe::default(), unit: Length::Tenth, length: 10.0, scene: Surroundings::Floating }
     }
 }
 
@@ -205,13 +208,15 @@ impl StatedProbe {
         let Probe { radius, spacing, speed, stroke, travel, .. } = self.probe;
         let [radius, spacing, speed] = [radius, spacing, speed].map(scaled);
         let [stroke, travel] = [stroke, travel].map(|length| length.map(scaled));
-        TrainedProbe { radius, spacing, speed, length: self.unit, stroke, travel }
+        // At least a hundredth of a degree, since 0 is a floating object; a conversion saturates.
+        let cone = self.scene.cone().map_or(0, |cone| ((100.0 * cone).round() as u16).max(1));
+        TrainedProbe { radius, spacing, speed, length: self.unit, stroke, travel, cone }
     }
 
     /// Compares what two sides state, such as a data set and a model; `names` says who they are.
     ///
     /// # Errors
-    /// [`ProbeProblem::Differs`] if radius, spacing, nominal speed, stroke or scale differ. Tilt and travel are not compared:
+    /// [`ProbeProblem::Differs`] if radius, spacing, nominal speed, stroke, scale or scene differ. Tilt and travel are not compared:
     /// they are how approaches were drawn.
     pub fn compare(names: [&str; 2], [one, other]: [TrainedProbe; 2]) -> Result<(), ProbeProblem> {
         let differs = |a: f32, b: f32| (a - b).abs() > 1e-5 * a.abs().max(b.abs());
@@ -234,6 +239,10 @@ impl StatedProbe {
         if !is_same {
             let [one, other] = strokes.map(|stroke| stroke.map_or("none".into(), |stroke| stroke.to_string()));
             differences.push(format!("stroke {one} and {other}"));
+        }
+        if one.cone != other.cone {
+            let [one, other] = [one.cone, other.cone].map(scene);
+            differences.push(format!("scene {one} and {other}"));
         }
         if differences.is_empty() {
             return Ok(());
@@ -263,7 +272,12 @@ impl StatedProbe {
         let own = Self::of(dataset).map(|own| own.trained());
         let is_simulated = own.is_some() && !dataset.is_recorded();
         if let Some((probe, own)) = probe.zip(own) {
-            let unstated = |own: TrainedProbe| TrainedProbe { stroke: own.stroke.or(probe.stroke), ..own };
+            // Nor do recordings state what the objects lay on.
+            let unstated = |own: TrainedProbe| TrainedProbe {
+                stroke: own.stroke.or(probe.stroke),
+                cone: if own.cone == 0 { probe.cone } else { own.cone },
+                ..own
+            };
             Self::compare(names, [probe, if is_simulated { own } else { unstated(own) }])?;
         }
         if is_simulated {
@@ -291,6 +305,12 @@ impl StatedProbe {
         };
         Err(ProbeProblem::OtherStroke { first, second, stroke, latest: seconds(latest.micros), is_later })
     }
+}
+
+/// The scene of a cone in hundredths of a degree, in words.
+fn scene(cone: u16) -> String {
+    let scene = if cone == 0 { Surroundings::Floating } else { Surroundings::Table { cone: f64::from(cone) / 100.0 } };
+    scene.to_string()
 }
 
 /// Contacts that end before this share of the longest time between them were ended by a stroke.
@@ -325,7 +345,7 @@ impl Latest {
 
 impl From<&touches::Origin> for StatedProbe {
     fn from(origin: &touches::Origin) -> Self {
-        Self { probe: origin.probe, unit: origin.unit, length: origin.length }
+        Self { probe: origin.probe, unit: origin.unit, length: origin.length, scene: origin.scene }
     }
 }
 

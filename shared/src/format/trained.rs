@@ -96,9 +96,15 @@ pub struct TrainedProbe {
     pub stroke: Option<f32>,
     /// Way that it goes from its start before an approach is a miss, in lengths; none: past the object.
     pub travel: Option<f32>,
+    /// Largest angle between approaches and straight down, in hundredths of a degree, where objects lie on a table; 0: they
+    /// float, and approaches come from every direction.
+    pub cone: u16,
 }
 
 impl TrainedProbe {
+    /// The largest cone: directions from the upper half sphere.
+    pub const LARGEST_CONE: u16 = 9_000;
+
     /// Bytes of the section without stroke and travel: the least that it has.
     pub const LENGTH: usize = 16;
 
@@ -109,7 +115,8 @@ impl TrainedProbe {
     pub fn to_bytes(self) -> [u8; Self::WITH_HAND] {
         let [radius, spacing, speed] = [self.radius, self.spacing, self.speed].map(f32::to_le_bytes);
         let [stroke, travel] = [self.stroke, self.travel].map(|length| length.unwrap_or_default().to_le_bytes());
-        let numbers = [radius, spacing, speed, [self.length.code(), 0, 0, 0], stroke, travel];
+        let [low, high] = self.cone.to_le_bytes();
+        let numbers = [radius, spacing, speed, [self.length.code(), 0, low, high], stroke, travel];
         let mut bytes = [0; Self::WITH_HAND];
         bytes.iter_mut().zip(numbers.into_iter().flatten()).for_each(|(to, from)| *to = from);
         bytes
@@ -120,10 +127,12 @@ impl TrainedProbe {
         if self.stroke.is_none() && self.travel.is_none() { Self::LENGTH } else { Self::WITH_HAND }
     }
 
-    /// Reads a section; `None` if a number is not positive and finite (stroke and travel may be 0, or not there), or the
-    /// unit of length does not exist. Bytes after those that are known are ignored.
+    /// Reads a section; `None` if a number is not positive and finite (stroke and travel may be 0, or not there), the unit of
+    /// length does not exist, or the cone is above 90 degrees. Bytes after those that are known are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let ([radius, spacing, speed, [length, ..]], rest) = bytes.as_chunks::<4>().0.split_first_chunk::<4>()?;
+        let ([radius, spacing, speed, [length, _, low, high]], rest) =
+            bytes.as_chunks::<4>().0.split_first_chunk::<4>()?;
+        let cone = u16::from_le_bytes([*low, *high]);
         let number = |bytes: &[u8; 4]| {
             let bits = u32::from_le_bytes(*bytes);
             // Positive and finite, without floating point.
@@ -138,6 +147,7 @@ impl TrainedProbe {
             length: Length::from_code(*length)?,
             stroke: stated(stroke)?,
             travel: stated(travel)?,
+            cone: (cone <= Self::LARGEST_CONE).then_some(cone)?,
         })
     }
 }
@@ -427,8 +437,15 @@ mod tests {
         needs_pose: true,
         largest_spread: 1_050_000,
     };
-    const PROBE: TrainedProbe =
-        TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Tenth, stroke: None, travel: None };
+    const PROBE: TrainedProbe = TrainedProbe {
+        radius: 0.15,
+        spacing: 1.5,
+        speed: 10.0,
+        length: Length::Tenth,
+        stroke: None,
+        travel: None,
+        cone: 0,
+    };
     const NOISE: TrainedNoise = TrainedNoise { least: 0, largest: 10_000, timer: 1_000, pose: 5_000 };
 
     #[test]
@@ -465,6 +482,17 @@ mod tests {
             assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), Some(probe));
             assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()[..23]), Some(PROBE), "as far as it is whole");
         }
+    }
+
+    #[test]
+    fn a_probe_states_its_scene_in_bytes_that_were_zeros() {
+        for cone in [1, 6_000, 9_000] {
+            let probe = TrainedProbe { cone, ..PROBE };
+            assert_eq!(probe.length(), PROBE.length());
+            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), Some(probe));
+        }
+        assert_eq!(PROBE.to_bytes()[12..16], [0; 4]);
+        assert_eq!(TrainedProbe::from_bytes(&TrainedProbe { cone: 9_001, ..PROBE }.to_bytes()), None);
     }
 
     #[test]

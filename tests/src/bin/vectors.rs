@@ -7,7 +7,7 @@
 use palpate::compile::{EarlyExit, Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node};
 use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict, exp2_negative};
-use palpate_shared::format::{Counted, PatternShares, Trained, TrainedTouches, checksum, f32_key};
+use palpate_shared::format::{Counted, Outputs, PatternShares, Trained, TrainedTouches, checksum, f32_key};
 use palpate_shared::{ContactTime, Descriptor, MISSING_FEATURE, Patterns, Pose, Touch};
 use palpate_tests::abuse::{self, changed, section};
 use palpate_tests::random::{self, Shape};
@@ -26,6 +26,7 @@ fn main() {
     decisions(&mut text);
     shared_leaves(&mut text);
     early_exits(&mut text);
+    together(&mut text);
     refused(&mut text);
     assert!(text.lines().all(|line| line.len() < 16_384), "a line is too long");
     print!("{text}");
@@ -133,7 +134,12 @@ fn known(text: &mut String, model: &Model<'_>, recognizer: &Recognizer<'_, 256>,
     // The leader's, and now and then the last one's.
     let last = recognizer.touches().is_multiple_of(3).then(|| model.object_count() - 1);
     for object in [Some(recognizer.best()), last].into_iter().flatten() {
-        *text += &format!("posterior {object} {}\n", recognizer.posterior(object).q56());
+        if model.outputs().is_some() {
+            let (posterior, share) = recognizer.posterior_together(object);
+            *text += &format!("together {object} {} {}\n", posterior.q56(), share.q56());
+        } else {
+            *text += &format!("posterior {object} {}\n", recognizer.posterior(object).q56());
+        }
     }
 }
 
@@ -324,6 +330,48 @@ fn early_exits(text: &mut String) {
         let settings = Settings { leaf, layout: Some(layout), early_exit, ..Settings::default() };
         let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
         play_rows(text, &format!("early exit, {} {}", layout.name(), leaf.name()), &bytes, true);
+    }
+}
+
+/// Outputs that belong together, with the model's threshold, with their own, with a temperature, and with level evidence.
+fn together(text: &mut String) {
+    let all = section(2 | 1 << 15, &ALL.to_bytes());
+    let outputs = |objects: [u8; 5]| {
+        let mut content = Vec::new();
+        Outputs::write(objects.iter().map(|&object| (object, 0.4)), &mut |bytes| content.extend_from_slice(bytes));
+        section(18 | 1 << 15, &content)
+    };
+    let odds = section(5 | 1 << 15, &[1_u32 << 31, 1 << 29, 5, 1 << 30, 1 << 28].map(u32::to_le_bytes).concat());
+    let temperature = section(11, &((1_u32 << 16) / 3).to_le_bytes());
+    let shape = Shape { objects: 5, leaf: 0.7, ..SHAPE };
+    let ensemble = random::ensemble(shape, 27);
+    for (name, objects, between, after) in [
+        ("two objects of five outputs", [0, 0, 1, 1, 1], &[][..], &[][..]),
+        ("four objects of five outputs, thresholds of their own", [0, 1, 2, 2, 3], &odds[..], &[]),
+        ("a temperature", [0, 0, 0, 1, 2], &[], &temperature[..]),
+        ("one object of all outputs", [0; 5], &[], &[]),
+    ] {
+        let settings = Settings { leaf: Leaf::I8, error_rate: 0.05, max_touches: 8, ..Settings::default() };
+        let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
+        let sections = [&all[..], between, after, &outputs(objects)].concat();
+        play(text, &format!("outputs together: {name}"), &with_sections(&bytes, &sections), &random::touches(8, 28));
+    }
+    // Evidence that is level, and evidence far behind.
+    let sections = [&all[..], &outputs([0, 0, 0, 1, 1])].concat();
+    let bytes = with_sections(&compile(&ensemble, &Settings::default()).expect("it fits").bytes, &sections);
+    let model = Model::new(&bytes).expect("a model");
+    let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model)).expect("at most 256 objects");
+    *text += &format!("model {} outputs together: evidence that is level\n", hex(&bytes));
+    for evidence in [[0; 5], [9, 9, 9, 2_000, 2_000], [i64::MIN, i64::MIN, 0, i64::MIN, 0]] {
+        let bytes = abuse::snapshot(&model, 7, 0, 0, &evidence);
+        recognizer.restore(&bytes).expect("a snapshot");
+        *text += &format!("restore {} ok\n", hex(&bytes));
+        for touch in random::touches(2, 29) {
+            *text += &format!("touch {}\n", touch_words(&touch));
+            let verdict = recognizer.push(&touch).expect("every approach counts");
+            let features = Descriptor::Curvature.features(&touch);
+            known(text, &model, &recognizer, features.as_slice(), verdict);
+        }
     }
 }
 

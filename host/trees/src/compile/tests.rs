@@ -324,8 +324,15 @@ fn estimates_from_a_models_bytes_are_those_of_its_compilation() {
 fn what_is_read_from_a_model_is_found_behind_its_optional_sections() {
     let trees = (1..8).map(|splits| chain(splits, |number| number % 2)).collect();
     let ensemble = ensemble(Descriptor::Curvature, trees);
-    let probe =
-        TrainedProbe { radius: 0.15, spacing: 1.5, speed: 10.0, length: Length::Tenth, stroke: None, travel: None };
+    let probe = TrainedProbe {
+        radius: 0.15,
+        spacing: 1.5,
+        speed: 10.0,
+        length: Length::Tenth,
+        stroke: None,
+        travel: None,
+        cone: 0,
+    };
     for &layout in Layout::OF_DATA {
         let compiled = |probe| {
             let stated = Stated { probe, ..Stated::default() };
