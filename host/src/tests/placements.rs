@@ -4,7 +4,7 @@ use crate::calibrate::{self, Per, calibrate};
 use crate::capture::{self, Settings};
 use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::train::{self, Outputs, train};
-use crate::ensemble::{Ensemble, TouchOrigin};
+use crate::ensemble::{Ensemble, StatedProbe, TouchOrigin};
 use crate::evaluate::{Candidate, Margins, SequentialSettings, parity};
 use crate::mesh::{Mesh, Object};
 use crate::touches::{Dataset, Origin, Surroundings};
@@ -12,17 +12,22 @@ use palpate_shared::Descriptor;
 
 /// Touches of two objects that lie in several ways and of one that lies in one.
 fn touched(seed: u64, touches: u64) -> Dataset {
+    in_scene(Surroundings::Table { cone: 60.0 }, seed, touches)
+}
+
+fn in_scene(scene: Surroundings, seed: u64, touches: u64) -> Dataset {
     let shapes = [("brick", [1.0, 0.6, 0.3]), ("disc", [1.0, 1.0, 0.2]), ("rod", [1.0, 0.3, 0.3])];
     let objects = shapes.map(|(name, sides)| Object::new(name, Mesh::globe(12).stretched(sides)));
-    let scene = Surroundings::Table { cone: 60.0 };
     let origin = Origin { touches, seed, scene, approaches: true, pose: true, ..Origin::default() };
     capture::in_memory(&objects, &Settings { origin, ..Settings::default() }, &()).unwrap().0
 }
 
 fn trained(outputs: Outputs) -> Ensemble {
-    let settings =
-        train::Settings { descriptor: Descriptor::Gravity, rounds: 12, outputs, ..train::Settings::compact() };
-    train(&touched(1, 12_000), &settings, &()).unwrap()
+    let dataset = touched(1, 12_000);
+    let probe = StatedProbe::of(&dataset);
+    let descriptor = Descriptor::Gravity;
+    let settings = train::Settings { descriptor, rounds: 12, outputs, probe, ..train::Settings::compact() };
+    train(&dataset, &settings, &()).unwrap()
 }
 
 fn compiled(ensemble: &Ensemble) -> CompiledModel {
@@ -53,6 +58,27 @@ fn outputs_are_placements_of_objects_with_their_weights_as_priors() {
     let single = self::compiled(&trained(Outputs::Objects));
     assert_eq!(single.names(), ["brick", "disc", "rod"]);
     assert!(single.model().outputs().is_none());
+}
+
+#[test]
+fn touches_of_another_scene_are_refused_by_ensembles_and_models() {
+    let ensemble = trained(Outputs::Objects);
+    let compiled = compiled(&ensemble);
+    let model = compiled.model();
+    assert_eq!(model.probe().unwrap().cone, 6_000);
+    for (scene, expected) in [
+        (Surroundings::Floating, "scene table with approaches within 60 degrees of straight down and floating"),
+        (Surroundings::Table { cone: 30.0 }, "and table with approaches within 30 degrees of straight down"),
+    ] {
+        let other = in_scene(scene, 3, 200);
+        for candidate in [Candidate::Full(&ensemble), Candidate::Compiled(&model)] {
+            let refused = Margins::new(candidate, &other).err().expect("refused").to_string();
+            assert!(refused.contains(expected), "{refused}");
+        }
+        let refused = calibrate(&model, other, &calibrate::Settings::default(), &()).unwrap_err().to_string();
+        assert!(refused.contains(expected), "{refused}");
+    }
+    assert!(Margins::new(Candidate::Compiled(&model), &touched(3, 200)).is_ok());
 }
 
 #[test]

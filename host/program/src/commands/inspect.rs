@@ -188,12 +188,15 @@ fn strangers_line(lines: &mut Lines, test: &Tested) {
 
 fn probe_lines(lines: &mut Lines, probe: &Probe, touches: &Touches) {
     let text = match probe {
-        Probe { radius: Some(radius), spacing, speed, unit, stroke, travel, .. } => {
+        Probe { radius: Some(radius), spacing, speed, unit, stroke, travel, cone, .. } => {
             let unit = if *unit == "unit" { "units" } else { unit };
             let way = [("stroke", stroke), ("travel", travel)];
             let way = way.into_iter().filter_map(|(name, length)| Some(format!(", {name} {} {unit}", (*length)?)));
             format!("radius {radius}, spacing {spacing} {unit}, speed {speed} {unit} per second")
                 + &way.collect::<String>()
+                + &cone.map_or_else(String::new, |cone| {
+                    format!("; objects on a table, approaches within {cone} degrees of straight down")
+                })
         }
         Probe { spacing, speed, .. } => {
             format!("not stated; assumed: spacing {spacing} units, speed {speed} units per second")
