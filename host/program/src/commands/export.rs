@@ -221,6 +221,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         1 => error.in_file(&arguments.ensemble),
         _ => error,
     })?;
+    let model = CompiledModel::from_bytes(compiled.bytes.clone())?;
     output::write_bytes(&arguments.output, &compiled.bytes)?;
     let written = write_emitted(&emitted, &compiled, &ensemble, &arguments.output)?;
     let imported = ensemble.origin.imported.as_ref();
@@ -257,7 +258,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if global.json {
         return output::print_json_about(&arguments.output, &exported);
     }
-    output::print_about(&arguments.output, &text(&arguments.output, &exported))
+    output::print_about(&arguments.output, &text(&arguments.output, &exported, &features(model.model())))
 }
 
 impl Arguments {
@@ -364,7 +365,7 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
         // Writing to a string cannot fail.
         _ = writeln!(text, "Source code: {}", source.display());
     }
-    text += &features(written.layout, written.leaf, compiled.model().shared_leaves().is_some());
+    text += &features(compiled.model());
     output::print_about(&arguments.output, &text)
 }
 
@@ -593,7 +594,7 @@ fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<(Option<Vec<f32>
     Ok((Some(scales), rows))
 }
 
-fn text(path: &Path, exported: &Exported) -> String {
+fn text(path: &Path, exported: &Exported, features: &str) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     if let (Some(kind), Some(features)) = (&exported.imported, &exported.features) {
@@ -651,9 +652,7 @@ fn text(path: &Path, exported: &Exported) -> String {
         _ = writeln!(text, "The trees are code ({form}), which the model has to be built with; see {}", GUIDE);
         return text;
     }
-    let has_sentinel = exported.predicts.as_ref().is_some_and(|predicts| predicts.missing.is_some());
-    let features = features(exported.layout, exported.leaf, exported.shared_leaves.is_some());
-    if has_sentinel { text + features.trim_end() + ", sentinel\n" } else { text + &features }
+    text + features
 }
 
 /// Effects of whole numbers; of features that they hold exactly, only the number.

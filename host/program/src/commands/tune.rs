@@ -5,7 +5,7 @@ use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
 use palpate::Result;
-use palpate::compile::Core;
+use palpate::compile::{self, Core};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::tune::{self, Row, Settings, Tuned};
@@ -90,12 +90,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return output::print_json_about(&written, &tuned);
     }
     let mut text = table(&tuned);
-    let chosen = &tuned.rows[tuned.chosen];
-    text += &features(
-        chosen.layout.unwrap_or_default(),
-        chosen.leaf.unwrap_or_default(),
-        chosen.recipe.different_leaves.is_some(),
-    );
+    text += &features(&compile::open(&tuned.model)?);
     for (what, path) in [("model", &arguments.output), ("ensemble", &arguments.ensemble)] {
         if let Some(path) = path {
             // Writing to a string cannot fail.

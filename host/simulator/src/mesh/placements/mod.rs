@@ -14,8 +14,8 @@
 //! let placements = placements::placements(&tetrahedron)?;
 //! assert_eq!(placements.center, placements::Center::OfVolume);
 //! let names: Vec<&str> = placements.placements.iter().map(|placement| placement.name.as_str()).collect();
-//! // Three faces alike, of which the one up is opposite; and the large face below.
-//! assert_eq!(names, ["-x-y-z", "+x"]);
+//! // On one of three faces that are alike, and on the large one.
+//! assert_eq!(names, ["+z", "-x-y-z"]);
 //! # Ok(())
 //! # }
 //! ```
