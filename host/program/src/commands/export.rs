@@ -258,7 +258,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if global.json {
         return output::print_json_about(&arguments.output, &exported);
     }
-    output::print_about(&arguments.output, &text(&arguments.output, &exported, &features(model.model())))
+    output::print_about(&arguments.output, &text(&arguments.output, &exported, &features(&model.model())))
 }
 
 impl Arguments {
@@ -365,7 +365,7 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
         // Writing to a string cannot fail.
         _ = writeln!(text, "Source code: {}", source.display());
     }
-    text += &features(compiled.model());
+    text += &features(&compiled.model());
     output::print_about(&arguments.output, &text)
 }
 
