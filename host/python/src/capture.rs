@@ -12,7 +12,7 @@ use palpate::mesh::source::{self, Source};
 use palpate::mesh::{Mesh, Object};
 use palpate::probe::approach::Aim;
 use palpate::shared::format::Length;
-use palpate::touches::Origin;
+use palpate::touches::{Origin, Surroundings};
 use pyo3::exceptions::PyTypeError;
 use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
@@ -142,7 +142,8 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 /// its true size and the `probe` is in millimeters.
 ///
 /// `touches` full touches of each object are kept, or with `approaches` that many approaches whether fingers touch or not;
-/// `pose` keeps the probe's direction and alignment. The same `seed` gives the same touches on any number of `threads`, and
+/// `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a table in each of their placements, and
+/// approaches come within that many degrees of straight down. The same `seed` gives the same touches on any number of `threads`, and
 /// the same as the program's. `shard` is "K/N" for a part. With `instances` a directory inside a directory is one object.
 /// With `out` the touches are written there, as "text" or "parquet", as `palpate capture` does: `resume`, `add` and `force`
 /// are its options.
@@ -156,8 +157,8 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 /// >>> data.times.shape, bool(data.times.min() == 0.0)
 /// ((200, 3), True)
 #[pyo3::pyfunction]
-#[pyo3(signature = (meshes, *, touches=21_000, seed=1, probe=None, approaches=false, pose=false, aim="box", length=10.0,
-    millimeters=None, instances=false, shard="1/1", out=None, format="text", resume=false, add=false, force=false,
+#[pyo3(signature = (meshes, *, touches=21_000, seed=1, probe=None, approaches=false, pose=false, aim="box", cone=None,
+    length=10.0, millimeters=None, instances=false, shard="1/1", out=None, format="text", resume=false, add=false, force=false,
     threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "they are keywords in Python")]
 pub(crate) fn capture(
@@ -169,6 +170,7 @@ pub(crate) fn capture(
     approaches: bool,
     pose: bool,
     aim: &str,
+    cone: Option<f64>,
     length: f64,
     millimeters: Option<f64>,
     instances: bool,
@@ -193,6 +195,7 @@ pub(crate) fn capture(
         aim: Aim::from_name(aim).ok_or_else(|| Error::setting("aim", aim, "box, middle or mass"))?,
         pose,
         approaches,
+        scene: cone.map_or(Surroundings::Floating, |cone| Surroundings::Table { cone }),
         format: format.parse().map_err(Error::from)?,
         shard: shard.parse().map_err(Error::from)?,
         ..Origin::default()

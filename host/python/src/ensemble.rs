@@ -7,7 +7,7 @@ use crate::named::{descriptor_of, noise_of};
 use crate::work::{Callback, long};
 use numpy::ndarray::{Ix1, Ix2};
 use palpate::ensemble::import::{self, Options, PartTree, Parts};
-use palpate::ensemble::train::{self as library, Settings, Small};
+use palpate::ensemble::train::{self as library, Outputs, Settings, Small};
 use palpate::ensemble::{self, Inputs, StatedProbe};
 use palpate::error::{Error, EvaluateProblem, RowsProblem};
 use palpate::shared::Descriptor;
@@ -201,6 +201,7 @@ impl Ensemble {
 /// method); whatever else is given replaces a part of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
 /// `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
 /// approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
+/// Of objects on a table each placement is an output, or with `outputs` "objects" each object.
 /// `background` is a data set of many other shapes, which stand for everything that the model does not know.
 /// `different_leaves` grows trees for little flash: their leaves share at most this many leaf vectors. A new threshold has
 /// to reduce the mean loss of a touch by `threshold_cost` nats (2e-5 by default).
@@ -212,7 +213,7 @@ impl Ensemble {
 #[pyo3::pyfunction]
 #[pyo3(signature = (data, *, preset="compact", descriptor=None, counted=None, rounds=None, depth=None, eta=None,
     min_child_weight=None, bins=None, leaf_bits=None, different_leaves=None, threshold_cost=None, multi_output=None,
-    noise="", timer="", background=None, seed=1, threads=None, progress=None))]
+    noise="", timer="", outputs="placements", background=None, seed=1, threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn train(
     py: Python<'_>,
@@ -231,6 +232,7 @@ pub(crate) fn train(
     multi_output: Option<bool>,
     noise: &str,
     timer: &str,
+    outputs: &str,
     background: Option<Bound<'_, DataSet>>,
     seed: u64,
     threads: Option<usize>,
@@ -268,6 +270,11 @@ pub(crate) fn train(
         small: small.or(preset.small),
         multi_output: multi_output.unwrap_or(preset.multi_output),
         noise: noise_of(noise, timer)?,
+        outputs: match outputs {
+            "placements" => Outputs::Placements,
+            "objects" => Outputs::Objects,
+            other => return Err(Error::setting("outputs", other, "placements or objects").into()),
+        },
         seed,
         threads,
         probe: StatedProbe::of(dataset),

@@ -7,6 +7,7 @@ use crate::failure::Failure;
 use crate::model::Model;
 use crate::named::noise_of;
 use crate::work::{Callback, long};
+use palpate::compile;
 use palpate::ensemble::StatedProbe;
 use palpate::error::Error;
 use palpate::evaluate::{
@@ -45,8 +46,12 @@ pub(crate) fn evaluate(
         Evaluated::Ensemble(ensemble) => Candidate::Full(&ensemble.get().ensemble),
     };
     let data = &data.get().dataset;
+    let names = match &model {
+        Evaluated::Model(model) => compile::names(model.get().model()),
+        Evaluated::Ensemble(ensemble) => ensemble.get().ensemble.objects.clone(),
+    };
     let evaluation = long(py, None, |_| {
-        let mut dataset = (**data).clone();
+        let mut dataset = (**data).clone().matching(&names);
         // What the touches have already counts too.
         let stated = dataset.real().and(&noise);
         add_noise(&mut dataset, &noise, seed)?;
@@ -78,7 +83,10 @@ pub(crate) fn parity(
     let (ensemble, model, data) = (&ensemble.get().ensemble, model.get().model(), &data.get().dataset);
     let longest = model.trained_touches().largest_spread;
     StatedProbe::compare_with(["the model", "the data set"], model.probe(), longest, data).map_err(Error::from)?;
-    let found = long(py, progress.as_ref(), |progress| compare(ensemble, model, data, sequences, seed, progress))?;
+    let found = long(py, progress.as_ref(), |progress| {
+        let data = (**data).clone().matching(&ensemble.objects);
+        compare(ensemble, model, &data, sequences, seed, progress)
+    })?;
     json(&found)
 }
 

@@ -144,13 +144,13 @@ impl Recognizer {
         self.cell.borrow_dependent().touches()
     }
 
-    /// The object with the most evidence so far.
+    /// The object with the most evidence so far, or the placement.
     #[getter]
     fn best(&self, py: Python<'_>) -> Py<PyString> {
         self.names[self.cell.borrow_dependent().best()].clone_ref(py)
     }
 
-    /// The posterior of each object so far.
+    /// The posterior of each output so far: of each object, or, of objects on a table, of each of their placements.
     #[getter]
     fn posteriors(&self) -> HashMap<String, f64> {
         let recognizer = self.cell.borrow_dependent();
@@ -186,8 +186,16 @@ impl Recognizer {
         let made = match verdict {
             Verdict::Recognized { object, touches, .. } => {
                 let object = usize::from(object);
-                let posterior = recognizer.posterior(object).to_f64();
-                class.call1((intern!(py, "recognized"), self.names[object].bind(py), posterior, touches, refused))?
+                let (posterior, share) = recognizer.posterior_together(object);
+                let (posterior, share) = (posterior.to_f64(), share.to_f64());
+                class.call1((
+                    intern!(py, "recognized"),
+                    self.names[object].bind(py),
+                    posterior,
+                    touches,
+                    refused,
+                    share,
+                ))?
             }
             other => {
                 let state = match other {

@@ -149,3 +149,37 @@ def test_few_different_leaves_make_a_smaller_model(touches: palpate.DataSet) -> 
     assert len(small.to_bytes()) < len(plain.to_bytes())
     with pytest.raises(palpate.SettingError, match="threshold_cost"):
         palpate.train(touches, threshold_cost=1e-4)
+
+
+def test_placements_on_a_table_are_outputs_and_a_verdict_names_one_with_its_share() -> None:
+    def touched(seed: int) -> palpate.DataSet:
+        return palpate.capture(["bowl", "fork"], touches=4000, seed=seed, approaches=True, pose=True, cone=60.0)
+
+    trained = palpate.train(touched(1), descriptor="gravity", rounds=8)
+    assert any(name.startswith("fork/") for name in trained.objects) and len(trained.objects) > 3
+    model = palpate.compile(trained)
+    recognizer = palpate.Recognizer(model)
+    data = touched(2)
+    assert data.direction is not None and data.alignment is not None
+    fork = data.objects == 1
+    one = fork & (data.instances == data.instances[fork][0])
+    for touch in np.hstack([data.times, data.direction, data.alignment])[one]:
+        verdict = recognizer.push(touch)
+        if verdict.decided:
+            break
+    assert verdict.object is not None and verdict.object.startswith("fork/")
+    assert verdict.posterior is not None and verdict.posterior > 0.98
+    assert verdict.share is not None and recognizer.posteriors[verdict.object] == pytest.approx(
+        verdict.share * verdict.posterior, abs=1e-6
+    )
+    evaluation = palpate.evaluate(model, data, groups=50)
+    assert evaluation.sequential.error < 0.2
+    assert palpate.parity(trained, model, data, sequences=50).verdict_differs == 0
+    objects = palpate.train(touched(1), descriptor="gravity", rounds=2, outputs="objects")
+    assert objects.objects == ["bowl", "fork"]
+    with pytest.raises(palpate.SettingError, match="outputs"):
+        palpate.train(data, outputs="sides")
+    with pytest.raises(palpate.SettingError, match="cone"):
+        palpate.capture(["bowl"], touches=10, cone=91.0)
+    with pytest.raises(palpate.PalpateError, match="scene"):
+        palpate.evaluate(model, palpate.capture(["bowl", "fork"], touches=100, approaches=True, pose=True))

@@ -57,7 +57,9 @@ impl ProbeArguments {
     pub(crate) fn of_dataset(&self, file: Option<&ProbeFile>, dataset: &Dataset) -> Result<Option<StatedProbe>> {
         let own = StatedProbe::of(dataset);
         let Some(file) = file else { return Ok(own) };
-        let given = StatedProbe { probe: file.probe, unit: file.unit, ..StatedProbe::default() };
+        // A file says nothing of the scene.
+        let scene = own.map(|own| own.scene).unwrap_or_default();
+        let given = StatedProbe { probe: file.probe, unit: file.unit, scene, ..StatedProbe::default() };
         let name = self.path().map_or_else(String::new, |path| path.display().to_string());
         StatedProbe::compare_with([&name, "the data set"], Some(given.trained()), u32::MAX, dataset)?;
         // Recordings need not state the stroke that a file states.

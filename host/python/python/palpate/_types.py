@@ -63,13 +63,15 @@ class Verdict:
     state: Literal["undecided", "recognized", "unknown", "gave-up"]
     """An object was recognized, the touches fit none that the model knows, or the limit of touches was reached."""
     object: str | None
-    """The object that was recognized."""
+    """The object that was recognized; of a model with an output for each placement, `object/placement`."""
     posterior: float | None
     """The posterior of that object."""
     touches: int
     """The number of touches counted."""
     refused: str | None = None
     """The reason why the last touch was not counted, if it was not."""
+    share: float | None = None
+    """The share of the object's posterior that its placement has; 1 where objects have one output."""
 
     @property
     def decided(self) -> bool:
