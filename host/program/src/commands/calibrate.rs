@@ -47,6 +47,9 @@ pub(crate) struct Arguments {
     /// Cases that it is promised of: average, name or object
     #[arg(long, value_parser = per, default_value = "average", value_name = "OF")]
     per: Per,
+    /// Shares of placements it holds for: stated or any
+    #[arg(long, value_parser = prior, default_value = "stated", value_name = "OF", conflicts_with_all = ["recorded", "label"])]
+    placement_prior: PlacementPrior,
     /// The probability that the promise is kept
     #[arg(long, default_value = "0.95", value_name = "SHARE", value_parser = share)]
     confidence: f64,
@@ -73,8 +76,46 @@ pub(crate) struct Arguments {
 }
 
 /// The options that a plan has no use for.
-const PROMISE: [&str; 9] =
-    ["error_rate", "per", "confidence", "sequences", "max_touches", "active", "strangers", "background", "label"];
+const PROMISE: [&str; 10] = [
+    "error_rate",
+    "per",
+    "placement_prior",
+    "confidence",
+    "sequences",
+    "max_touches",
+    "active",
+    "strangers",
+    "background",
+    "label",
+];
+
+/// Shares of the placements of objects for which a promise holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum PlacementPrior {
+    Stated,
+    Any,
+}
+
+impl PlacementPrior {
+    /// The cases of a promise: with any shares those of each output, which are placements.
+    ///
+    /// # Errors
+    /// For any shares with a promise per name, and of a model without placements.
+    fn per(self, per: Per, compiled: &CompiledModel) -> Result<Per> {
+        match self {
+            Self::Stated => Ok(per),
+            Self::Any if per == Per::Name => Err(Error::setting(
+                "placement_prior",
+                "any",
+                "stated with --per name: a name's errors depend on the shares",
+            )),
+            Self::Any if compiled.model().outputs().is_none() => {
+                Err(Error::setting("placement_prior", "any", "it with a model that has an output for each placement"))
+            }
+            Self::Any => Ok(Per::Object),
+        }
+    }
+}
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if let Some(rolls) = arguments.plan {
@@ -95,7 +136,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     arguments.probe.of_dataset(file.as_ref(), &dataset)?;
     let settings = Settings {
         rate: arguments.error_rate,
-        per: arguments.per,
+        per: arguments.placement_prior.per(arguments.per, &compiled)?,
         confidence: arguments.confidence,
         sequences: usize::try_from(arguments.sequences).unwrap_or(usize::MAX),
         max_touches: arguments.max_touches,
@@ -139,7 +180,11 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return output::print_json_about(&arguments.output, &Both { calibrated: &calibrated, strangers: &found });
     }
     let strangers = found.map_or_else(String::new, |found| super::strangers::text(&found) + "\n");
-    let text = format!("{}{strangers}{}\n", text(&calibrated), written(&arguments.output, &calibrated));
+    let placements = match arguments.placement_prior {
+        PlacementPrior::Stated => String::new(),
+        PlacementPrior::Any => in_each_placement(&calibrated),
+    };
+    let text = format!("{}{placements}{strangers}{}\n", text(&calibrated), written(&arguments.output, &calibrated));
     output::print_about(&arguments.output, &text)
 }
 
@@ -216,6 +261,37 @@ fn text(calibrated: &Calibrated) -> String {
         + &thresholds::worse(&calibrated.worse(), calibrated.promised, calibrated.promise.per, hidden)
 }
 
+/// A promise whatever the placements' shares, and the approaches that one takes at least: as many names of each placement as
+/// are needed if none is wrong, each at the cost of those that came before.
+fn in_each_placement(calibrated: &Calibrated) -> String {
+    let placements = calibrated.objects.len();
+    let touches = calibrated.mean_approaches.unwrap_or(calibrated.mean_touches);
+    let named = (1.0 - calibrated.undecided).max(f64::MIN_POSITIVE);
+    let least = |rate: f64| {
+        let names = calibrate::needed(rate, calibrated.confidence);
+        let all = names as f64 * placements as f64 * touches / named;
+        format!(
+            "{} % takes {names} names of each and {} {} in all",
+            super::percent(rate),
+            round(all),
+            calibrated.counted
+        )
+    };
+    let rates = [calibrated.promised, calibrated.promised / 2.0, 2.0 * calibrated.promised];
+    let rates: Vec<String> = rates.into_iter().filter(|rate| *rate < 1.0).map(least).collect();
+    format!(
+        "The rate holds in each of {placements} placements, and so whatever their shares are; not for placements that were left out. \
+         At least, with no name wrong: {}.\n",
+        rates.join("; ")
+    )
+}
+
+/// A number to two digits.
+fn round(number: f64) -> String {
+    let unit = 10_f64.powf((number.max(10.0).log10() - 1.0).floor());
+    format!("{:.0}", (number / unit).round() * unit)
+}
+
 /// Statements about a promise that was tested on recordings.
 fn of_recorded(recorded: &OfRecorded, calibrated: &Calibrated) -> String {
     let percent = |share: f64| format!("{:.2} %", 100.0 * share);
@@ -232,6 +308,14 @@ fn of_recorded(recorded: &OfRecorded, calibrated: &Calibrated) -> String {
             super::percent(calibrated.confidence)
         ),
         None => text,
+    }
+}
+
+fn prior(name: &str) -> Result<PlacementPrior, String> {
+    match name {
+        "stated" => Ok(PlacementPrior::Stated),
+        "any" => Ok(PlacementPrior::Any),
+        _ => Err("use one of stated, any".to_owned()),
     }
 }
 
