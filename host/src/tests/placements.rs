@@ -8,6 +8,7 @@ use crate::ensemble::{Ensemble, StatedProbe, TouchOrigin};
 use crate::evaluate::{Candidate, Margins, SequentialSettings, parity};
 use crate::mesh::{Mesh, Object};
 use crate::touches::{Dataset, Origin, Surroundings};
+use crate::tune;
 use palpate_shared::Descriptor;
 
 /// Touches of two objects that lie in several ways and of one that lies in one.
@@ -102,6 +103,17 @@ fn names_are_of_objects_and_placements_are_named_beside_them() {
     let single = self::compiled(&trained(Outputs::Objects));
     let names = single.names();
     assert_eq!(tested.matching(&names).names(), names);
+}
+
+#[test]
+fn a_tuned_model_has_an_output_for_each_placement() {
+    let dataset = touched(1, 1_500);
+    let settings =
+        tune::Settings { descriptor: Descriptor::Gravity, max_bytes: Some(24 << 10), groups: 60, ..Default::default() };
+    let tuned = tune::tune(&dataset, &settings, &()).unwrap();
+    assert_eq!(tuned.ensemble.objects, dataset.placement_shares().into_keys().collect::<Vec<_>>());
+    let model = compile::open(&tuned.model).unwrap();
+    assert_eq!(model.outputs().unwrap().most(), 2);
 }
 
 #[test]

@@ -28,7 +28,7 @@ mod tests;
 
 use crate::calibrate::{self, Calibrated};
 use crate::compile::{self, Compiled, Core, Layout, Leaf, compile};
-use crate::ensemble::{Ensemble, StatedProbe};
+use crate::ensemble::{Ensemble, StatedProbe, train};
 use crate::error::{CalibrateProblem, CompileProblem, Result};
 use crate::evaluate::{self, Candidate, Evaluation, Margins};
 use crate::probe::noise::Noise;
@@ -154,12 +154,15 @@ pub struct Tuned {
 }
 
 /// Trains the family on seven tenths of the touches, chooses on one tenth, calibrates the choice on one, and measures it
-/// on the last.
+/// on the last. Of objects on a table each placement is an output, as [`crate::ensemble::train::Outputs`] says.
 ///
 /// # Errors
 /// As [`crate::ensemble::train::train`], [`compile`](fn@crate::compile::compile) (but for layouts that an ensemble does not fit) and
 /// [`evaluate::evaluate`]; [`TuneProblem::NothingFits`] if no model is within the limits.
 pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Tuned> {
+    let shares = dataset.placement_shares();
+    let placed = (!shares.is_empty()).then(|| dataset.by_placement());
+    let dataset = placed.as_ref().unwrap_or(dataset);
     let outer = folds::split(dataset, 0.3, settings.seed)?;
     let held_out = folds::split(&outer.test, 1.0 / 3.0, settings.seed)?;
     let halves = folds::split(&held_out.train, 0.5, settings.seed)?;
@@ -168,7 +171,10 @@ pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> 
     let robots = [(&mut choose, 1), (&mut test, 2)]
         .map(|(part, other)| evaluate::add_noise(part, &settings.noise, settings.seed.wrapping_add(other)));
     robots.into_iter().try_for_each(|robots| robots.map(drop))?;
-    let family = family::train(&outer.train, settings, progress)?;
+    let mut family = family::train(&outer.train, settings, progress)?;
+    for (_, ensemble) in &mut family {
+        train::state_placements(ensemble, &shares)?;
+    }
     progress.begin("measuring", Some(family.len() as u64));
     let mut models = Vec::new();
     let mut unlimited = None;

@@ -21,6 +21,7 @@ use palpate_shared::{Descriptor, Patterns, Touch};
 use palpate_trees::train as boost;
 use rayon::prelude::*;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 mod small;
@@ -180,11 +181,19 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
         Outputs::Objects => train_outputs(&dataset.each(ObjectTouches::as_often_as_placed), settings, progress),
         Outputs::Placements => {
             let mut ensemble = train_outputs(&dataset.by_placement(), settings, progress)?;
-            let stated = TouchOrigin { placements: shares, ..TouchOrigin::of(&ensemble.origin)? };
-            stated.state(&mut ensemble.origin);
+            state_placements(&mut ensemble, &shares)?;
             Ok(ensemble)
         }
     }
+}
+
+/// Makes an ensemble whose outputs are placements state their weights; without any it stays as it is.
+pub(crate) fn state_placements(ensemble: &mut Ensemble, shares: &BTreeMap<String, f64>) -> Result<()> {
+    if !shares.is_empty() {
+        let stated = TouchOrigin { placements: shares.clone(), ..TouchOrigin::of(&ensemble.origin)? };
+        stated.state(&mut ensemble.origin);
+    }
+    Ok(())
 }
 
 /// Trains one output for each object.
