@@ -35,6 +35,7 @@ mod stages;
 pub mod statistics;
 mod strangers;
 pub mod stream;
+mod table;
 pub mod teach;
 pub mod view;
 

@@ -5,7 +5,7 @@ use super::context::{Context, get_or_try};
 use super::settings::Settings;
 use super::{
     approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, plan, promises,
-    published, recorded, results, sequential, simulator, strangers,
+    published, recorded, results, sequential, simulator, strangers, table,
 };
 use crate::error::ReportProblem;
 use crate::page::document::{Page, Section};
@@ -182,6 +182,7 @@ struct Measured {
     members: Vec<cost::Member>,
     approaches: approaches::ByApproach,
     plans: plan::Plans,
+    table: table::Measured,
     strangers: strangers::Measured,
     recorded: Option<Comparison>,
     engines: Vec<simulator::Engine>,
@@ -204,6 +205,7 @@ fn measured(context: &Context, stages: &mut Stages<'_>) -> Result<Measured> {
     drop(large);
     let approaches = stages.stage("approaches", || approaches::measure(context))?;
     let plans = stages.stage("plan", || plan::measure(context))?;
+    let table = stages.stage("table", || table::measure(context))?;
     let strangers = stages.stage("strangers", || strangers::measure(context))?;
     let recorded = match context.settings.recorded {
         Some(_) => stages.stage("recorded", || recorded::measure(context))?,
@@ -226,6 +228,7 @@ fn measured(context: &Context, stages: &mut Stages<'_>) -> Result<Measured> {
         members,
         approaches,
         plans,
+        table,
         strangers,
         recorded,
         engines,
@@ -252,6 +255,7 @@ fn sections(context: &Context, measured: &Measured, summary: &published::Summary
         cross_validation::section(context, &measured.folds)?,
         approaches::section(context, &measured.approaches)?,
         plan::section(context, &measured.plans)?,
+        table::section(context, &measured.table),
         noise::section(context, &measured.noisy)?,
         limit::section(context, &measured.limit)?,
         sequential::section(context, &measured.sequences)?,
