@@ -33,7 +33,7 @@ pub use error::TeachProblem;
 pub use promise::Needed;
 
 use crate::ensemble::train::{BASE_MARGIN, round_leaves};
-use crate::ensemble::{Ensemble, Node, TouchOrigin};
+use crate::ensemble::{Ensemble, Node, TouchOrigin, train};
 use crate::error::Result;
 use crate::evaluate::ROBOTS;
 use crate::in_order::in_order;
@@ -46,6 +46,7 @@ use palpate_shared::Touch;
 use palpate_shared::format::TrainedTouches;
 use rayon::prelude::*;
 use serde::Serialize;
+use std::borrow::Cow;
 
 /// Jitters that are tried, in multiples of 30 % and 10 ms on times, 8° on the pose.
 const JITTERS: [f64; 3] = [0.5, 1.0, 2.0];
@@ -142,6 +143,8 @@ pub struct TaughtObject {
 /// Adds the objects of `recorded` to `ensemble`, without changing its trees' splits or the values of the objects that it
 /// knows. `known` holds touches of these objects, such as those that the ensemble was trained on. The same touches and settings give the same ensemble on any number of threads.
 ///
+/// Beside outputs that are placements, an object has one output, or one for each placement that its recordings name.
+///
 /// # Errors
 /// [`TeachProblem`] if the ensemble has leaves of one value or is not over touches, if a name
 /// is known already, if touches are missing or too few, have no pose, or are not every approach;
@@ -154,6 +157,9 @@ pub fn teach(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<(Ensemble, Taught)> {
+    let (known, placed) = (&matching(ensemble, known), &matching(ensemble, recorded));
+    let shares = recorded.placement_shares();
+    let recorded = &**placed;
     let descriptor = check::check(ensemble, known, recorded, settings)?;
     let noise = settings.noise.map_or_else(|| check::missing_noise(ensemble, known), Ok)?;
     on_threads(settings.threads, || {
@@ -201,11 +207,21 @@ pub fn teach(
         };
         let columns = material.fitted(&smoothings);
         let mut extended = extended(ensemble, recorded, &columns, &constants);
+        let stated = TouchOrigin::of(&extended.origin)?.placements;
+        if !stated.is_empty() {
+            train::state_placements(&mut extended, &stated.into_iter().chain(shares).collect())?;
+        }
         if let Some(bits) = settings.leaf_bits {
             round_leaves(&mut extended, bits);
         }
         Ok((extended, found))
     })
+}
+
+/// Touches as an ensemble's outputs are: of placements, where those are and the touches name theirs.
+fn matching<'d>(ensemble: &Ensemble, dataset: &'d Dataset) -> Cow<'d, Dataset> {
+    let is_of_placements = TouchOrigin::of(&ensemble.origin).is_ok_and(|stated| !stated.placements.is_empty());
+    if is_of_placements { Cow::Owned(dataset.by_placement()) } else { Cow::Borrowed(dataset) }
 }
 
 /// Runs on so many threads.

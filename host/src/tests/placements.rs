@@ -7,7 +7,8 @@ use crate::ensemble::train::{self, Outputs, train};
 use crate::ensemble::{Ensemble, StatedProbe, TouchOrigin};
 use crate::evaluate::{Candidate, Margins, SequentialSettings, parity};
 use crate::mesh::{Mesh, Object};
-use crate::touches::{Dataset, Origin, Surroundings};
+use crate::teach;
+use crate::touches::{Dataset, ObjectTouches, Origin, Source, Surroundings};
 use crate::tune;
 use palpate_shared::Descriptor;
 
@@ -133,5 +134,35 @@ fn a_promise_of_each_placement_is_kept_on_fresh_touches_whatever_their_shares() 
     for (placement, wrong) in &found.error_of_given_per_object {
         // Two standard errors of 2,000 sequences above the promise.
         assert!(*wrong < 0.05 + 2.0 * (0.05_f64 * 0.95 / 2_000.0).sqrt(), "{placement}: {wrong}");
+    }
+}
+
+#[test]
+fn a_taught_object_has_one_output_unless_its_recordings_name_placements() {
+    let dataset = touched(1, 4_000);
+    let known = dataset.only(|name| name != "brick");
+    let settings = train::Settings {
+        descriptor: Descriptor::Gravity,
+        rounds: 8,
+        multi_output: true,
+        ..train::Settings::compact()
+    };
+    let ensemble = train(&known, &settings, &()).unwrap();
+    let new = touched(5, 1_200).only(|name| name == "brick");
+    let mut plain = new.clone();
+    plain.objects[0] = ObjectTouches::new("brick", new.objects[0].touches().to_vec(), Source::Object);
+    let how = teach::Settings { groups: 40, ..teach::Settings::default() };
+    for (recorded, added) in [(new, ["brick/+z", "brick/-y"].as_slice()), (plain, &["brick"])] {
+        let (taught, _) = teach::teach(&ensemble, &known, &recorded, &how, &()).unwrap();
+        let expected: Vec<&str> = ensemble.objects.iter().map(String::as_str).chain(added.iter().copied()).collect();
+        assert_eq!(taught.objects, expected);
+        let compiled = compiled(&taught);
+        let outputs = compiled.model().outputs().unwrap();
+        let last = outputs.object(ensemble.objects.len() - 1).unwrap();
+        for output in ensemble.objects.len()..taught.objects.len() {
+            assert_eq!(outputs.object(output), Some(last + 1));
+        }
+        let shares = (ensemble.objects.len()..taught.objects.len()).map(|output| f64::from(outputs.share(output)));
+        assert!((shares.sum::<f64>() / 65_536.0 - 1.0).abs() < 1e-4);
     }
 }

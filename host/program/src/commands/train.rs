@@ -218,8 +218,10 @@ fn simulated(arguments: &Arguments, global: &Global, directory: &PathBuf, record
     // An ensemble that is there states what it was trained for.
     let noise = arguments.teach.extend.is_none().then_some(settings.noise);
     let how = teach::Settings { noise, ..teaching(&settings) };
-    let [old, new] =
-        [true, false].map(|is_known| recorded.only(|name| ensemble.objects.iter().any(|own| own == name) == is_known));
+    // An output is an object, or a placement of one.
+    let is_of = |own: &str, name: &str| own == name || own.rsplit_once('/').is_some_and(|(object, _)| object == name);
+    let [old, new] = [true, false]
+        .map(|is_known| recorded.only(|name| ensemble.objects.iter().any(|own| is_of(own, name)) == is_known));
     let (ensemble, adjusted) = match old.objects.is_empty() {
         true => (ensemble, None),
         false => {
