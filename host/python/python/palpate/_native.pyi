@@ -323,12 +323,12 @@ class Recognizer:
     @property
     def best(self, /) -> str:
         """
-        The object with the most evidence so far.
+        The object with the most evidence so far, or the placement.
         """
     @property
     def posteriors(self, /) -> dict[str, float]:
         """
-        The posterior of each object so far.
+        The posterior of each output so far: of each object, or, of objects on a table, of each of their placements.
         """
     def push(self, /, touch: Touch) -> Verdict:
         """
@@ -393,7 +393,7 @@ def calibrate(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], 
     Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
     """
 
-def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, shard: str = "1/1", out: str | PathLike[str] | None = None, format: str = "text", resume: bool = False, add: bool = False, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
+def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", cone: SupportsFloat | SupportsIndex | None = None, length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, shard: str = "1/1", out: str | PathLike[str] | None = None, format: str = "text", resume: bool = False, add: bool = False, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
     """
     Touches objects with a simulated probe.
 
@@ -403,7 +403,8 @@ def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsInd
     its true size and the `probe` is in millimeters.
 
     `touches` full touches of each object are kept, or with `approaches` that many approaches whether fingers touch or not;
-    `pose` keeps the probe's direction and alignment. The same `seed` gives the same touches on any number of `threads`, and
+    `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a table in each of their placements, and
+    approaches come within that many degrees of straight down. The same `seed` gives the same touches on any number of `threads`, and
     the same as the program's. `shard` is "K/N" for a part. With `instances` a directory inside a directory is one object.
     With `out` the touches are written there, as "text" or "parquet", as `palpate capture` does: `resume`, `add` and `force`
     are its options.
@@ -463,7 +464,7 @@ def sources(meshes: SupportsGetItem[int, str | PathLike[str]]) -> list[tuple[str
     The objects that sources stand for: their names, sorted, and what `capture` takes for each alone. Nothing is read.
     """
 
-def train(data: DataSet, *, preset: str = "compact", descriptor: str | None = None, counted: str | None = None, rounds: SupportsIndex | None = None, depth: SupportsIndex | None = None, eta: SupportsFloat | SupportsIndex | None = None, min_child_weight: SupportsFloat | SupportsIndex | None = None, bins: SupportsIndex | None = None, leaf_bits: SupportsIndex | None = None, different_leaves: SupportsIndex | None = None, threshold_cost: SupportsFloat | SupportsIndex | None = None, multi_output: bool | None = None, noise: str = "", timer: str = "", background: DataSet | None = None, seed: SupportsIndex = 1, threads: SupportsIndex | None = None, progress: Progress | None = None) -> Ensemble:
+def train(data: DataSet, *, preset: str = "compact", descriptor: str | None = None, counted: str | None = None, rounds: SupportsIndex | None = None, depth: SupportsIndex | None = None, eta: SupportsFloat | SupportsIndex | None = None, min_child_weight: SupportsFloat | SupportsIndex | None = None, bins: SupportsIndex | None = None, leaf_bits: SupportsIndex | None = None, different_leaves: SupportsIndex | None = None, threshold_cost: SupportsFloat | SupportsIndex | None = None, multi_output: bool | None = None, noise: str = "", timer: str = "", outputs: str = "placements", background: DataSet | None = None, seed: SupportsIndex = 1, threads: SupportsIndex | None = None, progress: Progress | None = None) -> Ensemble:
     """
     Trains an ensemble on a data set: gradient boosting with XGBoost's algorithm and parameters.
 
@@ -471,6 +472,7 @@ def train(data: DataSet, *, preset: str = "compact", descriptor: str | None = No
     method); whatever else is given replaces a part of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
     `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
     approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
+    Of objects on a table each placement is an output, or with `outputs` "objects" each object.
     `background` is a data set of many other shapes, which stand for everything that the model does not know.
     `different_leaves` grows trees for little flash: their leaves share at most this many leaf vectors. A new threshold has
     to reduce the mean loss of a touch by `threshold_cost` nats (2e-5 by default).
