@@ -208,7 +208,7 @@ fn models(context: &Context, rows: &[Row]) -> Table {
         "wrong of the names given",
         "undecided",
         "placement named",
-        "keeps the promise",
+        "promised",
     ]);
     for row in rows {
         data.push([
@@ -219,7 +219,7 @@ fn models(context: &Context, rows: &[Row]) -> Table {
             row.wrong.map_or(Cell::Missing, |share| Cell::Percent(share, 2)),
             Cell::Percent(row.undecided, 1),
             row.placement.map_or(Cell::Missing, |share| Cell::Percent(share, 0)),
-            if row.is_calibrated { "yes" } else { "no threshold does" }.into(),
+            if row.is_calibrated { "yes" } else { "no" }.into(),
         ]);
     }
     Table {
@@ -227,7 +227,8 @@ fn models(context: &Context, rows: &[Row]) -> Table {
         title: "Approaches to a name on a table".into(),
         caption: format!(
             "At thresholds that promise at most {} % wrong names; at most {MOST} approaches, with which sequences without a \
-             name are counted. Placement named: the share of right names that are given with the right placement.",
+             name are counted. Not promised: no threshold keeps the rate, or names were too few to know; then at the threshold \
+             of the posterior. Placement named: the share of right names that are given with the right placement.",
             100.0 * RATE
         ),
         command: context.settings.command.clone(),
