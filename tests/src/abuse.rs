@@ -409,7 +409,7 @@ fn tables(put: Put<'_>) {
 fn predictions(put: Put<'_>) {
     let plain = model(Layout::Compact, Leaf::I8, true);
     let [optional, ..] = places(&plain);
-    let prediction = Prediction { link: Link::Exponential, last_of_ties: true, scale: 64.0 }.to_bytes();
+    let prediction = Prediction { link: Link::Exponential, last_of_ties: true, scale: 64.0, targets: false }.to_bytes();
     let mut with = |name: &str, tag: Tag, content: &[u8]| {
         put(name, "field", optional, with_sections(&plain, &section(tag.code() | MUST_UNDERSTAND, content)));
     };

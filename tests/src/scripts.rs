@@ -73,7 +73,7 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
     if rng.random_bool(0.7) {
         let link = Link::ALL[rng.random_range(0..Link::ALL.len())];
         let scale = [1.0, 0.5, 4096.0, 0.7][rng.random_range(0..4)];
-        let prediction = Prediction { link, last_of_ties: rng.random_bool(0.5), scale };
+        let prediction = Prediction { link, last_of_ties: rng.random_bool(0.5), scale, targets: false };
         write_section(Tag::Prediction, scale != 1.0, &prediction.to_bytes(), &mut put);
     }
     if rng.random_bool(0.5) {

@@ -84,9 +84,9 @@ impl Ensemble {
     /// a leaf), the right child, the feature, the threshold, whether a missing value goes left, and the values. `base` is
     /// where margins start; an empty name stands for a feature that has none. `link` is "identity", "logistic",
     /// "exponential", "square" or "softplus": what makes a value of a margin. With `last_of_ties` the last of several
-    /// largest margins names the class, otherwise the first.
+    /// largest margins names the class, otherwise the first. With `targets` each output is a value, and none is a class.
     #[staticmethod]
-    #[pyo3(signature = (kind, features, base, trees, *, names=None, notes=Vec::new(), link="identity", last_of_ties=false))]
+    #[pyo3(signature = (kind, features, base, trees, *, names=None, notes=Vec::new(), link="identity", last_of_ties=false, targets=false))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn from_trees(
         py: Python<'_>,
@@ -98,11 +98,12 @@ impl Ensemble {
         notes: Vec<String>,
         link: &str,
         last_of_ties: bool,
+        targets: bool,
     ) -> Result<Self, Failure> {
         let found = Link::ALL.iter().copied().find(|known| known.name() == link);
         let link =
             found.ok_or_else(|| Error::setting("link", link, "identity, logistic, exponential, square or softplus"))?;
-        let prediction = Prediction { link, last_of_ties, ..Prediction::default() };
+        let prediction = Prediction { link, last_of_ties, targets, ..Prediction::default() };
         let tree = |(output, left, right, feature, threshold, missing_left, values): Columns<'_>| {
             PyResult::Ok(PartTree {
                 output,

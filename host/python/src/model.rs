@@ -254,7 +254,7 @@ impl Model {
         Ok(two(py, margins, objects)?)
     }
 
-    /// The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value,
+    /// The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value (its values, a column for each of several targets),
     /// with `raw` the margin before the inverse link. Rows are as for `margins`.
     #[pyo3(signature = (rows, *, raw=false))]
     fn predict<'py>(&self, py: Python<'py>, rows: Rows<'py>, raw: bool) -> Result<Predictions<'py>, Failure> {
@@ -270,6 +270,9 @@ impl Model {
             }
         };
         Ok(match predicted {
+            Predicted::Values(values) if self.model().object_count() > 1 => {
+                Predictions::Targets(two(py, values, self.model().object_count())?)
+            }
             Predicted::Values(values) => Predictions::Values(one(py, values)),
             Predicted::Classes(classes) => {
                 let names = self.objects();
@@ -289,6 +292,7 @@ impl Model {
 pub(crate) enum Predictions<'py> {
     Classes(Vec<String>),
     Values(Output<'py, f32, Ix1>),
+    Targets(Output<'py, f32, Ix2>),
 }
 
 /// Touches from rows of three or nine numbers.

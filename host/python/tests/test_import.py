@@ -12,6 +12,7 @@ import numpy.typing as npt
 import palpate
 import pytest
 import xgboost
+from sklearn.frozen import FrozenEstimator
 from sklearn import (
     calibration,
     dummy,
@@ -291,9 +292,7 @@ def combining() -> list[Any]:
         ensemble.VotingRegressor([("a", regression), ("b", regression)], weights=[9, 1]),
         ensemble.StackingClassifier([("a", deep), ("b", stump)]),
         ensemble.StackingRegressor([("a", regression), ("b", regression)]),
-        ensemble.IsolationForest(n_estimators=10, random_state=1),
         ensemble.RandomTreesEmbedding(n_estimators=10, random_state=1),
-        calibration.CalibratedClassifierCV(deep),
         model_selection.FixedThresholdClassifier(deep, threshold=0.8),
         model_selection.GridSearchCV(deep, {"max_depth": [2, 3]}),
         multiclass.OneVsRestClassifier(deep),
@@ -334,6 +333,105 @@ def test_classes_derived_from_others_are_refused_by_name(estimator: Any, base: s
         palpate.compile(estimator)
 
 
+@pytest.mark.parametrize("kind", [ensemble.RandomForestRegressor, ensemble.ExtraTreesRegressor, tree.DecisionTreeRegressor])
+def test_each_target_of_a_forest_has_the_value_that_scikit_learn_predicts(kind: Any) -> None:
+    targets = np.stack([np.nan_to_num(TRAIN[:, 0]) * 3, 1000 + labels(TRAIN, 3), np.nan_to_num(TRAIN[:, 1])], axis=1)
+    estimator = kind(max_depth=5, random_state=1).fit(TRAIN, targets)
+    model = palpate.compile(estimator, leaf="f32")
+    found = model.predict(TEST)
+    assert isinstance(found, np.ndarray) and found.shape == (len(TEST), 3)
+    np.testing.assert_allclose(found, estimator.predict(TEST), rtol=1e-5, atol=1e-5)
+    assert model.objects == ["target0", "target1", "target2"]
+
+
+def test_each_target_of_a_booster_has_the_value_that_the_library_predicts() -> None:
+    train = np.nan_to_num(TRAIN)
+    targets = np.stack([train[:, 0] * 3, train[:, 1] + train[:, 2]], axis=1)
+    for strategy in ["one_output_per_tree", "multi_output_tree"]:
+        estimator = xgboost.XGBRegressor(n_estimators=6, max_depth=3, multi_strategy=strategy).fit(TRAIN, targets)
+        np.testing.assert_array_equal(palpate.compile(estimator, leaf="f32").predict(TEST), estimator.predict(TEST))
+    regressor = catboost.CatBoostRegressor(loss_function="MultiRMSE", iterations=6, depth=3, verbose=False, allow_writing_files=False)
+    regressor.fit(TRAIN, targets)
+    np.testing.assert_allclose(palpate.compile(regressor, leaf="f32").predict(TEST), regressor.predict(TEST), atol=1e-5)
+
+
+@pytest.mark.parametrize("settings", [{}, {"max_features": 0.5, "bootstrap": True}, {"max_samples": 30, "contamination": 0.1}])
+def test_an_isolation_forest_gives_its_anomaly_score_and_states_where_outliers_begin(settings: dict[str, Any]) -> None:
+    estimator = ensemble.IsolationForest(n_estimators=30, random_state=1, **settings).fit(np.nan_to_num(TRAIN))
+    test = np.nan_to_num(TEST) * 2
+    ours = palpate.to_ensemble(estimator)
+    found = palpate.compile(ours, leaf="f32").predict(test)
+    scores = -estimator.score_samples(test)
+    np.testing.assert_allclose(found, scores, atol=2e-6)
+    threshold = float(ours.notes[0].split()[-1].rstrip("."))
+    clear = np.abs(scores + estimator.offset_) > 1e-5
+    outliers = estimator.predict(test) == -1
+    assert 0 < outliers.sum() < len(test) and clear.mean() > 0.9
+    np.testing.assert_array_equal((np.asarray(found) > threshold)[clear], outliers[clear])
+
+
+@pytest.mark.parametrize("method", ["sigmoid", "isotonic"])
+@pytest.mark.parametrize("classes", [2, 3])
+@pytest.mark.parametrize(
+    "inner",
+    [
+        ensemble.GradientBoostingClassifier(n_estimators=8),
+        ensemble.GradientBoostingClassifier(n_estimators=8, loss="exponential"),
+        ensemble.HistGradientBoostingClassifier(max_iter=8),
+        ensemble.RandomForestClassifier(12, max_depth=5, random_state=1),
+    ],
+)
+def test_a_calibrated_classifier_gives_its_classes_and_by_a_sigmoid_its_probabilities(inner: Any, classes: int, method: str) -> None:
+    train, test = np.nan_to_num(TRAIN), np.nan_to_num(TEST)
+    if classes == 3 and getattr(inner, "loss", "") == "exponential":
+        return
+    estimator = calibration.CalibratedClassifierCV(inner, method=method, ensemble=False).fit(train, labels(train, classes))
+    if classes == 3 and method == "isotonic":
+        with pytest.raises(palpate.InputError, match="IsotonicRegression of 3 classes"):
+            palpate.to_ensemble(estimator)
+        return
+    model = palpate.compile(estimator, leaf="f32")
+    shares = estimator.predict_proba(test)
+    ordered = np.sort(shares, axis=1)
+    clear = ordered[:, -1] - ordered[:, -2] > 1e-4
+    assert clear.mean() > 0.9
+    found = np.array(model.predict(test))
+    np.testing.assert_array_equal(found[clear], estimator.predict(test).astype(str)[clear])
+    if classes == 2 and method == "sigmoid":
+        margins = model.margins(test)
+        np.testing.assert_allclose(1 / (1 + np.exp(margins[:, 0] - margins[:, 1])), shares[:, 1], atol=1e-5)
+
+
+def test_a_frozen_model_is_taken_calibrated_and_several_that_are_averaged_are_refused() -> None:
+    train = np.nan_to_num(TRAIN)
+    forest = ensemble.RandomForestClassifier(5, random_state=1).fit(train, labels(train, 2))
+    frozen = calibration.CalibratedClassifierCV(FrozenEstimator(forest), method="sigmoid").fit(train, labels(train, 2))
+    model = palpate.compile(frozen, leaf="f32")
+    assert model.predict(train) == [str(name) for name in frozen.predict(train)]
+    averaged = calibration.CalibratedClassifierCV(forest, cv=3).fit(train, labels(train, 2))
+    with pytest.raises(palpate.InputError, match="averages 3 calibrated models"):
+        palpate.to_ensemble(averaged)
+
+
+def test_categories_are_decided_as_the_library_decides_them() -> None:
+    generator = np.random.default_rng(4)
+    train = np.nan_to_num(TRAIN)
+    train[:, 3] = generator.integers(0, 30, len(train))
+    own = (train[:, 3] * 7 % 5 > 2) ^ (train[:, 0] > 0)
+    test = np.nan_to_num(TEST)
+    test[:, 3] = generator.choice([*range(32), -1, np.nan], len(test))
+    types = ["c" if index == 3 else "q" for index in range(6)]
+    matrix = xgboost.DMatrix(train, own, feature_types=types, enable_categorical=True)
+    booster = xgboost.train({"objective": "binary:logistic", "max_cat_to_onehot": 2, "max_depth": 4}, matrix, 6)
+    expected = booster.predict(xgboost.DMatrix(test, feature_types=types, enable_categorical=True), output_margin=True)
+    np.testing.assert_array_equal(palpate.compile(booster, leaf="f32").margins(test)[:, 1], expected)
+    data = lightgbm.Dataset(train, own, categorical_feature=[3])
+    lights = lightgbm.train({"objective": "binary", "verbose": -1, "num_threads": 1}, data, 6)
+    np.testing.assert_allclose(
+        palpate.compile(lights, leaf="f32").margins(test)[:, 1], lights.predict(test, raw_score=True), atol=1e-5
+    )
+
+
 def test_what_has_no_trees_that_can_be_read_is_refused_by_name() -> None:
     categories = ensemble.HistGradientBoostingClassifier(categorical_features=[3], max_iter=2)
     categories.fit(np.abs(rows(200, False, 5)), np.arange(200) % 2)
@@ -343,7 +441,7 @@ def test_what_has_no_trees_that_can_be_read_is_refused_by_name() -> None:
     for model, message in [
         (ensemble.RandomForestClassifier(), "not fitted"),
         (categories, "splits on categories"),
-        (several, "several targets"),
+        (several, "classes of several kinds"),
         (folds, "lightgbm's CVBooster has no trees that can be read"),
         (xgboost.XGBModel(n_estimators=2).fit(TRAIN, TRAIN[:, 3] > 0), "xgboost's XGBModel has no trees that can be read"),
         (object(), "builtins.object is not a model"),

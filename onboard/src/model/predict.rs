@@ -56,6 +56,34 @@ impl Model<'_> {
         })
     }
 
+    /// The values of a row, one for each output, before the inverse link: of a model with several
+    /// [targets](Prediction::targets), or of one output as [`Model::predict_raw`]. `room` has as many numbers as there are
+    /// outputs; `false`, and nothing written, if it or `values` is shorter. `values` beyond them are left alone.
+    ///
+    /// Cost: that of the margins, and three operations of floating point for each output. Cannot fail otherwise.
+    pub fn predict_raw_each(&self, features: &[i32], room: &mut [i32], values: &mut [f32]) -> bool {
+        let outputs = self.object_count();
+        let (Some(sums), Some(values)) = (room.get_mut(..outputs), values.get_mut(..outputs)) else { return false };
+        sums.fill(0);
+        self.sum(features, sums);
+        let scale = self.prediction().scale;
+        let factor = self.unit() * scale;
+        for (value, sum) in values.iter_mut().zip(sums) {
+            *value = if self.is_float() { f32::from_bits(sum.cast_unsigned()) * scale } else { *sum as f32 * factor };
+        }
+        true
+    }
+
+    /// The same as the library predicts them: [`Model::predict_raw_each`] after the model's inverse link.
+    pub fn predict_each(&self, features: &[i32], room: &mut [i32], values: &mut [f32]) -> bool {
+        let link = self.prediction().link;
+        let is_long = self.predict_raw_each(features, room, values);
+        if is_long {
+            values.iter_mut().take(self.object_count()).for_each(|value| *value = inverse_link(link, *value));
+        }
+        is_long
+    }
+
     /// The value of a row as the library predicts it: [`Model::predict_raw`] after the model's inverse link, see
     /// [`inverse_link`]. `None` for a model with several outputs.
     pub fn predict_value(&self, features: &[i32]) -> Option<f32> {

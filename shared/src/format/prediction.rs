@@ -29,11 +29,13 @@ pub struct Prediction {
     pub last_of_ties: bool,
     /// Factor that turns a margin into the library's: positive and finite.
     pub scale: f32,
+    /// True if each output is a target with a value of its own, and none is a class.
+    pub targets: bool,
 }
 
 impl Default for Prediction {
     fn default() -> Self {
-        Self { link: Link::Identity, last_of_ties: false, scale: 1.0 }
+        Self { link: Link::Identity, last_of_ties: false, scale: 1.0, targets: false }
     }
 }
 
@@ -44,7 +46,7 @@ impl Prediction {
     /// The section's content.
     pub fn to_bytes(self) -> [u8; Self::LENGTH] {
         let [a, b, c, d] = self.scale.to_le_bytes();
-        [self.link.code(), self.last_of_ties.into(), 0, 0, a, b, c, d]
+        [self.link.code(), self.last_of_ties.into(), self.targets.into(), 0, a, b, c, d]
     }
 
     /// Reads a section; `None` for a link that does not exist, a scale that is not positive and finite, or too few bytes.
@@ -52,13 +54,14 @@ impl Prediction {
     ///
     /// Cost: a few instructions. Cannot fail otherwise.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let (&[link, ties, _, _, a, b, c, d], _) = bytes.split_first_chunk()?;
+        let (&[link, ties, targets, _, a, b, c, d], _) = bytes.split_first_chunk()?;
         let scale = u32::from_le_bytes([a, b, c, d]);
         // Positive and finite, without floating point.
         if ties > 1 || scale.wrapping_sub(1) >= f32::INFINITY.to_bits() - 1 {
             return None;
         }
-        Some(Self { link: Link::from_code(link)?, last_of_ties: ties == 1, scale: f32::from_bits(scale) })
+        let (last_of_ties, targets) = (ties == 1, targets == 1);
+        Some(Self { link: Link::from_code(link)?, last_of_ties, scale: f32::from_bits(scale), targets })
     }
 }
 
@@ -103,7 +106,7 @@ mod tests {
     fn sections_are_read_back_and_what_makes_no_sense_is_refused() {
         for &link in Link::ALL {
             for last_of_ties in [false, true] {
-                let prediction = Prediction { link, last_of_ties, scale: 64.0 };
+                let prediction = Prediction { link, last_of_ties, scale: 64.0, targets: !last_of_ties };
                 assert_eq!(Prediction::from_bytes(&prediction.to_bytes()), Some(prediction));
             }
         }

@@ -42,6 +42,28 @@ def with_missing(x, seed=3):
     return x
 
 
+KIND = 2  # The feature that `kinds` makes a category.
+STRANGE = [np.nan, -1.0, -0.5, -0.0, 0.5, 2.9999, 7.5, 19.0, 20.0, 63.0, 64.0, 5000.0, 16777215.0, 16777216.0, 1e9, -1e9]
+"""Categories that are missing, negative, fractions, not in training, or beyond what f32 or a library counts to."""
+
+
+def kinds(x, number=20):
+    """The same rows with a category whose neighbors have nothing in common, the label's share among others."""
+    x = x.copy()
+    of_row = np.floor(np.abs(x[:, 0] * 37.7)) % number
+    x[:, KIND] = (of_row * 7 + 3) % number
+    return x
+
+
+def kind_rows(thresholds, number=20, strange=STRANGE):
+    """Rows as of `rows`, and one of each category and of each strange value; other features are plain."""
+    test = rows(thresholds, True)
+    test[:, KIND] = np.random.default_rng(6).integers(0, number + 2, len(test))
+    more = data(3, seed=15, rows=number + len(strange))[0]
+    more[:, KIND] = np.concatenate([np.arange(number), strange])
+    return np.vstack([test, more]).astype(np.float32)
+
+
 def rows(thresholds, missing, classes=3):
     """Plain, tied and missing rows; `thresholds` is a list for each feature."""
     random = np.random.default_rng(11)
@@ -122,6 +144,29 @@ def make_xgboost():
                     thresholds[feature].append(at)
         return thresholds
 
+    def save_kinds(kind, settings, classes=2):
+        x, y = data(classes)
+        x = kinds(with_missing(x))
+        x[np.random.default_rng(8).uniform(size=len(x)) < 0.1, KIND] = np.nan
+        y = (y + (x[:, KIND] % 3 == 1)) % classes
+        types = ["c" if index == KIND else "q" for index in range(4)]
+        matrix = lambda x, y=None: xgb.DMatrix(x, y, feature_names=NAMES, feature_types=types, enable_categorical=True)
+        booster = xgb.train({**plain, **settings}, matrix(x, y), 3)
+        name = f"xgboost-{version}-{kind}"
+        booster.save_model(HERE / f"{name}.json")
+        test = kind_rows(json_thresholds(booster))
+        write(name, test, booster.predict(matrix(test), output_margin=True))
+
+    def save_targets(kind, settings):
+        x, y = data(3)
+        targets = np.stack([amount(x, y), x[:, 1] / 100, x[:, 3] * x[:, 0]], axis=1)
+        booster = xgb.train({**plain, "objective": "reg:squarederror", **settings}, xgb.DMatrix(with_missing(x), targets, feature_names=NAMES), 3)
+        name = f"xgboost-{version}-{kind}"
+        booster.save_model(HERE / f"{name}.json")
+        test = rows(json_thresholds(booster), True)
+        predicted = booster.predict(xgb.DMatrix(test, feature_names=NAMES), output_margin=True)
+        write(name, test, predicted)
+
     binary = {"objective": "binary:logistic", "base_score": 0.3}
     softprob = {"objective": "multi:softprob", "num_class": 3}
     amount = lambda x, y: np.abs(x[:, 0]) * 3 + y
@@ -161,6 +206,15 @@ def make_xgboost():
         save("squarederror", "ubj", 0, {"objective": "reg:squarederror"}, label=amount)
     if release >= (2, 0):
         save("vector-leaves", "json", 3, {**softprob, "multi_strategy": "multi_output_tree"})
+    if release in [(1, 6), (1, 7), (2, 1), (3, 2)]:
+        # By sets of categories, one category at a time, and for each class or with a value for each.
+        by_set = {"tree_method": "hist" if release > (1, 6) else "approx", "max_cat_to_onehot": 2, "max_depth": 3}
+        save_kinds("categorical", {**binary, **by_set})
+        if release == (3, 2):
+            save_kinds("one-hot", {**binary, **by_set, "max_cat_to_onehot": 100})
+    if release in [(2, 1), (3, 2)]:
+        save_targets("targets", {})
+        save_targets("targets-vector", {"multi_strategy": "multi_output_tree"})
     if release >= (3, 1):
         # A vector of intercepts, fitted to the labels.
         save("intercepts", "ubj", 3, softprob, label=lambda x, y: np.where(y == 2, 0, y), rounds=2)
@@ -217,8 +271,25 @@ def make_lightgbm():
     save("forest", 2, {"objective": "binary", "boosting": "rf", "bagging_fraction": 0.6, "bagging_freq": 1}, missing=True)
     save("regression", 0, {"objective": "regression"}, label=lambda x, y: np.abs(x[:, 0]) * 3 + y)
     save("dart", 3, {"objective": "multiclass", "num_class": 3, "boosting": "dart", "drop_rate": 0.5}, missing=True)
-    save("categorical", 2, {"objective": "binary", "categorical_feature": [2], "min_data_per_group": 5,
-                            "max_cat_to_onehot": 1, "cat_smooth": 1}, rounds=6)
+    def save_kinds(kind, settings, number=20):
+        x, y = data(2)
+        x = kinds(with_missing(x), number)
+        x[np.random.default_rng(8).uniform(size=len(x)) < 0.1, KIND] = np.nan
+        y = (y + (x[:, KIND] % 3 == 1)) % 2
+        settings = {**plain, "objective": "binary", "num_leaves": 6, "min_data_per_group": 5, "cat_smooth": 1, **settings}
+        own = lgb.Dataset(x, y, feature_name=NAMES, categorical_feature=[KIND])
+        booster = lgb.train(settings, own, 3)
+        name = f"lightgbm-{lgb.__version__.rsplit('.', 1)[0]}-{kind}"
+        path = HERE / f"{name}.txt"
+        booster.save_model(path)
+        path.write_text(path.read_text().split("\nparameters:")[0] + "\n")
+        test = kind_rows([[]] * 4, number)
+        write(name, test, booster.predict(test, raw_score=True))
+
+    save_kinds("categorical", {"max_cat_to_onehot": 1})
+    save_kinds("categorical-many", {"max_cat_to_onehot": 1}, number=70)
+    save_kinds("one-hot", {"max_cat_to_onehot": 100})
+    save_kinds("categorical-zero-as-missing", {"max_cat_to_onehot": 1, "zero_as_missing": True})
     save("linear", 0, {"objective": "regression", "linear_tree": True}, rounds=2,
          label=lambda x, y: np.abs(x[:, 0]) * 3 + y)
 
@@ -249,6 +320,52 @@ def make_catboost():
         path.write_text(json.dumps(document, separators=(",", ":")) + "\n")
         borders = booster.get_borders()
         test = rows([borders[index] for index in range(4)], missing, max(classes, 2))
+        write(name, test, booster.predict(test, prediction_type="RawFormulaVal"))
+
+    def save_kinds(kind, settings, strings=False):
+        x, y = data(2)
+        x = kinds(with_missing(x), 12)
+        y = (y + (x[:, KIND] % 3 == 1)) % 2
+        # Of CatBoost, categories are whole numbers.
+        known = [number for number in STRANGE if number == int(0 if np.isnan(number) else number) and abs(number) < 2**24]
+        test = kind_rows([[]] * 4, 12, known)
+        word = lambda number: f"k{number:.0f}" if strings else int(number)
+        mixed = lambda x: np.array([[word(row[KIND]) if at == KIND else row[at] for at in range(4)] for row in x], object)
+        settings = {"iterations": 3, "depth": 3, "learning_rate": 0.4, "border_count": 12, "random_seed": 1,
+                    "thread_count": 1, "verbose": False, "allow_writing_files": False, **settings}
+        booster = catboost.CatBoostClassifier(**settings)
+        booster.fit(catboost.Pool(mixed(x), y, feature_names=NAMES, cat_features=[KIND]))
+        name = f"catboost-{version}-{kind}"
+        shorten(booster, name)
+        write(name, test, booster.predict(catboost.Pool(mixed(test), feature_names=NAMES, cat_features=[KIND]),
+                                          prediction_type="RawFormulaVal"))
+
+    def shorten(booster, name):
+        """Saves a model without what is known about the training, and without indentation."""
+        path = HERE / f"{name}.json"
+        booster.save_model(str(path), format="json")
+        document = json.loads(path.read_text())
+        about = document["model_info"]
+        about["params"] = {"loss_function": about["params"]["loss_function"]}
+        about.pop("output_options", None)
+        about.pop("training", None)
+        path.write_text(json.dumps(document, separators=(",", ":")) + "\n")
+
+    save_kinds("one-hot", {"one_hot_max_size": 20})
+    save_kinds("one-hot-lossguide", {"one_hot_max_size": 20, "grow_policy": "Lossguide", "max_leaves": 6})
+    save_kinds("one-hot-words", {"one_hot_max_size": 20}, strings=True)
+    save_kinds("statistics", {"one_hot_max_size": 2})
+    x, y = data(3)
+    targets = np.stack([np.abs(x[:, 0]) * 3 + y, x[:, 1] / 100, x[:, 3] * x[:, 0]], axis=1)
+    for policy in ["SymmetricTree", "Depthwise"]:
+        booster = catboost.CatBoostRegressor(
+            loss_function="MultiRMSE", iterations=3, depth=2, learning_rate=0.4, border_count=12, random_seed=1,
+            thread_count=1, verbose=False, allow_writing_files=False, grow_policy=policy)
+        booster.fit(catboost.Pool(with_missing(x), targets, feature_names=NAMES))
+        name = f"catboost-{version}-targets-{policy.lower()}"
+        shorten(booster, name)
+        borders = booster.get_borders()
+        test = rows([borders[index] for index in range(4)], True)
         write(name, test, booster.predict(test, prediction_type="RawFormulaVal"))
 
     amount = lambda x, y: np.abs(x[:, 0]) * 3 + y

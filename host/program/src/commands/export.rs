@@ -492,9 +492,14 @@ struct Predicts {
 impl Predicts {
     fn of(ensemble: &Ensemble) -> Option<Self> {
         let imported = ensemble.origin.imported.as_ref()?;
-        let is_value = ensemble.objects.len() == 1;
+        let targets = imported.prediction.targets;
+        let is_value = targets || ensemble.objects.len() == 1;
         Some(Self {
-            what: if is_value { "value" } else { "class" },
+            what: match (targets, is_value) {
+                (true, _) => "targets",
+                (false, true) => "value",
+                (false, false) => "class",
+            },
             link: is_value.then(|| imported.prediction.link.name()),
             last_of_ties: imported.prediction.last_of_ties,
             missing: imported.sentinel,
@@ -505,6 +510,7 @@ impl Predicts {
         let what = match self.link {
             None if self.last_of_ties => "the class with the largest margin, of several the last".into(),
             None => "the class with the largest margin, of several the first".into(),
+            Some(link) if self.what == "targets" => format!("the targets, each {}", formula(link)),
             Some(link) => format!("{}{}", formula(link), if link == "identity" { "" } else { " of the margin x" }),
         };
         let missing = match self.missing {
@@ -530,7 +536,7 @@ pub(super) fn formula(link: &str) -> &'static str {
 /// Takes another link than the file's, of a regression.
 fn set_link(ensemble: &mut Ensemble, link: Option<Link>) -> Result<()> {
     let Some(link) = link else { return Ok(()) };
-    let is_value = ensemble.objects.len() == 1;
+    let is_value = ensemble.objects.len() == 1 || ensemble.prediction().targets;
     match ensemble.origin.imported.as_mut().filter(|_| is_value) {
         Some(imported) => imported.prediction.link = link,
         None => return Err(Error::setting("link", link.name(), "none: only a regression has one")),

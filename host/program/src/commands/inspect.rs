@@ -45,9 +45,11 @@ fn predicts_text(predicts: &Predicts) -> String {
         None => "the class with the largest margin, of several the first",
         Some(link) => super::export::formula(link),
     };
+    let of_each = if predicts.what == "targets" { "of each target " } else { "" };
+    let what = format!("{of_each}{what}");
     match predicts.missing {
         Some([low, high]) => format!("{what}; features from {low} to {high} are missing"),
-        None => what.into(),
+        None => what,
     }
 }
 

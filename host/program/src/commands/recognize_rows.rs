@@ -27,6 +27,9 @@ struct Line<'a> {
     /// Prediction of a regression, after its inverse link.
     #[serde(skip_serializing_if = "Option::is_none")]
     value: Option<f32>,
+    /// The same of each target, where there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    values: Option<Vec<f32>>,
     /// The row's own, before any link.
     margins: Vec<f64>,
 }
@@ -53,7 +56,8 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked) -
     let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
     let rows = read_rows(path, &names, None)?;
     let encoder = Encoder::of(&model);
-    let has_classes = model.object_count() > 1;
+    let has_targets = model.prediction().targets;
+    let has_classes = model.object_count() > 1 && !has_targets;
     let mut scratch = vec![0; model.object_count()];
     for (number, row) in (1..).zip(rows.iter()) {
         let encoded = encoder.row(row);
@@ -80,6 +84,11 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked) -
             posterior: has_classes.then(|| recognizer.posterior(class).to_f64()),
             rows: (has_classes && adds_up).then(|| recognizer.touches()),
             value: model.predict_value(&encoded),
+            values: has_targets.then(|| {
+                let mut values = vec![0.0; model.object_count()];
+                model.predict_each(&encoded, &mut scratch, &mut values);
+                values
+            }),
             margins: margins(&model, &encoded),
         };
         print(&line, json)?;
@@ -99,6 +108,10 @@ fn print(line: &Line<'_>, json: bool) -> Result<()> {
             output::print(&format!("{row:4}  {verdict:10}  {class} {posterior:.4}\n"))
         }
         (None, Some(class), Some(posterior)) => output::print(&format!("{row:4}  {class} {posterior:.4}\n")),
-        _ => output::print(&format!("{row:4}  {}\n", line.value.unwrap_or_default())),
+        _ => {
+            let one = [line.value.unwrap_or_default()];
+            let values = line.values.as_deref().unwrap_or(&one).iter().map(ToString::to_string).collect::<Vec<_>>();
+            output::print(&format!("{row:4}  {}\n", values.join("  ")))
+        }
     }
 }

@@ -258,7 +258,8 @@ fn what_cannot_be_taken_over_is_refused_by_name_with_the_way_round() {
         assert!(message.contains(what) && message.contains(way), "{message}");
     }
     for (model, what, way) in [
-        ("lightgbm-4.7-categorical.txt", "splits on categories of the feature count", "one-hot"),
+        ("catboost-1.2-statistics.json", "statistics of the target by category (count)", "one_hot_max_size"),
+        ("catboost-1.2-one-hot-words.json", "a category of feature 2", "Number the categories"),
         ("lightgbm-4.7-linear.txt", "tree 0 has linear functions", "linear_tree=false"),
     ] {
         let message = stderr(run(["export", &data(model), "-o", &path("model.palpate")]), 1);

@@ -164,14 +164,14 @@ class Ensemble:
         The same from the bytes of such a file. `notes` are what to know about it beyond what it says itself.
         """
     @staticmethod
-    def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ..., link: str = "identity", last_of_ties: bool = False) -> Ensemble:
+    def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ..., link: str = "identity", last_of_ties: bool = False, targets: bool = False) -> Ensemble:
         """
         An ensemble of trees in memory. Each tree is a tuple of columns with one entry per node: the output that its
         leaves are for (`None`: each leaf has a value for each output), the left child (where x <= threshold; negative in
         a leaf), the right child, the feature, the threshold, whether a missing value goes left, and the values. `base` is
         where margins start; an empty name stands for a feature that has none. `link` is "identity", "logistic",
         "exponential", "square" or "softplus": what makes a value of a margin. With `last_of_ties` the last of several
-        largest margins names the class, otherwise the first.
+        largest margins names the class, otherwise the first. With `targets` each output is a value, and none is a class.
         """
     @staticmethod
     def load(path: str | PathLike[str], names: SupportsGetItem[int, str] | None = None, *, all_trees: bool = False, missing: SupportsFloat | SupportsIndex | None = None) -> Ensemble:
@@ -285,7 +285,7 @@ class Model:
         """
     def predict(self, /, rows: DataSet | ArrayLike, *, raw: bool = False) -> list[str] | NDArray[float32]:
         """
-        The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value,
+        The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value (its values, a column for each of several targets),
         with `raw` the margin before the inverse link. Rows are as for `margins`.
         """
     def save(self, /, path: str | PathLike[str]) -> None:

@@ -27,6 +27,8 @@ class _Parts:
     """The function from a margin to a value."""
     last_of_ties: bool = False
     """True if the last of several largest margins names the class, and not the first."""
+    targets: bool = False
+    """True if each output is a target of a regression, and none is a class."""
 
 
 _VOTES = (
@@ -40,8 +42,8 @@ def read(model: Any, names: list[str] | None) -> Ensemble:
     kind = type(model).__name__
     if not hasattr(model, "n_features_in_"):
         raise InputError(f"the {kind} is not fitted. Call its `fit` first.")
-    if getattr(model, "n_outputs_", 1) > 1:
-        raise InputError(f"the {kind} has several targets, which are not classes of one object. Train a model for each target.")
+    if getattr(model, "n_outputs_", 1) > 1 and _is_classifier(model):
+        raise InputError(f"the {kind} has classes of several kinds, each of which is a question of its own. Train a model for each.")
     parts = KNOWN[kind](model)
     features = [str(name) for name in getattr(model, "feature_names_in_", [""] * model.n_features_in_)]
     return Ensemble.from_trees(
@@ -53,6 +55,7 @@ def read(model: Any, names: list[str] | None) -> Ensemble:
         notes=parts.notes,
         link=parts.link,
         last_of_ties=parts.last_of_ties,
+        targets=parts.targets,
     )
 
 
@@ -71,14 +74,108 @@ def _forest(model: Any) -> _Parts:
 def _votes(model: Any, estimators: Sequence[Any]) -> _Parts:
     """Every tree gives the share of each class, or a value; the forest's prediction is their mean."""
     is_classifier = _is_classifier(model)
+    targets = 1 if is_classifier else int(model.n_outputs_)
+    is_each = is_classifier or targets > 1
     trees: list[_Tree] = []
     for estimator in estimators:
-        values = np.asarray(estimator.tree_.value, dtype=np.float64)[:, 0, :]
+        values = np.asarray(estimator.tree_.value, dtype=np.float64)
         if is_classifier:
-            values = values / values.sum(axis=1, keepdims=True)
-        trees.append(_tree(estimator.tree_, None if is_classifier else 0, values / len(estimators)))
-    outputs = len(model.classes_) if is_classifier else 1
-    return _Parts([0.0] * outputs, trees, [_VOTES] if is_classifier else [])
+            values = values[:, 0, :] / values[:, 0, :].sum(axis=1, keepdims=True)
+        else:
+            values = values[:, :, 0]
+        trees.append(_tree(estimator.tree_, None if is_each else 0, values / len(estimators)))
+    outputs = len(model.classes_) if is_classifier else targets
+    return _Parts([0.0] * outputs, trees, [_VOTES] if is_classifier else [], targets=targets > 1)
+
+
+def _isolation(model: Any) -> _Parts:
+    """The anomaly score, 2 to the power of minus the mean depth of a row's leaves over that of a random tree's."""
+    from sklearn.ensemble._iforest import _average_path_length
+
+    usual = float(_average_path_length(np.array([model._max_samples]))[0])
+    if usual == 0.0:
+        raise InputError("the IsolationForest was trained on one row for each tree: every row has the same score.")
+    factor = -np.log(2.0) / (len(model.estimators_) * usual)
+    trees: list[_Tree] = []
+    for estimator, features in zip(model.estimators_, model.estimators_features_, strict=True):
+        own = estimator.tree_
+        depth = np.zeros(own.node_count)
+        for node in range(own.node_count):
+            if own.children_left[node] >= 0:
+                depth[[own.children_left[node], own.children_right[node]]] = depth[node] + 1.0
+        values = factor * (depth + _average_path_length(own.n_node_samples))
+        output, left, right, feature, threshold, missing, values = _tree(own, 0, values)
+        # Each tree may have been given some of the columns.
+        feature = np.where(left >= 0, np.asarray(features, dtype=np.int64)[np.maximum(feature, 0)], feature)
+        trees.append((output, left, right, feature, threshold, missing, values))
+    note = (
+        f"The value is the anomaly score, from 0 to 1, that is -score_samples(X): the forest calls a row an outlier above "
+        f"{-float(model.offset_):.9g}."
+    )
+    return _Parts([0.0], trees, [note], "exponential")
+
+
+def _calibrated(model: Any) -> _Parts:
+    """The margins that a calibrator makes of those of one estimator: a multiple of them and a constant."""
+    if len(model.calibrated_classifiers_) != 1:
+        raise InputError(
+            f"the CalibratedClassifierCV averages {len(model.calibrated_classifiers_)} calibrated models, which is no sum of "
+            "trees. Train with ensemble=False, or calibrate a fitted model (sklearn.frozen.FrozenEstimator)."
+        )
+    (own,) = model.calibrated_classifiers_
+    estimator = own.estimator
+    # A model that was fitted before is wrapped.
+    estimator = getattr(estimator, "estimator", estimator) if type(estimator).__name__ == "FrozenEstimator" else estimator
+    kind = type(estimator).__name__
+    if type(estimator).__module__.partition(".")[0] != "sklearn" or kind not in KNOWN or kind == "CalibratedClassifierCV":
+        raise InputError(f"what the CalibratedClassifierCV calibrates is a {kind}. Calibrate a forest or boosted trees of scikit-learn.")
+    parts = KNOWN[kind](estimator)
+    classes = len(model.classes_)
+    if len(estimator.classes_) != classes:
+        raise InputError("the calibrated estimator knows other classes than the CalibratedClassifierCV.")
+    is_vote = not hasattr(estimator, "decision_function")
+    # The margins of this loss are twice the values that were calibrated.
+    half = 0.5 if not is_vote and type(getattr(estimator, "_loss", None)).__name__ == "ExponentialLoss" else 1.0
+    calibrators = [_line(calibrator, classes) for calibrator in own.calibrators]
+    if len(calibrators) == 1:
+        calibrators = [(0.0, 0.0), calibrators[0]]
+    notes = [
+        "Margins are calibrated: posteriors of two classes are those of predict_proba."
+        if classes == 2 and own.method == "sigmoid"
+        else "Margins are those of the calibrated classes: classes are right, posteriors are not the calibrated probabilities."
+    ]
+    slopes = np.array([slope * half for slope, _ in calibrators])
+    base = [slope * first + constant for (_, constant), slope, first in zip(calibrators, slopes, parts.base, strict=True)]
+    trees: list[_Tree] = []
+    for output, left, right, feature, threshold, missing, values in parts.trees:
+        if output is not None:
+            scaled = slopes[output] * values
+        elif classes == 2:
+            # Votes for the second class alone were calibrated.
+            output, scaled = 1, slopes[1] * values.reshape(-1, 2)[:, 1]
+        else:
+            scaled = (values.reshape(-1, classes) * slopes).ravel()
+        trees.append((output, left, right, feature, threshold, missing, np.ascontiguousarray(scaled)))
+    return _Parts(base, trees, notes)
+
+
+def _line(calibrator: Any, classes: int) -> tuple[float, float]:
+    """A slope and a constant that make a margin of what was calibrated: log-odds, or of steps how far it is above one half."""
+    kind = type(calibrator).__name__
+    if kind == "_SigmoidCalibration":
+        return -float(calibrator.a_), -float(calibrator.b_)
+    if kind != "IsotonicRegression" or classes > 2:
+        raise InputError(
+            f"a {kind} of {classes} classes keeps no order between them that trees could add up. Train with method=\"sigmoid\", or "
+            "two classes."
+        )
+    at, share = np.asarray(calibrator.X_thresholds_, np.float64), np.asarray(calibrator.y_thresholds_, np.float64)
+    below = np.flatnonzero(share <= 0.5)
+    if len(below) == 0 or len(below) == len(share):
+        raise InputError("the calibrated probability is on the same side of one half for every row: there is nothing to decide.")
+    last = int(below[-1])
+    crossing = at[last] + (0.5 - share[last]) / (share[last + 1] - share[last]) * (at[last + 1] - at[last])
+    return 1.0, -float(crossing)
 
 
 def _gradient(model: Any) -> _Parts:
@@ -172,6 +269,7 @@ _LINKS = {"IdentityLink": "identity", "LogLink": "exponential"}
 """The function from a margin to a prediction, by scikit-learn's class of the link."""
 
 KNOWN: dict[str, Callable[[Any], _Parts]] = {
+    "CalibratedClassifierCV": _calibrated,
     "DecisionTreeClassifier": _single,
     "DecisionTreeRegressor": _single,
     "ExtraTreeClassifier": _single,
@@ -182,6 +280,7 @@ KNOWN: dict[str, Callable[[Any], _Parts]] = {
     "GradientBoostingRegressor": _gradient,
     "HistGradientBoostingClassifier": _histogram,
     "HistGradientBoostingRegressor": _histogram,
+    "IsolationForest": _isolation,
     "RandomForestClassifier": _forest,
     "RandomForestRegressor": _forest,
 }

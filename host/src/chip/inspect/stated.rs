@@ -141,7 +141,7 @@ pub struct Noise {
 /// The prediction of a model over rows.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Predicts {
-    /// "class" or "value".
+    /// "class", "value" or "targets".
     pub what: &'static str,
     /// Function from a margin to a value.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -156,10 +156,14 @@ pub struct Predicts {
 }
 
 pub(super) fn predicts(model: &Model<'_>) -> Option<Predicts> {
-    let is_value = model.object_count() == 1;
     let prediction = model.prediction();
+    let is_value = model.object_count() == 1 || prediction.targets;
     model.descriptor().is_none().then(|| Predicts {
-        what: if is_value { "value" } else { "class" },
+        what: match (prediction.targets, is_value) {
+            (true, _) => "targets",
+            (false, true) => "value",
+            (false, false) => "class",
+        },
         link: is_value.then(|| prediction.link.name()),
         scale: prediction.scale,
         last_of_ties: prediction.last_of_ties,

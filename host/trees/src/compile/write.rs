@@ -137,8 +137,8 @@ fn of_rows(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
     let mut put = |part: &[u8]| bytes.extend_from_slice(part);
     let prediction = imported.prediction;
     if prediction != Prediction::default() {
-        // Whoever does not know it would take scaled margins for values.
-        write_section(Tag::Prediction, prediction.scale != 1.0, &prediction.to_bytes(), &mut put);
+        // Whoever does not know it would take scaled margins for values, or targets for classes.
+        write_section(Tag::Prediction, prediction.scale != 1.0 || prediction.targets, &prediction.to_bytes(), &mut put);
     }
     if let Some(sentinel) = sentinel(ensemble, settings) {
         write_section(Tag::Sentinel, true, &sentinel.to_bytes(), &mut put);

@@ -20,6 +20,8 @@ pub(super) struct Plain {
     pub(super) unit: f64,
     /// Code of the link, and true if the last of several equal classes is predicted.
     pub(super) link: (u8, bool),
+    /// True if outputs are targets, and none is a class.
+    pub(super) targets: bool,
     /// The largest whole number of a leaf; 0 for f32 leaves.
     pub(super) most: f64,
     /// The farthest that a margin can be from the library's, as the model states.
@@ -167,6 +169,7 @@ struct Stated<'b> {
     sentinel: Option<[i64; 2]>,
     scale: f64,
     link: (u8, bool),
+    targets: bool,
     scales: Vec<f32>,
     feature_names: Vec<String>,
     /// Groups before each place where a walk may end, and units.
@@ -180,6 +183,7 @@ impl<'b> Stated<'b> {
             sentinel: None,
             scale: 1.0,
             link: (0, false),
+            targets: false,
             scales: vec![1.0; features],
             feature_names: Vec::new(),
             exits: Vec::new(),
@@ -204,7 +208,8 @@ impl<'b> Stated<'b> {
                 }
                 13 => {
                     stated.link = (content.byte()?, content.byte()? == 1);
-                    content.take(2)?;
+                    stated.targets = content.byte()? == 1;
+                    content.take(1)?;
                     stated.scale = f64::from(content.float()?);
                 }
                 14 => stated.sentinel = Some([content.signed(4)?, content.signed(4)?]),
@@ -253,7 +258,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     text.text()?;
     // A name is empty where the text ends too early.
     let names = (0..objects).map(|_| text.text().unwrap_or_default()).collect();
-    let Stated { shared, sentinel, scale, link, scales, feature_names, mut exits } =
+    let Stated { shared, sentinel, scale, link, targets, scales, feature_names, mut exits } =
         Stated::read(Bytes(rest.take(sections_length)?), features)?;
     let is_f32 = kind == 2;
     let leaves_of = Leaves { kind, unit: if is_f32 { scale } else { unit * scale }, shared };
@@ -316,6 +321,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
         sentinel,
         unit: unit * scale,
         link,
+        targets,
         most: [127.0, 32767.0, 0.0].get(usize::from(kind)).copied().unwrap_or(0.0),
         stated: error * scale,
         base: if cells.is_some() { vec![0.0; objects] } else { base },

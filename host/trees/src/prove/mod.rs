@@ -326,6 +326,8 @@ fn statements(plain: &Plain, ensemble: &Ensemble) -> Result<(), ProofProblem> {
     let link =
         |(link, last): (u8, bool)| format!("link {link}, the {} of equal classes", if last { "last" } else { "first" });
     same("predictions", link(plain.link), link((own.link.code(), own.last_of_ties)))?;
+    let kind = |targets| if targets { "targets" } else { "classes, or one value" };
+    same("kinds of outputs", kind(plain.targets).into(), kind(own.targets).into())?;
     let missing = ensemble.origin.imported.as_ref().and_then(|imported| imported.sentinel);
     let number = |end: f32| match &plain.keys {
         Keys::Scaled(scales) => (f64::from(end) * f64::from(scales[0])).round() as i32,

@@ -36,7 +36,7 @@ pub struct Moves {
 pub fn moves<'r>(bytes: &[u8], rows: impl IntoIterator<Item = &'r [f64]>) -> Result<Vec<Vec<Moves>>> {
     let model = compile::open(bytes)?;
     let plain = format::read(bytes)?;
-    if model.object_count() < 2 {
+    if model.object_count() < 2 || model.prediction().targets {
         return Err(ProofProblem::NoClass.into());
     }
     let encoder = Encoder::of(&model);

@@ -34,6 +34,12 @@ pub enum RowsProblem {
         /// A feature that no column is named after.
         missing: String,
     },
+    /// One label cannot be compared with several targets.
+    #[error("the model has {targets} targets, and a row has one label")]
+    Targets {
+        /// Targets.
+        targets: usize,
+    },
     /// A column that was asked for is not there.
     #[error("it has no column {name:?}")]
     NoColumn {
@@ -193,6 +199,10 @@ impl Problem for RowsProblem {
             Self::ComesBack { .. } => "Sort the rows by sequence, each in its order, or give each stretch of rows an id of its own.",
             Self::InRow { problem, .. } => return problem.fix(),
             Self::NotCompiled => "Compile it with `palpate export`, and give the model.",
+            Self::Targets { .. } => {
+                "Compare the values that `palpate recognize --features` prints for each row, or `palpate verify` with the \
+                 library's margins."
+            }
             Self::Regression { .. } => "Give a model of two or more classes.",
             Self::Label { .. } => "Correct the label, or name the model's classes with `export --names`.",
         }

@@ -22,7 +22,7 @@ use crate::rows::{Encoder, Rows, generate};
 use isolated::first_different_tree;
 use palpate_onboard::Model;
 use palpate_shared::format::LeafType;
-use predict::class_of;
+use predict::class_by;
 use rayon::prelude::*;
 use reference::Reference;
 use together::margins_of_rows;
@@ -204,7 +204,7 @@ fn compare_all(
     progress: &dyn Progress,
 ) -> Result<Difference> {
     let bound = bound(model);
-    let last_of_ties = model.prediction().last_of_ties;
+    let prediction = model.prediction();
     let own = margins_of_rows(model, &reference.encoder, values);
     let own = own.par_chunks_exact(model.object_count());
     let rows = values.par_chunks_exact(model.feature_count()).zip(own).enumerate();
@@ -213,7 +213,7 @@ fn compare_all(
         let encoded = reference.encoder.row(row);
         let full: Vec<f64> = reference.margins(row, &encoded).into_iter().map(f64::from).collect();
         let margin_error = largest_difference(own, &full);
-        let class_differs = usize::from(class_of(own, last_of_ties) != class_of(&full, last_of_ties));
+        let class_differs = usize::from(class_by(own, &prediction) != class_by(&full, &prediction));
         let example = (margin_error > bound).then(|| (first + index, row.to_vec()));
         Ok(Difference { margin_error, class_differs, example })
     });
@@ -272,8 +272,8 @@ fn compare_library(
             }
         };
         error = error.max(largest_difference(&own, &expected));
-        let class = class_of(&expected, prediction.last_of_ties);
-        let own = model.predict_class(&encoded, &mut scratch).unwrap_or_default();
+        let class = class_by(&expected, &prediction);
+        let own = if prediction.targets { 0 } else { model.predict_class(&encoded, &mut scratch).unwrap_or_default() };
         if own == class {
             continue;
         }
@@ -305,14 +305,14 @@ fn scaling(reference: &Reference<'_>, rows: &Rows) -> Option<(f64, usize)> {
     if reference.encoder == Encoder::Real {
         return None;
     }
-    let ties = reference.ensemble.prediction().last_of_ties;
+    let prediction = reference.ensemble.prediction();
     let changes = rows.iter().map(|row| {
         let singles: Vec<f32> = row.iter().map(|&value| value as f32).collect();
         let as_they_are = reference.ensemble.margins_of_features(&singles);
         let measured = reference.margins(row, &reference.encoder.row(row));
         let nats = |margins: &[f32]| margins.iter().copied().map(f64::from).collect::<Vec<_>>();
         let change = largest_difference(&nats(&as_they_are), &nats(&measured));
-        (change, usize::from(class_of(&nats(&as_they_are), ties) != class_of(&nats(&measured), ties)))
+        (change, usize::from(class_by(&nats(&as_they_are), &prediction) != class_by(&nats(&measured), &prediction)))
     });
     Some(changes.fold((0.0, 0), |(most, classes), (change, class)| (f64::max(most, change), classes + class)))
 }

@@ -5,6 +5,7 @@ use super::together::AT_ONCE;
 use crate::error::{Result, RowsProblem};
 use crate::rows::Encoder;
 use palpate_onboard::inverse_link;
+use palpate_shared::format::Prediction;
 use rayon::prelude::*;
 
 /// Predictions of a model for rows.
@@ -12,7 +13,7 @@ use rayon::prelude::*;
 pub enum Predicted {
     /// The class of each row, as its position among the model's.
     Classes(Vec<usize>),
-    /// The value of each row.
+    /// The value of each row; of a model with several targets those of each row, one after the other.
     Values(Vec<f32>),
 }
 
@@ -21,6 +22,11 @@ pub fn class_of(margins: &[f64], last_of_ties: bool) -> usize {
     let better =
         |class: usize, best: usize| margins[class] > margins[best] || last_of_ties && margins[class] == margins[best];
     (1..margins.len()).fold(0, |best, class| if better(class, best) { class } else { best })
+}
+
+/// The class by a model's own rule; 0 where outputs are targets, of which none is a class.
+pub(super) fn class_by(margins: &[f64], prediction: &Prediction) -> usize {
+    if prediction.targets { 0 } else { class_of(margins, prediction.last_of_ties) }
 }
 
 /// Predicts as the library does that trained the model: classes by the largest margin, or the values of a regression, with
@@ -53,9 +59,9 @@ pub fn predict<V: Copy + Into<f64> + Sync>(
                 let row: Vec<f32> = row.iter().map(|&value| value.into() as f32).collect();
                 ensemble.margins_of_features(&row)
             };
-            if outputs == 1 {
-                let link = |margin| if raw { margin } else { inverse_link(prediction.link, margin) };
-                Predicted::Values(rows.map(|row| link(margins(row)[0])).collect())
+            if outputs == 1 || prediction.targets {
+                let link = move |margin| if raw { margin } else { inverse_link(prediction.link, margin) };
+                Predicted::Values(rows.flat_map_iter(|row| margins(row).into_iter().map(link)).collect())
             } else {
                 let nats = |row: &[V]| margins(row).into_iter().map(f64::from).collect::<Vec<_>>();
                 Predicted::Classes(rows.map(|row| class_of(&nats(row), prediction.last_of_ties)).collect())
@@ -63,12 +69,17 @@ pub fn predict<V: Copy + Into<f64> + Sync>(
         }
         Candidate::Compiled(model) => {
             let encoder = Encoder::of(model);
-            if outputs == 1 {
-                let value = |row: &[V]| {
-                    let row = encoder.row(row);
-                    if raw { model.predict_raw(&row) } else { model.predict_value(&row) }
+            if outputs == 1 || model.prediction().targets {
+                let values = |room: &mut Vec<i32>, row: &[V]| {
+                    let (row, mut values) = (encoder.row(row), vec![0.0; outputs]);
+                    if raw {
+                        model.predict_raw_each(&row, room, &mut values);
+                    } else {
+                        model.predict_each(&row, room, &mut values);
+                    }
+                    values
                 };
-                Predicted::Values(rows.map(|row| value(row).unwrap_or_default()).collect())
+                Predicted::Values(rows.map_init(|| vec![0; outputs], values).flatten_iter().collect())
             } else {
                 let class = |margins: &mut Vec<i32>, row: &[V]| {
                     model.predict_class(&encoder.row(row), margins).unwrap_or_default()

@@ -69,6 +69,7 @@ pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvalua
     };
     let classes = match predicted {
         Predicted::Classes(classes) => classes,
+        Predicted::Values(_) if names.len() > 1 => return Err(RowsProblem::Targets { targets: names.len() }.into()),
         Predicted::Values(values) => {
             let (mut absolute, mut squares) = (0.0, 0.0);
             for (row, &value) in values.iter().enumerate() {

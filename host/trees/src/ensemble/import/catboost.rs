@@ -1,14 +1,18 @@
 //! CatBoost's JSON: `save_model("model.json", format="json")`, symmetric trees (`oblivious_trees`) and others (`trees`).
 //!
-//! A value goes right if it is above the border, in f32.
+//! A value goes right if it is above the border, in f32, and a category if it is the one of the split (one-hot).
 
+use super::city;
 use super::draft::{Draft, DraftNode, DraftTree};
+use super::options::CATEGORIES;
+use super::sets::Set;
 use super::unsupported;
 use crate::ensemble::{Ensemble, Output, Threshold};
 use crate::error::EnsembleProblem;
 use palpate_shared::format::Link;
 use serde::Deserialize;
 use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
 
 type Result<T, E = EnsembleProblem> = std::result::Result<T, E>;
 
@@ -101,8 +105,44 @@ struct Split {
     #[serde(default)]
     border: f64,
     float_feature_index: Option<usize>,
+    cat_feature_index: Option<usize>,
+    /// The hash of a category.
+    value: Option<i32>,
     #[serde(default)]
     split_type: String,
+}
+
+impl Split {
+    /// The hash of the category that it asks for, if it is of categories.
+    fn hash(&self) -> Option<u32> {
+        self.value.filter(|_| self.split_type == ONE_HOT).map(i32::cast_unsigned)
+    }
+}
+
+const ONE_HOT: &str = "OneHotFeature";
+
+/// A split of a tree: by a border, or by whether a value is of these numbers.
+enum Test {
+    Border(Threshold, bool),
+    Numbers(Vec<i32>),
+}
+
+impl Test {
+    /// The split of a feature.
+    fn node(&self, feature: usize, [left, right]: [usize; 2]) -> DraftNode {
+        match self {
+            &Self::Border(threshold, missing_left) => {
+                DraftNode::Split { feature, threshold, missing_left, left, right }
+            }
+            Self::Numbers(numbers) => DraftNode::Set {
+                feature,
+                set: Set::of_numbers(numbers.clone()),
+                missing_inside: false,
+                inside: right,
+                outside: left,
+            },
+        }
+    }
 }
 
 fn damaged(what: impl Into<String>) -> EnsembleProblem {
@@ -134,10 +174,13 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     let classes = class_names(&document.model_info.class_params);
     let values = values_per_leaf(&document.oblivious_trees, &document.trees)?;
     let is_multiclass = matches!(loss, "MultiClass" | "MultiClassOneVsAll") || (loss.is_empty() && classes.len() > 2);
-    if values > 1 && !is_multiclass {
+    let are_targets = values > 1 && !is_multiclass;
+    if are_targets && !loss.starts_with("MultiRMSE") {
         return Err(unsupported(
-            format!("it has {values} targets, which are not classes of one object (its loss is {loss})"),
-            "Train a model for each target.",
+            format!(
+                "it has {values} outputs that are neither classes nor targets of a regression (its loss is {loss})"
+            ),
+            "Train a model for each.",
         ));
     }
     let is_binary = values == 1 && (classes.len() == 2 || matches!(loss, "Logloss" | "CrossEntropy"));
@@ -155,6 +198,7 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     if matches!(loss, "Poisson" | "Tweedie" | "LogLinQuantile") {
         draft.prediction.link = Link::Exponential;
     }
+    draft.prediction.targets = are_targets;
     draft.base = vec![0.0; outputs];
     if bias.len() != values && bias.len() != 1 {
         return Err(damaged(format!("scale_and_bias has {} numbers for {values} outputs", bias.len())));
@@ -162,7 +206,16 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     for value in 0..values {
         draft.base[first + value] = if bias.len() == 1 { bias[0] } else { bias[value] };
     }
-    let reader = Reader { info, values, scale };
+    let mut hashes = BTreeSet::new();
+    document
+        .oblivious_trees
+        .iter()
+        .for_each(|tree| hashes.extend(tree.splits.iter().flatten().filter_map(Split::hash)));
+    document.trees.iter().for_each(|tree| tree.hashes(&mut hashes));
+    if !hashes.is_empty() {
+        draft.notes.push(CATEGORIES.into());
+    }
+    let reader = Reader { info, values, scale, numbers: city::numbers(&hashes) };
     let output = if values > 1 { Output::Each } else { Output::One(first) };
     for (number, tree) in document.oblivious_trees.iter().enumerate() {
         let nodes = reader.oblivious(tree, number)?;
@@ -199,29 +252,71 @@ fn values_per_leaf(oblivious: &[Oblivious], trees: &[Branch]) -> Result<usize> {
     }
 }
 
+impl Branch {
+    fn hashes(&self, seen: &mut BTreeSet<u32>) {
+        let mut waiting = vec![self];
+        while let Some(branch) = waiting.pop() {
+            seen.extend(branch.split.as_ref().and_then(Split::hash));
+            waiting.extend([&branch.left, &branch.right].into_iter().flatten().map(|child| &**child));
+        }
+    }
+}
+
 struct Reader<'a> {
     info: &'a FeaturesInfo,
     values: usize,
     scale: f64,
+    /// Whole numbers by the hashes of categories.
+    numbers: BTreeMap<u32, Vec<i32>>,
 }
 
 impl Reader<'_> {
-    /// A split's feature in a row, its threshold, and where a missing value goes.
-    fn split(&self, split: &Split, tree: usize) -> Result<(usize, Threshold, bool)> {
+    /// A split's feature in a row, and its test.
+    fn split(&self, split: &Split, tree: usize) -> Result<(usize, Test)> {
+        if let Some(hash) = split.hash() {
+            return self.one_hot(split, hash, tree);
+        }
         let index = split.float_feature_index.filter(|_| matches!(split.split_type.as_str(), "FloatFeature" | ""));
         let Some(index) = index else {
             let others = &self.info.categorical_features;
             let names: Vec<&str> = others.iter().map(|feature| feature.feature_id.as_str()).collect();
-            return Err(unsupported(
-                format!("tree {tree} splits on categories ({}: {})", split.split_type, names.join(", ")),
-                "Encode categories as numbers before training, one column of 0 and 1 for each (one-hot).",
-            ));
+            let (what, way) = match split.split_type.as_str() {
+                "OnlineCtr" => (
+                    format!("tree {tree} splits on statistics of the target by category ({})", names.join(", ")),
+                    "Train with one_hot_max_size at least as large as the number of categories of a feature (at most 255), and \
+                     max_ctr_complexity=1.",
+                ),
+                other => (
+                    format!("tree {tree} has splits of another kind ({other})"),
+                    "Train on numbers, or on categories with one_hot_max_size.",
+                ),
+            };
+            return Err(unsupported(what, way));
         };
         let feature = self.info.float_features.get(index);
         let feature = feature.ok_or_else(|| damaged(format!("tree {tree}: it has no feature {index}")))?;
         // A comparison with NaN is false; or missing values count as above all borders.
         let missing_left = feature.nan_value_treatment != "AsTrue";
-        Ok((feature.flat_feature_index, Threshold::at_or_below(f64::from(split.border as f32)), missing_left))
+        let threshold = Threshold::at_or_below(f64::from(split.border as f32));
+        Ok((feature.flat_feature_index, Test::Border(threshold, missing_left)))
+    }
+
+    /// A split that asks for one category.
+    fn one_hot(&self, split: &Split, hash: u32, tree: usize) -> Result<(usize, Test)> {
+        let feature = split.cat_feature_index.and_then(|index| self.info.categorical_features.get(index));
+        let feature = feature.ok_or_else(|| damaged(format!("tree {tree}: its categorical feature does not exist")))?;
+        let numbers = self.numbers.get(&hash).ok_or_else(|| {
+            unsupported(
+                format!(
+                    "tree {tree} asks for a category of feature {} ({:?}) that is no whole number within {} of 0",
+                    feature.flat_feature_index,
+                    feature.feature_id,
+                    city::MOST
+                ),
+                "Number the categories before training, from 0 on: a chip has no words.",
+            )
+        })?;
+        Ok((feature.flat_feature_index, Test::Numbers(numbers.clone())))
     }
 
     fn leaf(&self, values: &[f64]) -> DraftNode {
@@ -239,11 +334,11 @@ impl Reader<'_> {
         let splits: Vec<_> = splits.iter().map(|split| self.split(split, number)).collect::<Result<_>>()?;
         let mut nodes = Vec::with_capacity((2 << depth) - 1);
         // Level by level: node i of a level has the children 2 i and 2 i + 1 of the next.
-        for (level, &(feature, threshold, missing_left)) in splits.iter().enumerate() {
+        for (level, (feature, test)) in splits.iter().enumerate() {
             let next = (2 << level) - 1;
             for index in 0..1 << level {
                 let left = next + 2 * index;
-                nodes.push(DraftNode::Split { feature, threshold, missing_left, left, right: left + 1 });
+                nodes.push(test.node(*feature, [left, left + 1]));
             }
         }
         for position in 0..1_usize << depth {
@@ -260,11 +355,11 @@ impl Reader<'_> {
         while let Some((branch, to)) = waiting.pop() {
             nodes[to] = match branch {
                 Branch { split: Some(split), left: Some(left), right: Some(right), .. } => {
-                    let (feature, threshold, missing_left) = self.split(split, number)?;
+                    let (feature, test) = self.split(split, number)?;
                     let first = nodes.len();
                     nodes.extend([DraftNode::Leaf(Vec::new()), DraftNode::Leaf(Vec::new())]);
                     waiting.extend([(&**right, first + 1), (&**left, first)]);
-                    DraftNode::Split { feature, threshold, missing_left, left: first, right: first + 1 }
+                    test.node(feature, [first, first + 1])
                 }
                 Branch { value: Some(OneOrEach::One(value)), .. } => self.leaf(&[*value]),
                 Branch { value: Some(OneOrEach::Each(values)), .. } => self.leaf(values),

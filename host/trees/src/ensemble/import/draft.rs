@@ -1,6 +1,7 @@
 //! An ensemble in f64, as most libraries have it, on the way to f32.
 
 use super::options::{default_names, named};
+use super::sets::{Set, spelled_out};
 use super::votes;
 use crate::ensemble::{Ensemble, Imported, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Origin, Output, Threshold, Tree};
 use crate::error::EnsembleProblem;
@@ -28,25 +29,44 @@ pub(super) struct Draft {
 }
 
 /// A tree whose leaves have values in f64.
-pub(super) struct DraftTree {
-    pub(super) nodes: Vec<DraftNode>,
-    pub(super) output: Output,
+pub(in crate::ensemble) struct DraftTree {
+    pub(in crate::ensemble) nodes: Vec<DraftNode>,
+    pub(in crate::ensemble) output: Output,
 }
 
-pub(super) enum DraftNode {
-    Split { feature: usize, threshold: Threshold, missing_left: bool, left: usize, right: usize },
+#[derive(Debug)]
+pub(in crate::ensemble) enum DraftNode {
+    Split {
+        feature: usize,
+        threshold: Threshold,
+        missing_left: bool,
+        left: usize,
+        right: usize,
+    },
+    /// Categories: [`spelled_out`] makes splits of it.
+    Set {
+        feature: usize,
+        set: Set,
+        missing_inside: bool,
+        inside: usize,
+        outside: usize,
+    },
     Leaf(Vec<f64>),
 }
 
 impl Draft {
     /// The ensemble in f32, checked.
     pub(super) fn finish(mut self, names: Option<&[String]>) -> Result<Ensemble, EnsembleProblem> {
+        for (number, tree) in self.trees.iter_mut().enumerate() {
+            let name = |feature: usize| self.features.get(feature).cloned().unwrap_or_default();
+            tree.nodes = spelled_out(std::mem::take(&mut tree.nodes), number, name)?;
+        }
         let outputs = self.base.len();
         if outputs > MAX_OBJECTS {
             return Err(EnsembleProblem::ObjectCount { count: outputs });
         }
         if self.names.is_empty() {
-            self.names = default_names(outputs);
+            self.names = default_names(outputs, self.prediction.targets);
         }
         let count = self.features.len();
         if count > MAX_FEATURES {
@@ -96,7 +116,7 @@ impl Draft {
     pub(super) fn used_features(&self) -> usize {
         let nodes = self.trees.iter().flat_map(|tree| &tree.nodes);
         let features = nodes.filter_map(|node| match node {
-            DraftNode::Split { feature, .. } => Some(feature),
+            DraftNode::Split { feature, .. } | DraftNode::Set { feature, .. } => Some(feature),
             DraftNode::Leaf(_) => None,
         });
         features.collect::<BTreeSet<_>>().len()
@@ -119,7 +139,7 @@ impl Draft {
     fn leaves(&self) -> Vec<Vec<Vec<f64>>> {
         let leaf = |node: &DraftNode| match node {
             DraftNode::Leaf(values) => Some(values.clone()),
-            DraftNode::Split { .. } => None,
+            DraftNode::Split { .. } | DraftNode::Set { .. } => None,
         };
         self.trees.iter().map(|tree| tree.nodes.iter().filter_map(leaf).collect()).collect()
     }
@@ -141,7 +161,7 @@ impl Draft {
                 };
                 let own = tree.nodes.iter().filter_map(|node| match node {
                     DraftNode::Leaf(values) => values.get(position).copied(),
-                    DraftNode::Split { .. } => None,
+                    DraftNode::Split { .. } | DraftNode::Set { .. } => None,
                 });
                 let values = leaves.iter().filter_map(|values| values.get(position).copied()).zip(own);
                 let of_tree = values.fold((0.0, 0.0), |(most, largest), (value, own): (f64, f64)| {
@@ -161,7 +181,7 @@ impl Draft {
 
 impl DraftTree {
     /// The tree in f32, and the threshold of each node as the file has it.
-    fn finish(self) -> (Tree, Vec<Threshold>) {
+    pub(in crate::ensemble) fn finish(self) -> (Tree, Vec<Threshold>) {
         let none = Threshold::below(0.0);
         let node = |node| match node {
             DraftNode::Split { feature, threshold, missing_left, left, right } => match threshold.single() {
@@ -175,6 +195,8 @@ impl DraftTree {
                 }
             },
             DraftNode::Leaf(values) => (Node::Leaf(values.into_iter().map(|value| value as f32).collect()), none),
+            // Spelled out before.
+            DraftNode::Set { .. } => (Node::Leaf(Vec::new()), none),
         };
         let (nodes, thresholds) = self.nodes.into_iter().map(node).unzip();
         (Tree { nodes, output: self.output }, thresholds)

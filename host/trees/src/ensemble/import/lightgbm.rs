@@ -1,9 +1,12 @@
 //! LightGBM's text: `save_model("model.txt")`, versions 3 and 4 of the library.
 //!
 //! A value goes left if it is at or below the threshold, in f64; one of infinity parts missing values from all others.
-//! What counts as missing is each split's own: nothing (NaN is 0 then), zero (and NaN), or NaN.
+//! What counts as missing is each split's own: nothing (NaN is 0 then), zero (and NaN), or NaN. A category goes left if its
+//! bit is set; what is missing or negative goes right, and so does what has no bit.
 
 use super::draft::{Draft, DraftNode, DraftTree};
+use super::options::CATEGORIES;
+use super::sets::Set;
 use super::unsupported;
 use crate::ensemble::{Ensemble, Output, Threshold};
 use crate::error::EnsembleProblem;
@@ -91,7 +94,12 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
         .collect::<Result<_>>()?;
     // Where zeros are missing in all of the splits, they are missing in a row.
     let is_zero = |(splits, _): &(Vec<Split>, Vec<f64>)| splits.iter().all(|split| split.missing == Missing::Zero);
-    let zero_is_missing = trees.iter().all(is_zero) && trees.iter().any(|(splits, _)| !splits.is_empty());
+    let has_sets = trees.iter().flat_map(|(splits, _)| splits).any(|split| split.set.is_some());
+    if has_sets {
+        draft.notes.push(CATEGORIES.into());
+    }
+    // Zero is a category like others.
+    let zero_is_missing = !has_sets && trees.iter().all(is_zero) && trees.iter().any(|(splits, _)| !splits.is_empty());
     if zero_is_missing {
         draft.sentinel = Some([-ZERO, ZERO]);
     }
@@ -161,9 +169,11 @@ fn objective(text: Option<&str>, outputs: usize, draft: &mut Draft) -> Result<us
 }
 
 /// A split as the file has it.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Split {
     feature: usize,
+    /// Categories that go left, instead of a threshold.
+    set: Option<Set>,
     threshold: f64,
     default_left: bool,
     missing: Missing,
@@ -198,19 +208,22 @@ fn tree(block: &Block<'_>, number: usize, features: usize, names: &[String]) -> 
     let decisions: Vec<u8> = block.list("decision_type", splits)?;
     let lefts: Vec<i64> = block.list("left_child", splits)?;
     let rights: Vec<i64> = block.list("right_child", splits)?;
+    let sets = categories(block)?;
     let mut read = Vec::with_capacity(splits);
     for (index, &decision) in decisions.iter().enumerate() {
         let feature = selected[index];
         let Some(name) = names.get(feature).filter(|_| feature < features) else {
             return Err(block.damaged("split_feature", &format!("has {feature}, but there are {features} features")));
         };
-        if decision & 1 != 0 {
-            return Err(EnsembleProblem::Tree {
-                tree: number,
-                problem: crate::error::TreeProblem::Categorical { feature: name.clone() },
-            }
-            .into());
-        }
+        let set = if decision & 1 == 0 {
+            None
+        } else {
+            // `as` saturates; a fraction is the number of no set.
+            let number = thresholds[index] as usize;
+            let own = sets.get(number).filter(|_| thresholds[index] == number as f64);
+            let wrong = || block.damaged("threshold", &format!("has no set of categories of {name}"));
+            Some(Set::of_categories(bits(own.ok_or_else(wrong)?), true)?)
+        };
         let missing = match decision >> 2 & 3 {
             0 => Missing::Nothing,
             1 => Missing::Zero,
@@ -223,10 +236,34 @@ fn tree(block: &Block<'_>, number: usize, features: usize, names: &[String]) -> 
             return Err(block.damaged("threshold", "is not a number"));
         }
         let (left, right) = (lefts[index], rights[index]);
-        read.push(Split { feature, threshold, default_left, missing, left, right });
+        read.push(Split { feature, set, threshold, default_left, missing, left, right });
     }
     check_structure(block, &read, values.len())?;
     Ok((read, values))
+}
+
+/// The sets of categories of a tree: of each, a bit for each category, in words of 32.
+fn categories(block: &Block<'_>) -> Result<Vec<Vec<u32>>> {
+    if block.text("num_cat").is_none_or(|count| count.trim() == "0") {
+        return Ok(Vec::new());
+    }
+    let sets = block.count("num_cat")?;
+    let ends: Vec<usize> = block.list("cat_boundaries", sets.saturating_add(1))?;
+    let words: Vec<u32> = block.list("cat_threshold", ends.last().copied().unwrap_or(0))?;
+    let own = |bounds: &[usize]| match *bounds {
+        [from, to] => words.get(from..to).map(<[u32]>::to_vec),
+        _ => None,
+    };
+    let sets: Option<Vec<Vec<u32>>> = ends.windows(2).map(own).collect();
+    sets.ok_or_else(|| block.damaged("cat_boundaries", "do not ascend"))
+}
+
+/// The categories whose bit is set.
+fn bits(words: &[u32]) -> impl Iterator<Item = u32> {
+    words.iter().enumerate().flat_map(|(position, word)| {
+        let first = u32::try_from(position).unwrap_or(u32::MAX).saturating_mul(32);
+        (0..32).filter(move |bit| word >> bit & 1 != 0).map(move |bit| first.saturating_add(bit))
+    })
 }
 
 /// Returns an error unless every split and every leaf is reached at most once.
@@ -269,11 +306,11 @@ impl Grower<'_> {
         while let Some((from, to)) = waiting.pop() {
             // The structure was checked.
             let position = usize::try_from(if from < 0 { -1 - from } else { from }).unwrap_or(usize::MAX);
-            let Some(&split) = self.splits.get(position).filter(|_| from >= 0) else {
+            let Some(split) = self.splits.get(position).filter(|_| from >= 0) else {
                 self.nodes[to] = DraftNode::Leaf(self.values.get(position).copied().into_iter().collect());
                 continue;
             };
-            self.split(split, to, &mut waiting);
+            self.split(split.clone(), to, &mut waiting);
             if self.nodes.len() > most {
                 let name = names.get(split.feature).map_or("", String::as_str);
                 return Err(unsupported(
@@ -296,7 +333,16 @@ impl Grower<'_> {
 
     /// Writes one split, or three where zero goes another way than its neighbors.
     fn split(&mut self, split: Split, to: usize, waiting: &mut Vec<(i64, usize)>) {
-        let Split { feature, threshold, default_left, missing, left, right } = split;
+        let Split { feature, set, threshold, default_left, missing, left, right } = split;
+        if let Some(set) = set {
+            let [inside, outside] = [left, right].map(|from| {
+                let to = self.reserve();
+                waiting.push((from, to));
+                to
+            });
+            self.nodes[to] = DraftNode::Set { feature, set, missing_inside: false, inside, outside };
+            return;
+        }
         let zero_is_left = threshold >= 0.0;
         // LightGBM reads everything from -ZERO to ZERO as 0: all of it goes one way.
         let zero = f64::from(ZERO);

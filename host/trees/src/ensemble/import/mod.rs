@@ -13,15 +13,17 @@
 //! has them. Comparisons are exact: `x <= t` is `x < c` with the next f32 c, whatever t's precision; the file's own t stays
 //! in [`Imported::thresholds`](super::Imported::thresholds), for rows of whole numbers that f32 does not hold. How far
 //! margins can be from the library's own is computed from the leaves and stated in
-//! [`Imported::rounding`](super::Imported::rounding). What cannot be taken over exactly is refused by name: categorical
-//! splits, linear leaves, several targets.
+//! [`Imported::rounding`](super::Imported::rounding). Splits by sets of categories become splits by thresholds. What cannot be
+//! taken over exactly is refused by name, such as linear leaves and statistics of the target.
 
 mod catboost;
-mod draft;
+mod city;
+pub(super) mod draft;
 mod lightgbm;
 mod onnx;
 pub(super) mod options;
 mod parts;
+pub(super) mod sets;
 mod ubjson;
 mod votes;
 

@@ -19,9 +19,17 @@ pub(in crate::ensemble) const MISSING_UNKNOWN: &str = "The file does not state t
                                           training (XGBoost's `missing=`): only NaN counts as missing. State the \
                                           number if there was another.";
 
-/// The names of outputs that have none: the labels 0, 1 and so on, or the value of a regression.
-pub(in crate::ensemble) fn default_names(outputs: usize) -> Vec<String> {
-    if outputs == 1 { vec!["value".into()] } else { (0..outputs).map(|label| label.to_string()).collect() }
+/// Note about every model with categories.
+pub(in crate::ensemble) const CATEGORIES: &str = "Categories are the numbers that the library saw in training: of a pandas \
+                                                  column their codes, from 0 on in the order of its categories.";
+
+/// The names of outputs that have none: the labels 0, 1 and so on, or the value or targets of a regression.
+pub(in crate::ensemble) fn default_names(outputs: usize, are_targets: bool) -> Vec<String> {
+    match outputs {
+        1 => vec!["value".into()],
+        _ if are_targets => (0..outputs).map(|target| format!("target{target}")).collect(),
+        _ => (0..outputs).map(|label| label.to_string()).collect(),
+    }
 }
 
 /// The given names, if there are some, instead of a file's own.

@@ -12,8 +12,9 @@ pub(super) struct Outputs {
     first: usize,
     pub(super) objective: Objective,
     pub(super) base_score: String,
-    /// 0 for models with one group.
+    /// 0 for models with one group, or targets.
     pub(super) num_class: String,
+    pub(super) num_target: String,
 }
 
 impl Outputs {
@@ -34,6 +35,7 @@ impl Outputs {
             },
             base_score: format!("{base:E}"),
             num_class: "0".into(),
+            num_target: "1".into(),
         };
         if is_binary {
             // Where no probability stands for the margin that is added up from, the raw margin has to.
@@ -46,6 +48,10 @@ impl Outputs {
             return one("reg:squarederror", 0, base);
         }
         let groups = ensemble.objects.len();
+        if ensemble.prediction().targets {
+            let own = one("reg:squarederror", 0, 0.0);
+            return Self { groups, base_score: base_score(margins), num_target: groups.to_string(), ..own };
+        }
         let num_class = groups.to_string();
         Self {
             groups,
@@ -57,6 +63,7 @@ impl Outputs {
             },
             base_score: base_score(margins),
             num_class,
+            num_target: "1".into(),
         }
     }
 

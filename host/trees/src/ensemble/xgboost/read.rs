@@ -2,9 +2,9 @@
 
 use super::objective::{Kind, Objective};
 use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
-use super::trees::{Shape, tree};
+use super::trees::{Shape, has_sets, tree};
 use crate::ensemble::check::check_names;
-use crate::ensemble::import::options::{MISSING_UNKNOWN, Options, default_names, named};
+use crate::ensemble::import::options::{CATEGORIES, MISSING_UNKNOWN, Options, default_names, named};
 use crate::ensemble::{Ensemble, Imported, Inputs, MAX_FEATURES, Node, Origin};
 use crate::error::EnsembleProblem;
 use palpate_shared::Descriptor;
@@ -18,6 +18,8 @@ impl Document {
     /// names; `kind` is JSON or UBJSON.
     pub(super) fn into_ensemble(self, options: &Options<'_>, kind: &str) -> Result<Ensemble, EnsembleProblem> {
         let names = options.names;
+        let [major, minor, _] = self.version;
+        let unknown_as_missing = (major, minor) < (1, 7);
         let version = self.version.map(|number| number.to_string()).join(".");
         let Learner { attributes, feature_names, gradient_booster, learner_model_param, objective, .. } = self.learner;
         let (forest, weights) = forest(gradient_booster)?;
@@ -26,13 +28,16 @@ impl Document {
         let targets = count("num_target", &learner_model_param.num_target)?;
         let groups = match outputs {
             Kind::Classes => classes,
-            Kind::Binary | Kind::One if targets > 1 => {
+            Kind::One => targets.max(1),
+            Kind::Binary if targets > 1 => {
                 return Err(EnsembleProblem::Unsupported {
-                    what: format!("it has {targets} targets, which are not classes of one object"),
-                    way: "Train a model for each target.".into(),
+                    what: format!(
+                        "it has {targets} labels, each of which is there or not, and not one of several classes"
+                    ),
+                    way: "Train a model for each label.".into(),
                 });
             }
-            Kind::Binary | Kind::One => 1,
+            Kind::Binary => 1,
         };
         let first = usize::from(outputs == Kind::Binary);
         let objects = groups + first;
@@ -56,7 +61,7 @@ impl Document {
                 (Inputs::Touches(descriptor), named(names, own)?)
             }
             None => {
-                let own = object_names(&attributes)?.unwrap_or_else(|| default_names(objects));
+                let own = object_names(&attributes)?.unwrap_or_else(|| default_names(objects, outputs == Kind::One));
                 if own.len() != objects {
                     return Err(EnsembleProblem::Classes { classes: objects, objects: own.len() });
                 }
@@ -88,14 +93,17 @@ impl Document {
             groups,
             first,
             infinite: inputs.descriptor().is_none(),
+            unknown_as_missing,
         };
-        let read = |((number, columns), group): ((usize, &TreeColumns), u64)| {
-            tree(columns, group, &shape).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
-        };
+        let read = |((number, columns), group): ((usize, &TreeColumns), u64)| tree(columns, (number, group), &shape);
+        if trees.iter().any(has_sets) {
+            notes.push(CATEGORIES.into());
+        }
         let trees = trees.iter().enumerate().zip(tree_info).take(taken).map(read).collect::<Result<_, _>>()?;
         let mut origin = origin(&attributes)?;
         if inputs.descriptor().is_none() {
-            let Rows { prediction, sentinel } = rows(&attributes, inverse)?;
+            let Rows { mut prediction, sentinel } = rows(&attributes, inverse)?;
+            prediction.targets = outputs == Kind::One && objects.len() > 1;
             if sentinel.is_none() {
                 notes.push(MISSING_UNKNOWN.into());
             }
@@ -182,7 +190,7 @@ fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows, EnsembleProbl
         Some([Some(low), Some(high)]) if low <= high => Some([low, high]),
         Some(_) => return Err(wrong("the sentinel is not a range of numbers".into())),
     };
-    let prediction = Prediction { link, last_of_ties: stated.last_of_ties, scale: stated.scale };
+    let prediction = Prediction { link, last_of_ties: stated.last_of_ties, scale: stated.scale, targets: false };
     Ok(Rows { prediction, sentinel })
 }
 

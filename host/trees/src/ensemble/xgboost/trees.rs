@@ -1,9 +1,12 @@
 //! From one of XGBoost's trees to nodes, everything checked.
 
 use super::schema::TreeColumns;
+use crate::ensemble::import::draft::{DraftNode, DraftTree};
+use crate::ensemble::import::sets::{Set, spelled_out};
 use crate::ensemble::nodes::reachable;
-use crate::ensemble::{Node, Output, Tree};
-use crate::error::TreeProblem;
+use crate::ensemble::{Node, Output, Threshold, Tree};
+use crate::error::{EnsembleProblem, TreeProblem};
+use std::collections::BTreeMap;
 
 /// Facts of a document about all of its trees.
 pub(super) struct Shape {
@@ -15,6 +18,8 @@ pub(super) struct Shape {
     pub(super) first: usize,
     /// True if a threshold may be infinite.
     pub(super) infinite: bool,
+    /// True if categories that a set has no bit for go where missing ones go.
+    pub(super) unknown_as_missing: bool,
 }
 
 /// A column must have one entry for each node; XGBoost leaves some columns out, which read as empty.
@@ -22,7 +27,94 @@ fn whole(column: &'static str, found: usize, wanted: usize) -> Result<(), TreePr
     if found == wanted { Ok(()) } else { Err(TreeProblem::Column { column, found, wanted }) }
 }
 
-pub(super) fn tree(columns: &TreeColumns, group: u64, shape: &Shape) -> Result<Tree, TreeProblem> {
+/// Categories from here on are none to XGBoost, nor are negative ones: they go left, or up to 1.6 as missing ones.
+const OUT_OF_RANGE: u32 = 1 << 24;
+
+/// Reads the tree with this number.
+pub(super) fn tree(
+    columns: &TreeColumns,
+    (number, group): (usize, u64),
+    shape: &Shape,
+) -> Result<Tree, EnsembleProblem> {
+    let wrong = |problem| EnsembleProblem::Tree { tree: number, problem };
+    let tree = plain(columns, group, shape).map_err(wrong)?;
+    if !has_sets(columns) {
+        return Ok(tree);
+    }
+    let sets = sets(columns, shape).map_err(wrong)?;
+    let output = tree.output;
+    let read = |position: usize| -> Result<DraftNode, EnsembleProblem> {
+        // What no other node leads to was not checked, and is not reached.
+        Ok(match node(columns, position, output, shape) {
+            Ok(Node::Split { .. }) if is_set(columns, position) && !sets.contains_key(&position) => {
+                DraftNode::Leaf(Vec::new())
+            }
+            Ok(Node::Split { feature, threshold, missing_left, left, right }) => match sets.get(&position) {
+                // What is in the set goes right.
+                Some(set) => {
+                    let last = set.iter().max().copied().unwrap_or(0);
+                    let set = Set::of_categories(set.iter().copied(), false)?;
+                    // Up to there a set has bits, in words of 32.
+                    let end = (last / 32 + 1) * 32;
+                    let set = if shape.unknown_as_missing && !missing_left { set.and_beyond(end.into()) } else { set };
+                    DraftNode::Set { feature, set, missing_inside: !missing_left, inside: right, outside: left }
+                }
+                None => {
+                    let threshold = Threshold::below(threshold.into());
+                    DraftNode::Split { feature, threshold, missing_left, left, right }
+                }
+            },
+            Ok(Node::Leaf(values)) => DraftNode::Leaf(values.into_iter().map(f64::from).collect()),
+            Err(_) => DraftNode::Leaf(Vec::new()),
+        })
+    };
+    let nodes = (0..columns.left_children.len()).map(read).collect::<Result<_, _>>()?;
+    let name = |feature: usize| shape.features.get(feature).cloned().unwrap_or_default();
+    let nodes = spelled_out(nodes, number, name)?;
+    Ok(DraftTree { nodes, output }.finish().0)
+}
+
+/// True if a tree has splits by categories.
+pub(super) fn has_sets(columns: &TreeColumns) -> bool {
+    columns.split_type.iter().any(|&kind| kind != 0)
+}
+
+fn is_set(columns: &TreeColumns, position: usize) -> bool {
+    columns.split_type.get(position).is_some_and(|&kind| kind != 0)
+}
+
+/// The categories of each node that splits by them.
+fn sets(columns: &TreeColumns, shape: &Shape) -> Result<BTreeMap<usize, Vec<u32>>, TreeProblem> {
+    let splits = columns.split_type.iter().enumerate().filter(|(_, kind)| **kind != 0);
+    let mut sets: BTreeMap<usize, Option<Vec<u32>>> = splits.map(|(node, _)| (node, None)).collect();
+    if !shape.infinite {
+        let node = sets.keys().next().copied().unwrap_or_default();
+        let feature = columns.split_indices.get(node).and_then(|&index| usize::try_from(index).ok());
+        let name = feature.and_then(|feature| shape.features.get(feature));
+        return Err(TreeProblem::Categorical { feature: name.cloned().unwrap_or_default() });
+    }
+    let wanted = columns.categories_nodes.len();
+    whole("categories_segments", columns.categories_segments.len(), wanted)?;
+    whole("categories_sizes", columns.categories_sizes.len(), wanted)?;
+    let bounds = columns.categories_segments.iter().zip(&columns.categories_sizes);
+    for (&node, (&first, &size)) in columns.categories_nodes.iter().zip(bounds) {
+        let place = usize::try_from(node).ok().and_then(|node| sets.get_mut(&node));
+        let range = usize::try_from(first).ok().zip(usize::try_from(size).ok());
+        let own = range.and_then(|(first, size)| columns.categories.get(first..first.checked_add(size)?));
+        // A category that XGBoost never finds is in no set.
+        let own = own.map(|own| own.iter().filter_map(|&category| u32::try_from(category).ok()));
+        let own = own.map(|own| own.filter(|category| *category < OUT_OF_RANGE).collect());
+        let (Some(place), Some(own)) = (place, own) else {
+            return Err(TreeProblem::Column { column: "categories", found: columns.categories.len(), wanted });
+        };
+        *place = Some(own);
+    }
+    // Nodes that were pruned may have lost theirs.
+    Ok(sets.into_iter().filter_map(|(node, set)| Some((node, set?))).collect())
+}
+
+/// The tree, without what sets of categories say.
+fn plain(columns: &TreeColumns, group: u64, shape: &Shape) -> Result<Tree, TreeProblem> {
     let objects = shape.groups;
     let number = |name, text: &str| text.parse().map_err(|_| TreeProblem::Count { name, text: text.into() });
     let nodes = columns.left_children.len();
@@ -34,11 +126,6 @@ pub(super) fn tree(columns: &TreeColumns, group: u64, shape: &Shape) -> Result<T
     whole("default_left", columns.default_left.len(), nodes)?;
     if nodes == 0 {
         return Err(TreeProblem::NoNodes);
-    }
-    if let Some(node) = columns.split_type.iter().position(|&kind| kind != 0) {
-        let feature = columns.split_indices.get(node).and_then(|&index| usize::try_from(index).ok());
-        let name = feature.and_then(|feature| shape.features.get(feature));
-        return Err(TreeProblem::Categorical { feature: name.cloned().unwrap_or_default() });
     }
     let values = number("size_leaf_vector", &columns.tree_param.size_leaf_vector)?.max(1);
     let output = match usize::try_from(group) {
@@ -65,7 +152,7 @@ fn node(columns: &TreeColumns, position: usize, output: Output, shape: &Shape) -
         in_range.ok_or(TreeProblem::Child { node: position, side, child, nodes })
     };
     let feature = columns.split_indices[position];
-    let threshold = columns.split_conditions[position];
+    let threshold = if is_set(columns, position) { 0.0 } else { columns.split_conditions[position] };
     if threshold.is_nan() || !(shape.infinite || threshold.is_finite()) {
         return Err(TreeProblem::Threshold { node: position, threshold });
     }

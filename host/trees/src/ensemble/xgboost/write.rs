@@ -50,7 +50,7 @@ impl Document {
                     boost_from_average: "0".into(),
                     num_class: outputs.num_class,
                     num_feature: features.to_string(),
-                    num_target: "1".into(),
+                    num_target: outputs.num_target,
                 },
                 objective: outputs.objective,
             },

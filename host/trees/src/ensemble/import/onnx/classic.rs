@@ -2,7 +2,6 @@
 
 use super::wire::Node;
 use super::{Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
-use crate::ensemble::import::unsupported;
 use palpate_shared::format::Link;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -97,16 +96,14 @@ impl Weights {
         } else {
             let wanted =
                 outputs(node.attributes.get("n_targets").and_then(|attribute| attribute.integer).unwrap_or(1))?;
-            if wanted > 1 {
-                return Err(unsupported(
-                    format!("it has {wanted} targets, which are not classes of one object"),
-                    "Train a model for each target.",
-                ));
-            }
+            draft.prediction.targets = wanted > 1;
             draft.base = match base {
-                [] => vec![0.0],
-                [one] => vec![*one],
-                _ => return Err(damaged(format!("base_values has {} numbers for 1 target", base.len()))),
+                [] => vec![0.0; wanted],
+                each if each.len() == wanted => each.to_vec(),
+                _ => {
+                    let targets = if wanted == 1 { "1 target".into() } else { format!("{wanted} targets") };
+                    return Err(damaged(format!("base_values has {} numbers for {targets}", base.len())));
+                }
             };
             match transform {
                 "NONE" => {}
