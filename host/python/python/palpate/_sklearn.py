@@ -90,7 +90,7 @@ def _votes(model: Any, estimators: Sequence[Any]) -> _Parts:
 
 def _isolation(model: Any) -> _Parts:
     """The anomaly score, 2 to the power of minus the mean depth of a row's leaves over that of a random tree's."""
-    from sklearn.ensemble._iforest import _average_path_length
+    from sklearn.ensemble._iforest import _average_path_length  # type: ignore[import-untyped]
 
     usual = float(_average_path_length(np.array([model._max_samples]))[0])
     if usual == 0.0:
