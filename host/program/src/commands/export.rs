@@ -9,7 +9,7 @@ use palpate::compile::{
     self, Candidate, Compiled, CompiledModel, EarlyExit, EarlyExitFound, Goal, Instructions, Language, Layout, Leaf,
     Settings,
 };
-use palpate::ensemble::{Ensemble, Inputs};
+use palpate::ensemble::{Ensemble, Inputs, train};
 use palpate::error::Error;
 use palpate::output;
 use palpate::rows::Rows;
@@ -201,6 +201,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let (scales, fitted) = scales(&arguments, &ensemble)?;
     let (layout, forms) = arguments.code()?;
     let usual = match ensemble.inputs {
+        // Where leaves were rounded to one byte, two hold nothing more.
+        Inputs::Touches(_) if train::is_rounded(&ensemble, 8) => Settings { leaf: Leaf::I8, ..Settings::default() },
         Inputs::Touches(_) => Settings::for_touches(ensemble.objects.len()),
         Inputs::Rows(_) => Settings::default(),
     };

@@ -191,7 +191,7 @@ fn simulated(arguments: &Arguments, global: &Global, directory: &PathBuf, record
     let dataset = super::dataset(directory)?;
     let file = arguments.probe.read()?;
     let probe = arguments.probe.of_dataset(file.as_ref(), &dataset)?;
-    let mut settings = Settings { probe, ..arguments.settings(global) };
+    let mut settings = Settings { probe, ..arguments.settings(global, &dataset) };
     settings.noise = arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, settings.noise)?)?;
     let background = arguments.background.as_deref().map(Dataset::read_any).transpose()?.map(super::checked);
     let in_directory = |error: Error| match error.exit_code() {
@@ -254,7 +254,7 @@ fn alone(arguments: &Arguments, global: &Global, recorded: Dataset) -> Result<Ma
     }
     let file = arguments.probe.read()?;
     let probe = arguments.probe.of_dataset(file.as_ref(), &recorded)?;
-    let settings = Settings { probe, noise: Noise::default(), ..arguments.settings(global) };
+    let settings = Settings { probe, noise: Noise::default(), ..arguments.settings(global, &recorded) };
     let (ensemble, taught) = teach::alone(&recorded, &settings, &teaching(&settings), &Bar::new())?;
     Ok(Made { ensemble, dataset: recorded, taught: Some(taught), adjusted: None, is_clean: false, settings })
 }
@@ -286,9 +286,13 @@ fn cost(trained: &Trained<'_>, is_clean: bool) -> String {
 
 impl Arguments {
     /// All but the noise and the probe.
-    fn settings(&self, global: &Global) -> Settings {
+    fn settings(&self, global: &Global, dataset: &Dataset) -> Settings {
+        let outputs = match self.outputs {
+            Outputs::Placements => dataset.placement_shares().len().max(dataset.objects.len()),
+            Outputs::Objects => dataset.objects.len(),
+        };
         let preset = match self.preset {
-            Preset::Compact => Settings::compact(),
+            Preset::Compact => Settings::compact_for(self.descriptor.unwrap_or(Descriptor::Curvature), outputs),
             Preset::Paper => Settings::paper(),
         };
         let settings = Settings {
