@@ -98,7 +98,7 @@ pub fn adjust(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<(Ensemble, Adjusted)> {
-    let (known, recorded) = (&*super::matching(ensemble, known), &*super::matching(ensemble, recorded));
+    let (known, recorded) = (&*super::by_output(ensemble, known), &*super::by_output(ensemble, recorded));
     let descriptor = check::adjustable(ensemble, known, recorded, settings)?;
     let noise = settings.noise.map_or_else(|| check::missing_noise(ensemble, known), Ok)?;
     on_threads(settings.threads, || {

@@ -157,7 +157,7 @@ pub fn teach(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<(Ensemble, Taught)> {
-    let (known, placed) = (&matching(ensemble, known), &matching(ensemble, recorded));
+    let (known, placed) = (&by_output(ensemble, known), &by_output(ensemble, recorded));
     let shares = recorded.placement_shares();
     let recorded = &**placed;
     let descriptor = check::check(ensemble, known, recorded, settings)?;
@@ -219,7 +219,7 @@ pub fn teach(
 }
 
 /// Touches as an ensemble's outputs are: of placements, where those are and the touches name theirs.
-fn matching<'d>(ensemble: &Ensemble, dataset: &'d Dataset) -> Cow<'d, Dataset> {
+fn by_output<'d>(ensemble: &Ensemble, dataset: &'d Dataset) -> Cow<'d, Dataset> {
     let is_of_placements = TouchOrigin::of(&ensemble.origin).is_ok_and(|stated| !stated.placements.is_empty());
     if is_of_placements { Cow::Owned(dataset.by_placement()) } else { Cow::Borrowed(dataset) }
 }

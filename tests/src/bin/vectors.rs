@@ -363,15 +363,26 @@ fn together(text: &mut String) {
     let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model)).expect("at most 256 objects");
     *text += &format!("model {} outputs together: evidence that is level\n", hex(&bytes));
     for evidence in [[0; 5], [9, 9, 9, 2_000, 2_000], [i64::MIN, i64::MIN, 0, i64::MIN, 0]] {
-        let bytes = abuse::snapshot(&model, 7, 0, 0, &evidence);
-        recognizer.restore(&bytes).expect("a snapshot");
-        *text += &format!("restore {} ok\n", hex(&bytes));
-        for touch in random::touches(2, 29) {
-            *text += &format!("touch {}\n", touch_words(&touch));
-            let verdict = recognizer.push(&touch).expect("every approach counts");
-            let features = Descriptor::Curvature.features(&touch);
-            known(text, &model, &recognizer, features.as_slice(), verdict);
-        }
+        touch_after(text, &model, &mut recognizer, &evidence, &random::touches(2, 29));
+    }
+}
+
+/// Evidence that a snapshot brings about, and touches after it.
+fn touch_after(
+    text: &mut String,
+    model: &Model<'_>,
+    recognizer: &mut Recognizer<'_, 256>,
+    evidence: &[i64],
+    touches: &[Touch],
+) {
+    let bytes = abuse::snapshot(model, 7, 0, 0, evidence);
+    recognizer.restore(&bytes).expect("a snapshot");
+    *text += &format!("restore {} ok\n", hex(&bytes));
+    for touch in touches {
+        *text += &format!("touch {}\n", touch_words(touch));
+        let verdict = recognizer.push(touch).expect("every approach counts");
+        let features = Descriptor::Curvature.features(touch);
+        known(text, model, recognizer, features.as_slice(), verdict);
     }
 }
 
@@ -413,15 +424,7 @@ fn limits(text: &mut String) {
     let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model)).expect("at most 256 objects");
     *text += &format!("model {} evidence at its limits\n", hex(&bytes));
     for evidence in [[i64::MAX - 5; 3], [i64::MIN + 5; 3], [i64::MAX, 0, i64::MIN], [1 << 40, 0, 5]] {
-        let bytes = abuse::snapshot(&model, 7, 0, 0, &evidence);
-        recognizer.restore(&bytes).expect("a snapshot");
-        *text += &format!("restore {} ok\n", hex(&bytes));
-        for touch in random::touches(3, 22) {
-            *text += &format!("touch {}\n", touch_words(&touch));
-            let verdict = recognizer.push(&touch).expect("every approach counts");
-            let features = Descriptor::Curvature.features(&touch);
-            known(text, &model, &recognizer, features.as_slice(), verdict);
-        }
+        touch_after(text, &model, &mut recognizer, &evidence, &random::touches(3, 22));
     }
     let own = abuse::snapshot(&model, 7, 0, 0, &[1, 2, 3]);
     let mut changed = own.clone();

@@ -223,7 +223,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         1 => error.in_file(&arguments.ensemble),
         _ => error,
     })?;
-    let model = CompiledModel::from_bytes(compiled.bytes.clone())?;
     output::write_bytes(&arguments.output, &compiled.bytes)?;
     let written = write_emitted(&emitted, &compiled, &ensemble, &arguments.output)?;
     let imported = ensemble.origin.imported.as_ref();
@@ -260,7 +259,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if global.json {
         return output::print_json_about(&arguments.output, &exported);
     }
-    output::print_about(&arguments.output, &text(&arguments.output, &exported, &features(&model.model())))
+    // Trees that are code are built with the model.
+    let features = if exported.form.is_some() { String::new() } else { features(&compile::open(&compiled.bytes)?) };
+    output::print_about(&arguments.output, &text(&arguments.output, &exported, &features))
 }
 
 impl Arguments {

@@ -172,7 +172,7 @@ def _line(calibrator: Any, classes: int) -> tuple[float, float]:
     at, share = np.asarray(calibrator.X_thresholds_, np.float64), np.asarray(calibrator.y_thresholds_, np.float64)
     below = np.flatnonzero(share <= 0.5)
     if len(below) == 0 or len(below) == len(share):
-        raise InputError("the calibrated probability is on the same side of one half for every row: there is nothing to decide.")
+        raise InputError("the calibrated probability never crosses one half, so every row gets the same class. Calibrate on more rows.")
     last = int(below[-1])
     crossing = at[last] + (0.5 - share[last]) / (share[last + 1] - share[last]) * (at[last + 1] - at[last])
     return 1.0, -float(crossing)

@@ -148,7 +148,7 @@ impl Settings {
 
     /// The same for a descriptor and a number of outputs, on a chip with 64 KB: of descriptors with a pose 60 trees, or fewer where
     /// there are more than 13 outputs, with leaves of one byte. For ten objects twice the trees with half the bytes of a leaf
-    /// take 52 KB instead of 46, and a fifth fewer approaches.
+    /// take 52 KB instead of 46, and a fifth fewer approaches (`docs/measurements/tables/pose.sh`).
     pub fn compact_for(descriptor: Descriptor, outputs: usize) -> Self {
         let compact = Self { descriptor, ..Self::compact() };
         if !descriptor.needs_pose() {
@@ -285,11 +285,7 @@ pub fn train_with_background(
 /// of leaves are exact in any order while they stay below 2²⁴ units, a compiled model with leaves of that width holds
 /// the very same numbers, and full and compiled model cannot differ.
 pub fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
-    let leaves = || ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(Node::leaf).flatten();
-    let largest = leaves().fold(0.0_f32, |most, value| most.max(value.abs()));
-    let most = 2.0_f32.powi(i32::try_from(bits).unwrap_or(32) - 1) - 1.0;
-    let fits = |digits: &i32| (largest * 2.0_f32.powi(*digits)).round() <= most;
-    let unit = 2.0_f32.powi(-(1..=15).rev().find(fits).unwrap_or(1));
+    let unit = leaf_unit(ensemble, bits);
     // Multiplying and dividing by a power of two is exact.
     let rounded = |value: &mut f32| *value = (*value / unit).round() * unit;
     ensemble.base_margins.iter_mut().for_each(rounded);
@@ -300,13 +296,22 @@ pub fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
     }
 }
 
-/// True if leaves are rounded as [`round_leaves`] does to so many bits, and so leaves of that width hold the very same numbers.
+/// True if [`round_leaves`] to this many bits changes no leaf, so that a compiled model loses nothing in leaves of that width.
 pub fn is_rounded(ensemble: &Ensemble, bits: u32) -> bool {
-    let leaves = || ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(Node::leaf).flatten();
-    let mut rounded = ensemble.clone();
-    round_leaves(&mut rounded, bits);
-    let again = rounded.trees.iter().flat_map(|tree| &tree.nodes).filter_map(Node::leaf).flatten();
-    leaves().eq(again)
+    let unit = leaf_unit(ensemble, bits);
+    leaves(ensemble).all(|value| (value / unit).fract() == 0.0)
+}
+
+/// The unit of [`round_leaves`], in nats.
+fn leaf_unit(ensemble: &Ensemble, bits: u32) -> f32 {
+    let largest = leaves(ensemble).fold(0.0_f32, |most, value| most.max(value.abs()));
+    let most = 2.0_f32.powi(i32::try_from(bits).unwrap_or(32) - 1) - 1.0;
+    let fits = |digits: &i32| (largest * 2.0_f32.powi(*digits)).round() <= most;
+    2.0_f32.powi(-(1..=15).rev().find(fits).unwrap_or(1))
+}
+
+fn leaves(ensemble: &Ensemble) -> impl Iterator<Item = f32> {
+    ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(Node::leaf).flatten().copied()
 }
 
 fn with_palpate(

@@ -3,9 +3,10 @@
 //! A value goes right if it is above the border, in f32, and a category if it is the one of the split (one-hot).
 
 use super::city;
-use super::draft::{Draft, DraftNode, DraftTree};
+use super::draft::{Draft, DraftTree};
+use super::draft_node::DraftNode;
 use super::options::CATEGORIES;
-use super::sets::Set;
+use super::set::Set;
 use super::unsupported;
 use crate::ensemble::{Ensemble, Output, Threshold};
 use crate::error::EnsembleProblem;

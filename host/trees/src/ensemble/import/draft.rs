@@ -1,7 +1,8 @@
 //! An ensemble in f64, as most libraries have it, on the way to f32.
 
+use super::draft_node::DraftNode;
 use super::options::{default_names, named};
-use super::sets::{Set, spelled_out};
+use super::spelled_out::spelled_out;
 use super::votes;
 use crate::ensemble::{Ensemble, Imported, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Origin, Output, Threshold, Tree};
 use crate::error::EnsembleProblem;
@@ -32,26 +33,6 @@ pub(super) struct Draft {
 pub(in crate::ensemble) struct DraftTree {
     pub(in crate::ensemble) nodes: Vec<DraftNode>,
     pub(in crate::ensemble) output: Output,
-}
-
-#[derive(Debug)]
-pub(in crate::ensemble) enum DraftNode {
-    Split {
-        feature: usize,
-        threshold: Threshold,
-        missing_left: bool,
-        left: usize,
-        right: usize,
-    },
-    /// Categories: [`spelled_out`] makes splits of it.
-    Set {
-        feature: usize,
-        set: Set,
-        missing_inside: bool,
-        inside: usize,
-        outside: usize,
-    },
-    Leaf(Vec<f64>),
 }
 
 impl Draft {

@@ -1,12 +1,13 @@
 //! LightGBM's text: `save_model("model.txt")`, versions 3 and 4 of the library.
 //!
 //! A value goes left if it is at or below the threshold, in f64; one of infinity parts missing values from all others.
-//! What counts as missing is each split's own: nothing (NaN is 0 then), zero (and NaN), or NaN. A category goes left if its
+//! Each split states its missing values: none (NaN is 0 then), zero (and NaN), or NaN. A category goes left if its
 //! bit is set; what is missing or negative goes right, and so does what has no bit.
 
-use super::draft::{Draft, DraftNode, DraftTree};
+use super::draft::{Draft, DraftTree};
+use super::draft_node::DraftNode;
 use super::options::CATEGORIES;
-use super::sets::Set;
+use super::set::Set;
 use super::unsupported;
 use crate::ensemble::{Ensemble, Output, Threshold};
 use crate::error::EnsembleProblem;

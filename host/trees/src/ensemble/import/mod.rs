@@ -19,11 +19,15 @@
 mod catboost;
 mod city;
 pub(super) mod draft;
+pub(super) mod draft_node;
 mod lightgbm;
 mod onnx;
 pub(super) mod options;
 mod parts;
-pub(super) mod sets;
+pub(super) mod set;
+#[cfg(test)]
+mod set_tests;
+pub(super) mod spelled_out;
 mod ubjson;
 mod votes;
 

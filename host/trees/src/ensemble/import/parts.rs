@@ -1,6 +1,7 @@
 //! Trees that another program holds in memory, such as scikit-learn's, which no file holds.
 
-use super::draft::{Draft, DraftNode, DraftTree};
+use super::draft::{Draft, DraftTree};
+use super::draft_node::DraftNode;
 use crate::ensemble::{Ensemble, Output, Threshold};
 use crate::error::{EnsembleProblem, TreeProblem};
 use palpate_shared::format::Prediction;

@@ -1,8 +1,10 @@
 //! From one of XGBoost's trees to nodes, everything checked.
 
 use super::schema::TreeColumns;
-use crate::ensemble::import::draft::{DraftNode, DraftTree};
-use crate::ensemble::import::sets::{Set, spelled_out};
+use crate::ensemble::import::draft::DraftTree;
+use crate::ensemble::import::draft_node::DraftNode;
+use crate::ensemble::import::set::Set;
+use crate::ensemble::import::spelled_out::spelled_out;
 use crate::ensemble::nodes::reachable;
 use crate::ensemble::{Node, Output, Threshold, Tree};
 use crate::error::{EnsembleProblem, TreeProblem};
