@@ -597,3 +597,34 @@ fn what_cannot_be_promised_is_said_and_nothing_is_written() {
     // Its own input may be replaced by the calibrated model.
     succeeds(at, &["calibrate", "model.palpate", "fresh", "-o", "model.palpate", "--error-rate", "0.1"]);
 }
+
+#[test]
+fn a_promise_whatever_the_placements_shares_is_one_of_each_placement_and_says_what_it_takes() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let captured = |name: &str, approaches: &str, seed: &str| {
+        let scene = ["--scene", "table", "--approaches", approaches, "--pose", "--seed", seed];
+        succeeds(at, &[&["capture", "bowl", "fork", "-o", name][..], &scene].concat());
+    };
+    captured("touches", "9000", "1");
+    captured("fresh", "40000", "2");
+    for (outputs, model) in [("placements", "model"), ("objects", "plain")] {
+        let (ensemble, compiled) = (format!("{model}.json"), format!("{model}.palpate"));
+        let train = ["train", "touches", "-o", &ensemble, "--descriptor", "gravity", "--outputs", outputs];
+        succeeds(at, &[&train[..], &["--trees", "rounds=10"]].concat());
+        let said = succeeds(at, &["export", &ensemble, "-o", &compiled]);
+        assert_eq!(said.contains("-leaves, outputs\n"), outputs == "placements", "{said}");
+    }
+    let calibrate = ["calibrate", "model.palpate", "fresh", "-o", "sure.palpate", "--error-rate", "5%"];
+    let any = ["--placement-prior", "any"];
+    let said = succeeds(at, &[&calibrate[..], &any].concat());
+    assert!(said.contains("The rate holds in each of 6 placements"), "{said}");
+    assert!(said.contains("5 % takes 59 names of each") && said.contains("2.5 % takes 119"), "{said}");
+    let evaluated = succeeds(at, &["inspect", "sure.palpate"]);
+    assert!(evaluated.contains("5 % of the names given to each object wrong"), "{evaluated}");
+    let name = [&calibrate[..], &any, &["--per", "name"]].concat();
+    fails(at, &name, 2, "--placement-prior is any. Use stated with --per name");
+    let plain = ["calibrate", "plain.palpate", "fresh", "-o", "no.palpate", "--placement-prior", "any"];
+    fails(at, &plain, 2, "a model that has an output for each placement");
+    assert!(!at.join("no.palpate").exists());
+}
