@@ -38,14 +38,18 @@ pub(super) struct Walk<'w> {
     end: Option<(State, i32, usize)>,
     /// Instructions of the longest way.
     longest: usize,
+    /// Ways so far.
+    ways: usize,
 }
 
 /// Instructions that a column may take, for programs that do not end.
 const MOST: usize = 400;
+/// Ways of a column: those of generated code have a number of eight bits at their end, and branch for few other reasons.
+const MOST_WAYS: usize = 1 << 12;
 
 impl<'w> Walk<'w> {
     pub(super) fn new(text: &'w Text, keys: &'w Keys, sentinel: Option<[i64; 2]>) -> Self {
-        Self { text, keys, sentinel, pieces: Vec::new(), end: None, longest: 0 }
+        Self { text, keys, sentinel, pieces: Vec::new(), end: None, longest: 0, ways: 0 }
     }
 
     /// The column whose feature was just loaded, the state after it with its address on the stack, the next instruction, and how
@@ -107,6 +111,10 @@ impl<'w> Walk<'w> {
         is_negative: bool,
         mut count: usize,
     ) -> Result<(), ProofProblem> {
+        self.ways += 1;
+        if self.ways > MOST_WAYS {
+            return Err(problem(0, "a column branches without end"));
+        }
         loop {
             let instruction = self.text.instructions.get(at).ok_or_else(|| problem(0, "it runs past its end"))?;
             let line = instruction.line;

@@ -74,6 +74,9 @@ pub(super) enum Flow {
     Return,
 }
 
+/// Bytes of the stack at most: generated code has a byte for each column there, and registers.
+const DEEPEST_STACK: i32 = 1 << 14;
+
 pub(super) const SP: usize = 13;
 pub(super) const LR: usize = 14;
 pub(super) const PC: usize = 15;
@@ -86,7 +89,11 @@ impl State {
     }
 
     fn pointer(&self, line: usize) -> Result<i32, ProofProblem> {
-        if let Stack(at) = self.registers[SP] { Ok(at) } else { Err(problem(line, "the stack pointer is lost")) }
+        match self.registers[SP] {
+            Stack(at) if at < -DEEPEST_STACK => Err(problem(line, "the stack grows without end")),
+            Stack(at) => Ok(at),
+            _ => Err(problem(line, "the stack pointer is lost")),
+        }
     }
 
     /// Executes an instruction that does not store the number of a column.
@@ -163,6 +170,9 @@ impl State {
             }
             ("push", [list]) => {
                 let list = registers(list).ok_or_else(unknown)?;
+                if list.contains(&LR) && !self.stack.is_empty() {
+                    return Err(problem(line, "it begins again"));
+                }
                 let start = self.pointer(line)? - 4 * list.len() as i32;
                 self.stack
                     .extend((0..).map(|index| start + 4 * index).zip(list.iter().map(|&own| self.registers[own])));

@@ -400,6 +400,10 @@ impl Ways<'_, '_> {
                             _ => return Err(problem(line, "a branch that no tree has")),
                         };
                         let own = self.nodes.len();
+                        // Each split has a branch of its own; where ways met again, there would be a node for every way.
+                        if own > 2 * text.instructions.len() {
+                            return Err(problem(line, "ways through a tree meet again before its end"));
+                        }
                         self.nodes.push(Step::Leaf(Vec::new()));
                         let left = self.walk(state.clone(), left, [depth + 1, count])?;
                         let right = self.walk(state, right, [depth + 1, count])?;

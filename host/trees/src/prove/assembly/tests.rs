@@ -154,3 +154,21 @@ fn a_changed_number_condition_register_or_label_is_refused_unless_the_trees_stay
 fn is_proved(bytes: &[u8], text: &str, ensemble: &Ensemble) -> bool {
     prove_code(bytes, text, ensemble, FILE).is_ok()
 }
+
+#[test]
+fn assembly_that_begins_again_without_end_is_refused_in_little_time_and_memory() {
+    let mut refused = 0;
+    for (case, chip, early_exit) in all().step_by(7) {
+        if early_exit && !case.has_classes() {
+            continue;
+        }
+        let (bytes, text) = case.assembly(chip, early_exit);
+        for (number, line) in text.lines().enumerate().filter(|line| line.1.starts_with("\tb.n .L")).take(3) {
+            let lines = text.lines().enumerate().map(|own| if own.0 == number { "\tb.n m_margins" } else { own.1 });
+            let changed = lines.collect::<Vec<_>>().join("\n");
+            assert!(meaning(&bytes, &changed).is_none(), "{} {chip:?}: {line}", case.name);
+            refused += 1;
+        }
+    }
+    assert!(refused > 30, "{refused}");
+}
