@@ -3,8 +3,8 @@ chip on to them, and ends with the browser's verdict. For .ci/port.
 
     port.py PAGES DATA [PLAYER IMAGE [NEW]]
 
-PAGES has plain.html, model.html and other.html; DATA has touches-1.txt to touches-3.txt, recorded-1.bin, recorded-2.bin and
-shown.json. With NEW, a directory, what the emulated chip says and what the page shows is written there. The address of the
+PAGES has plain.html, model.html and other.html, and says.txt, what the program makes of the touches; DATA has touches-1.txt to
+touches-3.txt, recorded-1.bin, recorded-2.bin and shown.json. With NEW, a directory, what the emulated chip says and what the page shows is written there. The address of the
 pages is the first line of the output.
 """
 
@@ -25,8 +25,11 @@ verdict = []
 done = threading.Event()
 
 
-def parts():
-    return [(data / f"touches-{part}.txt").read_text().split("\n")[:-1] for part in (1, 2, 3)]
+def touches():
+    def lines(file):
+        return file.read_text().splitlines()
+
+    return {"parts": [lines(data / f"touches-{part}.txt") for part in (1, 2, 3)], "says": lines(pages / "says.txt")}
 
 
 class Chip:
@@ -85,7 +88,7 @@ class Handler(BaseHTTPRequestHandler):
             page = page.replace("<script>", '<script type="text/later">').replace("<head>", f"<head><script>{script}</script>")
             self.answer(page.encode(), "text/html; charset=utf-8")
         elif name == "touches.json":
-            self.answer(json.dumps(parts()).encode())
+            self.answer(json.dumps(touches()).encode())
         elif name == "line":
             self.pass_on()
         elif (data / name).is_file():
@@ -118,13 +121,13 @@ class Handler(BaseHTTPRequestHandler):
         elif name.startswith("touch/"):
             chip.touch(int(name[-1]))
         elif name == "shown.json":
-            self.compare(json.loads(body))
+            self.keep(json.loads(body))
         elif name == "verdict":
             verdict.append(body.decode())
             done.set()
         self.answer()
 
-    def compare(self, shown):
+    def keep(self, shown):
         if not new:
             return
         new.mkdir(parents=True, exist_ok=True)

@@ -54,7 +54,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     play: bool,
     /// Make a page that watches a chip at a serial port, as `palpate link --watch` does
-    #[arg(long, conflicts_with_all = ["play", "sources", "touches", "misses", "SizeArguments", "SceneArguments", "RealArguments"])]
+    #[arg(long, conflicts_with_all = ["play", "sources", "touches", "misses", "ProbeArguments", "UnitArguments", "SceneArguments", "RealArguments"])]
     port: bool,
     /// A compiled model for the page; with --play may be given several times, with --port is the one that the chip has
     #[arg(long, value_name = "FILE", requires = "recognizes", conflicts_with = "touches")]

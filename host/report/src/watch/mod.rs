@@ -15,7 +15,7 @@ use palpate::error::Result;
 use palpate_onboard::Stopping;
 
 /// The host's end of the link, compiled to WebAssembly.
-const WASM: &[u8] = include_bytes!("../../assets/play/link.wasm");
+pub(crate) const WASM: &[u8] = include_bytes!("../../assets/play/link.wasm");
 
 /// The page, as HTML; about 110 KB. `command` remakes it. The same arguments give the same page.
 ///
@@ -38,12 +38,12 @@ pub fn page(model: Option<&CompiledModel>, command: &str) -> Result<String> {
 
 /// What the page knows of a model: enough to recognize it on a chip, and the posterior that each object has to reach.
 fn stated(model: &CompiledModel) -> serde_json::Value {
-    let (bytes, names, model) = (model.bytes(), model.names(), model.model());
+    let (length, names, model) = (model.bytes().len(), model.names(), model.model());
     let stopping = Stopping::from_model(&model);
     let threshold = |object| 1.0 / (1.0 + stopping.odds_of(object, &model) as f64 / 2.0_f64.powi(56));
     serde_json::json!({
         "checksum": model.checksum(),
-        "length": bytes.len(),
+        "length": length,
         "objects": names,
         "thresholds": (0..model.object_count()).map(threshold).collect::<Vec<f64>>(),
     })

@@ -5,6 +5,7 @@
   const fail = (why) => {
     element("failure").textContent = why;
     for (const control of document.querySelectorAll("button, input")) control.disabled = true;
+    for (const part of document.querySelectorAll("#state, .knowledge, .felt")) part.hidden = true;
   };
   if (!("serial" in navigator)) {
     return fail("This browser offers no Web Serial, so it cannot reach a chip. On a computer, Chrome, Edge and Opera do, and "

@@ -3,7 +3,7 @@
 use palpate_shared::Touch;
 use palpate_shared::link::{
     Answer, Command, Decision, Decoder, Event, FrameError, HostEnd, HostSettings, Incoming, LinkError, ModelInfo,
-    Outcome, Query, TouchMessage, VerdictMessage,
+    Outcome, Query, Refusal, TouchMessage, VerdictMessage,
 };
 use serde::Serialize;
 
@@ -262,7 +262,14 @@ fn told(event: &Event, earlier: bool) -> Happening {
             Happening::Touch { times: times(touch), verdict, object, touches: *touches, earlier }
         }
         Event::Refused { touch, refusal } => {
-            Happening::Refused { times: times(touch), why: refusal.to_string(), earlier }
+            let times = times(touch);
+            let why = match refusal {
+                Refusal::Pattern if times == [None; 3] => {
+                    "no finger touched, and the model was not trained on such approaches".into()
+                }
+                refusal => refusal.to_string(),
+            };
+            Happening::Refused { times, why, earlier }
         }
         Event::Fault { kind, finger } => {
             Happening::Fault { finger: (*finger < 3).then_some(*finger), what: kind.to_string() }
@@ -272,3 +279,7 @@ fn told(event: &Event, earlier: bool) -> Happening {
         _ => Happening::Fault { finger: None, what: "the chip reports something that this page does not know".into() },
     }
 }
+
+#[cfg(test)]
+#[path = "tests.rs"]
+mod tests;
