@@ -21,14 +21,17 @@ const waitFor = async (holds, what, seconds = 20) => {
 
 // A port as browsers have it: a fatal error takes its streams away, another one leaves a new one.
 class StubPort {
-  constructor(plug) { Object.assign(this, { plug, readable: null, writable: null, sessions: 0 }); }
+  constructor(plug, product = 1) { Object.assign(this, { plug, product, readable: null, writable: null }); }
+  getInfo() { return { usbVendorId: 0x403, usbProductId: this.product }; }
   async open({ baudRate }) {
     if (this.readable) throw new DOMException("The port is already open.", "InvalidStateError");
-    if (this.plug.refuses) throw new DOMException("Failed to open serial port.", "NetworkError");
+    if (this.plug.refuses > 0) this.plug.refuses -= 1;
+    else this.isReady = true;
+    if (!this.isReady) throw new DOMException("Failed to open serial port.", "NetworkError");
     this.baudRate = baudRate;
     this.writable = new WritableStream({ write: (bytes) => this.plug.write?.(bytes, this) });
     this.stream();
-    this.sessions += 1;
+    this.plug.sessions = (this.plug.sessions ?? 0) + 1;
     await this.plug.opened?.(this);
   }
   stream() { this.readable = new ReadableStream({ start: (controller) => { this.controller = controller; }, cancel: () => this.plug.cancelled?.() }); }
@@ -59,7 +62,7 @@ const plugIn = (plug) => {
     addEventListener: (kind, listener) => { if (kind === "connect") listeners.push(listener); },
   };
   Object.defineProperty(navigator, "serial", { value: serial });
-  return { port, connect: () => listeners.forEach((listener) => listener({ target: port })) };
+  return { port, connect: (target = port) => listeners.forEach((listener) => listener({ target })) };
 };
 
 const cells = (id) => [...element(id).tBodies[0].rows].map((row) => [...row.cells].map((cell) => cell.textContent));
@@ -139,11 +142,13 @@ const TRIES = {
     expect(text("state").startsWith("The baud rate must be"), "a baud rate that is none is taken");
   },
   busy: async () => {
-    plugIn({ refuses: true });
+    plugIn({ refuses: 1 });
     await start();
     element("connect").click();
     await waitFor(() => text("state").startsWith("The port cannot be opened (Failed to open serial port)"), "it does not say why");
     expect(!element("connect").disabled && text("connect") === "Connect", "it cannot be tried again");
+    element("connect").click();
+    await waitFor(() => text("state").startsWith("The port is open"), "it does not open when the port is free");
   },
   silent: async () => {
     const written = [];
@@ -218,9 +223,9 @@ const TRIES = {
     const all = await recorded();
     const last = frames(all.first).slice(-1)[0];
     const plug = { write: (_, port) => {
-      if (port.told === port.sessions) return;
-      port.told = port.sessions;
-      port.push(port.sessions === 1 ? all.first.slice(0, (last[0] + last[1]) >> 1) : all.second);
+      if (plug.told === plug.sessions) return;
+      plug.told = plug.sessions;
+      port.push(plug.sessions === 1 ? all.first.slice(0, (last[0] + last[1]) >> 1) : all.second);
     } };
     const { port, connect } = plugIn(plug);
     await start();
@@ -230,7 +235,12 @@ const TRIES = {
     await waitFor(() => text("state").startsWith("The port is gone (The device has been lost)"), "it does not notice");
     expect(text("connect") === "Connect" && element("reset").disabled, "the buttons do not suit");
     expect(cells("touches").length === all.shown[0].touches.length, "the touches are gone");
-    connect();
+    connect(new StubPort({}, 2));
+    await pause(50);
+    expect(element("state").dataset.state === "lost", "another device is taken for the chip");
+    // As where the system takes a moment to let a port be opened.
+    plug.refuses = 1;
+    connect(new StubPort(plug));
     await waitFor(() => JSON.stringify(shown()) === JSON.stringify(all.shown[1]), "it does not go on where it was");
     same(shown(), all.shown[1], "plugged in again");
     expect(line()[0] === 2, `two touches were made without the cable; the line is "${text("line")}"`);

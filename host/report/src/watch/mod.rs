@@ -11,17 +11,21 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 use palpate::compile::CompiledModel;
-use palpate::error::Result;
+use palpate::error::{EvaluateProblem, Result};
 use palpate_onboard::Stopping;
 
 /// The host's end of the link, compiled to WebAssembly.
 pub(crate) const WASM: &[u8] = include_bytes!("../../assets/play/link.wasm");
 
-/// The page, as HTML; about 110 KB. `command` remakes it. The same arguments give the same page.
+/// The page, as HTML; about 110 KB. `model` is the one that the chip should have; `command` remakes the page. The same
+/// arguments give the same page.
 ///
 /// # Errors
-/// None but those of writing JSON.
+/// [`EvaluateProblem::RawFeatures`] for a model over rows of features.
 pub fn page(model: Option<&CompiledModel>, command: &str) -> Result<String> {
+    if model.is_some_and(|model| model.model().descriptor().is_none()) {
+        return Err(EvaluateProblem::RawFeatures.into());
+    }
     let data = serde_json::json!({ "wasm": STANDARD.encode(WASM), "model": model.map(stated) });
     let text = serde_json::to_string(&data).map_err(|error| PageProblem::Scene { reason: error.to_string() })?;
     let body = html! {
@@ -36,16 +40,18 @@ pub fn page(model: Option<&CompiledModel>, command: &str) -> Result<String> {
     Ok(html::file_with_wasm("A chip at the cable – Palpate", &styles, &body))
 }
 
-/// What the page knows of a model: enough to recognize it on a chip, and the posterior that each object has to reach.
+/// What the page knows of a model: enough to recognize it on a chip, and the posterior that each object has to reach. Where
+/// several outputs belong to one object, their sum has to reach it, so none is stated; nor for a background, which is no object.
 fn stated(model: &CompiledModel) -> serde_json::Value {
     let (length, names, model) = (model.bytes().len(), model.names(), model.model());
     let stopping = Stopping::from_model(&model);
     let threshold = |object| 1.0 / (1.0 + stopping.odds_of(object, &model) as f64 / 2.0_f64.powi(56));
+    let thresholds = 0..if model.outputs().is_some() { 0 } else { model.known_count() };
     serde_json::json!({
         "checksum": model.checksum(),
         "length": length,
         "objects": names,
-        "thresholds": (0..model.object_count()).map(threshold).collect::<Vec<f64>>(),
+        "thresholds": thresholds.map(threshold).collect::<Vec<f64>>(),
     })
 }
 
@@ -81,7 +87,7 @@ fn body(has_model: bool, command: &str) -> Markup {
                     tbody {}
                 }
             }
-            section.felt aria-label="Touches" {
+            section.felt aria-label="What the fingers felt" {
                 figure id="last" {
                     table id="fingers" {
                         thead { tr {

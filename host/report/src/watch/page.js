@@ -34,7 +34,7 @@
       const bar = Object.assign(document.createElement("div"), { className: "bar" });
       track.setAttribute("aria-hidden", "true");
       track.append(bar);
-      if (isOurs) {
+      if (isOurs && index < data.model.thresholds.length) {
         const line = Object.assign(document.createElement("div"), { className: "line" });
         line.style.left = `${100 * data.model.thresholds[index]}%`;
         track.append(line);

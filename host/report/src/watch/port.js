@@ -3,13 +3,13 @@
 // "closed", or "lost" or "refused" with the reason.
 function openCable(link, heard, became) {
   const TICK = 100;
-  let port = null, baudRate = 0, writer = null, reader = null, sent = Promise.resolve();
+  let port = null, baudRate = 0, writer = null, reader = null;
   // Whether the port is to be open, and whether it was until it went away.
   let wanted = false, isLost = false;
 
-  // Bytes go out in their order. A line that takes none is noticed by the reader.
+  // A line that takes no bytes is a line that is gone.
   const act = ({ line, heard: happened }) => {
-    if (line.length && writer) sent = sent.then(() => writer?.write(line)).catch(() => reader?.cancel().catch(() => {}));
+    if (line.length) writer?.write(line).catch(() => reader?.cancel().catch(() => {}));
     happened.forEach(heard);
   };
   const read = async () => {
@@ -40,6 +40,7 @@ function openCable(link, heard, became) {
         break;
       } catch (error) {
         // Just plugged in, a port may not be ready yet.
+        if (!wanted) return became("closed");
         if ((tries -= 1) <= 0) {
           wanted = false;
           return became("refused", error);
@@ -66,9 +67,12 @@ function openCable(link, heard, became) {
     [wanted, isLost] = [true, false];
     return run(tries);
   };
-  // A cable that is plugged in again.
+  // A cable that is plugged in again: the same kind of port, which for some browsers is another object.
+  const kind = (one) => JSON.stringify(one.getInfo());
   navigator.serial.addEventListener("connect", ({ target }) => {
-    if (isLost && target === port) begin(6);
+    if (!isLost || kind(target) !== kind(port)) return;
+    port = target;
+    begin(6);
   });
   return {
     // To be called by a visitor's click, as browsers want it.
@@ -85,7 +89,6 @@ function openCable(link, heard, became) {
     },
     disconnect: async () => {
       wanted = false;
-      await sent.catch(() => {});
       await reader?.cancel().catch(() => {});
     },
     reset: () => act(link.reset()),
