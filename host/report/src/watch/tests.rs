@@ -38,7 +38,7 @@ fn a_page_holds_everything_itself_is_small_and_names_cannot_break_out_of_it() {
 fn a_page_states_a_models_checksum_and_the_posterior_that_it_stops_at() {
     let model = model(["cup", "bowl"]);
     let stated = stated(&model);
-    assert_eq!(stated["checksum"], model.checksum());
+    assert_eq!(stated["checksum"], model.model().checksum());
     assert_eq!(stated["objects"], serde_json::json!(["cup", "bowl"]));
     let error_rate = Stopping::from_model(&model.model()).error_rate();
     for threshold in stated["thresholds"].as_array().unwrap() {

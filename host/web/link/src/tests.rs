@@ -2,8 +2,7 @@ use super::*;
 use palpate_shared::ContactTime;
 use palpate_shared::link::{Device, DeviceEnd, FaultKind, Payload, Progress, VERSION};
 
-const NAMES: [&str; 18] =
-    ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l", "m", "n", "o", "p", "q", "r"];
+const NAMES: [&str; 18] = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l", "m", "n", "o", "p", "q", "r"];
 
 /// A chip with a model of 18 objects, more than have room in one answer, or without one.
 #[derive(Default)]

@@ -67,7 +67,9 @@ impl Known {
         let object = |count: usize| u8::try_from(count).unwrap_or(u8::MAX);
         match self.model {
             None => Some(Query::Model),
-            Some(Some(info)) if self.names.len() < info.objects() => Some(Query::Name { object: object(self.names.len()) }),
+            Some(Some(info)) if self.names.len() < info.objects() => {
+                Some(Query::Name { object: object(self.names.len()) })
+            }
             Some(Some(_)) if !self.is_current => Some(Query::Posteriors { first: object(self.posteriors.len()) }),
             _ => (!self.has_program).then_some(Query::Program),
         }
@@ -178,35 +180,40 @@ impl Watch {
             // One at a time: what an answer says decides on the next question.
             let mut opened = false;
             let Self { end, boot, known, asked, happened, .. } = self;
-            end.receive(&[*byte], now, |bytes| line.extend(bytes), |incoming| match incoming {
-                Incoming::Opened => opened = true,
-                Incoming::Answer(answer) => {
-                    if let Some((query, _)) = asked.take() {
-                        known.take(query, answer, happened);
+            end.receive(
+                &[*byte],
+                now,
+                |bytes| line.extend(bytes),
+                |incoming| match incoming {
+                    Incoming::Opened => opened = true,
+                    Incoming::Answer(answer) => {
+                        if let Some((query, _)) = asked.take() {
+                            known.take(query, answer, happened);
+                        }
                     }
-                }
-                Incoming::Event { event, missed, boot: of } => {
-                    if missed > 0 {
-                        happened.push(Happening::Missed { count: missed });
+                    Incoming::Event { event, missed, boot: of } => {
+                        if missed > 0 {
+                            happened.push(Happening::Missed { count: missed });
+                        }
+                        if event == Event::Started {
+                            // Perhaps with another program or model.
+                            (*boot, *known) = (Some(of), Known::default());
+                        }
+                        let is_earlier = boot.is_some_and(|boot| boot != of);
+                        if matches!(event, Event::Touch { .. } | Event::Refused { .. }) && !is_earlier {
+                            known.touched();
+                        }
+                        happened.push(told(&event, is_earlier));
                     }
-                    if event == Event::Started {
-                        // Perhaps with another program or model.
-                        (*boot, *known) = (Some(of), Known::default());
+                    Incoming::Outcome { outcome: Outcome::Refused(refusal), .. } => {
+                        happened.push(Happening::Fault { finger: None, what: refusal.to_string() });
                     }
-                    let is_earlier = boot.is_some_and(|boot| boot != of);
-                    if matches!(event, Event::Touch { .. } | Event::Refused { .. }) && !is_earlier {
+                    Incoming::Outcome { .. } => {
                         known.touched();
+                        happened.push(Happening::Reset);
                     }
-                    happened.push(told(&event, is_earlier));
-                }
-                Incoming::Outcome { outcome: Outcome::Refused(refusal), .. } => {
-                    happened.push(Happening::Fault { finger: None, what: refusal.to_string() });
-                }
-                Incoming::Outcome { .. } => {
-                    known.touched();
-                    happened.push(Happening::Reset);
-                }
-            });
+                },
+            );
             if opened {
                 (self.boot, self.asked, self.known) = (Some(self.end.boot()), None, Known::default());
                 self.happened.push(Happening::Connected);
