@@ -21,22 +21,17 @@ use std::path::PathBuf;
 #[command(group(ArgGroup::new("recognizes").args(["play", "port"])), after_help = "\
 Pages work in any browser, without a network. The inside of a surface is orange; a mesh that shows orange from outside is inside out, or has holes.
 
-With --play the page lets you touch several objects, and models recognize them. Without --model four are trained for it, which takes about a minute.
-
-With --port the page shows what a chip at a serial port of the reader's computer touches and recognizes, in browsers that have Web Serial.
+With --play the page lets you touch several objects, and models recognize them. Without --model four are trained for it, which takes about a minute. With --port it shows what a chip at the reader's computer touches and recognizes, where the browser has Web Serial.
 
 Examples:
   palpate view bowl -o bowl.html                a built-in object
-  palpate view cup.stl -o cup.html              is your own mesh right?
-  palpate view fork -o fork.html --touches 60   more touches
+  palpate view cup.stl -o cup.html              your own mesh
   palpate view cup.obj -o cup.html --true-size mm --probe probe.toml
                                                 as large as it is, your probe
   palpate view fork -o fork.html --scene table  as it lies on a table
   palpate view --play -o play.html              ten objects, four models
-  palpate view --play meshes/ -o play.html      your own meshes
   palpate view --play --model models/household.palpate -o play.html
-  palpate view --port -o chip.html              a chip, without a program
-  palpate view --port --model models/household.palpate -o chip.html")]
+  palpate view --port -o chip.html              a chip, without a program")]
 pub(crate) struct Arguments {
     /// An object: a built-in object's name, or a mesh (OBJ, STL, PLY, glTF, GLB, COLLADA); with --play several, or directories
     #[arg(value_name = "SOURCE", required_unless_present_any = ["play", "port"])]
@@ -50,13 +45,14 @@ pub(crate) struct Arguments {
     /// Approaches to show in which a finger missed
     #[arg(long, value_name = "N", default_value = "12", conflicts_with = "play")]
     misses: usize,
-    /// Make a page on which the objects are touched, with the recognizer inside
+    /// Make a page on which the objects are touched
     #[arg(long)]
     play: bool,
-    /// Make a page that watches a chip at a serial port, as `palpate link --watch` does
-    #[arg(long, conflicts_with_all = ["play", "sources", "touches", "misses", "ProbeArguments", "UnitArguments", "SceneArguments", "RealArguments"])]
+    /// Make a page that watches a chip at a serial port
+    #[arg(long, conflicts_with_all = ["play", "sources", "touches", "misses", "trace"])]
+    #[arg(conflicts_with_all = ["ProbeArguments", "UnitArguments", "SceneArguments", "RealArguments"])]
     port: bool,
-    /// A compiled model for the page; with --play may be given several times, with --port is the one that the chip has
+    /// A compiled model for the page; may be given several times, with --port once
     #[arg(long, value_name = "FILE", requires = "recognizes", conflicts_with = "touches")]
     model: Vec<PathBuf>,
     /// For tests of the page: also write what it has to compute, as this program computes it

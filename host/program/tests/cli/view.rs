@@ -72,7 +72,7 @@ fn a_page_that_watches_a_chip_needs_no_object_and_takes_one_model() {
         (&["--true-size", "mm"], "cannot be used"),
         (&["--scene", "table"], "cannot be used"),
         (&["--real", "noise=1ms"], "cannot be used"),
-        (&["--trace", "trace.txt"], "--play"),
+        (&["--trace", "trace.txt"], "cannot be used"),
         (&["--model", model, "--model", model], "one with --port"),
     ] {
         let error = view(wrong, 2);
