@@ -40,7 +40,7 @@ pub fn page(model: Option<&CompiledModel>, command: &str) -> Result<String> {
     Ok(html::file_with_wasm("A chip at the cable – Palpate", &styles, &body))
 }
 
-/// What the page knows of a model: enough to recognize it on a chip, and the posterior that each object has to reach. Where
+/// Facts of a model for the page: enough to recognize it on a chip, and the posterior that each object has to reach. Where
 /// several outputs belong to one object, their sum has to reach it, so none is stated; nor for a background, which is no object.
 fn stated(model: &CompiledModel) -> serde_json::Value {
     let (length, names, model) = (model.bytes().len(), model.names(), model.model());

@@ -85,7 +85,7 @@ export! {
         with(|desk| desk.line.len())
     }
 
-    /// What happened, as JSON in UTF-8.
+    /// Happenings as JSON in UTF-8.
     fn heard() -> *const u8 {
         with(|desk| desk.heard.as_ptr())
     }

@@ -158,7 +158,7 @@ impl Default for Watch {
 }
 
 impl Watch {
-    /// What happened since it was last asked.
+    /// Happenings since it was last asked.
     pub(crate) fn take(&mut self) -> Vec<Happening> {
         core::mem::take(&mut self.happened)
     }
