@@ -131,7 +131,7 @@ class Handler(BaseHTTPRequestHandler):
         if not new:
             return
         new.mkdir(parents=True, exist_ok=True)
-        (new / "shown.json").write_text(json.dumps(shown, ensure_ascii=False, indent=1) + "\n")
+        (new / "shown.json").write_text(json.dumps(shown, ensure_ascii=False) + "\n")
         for number, said in enumerate(chip.sessions, 1):
             (new / f"recorded-{number}.bin").write_bytes(said)
 
