@@ -1,8 +1,8 @@
 //! The evaluation: what is measured and shown, one section per module, written as one page with the files behind it.
 //!
 //! [`report`] measures every stage, or takes it from an interrupted report, and writes the page. [`view`] makes the page
-//! that shows an object and its touches, [`play`] the one on which objects can be touched. The page of the program's
-//! main job is also drawn here, and [`page`] draws what all of them consist of.
+//! that shows an object and its touches, [`play`] the one on which objects can be touched, [`watch`] the one that watches a
+//! chip. The page of the program's main job is also drawn here, and [`page`] draws what all of them consist of.
 
 mod approaches;
 mod cache;
@@ -38,6 +38,7 @@ pub mod stream;
 mod table;
 pub mod teach;
 pub mod view;
+pub mod watch;
 
 pub use settings::Settings;
 pub use stages::{Existing, Report, report, report_on};

@@ -92,7 +92,7 @@ commands! {
     Report => report,
     /// Recognize on a chip at the end of a line, or watch it
     Link => link,
-    /// Make a page that shows an object, or on which to touch objects
+    /// Show an object or a chip on a page, or touch objects there
     View => view,
     /// Check, compare and record data sets of touches; write built-in objects
     Data => data,

@@ -1,38 +1,40 @@
-//! `palpate view`: a page that shows an object, or on which objects are touched.
+//! `palpate view`: a page that shows an object, on which objects are touched, or which watches a chip.
 
 use super::Global;
 use super::play;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::real::RealArguments;
 use super::scene::{SceneArguments, described};
+use super::shell;
+use clap::ArgGroup;
 use glam::DVec3;
+use palpate::compile::CompiledModel;
 use palpate::error::CaptureProblem;
 use palpate::mesh::facts::Facts;
 use palpate::output;
 use palpate::touches::{Origin, Surroundings};
 use palpate::{Error, Result};
-use palpate_report::view;
+use palpate_report::{view, watch};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
-#[command(after_help = "\
+#[command(group(ArgGroup::new("recognizes").args(["play", "port"])), after_help = "\
 Pages work in any browser, without a network. The inside of a surface is orange; a mesh that shows orange from outside is inside out, or has holes.
 
-With --play the page lets you touch several objects, and models recognize them. Without --model four are trained for it, which takes about a minute.
+With --play the page lets you touch several objects, and models recognize them. Without --model four are trained for it, which takes about a minute. With --port it shows what a chip at the reader's computer touches and recognizes, where the browser has Web Serial.
 
 Examples:
   palpate view bowl -o bowl.html                a built-in object
-  palpate view cup.stl -o cup.html              is your own mesh right?
-  palpate view fork -o fork.html --touches 60   more touches
+  palpate view cup.stl -o cup.html              your own mesh
   palpate view cup.obj -o cup.html --true-size mm --probe probe.toml
                                                 as large as it is, your probe
   palpate view fork -o fork.html --scene table  as it lies on a table
   palpate view --play -o play.html              ten objects, four models
-  palpate view --play meshes/ -o play.html      your own meshes
-  palpate view --play --model models/household.palpate -o play.html")]
+  palpate view --play --model models/household.palpate -o play.html
+  palpate view --port -o chip.html              a chip, without a program")]
 pub(crate) struct Arguments {
     /// An object: a built-in object's name, or a mesh (OBJ, STL, PLY, glTF, GLB, COLLADA); with --play several, or directories
-    #[arg(value_name = "SOURCE", required_unless_present = "play")]
+    #[arg(value_name = "SOURCE", required_unless_present_any = ["play", "port"])]
     sources: Vec<String>,
     /// Where to write; the page
     #[arg(short, long, value_name = "PATH")]
@@ -43,11 +45,15 @@ pub(crate) struct Arguments {
     /// Approaches to show in which a finger missed
     #[arg(long, value_name = "N", default_value = "12", conflicts_with = "play")]
     misses: usize,
-    /// Make a page on which the objects are touched, with the recognizer inside
+    /// Make a page on which the objects are touched
     #[arg(long)]
     play: bool,
-    /// A compiled model for the page; may be given several times
-    #[arg(long, value_name = "FILE", requires = "play", conflicts_with = "touches")]
+    /// Make a page that watches a chip at a serial port
+    #[arg(long, conflicts_with_all = ["play", "sources", "touches", "misses", "trace"])]
+    #[arg(conflicts_with_all = ["ProbeArguments", "UnitArguments", "SceneArguments", "RealArguments"])]
+    port: bool,
+    /// A compiled model for the page; may be given several times, with --port once
+    #[arg(long, value_name = "FILE", requires = "recognizes", conflicts_with = "touches")]
     model: Vec<PathBuf>,
     /// For tests of the page: also write what it has to compute, as this program computes it
     #[arg(long, value_name = "FILE", requires = "play")]
@@ -72,6 +78,9 @@ struct Shown<'a> {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    if arguments.port {
+        return watches(&arguments, global);
+    }
     let scene = arguments.scene.scene(Surroundings::Floating)?;
     if arguments.play {
         if !scene.is_floating() {
@@ -119,4 +128,22 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         text += &described(std::slice::from_ref(&object))?;
     }
     output::print_about(output, &text)
+}
+
+/// Makes a page that watches a chip.
+fn watches(Arguments { model, output, .. }: &Arguments, global: &Global) -> Result<()> {
+    if model.len() > 1 {
+        return Err(Error::setting("model", "given several times", "one with --port: a chip has one"));
+    }
+    output::refuse_input(output, model)?;
+    let shown = output.to_string_lossy();
+    let paths = model.iter().flat_map(|path| ["--model".into(), path.to_string_lossy()]);
+    let words: Vec<_> = ["palpate", "view", "--port", "-o", &shown].map(Into::into).into_iter().chain(paths).collect();
+    let command = shell::command(words.iter().map(AsRef::as_ref));
+    let model = model.first().map(CompiledModel::read).transpose()?;
+    output::write_bytes(output, watch::page(model.as_ref(), &command)?.as_bytes())?;
+    if global.json {
+        return output::print_json_about(output, &serde_json::json!({ "page": output }));
+    }
+    output::print_about(output, &format!("{}: open it in a browser that has Web Serial\n", output.display()))
 }

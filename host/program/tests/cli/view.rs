@@ -54,3 +54,34 @@ fn a_directory_of_several_objects_is_refused_with_their_number() {
     assert!(error.contains("2 objects, where one is needed. Give one mesh file"), "{error}");
     assert!(!page.exists());
 }
+
+#[test]
+fn a_page_that_watches_a_chip_needs_no_object_and_takes_one_model() {
+    let directory = tempfile::tempdir().unwrap();
+    let page = directory.path().join("chip.html");
+    let view = |arguments: &[&str], code| {
+        let mut command = command(["view", "--port", "-o"]);
+        let output = command.arg(&page).args(arguments).output().unwrap();
+        if code == 0 { stdout(output) } else { stderr(output, code) }
+    };
+    let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
+    for (wrong, expected) in [
+        (&["bowl"][..], "cannot be used"),
+        (&["--play"], "cannot be used"),
+        (&["--probe", "probe.toml"], "cannot be used"),
+        (&["--true-size", "mm"], "cannot be used"),
+        (&["--scene", "table"], "cannot be used"),
+        (&["--real", "noise=1ms"], "cannot be used"),
+        (&["--trace", "trace.txt"], "cannot be used"),
+        (&["--model", model, "--model", model], "one with --port"),
+    ] {
+        let error = view(wrong, 2);
+        assert!(error.contains(expected), "{wrong:?}: {error}");
+    }
+    assert!(!page.exists());
+    assert!(view(&[], 0).contains("chip.html"));
+    assert!(std::fs::read_to_string(&page).unwrap().contains("\"model\":null"));
+    view(&["--model", model], 0);
+    let text = std::fs::read_to_string(&page).unwrap();
+    assert!(text.contains("\"thresholds\":[0.9") && text.contains(&format!("--model {model}")));
+}

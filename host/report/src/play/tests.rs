@@ -23,15 +23,17 @@ fn sections(module: &[u8]) -> Vec<(u8, &[u8])> {
 }
 
 #[test]
-fn the_compiled_game_imports_nothing_names_no_path_and_is_small() {
-    let sections = sections(WASM);
-    assert!(sections.iter().any(|(number, _)| *number == 10), "it has code");
-    assert!(!sections.iter().any(|(number, _)| *number == 2), "it has a section of imports");
-    let compressed = miniz_oxide::deflate::compress_to_vec_zlib(WASM, 9).len();
-    assert!(compressed <= 400_000, "{compressed} bytes");
-    let text = String::from_utf8_lossy(WASM);
-    for path in ["/home/", "/root/", "/tmp/", "/usr/", "C:\\"] {
-        assert!(!text.contains(path), "{path}");
+fn the_compiled_parts_of_pages_import_nothing_name_no_path_and_are_small() {
+    for (module, most) in [(WASM, 400_000), (crate::watch::WASM, 40_000)] {
+        let sections = sections(module);
+        assert!(sections.iter().any(|(number, _)| *number == 10), "it has code");
+        assert!(!sections.iter().any(|(number, _)| *number == 2), "it has a section of imports");
+        let compressed = miniz_oxide::deflate::compress_to_vec_zlib(module, 9).len();
+        assert!(compressed <= most, "{compressed} bytes");
+        let text = String::from_utf8_lossy(module);
+        for path in ["/home/", "/root/", "/tmp/", "/usr/", "C:\\"] {
+            assert!(!text.contains(path), "{path}");
+        }
     }
 }
 
