@@ -1,0 +1,672 @@
+//! The node: topics, a service, an action and parameters around what recognizes.
+
+use crate::chip::{self, Heard, Order};
+use crate::decide::{Decider, Step, Thresholds, UNDECIDED, check};
+use crate::switches::Switches;
+use crate::wire::{
+    Approach, Bool, DiagnosticArray, DiagnosticStatus, Evidence, Expected, Header, KeyValue, PACKAGE, Recognized,
+    ResetDone, Touch, Verdict,
+};
+use async_channel::{Receiver, Sender};
+use futures::stream::{self, LocalBoxStream, SelectAll, StreamExt};
+use palpate::chip::Port;
+use palpate::compile::CompiledModel;
+use palpate::onboard::effector::{Finger, Scale, Settings};
+use palpate::onboard::shared::Touch as Felt;
+use ros2_client::action::{
+    ActionServerQosPolicies, AsyncActionServer, CancelHandle, ExecutingGoalHandle, GoalEndStatus, NewGoalHandle,
+};
+use ros2_client::builtin_interfaces::Time;
+use ros2_client::qos::{Durability, History};
+use ros2_client::ros2::LogLevel;
+use ros2_client::{
+    ActionTypeName, Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions, ParameterValue,
+    Publisher, QosProfile, ROSTime, RmwRequestId, Server, ServiceMapping, ServiceTypeName, Subscription, rosout,
+};
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::fmt::Display;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Time between looks at the switches.
+const SWITCHES_EVERY: Duration = Duration::from_millis(5);
+/// Time between diagnostics.
+const DIAGNOSTICS_EVERY: Duration = Duration::from_secs(1);
+/// Time in which a client may ask for the result of its goal, as in rcl.
+const RESULT_TIMEOUT: Duration = Duration::from_secs(10);
+/// Touches and edges that wait while others are taken in.
+const QUEUE: usize = 1_000;
+
+/// How the node is started.
+pub(crate) struct Options {
+    pub(crate) name: String,
+    pub(crate) namespace: String,
+    pub(crate) domain: u16,
+    /// Also hear publishers that do not repeat what was lost.
+    pub(crate) best_effort: bool,
+    pub(crate) services: ServiceMapping,
+    pub(crate) model: Option<Arc<CompiledModel>>,
+    pub(crate) thresholds: Thresholds,
+    /// The chip that recognizes; without one this program does.
+    pub(crate) chip: Option<(Port, u32)>,
+}
+
+/// A parameter that was changed.
+enum Change {
+    Model(Arc<CompiledModel>),
+    ErrorRate(f64),
+    MaxTouches(i64),
+}
+
+/// Something for the node to do.
+enum Happened {
+    Touch(Touch),
+    Edge {
+        finger: Finger,
+        closed: bool,
+        stamp: u64,
+    },
+    /// A message that is none of the type that was agreed on.
+    Malformed(String),
+    Reset(RmwRequestId, Expected),
+    Goal(NewGoalHandle<Expected>),
+    Cancel(CancelHandle),
+    Changed(Change),
+    Chip(Heard),
+    LookAtSwitches,
+    Diagnose,
+    Stop,
+}
+
+/// Where verdicts come from.
+enum Recognizing {
+    Here(Decider),
+    Chip { orders: Sender<Order>, objects: Vec<String>, is_there: bool },
+}
+
+type Actions = AsyncActionServer<Expected, Recognized, Recognized>;
+type Goal = ExecutingGoalHandle<Expected>;
+type Finished = (Goal, GoalEndStatus, Verdict);
+
+/// What the node hears.
+struct Inputs {
+    touches: Subscription<Touch>,
+    switches: [(Finger, Subscription<Bool>); 3],
+    reset: Server<Expected, ResetDone>,
+    actions: Actions,
+}
+
+/// What the node says.
+struct Outputs {
+    verdicts: Publisher<Verdict>,
+    evidence: Publisher<Evidence>,
+    approaches: Publisher<Approach>,
+    /// Touches of switches, and of a chip's own fingers.
+    measured: Publisher<Touch>,
+    diagnostics: Publisher<DiagnosticArray>,
+}
+
+/// Counts for diagnostics.
+#[derive(Default)]
+struct Counts {
+    touches: u64,
+    refused: u64,
+    malformed: u64,
+    verdicts: u64,
+    faults: u64,
+    /// Problems since the last diagnostics.
+    recent: VecDeque<String>,
+}
+
+/// Runs the node until `stop` says so.
+///
+/// # Errors
+/// Why it cannot start.
+pub(crate) fn run(options: Options, stop: Receiver<()>) -> Result<(), String> {
+    let (changed, changes) = async_channel::unbounded();
+    let context = Context::with_options(ContextOptions::new().domain_id(options.domain)).map_err(text)?;
+    let name = NodeName::new(&options.namespace, &options.name).map_err(text)?;
+    let node = context.new_node(name, parameters(&options, changed));
+    let mut node = node.map_err(text)?;
+    // What was declared is in the options.
+    while changes.try_recv().is_ok() {}
+    let spinner = node.spinner().map_err(text)?;
+    let (inputs, outputs) = open(&mut node, &options)?;
+    let (recognizing, heard) = match options.chip {
+        None => {
+            let model = options.model.clone().ok_or("there is no model")?;
+            (Recognizing::Here(Decider::new(model, options.thresholds)?), stream::pending().boxed_local())
+        }
+        Some((port, baud)) => {
+            let (orders, heard) = chip::start(port, baud, options.model.clone());
+            (
+                Recognizing::Chip { orders, objects: Vec::new(), is_there: false },
+                heard.map(Happened::Chip).boxed_local(),
+            )
+        }
+    };
+    let (finished, results) = async_channel::unbounded();
+    let mut running = Running {
+        node: &node,
+        inputs: &inputs,
+        outputs: &outputs,
+        recognizing,
+        switches: Switches::new(settings(options.model.as_deref())),
+        thresholds: options.thresholds,
+        goal: None,
+        finished,
+        counts: Counts::default(),
+    };
+    let happened = happened(&inputs, changes, heard, stop);
+    // Dropped before the node, which then says goodbye to the others.
+    let executor = smol::LocalExecutor::new();
+    executor.spawn(spinner.spin()).detach();
+    executor.spawn(answer(&inputs.actions, results)).detach();
+    smol::block_on(executor.run(running.run(happened)));
+    Ok(())
+}
+
+/// The node's parameters; those that can be set are sent to `changed`.
+fn parameters(options: &Options, changed: Sender<Change>) -> NodeOptions {
+    let has_chip = options.chip.is_some();
+    let path = options.model.as_ref().and_then(|model| model.path()).unwrap_or(&PathBuf::new()).display().to_string();
+    let model = options.model.clone();
+    let change = move |name: &str, value: &ParameterValue| change(name, value, has_chip, model.as_deref());
+    let validate = change.clone();
+    NodeOptions::new()
+        .declare_parameter("model", ParameterValue::String(path))
+        .declare_parameter("error_rate", ParameterValue::Double(options.thresholds.error_rate))
+        .declare_parameter("max_touches", ParameterValue::Integer(options.thresholds.max_touches))
+        .parameter_validator(Box::new(move |name, value| validate(name, value).map(|_| ())))
+        .parameter_set_action(Box::new(move |name, value| {
+            let change = change(name, value)?;
+            // The node has ended where nobody takes it.
+            change.map_or(Ok(()), |change| changed.send_blocking(change).map_err(text))
+        }))
+}
+
+/// What a parameter changes; nothing if it is the empty path of no model.
+///
+/// # Errors
+/// Why the value cannot be used.
+fn change(
+    name: &str,
+    value: &ParameterValue,
+    has_chip: bool,
+    model: Option<&CompiledModel>,
+) -> Result<Option<Change>, String> {
+    let thresholds = |thresholds: Thresholds| match model {
+        _ if has_chip && thresholds != Thresholds::default() => {
+            Err("the chip stops as its model says: calibrate the model and load it".into())
+        }
+        Some(model) => thresholds.stopping(&model.model()).map(|_| ()),
+        None => Ok(()),
+    };
+    match (name, value) {
+        ("model", ParameterValue::String(path)) if path.is_empty() && has_chip => Ok(None),
+        ("model", ParameterValue::String(path)) => {
+            let model = CompiledModel::read(path).map_err(text)?;
+            check(&model)?;
+            Ok(Some(Change::Model(Arc::new(model))))
+        }
+        ("error_rate", &ParameterValue::Double(error_rate)) => {
+            thresholds(Thresholds { error_rate, ..Thresholds::default() })?;
+            Ok(Some(Change::ErrorRate(error_rate)))
+        }
+        ("max_touches", &ParameterValue::Integer(max_touches)) => {
+            thresholds(Thresholds { max_touches, ..Thresholds::default() })?;
+            Ok(Some(Change::MaxTouches(max_touches)))
+        }
+        _ => Err(format!("{name} is no parameter of this type")),
+    }
+}
+
+/// Times of the effector for a model.
+fn settings(model: Option<&CompiledModel>) -> Settings {
+    model.map_or_else(Settings::default, |model| Settings::default().for_model(&model.model(), &Scale::IDENTITY))
+}
+
+/// Opens everything under the node's own name: `/palpate/touch` and so on.
+fn open(node: &mut Node, options: &Options) -> Result<(Inputs, Outputs), String> {
+    let base = format!("{}/{}", options.namespace.trim_end_matches('/'), options.name);
+    let name = |name: &str| Name::parse(&format!("{base}/{name}")).map_err(text);
+    let reliable = QosProfile::publisher_default().history(History::KeepLast { depth: 10 });
+    let latched = reliable.clone().durability(Durability::TransientLocal).history(History::KeepLast { depth: 1 });
+    let queued = match options.best_effort {
+        true => QosProfile::subscription_default(),
+        false => reliable.clone(),
+    };
+    let queued = queued.history(History::KeepLast { depth: QUEUE });
+
+    let of = |kind| MessageTypeName::new(PACKAGE, kind);
+    let touches = subscribe(node, &name("touch")?, of("Touch"), &queued)?;
+    let mut switch = |finger, topic| -> Result<_, String> {
+        Ok((finger, subscribe(node, &name(topic)?, MessageTypeName::new("std_msgs", "Bool"), &queued)?))
+    };
+    let [first, middle, last] = Finger::ALL;
+    let switches = [switch(first, "switch/first")?, switch(middle, "switch/middle")?, switch(last, "switch/last")?];
+    let reset = node
+        .create_server(
+            options.services,
+            &name("reset")?,
+            &ServiceTypeName::new(PACKAGE, "Reset"),
+            reliable.clone(),
+            reliable.clone(),
+        )
+        .map_err(text)?;
+    let qos = ActionServerQosPolicies {
+        goal_service: reliable.clone(),
+        result_service: reliable.clone(),
+        cancel_service: reliable.clone(),
+        feedback_publisher: reliable.clone(),
+        status_publisher: latched.clone(),
+    };
+    let actions = node
+        .create_action_server(options.services, &name("recognize")?, &ActionTypeName::new(PACKAGE, "Recognize"), qos)
+        .map_err(text)?;
+    let inputs = Inputs { touches, switches, reset, actions: AsyncActionServer::new(actions) };
+
+    let diagnostics = Name::new("/", "diagnostics").map_err(text)?;
+    let array = MessageTypeName::new("diagnostic_msgs", "DiagnosticArray");
+    let outputs = Outputs {
+        verdicts: publish_on(node, &name("verdict")?, of("Verdict"), &latched)?,
+        evidence: publish_on(node, &name("evidence")?, of("Evidence"), &latched)?,
+        approaches: publish_on(node, &name("next_approach")?, of("Approach"), &latched)?,
+        measured: publish_on(node, &name("measured_touch")?, of("Touch"), &reliable)?,
+        diagnostics: publish_on(node, &diagnostics, array, &reliable)?,
+    };
+    Ok((inputs, outputs))
+}
+
+fn subscribe<M: 'static>(
+    node: &mut Node,
+    name: &Name,
+    of: MessageTypeName,
+    qos: &QosProfile,
+) -> Result<Subscription<M>, String> {
+    let topic = node.create_topic(name, of, qos).map_err(text)?;
+    node.create_subscription(&topic, Some(qos.clone())).map_err(text)
+}
+
+fn publish_on<M: Serialize>(
+    node: &mut Node,
+    name: &Name,
+    of: MessageTypeName,
+    qos: &QosProfile,
+) -> Result<Publisher<M>, String> {
+    let topic = node.create_topic(name, of, qos).map_err(text)?;
+    node.create_publisher(&topic, Some(qos.clone())).map_err(text)
+}
+
+/// Everything that can happen, as it happens.
+fn happened<'n>(
+    inputs: &'n Inputs,
+    changes: Receiver<Change>,
+    chip: LocalBoxStream<'n, Happened>,
+    stop: Receiver<()>,
+) -> SelectAll<LocalBoxStream<'n, Happened>> {
+    let touches = inputs.touches.async_stream().map(|read| match read {
+        Ok((touch, _)) => Happened::Touch(touch),
+        Err(error) => Happened::Malformed(format!("touch: {error}")),
+    });
+    let switches = inputs.switches.iter().map(|(finger, switch)| {
+        let edges = switch.async_stream().map(move |read| match read {
+            Ok((Bool { data }, info)) => {
+                let stamp = info.source_timestamp().or(info.received_timestamp());
+                Happened::Edge { finger: *finger, closed: data, stamp: stamp.map_or_else(now, nanos) }
+            }
+            Err(error) => Happened::Malformed(format!("switch of {finger}: {error}")),
+        });
+        edges.boxed_local()
+    });
+    let resets = inputs.reset.receive_request_stream().map(|read| match read {
+        Ok((id, expected)) => Happened::Reset(id, expected),
+        Err(error) => Happened::Malformed(format!("reset: {error}")),
+    });
+    let goals = stream::unfold(&inputs.actions, |actions| async move {
+        let goal = actions
+            .receive_new_goal()
+            .await
+            .map_or_else(|error| Happened::Malformed(format!("goal of recognize: {error}")), Happened::Goal);
+        Some((goal, actions))
+    });
+    let cancels = stream::unfold(&inputs.actions, |actions| async move {
+        let cancel = actions
+            .receive_cancel_request()
+            .await
+            .map_or_else(|error| Happened::Malformed(format!("cancellation of recognize: {error}")), Happened::Cancel);
+        Some((cancel, actions))
+    });
+    let mut all: SelectAll<LocalBoxStream<'n, Happened>> = switches.collect();
+    all.extend([
+        touches.boxed_local(),
+        resets.boxed_local(),
+        goals.boxed_local(),
+        cancels.boxed_local(),
+        changes.map(Happened::Changed).boxed_local(),
+        chip,
+        stop.map(|()| Happened::Stop).boxed_local(),
+        smol::Timer::interval(SWITCHES_EVERY).map(|_| Happened::LookAtSwitches).boxed_local(),
+        smol::Timer::interval(DIAGNOSTICS_EVERY).map(|_| Happened::Diagnose).boxed_local(),
+    ]);
+    all
+}
+
+/// Sends results, one after another, to clients that ask for them.
+async fn answer(actions: &Actions, results: Receiver<Finished>) {
+    while let Ok((goal, status, verdict)) = results.recv().await {
+        let sent = actions.send_result_response(goal, status, Recognized { verdict });
+        let timeout = async {
+            smol::Timer::after(RESULT_TIMEOUT).await;
+            // Nobody asked: as in rcl, the result is gone.
+            Ok(())
+        };
+        let sent = smol::future::or(sent, timeout).await;
+        if let Err(error) = sent {
+            eprintln!("palpate-ros: the result of a goal was not sent: {error:?}");
+        }
+    }
+}
+
+/// A node that runs.
+struct Running<'n> {
+    node: &'n Node,
+    inputs: &'n Inputs,
+    outputs: &'n Outputs,
+    recognizing: Recognizing,
+    switches: Switches,
+    thresholds: Thresholds,
+    goal: Option<Goal>,
+    finished: Sender<Finished>,
+    counts: Counts,
+}
+
+impl Running<'_> {
+    async fn run(&mut self, mut happened: SelectAll<LocalBoxStream<'_, Happened>>) {
+        if let Recognizing::Here(decider) = &self.recognizing {
+            self.say(decider.step()).await;
+        }
+        while let Some(happened) = happened.next().await {
+            match happened {
+                Happened::Touch(touch) => self.touch(&touch).await,
+                Happened::Edge { finger, closed, stamp } => self.switches.message(finger, closed, stamp, now()),
+                Happened::Malformed(what) => {
+                    self.counts.malformed += 1;
+                    self.problem(format!("a message that cannot be read: {what}"));
+                }
+                Happened::Reset(id, expected) => {
+                    let done = self.reset(&expected).await;
+                    let message = done.as_ref().err().cloned().unwrap_or_default();
+                    let response = ResetDone { success: done.is_ok(), message };
+                    self.note(self.inputs.reset.async_send_response(id, response).await);
+                }
+                Happened::Goal(goal) => self.begin(goal).await,
+                Happened::Cancel(cancel) => self.cancel(&cancel).await,
+                Happened::Changed(change) => self.change(change).await,
+                Happened::Chip(heard) => self.hear(heard).await,
+                Happened::LookAtSwitches => {
+                    for found in self.switches.poll(now()) {
+                        match found {
+                            Ok(touch) => {
+                                let touch = Touch::from(&touch);
+                                self.send(&self.outputs.measured, touch.clone()).await;
+                                self.touch(&touch).await;
+                            }
+                            Err(fault) => self.fault(format!("switches: {fault}")),
+                        }
+                    }
+                }
+                Happened::Diagnose => self.diagnose().await,
+                Happened::Stop => break,
+            }
+        }
+        self.end(GoalEndStatus::Aborted, Verdict { verdict: UNDECIDED.into(), ..Verdict::default() });
+    }
+
+    async fn touch(&mut self, message: &Touch) {
+        let step = match &mut self.recognizing {
+            Recognizing::Here(decider) => decider.touch(message),
+            Recognizing::Chip { .. } => match message.felt() {
+                Ok(touch) => {
+                    self.order(Order::Touch(touch));
+                    return;
+                }
+                Err(problem) => refused(problem.to_string()),
+            },
+        };
+        self.took(step).await;
+    }
+
+    fn order(&mut self, order: Order) {
+        if let Recognizing::Chip { orders, .. } = &self.recognizing
+            && orders.try_send(order).is_err()
+        {
+            self.problem("the thread that talks with the chip has ended: start the node again".into());
+        }
+    }
+
+    /// After a touch.
+    async fn took(&mut self, step: Step) {
+        self.counts.touches += 1;
+        self.counts.refused += u64::from(!step.verdict.refused.is_empty());
+        if let Some(goal) = &self.goal {
+            let feedback = Recognized { verdict: step.verdict.clone() };
+            self.note(self.inputs.actions.publish_feedback(goal.clone(), feedback).await);
+        }
+        if step.is_decided() {
+            self.counts.verdicts += 1;
+            self.end(GoalEndStatus::Succeeded, step.verdict.clone());
+        }
+        self.say(step).await;
+    }
+
+    async fn say(&self, step: Step) {
+        self.send(&self.outputs.verdicts, step.verdict).await;
+        if let Some(evidence) = step.evidence {
+            self.send(&self.outputs.evidence, evidence).await;
+        }
+        if let Some(approach) = step.approach {
+            self.send(&self.outputs.approaches, approach).await;
+        }
+    }
+
+    async fn send<M: Serialize>(&self, publisher: &Publisher<M>, message: M) {
+        if let Err(error) = publisher.async_publish(message).await {
+            eprintln!("palpate-ros: a message was not published: {error}");
+        }
+    }
+
+    async fn reset(&mut self, expected: &Expected) -> Result<(), String> {
+        let step = match &mut self.recognizing {
+            Recognizing::Here(decider) => decider.reset(expected)?,
+            Recognizing::Chip { is_there: false, .. } => return Err("the chip does not answer".into()),
+            Recognizing::Chip { .. } if *expected != Expected::default() => {
+                return Err("a chip keeps its model's own priors: reset it without objects and weights".into());
+            }
+            Recognizing::Chip { .. } => {
+                self.order(Order::Reset);
+                return Ok(());
+            }
+        };
+        self.say(step).await;
+        Ok(())
+    }
+
+    async fn begin(&mut self, new: NewGoalHandle<Expected>) {
+        let actions = &self.inputs.actions;
+        let allowed = match (&self.goal, actions.get_new_goal(new.clone())) {
+            (Some(_), _) => Err("another goal is under way: cancel it first".into()),
+            (None, Some(expected)) => self.reset(&expected).await,
+            (None, None) => Err("it is gone".into()),
+        };
+        if let Err(reason) = allowed {
+            self.note(actions.reject_goal(new).await);
+            self.problem(format!("a goal of recognize was rejected: {reason}"));
+            return;
+        }
+        let started = match actions.accept_goal(new).await {
+            Ok(accepted) => actions.start_executing_goal(accepted).await,
+            Err(error) => Err(error),
+        };
+        match started {
+            Ok(goal) => self.goal = Some(goal),
+            Err(error) => self.problem(format!("a goal of recognize was not started: {error:?}")),
+        }
+    }
+
+    async fn cancel(&mut self, cancel: &CancelHandle) {
+        let mine = self.goal.as_ref().map(|goal| goal.goal_id()).filter(|goal| cancel.contains_goal(goal));
+        self.note(self.inputs.actions.respond_to_cancel_requests(cancel, mine.into_iter()).await);
+        if mine.is_some() {
+            self.end(GoalEndStatus::Canceled, self.verdict());
+        }
+    }
+
+    /// The verdict so far, as far as it is known here.
+    fn verdict(&self) -> Verdict {
+        match &self.recognizing {
+            Recognizing::Here(decider) => decider.step().verdict,
+            Recognizing::Chip { .. } => Verdict { verdict: UNDECIDED.into(), ..Verdict::default() },
+        }
+    }
+
+    /// Ends the goal, if there is one.
+    fn end(&mut self, status: GoalEndStatus, verdict: Verdict) {
+        if let Some(goal) = self.goal.take() {
+            self.note(self.finished.try_send((goal, status, verdict)));
+        }
+    }
+
+    async fn change(&mut self, change: Change) {
+        match change {
+            Change::ErrorRate(error_rate) => self.thresholds.error_rate = error_rate,
+            Change::MaxTouches(max_touches) => self.thresholds.max_touches = max_touches,
+            Change::Model(_) => {}
+        }
+        // What was touched counts under other thresholds, or another model, no more.
+        self.end(GoalEndStatus::Aborted, self.verdict());
+        let decider = match (&self.recognizing, change) {
+            (Recognizing::Here(_), Change::Model(model)) => {
+                self.switches = Switches::new(settings(Some(&model)));
+                Decider::new(model, self.thresholds)
+            }
+            (Recognizing::Here(decider), _) => decider.under(self.thresholds),
+            (Recognizing::Chip { .. }, Change::Model(model)) => return self.order(Order::Load(model)),
+            (Recognizing::Chip { .. }, _) => return,
+        };
+        match decider {
+            Ok(decider) => {
+                self.say(decider.step()).await;
+                self.recognizing = Recognizing::Here(decider);
+            }
+            Err(reason) => self.problem(format!("a parameter was not taken over: {reason}")),
+        }
+    }
+
+    async fn hear(&mut self, heard: Heard) {
+        let Recognizing::Chip { objects, is_there, .. } = &mut self.recognizing else { return };
+        *is_there = !matches!(heard, Heard::Lost(_));
+        match heard {
+            Heard::Connected(names) => {
+                *objects = names;
+                rosout!((*self.node), LogLevel::Info, "the chip answers");
+            }
+            Heard::Step(touch, step) => {
+                self.measured(touch).await;
+                self.took(step).await;
+            }
+            Heard::Refused(touch, reason) => {
+                self.measured(touch).await;
+                self.took(refused(reason)).await;
+            }
+            Heard::Reset => {
+                let verdict = Verdict { verdict: UNDECIDED.into(), objects: objects.clone(), ..Verdict::default() };
+                self.say(Step { verdict, ..Step::default() }).await;
+            }
+            Heard::Fault(fault) => self.fault(format!("chip: {fault}")),
+            Heard::Lost(error) => self.problem(error),
+        }
+    }
+
+    async fn measured(&self, touch: Option<Felt>) {
+        if let Some(touch) = touch {
+            self.send(&self.outputs.measured, Touch::from(&touch)).await;
+        }
+    }
+
+    fn fault(&mut self, fault: String) {
+        self.counts.faults += 1;
+        self.problem(fault);
+    }
+
+    /// Something that the user should know, and that does not end the node.
+    fn problem(&mut self, problem: String) {
+        rosout!((*self.node), LogLevel::Warn, "{problem}");
+        eprintln!("palpate-ros: {problem}");
+        self.counts.recent.push_back(problem);
+        if self.counts.recent.len() > 10 {
+            self.counts.recent.pop_front();
+        }
+    }
+
+    /// A failure of the middleware.
+    fn note<E: std::fmt::Debug>(&self, result: Result<(), E>) {
+        if let Err(error) = result {
+            eprintln!("palpate-ros: {error:?}");
+        }
+    }
+
+    async fn diagnose(&mut self) {
+        let recent: Vec<String> = self.counts.recent.drain(..).collect();
+        let (objects, is_there, hardware) = match &self.recognizing {
+            Recognizing::Here(decider) => (decider.names(), true, ""),
+            Recognizing::Chip { objects, is_there, .. } => (objects.clone(), *is_there, "chip"),
+        };
+        let (level, message) = match recent.last() {
+            _ if !is_there => (2, "the chip does not answer".to_owned()),
+            Some(problem) => (1, problem.clone()),
+            None => (0, "recognizing".to_owned()),
+        };
+        let Counts { touches, refused, malformed, verdicts, faults, .. } = &self.counts;
+        let values = [
+            ("objects", objects.join(", ")),
+            ("touches", touches.to_string()),
+            ("not counted", refused.to_string()),
+            ("verdicts", verdicts.to_string()),
+            ("messages that cannot be read", malformed.to_string()),
+            ("faults", faults.to_string()),
+            ("recent problems", recent.join("; ")),
+        ];
+        let values = values.map(|(key, value)| KeyValue { key: key.into(), value });
+        let status = DiagnosticStatus {
+            level,
+            name: format!("{}: recognition", self.node.fully_qualified_name().trim_start_matches('/')),
+            message,
+            hardware_id: hardware.into(),
+            values: values.into(),
+        };
+        let header = Header { stamp: Time::now(), frame_id: String::new() };
+        self.send(&self.outputs.diagnostics, DiagnosticArray { header, status: vec![status] }).await;
+    }
+}
+
+/// A touch that was not counted, where nothing is known of those before.
+fn refused(reason: String) -> Step {
+    let verdict = Verdict { verdict: UNDECIDED.into(), refused: reason, ..Verdict::default() };
+    Step { verdict, ..Step::default() }
+}
+
+/// Nanoseconds since 1970.
+fn nanos(time: ROSTime) -> u64 {
+    u64::try_from(time.to_nanos()).unwrap_or(0)
+}
+
+fn now() -> u64 {
+    nanos(Time::now().into())
+}
+
+fn text(error: impl Display) -> String {
+    error.to_string()
+}
