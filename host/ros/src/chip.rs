@@ -32,7 +32,7 @@ pub(crate) enum Heard {
     /// It answers, and has these objects.
     Connected(Vec<String>),
     /// A touch was counted: with the touch if its own fingers felt it.
-    Step(Option<Touch>, Step),
+    Step(Option<Touch>, Box<Step>),
     /// A touch was not counted, or an order refused, and why.
     Refused(Option<Touch>, String),
     /// All touches are forgotten.
@@ -134,7 +134,7 @@ impl Line {
             Received::Outcome(Outcome::Verdict(verdict)) => {
                 let step = self.step(connection, names, &verdict)?;
                 let decided = step.is_decided();
-                self.tell(Heard::Step(None, step));
+                self.tell(Heard::Step(None, step.into()));
                 if decided {
                     // The next touch is of another object.
                     connection.submit(Command::Reset)?;
@@ -158,7 +158,7 @@ impl Line {
         match event {
             Event::Touch { touch, verdict, .. } => {
                 let step = self.step_of_event(connection, names, &verdict)?;
-                self.tell(Heard::Step(Some((&touch).into()), step));
+                self.tell(Heard::Step(Some((&touch).into()), step.into()));
             }
             Event::Refused { touch, refusal } => {
                 self.tell(Heard::Refused(Some((&touch).into()), refusal.to_string()));

@@ -245,3 +245,143 @@ pub(crate) fn weights(expected: &Expected, names: &[String]) -> Result<Option<Ve
     };
     Ok(Some(names.iter().map(weight).collect()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAN: f64 = f64::NAN;
+
+    fn household() -> Arc<CompiledModel> {
+        Arc::new(CompiledModel::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate")).unwrap())
+    }
+
+    fn decider() -> Decider {
+        Decider::new(household(), Thresholds::default()).unwrap()
+    }
+
+    fn touch(times: [f64; 3]) -> Touch {
+        Touch { times, ..Touch::default() }
+    }
+
+    fn expected(objects: &[&str], weights: &[u32]) -> Expected {
+        Expected { objects: objects.iter().map(|&name| name.into()).collect(), weights: weights.into() }
+    }
+
+    /// Touches of one kind until something is decided.
+    fn until_decided(decider: &mut Decider, times: [f64; 3]) -> Step {
+        (0..1_000).map(|_| decider.touch(&touch(times))).find(Step::is_decided).unwrap()
+    }
+
+    #[test]
+    fn a_touch_changes_posteriors_and_evidence_as_the_recognizer_says() {
+        let file = household();
+        let model = file.model();
+        let mut recognizer = Recognizing::new(&model, Stopping::from_model(&model)).unwrap();
+        let mut decider = decider();
+        for times in [[0.03, 0.0, 0.05], [5.0, 5.1, NAN], [NAN, 0.2, 0.0]] {
+            let step = decider.touch(&touch(times));
+            recognizer.push(&touch(times).felt().unwrap()).unwrap();
+            let posteriors: Vec<f64> = (0..10).map(|object| recognizer.posterior(object).to_f64()).collect();
+            assert_eq!((step.verdict.touch, &step.verdict.posteriors), (recognizer.touches(), &posteriors));
+            assert_eq!(step.verdict.object, model.object_name(recognizer.best()));
+            let evidence = step.evidence.unwrap();
+            assert_eq!(evidence.nats[recognizer.best()], 0.0);
+            assert!(evidence.nats.iter().all(|&nats| nats <= 0.0));
+        }
+    }
+
+    #[test]
+    fn a_touch_that_cannot_be_counted_says_why_and_changes_nothing() {
+        let mut decider = decider();
+        let before = decider.touch(&touch([0.0, 0.1, NAN]));
+        for (times, why) in [
+            ([NAN; 3], "no finger touched"),
+            ([-1.0, 0.0, 0.0], "the time -1 is negative"),
+            ([f64::INFINITY, 0.0, 0.0], "inf is not finite"),
+            ([0.0, 0.0, 5_000.0], "longer than the 4294 s"),
+        ] {
+            let mut step = decider.touch(&touch(times));
+            let refused = std::mem::take(&mut step.verdict.refused);
+            assert!(refused.contains(why), "{times:?}: {refused}");
+            assert_eq!(step, before);
+        }
+        let half = Touch { has_pose: true, direction: [1.0, 0.0, 0.0], ..touch([0.0; 3]) };
+        assert!(decider.touch(&half).verdict.refused.contains("the alignment has length 0"));
+    }
+
+    #[test]
+    fn another_object_begins_after_a_verdict_and_with_another_name() {
+        let mut decider = decider();
+        let decided = until_decided(&mut decider, [0.0, 0.0, 0.0]);
+        assert_eq!(decided.verdict.verdict, "recognized");
+        assert!(decided.verdict.posterior > 0.99 && decided.approach.is_none());
+        assert_eq!(decider.touch(&touch([0.0, 0.0, 0.0])).verdict.touch, 1);
+        assert_eq!(decider.touch(&touch([0.0, 0.0, 0.0])).verdict.touch, 2);
+        let named = Touch { object: "bowl".into(), ..touch([0.0, 0.0, 0.0]) };
+        assert_eq!(decider.touch(&named).verdict.touch, 1);
+        assert_eq!(decider.touch(&named).verdict.touch, 2);
+    }
+
+    #[test]
+    fn priors_of_a_reset_hold_for_all_objects_until_the_next() {
+        let mut decider = decider();
+        let step = decider.reset(&expected(&["bowl", "fork"], &[3, 1])).unwrap();
+        let of = |step: &Step, name: &str| {
+            let index = step.verdict.objects.iter().position(|object| object == name).unwrap();
+            step.verdict.posteriors[index]
+        };
+        // Not 3 to 1: the model's temperature is above 1.
+        assert!(of(&step, "bowl") > of(&step, "fork") && of(&step, "fork") > 0.0);
+        assert_eq!((step.verdict.touch, step.verdict.object.as_str()), (0, ""));
+        assert_eq!(of(&step, "mouse"), 0.0);
+        until_decided(&mut decider, [0.0, 0.0, 0.0]);
+        assert_eq!(of(&decider.touch(&touch([0.0, 0.0, 0.0])), "mouse"), 0.0);
+        let step = decider.reset(&Expected::default()).unwrap();
+        assert!(step.verdict.posteriors.iter().all(|posterior| (posterior - 0.1).abs() < 1e-3));
+        let even = decider.reset(&expected(&["bowl", "fork"], &[])).unwrap();
+        assert!((of(&even, "bowl") - 0.5).abs() < 1e-3);
+    }
+
+    #[test]
+    fn priors_that_make_no_sense_are_refused_and_change_nothing() {
+        let mut decider = decider();
+        let before = decider.touch(&touch([0.0, 0.1, 0.1]));
+        for (priors, why) in [
+            (expected(&["bowl"], &[1, 2]), "2 weights for 1 objects"),
+            (expected(&[], &[1]), "1 weights for 0 objects"),
+            (expected(&["cup"], &[]), "no object \"cup\"; it has bowl, camera"),
+            (expected(&["bowl", "bowl"], &[]), "\"bowl\" is there twice"),
+            (expected(&["bowl", "fork"], &[0, 0]), "all weights are 0"),
+        ] {
+            let error = decider.reset(&priors).unwrap_err();
+            assert!(error.contains(why), "{error}");
+        }
+        assert_eq!(decider.step(), before);
+    }
+
+    #[test]
+    fn thresholds_decide_when_to_stop_and_wrong_ones_are_refused() {
+        let decider = decider();
+        let touches = |thresholds| until_decided(&mut decider.under(thresholds).unwrap(), [0.0, 0.0, 0.0]).verdict;
+        let of = |error_rate, max_touches| Thresholds { error_rate, max_touches };
+        let [own, strict, loose] = [of(0.0, 0), of(1e-12, 0), of(0.3, 0)].map(touches).map(|verdict| verdict.touch);
+        assert!(loose < own && own < strict, "{loose} {own} {strict}");
+        assert_eq!((touches(of(1e-12, 2)).touch, touches(of(1e-12, 2)).verdict.as_str()), (2, "gave-up"));
+        for (wrong, why) in [(of(0.5, 0), "error_rate"), (of(NAN, 0), "error_rate"), (of(0.1, -1), "max_touches")] {
+            assert!(decider.under(wrong).err().unwrap().contains(why));
+        }
+    }
+
+    #[test]
+    fn a_touch_survives_its_message() {
+        let message = Touch {
+            has_pose: true,
+            direction: [0.0, 0.0, -1.0],
+            alignment: [1.0, 0.0, 0.0],
+            ..touch([0.25, 0.0, NAN])
+        };
+        let felt = message.felt().unwrap();
+        assert_eq!(Touch::from(&felt).felt().unwrap(), felt);
+    }
+}

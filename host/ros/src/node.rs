@@ -575,7 +575,7 @@ impl Running<'_> {
             }
             Heard::Step(touch, step) => {
                 self.measured(touch).await;
-                self.took(step).await;
+                self.took(*step).await;
             }
             Heard::Refused(touch, reason) => {
                 self.measured(touch).await;
