@@ -12,7 +12,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-PATIENCE = 30  # seconds until something that should happen counts as missing
+PATIENCE = float(os.environ.get("PALPATE_PATIENCE", 30))  # seconds until something that should happen counts as missing
 
 
 def qos(reliable=True, latched=False, depth=1000):
@@ -29,7 +29,7 @@ def until(condition, what):
     """Waits until the condition holds, and returns its value."""
     end = time.monotonic() + PATIENCE
     while not (value := condition()):
-        assert time.monotonic() < end, f"after {PATIENCE} s: {what}"
+        assert time.monotonic() < end, f"after {PATIENCE} s: {what if isinstance(what, str) else what()}"
         time.sleep(0.005)
     return value
 
@@ -80,6 +80,12 @@ class Peer:
         until(reader.get_matched_publications, f"nobody publishes {name}")
         return reader
 
+    def verdicts(self, kind):
+        """A subscriber to verdicts that has got the one before the first touch: the node has found it too."""
+        reader = self.reader("verdict", kind, qos=qos(latched=True))
+        take(reader, 1, "no verdict before the first touch")
+        return reader
+
 
 def take(reader, count, what="messages are missing"):
     """The next so many messages."""
@@ -89,5 +95,25 @@ def take(reader, count, what="messages are missing"):
         taken.extend(sample for sample in reader.take(1000) if sample.sample_info.valid_data)
         return len(taken) >= count
 
-    until(enough, f"{what}: {count} expected")
+    until(enough, lambda: f"{what}: {count} expected, not {taken}")
     return taken
+
+
+class Service:
+    """A client of one of the node's services."""
+
+    def __init__(self, peer, name, request, response):
+        self.responses = peer.reader(name, response, prefix="rr", suffix="Reply")
+        self.requests = peer.writer(name, request, prefix="rq", suffix="Request")
+        self.response = response
+
+    def ask(self, request):
+        self.requests.write(request)
+
+    def answer(self):
+        [answer] = take(self.responses, 1, "no response")
+        return answer
+
+    def call(self, request):
+        self.ask(request)
+        return self.answer()
