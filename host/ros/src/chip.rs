@@ -35,8 +35,8 @@ pub(crate) enum Heard {
     Step(Option<Touch>, Box<Step>),
     /// A touch was not counted, or an order refused, and why.
     Refused(Option<Touch>, String),
-    /// All touches are forgotten.
-    Reset,
+    /// What there is to say before the next touch, after the beginning of a session or a reset.
+    Before(Box<Step>),
     /// Something is wrong with its fingers, the line or an order; the node goes on.
     Fault(String),
     /// It does not answer any more; it is tried again and again.
@@ -126,6 +126,7 @@ impl Line {
         let model = connection.model()?;
         self.plans = true;
         self.tell(Heard::Connected(model.names.clone()));
+        self.tell_before(connection, &model.names)?;
         Ok(model)
     }
 
@@ -141,7 +142,7 @@ impl Line {
                 }
             }
             Received::Outcome(Outcome::Refused(refusal)) => self.tell(Heard::Refused(None, refusal.to_string())),
-            Received::Outcome(_) => self.tell(Heard::Reset),
+            Received::Outcome(_) => self.tell_before(connection, names)?,
             Received::Event(event, missed) => {
                 if missed > 0 {
                     self.tell(Heard::Fault(format!("{missed} reports of the chip were lost on the way")));
@@ -171,6 +172,14 @@ impl Line {
             Event::NotStored => self.tell(Heard::Fault("the chip cannot store what it has touched".into())),
             _ => {}
         }
+        Ok(())
+    }
+
+    /// Tells what the chip says before the next touch. How many touches it has kept it does not say.
+    fn tell_before(&mut self, connection: &mut Connection, names: &[String]) -> Result<()> {
+        let nothing = VerdictMessage { decision: Decision::Undecided, best: 0, touches: 0, detail: None };
+        let step = self.step(connection, names, &nothing)?;
+        self.tell(Heard::Before(step.into()));
         Ok(())
     }
 
@@ -215,13 +224,11 @@ fn spoken(names: &[String], message: &VerdictMessage) -> Step {
         Decision::Recognized(object) => object,
         _ => message.best,
     };
-    let verdict = Verdict {
-        touch: message.touches,
-        verdict: verdict.into(),
-        object: names.get(usize::from(object)).cloned().unwrap_or_default(),
-        posterior: message.detail.map_or(f64::NAN, |detail| probability(detail.posterior())),
-        ..Verdict::default()
-    };
+    let mut verdict = Verdict { touch: message.touches, verdict: verdict.into(), ..Verdict::default() };
+    if message.touches > 0 {
+        verdict.object = names.get(usize::from(object)).cloned().unwrap_or_default();
+        verdict.posterior = message.detail.map_or(f64::NAN, |detail| probability(detail.posterior()));
+    }
     Step { verdict, evidence: None, approach: None }
 }
 

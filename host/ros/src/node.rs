@@ -581,10 +581,7 @@ impl Running<'_> {
                 self.measured(touch).await;
                 self.took(refused(reason)).await;
             }
-            Heard::Reset => {
-                let verdict = Verdict { verdict: UNDECIDED.into(), objects: objects.clone(), ..Verdict::default() };
-                self.say(Step { verdict, ..Step::default() }).await;
-            }
+            Heard::Before(step) => self.say(*step).await,
             Heard::Fault(fault) => self.fault(format!("chip: {fault}")),
             Heard::Lost(error) => self.problem(error),
         }

@@ -61,7 +61,7 @@ class Peer:
     """A participant of Cyclone DDS beside a node."""
 
     def __init__(self, node):
-        self.participant = DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", "0")))
+        self.participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
         self.base = node.base
 
     def topic(self, name, kind, prefix="rt", suffix=""):
