@@ -49,7 +49,7 @@ pub(crate) fn start(port: Port, baud: u32, load: Option<Arc<CompiledModel>>) -> 
     let (orders, taken) = async_channel::unbounded();
     let (said, heard) = async_channel::unbounded();
     std::thread::spawn(move || {
-        let mut line = Line { port, baud, said, load, plans: true };
+        let mut line = Line { port, baud, said, load, plans: true, decided: false, unasked: false };
         let mut connection = None;
         while !taken.is_closed() {
             match line.open(&mut connection).and_then(|connection| line.serve(connection, &taken)) {
@@ -70,6 +70,10 @@ struct Line {
     load: Option<Arc<CompiledModel>>,
     /// Whether the chip may be asked where to touch next.
     plans: bool,
+    /// A touch from here has decided: the next one is of another object.
+    decided: bool,
+    /// A reset is under way that makes it so.
+    unasked: bool,
 }
 
 impl Line {
@@ -91,14 +95,19 @@ impl Line {
 
     /// Talks until nobody gives orders any more.
     fn serve(&mut self, connection: &mut Connection, orders: &Receiver<Order>) -> Result<()> {
+        (self.decided, self.unasked) = (false, false);
         let mut model = self.model(connection)?;
         loop {
             if connection.is_idle() {
                 match orders.try_recv() {
                     Ok(Order::Touch(touch)) => {
+                        if std::mem::take(&mut self.decided) {
+                            self.unasked = connection.submit(Command::Reset)?;
+                        }
                         connection.submit(Command::Touch { touch: (&touch).into(), detail: true })?;
                     }
                     Ok(Order::Reset) => {
+                        self.decided = false;
                         connection.submit(Command::Reset)?;
                     }
                     Ok(Order::Load(load)) => {
@@ -134,14 +143,12 @@ impl Line {
         match received {
             Received::Outcome(Outcome::Verdict(verdict)) => {
                 let step = self.step(connection, names, &verdict)?;
-                let decided = step.is_decided();
+                self.decided = step.is_decided();
                 self.tell(Heard::Step(None, step.into()));
-                if decided {
-                    // The next touch is of another object.
-                    connection.submit(Command::Reset)?;
-                }
             }
             Received::Outcome(Outcome::Refused(refusal)) => self.tell(Heard::Refused(None, refusal.to_string())),
+            // Of a reset that nobody ordered: the verdict stays the last word until the next touch.
+            Received::Outcome(_) if std::mem::take(&mut self.unasked) => {}
             Received::Outcome(_) => self.tell_before(connection, names)?,
             Received::Event(event, missed) => {
                 if missed > 0 {

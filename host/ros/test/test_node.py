@@ -311,12 +311,11 @@ def chip():
 
 
 def test_a_chip_behind_a_port_says_the_same_as_the_node(chip):
-    drawn = [touch for touch in draw(60, seed=4)]
+    drawn = draw(60, seed=4) + [Touch(LEVEL)] * 40 + draw(60, seed=5)
     with Node(MODEL, namespace="/here") as here, Node("--port", chip.address, namespace="/chip") as there:
         of = [(peer.writer("touch", Touch), peer.verdicts(Verdict)) for peer in (Peer(here), Peer(there))]
         one, other = [exchange(touches, verdicts, drawn) for touches, verdicts in of]
-        other = [verdict for verdict in other if verdict.touch or verdict.refused]
-        assert len(one) == 60
+        assert any(verdict.verdict == "recognized" for verdict in one), "nothing is recognized"
         for mine, its in zip(one, other):
             assert bool(mine.refused) == bool(its.refused)
             if not mine.refused:
