@@ -49,7 +49,7 @@ pub(crate) fn start(port: Port, baud: u32, load: Option<Arc<CompiledModel>>) -> 
     let (orders, taken) = async_channel::unbounded();
     let (said, heard) = async_channel::unbounded();
     std::thread::spawn(move || {
-        let mut line = Line { port, baud, said, load, plans: true, decided: false, unasked: false };
+        let mut line = Line { port, baud, said, load, plans: true, under_way: 0, decided: false, unasked: false };
         let mut connection = None;
         while !taken.is_closed() {
             match line.open(&mut connection).and_then(|connection| line.serve(connection, &taken)) {
@@ -70,6 +70,8 @@ struct Line {
     load: Option<Arc<CompiledModel>>,
     /// Whether the chip may be asked where to touch next.
     plans: bool,
+    /// Commands without an outcome.
+    under_way: usize,
     /// A touch from here has decided: the next one is of another object.
     decided: bool,
     /// A reset is under way that makes it so.
@@ -95,20 +97,22 @@ impl Line {
 
     /// Talks until nobody gives orders any more.
     fn serve(&mut self, connection: &mut Connection, orders: &Receiver<Order>) -> Result<()> {
-        (self.decided, self.unasked) = (false, false);
+        (self.under_way, self.decided, self.unasked) = (0, false, false);
         let mut model = self.model(connection)?;
         loop {
-            if connection.is_idle() {
+            // One touch at a time: what the chip is asked about it has to be of this one.
+            if self.under_way == 0 {
                 match orders.try_recv() {
                     Ok(Order::Touch(touch)) => {
                         if std::mem::take(&mut self.decided) {
-                            self.unasked = connection.submit(Command::Reset)?;
+                            self.submit(connection, Command::Reset)?;
+                            self.unasked = true;
                         }
-                        connection.submit(Command::Touch { touch: (&touch).into(), detail: true })?;
+                        self.submit(connection, Command::Touch { touch: (&touch).into(), detail: true })?;
                     }
                     Ok(Order::Reset) => {
                         self.decided = false;
-                        connection.submit(Command::Reset)?;
+                        self.submit(connection, Command::Reset)?;
                     }
                     Ok(Order::Load(load)) => {
                         self.load = Some(load);
@@ -122,6 +126,12 @@ impl Line {
                 self.take(connection, &model.names, received)?;
             }
         }
+    }
+
+    fn submit(&mut self, connection: &mut Connection, command: Command<'_>) -> Result<()> {
+        // There is room: at most two are under way.
+        self.under_way += usize::from(connection.submit(command)?);
+        Ok(())
     }
 
     /// The chip's model, which is loaded if it has another one than it should have.
@@ -140,6 +150,9 @@ impl Line {
     }
 
     fn take(&mut self, connection: &mut Connection, names: &[String], received: Received) -> Result<()> {
+        if matches!(received, Received::Outcome(_)) {
+            self.under_way = self.under_way.saturating_sub(1);
+        }
         match received {
             Received::Outcome(Outcome::Verdict(verdict)) => {
                 let step = self.step(connection, names, &verdict)?;

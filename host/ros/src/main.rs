@@ -21,7 +21,7 @@ use std::sync::Arc;
 #[command(
     version,
     after_help = "\
-Topics under the node's name: touch, switch/first, switch/middle and switch/last in; verdict, evidence, next_approach and measured_touch out. Service: reset. Action: recognize. Parameters: model, error_rate, max_touches. docs/guide/ros.md describes them.
+Topics under the node's name: touch, switch/first, switch/middle and switch/last in; verdict, verdict_text, evidence, next_approach and measured_touch out. Service: reset. Action: recognize. Parameters: model, error_rate, max_touches. docs/guide/ros.md describes them.
 
 Examples:
   palpate-ros model.palpate

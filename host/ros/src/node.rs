@@ -5,7 +5,7 @@ use crate::decide::{Decider, Step, Thresholds, UNDECIDED, check};
 use crate::switches::Switches;
 use crate::wire::{
     Approach, Bool, DiagnosticArray, DiagnosticStatus, Evidence, Expected, Header, KeyValue, PACKAGE, Recognized,
-    ResetDone, Touch, Verdict,
+    ResetDone, Text, Touch, Verdict,
 };
 use async_channel::{Receiver, Sender};
 use futures::stream::{self, LocalBoxStream, SelectAll, StreamExt};
@@ -101,6 +101,8 @@ struct Inputs {
 /// What the node says.
 struct Outputs {
     verdicts: Publisher<Verdict>,
+    /// The same in a line, for nodes that do not know the package of the messages.
+    texts: Publisher<Text>,
     evidence: Publisher<Evidence>,
     approaches: Publisher<Approach>,
     /// Touches of switches, and of a chip's own fingers.
@@ -272,6 +274,7 @@ fn open(node: &mut Node, options: &Options) -> Result<(Inputs, Outputs), String>
     let array = MessageTypeName::new("diagnostic_msgs", "DiagnosticArray");
     let outputs = Outputs {
         verdicts: publish_on(node, &name("verdict")?, of("Verdict"), &latched)?,
+        texts: publish_on(node, &name("verdict_text")?, MessageTypeName::new("std_msgs", "String"), &latched)?,
         evidence: publish_on(node, &name("evidence")?, of("Evidence"), &latched)?,
         approaches: publish_on(node, &name("next_approach")?, of("Approach"), &latched)?,
         measured: publish_on(node, &name("measured_touch")?, of("Touch"), &reliable)?,
@@ -463,6 +466,7 @@ impl Running<'_> {
     }
 
     async fn say(&self, step: Step) {
+        self.send(&self.outputs.texts, Text { data: step.verdict.to_string() }).await;
         self.send(&self.outputs.verdicts, step.verdict).await;
         if let Some(evidence) = step.evidence {
             self.send(&self.outputs.evidence, evidence).await;

@@ -5,6 +5,7 @@ use palpate::touches::{TouchesProblem, touch_of_seconds};
 use ros2_client::Message;
 use ros2_client::builtin_interfaces::Time;
 use serde::{Deserialize, Serialize};
+use std::fmt::{Display, Formatter};
 
 /// The package of the definitions.
 pub(crate) const PACKAGE: &str = "palpate_msgs";
@@ -57,6 +58,22 @@ pub(crate) struct Verdict {
     pub(crate) posteriors: Vec<f64>,
 }
 
+impl Display for Verdict {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let Self { touch, verdict, object, posterior, refused, .. } = self;
+        let count = format!("after {touch} touch{}", if *touch == 1 { "" } else { "es" });
+        match (verdict.as_str(), object.as_str()) {
+            ("recognized", _) => write!(f, "recognized {object} {count}, posterior {posterior:.4}")?,
+            (_, "") => write!(f, "{verdict} {count}")?,
+            _ => write!(f, "{verdict} {count}, most likely {object}, posterior {posterior:.4}")?,
+        }
+        if !refused.is_empty() {
+            write!(f, "; not counted: {refused}")?;
+        }
+        Ok(())
+    }
+}
+
 /// `palpate_msgs/msg/Evidence`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Evidence {
@@ -100,6 +117,12 @@ pub(crate) struct Recognized {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct Bool {
     pub(crate) data: bool,
+}
+
+/// `std_msgs/msg/String`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Text {
+    pub(crate) data: String,
 }
 
 /// `std_msgs/msg/Header`.

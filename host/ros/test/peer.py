@@ -80,10 +80,10 @@ class Peer:
         until(reader.get_matched_publications, f"nobody publishes {name}")
         return reader
 
-    def verdicts(self, kind):
-        """A subscriber to verdicts that has got the one before the first touch: the node has found it too."""
-        reader = self.reader("verdict", kind, qos=qos(latched=True))
-        take(reader, 1, "no verdict before the first touch")
+    def latched(self, name, kind):
+        """A subscriber that has got the message of before the first touch: the node has found it too."""
+        reader = self.reader(name, kind, qos=qos(latched=True))
+        take(reader, 1, f"no {name} before the first touch")
         return reader
 
 

@@ -5,6 +5,7 @@ import random
 import signal
 import socket
 import subprocess
+import sys
 import time
 import uuid
 
@@ -43,7 +44,7 @@ def said(verdict):
 def test_a_touch_gets_a_verdict_and_evidence():
     with Node(MODEL) as node:
         peer = Peer(node)
-        verdicts, evidence = peer.verdicts(Verdict), peer.reader("evidence", Evidence)
+        verdicts, evidence = peer.latched("verdict", Verdict), peer.latched("evidence", Evidence)
         touches = peer.writer("touch", Touch)
         touches.write(Touch([0.03, 0.0, 0.05]))
         [verdict], [evidence] = take(verdicts, 1), take(evidence, 1)
@@ -59,7 +60,7 @@ def test_a_touch_gets_a_verdict_and_evidence():
 def test_ten_thousand_touches_get_a_verdict_each():
     with Node(MODEL) as node:
         peer = Peer(node)
-        verdicts, touches = peer.verdicts(Verdict), peer.writer("touch", Touch)
+        verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
         began, counted = time.monotonic(), 0
         for verdict in exchange(touches, verdicts, draw(10_000, seed=1)):
             counted = counted if verdict.refused else counted + 1
@@ -72,7 +73,7 @@ def test_ten_thousand_touches_get_a_verdict_each():
 def test_missing_contacts_count_and_numbers_that_are_no_times_are_refused():
     with Node(MODEL) as node:
         peer = Peer(node)
-        verdicts, touches = peer.verdicts(Verdict), peer.writer("touch", Touch)
+        verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
         times = [[0.0, 0.1, NAN], [NAN, NAN, 5.0], [NAN, NAN, NAN], [-1.0, 0.0, 0.0], [float("inf"), 0.0, 0.0]]
         said = exchange(touches, verdicts, [Touch(three) for three in times])
         assert [verdict.touch for verdict in said] == [1, 2, 2, 2, 2]
@@ -83,7 +84,7 @@ def test_missing_contacts_count_and_numbers_that_are_no_times_are_refused():
 def test_a_message_of_another_layout_is_reported_and_the_node_goes_on():
     with Node(MODEL) as node:
         peer = Peer(node)
-        verdicts, touches = peer.verdicts(Verdict), peer.writer("touch", Touch)
+        verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
         diagnostics = peer.reader("/diagnostics", DiagnosticArray)
         # Such as an older definition of the message.
         peer.writer("touch", OtherTouch).write(OtherTouch(0.1))
@@ -111,7 +112,7 @@ def test_diagnostics_say_what_happened():
 def test_a_late_subscriber_gets_the_last_verdict():
     with Node(MODEL) as node:
         peer = Peer(node)
-        verdicts, touches = peer.verdicts(Verdict), peer.writer("touch", Touch)
+        verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
         last = exchange(touches, verdicts, draw(3, seed=2))[-1]
         late = Peer(node).reader("verdict", Verdict, qos=qos(latched=True, depth=1))
         assert said(take(late, 1)[0]) == said(last)
@@ -121,7 +122,7 @@ def test_a_late_subscriber_gets_the_last_verdict():
 def test_a_node_that_was_killed_is_found_again_when_it_starts():
     with Node(MODEL) as node:
         peer = Peer(node)
-        verdicts, touches = peer.verdicts(Verdict), peer.writer("touch", Touch)
+        verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
         touches.write(Touch(LEVEL))
         assert take(verdicts, 1)[0].touch == 1
         assert node.stop(signal.SIGKILL) == -signal.SIGKILL
@@ -134,10 +135,39 @@ def test_a_node_that_was_killed_is_found_again_when_it_starts():
             assert take(verdicts, 1)[0].touch == 1
 
 
+def test_a_subscriber_that_no_longer_answers_does_not_stop_the_node():
+    with Node(MODEL) as node:
+        peer = Peer(node)
+        verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
+        stopped = subprocess.Popen([sys.executable, "-c", STOPS, node.base])
+        until(lambda: stopped.poll() is not None or is_stopped(stopped.pid), "the subscriber does not stop")
+        try:
+            assert stopped.poll() is None
+            assert [v.touch for v in exchange(touches, verdicts, draw(30, seed=6))][-1] > 0
+        finally:
+            stopped.kill()
+            stopped.wait()
+
+
+# A subscriber that has got a verdict and then reads nothing more.
+STOPS = """
+import os, signal, sys, types
+from messages import Verdict
+from peer import Peer
+reader = Peer(types.SimpleNamespace(base=sys.argv[1])).latched("verdict", Verdict)
+os.kill(os.getpid(), signal.SIGSTOP)
+"""
+
+
+def is_stopped(pid):
+    with open(f"/proc/{pid}/stat") as stat:
+        return stat.read().rsplit(")", 1)[1].split()[0] == "T"
+
+
 def test_two_nodes_say_the_same_of_the_same_touches():
     drawn = draw(200, seed=3)
     with Node(MODEL, namespace="/left") as left, Node(MODEL, namespace="/right") as right:
-        of = [(peer.writer("touch", Touch), peer.verdicts(Verdict)) for peer in (Peer(left), Peer(right))]
+        of = [(peer.writer("touch", Touch), peer.latched("verdict", Verdict)) for peer in (Peer(left), Peer(right))]
         one, other = [[said(v) for v in exchange(touches, verdicts, drawn)] for touches, verdicts in of]
         assert one == other and len(one) == 200
 
@@ -145,11 +175,11 @@ def test_two_nodes_say_the_same_of_the_same_touches():
 def test_a_best_effort_publisher_is_heard_if_the_node_says_so():
     with Node(MODEL, "--best-effort") as node:
         peer = Peer(node)
-        verdicts = peer.verdicts(Verdict)
+        verdicts = peer.latched("verdict", Verdict)
         for reliable in (False, True):
             touches = peer.writer("touch", Touch, qos=qos(reliable))
-            touches.write(Touch(LEVEL))
-            take(verdicts, 1)
+            # What is lost is not sent again.
+            until(lambda: touches.write(Touch(LEVEL)) or verdicts.take(), "no verdict")
 
 
 def test_a_best_effort_publisher_is_not_heard_otherwise():
@@ -161,10 +191,23 @@ def test_a_best_effort_publisher_is_not_heard_otherwise():
         assert not unheard.get_matched_subscriptions()
 
 
+def test_a_verdict_is_also_a_line_of_text():
+    with Node(MODEL) as node:
+        peer = Peer(node)
+        peer.latched("verdict", Verdict)
+        texts, touches = peer.reader("verdict_text", String, qos=qos(latched=True)), peer.writer("touch", Touch)
+        assert take(texts, 1)[0].data == "undecided after 0 touches"
+        touches.write(Touch(LEVEL))
+        touches.write(Touch([NAN, NAN, NAN]))
+        counted, refused = [text.data for text in take(texts, 2)]
+        assert counted.startswith("undecided after 1 touch, most likely ")
+        assert "; not counted: no finger touched" in refused
+
+
 def test_a_reset_forgets_and_sets_priors():
     with Node(MODEL) as node:
         peer = Peer(node)
-        verdicts, touches = peer.verdicts(Verdict), peer.writer("touch", Touch)
+        verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
         reset = Service(peer, "reset", ResetRequest, ResetResponse)
         touches.write(Touch(LEVEL))
         assert take(verdicts, 1)[0].touch == 1
@@ -190,7 +233,7 @@ def test_a_reset_over_cyclone_says_which_request_it_answers():
 def test_parameters_change_the_model_and_the_thresholds(tmp_path):
     with Node(MODEL) as node:
         peer = Peer(node)
-        verdicts, touches = peer.verdicts(Verdict), peer.writer("touch", Touch)
+        verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
         parameters = Service(peer, "set_parameters", SetParametersRequest, SetParametersResponse)
 
         def set(name, value):
@@ -281,7 +324,7 @@ def test_a_goal_is_canceled_and_a_change_of_the_thresholds_aborts_it():
 def test_three_switches_are_a_touch_of_the_times_that_they_were_published_at():
     with Node(MODEL) as node:
         peer = Peer(node)
-        verdicts, measured = peer.verdicts(Verdict), peer.reader("measured_touch", Touch)
+        verdicts, measured = peer.latched("verdict", Verdict), peer.reader("measured_touch", Touch)
         first, middle, last = [peer.writer(f"switch/{name}", Bool) for name in ("first", "middle", "last")]
         for number in range(1, 4):
             now = time.time_ns()
@@ -313,21 +356,21 @@ def chip():
 def test_a_chip_behind_a_port_says_the_same_as_the_node(chip):
     drawn = draw(60, seed=4) + [Touch(LEVEL)] * 40 + draw(60, seed=5)
     with Node(MODEL, namespace="/here") as here, Node("--port", chip.address, namespace="/chip") as there:
-        of = [(peer.writer("touch", Touch), peer.verdicts(Verdict)) for peer in (Peer(here), Peer(there))]
+        of = [(peer.writer("touch", Touch), peer.latched("verdict", Verdict)) for peer in (Peer(here), Peer(there))]
         one, other = [exchange(touches, verdicts, drawn) for touches, verdicts in of]
         assert any(verdict.verdict == "recognized" for verdict in one), "nothing is recognized"
         for mine, its in zip(one, other):
             assert bool(mine.refused) == bool(its.refused)
             if not mine.refused:
                 assert (mine.touch, mine.verdict, mine.object) == (its.touch, its.verdict, its.object)
-                assert max(abs(a - b) for a, b in zip(mine.posteriors, its.posteriors)) < 1e-12
+                assert max(abs(a - b) for a, b in zip(mine.posteriors, its.posteriors)) < 1e-12, (mine, its)
 
 
 def test_fingers_of_a_chip_are_heard_also_after_its_node_started_again(chip):
     for touch in (1, 2):
         with Node("--port", chip.address) as node:
             peer = Peer(node)
-            verdicts, measured = peer.verdicts(Verdict), peer.reader("measured_touch", Touch)
+            verdicts, measured = peer.latched("verdict", Verdict), peer.reader("measured_touch", Touch)
             diagnostics = peer.reader("/diagnostics", DiagnosticArray)
             until(lambda: take(diagnostics, 1)[0].status[0].level == 0, "the chip is not there")
             chip.stdin.write("0.03 0 -\n")
