@@ -63,11 +63,6 @@ enum Change {
 /// Something for the node to do.
 enum Happened {
     Touch(Touch),
-    Edge {
-        finger: Finger,
-        closed: bool,
-        stamp: u64,
-    },
     /// A message that is none of the type that was agreed on.
     Malformed(String),
     Reset(RmwRequestId, Expected),
@@ -314,16 +309,6 @@ fn happened<'n>(
         Ok((touch, _)) => Happened::Touch(touch),
         Err(error) => Happened::Malformed(format!("touch: {error}")),
     });
-    let switches = inputs.switches.iter().map(|(finger, switch)| {
-        let edges = switch.async_stream().map(move |read| match read {
-            Ok((Bool { data }, info)) => {
-                let stamp = info.source_timestamp().or(info.received_timestamp());
-                Happened::Edge { finger: *finger, closed: data, stamp: stamp.map_or_else(now, nanos) }
-            }
-            Err(error) => Happened::Malformed(format!("switch of {finger}: {error}")),
-        });
-        edges.boxed_local()
-    });
     let resets = inputs.reset.receive_request_stream().map(|read| match read {
         Ok((id, expected)) => Happened::Reset(id, expected),
         Err(error) => Happened::Malformed(format!("reset: {error}")),
@@ -342,8 +327,7 @@ fn happened<'n>(
             .map_or_else(|error| Happened::Malformed(format!("cancellation of recognize: {error}")), Happened::Cancel);
         Some((cancel, actions))
     });
-    let mut all: SelectAll<LocalBoxStream<'n, Happened>> = switches.collect();
-    all.extend([
+    stream::select_all([
         touches.boxed_local(),
         resets.boxed_local(),
         goals.boxed_local(),
@@ -353,8 +337,7 @@ fn happened<'n>(
         stop.map(|()| Happened::Stop).boxed_local(),
         smol::Timer::interval(SWITCHES_EVERY).map(|_| Happened::LookAtSwitches).boxed_local(),
         smol::Timer::interval(DIAGNOSTICS_EVERY).map(|_| Happened::Diagnose).boxed_local(),
-    ]);
-    all
+    ])
 }
 
 /// Sends results, one after another, to clients that ask for them.
@@ -394,11 +377,7 @@ impl Running<'_> {
         while let Some(happened) = happened.next().await {
             match happened {
                 Happened::Touch(touch) => self.touch(&touch).await,
-                Happened::Edge { finger, closed, stamp } => self.switches.message(finger, closed, stamp, now()),
-                Happened::Malformed(what) => {
-                    self.counts.malformed += 1;
-                    self.problem(format!("a message that cannot be read: {what}"));
-                }
+                Happened::Malformed(what) => self.malformed(&what),
                 Happened::Reset(id, expected) => {
                     let done = self.reset(&expected).await;
                     let message = done.as_ref().err().cloned().unwrap_or_default();
@@ -409,23 +388,44 @@ impl Running<'_> {
                 Happened::Cancel(cancel) => self.cancel(&cancel).await,
                 Happened::Changed(change) => self.change(change).await,
                 Happened::Chip(heard) => self.hear(heard).await,
-                Happened::LookAtSwitches => {
-                    for found in self.switches.poll(now()) {
-                        match found {
-                            Ok(touch) => {
-                                let touch = Touch::from(&touch);
-                                self.send(&self.outputs.measured, touch.clone()).await;
-                                self.touch(&touch).await;
-                            }
-                            Err(fault) => self.fault(format!("switches: {fault}")),
-                        }
-                    }
-                }
+                Happened::LookAtSwitches => self.look_at_switches().await,
                 Happened::Diagnose => self.diagnose().await,
                 Happened::Stop => break,
             }
         }
         self.end(GoalEndStatus::Aborted, Verdict { verdict: UNDECIDED.into(), ..Verdict::default() });
+    }
+
+    async fn look_at_switches(&mut self) {
+        let until = now();
+        // All that has arrived comes first: no edge is late because this program was.
+        for (finger, switch) in &self.inputs.switches {
+            loop {
+                match switch.take() {
+                    Ok(Some((Bool { data }, info))) => {
+                        let stamp = info.source_timestamp().or(info.received_timestamp());
+                        self.switches.message(*finger, data, stamp.map_or(until, nanos), now());
+                    }
+                    Ok(None) => break,
+                    Err(error) => self.malformed(&format!("switch of {finger}: {error}")),
+                }
+            }
+        }
+        for found in self.switches.poll(until) {
+            match found {
+                Ok(touch) => {
+                    let touch = Touch::from(&touch);
+                    self.send(&self.outputs.measured, touch.clone()).await;
+                    self.touch(&touch).await;
+                }
+                Err(fault) => self.fault(format!("switches: {fault}")),
+            }
+        }
+    }
+
+    fn malformed(&mut self, what: &str) {
+        self.counts.malformed += 1;
+        self.problem(format!("a message that cannot be read: {what}"));
     }
 
     async fn touch(&mut self, message: &Touch) {

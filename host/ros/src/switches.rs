@@ -7,8 +7,8 @@ use palpate::onboard::effector::{Edge, Effector, Fault, Finger, Settings};
 use palpate::onboard::shared::Touch;
 use std::collections::BTreeMap;
 
-/// Time that an edge may take to arrive, in nanoseconds.
-const LAG: u64 = 50_000_000;
+/// Nanoseconds that an edge may take to arrive longer than others.
+const LAG: u64 = 100_000_000;
 
 /// Microseconds before the first edge in which the switches are taken to have been open: as long as the effector waits at
 /// power-up, and more.
@@ -117,7 +117,7 @@ mod tests {
         let [first, middle, last] = Finger::ALL;
         let messages = [
             (0, 0, middle, true),
-            (30, 45, first, true),
+            (30, 95, first, true),
             (50, 0, last, true),
             (200, 0, first, false),
             (201, 0, middle, false),

@@ -325,19 +325,21 @@ def test_three_switches_are_a_touch_of_the_times_that_they_were_published_at():
     with Node(MODEL) as node:
         peer = Peer(node)
         verdicts, measured = peer.latched("verdict", Verdict), peer.reader("measured_touch", Touch)
-        first, middle, last = [peer.writer(f"switch/{name}", Bool) for name in ("first", "middle", "last")]
+        switches = [peer.writer(f"switch/{name}", Bool) for name in ("first", "middle", "last")]
         for number in range(1, 4):
-            now = time.time_ns()
-            at = lambda milliseconds: now + milliseconds * 1_000_000
-            # Arrive in another order, and faster than they happened.
-            last.write(Bool(True), timestamp=at(50))
-            first.write(Bool(True), timestamp=at(30))
-            middle.write(Bool(True), timestamp=at(0))
-            for switch in (first, middle, last):
-                switch.write(Bool(False), timestamp=at(200))
-            assert take(measured, 1)[0].times == [0.03, 0.0, 0.05]
+            stamps = [0, 0, 0]
+            for finger in (1, 0, 2):
+                stamps[finger] = time.time_ns()
+                switches[finger].write(Bool(True), timestamp=stamps[finger])
+                time.sleep(0.03)
+            for switch in switches:
+                switch.write(Bool(False))
+            [touch] = take(measured, 1)
+            expected = [(stamp - stamps[1]) / 1e9 for stamp in stamps]
+            assert touch.times == pytest.approx(expected, abs=2e-6)
             assert take(verdicts, 1)[0].touch == number
-            time.sleep(0.5)
+            # As long as the switches have to be open before the next touch.
+            time.sleep(0.3)
 
 
 @pytest.fixture
