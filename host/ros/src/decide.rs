@@ -249,6 +249,9 @@ pub(crate) fn weights(expected: &Expected, names: &[String]) -> Result<Option<Ve
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate::compile::{Restated, restate};
+    use palpate::onboard::shared::Poses;
+    use palpate::onboard::shared::format::{Plan, Tag};
 
     const NAN: f64 = f64::NAN;
 
@@ -371,6 +374,23 @@ mod tests {
         for (wrong, why) in [(of(0.5, 0), "error_rate"), (of(NAN, 0), "error_rate"), (of(0.1, -1), "max_touches")] {
             assert!(decider.under(wrong).err().unwrap().contains(why));
         }
+    }
+
+    #[test]
+    fn a_model_with_a_plan_proposes_the_pose_that_tells_most_until_it_has_decided() {
+        let poses = Poses::with_rolls(1).unwrap();
+        let (best, count) = (7, usize::from(poses.count()));
+        let separations = |_| (0..count).map(|pose| if pose == best { 100 } else { 10 });
+        let plan = Plan::header(poses).into_iter().chain((0..Plan::pairs(10)).flat_map(separations)).collect();
+        let sections = vec![(Tag::Plan, Some((false, plan)))];
+        let planned = restate(&household().model(), &Restated { sections, ..Restated::default() }).unwrap();
+        let planned = Arc::new(CompiledModel::from_bytes(planned).unwrap());
+        let mut decider = Decider::new(planned, Thresholds::default()).unwrap();
+        let (direction, alignment) = unit_vectors(&poses.pose(7).unwrap());
+        let expected = |touch| Approach { touch, pose: 7, direction, alignment, score: 100.0 / 128.0 };
+        assert_eq!(decider.step().approach, Some(expected(0)));
+        assert_eq!(decider.touch(&touch([0.0, 0.0, 0.0])).approach, Some(expected(1)));
+        assert_eq!(until_decided(&mut decider, [0.0, 0.0, 0.0]).approach, None);
     }
 
     #[test]

@@ -31,7 +31,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Time between looks at the switches.
-const SWITCHES_EVERY: Duration = Duration::from_millis(5);
+const SWITCHES_EVERY: Duration = Duration::from_millis(20);
 /// Time between diagnostics.
 const DIAGNOSTICS_EVERY: Duration = Duration::from_secs(1);
 /// Time in which a client may ask for the result of its goal, as in rcl.
