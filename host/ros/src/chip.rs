@@ -49,12 +49,20 @@ pub(crate) fn start(port: Port, baud: u32, load: Option<Arc<CompiledModel>>) -> 
     let (orders, taken) = async_channel::unbounded();
     let (said, heard) = async_channel::unbounded();
     std::thread::spawn(move || {
-        let mut line = Line { port, baud, said, load, plans: true, under_way: 0, decided: false, unasked: false };
-        let mut connection = None;
+        let mut line =
+            Line { port, baud, said, load, plans: true, answered: false, under_way: 0, decided: false, unasked: false };
+        let (mut connection, mut told) = (None, None);
         while !taken.is_closed() {
             match line.open(&mut connection).and_then(|connection| line.serve(connection, &taken)) {
                 Ok(()) => return,
-                Err(error) => line.tell(Heard::Lost(error.to_string())),
+                Err(error) => {
+                    // Once, however often it is tried.
+                    let error = error.to_string();
+                    if line.answered || told.as_ref() != Some(&error) {
+                        line.tell(Heard::Lost(error.clone()));
+                    }
+                    (line.answered, told) = (false, Some(error));
+                }
             }
             std::thread::sleep(RETRY);
         }
@@ -70,6 +78,8 @@ struct Line {
     load: Option<Arc<CompiledModel>>,
     /// Whether the chip may be asked where to touch next.
     plans: bool,
+    /// Since the last loss.
+    answered: bool,
     /// Commands without an outcome.
     under_way: usize,
     /// A touch from here has decided: the next one is of another object.
@@ -143,7 +153,7 @@ impl Line {
             }
         }
         let model = connection.model()?;
-        self.plans = true;
+        (self.plans, self.answered) = (true, true);
         self.tell(Heard::Connected(model.names.clone()));
         self.tell_before(connection, &model.names)?;
         Ok(model)

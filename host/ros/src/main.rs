@@ -6,12 +6,14 @@ mod node;
 mod switches;
 mod wire;
 
-use clap::{Parser, ValueEnum};
+use async_signal::{Signal, Signals};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, ValueEnum};
 use decide::Thresholds;
 use node::Options;
 use palpate::chip::Port;
 use palpate::compile::CompiledModel;
-use ros2_client::ServiceMapping;
+use ros2_client::{NodeName, ServiceMapping};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -83,12 +85,16 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<(), String> {
     let model = arguments.model.map(CompiledModel::read).transpose().map_err(|error| error.to_string())?;
-    let (send, stop) = async_channel::bounded(1);
-    ctrlc::set_handler(move || {
-        // It is stopping already if there is no room.
-        let _ = send.try_send(());
-    })
-    .map_err(|error| error.to_string())?;
+    let thresholds = Thresholds { error_rate: arguments.error_rate, max_touches: arguments.max_touches };
+    let wrong = match &model {
+        Some(model) => thresholds.stopping(&model.model()).err(),
+        None => None,
+    };
+    let wrong = wrong.or_else(|| NodeName::new(&arguments.namespace, &arguments.name).err().map(|e| e.to_string()));
+    if let Some(wrong) = wrong {
+        Arguments::command().error(ErrorKind::ValueValidation, wrong).exit();
+    }
+    let signals = Signals::new([Signal::Int, Signal::Term, Signal::Cont]).map_err(|error| error.to_string())?;
     let options = Options {
         name: arguments.name,
         namespace: arguments.namespace,
@@ -99,8 +105,8 @@ fn run(arguments: Arguments) -> Result<(), String> {
             Middleware::Cyclonedds => ServiceMapping::Cyclone,
         },
         model: model.map(Arc::new),
-        thresholds: Thresholds { error_rate: arguments.error_rate, max_touches: arguments.max_touches },
+        thresholds,
         chip: arguments.port.map(|port| (port, arguments.baud)),
     };
-    node::run(options, stop)
+    node::run(options, signals)
 }

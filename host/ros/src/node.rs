@@ -8,6 +8,7 @@ use crate::wire::{
     ResetDone, Text, Touch, Verdict,
 };
 use async_channel::{Receiver, Sender};
+use async_signal::{Signal, Signals};
 use futures::stream::{self, LocalBoxStream, SelectAll, StreamExt};
 use palpate::chip::Port;
 use palpate::compile::CompiledModel;
@@ -20,11 +21,12 @@ use ros2_client::builtin_interfaces::Time;
 use ros2_client::qos::{Durability, History};
 use ros2_client::ros2::LogLevel;
 use ros2_client::{
-    ActionTypeName, Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions, ParameterValue,
-    Publisher, QosProfile, ROSTime, RmwRequestId, Server, ServiceMapping, ServiceTypeName, Subscription, rosout,
+    ActionTypeName, Context, ContextOptions, Gid, MessageInfo, MessageTypeName, Name, Node, NodeName, NodeOptions,
+    ParameterValue, Publisher, QosProfile, ROSTime, RmwRequestId, Server, ServiceMapping, ServiceTypeName,
+    Subscription, rosout,
 };
 use serde::Serialize;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Display;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -62,7 +64,7 @@ enum Change {
 
 /// Something for the node to do.
 enum Happened {
-    Touch(Touch),
+    Touch(Touch, MessageInfo),
     /// A message that is none of the type that was agreed on.
     Malformed(String),
     Reset(RmwRequestId, Expected),
@@ -72,7 +74,7 @@ enum Happened {
     Chip(Heard),
     LookAtSwitches,
     Diagnose,
-    Stop,
+    Signal(Signal),
 }
 
 /// Where verdicts come from.
@@ -111,17 +113,20 @@ struct Counts {
     touches: u64,
     refused: u64,
     malformed: u64,
+    lost: u64,
+    /// The number of each publisher's last touch.
+    last: BTreeMap<Gid, i64>,
     verdicts: u64,
     faults: u64,
     /// Problems since the last diagnostics.
     recent: VecDeque<String>,
 }
 
-/// Runs the node until `stop` says so.
+/// Runs the node until a signal ends it.
 ///
 /// # Errors
-/// Why it cannot start.
-pub(crate) fn run(options: Options, stop: Receiver<()>) -> Result<(), String> {
+/// Why it cannot start, or go on.
+pub(crate) fn run(options: Options, signals: Signals) -> Result<(), String> {
     let (changed, changes) = async_channel::unbounded();
     let context = Context::with_options(ContextOptions::new().domain_id(options.domain)).map_err(text)?;
     let name = NodeName::new(&options.namespace, &options.name).map_err(text)?;
@@ -156,13 +161,12 @@ pub(crate) fn run(options: Options, stop: Receiver<()>) -> Result<(), String> {
         finished,
         counts: Counts::default(),
     };
-    let happened = happened(&inputs, changes, heard, stop);
+    let happened = happened(&inputs, changes, heard, signals);
     // Dropped before the node, which then says goodbye to the others.
     let executor = smol::LocalExecutor::new();
     executor.spawn(spinner.spin()).detach();
     executor.spawn(answer(&inputs.actions, results)).detach();
-    smol::block_on(executor.run(running.run(happened)));
-    Ok(())
+    smol::block_on(executor.run(running.run(happened)))
 }
 
 /// The node's parameters; those that can be set are sent to `changed`.
@@ -303,10 +307,10 @@ fn happened<'n>(
     inputs: &'n Inputs,
     changes: Receiver<Change>,
     chip: LocalBoxStream<'n, Happened>,
-    stop: Receiver<()>,
+    signals: Signals,
 ) -> SelectAll<LocalBoxStream<'n, Happened>> {
     let touches = inputs.touches.async_stream().map(|read| match read {
-        Ok((touch, _)) => Happened::Touch(touch),
+        Ok((touch, info)) => Happened::Touch(touch, info),
         Err(error) => Happened::Malformed(format!("touch: {error}")),
     });
     let resets = inputs.reset.receive_request_stream().map(|read| match read {
@@ -334,7 +338,7 @@ fn happened<'n>(
         cancels.boxed_local(),
         changes.map(Happened::Changed).boxed_local(),
         chip,
-        stop.map(|()| Happened::Stop).boxed_local(),
+        signals.filter_map(async |signal| signal.ok()).map(Happened::Signal).boxed_local(),
         smol::Timer::interval(SWITCHES_EVERY).map(|_| Happened::LookAtSwitches).boxed_local(),
         smol::Timer::interval(DIAGNOSTICS_EVERY).map(|_| Happened::Diagnose).boxed_local(),
     ])
@@ -370,13 +374,16 @@ struct Running<'n> {
 }
 
 impl Running<'_> {
-    async fn run(&mut self, mut happened: SelectAll<LocalBoxStream<'_, Happened>>) {
+    async fn run(&mut self, mut happened: SelectAll<LocalBoxStream<'_, Happened>>) -> Result<(), String> {
         if let Recognizing::Here(decider) = &self.recognizing {
             self.say(decider.step()).await;
         }
         while let Some(happened) = happened.next().await {
             match happened {
-                Happened::Touch(touch) => self.touch(&touch).await,
+                Happened::Touch(touch, info) => {
+                    self.count_lost(&info);
+                    self.touch(&touch).await;
+                }
                 Happened::Malformed(what) => self.malformed(&what),
                 Happened::Reset(id, expected) => {
                     let done = self.reset(&expected).await;
@@ -390,10 +397,28 @@ impl Running<'_> {
                 Happened::Chip(heard) => self.hear(heard).await,
                 Happened::LookAtSwitches => self.look_at_switches().await,
                 Happened::Diagnose => self.diagnose().await,
-                Happened::Stop => break,
+                // The event loop of RustDDS ends where a system call is interrupted.
+                Happened::Signal(Signal::Cont) => {
+                    return Err(
+                        "it was stopped, as by Ctrl-Z, which the connection does not survive: start it again".into()
+                    );
+                }
+                Happened::Signal(_) => break,
             }
         }
-        self.end(GoalEndStatus::Aborted, Verdict { verdict: UNDECIDED.into(), ..Verdict::default() });
+        Ok(())
+    }
+
+    /// Publishers number their messages: those between the last one and this one did not arrive.
+    fn count_lost(&mut self, info: &MessageInfo) {
+        let number = info.sequence_number();
+        if let Some(last) = self.counts.last.insert(info.publisher_gid(), number) {
+            let lost = u64::try_from(number - last - 1).unwrap_or(0);
+            if lost > 0 {
+                self.counts.lost += lost;
+                self.problem(format!("{lost} touches were lost on the way"));
+            }
+        }
     }
 
     async fn look_at_switches(&mut self) {
@@ -630,11 +655,12 @@ impl Running<'_> {
             Some(problem) => (1, problem.clone()),
             None => (0, "recognizing".to_owned()),
         };
-        let Counts { touches, refused, malformed, verdicts, faults, .. } = &self.counts;
+        let Counts { touches, refused, malformed, lost, verdicts, faults, .. } = &self.counts;
         let values = [
             ("objects", objects.join(", ")),
             ("touches", touches.to_string()),
             ("not counted", refused.to_string()),
+            ("lost on the way", lost.to_string()),
             ("verdicts", verdicts.to_string()),
             ("messages that cannot be read", malformed.to_string()),
             ("faults", faults.to_string()),

@@ -41,6 +41,24 @@ def said(verdict):
     return verdict.touch, verdict.verdict, verdict.object, verdict.posteriors, verdict.refused
 
 
+@pytest.mark.parametrize(
+    "arguments, code, why",
+    [
+        ([], 2, "MODEL"),
+        ([MODEL, "--error-rate", "0.7"], 2, "below 0.5"),
+        ([MODEL, "--max-touches", "-1"], 2, "-1"),
+        ([MODEL, "--name", "9"], 2, "9"),
+        ([MODEL, "--domain", "300"], 2, "300"),
+        (["--port", "http://there"], 2, "not a port"),
+        (["none.palpate"], 1, "none.palpate: cannot read the model"),
+        ([__file__], 1, "test_node.py: byte 0"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_with_the_reason(arguments, code, why):
+    ended = subprocess.run([os.environ["PALPATE_ROS"], *arguments], capture_output=True, text=True, timeout=30)
+    assert (ended.returncode, ended.stdout) == (code, "") and why in ended.stderr, ended
+
+
 def test_a_touch_gets_a_verdict_and_evidence():
     with Node(MODEL) as node:
         peer = Peer(node)
@@ -55,6 +73,7 @@ def test_a_touch_gets_a_verdict_and_evidence():
         assert verdict.objects[best] == verdict.object
         assert evidence.nats[best] == 0 == max(evidence.nats) and evidence.objects == verdict.objects
         assert node.stop() == 0
+        until(lambda: not touches.get_matched_subscriptions(), "the node did not say goodbye")
 
 
 def test_ten_thousand_touches_get_a_verdict_each():
@@ -107,6 +126,24 @@ def test_diagnostics_say_what_happened():
             return {value.key: value.value for value in status.values}
 
         until(lambda: (values()["touches"], values()["not counted"]) == ("2", "1"), "the touches are not reported")
+
+
+def test_touches_that_were_lost_are_counted():
+    with Node(MODEL) as node:
+        peer = Peer(node)
+        diagnostics, touches = peer.reader("/diagnostics", DiagnosticArray), peer.writer("touch", Touch, qos=qos(depth=10))
+        verdicts = peer.latched("verdict", Verdict)
+        touches.write(Touch(LEVEL))
+        take(verdicts, 1)
+        # More than the publisher keeps for a node that is slower.
+        for _ in range(2_000):
+            touches.write(Touch(LEVEL))
+
+        def all_counted():
+            values = {value.key: int(value.value) for value in take(diagnostics, 1)[0].status[0].values[1:6]}
+            return values["touches"] + values["lost on the way"] == 2_001
+
+        until(all_counted, "touches are missing without a word")
 
 
 def test_a_late_subscriber_gets_the_last_verdict():
@@ -162,6 +199,16 @@ os.kill(os.getpid(), signal.SIGSTOP)
 def is_stopped(pid):
     with open(f"/proc/{pid}/stat") as stat:
         return stat.read().rsplit(")", 1)[1].split()[0] == "T"
+
+
+def test_a_node_that_was_stopped_and_continues_ends_with_the_reason():
+    with Node(MODEL) as node:
+        Peer(node).latched("verdict", Verdict)
+        node.process.send_signal(signal.SIGSTOP)
+        until(lambda: is_stopped(node.process.pid), "the node does not stop")
+        node.process.send_signal(signal.SIGCONT)
+        assert node.process.wait(30) == 1
+        assert "start it again" in node.process.stderr.read()
 
 
 def test_two_nodes_say_the_same_of_the_same_touches():
