@@ -188,6 +188,8 @@ impl Line {
     fn take_event(&mut self, connection: &mut Connection, names: &[String], event: Event) -> Result<()> {
         match event {
             Event::Touch { touch, verdict, .. } => {
+                // The chip has begun another object by itself, if one was decided.
+                self.decided = false;
                 let step = self.step_of_event(connection, names, &verdict)?;
                 self.tell(Heard::Step(Some((&touch).into()), step.into()));
             }

@@ -80,7 +80,12 @@ enum Happened {
 /// Where verdicts come from.
 enum Recognizing {
     Here(Decider),
-    Chip { orders: Sender<Order>, objects: Vec<String>, is_there: bool },
+    Chip {
+        orders: Sender<Order>,
+        objects: Vec<String>,
+        /// Why the chip cannot be asked, if it cannot.
+        trouble: Option<String>,
+    },
 }
 
 type Actions = AsyncActionServer<Expected, Recognized, Recognized>;
@@ -144,7 +149,11 @@ pub(crate) fn run(options: Options, signals: Signals) -> Result<(), String> {
         Some((port, baud)) => {
             let (orders, heard) = chip::start(port, baud, options.model.clone());
             (
-                Recognizing::Chip { orders, objects: Vec::new(), is_there: false },
+                Recognizing::Chip {
+                    orders,
+                    objects: Vec::new(),
+                    trouble: Some("the chip has not answered yet".into()),
+                },
                 heard.map(Happened::Chip).boxed_local(),
             )
         }
@@ -456,6 +465,7 @@ impl Running<'_> {
     async fn touch(&mut self, message: &Touch) {
         let step = match &mut self.recognizing {
             Recognizing::Here(decider) => decider.touch(message),
+            Recognizing::Chip { trouble: Some(trouble), .. } => refused(trouble.clone()),
             Recognizing::Chip { .. } => match message.felt() {
                 Ok(touch) => {
                     self.order(Order::Touch(touch));
@@ -510,7 +520,7 @@ impl Running<'_> {
     async fn reset(&mut self, expected: &Expected) -> Result<(), String> {
         let step = match &mut self.recognizing {
             Recognizing::Here(decider) => decider.reset(expected)?,
-            Recognizing::Chip { is_there: false, .. } => return Err("the chip does not answer".into()),
+            Recognizing::Chip { trouble: Some(trouble), .. } => return Err(trouble.clone()),
             Recognizing::Chip { .. } if *expected != Expected::default() => {
                 return Err("a chip keeps its model's own priors: reset it without objects and weights".into());
             }
@@ -595,8 +605,8 @@ impl Running<'_> {
     }
 
     async fn hear(&mut self, heard: Heard) {
-        let Recognizing::Chip { objects, is_there, .. } = &mut self.recognizing else { return };
-        *is_there = !matches!(heard, Heard::Lost(_));
+        let Recognizing::Chip { objects, trouble, .. } = &mut self.recognizing else { return };
+        *trouble = if let Heard::Lost(error) = &heard { Some(error.clone()) } else { None };
         match heard {
             Heard::Connected(names) => {
                 *objects = names;
@@ -646,14 +656,14 @@ impl Running<'_> {
 
     async fn diagnose(&mut self) {
         let recent: Vec<String> = self.counts.recent.drain(..).collect();
-        let (objects, is_there, hardware) = match &self.recognizing {
-            Recognizing::Here(decider) => (decider.names(), true, ""),
-            Recognizing::Chip { objects, is_there, .. } => (objects.clone(), *is_there, "chip"),
+        let (objects, trouble, hardware) = match &self.recognizing {
+            Recognizing::Here(decider) => (decider.names(), None, ""),
+            Recognizing::Chip { objects, trouble, .. } => (objects.clone(), trouble.clone(), "chip"),
         };
-        let (level, message) = match recent.last() {
-            _ if !is_there => (2, "the chip does not answer".to_owned()),
-            Some(problem) => (1, problem.clone()),
-            None => (0, "recognizing".to_owned()),
+        let (level, message) = match (trouble, recent.last()) {
+            (Some(trouble), _) => (2, trouble),
+            (None, Some(problem)) => (1, problem.clone()),
+            (None, None) => (0, "recognizing".to_owned()),
         };
         let Counts { touches, refused, malformed, lost, verdicts, faults, .. } = &self.counts;
         let values = [

@@ -440,4 +440,7 @@ def test_a_chip_that_is_gone_is_an_error_in_the_diagnostics(chip):
         assert "own priors" in reset.call(ResetRequest(["bowl"])).message
         chip.kill()
         until(lambda: take(diagnostics, 1)[0].status[0].level == 2, "the chip that is gone is not reported")
-        assert "does not answer" in reset.call(ResetRequest()).message
+        assert chip.address in reset.call(ResetRequest()).message
+        verdicts, touches = peer.reader("verdict", Verdict), peer.writer("touch", Touch)
+        touches.write(Touch(LEVEL))
+        until(lambda: [v for v in take(verdicts, 1) if chip.address in v.refused], "the touch is not refused")
