@@ -27,7 +27,7 @@ pub(crate) enum Order {
     Load(Arc<CompiledModel>),
 }
 
-/// What a chip says.
+/// Message of a chip.
 pub(crate) enum Heard {
     /// It answers, and has these objects.
     Connected(Vec<String>),
@@ -35,7 +35,7 @@ pub(crate) enum Heard {
     Step(Option<Touch>, Box<Step>),
     /// A touch was not counted, or an order refused, and why.
     Refused(Option<Touch>, String),
-    /// What there is to say before the next touch, after the beginning of a session or a reset.
+    /// State before the next touch, after the beginning of a session or a reset.
     Before(Box<Step>),
     /// Something is wrong with its fingers, the line or an order; the node goes on.
     Fault(String),
@@ -76,7 +76,7 @@ struct Line {
     said: Sender<Heard>,
     /// The model that the chip has to have.
     load: Option<Arc<CompiledModel>>,
-    /// Whether the chip may be asked where to touch next.
+    /// True unless the chip has said that its model has no plan.
     plans: bool,
     /// Since the last loss.
     answered: bool,

@@ -27,7 +27,7 @@ pub(crate) struct Thresholds {
 }
 
 impl Thresholds {
-    /// What a recognizer of `model` takes.
+    /// The same for a recognizer of `model`.
     ///
     /// # Errors
     /// Which number is out of range, and what is allowed.
@@ -46,7 +46,7 @@ impl Thresholds {
     }
 }
 
-/// What is said after a touch, or a reset.
+/// Messages after a touch, or a reset.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Step {
     pub(crate) verdict: Verdict,
@@ -161,7 +161,7 @@ impl Decider {
         step
     }
 
-    /// What there is to say now.
+    /// Messages about the touches so far.
     pub(crate) fn step(&self) -> Step {
         let recognizer = self.recognizer();
         let (touch, objects) = (recognizer.touches(), self.names());
@@ -201,7 +201,7 @@ pub(crate) fn with_best(mut verdict: Verdict, best: usize, posteriors: Vec<f64>)
     verdict
 }
 
-/// How far each object is behind the likeliest, in nats.
+/// Distance of each object behind the likeliest, in nats.
 pub(crate) fn behind(posteriors: &[f64]) -> Vec<f64> {
     let most = posteriors.iter().copied().fold(0.0, f64::max);
     posteriors.iter().map(|posterior| (posterior / most).ln()).collect()

@@ -3,6 +3,7 @@
 mod chip;
 mod decide;
 mod node;
+mod open;
 mod switches;
 mod wire;
 
@@ -10,7 +11,7 @@ use async_signal::{Signal, Signals};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, ValueEnum};
 use decide::Thresholds;
-use node::Options;
+use open::Options;
 use palpate::chip::Port;
 use palpate::compile::CompiledModel;
 use ros2_client::{NodeName, ServiceMapping};

@@ -1,35 +1,26 @@
-//! The node: topics, a service, an action and parameters around what recognizes.
+//! The node while it runs: what happens on its topics, and what it says then.
 
 use crate::chip::{self, Heard, Order};
-use crate::decide::{Decider, Step, Thresholds, UNDECIDED, check};
+use crate::decide::{Decider, Step, Thresholds, UNDECIDED};
+use crate::open::{Actions, Change, Inputs, Options, Outputs, open, parameters, text};
 use crate::switches::Switches;
 use crate::wire::{
-    Approach, Bool, DiagnosticArray, DiagnosticStatus, Evidence, Expected, Header, KeyValue, PACKAGE, Recognized,
-    ResetDone, Text, Touch, Verdict,
+    Bool, DiagnosticArray, DiagnosticStatus, Expected, Header, KeyValue, Recognized, ResetDone, Text, Touch, Verdict,
 };
 use async_channel::{Receiver, Sender};
 use async_signal::{Signal, Signals};
 use futures::stream::{self, LocalBoxStream, SelectAll, StreamExt};
-use palpate::chip::Port;
 use palpate::compile::CompiledModel;
-use palpate::onboard::effector::{Finger, Scale, Settings};
+use palpate::onboard::effector::{Scale, Settings};
 use palpate::onboard::shared::Touch as Felt;
-use ros2_client::action::{
-    ActionServerQosPolicies, AsyncActionServer, CancelHandle, ExecutingGoalHandle, GoalEndStatus, NewGoalHandle,
-};
+use ros2_client::action::{CancelHandle, ExecutingGoalHandle, GoalEndStatus, NewGoalHandle};
 use ros2_client::builtin_interfaces::Time;
-use ros2_client::qos::{Durability, History};
 use ros2_client::ros2::LogLevel;
 use ros2_client::{
-    ActionTypeName, Context, ContextOptions, Gid, MessageInfo, MessageTypeName, Name, Node, NodeName, NodeOptions,
-    ParameterValue, Publisher, QosProfile, ROSTime, RmwRequestId, Server, ServiceMapping, ServiceTypeName,
-    Subscription, rosout,
+    Context, ContextOptions, Gid, MessageInfo, Node, NodeName, Publisher, ROSTime, RmwRequestId, rosout,
 };
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
-use std::fmt::Display;
-use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Duration;
 
 /// Time between looks at the switches.
@@ -38,29 +29,6 @@ const SWITCHES_EVERY: Duration = Duration::from_millis(20);
 const DIAGNOSTICS_EVERY: Duration = Duration::from_secs(1);
 /// Time in which a client may ask for the result of its goal, as in rcl.
 const RESULT_TIMEOUT: Duration = Duration::from_secs(10);
-/// Touches and edges that wait while others are taken in.
-const QUEUE: usize = 1_000;
-
-/// How the node is started.
-pub(crate) struct Options {
-    pub(crate) name: String,
-    pub(crate) namespace: String,
-    pub(crate) domain: u16,
-    /// Also hear publishers that do not repeat what was lost.
-    pub(crate) best_effort: bool,
-    pub(crate) services: ServiceMapping,
-    pub(crate) model: Option<Arc<CompiledModel>>,
-    pub(crate) thresholds: Thresholds,
-    /// The chip that recognizes; without one this program does.
-    pub(crate) chip: Option<(Port, u32)>,
-}
-
-/// A parameter that was changed.
-enum Change {
-    Model(Arc<CompiledModel>),
-    ErrorRate(f64),
-    MaxTouches(i64),
-}
 
 /// Something for the node to do.
 enum Happened {
@@ -83,34 +51,13 @@ enum Recognizing {
     Chip {
         orders: Sender<Order>,
         objects: Vec<String>,
-        /// Why the chip cannot be asked, if it cannot.
+        /// The reason, while the chip cannot be asked.
         trouble: Option<String>,
     },
 }
 
-type Actions = AsyncActionServer<Expected, Recognized, Recognized>;
 type Goal = ExecutingGoalHandle<Expected>;
 type Finished = (Goal, GoalEndStatus, Verdict);
-
-/// What the node hears.
-struct Inputs {
-    touches: Subscription<Touch>,
-    switches: [(Finger, Subscription<Bool>); 3],
-    reset: Server<Expected, ResetDone>,
-    actions: Actions,
-}
-
-/// What the node says.
-struct Outputs {
-    verdicts: Publisher<Verdict>,
-    /// The same in a line, for nodes that do not know the package of the messages.
-    texts: Publisher<Text>,
-    evidence: Publisher<Evidence>,
-    approaches: Publisher<Approach>,
-    /// Touches of switches, and of a chip's own fingers.
-    measured: Publisher<Touch>,
-    diagnostics: Publisher<DiagnosticArray>,
-}
 
 /// Counts for diagnostics.
 #[derive(Default)]
@@ -178,137 +125,9 @@ pub(crate) fn run(options: Options, signals: Signals) -> Result<(), String> {
     smol::block_on(executor.run(running.run(happened)))
 }
 
-/// The node's parameters; those that can be set are sent to `changed`.
-fn parameters(options: &Options, changed: Sender<Change>) -> NodeOptions {
-    let has_chip = options.chip.is_some();
-    let path = options.model.as_ref().and_then(|model| model.path()).unwrap_or(&PathBuf::new()).display().to_string();
-    let model = options.model.clone();
-    let change = move |name: &str, value: &ParameterValue| change(name, value, has_chip, model.as_deref());
-    let validate = change.clone();
-    NodeOptions::new()
-        .declare_parameter("model", ParameterValue::String(path))
-        .declare_parameter("error_rate", ParameterValue::Double(options.thresholds.error_rate))
-        .declare_parameter("max_touches", ParameterValue::Integer(options.thresholds.max_touches))
-        .parameter_validator(Box::new(move |name, value| validate(name, value).map(|_| ())))
-        .parameter_set_action(Box::new(move |name, value| {
-            let change = change(name, value)?;
-            // The node has ended where nobody takes it.
-            change.map_or(Ok(()), |change| changed.send_blocking(change).map_err(text))
-        }))
-}
-
-/// What a parameter changes; nothing if it is the empty path of no model.
-///
-/// # Errors
-/// Why the value cannot be used.
-fn change(
-    name: &str,
-    value: &ParameterValue,
-    has_chip: bool,
-    model: Option<&CompiledModel>,
-) -> Result<Option<Change>, String> {
-    let thresholds = |thresholds: Thresholds| match model {
-        _ if has_chip && thresholds != Thresholds::default() => {
-            Err("the chip stops as its model says: calibrate the model and load it".into())
-        }
-        Some(model) => thresholds.stopping(&model.model()).map(|_| ()),
-        None => Ok(()),
-    };
-    match (name, value) {
-        ("model", ParameterValue::String(path)) if path.is_empty() && has_chip => Ok(None),
-        ("model", ParameterValue::String(path)) => {
-            let model = CompiledModel::read(path).map_err(text)?;
-            check(&model)?;
-            Ok(Some(Change::Model(Arc::new(model))))
-        }
-        ("error_rate", &ParameterValue::Double(error_rate)) => {
-            thresholds(Thresholds { error_rate, ..Thresholds::default() })?;
-            Ok(Some(Change::ErrorRate(error_rate)))
-        }
-        ("max_touches", &ParameterValue::Integer(max_touches)) => {
-            thresholds(Thresholds { max_touches, ..Thresholds::default() })?;
-            Ok(Some(Change::MaxTouches(max_touches)))
-        }
-        _ => Err(format!("{name} is no parameter of this type")),
-    }
-}
-
 /// Times of the effector for a model.
 fn settings(model: Option<&CompiledModel>) -> Settings {
     model.map_or_else(Settings::default, |model| Settings::default().for_model(&model.model(), &Scale::IDENTITY))
-}
-
-/// Opens everything under the node's own name: `/palpate/touch` and so on.
-fn open(node: &mut Node, options: &Options) -> Result<(Inputs, Outputs), String> {
-    let base = format!("{}/{}", options.namespace.trim_end_matches('/'), options.name);
-    let name = |name: &str| Name::parse(&format!("{base}/{name}")).map_err(text);
-    let reliable = QosProfile::publisher_default().history(History::KeepLast { depth: 10 });
-    let latched = reliable.clone().durability(Durability::TransientLocal).history(History::KeepLast { depth: 1 });
-    let queued = match options.best_effort {
-        true => QosProfile::subscription_default(),
-        false => reliable.clone(),
-    };
-    let queued = queued.history(History::KeepLast { depth: QUEUE });
-
-    let of = |kind| MessageTypeName::new(PACKAGE, kind);
-    let touches = subscribe(node, &name("touch")?, of("Touch"), &queued)?;
-    let mut switch = |finger, topic| -> Result<_, String> {
-        Ok((finger, subscribe(node, &name(topic)?, MessageTypeName::new("std_msgs", "Bool"), &queued)?))
-    };
-    let [first, middle, last] = Finger::ALL;
-    let switches = [switch(first, "switch/first")?, switch(middle, "switch/middle")?, switch(last, "switch/last")?];
-    let reset = node
-        .create_server(
-            options.services,
-            &name("reset")?,
-            &ServiceTypeName::new(PACKAGE, "Reset"),
-            reliable.clone(),
-            reliable.clone(),
-        )
-        .map_err(text)?;
-    let qos = ActionServerQosPolicies {
-        goal_service: reliable.clone(),
-        result_service: reliable.clone(),
-        cancel_service: reliable.clone(),
-        feedback_publisher: reliable.clone(),
-        status_publisher: latched.clone(),
-    };
-    let actions = node
-        .create_action_server(options.services, &name("recognize")?, &ActionTypeName::new(PACKAGE, "Recognize"), qos)
-        .map_err(text)?;
-    let inputs = Inputs { touches, switches, reset, actions: AsyncActionServer::new(actions) };
-
-    let diagnostics = Name::new("/", "diagnostics").map_err(text)?;
-    let array = MessageTypeName::new("diagnostic_msgs", "DiagnosticArray");
-    let outputs = Outputs {
-        verdicts: publish_on(node, &name("verdict")?, of("Verdict"), &latched)?,
-        texts: publish_on(node, &name("verdict_text")?, MessageTypeName::new("std_msgs", "String"), &latched)?,
-        evidence: publish_on(node, &name("evidence")?, of("Evidence"), &latched)?,
-        approaches: publish_on(node, &name("next_approach")?, of("Approach"), &latched)?,
-        measured: publish_on(node, &name("measured_touch")?, of("Touch"), &reliable)?,
-        diagnostics: publish_on(node, &diagnostics, array, &reliable)?,
-    };
-    Ok((inputs, outputs))
-}
-
-fn subscribe<M: 'static>(
-    node: &mut Node,
-    name: &Name,
-    of: MessageTypeName,
-    qos: &QosProfile,
-) -> Result<Subscription<M>, String> {
-    let topic = node.create_topic(name, of, qos).map_err(text)?;
-    node.create_subscription(&topic, Some(qos.clone())).map_err(text)
-}
-
-fn publish_on<M: Serialize>(
-    node: &mut Node,
-    name: &Name,
-    of: MessageTypeName,
-    qos: &QosProfile,
-) -> Result<Publisher<M>, String> {
-    let topic = node.create_topic(name, of, qos).map_err(text)?;
-    node.create_publisher(&topic, Some(qos.clone())).map_err(text)
 }
 
 /// Everything that can happen, as it happens.
@@ -702,8 +521,4 @@ fn nanos(time: ROSTime) -> u64 {
 
 fn now() -> u64 {
     nanos(Time::now().into())
-}
-
-fn text(error: impl Display) -> String {
-    error.to_string()
 }

@@ -44,7 +44,7 @@ impl Switches {
         self.waiting.insert((stamp, self.arrived), (finger, closed));
     }
 
-    /// What was over by `now`: touches and faults, in their order. Call it often.
+    /// Touches that were over by `now`, and faults, in their order. Call it often.
     pub(crate) fn poll(&mut self, now: u64) -> Vec<Result<Touch, Fault>> {
         let mut found = Vec::new();
         let Some(ahead) = self.ahead else { return found };
