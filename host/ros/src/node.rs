@@ -241,7 +241,7 @@ impl Running<'_> {
     fn count_lost(&mut self, info: &MessageInfo) {
         let number = info.sequence_number();
         if let Some(last) = self.counts.last.insert(info.publisher_gid(), number) {
-            let lost = u64::try_from(number - last - 1).unwrap_or(0);
+            let lost = u64::try_from(number.saturating_sub(last).saturating_sub(1)).unwrap_or(0);
             if lost > 0 {
                 self.counts.lost += lost;
                 self.problem(format!("{lost} touches were lost on the way"));
