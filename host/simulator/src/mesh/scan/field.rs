@@ -5,13 +5,13 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Cells of the grid along the longest side of the points' box.
-const CELLS: f64 = 160.0;
+const CELLS: f64 = 112.0;
 
 /// Cells around the box.
 const AROUND: f64 = 16.0;
 
 /// Weight of the term that draws the field to its level at the points, for the area of a cell's side.
-const SCREENING: f32 = 1.0;
+const SCREENING: f32 = 0.25;
 
 /// Cycles of multigrid: each leaves about a tenth of the error.
 const CYCLES: usize = 6;

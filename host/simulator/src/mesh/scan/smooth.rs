@@ -28,7 +28,7 @@ const FEWEST: usize = 16;
 const MOST: usize = 400;
 
 /// Distance to the farthest neighbor, in standard deviations of the noise: closer ones do not show where the plane is.
-const REACH: f64 = 3.0;
+const REACH: f64 = 5.0;
 
 /// Times that points are moved.
 const ROUNDS: usize = 2;
