@@ -14,7 +14,9 @@ pub enum MeshProblem {
         builtin: Vec<&'static str>,
     },
     /// A directory holds no mesh.
-    #[error("no mesh here: no file ends in .obj, .stl, .ply, .gltf, .glb or .dae")]
+    #[error(
+        "no mesh here: no file ends in .obj, .stl, .ply, .gltf, .glb, .dae, .pcd or .xyz, and none is called scene_camera.json"
+    )]
     NoMeshes,
     /// Several objects where one is asked for.
     #[error("{count} objects, where one is needed")]

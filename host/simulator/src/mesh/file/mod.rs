@@ -27,7 +27,12 @@ pub enum Format {
     Pcd,
     /// XYZ: points, as text.
     Xyz,
+    /// Depth images with poses, of which `scene_camera.json` is the list, as in the BOP benchmark.
+    Depth,
 }
+
+/// The name of the list of a scan's depth images.
+pub const DEPTH_LIST: &str = "scene_camera.json";
 
 /// The extensions of mesh files, in the order in which they are preferred where a folder holds one name with several.
 pub const EXTENSIONS: [&str; 8] = ["obj", "stl", "ply", "gltf", "glb", "dae", "pcd", "xyz"];
@@ -136,7 +141,10 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Contents> {
 fn parse_buffered(mut reader: impl BufRead, length: u64, path: &Path, folder: Option<&Path>) -> Result<Contents> {
     let io = |source| Error::io(path, "read the mesh", source);
     let head = reader.fill_buf().map_err(io)?;
-    let format = Format::of(head, length, path.extension().and_then(|extension| extension.to_str()));
+    let format = match path.file_name() {
+        Some(name) if name == DEPTH_LIST => Format::Depth,
+        _ => Format::of(head, length, path.extension().and_then(|extension| extension.to_str())),
+    };
     let (parsed, millimeters) = match format {
         Format::Obj => (Parsed::Mesh(obj::parse_moved(reader, path)?), None),
         Format::Stl => (Parsed::Mesh(stl::parse(reader, length, path)?), None),
@@ -146,7 +154,13 @@ fn parse_buffered(mut reader: impl BufRead, length: u64, path: &Path, folder: Op
         #[cfg(feature = "scans")]
         Format::Xyz => (Parsed::Points(scan::xyz::parse(reader, path)?), None),
         #[cfg(not(feature = "scans"))]
-        Format::Pcd | Format::Xyz => return Err(Error::at(Place::file(path), MeshProblem::NeedsScans)),
+        Format::Pcd | Format::Xyz | Format::Depth => return Err(Error::at(Place::file(path), MeshProblem::NeedsScans)),
+        #[cfg(feature = "scans")]
+        Format::Depth => {
+            let mut bytes = Vec::new();
+            reader.take(length).read_to_end(&mut bytes).map_err(io)?;
+            (Parsed::Points(scan::depth::parse(&bytes, path, folder)?), Some(1.0))
+        }
         Format::Gltf | Format::Collada => {
             let mut bytes = Vec::new();
             // A file that grows while it is read is cut: its end is missing, as its parser says.
@@ -164,7 +178,7 @@ fn parse_buffered(mut reader: impl BufRead, length: u64, path: &Path, folder: Op
         }
         #[cfg(feature = "scans")]
         Parsed::Points(points) => {
-            let scan::Scanned { mesh, points, moved, notes } = scan::surface(&points, path)?;
+            let scan::Scanned { mesh, points, moved, notes } = scan::surface(points, path)?;
             Contents { mesh, moved, millimeters, format, points, notes }
         }
     })

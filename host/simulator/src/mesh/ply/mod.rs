@@ -185,11 +185,7 @@ impl Collect for Cloud {
     fn take(&mut self, row: CloudRow) -> Result<(), String> {
         let CloudRow { x, y, z, nx, ny, nz, vp_x, vp_y, vp_z } = row;
         let whole = |values: [f64; 3]| values.iter().all(|value| value.is_finite()).then_some(values);
-        self.0.add(scan::Point {
-            place: [x, y, z],
-            normal: whole([nx, ny, nz]),
-            viewpoint: whole([vp_x, vp_y, vp_z]),
-        });
+        self.0.add(scan::Point { place: [x, y, z], normal: whole([nx, ny, nz]), viewpoint: whole([vp_x, vp_y, vp_z]) });
         Ok(())
     }
 }

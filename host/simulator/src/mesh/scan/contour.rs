@@ -56,7 +56,11 @@ pub(super) fn contour(field: &Field) -> Mesh {
                         let triangle = [corners[0], corners[second], corners[second + 1]];
                         let [a, b, c] = triangle.map(|corner| places[corner as usize]);
                         let is_outward = (b - a).cross(c - a).dot(outward) > 0.0;
-                        mesh.triangles.push(if is_outward { triangle } else { [triangle[0], triangle[2], triangle[1]] });
+                        mesh.triangles.push(if is_outward {
+                            triangle
+                        } else {
+                            [triangle[0], triangle[2], triangle[1]]
+                        });
                     }
                 }
             }

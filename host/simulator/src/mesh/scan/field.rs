@@ -128,7 +128,8 @@ fn cycle(grid: Grid, x: &mut Vec<f32>, right: &[f32], screen: &[f32]) {
     let corrected = map(grid, |node, [_, y, z]| {
         let at = [node % y, node / y % (z / y), node / z];
         let sides = at.map(|index| [index / 2, index.div_ceil(2)]);
-        let corners = (0..8).map(|bits| sides[0][bits & 1] + sides[1][bits >> 1 & 1] * row + sides[2][bits >> 2] * slab);
+        let corners =
+            (0..8).map(|bits| sides[0][bits & 1] + sides[1][bits >> 1 & 1] * row + sides[2][bits >> 2] * slab);
         x[node] + corners.map(|corner| correction[corner]).sum::<f32>() / 8.0
     });
     *x = corrected;

@@ -9,12 +9,12 @@
 //! neither is refused, since a guess turns thin objects inside out. The method and its error: [`surface`].
 
 mod contour;
+pub(super) mod depth;
 mod field;
 mod holes;
 pub(super) mod pcd;
 mod smooth;
 pub(super) mod xyz;
-
 
 use super::Mesh;
 use super::exact::{Bounds, rounded};
@@ -25,8 +25,11 @@ use std::path::Path;
 /// Fewest points of a surface.
 const FEWEST: usize = 100;
 
-/// Most points: memory is about 1 KB each.
-const MOST: usize = 4_000_000;
+/// Most points in a file.
+const MOST: usize = 50_000_000;
+
+/// Most points that a surface is made of: some ten seconds.
+const USED: usize = 200_000;
 
 /// A point as it stands in a file.
 pub(super) struct Point {
@@ -74,7 +77,9 @@ struct Cloud {
 impl Cloud {
     fn new(points: &Points, offset: DVec3) -> Result<Self, MeshProblem> {
         let places: Vec<DVec3> = points.measured.iter().map(|point| DVec3::from(point.place) - offset).collect();
-        let bounds = places.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], &place| [low.min(place), high.max(place)]);
+        let bounds = places
+            .iter()
+            .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], &place| [low.min(place), high.max(place)]);
         let outward = |(point, &place): (&Point, &DVec3)| {
             let normal = point.normal.and_then(|normal| DVec3::from(normal).try_normalize());
             let eye = point.viewpoint.map(|eye| DVec3::from(eye) - offset);
@@ -104,14 +109,20 @@ impl Cloud {
 ///
 /// # Errors
 /// [`MeshProblem::TooFewPoints`], [`MeshProblem::NoSide`], [`MeshProblem::NoExtent`].
-pub(super) fn surface(points: &Points, path: &Path) -> Result<Scanned> {
+pub(super) fn surface(mut points: Points, path: &Path) -> Result<Scanned> {
     let at = |problem| Error::at(Place::file(path), problem);
     let count = points.measured.len();
     if !(FEWEST..=MOST).contains(&count) {
         return Err(at(MeshProblem::PointCount { count, fewest: FEWEST, most: MOST }));
     }
+    let nth = count.div_ceil(USED);
+    let mut number = 0;
+    points.measured.retain(|_| {
+        number += 1;
+        number % nth == 0
+    });
     let moved = Bounds::of(points.measured.iter().map(|point| point.place)).offset();
-    let cloud = Cloud::new(points, DVec3::from(moved)).map_err(at)?;
+    let cloud = Cloud::new(&points, DVec3::from(moved)).map_err(at)?;
     let smoothed = smooth::smoothed(&cloud).ok_or_else(|| at(MeshProblem::NoExtent))?;
     let field = field::Field::new(&smoothed);
     let mesh = contour::contour(&field);
@@ -120,15 +131,28 @@ pub(super) fn surface(points: &Points, path: &Path) -> Result<Scanned> {
     if points.unmeasured > 0 {
         note(format!("{} points without coordinates are left out", points.unmeasured));
     }
+    if nth > 1 {
+        note(format!("every {nth}th of {count} points is used, and the others are left out"));
+    }
+    let count = points.measured.len();
     if smoothed.outliers > 0 {
         note(format!("{} of {count} points lie apart from the others and are left out", smoothed.outliers));
     }
     let (mesh, specks) = holes::without_specks(mesh);
     if specks > 0 {
-        note(format!("{specks} specks of the surface, each below 1 % of it, are left out"));
+        let are = if specks == 1 {
+            "speck of the surface, below 1 % of it, is"
+        } else {
+            "specks of the surface, each below 1 % of it, are"
+        };
+        note(format!("{specks} {are} left out"));
     }
     let mesh = mesh.usable().map_err(at)?;
-    note(format!("a surface of {} triangles through {count} points with a noise of {}", mesh.triangles.len(), holes::short(smoothed.noise)));
+    note(format!(
+        "a surface of {} triangles through {count} points with a noise of {}",
+        mesh.triangles.len(),
+        holes::short(smoothed.noise)
+    ));
     note(holes::said(&mesh, &smoothed));
     let points = points.measured.iter().map(|point| rounded(point.place, moved)).collect();
     Ok(Scanned { mesh, points, moved, notes })

@@ -13,12 +13,6 @@ use std::path::Path;
 /// The most bytes of a header: real ones have some hundred.
 const MOST: u64 = 1 << 16;
 
-/// True if a file that starts so is a PCD file.
-pub(in crate::mesh) fn is_pcd(head: &[u8]) -> bool {
-    let text = head.trim_ascii_start();
-    text.starts_with(b"# .PCD") || text.starts_with(b"VERSION")
-}
-
 #[derive(Clone, Copy, PartialEq)]
 enum Data {
     Text,
@@ -52,7 +46,10 @@ pub(in crate::mesh) fn parse(mut reader: impl BufRead, length: u64, path: &Path)
     let columns = NAMES.map(|name| header.offset(name));
     let stride: usize = header.fields.iter().map(|field| field.size * field.count).sum();
     if columns[..3].contains(&None) {
-        return Err(damaged(Place::line(path, header.lines), "its points have no fields x, y and z of one number each"));
+        return Err(damaged(
+            Place::line(path, header.lines),
+            "its points have no fields x, y and z of one number each",
+        ));
     }
     let mut points = Points::default();
     let mut add = |values: [Option<f64>; 9]| {
@@ -148,13 +145,17 @@ fn read_text(
         for (value, word) in values.iter_mut().zip(words_of) {
             let Some(word) = word.map(|word| words[word]) else { continue };
             let parsed: Option<f64> = number(word);
-            *value = Some(parsed.ok_or_else(|| {
-                Error::at(Place::line(path, line), MeshProblem::NotANumber { text: shown(word) })
-            })?);
+            *value =
+                Some(parsed.ok_or_else(|| {
+                    Error::at(Place::line(path, line), MeshProblem::NotANumber { text: shown(word) })
+                })?);
         }
         found += 1;
         if found > header.points {
-            return Err(damaged(Place::line(path, line), format!("more than the {} points that it states", header.points)));
+            return Err(damaged(
+                Place::line(path, line),
+                format!("more than the {} points that it states", header.points),
+            ));
         }
         add(values);
     }

@@ -22,7 +22,7 @@ pub(super) struct Smoothed {
 }
 
 /// Fewest neighbors that a plane is fitted to.
-const FEWEST: usize = 16;
+const FEWEST: usize = 32;
 
 /// Most of them.
 const MOST: usize = 400;
@@ -36,7 +36,9 @@ const ROUNDS: usize = 2;
 pub(super) type Tree = RTree<GeomWithData<[f64; 3], usize>>;
 
 pub(super) fn tree(places: &[DVec3]) -> Tree {
-    RTree::bulk_load(places.iter().enumerate().map(|(index, place)| GeomWithData::new(place.to_array(), index)).collect())
+    RTree::bulk_load(
+        places.iter().enumerate().map(|(index, place)| GeomWithData::new(place.to_array(), index)).collect(),
+    )
 }
 
 /// Points that move onto planes fitted to their neighbors; none if all are at one place.
@@ -48,7 +50,8 @@ pub(super) fn smoothed(cloud: &Cloud) -> Option<Smoothed> {
     let mut count = FEWEST;
     let noise = loop {
         let fits = sample.par_iter().filter_map(|&index| fit(index, &places, &outward, &all, count, SEEN));
-        let (reach, noise): (Vec<f64>, Vec<f64>) = fits.map(|plane| (plane.reach, plane.noise)).collect::<Vec<_>>().into_iter().unzip();
+        let (reach, noise): (Vec<f64>, Vec<f64>) =
+            fits.map(|plane| (plane.reach, plane.noise)).collect::<Vec<_>>().into_iter().unzip();
         let (reach, noise) = (median(reach)?, median(noise)?);
         if reach >= REACH * noise || count >= MOST {
             break noise;
@@ -134,7 +137,8 @@ fn fit(index: usize, places: &[DVec3], outward: &[DVec3], tree: &Tree, count: us
 fn least_axis(matrix: DMat3) -> (f64, DVec3) {
     let mean = (matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z) / 3.0;
     let rest = matrix - DMat3::from_diagonal(DVec3::splat(mean));
-    let size = ((rest.x_axis.length_squared() + rest.y_axis.length_squared() + rest.z_axis.length_squared()) / 6.0).sqrt();
+    let size =
+        ((rest.x_axis.length_squared() + rest.y_axis.length_squared() + rest.z_axis.length_squared()) / 6.0).sqrt();
     if size <= 0.0 {
         return (mean, DVec3::Z);
     }

@@ -30,8 +30,13 @@ pub(in crate::mesh) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Po
             columns = words.len();
         }
         if words.len() != columns || ![3, 6].contains(&columns) {
-            let wanted = if [3, 6].contains(&columns) { format!("{columns}, as on the first line") } else { "3, or 6 with a normal".into() };
-            let what = format!("{} numbers where there should be {wanted}: {:?}", words.len(), shown(text.trim_ascii()));
+            let wanted = if [3, 6].contains(&columns) {
+                format!("{columns}, as on the first line")
+            } else {
+                "3, or 6 with a normal".into()
+            };
+            let what =
+                format!("{} numbers where there should be {wanted}: {:?}", words.len(), shown(text.trim_ascii()));
             return Err(at(MeshProblem::Damaged { format: "XYZ", what }));
         }
         let mut values = [0.0; 6];
