@@ -4,7 +4,7 @@
 
 OBJECTS is a directory of meshes; scans, touches and models are written to DIRECTORY. Each object is scaled to 100 mm and seen
 by eight cameras, at the corners of a cube, that each measure 2,500 points; the points get 1 mm of Gaussian noise along each
-axis (NOISE), or along the ray alone (ALONG=ray). Seeds are fixed (SEED, of scans). Some two minutes on two cores.
+axis (NOISE), or along the ray alone (ALONG=ray). Seeds are fixed (SEED, of scans). Some three minutes on two cores.
 """
 
 import json

@@ -14,6 +14,8 @@ mod field;
 mod holes;
 pub(super) mod pcd;
 mod smooth;
+#[cfg(test)]
+mod tests;
 pub(super) mod xyz;
 
 use super::Mesh;

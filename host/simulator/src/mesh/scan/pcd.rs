@@ -257,7 +257,7 @@ fn value(bytes: &[u8], kind: u8) -> f64 {
 ///
 /// # Errors
 /// The byte at which the data are damaged.
-fn unpack(packed: &[u8], length: usize) -> Result<Vec<u8>, usize> {
+pub(super) fn unpack(packed: &[u8], length: usize) -> Result<Vec<u8>, usize> {
     let mut unpacked = Vec::with_capacity(length);
     let mut at = 0;
     while at < packed.len() {
