@@ -24,7 +24,6 @@ Examples:
   palpate view bowl -o bowl.html                a built-in object
   palpate view cup.stl -o cup.html              is your own mesh right?
   palpate view fork -o fork.html --touches 60   more touches
-  palpate view scan.pcd -o scan.html            points and the surface through them
   palpate view cup.obj -o cup.html --true-size mm --probe probe.toml
                                                 as large as it is, your probe
   palpate view fork -o fork.html --scene table  as it lies on a table
@@ -32,7 +31,7 @@ Examples:
   palpate view --play meshes/ -o play.html      your own meshes
   palpate view --play --model models/household.palpate -o play.html")]
 pub(crate) struct Arguments {
-    /// An object: a built-in object's name, a mesh (OBJ, STL, PLY, glTF, GLB, COLLADA) or a scan (PLY, PCD, XYZ, scene_camera.json); with --play several, or directories
+    /// A built-in object's name, a mesh (OBJ, STL, PLY, glTF, COLLADA) or scan (PLY, PCD, XYZ); with --play several, or directories
     #[arg(value_name = "SOURCE", required_unless_present = "play")]
     sources: Vec<String>,
     /// Where to write; the page
