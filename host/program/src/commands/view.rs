@@ -33,7 +33,7 @@ Examples:
   palpate view --play --model models/household.palpate -o play.html
   palpate view --port -o chip.html              a chip, without a program")]
 pub(crate) struct Arguments {
-    /// An object: a built-in object's name, or a mesh (OBJ, STL, PLY, glTF, GLB, COLLADA); with --play several, or directories
+    /// A built-in object's name, a mesh (OBJ, STL, PLY, glTF, COLLADA) or scan (PLY, PCD, XYZ); with --play several, or directories
     #[arg(value_name = "SOURCE", required_unless_present_any = ["play", "port"])]
     sources: Vec<String>,
     /// Where to write; the page

@@ -12,9 +12,9 @@ use base64::engine::general_purpose::STANDARD;
 use glam::DVec3;
 use maud::html;
 use palpate::error::Result;
-use palpate::mesh::Object;
 use palpate::mesh::facts::Facts;
 use palpate::mesh::placements::{self, Placement, Placements};
+use palpate::mesh::{Mesh, Object};
 use palpate::probe::approach::{Approach, CLEARANCE, FINGERS, Probe};
 use palpate::probe::scene::{Scene, Table};
 use palpate::random::{self, Purpose};
@@ -71,7 +71,9 @@ pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     settings.probe.check(settings.length)?;
     let facts = Facts::of(object.mesh());
     let lying = settings.cone.map(|cone| Lying::new(object, cone)).transpose()?;
-    let (scene, mesh) = match lying.as_ref().and_then(Lying::first) {
+    let first = lying.as_ref().and_then(Lying::first);
+    let points = shown_points(object, first.as_ref().map(|(placement, _)| *placement), settings.length);
+    let (scene, mesh) = match first {
         None => (Scene::new(object.mesh(), settings.length)?, SimplifiedMesh::new(object.mesh(), settings.length)),
         Some((placement, table)) => {
             let scene = Scene::on_table(object.mesh(), settings.length, placement.rotation, table)?;
@@ -85,6 +87,7 @@ pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     let own = serde_json::json!({
         "length": settings.length,
         "table": lying.is_some(),
+        "points": STANDARD.encode(&points),
         "full": drawn.approaches.iter().map(Drawn::is_full).collect::<Vec<_>>(),
         "approaches": drawn.approaches,
     });
@@ -93,6 +96,24 @@ pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     let scene = scene::Scene { mesh, low, high, radius: settings.probe.radius, lines: lines.collect() };
     let json = scene.json(own.as_object().cloned().unwrap_or_default())?;
     Ok(html(object, settings, &facts, lying.as_ref(), shown_triangles, &drawn, &json))
+}
+
+/// Largest number of points of a scan that are shown.
+const MOST_POINTS: usize = 10_000;
+
+/// Points of a scan, evenly thinned out, in units, as its mesh is shown: three `f32` each, as bytes.
+fn shown_points(object: &Object, placement: Option<&Placement>, length: f64) -> Vec<u8> {
+    let [low, high] = object.mesh().bounds().map(|corner| corner.as_dvec3());
+    let scale = length / (high - low).max_element();
+    let points = object.points.iter().step_by(object.points.len().div_ceil(MOST_POINTS).max(1)).copied().collect();
+    let points = Mesh { vertices: points, triangles: Vec::new() };
+    let (points, [low, high]) = match placement {
+        Some(placement) => (placement.placed(&points), placement.placed(object.mesh()).bounds()),
+        None => (points, object.mesh().bounds()),
+    };
+    let center = low.as_dvec3().midpoint(high.as_dvec3());
+    let place = |point: &[f32; 3]| ((glam::Vec3::from(*point).as_dvec3() - center) * scale).as_vec3().to_array();
+    points.vertices.iter().flat_map(place).flat_map(f32::to_le_bytes).collect()
 }
 
 /// An object on a table: its placements.
@@ -247,6 +268,9 @@ fn html(
                     } }
                     div { dt { "Closed" } dd.warning[!facts.is_closed()] { (facts.closed()) } }
                     div { dt { "Right side out" } dd.warning[!facts.is_right_side_out()] { (facts.side()) } }
+                    @if !object.points.is_empty() { div { dt { "Points" } dd {
+                        (grouped(object.points.len())) ", of which the surface was made"
+                    } } }
                     @if facts.parts.len() > 1 { div { dt { "Parts" } dd { (grouped(facts.parts.len())) } } }
                     div { dt { "Size in the file" } dd {
                         (three_digits(side.x.into())) " × " (three_digits(side.y.into())) " × " (three_digits(side.z.into()))
@@ -259,13 +283,16 @@ fn html(
                 }
                 @for complaint in facts.complaints(object.millimeters) { p.warning { (complaint) } }
                 p { (object.name) ": " (verdict(facts, settings.length, &settings.probe)) "." }
+                @if !object.points.is_empty() {
+                    ul.note { @for note in &object.notes { li { (note) } } }
+                }
                 @if let Some(lying) = lying { (lying.html()) }
                 fieldset {
                     legend { "Show" }
                     @for (id, label, on) in [
                         ("touches", "touches", true), ("misses", "misses", false), ("box", "bounding box", true),
-                        ("edges", "edges of triangles", false), ("smooth", "smooth shading", facts.triangles > 5000),
-                    ] {
+                        ("edges", "edges of triangles", false), ("smooth", "smooth shading", facts.triangles > 5000), ("points", "points", true),
+                    ].into_iter().filter(|(id, ..)| *id != "points" || !object.points.is_empty()) {
                         label { input type="checkbox" id=(id) checked[on]; " " (label) }
                     }
                 }

@@ -14,7 +14,9 @@ pub enum MeshProblem {
         builtin: Vec<&'static str>,
     },
     /// A directory holds no mesh.
-    #[error("no mesh here: no file ends in .obj, .stl, .ply, .gltf, .glb or .dae")]
+    #[error(
+        "no mesh here: no file ends in .obj, .stl, .ply, .gltf, .glb, .dae, .pcd or .xyz, and none is called scene_camera.json"
+    )]
     NoMeshes,
     /// Several objects where one is asked for.
     #[error("{count} objects, where one is needed")]
@@ -133,6 +135,22 @@ pub enum MeshProblem {
         /// The index, counted from 0.
         index: u32,
     },
+    /// A file holds points, and this program was built without what makes surfaces of them.
+    #[error("the file holds points and no triangles, and this program was built without scans")]
+    NeedsScans,
+    /// Points say nothing about which side of them is outside.
+    #[error("the points have neither normals nor viewpoints, so it is unknown which side of the surface is outside")]
+    NoSide,
+    /// Too few points for a surface, or too many.
+    #[error("{count} points with coordinates, where a surface needs {fewest} to {most}")]
+    PointCount {
+        /// Number of points.
+        count: usize,
+        /// The fewest that are enough.
+        fewest: usize,
+        /// The most that are taken.
+        most: usize,
+    },
     /// An object has no placement of a name.
     #[error("{object} has no placement {name}: it has {}", known.join(", "))]
     NoSuchPlacement {
@@ -197,6 +215,11 @@ impl Problem for MeshProblem {
             Self::MissingVertex { .. } | Self::VertexNotFinite { .. } => {
                 "Give a mesh whose faces have finite vertices.".into()
             }
+            Self::NeedsScans => "Build it with --features scans, or give a mesh.".into(),
+            Self::NoSide => {
+                "Add normals (nx ny nz, in PCD normal_x normal_y normal_z) or the place of the sensor (vp_x vp_y vp_z for each point, in PCD also VIEWPOINT).".into()
+            }
+            Self::PointCount { .. } => "Scan the object more closely, or thin the points out.".into(),
             Self::NoSuchPlacement { .. } | Self::NoPlacement { .. } => {
                 "Give the weights of placements that it has; those that are not named are left out.".into()
             }

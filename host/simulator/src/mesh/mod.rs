@@ -48,6 +48,8 @@ mod placed;
 pub mod placements;
 mod ply;
 mod polygon;
+#[cfg(feature = "scans")]
+mod scan;
 pub mod source;
 mod stl;
 #[cfg(test)]
@@ -72,8 +74,11 @@ pub struct Object {
     /// Weights of its placements on a table that replace those of their solid angles, by name: a placement that is not among
     /// them is left out. Empty: solid angles.
     pub placement_weights: Vec<(String, f64)>,
-    /// Notes for the user on how it was found and read: other files of its name that were passed over.
+    /// Notes for the user on how it was found and read: other files of its name that were passed over; of a scan, its noise
+    /// and the holes that were closed.
     pub notes: Vec<String>,
+    /// The points that its first mesh was made of, in the mesh's coordinates; none if it is not from a scan.
+    pub points: Vec<[f32; 3]>,
     first: Instance,
     others: Vec<Instance>,
 }
@@ -92,7 +97,15 @@ impl Object {
     pub fn new(name: impl Into<String>, mesh: Mesh) -> Self {
         let name = name.into();
         let first = Instance { name: name.clone(), mesh };
-        Self { name, millimeters: None, placement_weights: Vec::new(), notes: Vec::new(), first, others: Vec::new() }
+        Self {
+            name,
+            millimeters: None,
+            placement_weights: Vec::new(),
+            notes: Vec::new(),
+            points: Vec::new(),
+            first,
+            others: Vec::new(),
+        }
     }
 
     /// An object with several meshes of unknown units; none if there is no instance.
@@ -104,6 +117,7 @@ impl Object {
             millimeters: None,
             placement_weights: Vec::new(),
             notes: Vec::new(),
+            points: Vec::new(),
             first,
             others: instances.collect(),
         })

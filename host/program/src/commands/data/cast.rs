@@ -48,7 +48,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
             return Err(Error::setting(name, value, "a number greater than 0"));
         }
     }
-    let Contents { mesh, moved, .. } = file::read(&arguments.mesh)?;
+    let Contents { mesh, moved, notes, .. } = file::read(&arguments.mesh)?;
+    notes.iter().for_each(|note| crate::commands::remark(&format!("palpate: {note}")));
     let scene = if arguments.as_is { Scene::as_is(&mesh) } else { Scene::new(&mesh, arguments.length) }?;
     let mut lines = cast::read(&arguments.casts)?;
     if arguments.as_is {

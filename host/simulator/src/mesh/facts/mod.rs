@@ -9,6 +9,8 @@ mod parts;
 mod stray;
 
 pub use parts::Part;
+#[cfg(feature = "scans")]
+pub(super) use parts::Sets;
 pub use stray::Piece;
 
 use crate::mesh::Mesh;
@@ -242,7 +244,7 @@ fn counted(count: usize, name: &str) -> String {
 }
 
 /// A number with about three significant digits.
-fn short(value: f64) -> String {
+pub(super) fn short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),
         1e-3..1e6 => {

@@ -1,5 +1,8 @@
 //! Mesh files of every kind: which kind a file is, by its content, and its mesh.
 
+use super::exact::Moved;
+#[cfg(feature = "scans")]
+use super::scan;
 use super::{Mesh, collada, gltf, obj, ply, stl};
 use crate::error::{Error, MeshProblem, Place, Result};
 use std::fs::File;
@@ -20,10 +23,19 @@ pub enum Format {
     Gltf,
     /// COLLADA.
     Collada,
+    /// PCD: points, as text, binary or compressed.
+    Pcd,
+    /// XYZ: points, as text.
+    Xyz,
+    /// Depth images with poses, of which `scene_camera.json` is the list, as in the BOP benchmark.
+    Depth,
 }
 
+/// The name of the list of a scan's depth images.
+pub const DEPTH_LIST: &str = "scene_camera.json";
+
 /// The extensions of mesh files, in the order in which they are preferred where a folder holds one name with several.
-pub const EXTENSIONS: [&str; 6] = ["obj", "stl", "ply", "gltf", "glb", "dae"];
+pub const EXTENSIONS: [&str; 8] = ["obj", "stl", "ply", "gltf", "glb", "dae", "pcd", "xyz"];
 
 impl Format {
     /// The kind of file that starts with `head` (a few hundred bytes or more, or all of it) and has `length` bytes. Its
@@ -37,12 +49,16 @@ impl Format {
         let rest = text.get(first.len()..).unwrap_or_default();
         if head.starts_with(b"glTF") || text.first() == Some(&b'{') {
             Self::Gltf
+        } else if first == b"VERSION" || text.starts_with(b"# .PCD") {
+            Self::Pcd
         } else if first == b"ply" {
             Self::Ply
         } else if text.first() == Some(&b'<') {
             Self::Collada
         } else if first.eq_ignore_ascii_case(b"solid") {
             Self::Stl
+        } else if extension.is_some_and(|extension| extension.eq_ignore_ascii_case("xyz")) {
+            Self::Xyz
         } else if !rest.is_empty() && (obj::KEYWORDS.contains(&first) || first.starts_with(b"#")) {
             Self::Obj
         } else {
@@ -51,6 +67,7 @@ impl Format {
                 Some("ply") => Self::Ply,
                 Some("gltf" | "glb") => Self::Gltf,
                 Some("dae") => Self::Collada,
+                Some("pcd") => Self::Pcd,
                 _ => Self::Obj,
             }
         }
@@ -70,6 +87,19 @@ pub struct Contents {
     pub millimeters: Option<f64>,
     /// Format of the file.
     pub format: Format,
+    /// The points that the mesh was made of, in its coordinates; none if the file holds triangles.
+    pub points: Vec<[f32; 3]>,
+    /// Of points: what was left out, how noisy they are, how large the holes were that are closed.
+    pub notes: Vec<String>,
+}
+
+/// What a file holds.
+pub(super) enum Parsed {
+    /// Triangles.
+    Mesh(Moved),
+    /// Points of a surface.
+    #[cfg(feature = "scans")]
+    Points(scan::Points),
 }
 
 /// The most bytes that are taken from what is no regular file, such as a pipe: 1 GiB.
@@ -111,22 +141,47 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Contents> {
 fn parse_buffered(mut reader: impl BufRead, length: u64, path: &Path, folder: Option<&Path>) -> Result<Contents> {
     let io = |source| Error::io(path, "read the mesh", source);
     let head = reader.fill_buf().map_err(io)?;
-    let format = Format::of(head, length, path.extension().and_then(|extension| extension.to_str()));
-    let ((mesh, moved), millimeters) = match format {
-        Format::Obj => (obj::parse_moved(reader, path)?, None),
-        Format::Stl => (stl::parse(reader, length, path)?, None),
+    let format = match path.file_name() {
+        Some(name) if name == DEPTH_LIST => Format::Depth,
+        _ => Format::of(head, length, path.extension().and_then(|extension| extension.to_str())),
+    };
+    let (parsed, millimeters) = match format {
+        Format::Obj => (Parsed::Mesh(obj::parse_moved(reader, path)?), None),
+        Format::Stl => (Parsed::Mesh(stl::parse(reader, length, path)?), None),
         Format::Ply => (ply::parse(reader, path)?, None),
+        #[cfg(feature = "scans")]
+        Format::Pcd => (Parsed::Points(scan::pcd::parse(reader, length, path)?), None),
+        #[cfg(feature = "scans")]
+        Format::Xyz => (Parsed::Points(scan::xyz::parse(reader, path)?), None),
+        #[cfg(not(feature = "scans"))]
+        Format::Pcd | Format::Xyz | Format::Depth => return Err(Error::at(Place::file(path), MeshProblem::NeedsScans)),
+        #[cfg(feature = "scans")]
+        Format::Depth => {
+            let mut bytes = Vec::new();
+            reader.take(length).read_to_end(&mut bytes).map_err(io)?;
+            (Parsed::Points(scan::depth::parse(&bytes, path, folder)?), Some(1.0))
+        }
         Format::Gltf | Format::Collada => {
             let mut bytes = Vec::new();
             // A file that grows while it is read is cut: its end is missing, as its parser says.
             reader.take(length).read_to_end(&mut bytes).map_err(io)?;
-            match format {
+            let (mesh, millimeters) = match format {
                 Format::Gltf => (gltf::parse(&bytes, path, folder)?, Some(1_000.0)),
                 _ => collada::parse(&bytes, path)?,
-            }
+            };
+            (Parsed::Mesh(mesh), millimeters)
         }
     };
-    Ok(Contents { mesh, moved, millimeters, format })
+    Ok(match parsed {
+        Parsed::Mesh((mesh, moved)) => {
+            Contents { mesh, moved, millimeters, format, points: Vec::new(), notes: Vec::new() }
+        }
+        #[cfg(feature = "scans")]
+        Parsed::Points(points) => {
+            let scan::Scanned { mesh, points, moved, notes } = scan::surface(points, path)?;
+            Contents { mesh, moved, millimeters, format, points, notes }
+        }
+    })
 }
 
 #[cfg(test)]

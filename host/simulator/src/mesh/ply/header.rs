@@ -17,6 +17,8 @@ pub(super) struct Header {
     /// Its number of bytes and lines in the file.
     pub(super) bytes: u64,
     pub(super) lines: u64,
+    /// True if it states vertices and nothing that connects them.
+    pub(super) is_cloud: bool,
 }
 
 struct Element {
@@ -98,7 +100,9 @@ impl Header {
         for element in &elements {
             element.check().map_err(|what| whole(element.line, &what))?;
         }
-        Ok(Self { format, text: text(format, &elements), bytes, lines })
+        let has = |name: &str| elements.iter().any(|element| element.name == name && element.count > 0);
+        let is_cloud = has("vertex") && !has("face") && !has("tristrips");
+        Ok(Self { format, text: text(format, &elements), bytes, lines, is_cloud })
     }
 }
 

@@ -1,6 +1,7 @@
 //! Layouts of the folders of mesh data sets.
 
 use super::search::{Found, lossy, rank};
+use crate::mesh::file::DEPTH_LIST;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -21,11 +22,12 @@ pub(super) fn shapenet(path: &Path) -> Option<(String, String)> {
 }
 
 /// The folder after which an object is named: in YCB's layout `NNN_name/google_16k/textured.obj`, in that of Google Scanned
-/// Objects `Name/meshes/model.obj`.
+/// Objects `Name/meshes/model.obj`, and of depth images `Name/scene_camera.json`.
 pub(super) fn folder(path: &Path) -> Option<String> {
     let inner = path.parent()?;
     let is_scanned = path.file_stem()? == "model" && inner.file_name()? == "meshes";
     match ycb(path) {
+        None if path.file_name()? == DEPTH_LIST => Some(lossy(Some(inner.file_name()?))),
         Some((folder, _)) => Some(lossy(folder.file_name())),
         None if is_scanned => Some(lossy(Some(inner.parent()?.file_name()?))),
         None => None,

@@ -96,23 +96,26 @@ impl Source {
             Self::Background => builtin::background(builtin::BACKGROUND_SHAPES, 1),
             Self::File { name, path, notes } => {
                 let contents = file::read(&path)?;
-                let notes = notes.into_iter().chain(moved(&path, contents.moved)).collect();
+                let notes = notes.into_iter().chain(moved(&path, contents.moved)).chain(contents.notes).collect();
                 let object = Object::new(name, contents.mesh);
-                Ok(Object { millimeters: contents.millimeters, notes, ..object })
+                Ok(Object { millimeters: contents.millimeters, notes, points: contents.points, ..object })
             }
             Self::Instances { name, files, notes } => {
                 let read = |(name, path): (String, PathBuf)| {
-                    let file::Contents { mesh, millimeters, moved: by, .. } = file::read(&path)?;
-                    Ok((Instance { name, mesh }, (millimeters, moved(&path, by))))
+                    let file::Contents { mesh, millimeters, moved: by, notes, points, .. } = file::read(&path)?;
+                    let notes: Vec<String> = moved(&path, by).into_iter().chain(notes).collect();
+                    Ok((Instance { name, mesh }, (millimeters, (notes, points))))
                 };
                 let read = in_order(files.into_par_iter().map(read))?;
                 let (mut instances, stated): (Vec<_>, Vec<_>) = read.into_iter().unzip();
-                let (units, moved): (Vec<_>, Vec<_>) = stated.into_iter().unzip();
+                let (units, read): (Vec<_>, Vec<_>) = stated.into_iter().unzip();
+                let (read, points): (Vec<_>, Vec<_>) = read.into_iter().unzip();
                 let (millimeters, note) = one_unit(&mut instances, &units);
                 let object = Object::of_instances(name, instances).ok_or(MeshProblem::NoMeshes)?;
                 Ok(Object {
                     millimeters,
-                    notes: notes.into_iter().chain(moved.into_iter().flatten()).chain(note).collect(),
+                    notes: notes.into_iter().chain(read.into_iter().flatten()).chain(note).collect(),
+                    points: points.into_iter().next().unwrap_or_default(),
                     ..object
                 })
             }

@@ -1,7 +1,7 @@
 //! Mesh files in directories.
 
 use crate::error::{Error, Result};
-use crate::mesh::file::EXTENSIONS;
+use crate::mesh::file::{DEPTH_LIST, EXTENSIONS};
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -30,6 +30,9 @@ pub(super) const LEVELS: usize = 8;
 
 /// Position of a file's extension among those of meshes; none if it is no mesh's.
 pub(super) fn rank(path: &Path) -> Option<usize> {
+    if path.file_name().is_some_and(|name| name == DEPTH_LIST) {
+        return Some(EXTENSIONS.len());
+    }
     let extension = path.extension()?;
     EXTENSIONS.iter().position(|known| extension.eq_ignore_ascii_case(known))
 }
