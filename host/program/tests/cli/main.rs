@@ -21,6 +21,7 @@ mod probe;
 mod record;
 mod reports;
 mod rows;
+mod scan;
 mod shards;
 mod strangers;
 mod support;
