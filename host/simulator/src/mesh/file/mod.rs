@@ -93,7 +93,7 @@ pub struct Contents {
     pub notes: Vec<String>,
 }
 
-/// What a file holds.
+/// Contents of a file.
 pub(super) enum Parsed {
     /// Triangles.
     Mesh(Moved),

@@ -1,4 +1,4 @@
-//! What of a surface no point lies near: specks, which are left out, and holes, which were closed.
+//! Parts of a surface that no point lies near: specks, which are left out, and holes, which were closed.
 
 use super::smooth::{self, Smoothed};
 use crate::mesh::Mesh;

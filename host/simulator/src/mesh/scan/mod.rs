@@ -66,7 +66,7 @@ pub(super) struct Scanned {
     pub(super) points: Vec<[f32; 3]>,
     /// Offset subtracted from the coordinates, as of meshes.
     pub(super) moved: [f64; 3],
-    /// What was left out, how noisy the points are, and how large the holes were that are closed.
+    /// Notes: the points that were left out, the noise of the others, and the sizes of the holes that were closed.
     pub(super) notes: Vec<String>,
 }
 
