@@ -54,9 +54,9 @@ fn points_that_do_not_say_which_side_is_outside_and_bad_lines_are_refused_with_w
         assert!(error.contains(name) && expected.iter().all(|words| error.contains(words)), "{error}");
         assert!(!page.exists());
     };
-    let bare: String = (0..40).map(|index| format!("{index} {} {}\n", index % 7, index % 5)).collect();
+    let bare: String = (0..400).map(|index| format!("{index} {} {}\n", index % 7, index % 5)).collect();
     refused("bare.xyz", &bare, &["normal"]);
-    refused("word.xyz", "# a ball\n0 0 5 0 0 1\n0 0 five 0 0 1\n", &["line 3", "five"]);
+    refused("word.xyz", "# a ball\n0 0 5 0 0 1\n0 0 five 0 0 1\n", &["word.xyz:3", "five"]);
     refused("cut.pcd", "VERSION 0.7\nFIELDS x y z normal_x\n", &["cut.pcd"]);
     refused("none.xyz", "", &["point"]);
 }
