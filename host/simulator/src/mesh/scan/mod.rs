@@ -110,7 +110,7 @@ impl Cloud {
 /// The same points give the same bytes on any number of threads. Its error is measured in `docs/measurements/scans.md`.
 ///
 /// # Errors
-/// [`MeshProblem::TooFewPoints`], [`MeshProblem::NoSide`], [`MeshProblem::NoExtent`].
+/// [`MeshProblem::PointCount`], [`MeshProblem::NoSide`], [`MeshProblem::NoExtent`].
 pub(super) fn surface(mut points: Points, path: &Path) -> Result<Scanned> {
     let at = |problem| Error::at(Place::file(path), problem);
     let count = points.measured.len();
