@@ -31,6 +31,8 @@ pub mod run_page;
 mod sequential;
 mod settings;
 mod simulator;
+#[cfg(test)]
+mod small;
 mod stages;
 pub mod statistics;
 mod strangers;

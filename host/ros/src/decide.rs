@@ -30,7 +30,7 @@ impl Thresholds {
     /// The same for a recognizer of `model`.
     ///
     /// # Errors
-    /// Which number is out of range, and what is allowed.
+    /// The number that is out of range, and the range.
     pub(crate) fn stopping(self, model: &Model<'_>) -> Result<Stopping, String> {
         let own = Stopping::from_model(model);
         let max_touches = match u32::try_from(self.max_touches) {
@@ -94,7 +94,7 @@ impl Decider {
     /// The same model under other thresholds, which begins again; priors of the last reset stay.
     ///
     /// # Errors
-    /// Which threshold cannot be used.
+    /// The threshold that cannot be used.
     pub(crate) fn under(&self, thresholds: Thresholds) -> Result<Self, String> {
         let mut decider = Self::new(Arc::clone(self.opened.borrow_owner()), thresholds)?;
         decider.expected.clone_from(&self.expected);
@@ -210,7 +210,7 @@ pub(crate) fn behind(posteriors: &[f64]) -> Vec<f64> {
 /// Refuses a model that is not over touches.
 ///
 /// # Errors
-/// What the model is.
+/// The kind of the model.
 pub(crate) fn check(model: &CompiledModel) -> Result<(), String> {
     match model.model().descriptor() {
         Some(_) => Ok(()),
@@ -221,7 +221,7 @@ pub(crate) fn check(model: &CompiledModel) -> Result<(), String> {
 /// A weight for each of `names`; none if nothing is expected.
 ///
 /// # Errors
-/// What is wrong with the names or the weights.
+/// The name or the weights at fault, and the remedy.
 pub(crate) fn weights(expected: &Expected, names: &[String]) -> Result<Option<Vec<u32>>, String> {
     let Expected { objects, weights } = expected;
     if objects.is_empty() && weights.is_empty() {

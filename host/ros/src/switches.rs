@@ -81,7 +81,7 @@ mod tests {
     const START: u64 = 1_790_000_000 * SECOND;
     const AHEAD: u64 = SECOND / 2;
 
-    /// Messages at times in milliseconds, each of which arrives so many milliseconds later, in the order of arrival.
+    /// Messages at times in milliseconds, each with its delay in milliseconds, in the order of arrival.
     fn touches(messages: &[(u64, u64, Finger, bool)]) -> Vec<Result<Touch, Fault>> {
         let mut switches = Switches::new(Settings::default());
         let mut sorted = messages.to_vec();

@@ -24,7 +24,7 @@ impl Touch {
     /// The touch that it describes.
     ///
     /// # Errors
-    /// What is wrong with a number.
+    /// The number at fault, and the reason.
     pub(crate) fn felt(&self) -> Result<Felt, TouchesProblem> {
         let pose = |vector| self.has_pose.then_some(vector);
         let times = self.times.map(|time| if time.is_nan() { None } else { Some(time) });

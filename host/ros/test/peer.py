@@ -88,7 +88,7 @@ class Peer:
 
 
 def take(reader, count, what="messages are missing"):
-    """The next so many messages."""
+    """The next messages, as many as given."""
     taken = []
 
     def enough():

@@ -1,4 +1,5 @@
 use super::*;
+use crate::small::model;
 use palpate::compile::{self, compile};
 use palpate::ensemble::{self, Ensemble, Node, Output, Tree};
 use palpate::mesh::Mesh;
@@ -43,20 +44,7 @@ fn object(name: &str, rings: u32, height: f32) -> Object {
 
 /// One nat for the first of two objects below a curvature of 9 ms, one for the second above.
 fn contender(names: [&str; 2]) -> Contender {
-    let nodes = vec![
-        Node::Split { feature: 0, threshold: 9_000.0, missing_left: true, left: 1, right: 2 },
-        Node::Leaf(vec![0.5, -0.5]),
-        Node::Leaf(vec![-0.5, 0.5]),
-    ];
-    let ensemble = Ensemble {
-        inputs: Descriptor::Curvature.into(),
-        objects: names.map(String::from).into(),
-        base_margins: vec![0.0; 2],
-        trees: vec![Tree { nodes, output: Output::Each }],
-        origin: ensemble::Origin::default(),
-    };
-    let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
-    Contender::new(CompiledModel::from_bytes(bytes).unwrap(), None).unwrap()
+    Contender::new(model(names), None).unwrap()
 }
 
 fn settings() -> Settings {

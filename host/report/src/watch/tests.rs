@@ -1,24 +1,5 @@
 use super::*;
-use palpate::compile::{self, compile};
-use palpate::ensemble::{self, Ensemble, Node, Output, Tree};
-use palpate_shared::Descriptor;
-
-fn model(names: [&str; 2]) -> CompiledModel {
-    let nodes = vec![
-        Node::Split { feature: 0, threshold: 9_000.0, missing_left: true, left: 1, right: 2 },
-        Node::Leaf(vec![0.5, -0.5]),
-        Node::Leaf(vec![-0.5, 0.5]),
-    ];
-    let ensemble = Ensemble {
-        inputs: Descriptor::Curvature.into(),
-        objects: names.map(String::from).into(),
-        base_margins: vec![0.0; 2],
-        trees: vec![Tree { nodes, output: Output::Each }],
-        origin: ensemble::Origin::default(),
-    };
-    let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
-    CompiledModel::from_bytes(bytes).unwrap()
-}
+use crate::small::model;
 
 #[test]
 fn a_page_holds_everything_itself_is_small_and_names_cannot_break_out_of_it() {

@@ -44,6 +44,7 @@ pub mod facts;
 pub mod file;
 mod gltf;
 pub mod obj;
+mod parsed;
 mod placed;
 pub mod placements;
 mod ply;

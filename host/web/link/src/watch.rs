@@ -105,7 +105,7 @@ impl Known {
                 }
             }
             (Query::Posteriors { first }, Answer::Posteriors(bytes)) => {
-                // Another touch came in between where they do not go on: they are asked for anew.
+                // Parts that do not follow one another belong to different touches: ask again from the first.
                 if usize::from(first) != self.posteriors.len() {
                     return;
                 }

@@ -1,6 +1,6 @@
 //! Mesh files of every kind: which kind a file is, by its content, and its mesh.
 
-use super::exact::Moved;
+use super::parsed::Parsed;
 #[cfg(feature = "scans")]
 use super::scan;
 use super::{Mesh, collada, gltf, obj, ply, stl};
@@ -91,15 +91,6 @@ pub struct Contents {
     pub points: Vec<[f32; 3]>,
     /// Of points: what was left out, how noisy they are, how large the holes were that are closed.
     pub notes: Vec<String>,
-}
-
-/// Contents of a file.
-pub(super) enum Parsed {
-    /// Triangles.
-    Mesh(Moved),
-    /// Points of a surface.
-    #[cfg(feature = "scans")]
-    Points(scan::Points),
 }
 
 /// The most bytes that are taken from what is no regular file, such as a pipe: 1 GiB.

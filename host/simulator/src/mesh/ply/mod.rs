@@ -9,7 +9,7 @@ mod header;
 
 use super::Mesh;
 use super::exact::{Bounds, rounded};
-use super::file::Parsed;
+use super::parsed::Parsed;
 use super::polygon::Cutter;
 #[cfg(feature = "scans")]
 use super::scan;

@@ -1,0 +1,23 @@
+//! The smallest model, for tests of pages.
+
+use palpate::compile::{self, CompiledModel, compile};
+use palpate::ensemble::{self, Ensemble, Node, Output, Tree};
+use palpate_shared::Descriptor;
+
+/// One split between two objects of these names.
+pub(crate) fn model(names: [&str; 2]) -> CompiledModel {
+    let nodes = vec![
+        Node::Split { feature: 0, threshold: 9_000.0, missing_left: true, left: 1, right: 2 },
+        Node::Leaf(vec![0.5, -0.5]),
+        Node::Leaf(vec![-0.5, 0.5]),
+    ];
+    let ensemble = Ensemble {
+        inputs: Descriptor::Curvature.into(),
+        objects: names.map(String::from).into(),
+        base_margins: vec![0.0; 2],
+        trees: vec![Tree { nodes, output: Output::Each }],
+        origin: ensemble::Origin::default(),
+    };
+    let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
+    CompiledModel::from_bytes(bytes).unwrap()
+}
