@@ -29,7 +29,7 @@ Examples:
   palpate capture meshes/ -o data --scene table    as they lie, from above
   palpate capture meshes/ -o part2 --shard 2/8     the second of eight parts")]
 pub(crate) struct Arguments {
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
     /// Where to write; a directory for the touches

@@ -47,7 +47,7 @@ Examples:
   palpate probe design meshes/ -o design --search aim=box --real noise=5ms
   palpate probe design meshes/ -o design --error-rate 0.1% --approaches 20000")]
 struct DesignArguments {
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
     /// Where to write; a directory for probe.toml and design.html

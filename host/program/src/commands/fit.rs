@@ -28,7 +28,7 @@ pub(super) struct FitArguments {
     /// The recorded touches: a directory with a file for each object
     #[arg(value_name = "RECORDED")]
     recorded: PathBuf,
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
     /// Where to write; the probe, such as probe.toml

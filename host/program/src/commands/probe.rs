@@ -263,7 +263,7 @@ pub(crate) fn refuse_unstated(size: &SizeArguments) -> Result<()> {
 }
 
 /// Tells on stderr how objects were found and read, where that may surprise.
-fn tell(objects: &[Object]) {
+pub(super) fn tell(objects: &[Object]) {
     for object in objects {
         object.notes.iter().for_each(|note| remark(&format!("{}: {note}", object.name)));
     }

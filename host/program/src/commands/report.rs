@@ -22,7 +22,7 @@ Examples:
                                        is the simulation of your probe right?
   palpate report --resume              continue an interrupted report")]
 pub(crate) struct Arguments {
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, GLB, COLLADA), directories of them
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(default_value = "builtin", value_name = "SOURCE")]
     sources: Vec<String>,
     /// Where to write; a directory for the page, its figures and tables

@@ -11,13 +11,13 @@ fn corners(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
 fn an_object_is_written_as_a_closed_mesh_and_the_same_each_time() {
     let directory = tempfile::tempdir().unwrap();
     let (once, again) = (directory.path().join("once"), directory.path().join("again"));
-    let said = stdout(command(["data", "objects", "--only", "bowl", "-o"]).arg(&once).output().unwrap());
+    let said = stdout(command(["data", "objects", "bowl", "-o"]).arg(&once).output().unwrap());
     assert!(said.contains("bowl.obj: ") && said.contains(" triangles"), "{said}");
     assert_eq!(listing(&once), ["bowl.obj"]);
     let mesh = obj::read(&once.join("bowl.obj")).unwrap();
     assert!(corners(&mesh) == corners(builtin::one("bowl").unwrap().mesh()), "the file holds another bowl");
     assert!(Facts::of(&mesh).is_right_side_out());
-    stdout(command(["data", "objects", "--only", "bowl", "-o"]).arg(&again).output().unwrap());
+    stdout(command(["data", "objects", "bowl", "-o"]).arg(&again).output().unwrap());
     assert_eq!(std::fs::read(once.join("bowl.obj")).unwrap(), std::fs::read(again.join("bowl.obj")).unwrap());
 }
 
@@ -25,8 +25,7 @@ fn an_object_is_written_as_a_closed_mesh_and_the_same_each_time() {
 fn varied_objects_and_a_picture_are_written_and_listed_as_json() {
     let directory = tempfile::tempdir().unwrap();
     let picture = directory.path().join("sheet.png");
-    let mut command =
-        command(["data", "objects", "--only", "spoon", "--only", "bowl", "--varied", "7", "--json", "--picture"]);
+    let mut command = command(["data", "objects", "spoon", "bowl", "--varied", "7", "--json", "--picture"]);
     let json = stdout(command.arg(&picture).arg("-o").arg(directory.path()).output().unwrap());
     let written: serde_json::Value = serde_json::from_str(&json).unwrap();
     // In the order in which the built-in objects are listed, whatever the order of the arguments.
@@ -42,8 +41,8 @@ fn varied_objects_and_a_picture_are_written_and_listed_as_json() {
 }
 
 #[test]
-fn an_unknown_name_is_a_wrong_argument_and_all_names_are_listed() {
-    let error = stderr(run(["data", "objects", "-o", "nowhere", "--only", "teapot"]), 2);
+fn an_unknown_name_is_refused_and_all_names_are_listed() {
+    let error = stderr(run(["data", "objects", "-o", "nowhere", "teapot"]), 1);
     assert!(error.contains("teapot") && builtin::names().iter().all(|name| error.contains(name)), "{error}");
     stderr(run(["data", "objects"]), 2);
     stderr(run(["data", "objects", "-o", "nowhere", "--varied", "seven"]), 2);
@@ -55,7 +54,26 @@ fn a_directory_that_cannot_be_made_is_named() {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("file");
     std::fs::write(&file, "kept").unwrap();
-    let error = stderr(command(["data", "objects", "--only", "bowl", "-o"]).arg(&file).output().unwrap(), 1);
+    let error = stderr(command(["data", "objects", "bowl", "-o"]).arg(&file).output().unwrap(), 1);
     assert!(error.contains("bowl.obj: cannot write"), "{error}");
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
+}
+
+#[test]
+fn a_mesh_is_written_but_neither_varied_nor_written_onto_itself() {
+    let directory = tempfile::tempdir().unwrap();
+    let bowl = directory.path().join("bowl.obj");
+    stdout(command(["data", "objects", "bowl", "-o"]).arg(directory.path()).output().unwrap());
+    let before = std::fs::read(&bowl).unwrap();
+    let again = directory.path().join("again");
+    let said = stdout(command(["data", "objects"]).arg(&bowl).arg("-o").arg(&again).output().unwrap());
+    assert!(said.contains("bowl.obj: ") && listing(&again) == ["bowl.obj"], "{said}");
+    let read = |path: &std::path::Path| corners(&obj::read(path).unwrap());
+    assert!(read(&again.join("bowl.obj")) == read(&bowl));
+    let error =
+        stderr(command(["data", "objects", "--varied", "1"]).arg(&bowl).arg("-o").arg(&again).output().unwrap(), 2);
+    assert!(error.contains("only they can be varied"), "{error}");
+    let error = stderr(command(["data", "objects"]).arg(&bowl).arg("-o").arg(directory.path()).output().unwrap(), 2);
+    assert!(error.contains("another file than what is read"), "{error}");
+    assert!(std::fs::read(&bowl).unwrap() == before);
 }

@@ -45,6 +45,19 @@ fn scans_and_meshes_are_captured_together_and_the_same_seed_gives_the_same_touch
 }
 
 #[test]
+fn the_surface_of_a_scan_is_written_as_a_closed_mesh() {
+    let directory = tempfile::tempdir().unwrap();
+    let scan = ball(directory.path(), "ball.xyz");
+    let said = stdout(command(["data", "objects"]).arg(&scan).arg("-o").arg(directory.path()).output().unwrap());
+    let mesh = palpate::mesh::obj::read(&directory.path().join("ball.obj")).unwrap();
+    assert!(said.contains(&format!("{} triangles", mesh.triangles.len())), "{said}");
+    let facts = palpate::mesh::facts::Facts::of(&mesh);
+    assert!(facts.is_right_side_out() && facts.open_edges == 0);
+    let farthest = mesh.vertices.iter().map(|[x, y, z]| (x.hypot(*y).hypot(*z) - 5.0).abs()).fold(0.0, f32::max);
+    assert!(farthest < 0.15, "{farthest}");
+}
+
+#[test]
 fn points_that_do_not_say_which_side_is_outside_and_bad_lines_are_refused_with_what_to_do() {
     let directory = tempfile::tempdir().unwrap();
     let refused = |name: &str, text: &str, expected: &[&str]| {

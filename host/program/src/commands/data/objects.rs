@@ -1,11 +1,13 @@
 //! `palpate data objects`.
 
 use crate::commands::Global;
-use palpate::Result;
+use crate::commands::probe::tell;
 use palpate::mesh::Object;
 use palpate::mesh::builtin;
 use palpate::mesh::obj;
+use palpate::mesh::source::{self, Source};
 use palpate::output;
+use palpate::{Error, Result};
 use palpate_report::page::render;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -14,19 +16,20 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   palpate data objects -o meshes                    ten files: bowl.obj, ...
-  palpate data objects -o meshes --only fork        one of them
+  palpate data objects fork -o meshes               one of them
   palpate data objects -o meshes --picture all.png  and a picture of them
   palpate data objects -o meshes --varied 7         other proportions
+  palpate data objects mug.pcd -o meshes            the surface of a scan
 
-The meshes are closed, in centimeters, with z up. The same command always writes the same bytes.")]
+The built-in meshes are closed, in centimeters, with z up; others keep the unit of their file. The same command always writes the same bytes.")]
 pub(super) struct Arguments {
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
+    #[arg(value_name = "SOURCE", default_value = "builtin")]
+    sources: Vec<String>,
     /// Where to write; a directory for NAME.obj of each object
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// Only these objects; others are not written
-    #[arg(long, value_delimiter = ',', value_name = "NAME,…", value_parser = built_in)]
-    only: Vec<String>,
-    /// Vary the proportions by up to about a fifth, with this seed
+    /// Vary the proportions of built-in objects by up to about a fifth, with this seed
     #[arg(long, value_name = "SEED")]
     varied: Option<u64>,
     /// Also draw a contact sheet of the objects into this PNG file
@@ -45,10 +48,9 @@ struct Written {
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
-    let chosen = |name: &&str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == name);
-    let names: Vec<&str> = builtin::names().into_iter().filter(chosen).collect();
-    let made = builtin::make(&names, arguments.varied)?;
-    let written = made.iter().map(|object| write(object, arguments)).collect::<Result<Vec<_>>>()?;
+    let (made, files) = made(arguments)?;
+    tell(&made);
+    let written = made.iter().map(|object| write(object, &files, arguments)).collect::<Result<Vec<_>>>()?;
     if let Some(picture) = &arguments.picture {
         output::write_bytes(picture, &render::sheet(&made, 1200))?;
     }
@@ -65,17 +67,34 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     output::print(&text)
 }
 
-fn write(object: &Object, arguments: &Arguments) -> Result<Written> {
+/// The objects, and the files that they come from.
+fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
+    let sources = source::files(&arguments.sources)?;
+    let names: Vec<&str> =
+        sources.iter().filter(|source| matches!(source, Source::BuiltIn(_))).map(Source::name).collect();
+    let files = sources.iter().filter_map(|source| match source {
+        Source::File { path, .. } => Some(path.clone()),
+        _ => None,
+    });
+    let files: Vec<PathBuf> = files.collect();
+    let objects = match arguments.varied {
+        Some(_) if names.len() < sources.len() => {
+            return Err(Error::setting(
+                "varied",
+                "given for a mesh",
+                "it with built-in objects: only they can be varied",
+            ));
+        }
+        Some(seed) => builtin::make(&names, Some(seed))?,
+        None => source::objects(&arguments.sources)?,
+    };
+    Ok((objects, files))
+}
+
+fn write(object: &Object, files: &[PathBuf], arguments: &Arguments) -> Result<Written> {
     let file = arguments.output.join(format!("{}.obj", object.name));
+    output::refuse_input(&file, files)?;
     output::write_whole(&file, |out| obj::write(object.mesh(), out))?;
     let (vertices, triangles) = (object.mesh().vertices.len(), object.mesh().triangles.len());
     Ok(Written { name: object.name.clone(), file, vertices, triangles })
-}
-
-fn built_in(name: &str) -> Result<String, String> {
-    let names = builtin::names();
-    match names.contains(&name) {
-        true => Ok(name.into()),
-        false => Err(format!("use one of {}", names.join(", "))),
-    }
 }
