@@ -141,6 +141,9 @@ pub enum MeshProblem {
     /// Points say nothing about which side of them is outside.
     #[error("the points have neither normals nor viewpoints, so it is unknown which side of the surface is outside")]
     NoSide,
+    /// All points of a scan are at one place.
+    #[error("no surface fits the points: all of them are at one place")]
+    OnePlace,
     /// Too few points for a surface, or too many.
     #[error("{count} points with coordinates, where a surface needs {fewest} to {most}")]
     PointCount {
@@ -219,7 +222,7 @@ impl Problem for MeshProblem {
             Self::NoSide => {
                 "Add normals (nx ny nz, in PCD normal_x normal_y normal_z) or the place of the sensor (vp_x vp_y vp_z for each point, in PCD also VIEWPOINT).".into()
             }
-            Self::PointCount { .. } => "Scan the object more closely, or thin the points out.".into(),
+            Self::OnePlace | Self::PointCount { .. } => "Scan the object more closely, or thin the points out.".into(),
             Self::NoSuchPlacement { .. } | Self::NoPlacement { .. } => {
                 "Give the weights of placements that it has; those that are not named are left out.".into()
             }

@@ -99,7 +99,8 @@ const MOST_OF_A_PIPE: u64 = 1 << 30;
 /// Reads a mesh file of any kind: all its meshes together, polygons cut into triangles, without faces that are a single
 /// point.
 ///
-/// Memory: at most 256 bytes for each byte of the file (and of those that a glTF file names), and 1 MB.
+/// Memory: at most 256 bytes for each byte of the file (and of those that a glTF file names), and 1 MB. The surface of a scan
+/// is made on a grid, which takes some 100 MB whatever the file's size.
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; a [`MeshProblem`] with its line or byte where the file is damaged, or uses

@@ -110,7 +110,7 @@ impl Cloud {
 /// The same points give the same bytes on any number of threads. Its error is measured in `docs/measurements/scans.md`.
 ///
 /// # Errors
-/// [`MeshProblem::PointCount`], [`MeshProblem::NoSide`], [`MeshProblem::NoExtent`].
+/// [`MeshProblem::PointCount`], [`MeshProblem::NoSide`], [`MeshProblem::OnePlace`].
 pub(super) fn surface(mut points: Points, path: &Path) -> Result<Scanned> {
     let at = |problem| Error::at(Place::file(path), problem);
     let count = points.measured.len();
@@ -125,7 +125,7 @@ pub(super) fn surface(mut points: Points, path: &Path) -> Result<Scanned> {
     });
     let moved = Bounds::of(points.measured.iter().map(|point| point.place)).offset();
     let cloud = Cloud::new(&points, DVec3::from(moved)).map_err(at)?;
-    let smoothed = smooth::smoothed(&cloud).ok_or_else(|| at(MeshProblem::NoExtent))?;
+    let smoothed = smooth::smoothed(&cloud).ok_or_else(|| at(MeshProblem::OnePlace))?;
     let field = field::Field::new(&smoothed);
     let mesh = contour::contour(&field);
     let mut notes = Vec::new();

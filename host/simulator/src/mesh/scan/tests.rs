@@ -83,6 +83,46 @@ fn points_far_from_all_others_are_left_out_and_counted() {
 }
 
 #[test]
+fn hard_clouds_give_a_closed_surface_that_can_be_touched_or_an_error() {
+    let ball = sphere(0.0, |_| true);
+    let moved = |by: &dyn Fn(DVec3) -> (DVec3, DVec3)| ball.iter().map(|&(place, _)| by(place)).collect::<Vec<_>>();
+    let alternating = |place: DVec3| if place.x.to_bits() % 2 == 0 { place } else { -place };
+    let far = 1_000.0 * DVec3::X;
+    let clouds = [
+        ("a plane of no thickness", moved(&|p| (DVec3::new(p.x, p.y, 0.0), DVec3::Z))),
+        ("a plane with both sides", moved(&|p| (DVec3::new(p.x, p.y, 0.0), p.z.signum() * DVec3::Z))),
+        ("a sheet thinner than a cell", moved(&|p| (DVec3::new(p.x, p.y, 1e-3 * p.z), p.z.signum() * DVec3::Z))),
+        ("a line", moved(&|p| (DVec3::new(p.x, 0.0, 0.0), DVec3::Z))),
+        ("a needle", moved(&|p| (DVec3::new(1e3 * p.x, p.y, p.z), DVec3::new(0.0, p.y, p.z)))),
+        ("one point many times", moved(&|_| (DVec3::ONE, DVec3::Z))),
+        ("each point twice", ball.iter().chain(&ball).copied().collect()),
+        ("inside out", moved(&|p| (p, -p))),
+        ("normals at random", moved(&|p| (p, alternating(p)))),
+        ("normals of different lengths", moved(&|p| (p, (1e-9 + p.x.abs() * 1e9) * p))),
+        ("huge", moved(&|p| (1e30 * p, p))),
+        ("tiny", moved(&|p| (1e-30 * p, p))),
+        ("far away", moved(&|p| (p + DVec3::splat(1e6), p))),
+        ("two balls far apart", ball.iter().map(|&(p, n)| (if p.x > 0.0 { p + far } else { p }, n)).collect()),
+        ("a half", sphere(0.0, |p| p.z > 0.0)),
+        ("a tenth", sphere(0.0, |p| p.z > 0.8)),
+        ("a hundred points", ball.iter().step_by(ball.len() / 100).copied().take(100).collect()),
+    ];
+    for (name, cloud) in clouds {
+        match file::parse(xyz(&cloud).as_bytes(), Path::new("hard.xyz")) {
+            Err(error) => {
+                assert_eq!(name, "one point many times");
+                assert!(error.to_string().contains("hard.xyz: no surface fits the points"), "{error}");
+            }
+            Ok(contents) => {
+                let facts = Facts::of(&contents.mesh);
+                assert_eq!([facts.open_edges, facts.branching_edges], [0, 0], "{name}");
+                crate::probe::Scene::new(&contents.mesh, 10.0).unwrap();
+            }
+        }
+    }
+}
+
+#[test]
 fn the_same_points_give_the_same_bytes_on_any_number_of_threads() {
     let text = xyz(&sphere(1.0, |_| true));
     let on = |threads| {
