@@ -47,7 +47,10 @@ fuzz_target!(|bytes: &[u8]| {
         }
     };
     match parsed {
-        Err(error) => assert!(["fuzz.", "scene_camera.json", ".png"].iter().any(|name| error.to_string().contains(name)), "{error}"),
+        Err(error) => assert!(
+            ["fuzz.", "scene_camera.json", ".png"].iter().any(|name| error.to_string().contains(name)),
+            "{error}"
+        ),
         Ok(contents) if contents.points.is_empty() => {}
         Ok(contents) => {
             let mesh = contents.mesh;

@@ -40,7 +40,7 @@ const RENAMED: &[Renamed] = &[
     option("*", "--pose-bias", "--real pose_bias=5deg"),
     option("*", "--unit", "--true-size mm, which takes the unit itself"),
     option("run", "--out", "--output"),
-    option("data objects", "--only", "palpate data objects fork -o meshes: objects are arguments"),
+    option("data objects", "--only", "palpate data objects NAME -o DIR: objects are arguments"),
     option("capture", "--radius", "--probe FILE: a probe file states radius, spacing, speed and tilt"),
     option("capture", "--spacing", "--probe FILE: a probe file states radius, spacing, speed and tilt"),
     option("capture", "--speed", "--probe FILE: a probe file states radius, spacing, speed and tilt"),

@@ -86,7 +86,7 @@ fn points_far_from_all_others_are_left_out_and_counted() {
 fn hard_clouds_give_a_closed_surface_that_can_be_touched_or_an_error() {
     let ball = sphere(0.0, |_| true);
     let moved = |by: &dyn Fn(DVec3) -> (DVec3, DVec3)| ball.iter().map(|&(place, _)| by(place)).collect::<Vec<_>>();
-    let alternating = |place: DVec3| if place.x.to_bits() % 2 == 0 { place } else { -place };
+    let alternating = |place: DVec3| if place.x.to_bits().is_multiple_of(2) { place } else { -place };
     let far = 1_000.0 * DVec3::X;
     let clouds = [
         ("a plane of no thickness", moved(&|p| (DVec3::new(p.x, p.y, 0.0), DVec3::Z))),
