@@ -76,4 +76,8 @@ fn a_mesh_is_written_but_neither_varied_nor_written_onto_itself() {
     let error = stderr(command(["data", "objects"]).arg(&bowl).arg("-o").arg(directory.path()).output().unwrap(), 2);
     assert!(error.contains("another file than what is read"), "{error}");
     assert!(std::fs::read(&bowl).unwrap() == before);
+    let mut command = command(["data", "objects"]);
+    let error = stderr(command.arg(&bowl).arg("-o").arg(&again).arg("--picture").arg(&bowl).output().unwrap(), 2);
+    assert!(error.contains("another file than what is read"), "{error}");
+    assert!(std::fs::read(&bowl).unwrap() == before);
 }

@@ -2,15 +2,15 @@
 
 use crate::commands::Global;
 use crate::commands::probe::tell;
-use palpate::mesh::Object;
 use palpate::mesh::builtin;
 use palpate::mesh::obj;
 use palpate::mesh::source::{self, Source};
+use palpate::mesh::{Instance, Object};
 use palpate::output;
 use palpate::{Error, Result};
 use palpate_report::page::render;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -26,7 +26,7 @@ pub(super) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
-    /// Where to write; a directory for NAME.obj of each object
+    /// Where to write; a directory for NAME.obj of each object, NAME/INSTANCE.obj of several instances
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Vary the proportions of built-in objects by up to about a fifth, with this seed
@@ -37,7 +37,7 @@ pub(super) struct Arguments {
     picture: Option<PathBuf>,
 }
 
-/// Files written for one object.
+/// A file that was written.
 #[derive(serde::Serialize)]
 struct Written {
     name: String,
@@ -50,7 +50,11 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
     let (made, files) = made(arguments)?;
     tell(&made);
-    let written = made.iter().map(|object| write(object, &files, arguments)).collect::<Result<Vec<_>>>()?;
+    let meshes: Vec<_> = made.iter().flat_map(|object| meshes(object, &arguments.output)).collect();
+    for file in meshes.iter().map(|(file, _)| file).chain(&arguments.picture) {
+        output::refuse_input(file, &files)?;
+    }
+    let written = meshes.into_iter().map(|(file, instance)| write(file, instance)).collect::<Result<Vec<_>>>()?;
     if let Some(picture) = &arguments.picture {
         output::write_bytes(picture, &render::sheet(&made, 1200))?;
     }
@@ -91,10 +95,34 @@ fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
     Ok((objects, files))
 }
 
-fn write(object: &Object, files: &[PathBuf], arguments: &Arguments) -> Result<Written> {
-    let file = arguments.output.join(format!("{}.obj", object.name));
-    output::refuse_input(&file, files)?;
-    output::write_whole(&file, |out| obj::write(object.mesh(), out))?;
-    let (vertices, triangles) = (object.mesh().vertices.len(), object.mesh().triangles.len());
-    Ok(Written { name: object.name.clone(), file, vertices, triangles })
+/// The files of an object: `NAME.obj`, or `NAME/INSTANCE.obj` if it has several instances.
+fn meshes<'a>(object: &'a Object, directory: &Path) -> Vec<(PathBuf, &'a Instance)> {
+    let file = |instance: &'a Instance| match object.instances().len() {
+        1 => (directory.join(format!("{}.obj", object.name)), instance),
+        _ => (directory.join(&object.name).join(format!("{}.obj", instance.name)), instance),
+    };
+    object.instances().map(file).collect()
+}
+
+fn write(file: PathBuf, Instance { name, mesh, .. }: &Instance) -> Result<Written> {
+    output::write_whole(&file, |out| obj::write(mesh, out))?;
+    Ok(Written { name: name.clone(), file, vertices: mesh.vertices.len(), triangles: mesh.triangles.len() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate::mesh::Mesh;
+
+    #[test]
+    fn all_instances_of_an_object_have_files_of_their_own() {
+        let instances = ["round", "flat"].map(|name| Instance { name: name.into(), mesh: Mesh::globe(4) });
+        let object = Object::of_instances("cup", instances.to_vec()).unwrap();
+        let files: Vec<_> = meshes(&object, Path::new("out")).into_iter().map(|(file, _)| file).collect();
+        assert_eq!(files, [Path::new("out/cup/round.obj"), Path::new("out/cup/flat.obj")]);
+        let [(file, _)] = &meshes(&Object::new("cup", Mesh::globe(4)), Path::new("out"))[..] else {
+            panic!("one file")
+        };
+        assert_eq!(file, Path::new("out/cup.obj"));
+    }
 }
