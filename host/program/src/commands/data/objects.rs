@@ -74,23 +74,21 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
 /// The objects, and the files that they come from.
 fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
     let sources = source::files(&arguments.sources)?;
-    let names: Vec<&str> =
-        sources.iter().filter(|source| matches!(source, Source::BuiltIn(_))).map(Source::name).collect();
-    let files = sources.iter().filter_map(|source| match source {
-        Source::File { path, .. } => Some(path.clone()),
-        _ => None,
-    });
-    let files: Vec<PathBuf> = files.collect();
-    let objects = match arguments.varied {
-        Some(_) if names.len() < sources.len() => {
-            return Err(Error::setting(
-                "varied",
-                "given for a mesh",
-                "it with built-in objects: only they can be varied",
-            ));
+    let (mut names, mut files) = (Vec::new(), Vec::new());
+    for source in &sources {
+        match source {
+            Source::BuiltIn(name) => names.push(*name),
+            Source::File { path, .. } => files.push(path.clone()),
+            Source::Background | Source::Instances { .. } => {}
         }
-        Some(seed) => builtin::make(&names, Some(seed))?,
-        None => source::objects(&arguments.sources)?,
+    }
+    let objects = match arguments.varied {
+        None => sources.into_iter().map(Source::read).collect::<Result<_>>()?,
+        Some(seed) if names.len() == sources.len() => builtin::make(&names, Some(seed))?,
+        Some(_) => {
+            let instead = "it with built-in objects: only they can be varied";
+            return Err(Error::setting("varied", "given for a mesh", instead));
+        }
     };
     Ok((objects, files))
 }
