@@ -1,6 +1,7 @@
 //! A ROS 2 node that recognizes objects by touch, without a ROS installation.
 
 mod chip;
+mod clients;
 mod decide;
 mod node;
 mod open;

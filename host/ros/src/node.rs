@@ -1,6 +1,7 @@
 //! The node while it runs: what happens on its topics, and what it says then.
 
 use crate::chip::{self, Heard, Order};
+use crate::clients::{AllClients, Clients};
 use crate::decide::{Decider, Step, Thresholds, UNDECIDED};
 use crate::open::{Actions, Change, Inputs, Options, Outputs, open, parameters, text};
 use crate::switches::Switches;
@@ -117,11 +118,12 @@ pub(crate) fn run(options: Options, signals: Signals) -> Result<(), String> {
         finished,
         counts: Counts::default(),
     };
-    let happened = happened(&inputs, changes, heard, signals);
+    let clients = AllClients::new(&context, &node);
+    let happened = happened(&inputs, &clients, changes, heard, signals);
     // Dropped before the node, which then says goodbye to the others.
     let executor = smol::LocalExecutor::new();
     executor.spawn(spinner.spin()).detach();
-    executor.spawn(answer(&inputs.actions, results)).detach();
+    executor.spawn(answer(&inputs.actions, &clients.results, results)).detach();
     smol::block_on(executor.run(running.run(happened)))
 }
 
@@ -133,6 +135,7 @@ fn settings(model: Option<&CompiledModel>) -> Settings {
 /// Everything that can happen, as it happens.
 fn happened<'n>(
     inputs: &'n Inputs,
+    clients: &'n AllClients<'n>,
     changes: Receiver<Change>,
     chip: LocalBoxStream<'n, Happened>,
     signals: Signals,
@@ -141,22 +144,27 @@ fn happened<'n>(
         Ok((touch, info)) => Happened::Touch(touch, info),
         Err(error) => Happened::Malformed(format!("touch: {error}")),
     });
-    let resets = inputs.reset.receive_request_stream().map(|read| match read {
-        Ok((id, expected)) => Happened::Reset(id, expected),
-        Err(error) => Happened::Malformed(format!("reset: {error}")),
+    let resets = inputs.reset.receive_request_stream().then(async |read| {
+        clients.reset.listen().await;
+        match read {
+            Ok((id, expected)) => Happened::Reset(id, expected),
+            Err(error) => Happened::Malformed(format!("reset: {error}")),
+        }
     });
-    let goals = stream::unfold(&inputs.actions, |actions| async move {
+    let goals = stream::unfold(&inputs.actions, move |actions| async move {
         let goal = actions
             .receive_new_goal()
             .await
             .map_or_else(|error| Happened::Malformed(format!("goal of recognize: {error}")), Happened::Goal);
+        clients.goals.listen().await;
         Some((goal, actions))
     });
-    let cancels = stream::unfold(&inputs.actions, |actions| async move {
+    let cancels = stream::unfold(&inputs.actions, move |actions| async move {
         let cancel = actions
             .receive_cancel_request()
             .await
             .map_or_else(|error| Happened::Malformed(format!("cancellation of recognize: {error}")), Happened::Cancel);
+        clients.cancellations.listen().await;
         Some((cancel, actions))
     });
     stream::select_all([
@@ -173,8 +181,9 @@ fn happened<'n>(
 }
 
 /// Sends results, one after another, to clients that ask for them.
-async fn answer(actions: &Actions, results: Receiver<Finished>) {
+async fn answer(actions: &Actions, clients: &Clients<'_>, results: Receiver<Finished>) {
     while let Ok((goal, status, verdict)) = results.recv().await {
+        clients.listen().await;
         let sent = actions.send_result_response(goal, status, Recognized { verdict });
         let timeout = async {
             smol::Timer::after(RESULT_TIMEOUT).await;

@@ -81,7 +81,7 @@ class Peer:
         return reader
 
     def latched(self, name, kind):
-        """A subscriber that has got the message of before the first touch: the node has found it too."""
+        """A subscriber that has got the message of before the first touch: the node has found it, and all opened before it."""
         reader = self.reader(name, kind, qos=qos(latched=True))
         take(reader, 1, f"no {name} before the first touch")
         return reader
@@ -102,13 +102,19 @@ def take(reader, count, what="messages are missing"):
 class Service:
     """A client of one of the node's services."""
 
-    def __init__(self, peer, name, request, response):
-        self.responses = peer.reader(name, response, prefix="rr", suffix="Reply")
+    def __init__(self, peer, name, request, response, late=False):
         self.requests = peer.writer(name, request, prefix="rq", suffix="Request")
-        self.response = response
+        self.open = lambda: peer.reader(name, response, prefix="rr", suffix="Reply")
+        self.responses = None if late else self.open()
 
     def ask(self, request):
         self.requests.write(request)
+
+    def ask_before_responses_can_be_heard(self, request):
+        """The node hears the request before it knows where responses go, as may happen right after discovery."""
+        self.ask(request)
+        time.sleep(0.3)
+        self.responses = self.open()
 
     def answer(self):
         [answer] = take(self.responses, 1, "no response")

@@ -277,11 +277,31 @@ def test_a_reset_over_cyclone_says_which_request_it_answers():
             assert answer.success and (answer.header.client, answer.header.number) == (77, number)
 
 
+def test_a_request_that_comes_before_the_reader_of_its_response_is_found_gets_a_response():
+    with Node(MODEL) as node:
+        for _ in range(2):
+            reset = Service(Peer(node), "reset", ResetRequest, ResetResponse, late=True)
+            reset.ask_before_responses_can_be_heard(ResetRequest())
+            assert reset.answer().success
+        send = Service(Peer(node), "recognize/_action/send_goal", SendGoalRequest, SendGoalResponse, late=True)
+        send.ask_before_responses_can_be_heard(SendGoalRequest(GoalId(uuid.uuid4().bytes), Goal()))
+        assert send.answer().accepted
+
+
+def test_a_client_that_never_hears_responses_does_not_keep_the_node_from_others():
+    with Node(MODEL) as node:
+        deaf, reset = (Service(Peer(node), "reset", ResetRequest, ResetResponse, late=late) for late in (True, False))
+        for _ in range(100):
+            deaf.ask(ResetRequest())
+        # A wait of a second, not of a hundred.
+        assert reset.call(ResetRequest()).success
+
+
 def test_parameters_change_the_model_and_the_thresholds(tmp_path):
     with Node(MODEL) as node:
         peer = Peer(node)
-        verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
         parameters = Service(peer, "set_parameters", SetParametersRequest, SetParametersResponse)
+        verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
 
         def set(name, value):
             return parameters.call(SetParametersRequest([Parameter(name, value)])).results[0]
@@ -354,6 +374,7 @@ def test_a_goal_is_canceled_and_a_change_of_the_thresholds_aborts_it():
         peer = Peer(node)
         client, touches = Client(peer), peer.writer("touch", Touch)
         parameters = Service(peer, "set_parameters", SetParametersRequest, SetParametersResponse)
+        peer.latched("verdict", Verdict)
         goal = client.begin()
         touches.write(Touch(LEVEL))
         take(client.feedback, 1)
@@ -371,7 +392,7 @@ def test_a_goal_is_canceled_and_a_change_of_the_thresholds_aborts_it():
 def test_three_switches_are_a_touch_of_the_times_that_they_were_published_at():
     with Node(MODEL) as node:
         peer = Peer(node)
-        verdicts, measured = peer.latched("verdict", Verdict), peer.reader("measured_touch", Touch)
+        measured, verdicts = peer.reader("measured_touch", Touch), peer.latched("verdict", Verdict)
         switches = [peer.writer(f"switch/{name}", Bool) for name in ("first", "middle", "last")]
         for number in range(1, 4):
             stamps = [0, 0, 0]
@@ -419,7 +440,7 @@ def test_fingers_of_a_chip_are_heard_also_after_its_node_started_again(chip):
     for touch in (1, 2):
         with Node("--port", chip.address) as node:
             peer = Peer(node)
-            verdicts, measured = peer.latched("verdict", Verdict), peer.reader("measured_touch", Touch)
+            measured, verdicts = peer.reader("measured_touch", Touch), peer.latched("verdict", Verdict)
             diagnostics = peer.reader("/diagnostics", DiagnosticArray)
             until(lambda: take(diagnostics, 1)[0].status[0].level == 0, "the chip is not there")
             chip.stdin.write("0.03 0 -\n")
@@ -441,6 +462,6 @@ def test_a_chip_that_is_gone_is_an_error_in_the_diagnostics(chip):
         chip.kill()
         until(lambda: take(diagnostics, 1)[0].status[0].level == 2, "the chip that is gone is not reported")
         assert chip.address in reset.call(ResetRequest()).message
-        verdicts, touches = peer.reader("verdict", Verdict), peer.writer("touch", Touch)
+        verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
         touches.write(Touch(LEVEL))
         until(lambda: [v for v in take(verdicts, 1) if chip.address in v.refused], "the touch is not refused")
