@@ -5,6 +5,7 @@ mod clients;
 mod decide;
 mod node;
 mod open;
+mod participant;
 mod switches;
 mod wire;
 

@@ -4,6 +4,7 @@ use crate::chip::{self, Heard, Order};
 use crate::clients::{AllClients, Clients};
 use crate::decide::{Decider, Step, Thresholds, UNDECIDED};
 use crate::open::{Actions, Change, Inputs, Options, Outputs, open, parameters, text};
+use crate::participant;
 use crate::switches::Switches;
 use crate::wire::{
     Bool, DiagnosticArray, DiagnosticStatus, Expected, Header, KeyValue, Recognized, ResetDone, Text, Touch, Verdict,
@@ -17,9 +18,7 @@ use palpate::onboard::shared::Touch as Felt;
 use ros2_client::action::{CancelHandle, ExecutingGoalHandle, GoalEndStatus, NewGoalHandle};
 use ros2_client::builtin_interfaces::Time;
 use ros2_client::ros2::LogLevel;
-use ros2_client::{
-    Context, ContextOptions, Gid, MessageInfo, Node, NodeName, Publisher, ROSTime, RmwRequestId, rosout,
-};
+use ros2_client::{Context, Gid, MessageInfo, Node, NodeName, Publisher, ROSTime, RmwRequestId, rosout};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -81,7 +80,7 @@ struct Counts {
 /// Why it cannot start, or go on.
 pub(crate) fn run(options: Options, signals: Signals) -> Result<(), String> {
     let (changed, changes) = async_channel::unbounded();
-    let context = Context::with_options(ContextOptions::new().domain_id(options.domain)).map_err(text)?;
+    let context = Context::from_domain_participant(participant::join(options.domain)?).map_err(text)?;
     let name = NodeName::new(&options.namespace, &options.name).map_err(text)?;
     let node = context.new_node(name, parameters(&options, changed));
     let mut node = node.map_err(text)?;

@@ -156,6 +156,18 @@ def test_a_late_subscriber_gets_the_last_verdict():
         assert len(Peer(node).reader("verdict", Verdict).take()) == 0
 
 
+@pytest.mark.parametrize("port", [10, 11], ids=["discovery", "data"])
+def test_a_node_of_whose_ports_another_process_has_one_is_heard_and_hears(port):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        # Of number 0, as the specification of RTPS has it.
+        taken.bind(("0.0.0.0", 7400 + 250 * int(os.environ["ROS_DOMAIN_ID"]) + port))
+        with Node(MODEL) as node:
+            peer = Peer(node)
+            verdicts, touches = peer.latched("verdict", Verdict), peer.writer("touch", Touch)
+            touches.write(Touch(LEVEL))
+            assert take(verdicts, 1)[0].touch == 1
+
+
 def test_a_node_that_was_killed_is_found_again_when_it_starts():
     with Node(MODEL) as node:
         peer = Peer(node)
@@ -289,12 +301,15 @@ def test_a_request_that_comes_before_the_reader_of_its_response_is_found_gets_a_
 
 
 def test_a_client_that_never_hears_responses_does_not_keep_the_node_from_others():
-    with Node(MODEL) as node:
-        deaf, reset = (Service(Peer(node), "reset", ResetRequest, ResetResponse, late=late) for late in (True, False))
-        for _ in range(100):
-            deaf.ask(ResetRequest())
-        # A wait of a second, not of a hundred.
-        assert reset.call(ResetRequest()).success
+    with Node(MODEL, "--middleware", "cyclonedds") as node:
+        deaf, other = (
+            Service(Peer(node), "reset", NumberedResetRequest, NumberedResetResponse, late=late) for late in (True, False)
+        )
+        for number in range(100):
+            deaf.ask(NumberedResetRequest(RequestHeader(1, number)))
+        other.ask(NumberedResetRequest(RequestHeader(2, 1)))
+        # Responses to others are heard, too. The node has waited for a second, not for a hundred.
+        until(lambda: take(other.responses, 1)[-1].header.client == 2, "no response")
 
 
 def test_parameters_change_the_model_and_the_thresholds(tmp_path):
