@@ -66,16 +66,12 @@ impl<'n> Clients<'n> {
     }
 
     fn is_one_not_listening(&self) -> bool {
-        let asking = self.asking();
-        if asking.is_subset(&self.known.borrow()) {
-            return false;
-        }
         let readers = self.context.domain_participant().discovered_readers();
         let listening: BTreeSet<_> = (readers.iter())
             .filter(|reader| reader.subscription_topic_data.topic_name == self.responses)
             .map(|reader| reader.reader_proxy.remote_reader_guid.prefix)
             .collect();
-        asking.difference(&self.known.borrow()).any(|writer| !listening.contains(&writer.prefix))
+        self.asking().difference(&self.known.borrow()).any(|writer| !listening.contains(&writer.prefix))
     }
 
     /// Writers of requests.
