@@ -31,7 +31,7 @@ pub(crate) fn join(domain: u16) -> Result<DomainParticipant, String> {
     Err(format!("domain {domain}: no two ports are free that belong together"))
 }
 
-/// Whether this process has a UDP port. Where the system does not say, it is taken to.
+/// True if this process has a UDP port, and where the system does not say.
 #[cfg(target_os = "linux")]
 fn is_open_here(port: u16) -> bool {
     use procfs::process::{FDTarget, Process};
