@@ -11,7 +11,7 @@ use std::time::Duration;
 
 /// Time between looks at what discovery has found.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
-/// Looks after which a client is taken for one that does not listen.
+/// Number of looks after which a client counts as not listening.
 const LOOKS: usize = 100;
 
 /// The clients of one service.
@@ -51,8 +51,8 @@ impl<'n> Clients<'n> {
     }
 
     /// Waits until a response reaches whoever may have asked: each participant that writes requests has a reader of responses.
-    /// One that still has none after a second is not waited for again.
-    pub(crate) async fn listen(&self) {
+    /// Takes a second at most, and a participant that has none by then is not waited for again.
+    pub(crate) async fn wait_until_listening(&self) {
         let mut looks = 0;
         while self.is_one_not_listening() && looks < LOOKS {
             smol::Timer::after(LOOK_EVERY).await;

@@ -144,7 +144,7 @@ fn happened<'n>(
         Err(error) => Happened::Malformed(format!("touch: {error}")),
     });
     let resets = inputs.reset.receive_request_stream().then(async |read| {
-        clients.reset.listen().await;
+        clients.reset.wait_until_listening().await;
         match read {
             Ok((id, expected)) => Happened::Reset(id, expected),
             Err(error) => Happened::Malformed(format!("reset: {error}")),
@@ -155,7 +155,7 @@ fn happened<'n>(
             .receive_new_goal()
             .await
             .map_or_else(|error| Happened::Malformed(format!("goal of recognize: {error}")), Happened::Goal);
-        clients.goals.listen().await;
+        clients.goals.wait_until_listening().await;
         Some((goal, actions))
     });
     let cancels = stream::unfold(&inputs.actions, move |actions| async move {
@@ -163,7 +163,7 @@ fn happened<'n>(
             .receive_cancel_request()
             .await
             .map_or_else(|error| Happened::Malformed(format!("cancellation of recognize: {error}")), Happened::Cancel);
-        clients.cancellations.listen().await;
+        clients.cancellations.wait_until_listening().await;
         Some((cancel, actions))
     });
     stream::select_all([
@@ -182,7 +182,7 @@ fn happened<'n>(
 /// Sends results, one after another, to clients that ask for them.
 async fn answer(actions: &Actions, clients: &Clients<'_>, results: Receiver<Finished>) {
     while let Ok((goal, status, verdict)) = results.recv().await {
-        clients.listen().await;
+        clients.wait_until_listening().await;
         let sent = actions.send_result_response(goal, status, Recognized { verdict });
         let timeout = async {
             smol::Timer::after(RESULT_TIMEOUT).await;

@@ -395,6 +395,7 @@ def test_a_goal_is_canceled_and_a_change_of_the_thresholds_aborts_it():
         peer = Peer(node)
         client, touches = Client(peer), peer.writer("touch", Touch)
         parameters = Service(peer, "set_parameters", SetParametersRequest, SetParametersResponse)
+        # The parameters' responses do not wait until the node has found their reader: now it has.
         peer.latched("verdict", Verdict)
         goal = client.begin()
         touches.write(Touch(LEVEL))
