@@ -64,9 +64,12 @@ impl Debounce {
         if self.settled { None } else { self.left }
     }
 
-    /// The clock starts here.
+    /// The clock starts here: what was before happened now.
     pub(super) const fn start(&mut self, now: u32) {
-        self.since = now;
+        (self.since, self.closed_since) = (now, now);
+        if self.left.is_some() {
+            self.left = Some(now);
+        }
     }
 
     /// The level is `closed` from `at` on. An edge to the level that was there already changes nothing.

@@ -24,6 +24,10 @@ pub enum State {
 /// More than the timers that can run out at one moment: three for each finger and two for the touch.
 const MOST_TIMERS: usize = 16;
 
+/// Microseconds by which a time may be older than the one before, and count as now. Less than a counter of 16 bits goes back
+/// when it overflows.
+const LATEST: u32 = 1 << 15;
+
 /// The driver without pins or a clock: edges and the time go in, touches and faults come out.
 ///
 /// What comes out depends on the edges and their times alone, not on how often [`Effector::poll`] is called; but a touch
@@ -56,13 +60,22 @@ struct Faults {
     bouncing: [bool; 3],
     silent: [bool; 3],
     unreadable: [bool; 3],
-    overrun: bool,
+    lost: Option<Lost>,
+}
+
+/// Reason why times are not known.
+#[derive(Clone, Copy, Debug)]
+enum Lost {
+    Overrun,
+    Clock,
 }
 
 impl Faults {
     fn take(&mut self) -> Option<Fault> {
-        if core::mem::take(&mut self.overrun) {
-            return Some(Fault::Overrun);
+        match self.lost.take() {
+            Some(Lost::Overrun) => return Some(Fault::Overrun),
+            Some(Lost::Clock) => return Some(Fault::Clock),
+            None => {}
         }
         Finger::ALL.into_iter().find_map(|finger| {
             let told = |flags: &mut [bool; 3], fault: Fault| core::mem::take(finger.of(flags)).then_some(fault);
@@ -124,7 +137,8 @@ impl Effector {
         self.fingers.map(|finger| finger.level())
     }
 
-    /// Takes in an edge. An edge older than the last one, or than the last poll, counts as now.
+    /// Takes in an edge. An edge older than the last one, or than the last poll, counts as now; one that is older by more than
+    /// 33 ms is a [`Fault::Clock`] while a time is running.
     ///
     /// Returns a touch that was over before the edge, if there was one.
     ///
@@ -152,20 +166,16 @@ impl Effector {
     }
 
     /// Takes in a fault that was seen elsewhere, as by [`Watcher::sense`](super::Watcher::sense):
-    /// [`Effector::poll`] reports it in its turn. [`Fault::Overrun`] drops the touch in progress.
+    /// [`Effector::poll`] reports it in its turn. [`Fault::Overrun`] and [`Fault::Clock`] drop the touch in progress.
     pub fn report(&mut self, fault: Fault) {
-        if fault == Fault::Overrun {
-            self.abandon();
-            // Also where no touch was in progress: one may have begun with what was lost.
-            self.unseen = true;
-        }
         let faults = &mut self.faults;
         let flag = match fault {
             Fault::Stuck(finger) => finger.of(&mut faults.stuck),
             Fault::Bouncing(finger) => finger.of(&mut faults.bouncing),
             Fault::Silent(finger) => finger.of(&mut faults.silent),
             Fault::Unreadable(finger) => finger.of(&mut faults.unreadable),
-            Fault::Overrun => &mut faults.overrun,
+            Fault::Overrun => return self.lose(Lost::Overrun),
+            Fault::Clock => return self.lose(Lost::Clock),
         };
         *flag = true;
     }
@@ -179,14 +189,19 @@ impl Effector {
 
     /// Fires the timers that run out until `now`, in their order.
     fn advance(&mut self, now: u32) {
-        let Some(mut at) = self.now else {
+        let runs = self.until_timer(self.now.unwrap_or(now)).is_some();
+        // While no timer runs any amount of time may have passed.
+        let back = if runs { after(self.now.unwrap_or(now), now) } else { 0 };
+        let Some(mut at) = self.now.filter(|_| back <= LATEST) else {
+            if self.now.is_some() {
+                self.lose(Lost::Clock);
+            }
+            // The clock starts here.
             self.fingers.iter_mut().for_each(|finger| finger.start(now));
-            self.now = Some(now);
-            self.open_since = Some(now);
+            (self.now, self.open_since) = (Some(now), Some(now));
             return;
         };
-        // While no timer runs any amount of time may have passed.
-        let mut left = if self.until_timer(at).is_none() { now.wrapping_sub(at) } else { after(now, at) };
+        let mut left = if back > 0 { 0 } else { now.wrapping_sub(at) };
         for _ in 0..MOST_TIMERS {
             let Some(due) = self.until_timer(at).filter(|&due| due <= left) else { break };
             at = at.wrapping_add(due);
@@ -260,6 +275,13 @@ impl Effector {
             self.state = State::Released;
             self.unseen = true;
         }
+    }
+
+    /// Drops the touch in progress; also where there was none, one may have begun with what was lost.
+    fn lose(&mut self, what: Lost) {
+        self.abandon();
+        self.unseen = true;
+        self.faults.lost = Some(what);
     }
 
     /// Time that all fingers have to be open before a touch can begin. In an approach they may be for up to `release`.

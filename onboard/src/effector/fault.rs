@@ -22,6 +22,9 @@ pub enum Fault {
     Unreadable(Finger),
     /// Edges came faster than the main loop drained them, and some were lost. The touch, if there was one, is dropped.
     Overrun,
+    /// The [`Clock`](super::Clock) went back by more than 33 ms while a time was running: it has fewer than 32 bits, or two
+    /// readings are out of order. The touch, if there was one, is dropped, and time goes on from the new reading.
+    Clock,
 }
 
 impl Fault {
@@ -31,7 +34,7 @@ impl Fault {
             Self::Stuck(finger) | Self::Bouncing(finger) | Self::Silent(finger) | Self::Unreadable(finger) => {
                 Some(finger)
             }
-            Self::Overrun => None,
+            Self::Overrun | Self::Clock => None,
         }
     }
 }
@@ -46,6 +49,7 @@ impl From<Fault> for Event {
             Fault::Silent(_) => FaultKind::Silent,
             Fault::Unreadable(_) => FaultKind::Unreadable,
             Fault::Overrun => FaultKind::Overrun,
+            Fault::Clock => FaultKind::Clock,
         };
         let finger = match fault.finger() {
             Some(Finger::First) => 0,
@@ -69,6 +73,7 @@ impl fmt::Display for Fault {
             Self::Silent(finger) => write!(f, "{finger} has not touched for many touches: check its wiring"),
             Self::Unreadable(finger) => write!(f, "the pin of {finger} cannot be read: check the port"),
             Self::Overrun => f.write_str("edges were lost: drain the queue more often, or make it longer"),
+            Self::Clock => f.write_str("the clock went back: extend the counter to 32 bits of microseconds"),
         }
     }
 }

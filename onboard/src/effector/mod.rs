@@ -40,7 +40,8 @@ pub use polled::Probe;
 pub use scale::{Geometry, Scale};
 pub use settings::Settings;
 
-/// A clock in microseconds that wraps from `u32::MAX` to 0 (every 71 minutes) and never stops.
+/// A clock in microseconds that wraps from `u32::MAX` to 0 (every 71 minutes) and never stops. A counter of fewer bits has to
+/// be extended by its overflows: read as it is, each of them within a touch drops that touch with [`Fault::Clock`].
 pub trait Clock {
     /// Microseconds since any moment.
     fn micros(&self) -> u32;

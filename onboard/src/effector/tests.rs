@@ -651,7 +651,77 @@ fn every_fault_says_what_to_do() {
             assert_eq!(fault.finger(), Some(finger));
         }
     }
-    assert_eq!(Fault::Overrun.finger(), None);
+    for fault in [Fault::Overrun, Fault::Clock] {
+        let text = std::format!("{fault}");
+        assert!(text.contains(':') && fault.finger().is_none(), "{text}");
+    }
+}
+
+/// Touches half a second apart, polled each millisecond, by a counter of so many bits that starts at `start`.
+fn by_counter(bits: u32, start: u64, touches: u64) -> Outcomes {
+    let (mut effector, mut outcomes) = (Effector::new(SETTINGS), Outcomes::new());
+    for at in (0..touches * 500_000).step_by(1_000) {
+        let now = u32::try_from((start + at) % (1 << bits)).unwrap();
+        for (finger, time) in [(First, 0), (Middle, 20_000), (Last, 35_000)] {
+            // The first touch after the rest at power-up.
+            for (closed, time) in [(true, 150_000 + time), (false, 210_000)] {
+                if at % 500_000 == time {
+                    outcomes.extend(effector.edge(Edge::new(finger, closed, now)).transpose());
+                }
+            }
+        }
+        poll(&mut effector, now, &mut outcomes);
+    }
+    outcomes
+}
+
+#[test]
+fn a_counter_of_fewer_than_32_bits_that_wraps_in_a_touch_is_a_fault_and_costs_no_later_touch() {
+    let touch = Ok(Touch::from_micros([0, 20_000, 35_000]));
+    assert_eq!(by_counter(32, (1 << 32) - 165_000, 3), [touch; 3]);
+    for bits in [16, 20, 24, 28] {
+        // In the first touch, between its first contact and the next.
+        let outcomes = by_counter(bits, (1 << bits) - 165_000 % (1 << bits), 8);
+        assert_eq!(outcomes[0], Err(Fault::Clock), "{bits} bits");
+        assert!(outcomes.iter().flatten().all(|of| Ok(*of) == touch), "{bits} bits: {outcomes:?}");
+        // A counter of 16 bits goes round within each touch.
+        assert_eq!(outcomes.iter().flatten().count(), if bits == 16 { 0 } else { 7 }, "{bits} bits: {outcomes:?}");
+    }
+}
+
+#[test]
+fn a_reading_of_the_clock_that_is_ahead_drops_its_touch_and_no_later_one() {
+    let (mut effector, mut outcomes) = (Effector::new(SETTINGS), Outcomes::new());
+    let mut touch = |from: u32, ahead: u32| {
+        poll(&mut effector, from, &mut outcomes);
+        poll(&mut effector, from + 200_000, &mut outcomes);
+        for (finger, time) in [(First, 200_000), (Middle, 220_000), (Last, 235_000)] {
+            outcomes.extend(effector.edge(Edge::new(finger, true, from + time)).transpose());
+            poll(&mut effector, from + time + 6_000 + if finger == First { ahead } else { 0 }, &mut outcomes);
+        }
+        for finger in Finger::ALL {
+            outcomes.extend(effector.edge(Edge::new(finger, false, from + 300_000)).transpose());
+        }
+        poll(&mut effector, from + 900_000, &mut outcomes);
+    };
+    touch(0, 1 << 16);
+    touch(1_000_000, 0);
+    assert_eq!(outcomes, [Err(Fault::Clock), Ok(Touch::from_micros([0, 20_000, 35_000]))]);
+}
+
+#[test]
+fn an_edge_that_is_a_little_older_than_the_last_poll_counts_as_now() {
+    let (mut effector, mut outcomes) = (Effector::new(SETTINGS), Outcomes::new());
+    for at in [0, 200_000] {
+        poll(&mut effector, at, &mut outcomes);
+    }
+    outcomes.extend(effector.edge(Edge::new(First, true, 200_000)).transpose());
+    poll(&mut effector, 240_000, &mut outcomes);
+    for finger in [Middle, Last] {
+        outcomes.extend(effector.edge(Edge::new(finger, true, 210_000)).transpose());
+    }
+    poll(&mut effector, 250_000, &mut outcomes);
+    assert_eq!(outcomes, [Ok(Touch::from_micros([0, 40_000, 40_000]))]);
 }
 
 #[test]

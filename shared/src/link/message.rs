@@ -297,6 +297,8 @@ pub enum FaultKind {
     Unreadable,
     /// Edges came faster than the main loop took them, and some were lost.
     Overrun,
+    /// The clock went back during a touch: it does not count through all 32 bits.
+    Clock,
 }
 
 impl core::fmt::Display for FaultKind {
@@ -307,6 +309,7 @@ impl core::fmt::Display for FaultKind {
             Self::Silent => "silent",
             Self::Unreadable => "unreadable",
             Self::Overrun => "edges lost",
+            Self::Clock => "the clock went back",
         })
     }
 }
