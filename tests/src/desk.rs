@@ -177,9 +177,8 @@ impl Write for Desk {
         let news = outcome.filter(|&sequence| self.newest.is_none_or(|newest| sequence > newest));
         if self.cut_every > 0 && self.rng.random_ratio(1, self.cut_every) {
             self.untold = news.is_some();
-            // What was on the line is gone; what is in the host is not.
-            self.to_chip.clear();
-            return Err(PowerCut);
+            self.power.set(false);
+            return self.alive().map(|()| 0);
         }
         self.newest = news.or(self.newest);
         let Self { host, to_chip, outcomes, answers, open, now, .. } = self;

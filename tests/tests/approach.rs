@@ -1,7 +1,7 @@
 //! Where to touch next, and what recent touches say against the evidence.
 
 use palpate::compile::{Leaf, Restated, Settings, compile, restate};
-use palpate_onboard::station::Station;
+use palpate_onboard::station::{NoStorage, Station, serve};
 use palpate_onboard::{Forgetting, Model, Proposal, Recognizer, Stopping, Verdict};
 use palpate_shared::format::{Plan, Tag};
 use palpate_shared::link::{ApproachMessage, Device, POSE_BYTES, Query, Refusal};
@@ -167,8 +167,7 @@ fn a_chip_proposes_over_the_link_what_the_hosts_recognizer_proposes() {
     script.push(Step::Ask(Query::NextApproach { without: [0xff; POSE_BYTES] }));
     expected.push(answered(Err(Refusal::NoPlan)));
     let mut desk = Desk::new(script, 0);
-    let memory = palpate_onboard::station::NoStorage;
-    palpate_onboard::station::serve::<OBJECTS, _, _>(&bytes, memory, 0, &mut desk).unwrap();
+    serve::<OBJECTS, _, _>(&bytes, &mut NoStorage, 0, &mut desk).unwrap();
     assert_eq!(desk.answers, expected);
     let different: std::collections::BTreeSet<&String> = desk.answers.iter().collect();
     assert!(different.len() > 5, "{different:?}");
@@ -178,8 +177,7 @@ fn a_chip_proposes_over_the_link_what_the_hosts_recognizer_proposes() {
 fn a_chip_without_a_plan_refuses_to_propose() {
     let bytes = model(3);
     let mut desk = Desk::new([Step::Ask(Query::NextApproach { without: [0; POSE_BYTES] })], 0);
-    palpate_onboard::station::serve::<OBJECTS, _, _>(&bytes, palpate_onboard::station::NoStorage, 0, &mut desk)
-        .unwrap();
+    serve::<OBJECTS, _, _>(&bytes, &mut NoStorage, 0, &mut desk).unwrap();
     assert_eq!(desk.answers, ["Refused(NoPlan)"]);
 }
 

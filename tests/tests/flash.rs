@@ -37,8 +37,8 @@ fn run(cells: &mut Cells, built_in: &[u8], desk: &mut Desk) -> u32 {
     desk.power = cells.power.clone();
     for cuts in 0..10 {
         cells.power.set(true);
-        let storage = FlashStorage::<_, RECORD>::new(Driver(cells), LOG * SECTOR).unwrap();
-        match serve::<OBJECTS, _, _>(built_in, storage, 7, desk) {
+        let mut storage = FlashStorage::<_, RECORD>::new(Driver(cells), LOG * SECTOR).unwrap();
+        match serve::<OBJECTS, _, _>(built_in, &mut storage, 7, desk) {
             Ok(()) => return cuts,
             Err(ServeError::Transport(PowerCut)) => {}
             Err(error) => panic!("{error}"),

@@ -30,6 +30,8 @@ struct Bench {
     /// Bytes that the chip has sent.
     said: Vec<u8>,
     is_unplugged: bool,
+    /// Every receive is an error of the line.
+    is_garbled: bool,
     /// Poses, and when they are announced.
     poses: Vec<(u32, Pose)>,
     asked: u32,
@@ -48,7 +50,7 @@ impl Board for Bench {
     }
 
     fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
-        if self.is_unplugged {
+        if self.is_unplugged || self.is_garbled {
             return Err(Unplugged);
         }
         let count = buffer.len().min(self.to_chip.len());
@@ -258,6 +260,19 @@ fn a_link_that_fails_hides_no_touch_and_no_verdict_from_the_chips_own_program() 
     bench.approach(bench.now, times.map(Some), 300_000);
     let end = bench.now + APPROACH;
     run(&mut station, &mut bench, end);
+    assert!(matches!(bench.told()[..], [Event::Touch { .. }]));
+}
+
+#[test]
+fn a_byte_that_is_garbled_while_a_touch_ends_does_not_keep_the_touch_from_being_told() {
+    let (mut station, mut bench) = started();
+    bench.is_garbled = true;
+    bench.approach(bench.now, deciding().0.map(Some), 300_000);
+    let end = bench.now + APPROACH;
+    while bench.now < end {
+        bench.now += 1_000;
+        station.step(&mut bench).unwrap_err();
+    }
     assert!(matches!(bench.told()[..], [Event::Touch { .. }]));
 }
 

@@ -56,8 +56,8 @@ fn the_chips_process() {
     wire.0.set_nodelay(true).unwrap();
     let [mut a, mut b] = [(); 2].map(|()| vec![0; 100_000]);
     let [mut c, mut d] = [(); 2].map(|()| vec![0; record_length(OBJECTS)]);
-    let memory = Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] };
-    serve::<OBJECTS, _, _>(&[], memory, 0, &mut wire).unwrap();
+    let mut memory = Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] };
+    serve::<OBJECTS, _, _>(&[], &mut memory, 0, &mut wire).unwrap();
 }
 
 /// Resident memory of a process in bytes, where the system reports it.

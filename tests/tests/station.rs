@@ -1,10 +1,16 @@
 //! A chip's whole program at the end of a link: its verdicts are those of a recognizer, through loading,
 //! power cuts and torn records.
 
+use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate::compile::{Leaf, Settings, compile};
-use palpate_onboard::station::{Memory, RecordsTooShort, ServeError, record_length, serve};
+use palpate_onboard::station::{
+    ERRORS_IN_A_ROW, Memory, NoStorage, RecordsTooShort, ServeError, Station, record_length, serve,
+};
 use palpate_shared::format::{Counted, Trained, TrainedTouches};
-use palpate_shared::link::{Command, LinkError, Outcome, Payload, Query, Refusal};
+use palpate_shared::link::{
+    Command, DeviceEnd, FRAME_MAX, Frame, HostEnd, HostSettings, Incoming, LinkError, Message, Outcome, Payload,
+    Progress, Query, Refusal, encode,
+};
 use palpate_shared::{ContactTime, Descriptor, Patterns, Pose, Touch};
 use palpate_tests::desk::{Desk, OBJECTS, PowerCut, Step, answers_to_touches, expected, load, push};
 use palpate_tests::random::{self, Shape};
@@ -53,7 +59,8 @@ impl Chip {
 
     fn run(&mut self, desk: &mut Desk) -> Result<(), PowerCut> {
         let Self { built_in, models: [a, b], records: [c, d] } = self;
-        match serve::<OBJECTS, _, _>(built_in, Memory { models: [a, b], records: [c, d] }, 0, desk) {
+        desk.power.set(true);
+        match serve::<OBJECTS, _, _>(built_in, &mut Memory { models: [a, b], records: [c, d] }, 0, desk) {
             Ok(()) => Ok(()),
             Err(ServeError::Transport(cut)) => Err(cut),
             Err(error) => panic!("{error}"),
@@ -179,10 +186,10 @@ fn places_for_records_that_are_too_short_are_refused_at_once() {
     chip.records[1].truncate(record_length(8));
     let mut desk = Desk::new(touches(3).iter().map(push), 0);
     let Chip { built_in, models: [a, b], records: [c, d] } = &mut chip;
-    let memory = Memory { models: [a, b], records: [c, d] };
+    let mut memory = Memory { models: [a, b], records: [c, d] };
     let (needed, found) = (record_length(OBJECTS), record_length(8));
     let too_short = ServeError::Records(RecordsTooShort { needed, found });
-    assert_eq!(serve::<OBJECTS, _, _>(built_in, memory, 0, &mut desk), Err(too_short));
+    assert_eq!(serve::<OBJECTS, _, _>(built_in, &mut memory, 0, &mut desk), Err(too_short));
     assert!(desk.outcomes.is_empty());
 }
 
@@ -258,4 +265,253 @@ fn newest(records: &[Vec<u8>; 2]) -> usize {
     };
     let [even, odd] = records.each_ref().map(|record| counter(record).unwrap_err());
     usize::from(odd > even)
+}
+
+/// A UART that lost or garbled a byte.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Garbled;
+
+impl core::fmt::Display for Garbled {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("garbled")
+    }
+}
+
+impl core::error::Error for Garbled {}
+
+impl embedded_io::Error for Garbled {
+    fn kind(&self) -> ErrorKind {
+        ErrorKind::Other
+    }
+}
+
+/// A UART that hands out byte by byte what a desk sends, and errors.
+struct Uart<'d, F> {
+    desk: &'d mut Desk,
+    /// True if this read, or this frame to be sent, is an error.
+    errs: F,
+    /// True if a read that is an error loses the byte.
+    loses: bool,
+    reads: u32,
+    writes: u32,
+}
+
+impl<'d, F> Uart<'d, F> {
+    fn new(desk: &'d mut Desk, loses: bool, errs: F) -> Self {
+        Self { desk, errs, loses, reads: 0, writes: 0 }
+    }
+}
+
+/// One read or write of a UART, by its number.
+enum Call {
+    Read(u32),
+    Write(u32),
+}
+
+impl<F> ErrorType for Uart<'_, F> {
+    type Error = Garbled;
+}
+
+impl<F: FnMut(Call) -> bool> Read for Uart<'_, F> {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Garbled> {
+        self.reads += 1;
+        let errs = (self.errs)(Call::Read(self.reads - 1));
+        if errs && !self.loses {
+            return Err(Garbled);
+        }
+        let count = self.desk.read(&mut buffer[..1]).map_err(|PowerCut| Garbled)?;
+        // The end is no byte.
+        if errs && count > 0 { Err(Garbled) } else { Ok(count) }
+    }
+}
+
+impl<F: FnMut(Call) -> bool> Write for Uart<'_, F> {
+    fn write(&mut self, buffer: &[u8]) -> Result<usize, Garbled> {
+        self.writes += 1;
+        if (self.errs)(Call::Write(self.writes - 1)) {
+            return Err(Garbled);
+        }
+        self.desk.write(buffer).map_err(|PowerCut| Garbled)
+    }
+
+    fn flush(&mut self) -> Result<(), Garbled> {
+        Ok(())
+    }
+}
+
+/// Serves these touches over a UART with errors, and returns its calls.
+fn served(touches: &[Touch], loses: bool, errs: impl FnMut(Call) -> bool) -> [u32; 2] {
+    let bytes = model(1);
+    let mut chip = Chip::new(bytes.clone());
+    let Chip { built_in, models: [a, b], records: [c, d] } = &mut chip;
+    let mut desk = Desk::new(touches.iter().map(push), 0);
+    let mut uart = Uart::new(&mut desk, loses, errs);
+    serve::<OBJECTS, _, _>(built_in, &mut Memory { models: [a, b], records: [c, d] }, 0, &mut uart).unwrap();
+    let calls = [uart.reads, uart.writes];
+    assert_eq!(desk.outcomes, expected(&bytes, touches));
+    calls
+}
+
+#[test]
+fn an_error_of_the_uart_at_any_byte_or_frame_ends_nothing_and_costs_no_touch() {
+    let touches = touches(4);
+    let [reads, writes] = served(&touches, true, |_| false);
+    assert!(reads > 100 && writes > 4, "{reads} reads, {writes} writes");
+    for at in 0..reads {
+        served(&touches, true, |call| matches!(call, Call::Read(number) if number == at));
+        served(&touches, false, |call| matches!(call, Call::Read(number) if number == at));
+    }
+    for at in 0..writes {
+        served(&touches, true, |call| matches!(call, Call::Write(number) if number == at));
+    }
+}
+
+#[test]
+fn a_uart_that_errs_before_every_byte_serves_all_touches() {
+    served(&touches(40), false, |call| matches!(call, Call::Read(number) if number % 2 == 0));
+    // As long as a byte comes now and then.
+    let most = u32::from(ERRORS_IN_A_ROW);
+    served(&touches(1), false, |call| matches!(call, Call::Read(number) if number % most != 0));
+}
+
+#[test]
+fn a_uart_that_only_errs_ends_the_program_and_its_storage_serves_on_over_another() {
+    let (bytes, touches) = (model(1), touches(20));
+    let mut chip = Chip::new(bytes.clone());
+    let Chip { built_in, models: [a, b], records: [c, d] } = &mut chip;
+    let mut storage = Memory { models: [a, b], records: [c, d] };
+    let mut desk = Desk::new(touches.iter().map(push), 0);
+    let mut uart = Uart::new(&mut desk, true, |call| matches!(call, Call::Read(number) if number >= 500));
+    let ended = serve::<OBJECTS, _, _>(built_in, &mut storage, 0, &mut uart);
+    assert_eq!((ended, uart.reads), (Err(ServeError::Transport(Garbled)), 500 + u32::from(ERRORS_IN_A_ROW)));
+    let before = desk.outcomes.len();
+    assert!((1..touches.len()).contains(&before), "{before}");
+    let mut uart = Uart::new(&mut desk, true, |_| false);
+    assert_eq!(serve::<OBJECTS, _, _>(built_in, &mut storage, 0, &mut uart), Ok(()));
+    assert_eq!(desk.outcomes, expected(&bytes, &touches));
+}
+
+/// A host that asks and asks, at a UART on which nothing can be sent.
+struct Mute {
+    frame: Vec<u8>,
+    writes: u32,
+}
+
+impl ErrorType for Mute {
+    type Error = Garbled;
+}
+
+impl Read for Mute {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Garbled> {
+        self.frame.rotate_left(1);
+        buffer[0] = self.frame[self.frame.len() - 1];
+        Ok(1)
+    }
+}
+
+impl Write for Mute {
+    fn write(&mut self, _: &[u8]) -> Result<usize, Garbled> {
+        self.writes += 1;
+        Err(Garbled)
+    }
+
+    fn flush(&mut self) -> Result<(), Garbled> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_uart_on_which_nothing_can_be_sent_ends_the_program_although_bytes_come() {
+    let message = Message::Query { tag: 1, query: Query::Hello };
+    let frame = encode(&Frame { session: 1, message }, &mut [0; FRAME_MAX]).to_vec();
+    let mut uart = Mute { frame, writes: 0 };
+    let ended = serve::<OBJECTS, _, _>(&[], &mut NoStorage, 0, &mut uart);
+    assert_eq!((ended, uart.writes), (Err(ServeError::Transport(Garbled)), u32::from(ERRORS_IN_A_ROW)));
+}
+
+/// A wire whose read is an error before every byte, and that is ready.
+#[derive(Default)]
+struct Wire {
+    bytes: std::collections::VecDeque<u8>,
+    written: Vec<u8>,
+    is_garbled: bool,
+}
+
+impl ErrorType for Wire {
+    type Error = Garbled;
+}
+
+impl Read for Wire {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Garbled> {
+        self.is_garbled = !self.is_garbled;
+        if self.is_garbled {
+            return Err(Garbled);
+        }
+        let byte = self.bytes.pop_front();
+        byte.into_iter().zip(buffer).for_each(|(from, to)| *to = from);
+        Ok(usize::from(byte.is_some()))
+    }
+}
+
+impl embedded_io::ReadReady for Wire {
+    fn read_ready(&mut self) -> Result<bool, Garbled> {
+        Ok(!self.bytes.is_empty())
+    }
+}
+
+impl Write for Wire {
+    fn write(&mut self, buffer: &[u8]) -> Result<usize, Garbled> {
+        self.written.extend(buffer);
+        Ok(buffer.len())
+    }
+
+    fn flush(&mut self) -> Result<(), Garbled> {
+        Ok(())
+    }
+}
+
+#[test]
+fn both_ends_of_the_link_go_on_after_an_error_before_every_byte() {
+    let (mut host, mut end) = (HostEnd::new(HostSettings::default()), DeviceEnd::new(Progress::NONE, 1));
+    let bytes = model(1);
+    let model = palpate_onboard::Model::new(&bytes).unwrap();
+    let mut station = Station::<OBJECTS>::new(&model);
+    let (mut to_chip, mut to_host) = (Wire::default(), Wire::default());
+    host.connect(1, 0, |frame| to_chip.bytes.extend(frame));
+    let (mut opened, mut errors) = (false, 0);
+    for now in 0..1_000 {
+        while !to_chip.bytes.is_empty() {
+            errors += u32::from(end.serve(&mut to_chip, &mut station).is_err());
+        }
+        to_host.bytes.extend(to_chip.written.drain(..));
+        match host.exchange(&mut to_host, now, |incoming| opened |= matches!(incoming, Incoming::Opened)) {
+            Ok(ticked) => ticked.unwrap(),
+            Err(Garbled) => errors += 1,
+        }
+        to_chip.bytes.extend(to_host.written.drain(..));
+    }
+    assert!(opened && errors > 50, "{opened}, {errors} errors");
+}
+
+#[test]
+fn a_loaded_model_of_more_objects_than_the_next_program_has_room_for_falls_back_to_the_built_in_one() {
+    let shape = Shape {
+        descriptor: Descriptor::Curvature,
+        objects: 3,
+        trees: 4,
+        depth: 3,
+        each: true,
+        thresholds: 40,
+        leaf: 0.3,
+    };
+    let small = compile(&random::ensemble(shape, 1), &Settings::default()).unwrap().bytes;
+    let mut chip = Chip::new(small.clone());
+    let mut desk = Desk::new(load(model(1).leak(), Payload::Model), 0);
+    chip.run(&mut desk).unwrap();
+    assert_eq!(desk.outcomes.last(), Some(&Outcome::Done));
+    let touches = touches(3);
+    let Chip { built_in, models: [a, b], records: [c, d] } = &mut chip;
+    let mut desk = Desk::new(touches.iter().map(push), 0);
+    serve::<4, _, _>(built_in, &mut Memory { models: [a, b], records: [c, d] }, 0, &mut desk).unwrap();
+    assert_eq!(desk.outcomes, expected(&small, &touches));
 }

@@ -39,6 +39,6 @@ pub use flash::{FlashError, FlashStorage, MappedFlash};
 pub use memory::Memory;
 pub use probe::{Board, Happened, LONGEST_WAIT, LinkFailed, ProbeSettings, ProbeStation};
 pub use record::record_length;
-pub use serve::{ServeError, serve};
+pub use serve::{ERRORS_IN_A_ROW, ServeError, serve};
 pub use session::{PROGRAM, RecordsTooShort, Station};
 pub use storage::{NoStorage, Place, Storage};

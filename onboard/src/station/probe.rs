@@ -17,7 +17,8 @@ pub trait Board {
     /// off.
     fn sense(&mut self) -> Sensed;
 
-    /// Takes bytes that have come from the host, without waiting for any; how many.
+    /// Takes bytes that have come from the host, without waiting for any; how many. Bytes that a UART reports as garbled are
+    /// best left out: the host sends again what was in them.
     ///
     /// # Errors
     /// The link failed.
@@ -180,16 +181,21 @@ impl<E: fmt::Debug + fmt::Display> core::error::Error for LinkFailed<E> {}
 /// The longest that a chip sleeps, in microseconds: a second.
 pub const LONGEST_WAIT: u32 = 1_000_000;
 
-/// A board whose link may fail: the first error is kept, and nothing more is sent.
+/// A board whose link may fail: the first error is kept, and once sending has failed nothing more is sent. What cannot be
+/// received says nothing of what can be sent.
 struct Line<'b, B: Board> {
     board: &'b mut B,
     failed: Option<B::Error>,
+    sends: bool,
 }
 
 impl<B: Board> Line<'_, B> {
     fn send(&mut self, frame: &[u8]) {
-        if self.failed.is_none() {
-            self.failed = self.board.send(frame).err();
+        if self.sends
+            && let Err(error) = self.board.send(frame)
+        {
+            self.sends = false;
+            self.failed.get_or_insert(error);
         }
     }
 
@@ -271,10 +277,10 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
     /// neither waits for the other. Of two things that happened it returns the touch or fault.
     ///
     /// # Errors
-    /// The link's, with what happened all the same. What was to be sent is lost; the host notices, and asks again for what
-    /// it waits for.
+    /// The link's, with what happened all the same. Call it again. What could not be sent is lost; the host notices, and asks
+    /// again for what it waits for.
     pub fn step<B: Board>(&mut self, board: &mut B) -> Result<Option<Happened>, LinkFailed<B::Error>> {
-        let mut line = Line { board, failed: None };
+        let mut line = Line { board, failed: None, sends: true };
         if !core::mem::replace(&mut self.started, true) {
             // Boot numbers count records, so without one a start before the first touch would have that of the next start.
             self.end.store(&mut self.station, |frame| line.send(frame));

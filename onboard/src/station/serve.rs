@@ -6,11 +6,15 @@ use core::fmt;
 use embedded_io::{Read, Write};
 use palpate_shared::link::DeviceEnd;
 
+/// Errors of a transport in a row after which [`serve`] ends: of reads without a byte in between, or of frames to be sent. A
+/// UART reports each garbled byte as an error, and has one or two of them whenever a cable is plugged in.
+pub const ERRORS_IN_A_ROW: u16 = 1_000;
+
 /// Reason why a chip's program has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ServeError<E> {
-    /// The transport's own error.
+    /// The last of [`ERRORS_IN_A_ROW`] errors of the transport.
     Transport(E),
     /// Records are too short: nothing could be stored.
     Records(RecordsTooShort),
@@ -33,10 +37,31 @@ impl<E> From<RecordsTooShort> for ServeError<E> {
     }
 }
 
-/// Serves a host at the other end of `transport`, with room for models of `N` objects, until the transport fails.
+/// Errors of one direction of a transport, in a row.
+struct Failures(u16);
+
+impl Failures {
+    /// The result of a call; `None` for an error that is one of few.
+    fn pass<T, E>(&mut self, result: Result<T, E>) -> Result<Option<T>, ServeError<E>> {
+        match result {
+            Ok(done) => {
+                self.0 = 0;
+                Ok(Some(done))
+            }
+            Err(error) => {
+                self.0 = self.0.saturating_add(1);
+                if self.0 < ERRORS_IN_A_ROW { Ok(None) } else { Err(ServeError::Transport(error)) }
+            }
+        }
+    }
+}
+
+/// Serves a host at the other end of `transport`, with room for models of `N` objects, until the transport ends or has failed
+/// [`ERRORS_IN_A_ROW`] times in a row. Fewer errors lose bytes or frames, which the host sends or asks for again.
 ///
 /// Continues from the newest record in `storage`; a loaded model is used again if it is still intact. `built_in` is a model
-/// in flash, in use until another is loaded; it may be empty.
+/// in flash, in use until another is loaded; it may be empty. Once the transport works again, call this again with the same
+/// storage.
 ///
 /// Stack: a few buffers for frames and records more than [`Recognizer::push`](crate::Recognizer::push); the README of the
 /// firmware states it.
@@ -45,37 +70,32 @@ impl<E> From<RecordsTooShort> for ServeError<E> {
 /// chip that has them may give 0.
 ///
 /// # Errors
-/// The transport's own; a transport that ends (reads nothing) returns `Ok`. [`ServeError::Records`] at once if the
-/// storage keeps records and they are too short for models of `N` objects.
+/// [`ServeError::Transport`], the transport's own; a transport that ends (reads nothing) returns `Ok`.
+/// [`ServeError::Records`] at once if the storage keeps records and they are too short for models of `N` objects.
 pub fn serve<const N: usize, S: Storage, T: Read + Write>(
     built_in: &[u8],
-    storage: S,
+    storage: &mut S,
     boot: u32,
     transport: &mut T,
 ) -> Result<(), ServeError<T::Error>> {
-    let (mut station, progress, starts) = Station::<N, S>::open(built_in, storage)?;
+    let (mut station, progress, starts) = Station::<N, &mut S>::open(built_in, storage)?;
     // Each start writes a record at its first command, so the counter is another one after each that mattered.
     let mut end = DeviceEnd::new(progress, boot.wrapping_add(starts));
-    let mut written = Ok(());
-    end.start(|frame| {
-        if written.is_ok() {
-            written = transport.write_all(frame);
-        }
-    });
-    written.map_err(ServeError::Transport)?;
+    let (mut reads, mut writes) = (Failures(0), Failures(0));
+    let mut send = |frame: &[u8], transport: &mut T| {
+        let written = transport.write_all(frame).and_then(|()| transport.flush());
+        writes.pass(written)
+    };
+    let mut sent = Ok(None);
+    end.start(|frame| sent = send(frame, transport));
     loop {
-        transport.flush().map_err(ServeError::Transport)?;
+        sent?;
         let mut buffer = [0; 32];
-        let count = transport.read(&mut buffer).map_err(ServeError::Transport)?;
+        sent = Ok(None);
+        let Some(count) = reads.pass(transport.read(&mut buffer))? else { continue };
         if count == 0 {
             return Ok(());
         }
-        // Byte by byte, so that nothing is done once the transport has failed.
-        for byte in buffer.get(..count).unwrap_or_default() {
-            let mut result = Ok(());
-            let send = |frame: &[u8]| result = transport.write_all(frame);
-            end.receive(core::slice::from_ref(byte), &mut station, send);
-            result.map_err(ServeError::Transport)?;
-        }
+        end.receive(buffer.get(..count).unwrap_or_default(), &mut station, |frame| sent = send(frame, transport));
     }
 }

@@ -110,9 +110,9 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
         Ok((station, progress, starts))
     }
 
-    /// The model that a source names, if it is one.
+    /// The model that a source names, if it is one with no more objects than there is room for.
     fn model_at(&self, source: Source) -> Option<Model<'_>> {
-        Model::new(self.bytes_at(source)).ok()
+        Model::new(self.bytes_at(source)).ok().filter(|model| model.object_count() <= N)
     }
 
     fn bytes_at(&self, source: Source) -> &[u8] {

@@ -44,6 +44,33 @@ pub trait Storage {
     fn store(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), NotStored>;
 }
 
+/// Storage that its owner keeps, as after [`serve`](super::serve) has ended.
+impl<S: Storage> Storage for &mut S {
+    fn room(&self) -> usize {
+        (**self).room()
+    }
+
+    fn model(&self, place: Place) -> &[u8] {
+        (**self).model(place)
+    }
+
+    fn write_model(&mut self, place: Place, offset: usize, bytes: &[u8]) -> Result<(), NotStored> {
+        (**self).write_model(place, offset, bytes)
+    }
+
+    fn record_length(&self) -> usize {
+        (**self).record_length()
+    }
+
+    fn newest(&self) -> Option<(u32, &[u8])> {
+        (**self).newest()
+    }
+
+    fn store(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), NotStored> {
+        (**self).store(fill)
+    }
+}
+
 /// Keeps nothing: every start is the first, and no model can be loaded.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoStorage;

@@ -217,7 +217,8 @@ impl DeviceEnd {
         }
     }
 
-    /// Waits for bytes on `transport`, and answers them there. Call it in a loop.
+    /// Waits for bytes on `transport`, and answers them there. Call it in a loop, also after an error: a UART reports each
+    /// garbled byte as one, and the host asks again for what it does not get.
     ///
     /// # Errors
     /// The transport's own.

@@ -539,7 +539,8 @@ impl HostEnd {
         Ok(())
     }
 
-    /// Reads what is there on `transport`, answers it, and sends again what is due. Does not wait.
+    /// Reads what is there on `transport`, answers it, and sends again what is due. Does not wait. Call it again after an
+    /// error: a UART reports each garbled byte as one.
     ///
     /// # Errors
     /// The transport's own, or [`LinkError`].

@@ -47,9 +47,9 @@ fn chip() -> String {
         stream.set_nodelay(true).unwrap();
         let [mut a, mut b] = [(); 2].map(|()| vec![0; 10_000]);
         let [mut c, mut d] = [(); 2].map(|()| vec![0; record_length(OBJECTS)]);
-        let memory = Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] };
+        let mut memory = Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] };
         // It ends with an error where the host hangs up in the middle of something.
-        let _ = serve::<OBJECTS, _, _>(&[], memory, 0, &mut Wire(stream));
+        let _ = serve::<OBJECTS, _, _>(&[], &mut memory, 0, &mut Wire(stream));
     })
 }
 

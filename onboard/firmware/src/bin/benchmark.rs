@@ -143,9 +143,9 @@ fn whole(meter: &mut Meter, touch: &Touch) {
     let mut run = |touches: u32| {
         first.fill(0);
         second.fill(0);
-        let memory = Memory { models: [&mut [], &mut []], records: [first, second] };
+        let mut memory = Memory { models: [&mut [], &mut []], records: [first, second] };
         let mut wire = Wire { touch, touches, sequence: 0, frame: [0; FRAME_MAX], at: 0, length: 0 };
-        match serve::<OBJECTS, _, _>(MODEL, memory, 0, &mut wire) {
+        match serve::<OBJECTS, _, _>(MODEL, &mut memory, 0, &mut wire) {
             Ok(()) => wire.sequence,
             Err(_) => fail(),
         }

@@ -16,8 +16,8 @@ const OBJECTS: usize = 16;
 #[entry]
 fn main() -> ! {
     let mut uart = Uart::take(Port::Link);
-    let memory = chip::take_memory(record_length(OBJECTS));
-    match serve::<OBJECTS, _, _>(&[], memory, 0, &mut uart) {
+    let mut memory = chip::take_memory(record_length(OBJECTS));
+    match serve::<OBJECTS, _, _>(&[], &mut memory, 0, &mut uart) {
         // The UART has no end.
         Ok(()) | Err(_) => palpate_firmware::fail(),
     }
