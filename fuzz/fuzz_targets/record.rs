@@ -56,7 +56,7 @@ impl MappedFlash for Flash {
 fuzz_target!(|bytes: &[u8]| {
     // As they are, and as the body of a record with a right checksum.
     let mut whole = u16::try_from(bytes.len()).unwrap_or(0).to_le_bytes().to_vec();
-    whole.extend((checksum(bytes) ^ 2).to_le_bytes());
+    whole.extend((checksum(bytes) ^ 3).to_le_bytes());
     whole.extend(bytes);
     for bytes in [bytes, &whole] {
         let mut places = [vec![0; RECORD.max(bytes.len())], vec![0; RECORD]];

@@ -60,7 +60,9 @@ pub enum Misread {
 pub struct Cells {
     /// Their content.
     pub bytes: Vec<u8>,
-    /// The same, for whoever looks while a driver has them.
+    /// The value of erased bytes.
+    pub erased_to: u8,
+    /// A copy of `bytes`, for whoever looks while a driver has them.
     pub mirror: Rc<RefCell<Vec<u8>>>,
     /// Erases of each sector.
     pub erases: Vec<u32>,
@@ -96,12 +98,18 @@ impl Cells {
         Self::holding(mirror.borrow().clone(), ChaCha8Rng::seed_from_u64(0))
     }
 
+    /// Cells that are erased to this value.
+    pub fn erased_to(self, erased_to: u8) -> Self {
+        Self { erased_to, ..self }
+    }
+
     fn holding(bytes: Vec<u8>, rng: ChaCha8Rng) -> Self {
         let sectors = bytes.len() / SECTOR;
         let power = Rc::new(Cell::new(true));
         Self {
             mirror: Rc::new(RefCell::new(bytes.clone())),
             bytes,
+            erased_to: 0xff,
             erases: vec![0; sectors],
             endurance: vec![u32::MAX; sectors],
             steps: 0,
@@ -175,11 +183,12 @@ impl NorFlash for Driver<'_> {
     fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
         check_erase(self, from, to).expect("whole sectors");
         for sector in from as usize / SECTOR..to as usize / SECTOR {
-            let mut wanted = [0xff; SECTOR];
+            let erased = self.0.erased_to;
+            let mut wanted = [erased; SECTOR];
             if self.0.erases[sector] >= self.0.endurance[sector] {
                 // Worn: some cells do not come back.
                 for byte in wanted.iter_mut().skip(sector % 7).step_by(97) {
-                    *byte = 0xfe;
+                    *byte = erased ^ 1;
                 }
             }
             self.0.erases[sector] += 1;
@@ -198,9 +207,12 @@ impl NorFlash for Driver<'_> {
             let cells: [u8; WORD] = self.0.bytes[at..at + WORD].try_into().expect("a word");
             // Worn cells aside, nothing is written twice.
             let worn = self.0.erases[at / SECTOR] > self.0.endurance[at / SECTOR];
-            assert!(worn || cells == [0xff; WORD], "the word at {at} is not erased");
+            let erased = self.0.erased_to;
+            assert!(worn || cells == [erased; WORD], "the word at {at} is not erased");
             let word = if self.0.programs.get() { *word } else { cells };
-            self.0.step(at, &std::array::from_fn::<u8, WORD, _>(|i| word[i] & cells[i]))?;
+            // A bit that is programmed does not come back.
+            let programmed = |i: usize| if erased == 0xff { word[i] & cells[i] } else { word[i] | cells[i] };
+            self.0.step(at, &std::array::from_fn::<u8, WORD, _>(programmed))?;
         }
         Ok(())
     }
@@ -208,12 +220,12 @@ impl NorFlash for Driver<'_> {
 
 impl MappedFlash for Driver<'_> {
     fn bytes(&self) -> &[u8] {
-        let Cells { bytes, reads, misread, misread_as, .. } = &*self.0;
+        let Cells { bytes, erased_to, reads, misread, misread_as, .. } = &*self.0;
         let read = reads.replace(reads.get() + 1);
         match misread {
             Some((when, how)) if *when == read => misread_as.get_or_init(|| match how {
                 Misread::Flipped => bytes.iter().map(|byte| byte ^ 0x10).collect(),
-                Misread::Erased => vec![0xff; bytes.len()],
+                Misread::Erased => vec![*erased_to; bytes.len()],
             }),
             _ => bytes,
         }

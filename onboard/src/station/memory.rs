@@ -1,12 +1,15 @@
 //! Memory that is written like RAM and keeps its content.
 
-use super::record::{self, Found};
+use super::record::{self, ERASED, Found};
 use super::storage::{Place, Storage};
 use core::sync::atomic::{Ordering, compiler_fence};
 use palpate_shared::link::NotStored;
 
 /// Memory that is written like RAM: battery-backed or FRAM, or RAM where it must survive resets but no power cuts.
 /// Every slice may be empty: then the chip does without.
+///
+/// Writes have to reach the memory by themselves: behind a data cache, as of a Cortex-M7, the region must be write-through or
+/// not cached, or a power cut takes the records that are still in the cache.
 #[derive(Debug)]
 pub struct Memory<'a> {
     /// Two places for models from the host: one in use, one being filled.
@@ -17,7 +20,7 @@ pub struct Memory<'a> {
 
 impl Memory<'_> {
     fn found(&self) -> Option<Found<'_>> {
-        let [even, odd] = self.records.each_ref().map(|place| record::read(place));
+        let [even, odd] = self.records.each_ref().map(|place| record::read(place, ERASED));
         match (even, odd) {
             (Some(even), Some(odd)) if odd.is_newer_than(even.counter) => Some(odd),
             (even, odd) => even.or(odd),
@@ -68,7 +71,7 @@ impl Storage for Memory<'_> {
         let [even, odd] = &mut self.records;
         let place = if counter.is_multiple_of(2) { even } else { odd };
         record::write(place, fill).ok_or(NotStored)?;
-        record::number(place, counter).ok_or(NotStored)?;
+        record::number(place, counter, ERASED).ok_or(NotStored)?;
         // The power may go at any moment from here on: the writes must not be delayed.
         compiler_fence(Ordering::SeqCst);
         Ok(())

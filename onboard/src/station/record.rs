@@ -40,6 +40,14 @@ pub(super) struct Staged {
 /// damaged.
 const VERSION: u32 = 3;
 
+/// The value of erased bytes of most flash. Records in memory of other kinds say this too.
+pub(super) const ERASED: u8 = 0xff;
+
+/// Addend of a record's checksum, by the value of erased bytes where the record is: it is how a start knows that value.
+fn version(erased: u8) -> u32 {
+    VERSION ^ u32::from(!erased) << 8
+}
+
 /// A record.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Record<'a> {
@@ -79,12 +87,12 @@ impl Found<'_> {
     }
 }
 
-/// The record at the start of `bytes`, if there is a whole one.
-pub(super) fn read(bytes: &[u8]) -> Option<Found<'_>> {
+/// The record at the start of `bytes`, whose erased value is `erased`, if there is a whole one.
+pub(super) fn read(bytes: &[u8], erased: u8) -> Option<Found<'_>> {
     let (&[l0, l1, c0, c1, c2, c3], body) = bytes.split_first_chunk::<HEADER>()?;
     let length = usize::from(u16::from_le_bytes([l0, l1]));
     let written = body.get(..length)?;
-    if checksum(written) ^ VERSION != u32::from_le_bytes([c0, c1, c2, c3]) {
+    if checksum(written) ^ version(erased) != u32::from_le_bytes([c0, c1, c2, c3]) {
         return None;
     }
     let (counter, record) = written.split_first_chunk::<COUNTER>()?;
@@ -101,13 +109,14 @@ pub(super) fn write(bytes: &mut [u8], fill: impl FnOnce(&mut [u8]) -> Option<usi
     Some(HEADER + length)
 }
 
-/// Numbers the record that was written into `bytes`, which is whole then. It may be numbered again.
-pub(super) fn number(bytes: &mut [u8], counter: u32) -> Option<()> {
+/// Numbers the record that was written into `bytes`, for memory whose erased value is `erased`. It is whole then, and may be
+/// numbered again.
+pub(super) fn number(bytes: &mut [u8], counter: u32, erased: u8) -> Option<()> {
     let (header, body) = bytes.split_first_chunk_mut::<HEADER>()?;
     let [l0, l1, ..] = *header;
     *body.first_chunk_mut::<COUNTER>()? = counter.to_le_bytes();
     let written = body.get(..usize::from(u16::from_le_bytes([l0, l1])))?;
-    let [c0, c1, c2, c3] = (checksum(written) ^ VERSION).to_le_bytes();
+    let [c0, c1, c2, c3] = (checksum(written) ^ version(erased)).to_le_bytes();
     *header = [l0, l1, c0, c1, c2, c3];
     Some(())
 }

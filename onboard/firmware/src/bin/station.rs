@@ -76,9 +76,8 @@ impl MappedFlash for Anything {
 
 #[entry]
 fn main() -> ! {
-    const RECORD: usize = record_length(10).next_multiple_of(4);
     let bytes: &'static [u8] = black_box(&[]);
-    if let Ok(storage) = FlashStorage::<_, RECORD>::new(Anything, black_box(8192))
+    if let Ok(storage) = FlashStorage::<_, { record_length(10) }>::new(Anything, black_box(8192))
         && let Ok(mut station) = ProbeStation::<10, _>::open(bytes, storage, ProbeSettings::default())
     {
         loop {
