@@ -53,6 +53,8 @@ pub struct Connection {
     heard: VecDeque<(Received, u32)>,
     reply: Option<Reply>,
     open: bool,
+    /// The checksum of the model that [`Connection::model`] described, and the boot number of the start that it is of.
+    model: Option<(u32, u32)>,
 }
 
 impl Connection {
@@ -68,6 +70,7 @@ impl Connection {
             heard: VecDeque::new(),
             reply: None,
             open: false,
+            model: None,
         };
         connection.connect()?;
         let boot = connection.end.boot();
@@ -141,12 +144,41 @@ impl Connection {
     ///
     /// # Errors
     /// When the line broke, or the chip is silent or has forgotten the session: the error says how many commands are
-    /// concerned.
+    /// concerned. [`ChipProblem::Replaced`] where it was reset and has another model than [`Connection::model`] described;
+    /// that has to be asked again then.
     pub fn hear(&mut self, wait: Duration) -> Result<Option<Received>> {
         if self.heard.is_empty() {
             self.exchange(wait)?;
         }
-        Ok(self.heard.pop_front().map(|(received, _)| received))
+        let Some((received, boot)) = self.heard.pop_front() else { return Ok(None) };
+        if matches!(received, Received::Event(..))
+            && let Err(error) = self.check_model(boot)
+        {
+            // It is of the model that the chip has now.
+            self.heard.push_front((received, boot));
+            return Err(error);
+        }
+        Ok(Some(received))
+    }
+
+    /// Asks a chip that has started since its model was asked for whether that is still the one: a loaded model that cannot
+    /// be read any more is replaced by the program's own.
+    fn check_model(&mut self, boot: u32) -> Result<()> {
+        let Some((known, of)) = self.model else { return Ok(()) };
+        if of == boot {
+            return Ok(());
+        }
+        match self.ask(Query::Model)? {
+            Reply::Model(info) if info.checksum == known => {
+                self.model = Some((known, boot));
+                Ok(())
+            }
+            Reply::Model(_) | Reply::Refused(Refusal::NoModel) => {
+                self.model = None;
+                Err(self.wrong(ChipProblem::Replaced))
+            }
+            reply => self.unexpected(&reply),
+        }
     }
 
     fn exchange(&mut self, wait: Duration) -> Result<()> {
@@ -228,6 +260,7 @@ impl Connection {
                 reply => return self.unexpected(&reply),
             }
         }
+        self.model = Some((info.checksum, self.end.boot()));
         Ok(ChipModel { info, names })
     }
 
@@ -291,6 +324,7 @@ impl Connection {
     /// is [cancelled](Error::Cancelled). When the line broke or the chip is silent.
     pub fn load(&mut self, bytes: &[u8], progress: &dyn Progress) -> Result<()> {
         progress.begin("loading", Some(bytes.len() as u64));
+        self.model = None;
         let length = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
         let begin = Command::Begin { payload: Payload::Model, length, checksum: checksum(bytes) };
         let chunks = bytes.chunks(CHUNK).enumerate().map(|(index, bytes)| {

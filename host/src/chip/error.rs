@@ -59,6 +59,9 @@ pub enum ChipProblem {
         /// Commands that may have been executed or not; if so, their effect is lost.
         uncertain: u32,
     },
+    /// The chip was reset, and has another model now, or none.
+    #[error("the chip was reset and has another model than before")]
+    Replaced,
     /// The chip has no model.
     #[error("the chip has no model")]
     NoModel,
@@ -161,6 +164,10 @@ impl Problem for ChipProblem {
                 );
             }
             Self::Forgotten { .. } => "Start again, or use a program on the chip that stores its progress.",
+            Self::Replaced => {
+                "Load the model again. The chip's flash may be worn, or its program may have been replaced by one without \
+                 the model's features."
+            }
             Self::NoModel | Self::Refused(Refusal::NoModel) => "Load a model into it.",
             Self::Rows => {
                 "Recognize rows here with `palpate recognize MODEL ROWS.csv --features`; on the chip the program itself \

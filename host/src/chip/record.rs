@@ -208,10 +208,17 @@ fn wait(
     }
 }
 
-/// True if the line broke, or the chip does not know the session any more: it may come back.
+/// True if the line broke, or the chip does not know the session any more or has another model: it may come back, and says
+/// again what it is.
 fn is_lost(error: &Error) -> bool {
     let lost = |problem: &ChipProblem| {
-        matches!(problem, ChipProblem::Lost { .. } | ChipProblem::Silent { .. } | ChipProblem::Forgotten { .. })
+        matches!(
+            problem,
+            ChipProblem::Lost { .. }
+                | ChipProblem::Silent { .. }
+                | ChipProblem::Forgotten { .. }
+                | ChipProblem::Replaced
+        )
     };
     is(error, lost)
 }

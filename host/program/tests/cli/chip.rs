@@ -2,7 +2,7 @@
 
 use crate::compiled::Place;
 use crate::{command, json, run, stderr, stdout};
-use palpate_onboard::station::{Memory, record_length, serve};
+use palpate_onboard::station::{Memory, NoStorage, record_length, serve};
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -181,4 +181,54 @@ fn watch_names_the_line_of_a_journal_that_is_wrong() {
     assert_eq!(String::from_utf8_lossy(&output.stdout), "another object: cup\n");
     let error = stderr(output, 1);
     assert!(error.contains("journal.jsonl:2: not an entry of a journal"), "{error}");
+}
+
+/// A stream that ends where nothing comes for a while.
+struct Brief(Wire);
+
+impl embedded_io::ErrorType for Brief {
+    type Error = embedded_io::ErrorKind;
+}
+
+impl embedded_io::Read for Brief {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Self::Error> {
+        self.0.0.set_read_timeout(Some(std::time::Duration::from_millis(500))).unwrap();
+        Ok(self.0.read(buffer).unwrap_or(0))
+    }
+}
+
+impl embedded_io::Write for Brief {
+    fn write(&mut self, buffer: &[u8]) -> Result<usize, Self::Error> {
+        self.0.write(buffer)
+    }
+
+    fn flush(&mut self) -> Result<(), Self::Error> {
+        self.0.flush()
+    }
+}
+
+/// A chip with this model, and after a reset with that one.
+fn chip_that_is_reset(before: Vec<u8>, after: Vec<u8>) -> String {
+    port(move |stream| {
+        let mut wire = Brief(Wire(stream));
+        let _ = serve::<16, _, _>(&before, &mut NoStorage, 1, &mut wire);
+        let _ = serve::<16, _, _>(&after, &mut NoStorage, 2, &mut wire);
+        // Until the host hangs up, so that what was sent last arrives.
+        let _ = wire.0.0.read(&mut [0; 100]);
+    })
+}
+
+#[test]
+fn a_chip_that_is_reset_and_has_another_model_then_is_not_watched_with_the_names_of_the_one_before() {
+    let household = include_bytes!("../../../../models/household.palpate").to_vec();
+    let own = std::fs::read(Place::new().path("model.palpate")).unwrap();
+    for after in [own, Vec::new()] {
+        let output = run(["link", &chip_that_is_reset(household.clone(), after), "--watch"]);
+        assert!(String::from_utf8_lossy(&output.stdout).starts_with("model of 44336 bytes"));
+        let error = stderr(output, 1);
+        assert!(
+            error.contains("the chip was reset and has another model than before. Load the model again"),
+            "{error}"
+        );
+    }
 }
