@@ -151,9 +151,14 @@ fn IO_IRQ_BANK0() {
 fn UART0_IRQ() {
     with(|shared| {
         let mut buffer = [0; 32];
-        // What was garbled on the way is missing, and the host sends it again.
-        while let Ok(count) = shared.reader.read_raw(&mut buffer) {
-            for byte in buffer.iter().take(count) {
+        loop {
+            let bytes = match shared.reader.read_raw(&mut buffer) {
+                Ok(count) => buffer.get(..count).unwrap_or_default(),
+                // A garbled byte is missing, and the host sends it again; those before it are here.
+                Err(nb::Error::Other(error)) => error.discarded,
+                Err(nb::Error::WouldBlock) => break,
+            };
+            for byte in bytes {
                 // No host that keeps to the window sends more.
                 let _ = shared.received.push_back(*byte);
             }
