@@ -172,7 +172,7 @@ fn a_step_that_fails_or_a_read_that_is_wrong_loses_no_acknowledged_record_howeve
 
 #[test]
 fn flash_whose_erased_bytes_are_0_keeps_its_records_through_every_fault() {
-    every_fault(|| Cells::new(LOG, 1).erased_to(0), 7);
+    every_fault(|| Cells::new(LOG, 1).erased_to(0), 13);
 }
 
 /// Has every fault happen at every `stride`th step, and every misreading at every such read.
