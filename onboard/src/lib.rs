@@ -45,12 +45,19 @@
 //! | `effector` | [`effector`] |
 //! | `link` | [`shared`]`::link`, and snapshots of a recognizer |
 //! | `station` | [`station`], with both of these |
-//! | `compact`, `complete`, `grid`, `wide` | layouts of trees that can be read |
+//! | `compact`, `complete`, `wide` | layouts of trees that can be read |
+//! | `grid`, `patterns` | layouts of tables that can be read |
+//! | `code` | models whose trees are a function of the program (`Model::with_code`); off by default |
 //! | `i8-leaves`, `i16-leaves`, `f32-leaves` | types of leaves that can be read |
 //! | `shared-leaves` | trees whose equal leaves are stored once |
 //! | `sentinel` | models over rows in which a number stands for a missing value |
 //! | `row-evidence` | models that state what a row adds to the evidence, and how much rows count together |
-//! | `defmt` | touches, verdicts, refusals and faults can be logged; the only one that is off by default |
+//! | `strangers` | models with a background, or a test for objects that they do not know |
+//! | `outputs` | models of which several outputs belong to one object |
+//! | `rows` | many rows at once, for hosts (`Model::margins_of_rows`) |
+//! | `defmt` | touches, verdicts, refusals and faults can be logged; off by default |
+//!
+//! A model that needs a feature which is not built in is refused when it is opened.
 //!
 //! `no_std`, without a heap and without `unsafe`; once a model has been validated nothing here can panic.
 #![no_std]

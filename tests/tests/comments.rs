@@ -1,9 +1,11 @@
 //! Rules for comments that hold for every file of the project.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+const ONBOARD: &str = include_str!("../../onboard/src/lib.rs");
 /// Folders with sources, from the root.
 const FOLDERS: [&str; 5] = ["shared", "onboard", "host", "tests", "fuzz"];
 /// Words that begin a question where the reader looks for the thing.
@@ -68,4 +70,50 @@ fn a_question_counts_only_at_the_start_of_a_block_of_documentation() {
     let block = "/// Number of touches.\n/// What follows is no start.\nstruct A;\n//// What\n// What\n";
     assert!(questions(block).is_empty());
     assert_eq!(questions("//! Whatever.\n\n    /// Whether it is.\n/// Why.\n\n///How\n"), [3, 6]);
+}
+/// Names between back quotes.
+fn names(text: &str) -> impl Iterator<Item = &str> {
+    text.split('`').skip(1).step_by(2)
+}
+
+/// Features of the manifest, and those that each brings in.
+fn features() -> BTreeMap<&'static str, Vec<&'static str>> {
+    let manifest = include_str!("../../onboard/Cargo.toml");
+    let (_, section) = manifest.split_once("[features]\n").expect("a section of features");
+    let section = section.split("\n[").next().expect("its lines");
+    let lines = section.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());
+    let feature = |line: &'static str| {
+        let (name, others) = line.split_once(" = ").expect("a feature of one line");
+        (name, others.split('"').skip(1).step_by(2).collect())
+    };
+    lines.map(feature).collect()
+}
+
+#[test]
+fn the_crates_table_of_features_has_all_that_there_are_and_says_which_are_off() {
+    let features = features();
+    let mut on: BTreeSet<&str> = BTreeSet::new();
+    let mut next = features["default"].clone();
+    while let Some(feature) = next.pop() {
+        if on.insert(feature) {
+            next.extend(features.get(feature).into_iter().flatten());
+        }
+    }
+    let table = ONBOARD.lines().skip_while(|line| !line.starts_with("//! | feature |")).skip(2);
+    let rows = table.map_while(|line| line.strip_prefix("//! | ")?.strip_suffix(" |")?.split_once(" | "));
+    let (mut stated, mut off) = (BTreeSet::new(), BTreeSet::new());
+    for (first, what) in rows {
+        for name in names(first) {
+            assert!(stated.insert(name), "{name} is there twice");
+            if what.ends_with("off by default") {
+                off.insert(name);
+            }
+        }
+    }
+    let all: BTreeSet<&str> = features.keys().copied().filter(|name| *name != "default").collect();
+    assert_eq!(stated, all);
+    assert_eq!(off, all.iter().copied().filter(|name| !on.contains(name)).collect());
+    // The documentation says nothing else of what is on.
+    let text: String = ONBOARD.lines().take_while(|line| line.starts_with("//!")).collect();
+    assert_eq!(text.matches("by default").count(), off.len());
 }

@@ -17,7 +17,8 @@ const NAN: i32 = 0x7fc0_0000;
 
 impl<'a> Model<'a> {
     /// Opens a model of the layout code, as [`Model::new`] does others, with the function that was written with it.
-    /// Margins are what that function makes of features: nothing says whether it is of this model.
+    /// Margins are what that function makes of features: nothing here says whether it is of this model. `model.rs` has the
+    /// [`checksum`](Model::checksum) of its model as `CHECKSUM`, and links with the assembly of that model alone.
     ///
     /// Cost: in proportion to the bytes, which are few. Cannot fail where the function is another one: margins are then
     /// wrong.

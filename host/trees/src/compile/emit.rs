@@ -56,12 +56,12 @@ pub fn emit_code(
     let mut files = match form {
         // C is one file with the model's array.
         Form::C => Vec::new(),
-        Form::Thumb(_) => program.sources(&name, file, form),
+        Form::Thumb(_) => program.sources(&name, file, model.checksum(), form),
     };
     if form == Form::C || languages.contains(&Language::C) {
         let functions = match form {
             Form::C => program.c_functions(&name),
-            Form::Thumb(_) => program.c_declaration(&name),
+            Form::Thumb(_) => program.c_declaration(&name, model.checksum()),
         };
         files.push(("h", c(&model, &name, &(functions + &program.c_opening(&name)))));
     }
@@ -81,6 +81,19 @@ pub fn emit(model: &Model<'_>, name: &str, language: Language) -> String {
 /// Bytes in a line.
 const LINE: usize = 20;
 
+/// The most bytes of an array on an AVR, whose pointers have 16 bits.
+const LONGEST_ON_AVR: usize = 32_767;
+
+/// A compile-time error on an AVR, for which a model is too long.
+fn avr_error(name: &str, length: usize) -> String {
+    format!(
+        "#if defined(__AVR__)\n\
+         #error \"model {name} has {length} bytes, and an array on an AVR at most {LONGEST_ON_AVR}: export it with --layout size and \
+         --leaf i8, or from fewer trees, or take a chip with pointers of 32 bits\"\n#endif\n",
+        name = name.to_uppercase(),
+    )
+}
+
 fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
     let guard = format!("{}_MODEL_H", name.to_uppercase());
     let layout = model.layout().name().to_uppercase();
@@ -94,6 +107,7 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
     let has_outputs = model.outputs().is_some();
     let outputs = if has_outputs { "#ifndef PALPATE_OUTPUTS\n#define PALPATE_OUTPUTS 1\n#endif\n" } else { "" };
     let (objects, length) = (model.object_count(), model.bytes().len());
+    let too_long = if length > LONGEST_ON_AVR { avr_error(name, length) } else { String::new() };
     format!(
         "/* {about}\n * Written by `palpate export`; not to be edited. */\n\
          #ifndef {guard}\n#define {guard}\n\n\
@@ -104,7 +118,7 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
          #ifndef PALPATE_SHARED\n#define PALPATE_SHARED {shared}\n#endif\n\
          #ifndef PALPATE_SENTINEL\n#define PALPATE_SENTINEL {sentinel}\n#endif\n\
          #ifndef PALPATE_ROW_EVIDENCE\n#define PALPATE_ROW_EVIDENCE {row_evidence}\n#endif\n\
-         {early}{outputs}\
+         {early}{outputs}{too_long}\
          #ifndef PALPATE_MAX_OBJECTS\n#define PALPATE_MAX_OBJECTS {objects}\n#endif\n\
          #if defined(__AVR__) && !defined(PALPATE_BYTE)\n#include <avr/pgmspace.h>\n#define PALPATE_BYTE(p) pgm_read_byte(p)\n#endif\n\
          #include \"palpate.h\"\n\n\
@@ -214,6 +228,19 @@ mod tests {
         let model = Model::new(HOUSEHOLD).unwrap();
         assert_eq!(numbers(&emit(&model, "household", Language::C), "= {"), HOUSEHOLD);
         assert_eq!(numbers(&emit(&model, "household", Language::Rust), "Aligned(["), HOUSEHOLD);
+    }
+
+    #[test]
+    fn an_array_that_is_too_long_for_an_avr_is_an_error_there_that_says_what_to_do() {
+        let model = Model::new(HOUSEHOLD).unwrap();
+        let source = emit(&model, "household", Language::C);
+        let error = source.lines().find(|line| line.starts_with("#error \"model HOUSEHOLD has")).unwrap();
+        assert!(HOUSEHOLD.len() > LONGEST_ON_AVR && error.contains("32767") && error.contains("--leaf i8"), "{error}");
+        // Before anything that an AVR's compiler would stop at first.
+        assert!(source.find(error) < source.find("#include"));
+        // Shorter ones are none.
+        let short = include_bytes!("../../../../onboard/c/examples/Lines/model.palpate");
+        assert!(!emit(&Model::new(short).unwrap(), "short", Language::C).contains("on an AVR at most"));
     }
 
     #[test]

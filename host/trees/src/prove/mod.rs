@@ -164,6 +164,11 @@ pub fn check_code(
     Ok(Proof { instructions: Some(read.instructions), ..subject.proof(&found) })
 }
 
+/// The checksum at the end of a model.
+fn checksum_of(bytes: &[u8]) -> u32 {
+    bytes.last_chunk().map_or(0, |sum| u32::from_le_bytes(*sum))
+}
+
 /// A model of the layout code with the trees of its assembly.
 fn with_code(bytes: &[u8], code: &str) -> Result<(Plain, assembly::Code), ProofProblem> {
     let mut plain = format::read(bytes)?;
@@ -172,6 +177,7 @@ fn with_code(bytes: &[u8], code: &str) -> Result<(Plain, assembly::Code), ProofP
         known: plain.names.len(),
         features: plain.features,
         keys: &plain.keys,
+        checksum: checksum_of(bytes),
         sentinel: plain.sentinel,
     };
     let mut read = assembly::read(code, &stated)?;

@@ -23,6 +23,10 @@ fn main() -> ! {
     let Ok(data) = Model::new(include_model!("../code/data.palpate")) else { fail() };
     let bytes = include_model!("../code/softmax.palpate");
     let Ok(code) = Model::with_code(bytes, softmax::margins) else { fail() };
+    if code.checksum() != softmax::CHECKSUM {
+        println!("the trees are of another export than the model");
+        fail()
+    }
     if Model::new(bytes).is_ok() {
         println!("a model without its trees was opened");
         fail()

@@ -3,9 +3,15 @@
 
 core::arch::global_asm!(include_str!("softmax.s"), options(raw));
 
+/// The checksum of the model that was written with it; the names of its functions carry it, so that assembly of another export
+/// does not link.
+#[allow(dead_code)]
+pub const CHECKSUM: u32 = 0xed892af5;
+
 // SAFETY: the assembly reads 4 features, writes 3 margins, and keeps to the calling convention.
 unsafe extern "C" {
     /// The margins of a row of f32 values, NaN where one is missing, in units.
+    #[link_name = "softmax_margins_ed892af5"]
     pub safe fn softmax_margins(row: &[f32; 4], margins: &mut [i32; 3]);
 }
 
@@ -14,7 +20,7 @@ unsafe extern "C" {
 mod bits {
     // SAFETY: as above; an f32 and its bits are the same in memory.
     unsafe extern "C" {
-        #[link_name = "softmax_margins"]
+        #[link_name = "softmax_margins_ed892af5"]
         pub(super) safe fn margins(row: &[i32; 4], margins: &mut [i32; 3]);
     }
 }

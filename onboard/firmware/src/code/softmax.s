@@ -1,13 +1,15 @@
 @ 6 trees for any Cortex-M (ARMv6-M). Written by `palpate export`; not to be edited.
-@ void softmax_margins(const float row[4], int32_t margins[3])
+@ The model's checksum is ed892af5, as in the names of functions: assembly of another export does not link.
+@ void softmax_margins_ed892af5(const float row[4], int32_t margins[3])
 	.syntax unified
 	.thumb
-	.section .text.softmax_margins,"ax",%progbits
+	.section .note.GNU-stack,"",%progbits
+	.section .text.softmax_margins_ed892af5,"ax",%progbits
 	.balign 4
-	.global softmax_margins
-	.type softmax_margins, %function
+	.global softmax_margins_ed892af5
+	.type softmax_margins_ed892af5, %function
 	.thumb_func
-softmax_margins:
+softmax_margins_ed892af5:
 	push {r1, r4-r7, lr}
 	mov r4, r8
 	mov r5, r9
@@ -311,3 +313,4 @@ softmax_margins:
 	mov r10, r6
 	mov r11, r7
 	pop {r1, r4-r7, pc}
+	.size softmax_margins_ed892af5, .-softmax_margins_ed892af5

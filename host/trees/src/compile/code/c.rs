@@ -3,7 +3,7 @@
 use super::columns::{Column, Kind};
 use super::program::{CodeNode, CodeTree, Program};
 use super::thumb::{self, Chip};
-use super::{CodeCost, Form};
+use super::{CodeCost, Form, symbol};
 use crate::compile::cost::Instructions;
 use palpate_shared::format::Key;
 use std::collections::HashMap;
@@ -57,18 +57,27 @@ pub(super) fn base(program: &Program) -> String {
     program.base.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// The declaration of functions that are elsewhere.
-pub(super) fn declaration(program: &Program, name: &str) -> String {
+/// The declaration of functions that are elsewhere, and functions with plain names that call them.
+pub(super) fn declaration(program: &Program, name: &str, checksum: u32) -> String {
     let row = row(program);
-    let mut text = format!(
-        "#if defined(__cplusplus)\nextern \"C\" {{\n#endif\nvoid {name}_margins(const {row} *row, int32_t *margins);\n"
-    );
-    let has_exits = !program.exits.is_empty();
-    if has_exits {
-        text += &format!("void {name}_early(const {row} *row, int32_t *margins);\n");
+    let mut functions = vec!["margins"];
+    if !program.exits.is_empty() {
+        functions.push("early");
     }
-    text += "#if defined(__cplusplus)\n}\n#endif\n";
-    if has_exits { text + &class_elsewhere(program, name) } else { text }
+    let mut text = "/* The names in assembly carry the model's checksum: that of another export does not link. */\n\
+                    #if defined(__cplusplus)\nextern \"C\" {\n#endif\n"
+        .to_owned();
+    for function in &functions {
+        text += &format!("void {}(const {row} *row, int32_t *margins);\n", symbol(name, function, checksum));
+    }
+    text += "#if defined(__cplusplus)\n}\n#endif\n\n";
+    for function in &functions {
+        text += &format!(
+            "static inline void {name}_{function}(const {row} *row, int32_t *margins)\n{{\n    {}(row, margins);\n}}\n\n",
+            symbol(name, function, checksum)
+        );
+    }
+    if program.exits.is_empty() { text } else { text + &class_elsewhere(program, name) }
 }
 
 /// The function that opens the model and gives it the function that adds up its trees.

@@ -54,6 +54,12 @@ pub struct CodeCost {
     pub instructions: Instructions,
 }
 
+/// The symbol of a function in assembly. It carries the checksum of the model that was written with it: assembly of another
+/// export does not link.
+fn symbol(name: &str, function: &str, checksum: u32) -> String {
+    format!("{name}_{function}_{checksum:08x}")
+}
+
 impl Program {
     /// Size and speed in a form.
     pub fn cost(&self, form: Form) -> CodeCost {
@@ -79,10 +85,12 @@ impl Program {
     }
 
     /// The files of assembly, and of Rust that makes a safe function of it: their extensions and texts; `name`, an
-    /// identifier, is what functions are called after, `file` the files.
-    pub(super) fn sources(&self, name: &str, file: &str, form: Form) -> Vec<(&'static str, String)> {
+    /// identifier, is what functions are called after, `file` the files. `checksum` is the model's.
+    pub(super) fn sources(&self, name: &str, file: &str, checksum: u32, form: Form) -> Vec<(&'static str, String)> {
         match form {
-            Form::Thumb(chip) => vec![("s", thumb::text(self, name, chip)), ("rs", rust::text(self, name, file))],
+            Form::Thumb(chip) => {
+                vec![("s", thumb::text(self, name, checksum, chip)), ("rs", rust::text(self, name, file, checksum))]
+            }
             Form::C => Vec::new(),
         }
     }
@@ -93,8 +101,8 @@ impl Program {
     }
 
     /// The declaration of functions in assembly, for C.
-    pub(super) fn c_declaration(&self, name: &str) -> String {
-        c::declaration(self, name)
+    pub(super) fn c_declaration(&self, name: &str, checksum: u32) -> String {
+        c::declaration(self, name, checksum)
     }
 
     /// The function in C that opens the model with its trees.

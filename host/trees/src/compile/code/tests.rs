@@ -475,11 +475,81 @@ fn the_firmware_has_the_code_that_is_exported_now() {
     let case = Case { name: "softmax".into(), ensemble, leaf: Leaf::I16 };
     let compiled = case.compiled(Some(Form::Thumb(Chip::M0Plus)));
     let (program, form) = compiled.code.as_ref().unwrap();
-    let own = |file: &str| std::fs::read(root.join("onboard/firmware/src/code").join(file)).unwrap();
-    assert_eq!(own("softmax.palpate"), compiled.bytes);
+    let place = |file: &str| root.join("onboard/firmware/src/code").join(file);
+    assert_eq!(std::fs::read(place("softmax.palpate")).unwrap(), compiled.bytes);
     for (extension, text) in emit_code(&compiled.bytes, program, *form, "softmax", &[]).unwrap() {
-        assert_eq!(String::from_utf8(own(&format!("softmax.{extension}"))).unwrap(), text);
+        let path = place(&format!("softmax.{extension}"));
+        if std::env::var_os("PALPATE_RESTATE").is_some() {
+            std::fs::write(&path, &text).unwrap();
+        }
+        assert_eq!(std::fs::read_to_string(path).unwrap(), text);
     }
+}
+
+/// Files of one ensemble in assembly, with the header for C.
+fn exported(seed: u64, early_exit: bool) -> Vec<(&'static str, String)> {
+    let ensemble = random_of(3).ensemble(seed);
+    let case = Case { name: String::new(), ensemble, leaf: Leaf::I16 };
+    let form = Form::Thumb(Chip::M0Plus);
+    let compiled = case.compiled_with(Some(form), early_exit.then_some(EarlyExit::Always));
+    emit_code(&compiled.bytes, program(&compiled), form, "same", &[Language::C]).unwrap()
+}
+
+/// The symbols of a text.
+fn symbols(text: &str) -> Vec<&str> {
+    let words = text.split(|character: char| !character.is_alphanumeric() && character != '_');
+    let is_symbol = |word: &&str| {
+        ["same_margins_", "same_early_"].iter().any(|start| word.strip_prefix(start).is_some_and(|end| end.len() == 8))
+    };
+    let mut found: Vec<&str> = words.filter(is_symbol).collect();
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+#[test]
+fn symbols_of_assembly_are_those_of_the_files_that_were_exported_with_it_and_of_no_others() {
+    for early_exit in [false, true] {
+        let (one, other) = (exported(1, early_exit), exported(2, early_exit));
+        let [assembly, rust, header] = &one[..] else { panic!("three files") };
+        let own = symbols(&assembly.1);
+        assert_eq!(own.len(), 1 + usize::from(early_exit), "{own:?}");
+        assert_eq!((symbols(&rust.1), symbols(&header.1)), (own.clone(), own.clone()));
+        assert!(other.iter().all(|(_, text)| symbols(text).iter().all(|symbol| !own.contains(symbol))));
+        // Every symbol has its size, and no stack of code is asked for.
+        assert_eq!(assembly.1.matches("\t.size same_").count(), own.len());
+        assert!(assembly.1.contains(".note.GNU-stack"));
+    }
+}
+
+#[test]
+#[ignore = "needs a compiler for chips"]
+fn assembly_of_another_export_does_not_link() {
+    let directory = tempfile::tempdir().unwrap();
+    let put = |file: &str, text: &str| std::fs::write(directory.path().join(file), text).unwrap();
+    let source = "#include \"same.h\"\nint main(void)\n{\n    palpate_model model;\n    return same_open(&model);\n}\n\
+                  void reset(void);\nvoid reset(void) { main(); }\n";
+    put("program.c", source);
+    let link = |one: u64, other: u64| {
+        for (file, seed) in [("same.h", one), ("same.s", other)] {
+            let files = exported(seed, false);
+            put(file, &files.iter().find(|own| file.ends_with(own.0)).unwrap().1);
+        }
+        let mut command = Command::new("arm-none-eabi-gcc");
+        command.args(["-mcpu=cortex-m0plus", "-mthumb", "-ffreestanding", "-nostdlib", "-e", "reset"]);
+        command.arg("-I").arg(Path::new(ROOT).join("onboard/c")).args([
+            "program.c",
+            "same.s",
+            "-lgcc",
+            "-o",
+            "program",
+        ]);
+        let output = command.current_dir(directory.path()).output().unwrap();
+        if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
+    };
+    assert_eq!(link(1, 1), Ok(()));
+    let error = link(1, 2).unwrap_err();
+    assert!(error.contains("undefined reference to `same_margins_"), "{error}");
 }
 
 /// The files of a test program: `models.h`, and assembly of every model if the form is assembly.

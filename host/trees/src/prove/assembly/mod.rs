@@ -37,6 +37,8 @@ pub(super) struct Stated<'s> {
     pub(super) known: usize,
     pub(super) features: usize,
     pub(super) keys: &'s Keys,
+    /// The checksum, which names of functions carry.
+    pub(super) checksum: u32,
     pub(super) sentinel: Option<[i64; 2]>,
 }
 
@@ -51,7 +53,7 @@ const DEEPEST: usize = 300;
 /// [`ProofProblem::Assembly`] with the line that is not understood.
 pub(super) fn read(text: &str, stated: &Stated<'_>) -> Result<Code, ProofProblem> {
     let text = Text::read(text)?;
-    let start = start(&text)?;
+    let start = start(&text, stated.checksum)?;
     let reader = Reader {
         text: &text,
         stated,
@@ -67,12 +69,37 @@ pub(super) fn read(text: &str, stated: &Stated<'_>) -> Result<Code, ProofProblem
     reader.run(start)
 }
 
+/// The checksum at the end of a function's name, after what the function is; `Some(None)` where there is none, as in files of
+/// earlier releases, and `None` for the name of another function.
+fn stated_checksum(label: &str, function: &str) -> Option<Option<u32>> {
+    if label.starts_with('.') {
+        return None;
+    }
+    let (_, end) = label.rsplit_once(function)?;
+    let digits = end.strip_prefix('_').filter(|digits| digits.len() == 8);
+    match digits {
+        None => end.is_empty().then_some(None),
+        Some(digits) => u32::from_str_radix(digits, 16).ok().map(Some),
+    }
+}
+
 /// Where a row's margins begin, and the number that says whether the walk may end early, if it may.
-fn start(text: &Text) -> Result<(usize, Option<i32>), ProofProblem> {
-    let find = |end: &str| text.labels().find(|label| !label.starts_with('.') && label.ends_with(end));
-    let margins = find("_margins").ok_or_else(|| problem(1, "it has no function for margins"))?;
+fn start(text: &Text, checksum: u32) -> Result<(usize, Option<i32>), ProofProblem> {
+    let find = |function: &str| {
+        let mut labels = text.labels();
+        labels.find_map(|label| stated_checksum(label, function).map(|stated| (label, stated)))
+    };
+    let (margins, stated) = find("_margins").ok_or_else(|| problem(1, "it has no function for margins"))?;
+    if let Some(stated) = stated.filter(|&stated| stated != checksum) {
+        return Err(problem(
+            1,
+            format!(
+                "it was exported with the model {stated:08x}, and this model is {checksum:08x}: take both of one export"
+            ),
+        ));
+    }
     let at = text.target(1, margins)?;
-    let Some(early) = find("_early") else { return Ok((at, None)) };
+    let Some((early, _)) = find("_early") else { return Ok((at, None)) };
     let early = text.target(1, early)?;
     let line = text.instructions.get(early).map_or(0, |own| own.line);
     let body = text.instructions.get(early + 1).filter(|own| own.name == "b").and_then(|own| own.operands.first());

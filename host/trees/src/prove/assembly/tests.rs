@@ -17,6 +17,7 @@ fn meaning(bytes: &[u8], text: &str) -> Option<(Code, Vec<Values>)> {
         known: plain.names.len(),
         features: plain.features,
         keys: &plain.keys,
+        checksum: crate::prove::checksum_of(bytes),
         sentinel: plain.sentinel,
     };
     read(text, &stated).ok().map(|code| (code, plain.keys.all(plain.features)))
@@ -163,12 +164,25 @@ fn assembly_that_begins_again_without_end_is_refused_in_little_time_and_memory()
             continue;
         }
         let (bytes, text) = case.assembly(chip, early_exit);
+        let again = format!("\tb.n m_margins_{:08x}", crate::prove::checksum_of(&bytes));
         for (number, line) in text.lines().enumerate().filter(|line| line.1.starts_with("\tb.n .L")).take(3) {
-            let lines = text.lines().enumerate().map(|own| if own.0 == number { "\tb.n m_margins" } else { own.1 });
+            let lines = text.lines().enumerate().map(|own| if own.0 == number { &again[..] } else { own.1 });
             let changed = lines.collect::<Vec<_>>().join("\n");
             assert!(meaning(&bytes, &changed).is_none(), "{} {chip:?}: {line}", case.name);
             refused += 1;
         }
     }
     assert!(refused > 30, "{refused}");
+}
+
+#[test]
+fn assembly_of_another_export_is_refused_by_its_checksum_and_without_one_it_is_read() {
+    let case = cases().remove(0);
+    let (bytes, text) = case.assembly(Chip::M0Plus, false);
+    let own = format!("{:08x}", crate::prove::checksum_of(&bytes));
+    assert!(is_proved(&bytes, &text, &case.ensemble));
+    let error = prove_code(&bytes, &text.replace(&own, "0badcafe"), &case.ensemble, FILE).unwrap_err().to_string();
+    assert!(error.contains("model 0badcafe") && error.contains(&own), "{error}");
+    // As earlier releases wrote it.
+    assert!(is_proved(&bytes, &text.replace(&format!("_{own}"), ""), &case.ensemble));
 }

@@ -44,7 +44,7 @@ impl Text {
             let (name, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
             let operands = operands(rest);
             match name {
-                "" | ".syntax" | ".thumb" | ".section" | ".global" | ".type" | ".thumb_func" => {}
+                "" | ".syntax" | ".thumb" | ".section" | ".global" | ".type" | ".thumb_func" | ".size" => {}
                 ".balign" => read.data.resize(read.data.len().next_multiple_of(4), 0),
                 ".byte" | ".hword" | ".word" => {
                     let length = [(".byte", 1), (".hword", 2), (".word", 4)].iter().find(|size| size.0 == name);

@@ -1,6 +1,6 @@
 //! Instructions with labels, and branches of the length that they need.
 
-use super::Chip;
+use super::{Chip, symbol};
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
@@ -278,13 +278,13 @@ impl Assembler {
         }
     }
 
-    /// The text; `name` is what functions are called after.
-    pub(super) fn print(&self, name: &str, text: &mut String) {
+    /// The text; `name` is what functions are called after, and the model's checksum.
+    pub(super) fn print(&self, name: &str, checksum: u32, text: &mut String) {
         // Writing to a string cannot fail.
         for (index, item) in self.items.iter().enumerate() {
             _ = match item {
                 Item::Global(function) => {
-                    let full = format!("{name}_{function}");
+                    let full = symbol(name, function, checksum);
                     writeln!(text, "\t.global {full}\n\t.type {full}, %function\n\t.thumb_func\n{full}:")
                 }
                 Item::Label(label) => writeln!(text, "{}:", local(name, *label)),
@@ -301,6 +301,12 @@ impl Assembler {
                     self.print_branch(text, *condition, &local(name, *target), *reach, &over)
                 }
             };
+        }
+        for item in &self.items {
+            if let Item::Global(function) = item {
+                let full = symbol(name, function, checksum);
+                _ = writeln!(text, "\t.size {full}, .-{full}");
+            }
         }
     }
 

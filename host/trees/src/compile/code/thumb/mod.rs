@@ -12,6 +12,7 @@ mod vectors;
 mod walk;
 
 use super::program::Program;
+use super::symbol;
 use assembler::Assembler;
 use exits::Exits;
 use std::fmt::Write as _;
@@ -26,8 +27,9 @@ pub enum Chip {
 }
 
 /// The program as assembly, for GNU's assembler and for `global_asm!`.
-pub(super) fn text(program: &Program, name: &str, chip: Chip) -> String {
+pub(super) fn text(program: &Program, name: &str, checksum: u32, chip: Chip) -> String {
     let written = write(program, chip);
+    let [margins, early] = ["margins", "early"].map(|function| symbol(name, function, checksum));
     let mut text = String::new();
     let what = match chip {
         Chip::M0Plus => "any Cortex-M (ARMv6-M)",
@@ -38,7 +40,8 @@ pub(super) fn text(program: &Program, name: &str, chip: Chip) -> String {
     _ = writeln!(
         text,
         "@ {} trees for {what}. Written by `palpate export`; not to be edited.\n\
-         @ void {name}_margins(const {row} row[{}], int32_t margins[{}])",
+         @ The model's checksum is {checksum:08x}, as in the names of functions: assembly of another export does not link.\n\
+         @ void {margins}(const {row} row[{}], int32_t margins[{}])",
         program.trees.len(),
         program.features,
         program.base.len(),
@@ -46,11 +49,16 @@ pub(super) fn text(program: &Program, name: &str, chip: Chip) -> String {
     if !program.exits.is_empty() {
         _ = writeln!(
             text,
-            "@ {name}_early has the same arguments; where a class is known it ends, and no other margin is larger than that one."
+            "@ {early} has the same arguments; where a class is known it ends, and no other margin is larger than that one."
         );
     }
-    _ = writeln!(text, "\t.syntax unified\n\t.thumb\n\t.section .text.{name}_margins,\"ax\",%progbits\n\t.balign 4");
-    written.print(name, &mut text);
+    // No code is on the stack.
+    _ = writeln!(
+        text,
+        "\t.syntax unified\n\t.thumb\n\t.section .note.GNU-stack,\"\",%progbits\n\
+         \t.section .text.{margins},\"ax\",%progbits\n\t.balign 4"
+    );
+    written.print(name, checksum, &mut text);
     text
 }
 
