@@ -55,7 +55,10 @@ pub mod source;
 mod stl;
 #[cfg(test)]
 mod tests;
+mod text;
 mod triangles;
+mod unread;
+mod weld;
 mod words;
 
 pub use error::MeshProblem;

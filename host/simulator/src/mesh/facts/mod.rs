@@ -16,7 +16,7 @@ pub use stray::Piece;
 use crate::mesh::Mesh;
 use glam::Vec3;
 
-/// Facts about a mesh, in the units of its file. Vertices at the same place count as one.
+/// Facts about a mesh, in the units of its file. Vertices closer than a billionth of its size count as one.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Facts {
