@@ -1,6 +1,7 @@
 //! Admission of a capture to a directory, given what is there.
 
 use super::Settings;
+use super::store::own_files;
 use crate::error::{CaptureProblem, Error, Place, Result};
 use crate::touches::{Entry, Listing, Lying, Origin, files};
 use std::path::Path;
@@ -23,13 +24,19 @@ pub(super) fn admit(directory: &Path, settings: &Settings, objects: &[Entry]) ->
         Err(Error::At { .. }) if settings.force => None,
         found => found?,
     };
-    let Some(found) = found else {
-        let files: Vec<String> = files(directory)?.iter().filter_map(|(_, path, _)| file_name(path)).collect();
-        if !settings.force && !files.is_empty() {
-            return refuse(CaptureProblem::HoldsFiles { files });
-        }
-        return Ok(Admission { replaced: None, listing: wanted });
-    };
+    // Files that a capture of these objects writes, and that no capture has listed.
+    let is_listed = |name: &str| found.iter().any(|found| found.objects.iter().any(|entry| entry.name == name));
+    let unlisted = objects.iter().filter(|entry| !is_listed(&entry.name)).flat_map(|entry| own_files(directory, &entry.name));
+    let mut foreign: Vec<String> = unlisted.filter(|path| path.exists()).filter_map(|path| file_name(&path)).collect();
+    if found.is_none() {
+        foreign.extend(files(directory)?.iter().filter_map(|(_, path, _)| file_name(path)));
+    }
+    foreign.sort();
+    foreign.dedup();
+    if !settings.force && !foreign.is_empty() {
+        return refuse(CaptureProblem::HoldsFiles { files: foreign });
+    }
+    let Some(found) = found else { return Ok(Admission { replaced: None, listing: wanted }) };
     if found.is_recorded() {
         let touches = touches(&found.objects);
         return refuse(CaptureProblem::HoldsRecorded { touches, objects: found.names() });

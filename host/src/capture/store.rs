@@ -181,11 +181,16 @@ fn convert(_: &Path, done: &Path, _: &str) -> Result<()> {
     Err(Error::at(Place::file(done), crate::error::TouchesProblem::NoParquet))
 }
 
-fn remove_touches(directory: &Path, name: &str) -> Result<()> {
+/// The files that hold an object's touches, complete or not, in any format.
+pub(super) fn own_files(directory: &Path, name: &str) -> impl Iterator<Item = PathBuf> {
     let entry = Entry { name: name.into(), ..Entry::default() };
     let done = Format::ALL.map(|format| entry.file(directory, format));
     let unfinished = [part(directory, name), directory.join(format!("{name}.parquet.part"))];
-    done.iter().chain(&unfinished).try_for_each(|path| remove(path))
+    done.into_iter().chain(unfinished)
+}
+
+fn remove_touches(directory: &Path, name: &str) -> Result<()> {
+    own_files(directory, name).try_for_each(|path| remove(&path))
 }
 
 /// Removes a file, if it is there.

@@ -125,7 +125,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if arguments.rows.label.is_some() {
         return rows(&arguments, global);
     }
-    output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
+    output::admit(&arguments.output, super::files_of(&arguments.directory))?;
     if let Some(recorded) = &arguments.recorded {
         output::refuse_input(&arguments.output, super::files_of(recorded))?;
     }

@@ -103,7 +103,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             None => rows(&arguments, &file, label, global),
         };
     }
-    let mut dataset = super::dataset(&arguments.directory)?.matching(&file.names());
+    let mut dataset = super::checked(Dataset::read_any(&arguments.directory)?).matching(&file.names());
     let touches = || dataset.touches();
     if counts_patterns(&file) {
         super::warn_of_full(touches().count(), touches().any(|touch| !touch.is_full()));

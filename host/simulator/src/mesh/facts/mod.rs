@@ -243,6 +243,19 @@ fn counted(count: usize, name: &str) -> String {
     if count == 1 { format!("1 {name}") } else { format!("{count} {name}s") }
 }
 
+/// The sides of a box in words, with about three significant digits: "90 × 80.5 × 90".
+pub fn sides(size: glam::DVec3) -> String {
+    let side = |side: f64| {
+        let text = short(side);
+        if text.contains('.') && !text.contains('e') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
+        }
+    };
+    size.to_array().map(side).join(" × ")
+}
+
 /// A number with about three significant digits.
 pub(super) fn short(value: f64) -> String {
     match value.abs() {

@@ -178,6 +178,13 @@ fn coordinates_whose_squares_are_too_large_and_corners_on_edges_of_cells_are_in_
 }
 
 #[test]
+fn sides_have_three_digits_and_no_zeros_after_them() {
+    assert_eq!(sides(glam::DVec3::new(90.0, 80.0001, 0.5)), "90 × 80 × 0.5");
+    assert_eq!(sides(glam::DVec3::new(100.0, 1234.4, 7.256)), "100 × 1234 × 7.26");
+    assert_eq!(sides(glam::DVec3::new(0.0, 1e-5, 1e7)), "0 × 1.00e-5 × 1.00e7");
+}
+
+#[test]
 fn a_mesh_is_usable_unless_a_finger_fits_through_a_gap_or_pieces_float_apart() {
     let verdict = |mesh: &Mesh, diameter| Facts::of(mesh).verdict(diameter);
     let mut mesh = cube();

@@ -119,7 +119,9 @@ fn outside(uri: &str, index: usize, buffer: &Buffer, path: &Path, folder: Option
     let metadata = file.metadata().map_err(io)?;
     if !metadata.is_file() || metadata.len() < buffer.byte_length {
         let mut head = Vec::new();
-        file.take(1024).read_to_end(&mut head).map_err(io)?;
+        if metadata.is_file() {
+            file.take(1024).read_to_end(&mut head).map_err(io)?;
+        }
         if is_pointer(&head) {
             return Err(Error::at(Place::file(&place), MeshProblem::LfsPointer));
         }

@@ -282,7 +282,7 @@ fn found(sources: &[String], search: Search) -> Result<(Vec<Source>, Option<Stri
     for source in sources {
         if source == "builtin" {
             if builtin::names().is_empty() {
-                return builtin::one(source).map(|_| Vec::new());
+                return builtin::one(source).map(|_| Default::default());
             }
             for name in builtin::names() {
                 insert(&mut found, name.into(), Source::BuiltIn(name))?;
