@@ -1,10 +1,9 @@
 //! Admission of a capture to a directory, given what is there.
 
 use super::Settings;
-use super::store::own_files;
 use crate::error::{CaptureProblem, Error, Place, Result};
-use crate::touches::{Entry, Listing, Lying, Origin, files};
-use std::path::Path;
+use crate::touches::{Entry, Format, Listing, Lying, Origin, files};
+use std::path::{Path, PathBuf};
 
 /// State that a capture begins with.
 pub(super) struct Admission {
@@ -12,6 +11,19 @@ pub(super) struct Admission {
     pub(super) replaced: Option<Listing>,
     /// The listing to start or go on from: it names every object of the capture.
     pub(super) listing: Listing,
+}
+
+/// The file that an object's touches are in until it is complete.
+pub(super) fn part(directory: &Path, name: &str) -> PathBuf {
+    directory.join(format!("{name}.part"))
+}
+
+/// The files that hold an object's touches, complete or not, in any format.
+pub(super) fn own_files(directory: &Path, name: &str) -> impl Iterator<Item = PathBuf> {
+    let entry = Entry { name: name.into(), ..Entry::default() };
+    let done = Format::ALL.map(|format| entry.file(directory, format));
+    let unfinished = [part(directory, name), directory.join(format!("{name}.parquet.part"))];
+    done.into_iter().chain(unfinished)
 }
 
 /// Compares what is in a directory with what a capture would write, and refuses what would be lost.

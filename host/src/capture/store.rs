@@ -8,7 +8,7 @@
 //! listing name files that are gone.
 
 use super::Settings;
-use super::admission::{Admission, admit};
+use super::admission::{Admission, admit, own_files, part};
 use crate::error::{CaptureProblem, Error, Place, Result};
 use crate::output;
 use crate::touches::{Entry, Format, Listing, checksum};
@@ -161,10 +161,6 @@ impl Store {
     }
 }
 
-fn part(directory: &Path, name: &str) -> PathBuf {
-    directory.join(format!("{name}.part"))
-}
-
 /// Turns a complete part into a Parquet file.
 #[cfg(feature = "parquet")]
 fn convert(part: &Path, done: &Path, object: &str) -> Result<()> {
@@ -179,14 +175,6 @@ fn convert(part: &Path, done: &Path, object: &str) -> Result<()> {
 #[cfg(not(feature = "parquet"))]
 fn convert(_: &Path, done: &Path, _: &str) -> Result<()> {
     Err(Error::at(Place::file(done), crate::error::TouchesProblem::NoParquet))
-}
-
-/// The files that hold an object's touches, complete or not, in any format.
-pub(super) fn own_files(directory: &Path, name: &str) -> impl Iterator<Item = PathBuf> {
-    let entry = Entry { name: name.into(), ..Entry::default() };
-    let done = Format::ALL.map(|format| entry.file(directory, format));
-    let unfinished = [part(directory, name), directory.join(format!("{name}.parquet.part"))];
-    done.into_iter().chain(unfinished)
 }
 
 fn remove_touches(directory: &Path, name: &str) -> Result<()> {

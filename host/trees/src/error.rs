@@ -166,7 +166,7 @@ impl Error {
             ErrorKind::PermissionDenied => "Check the permissions, or choose another place",
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space, then run the command again",
             ErrorKind::IsADirectory => "Give a file, not a directory",
-            ErrorKind::NotADirectory => "Give a directory, not a file",
+            ErrorKind::NotADirectory | ErrorKind::AlreadyExists => "Give a directory, not a file",
             ErrorKind::InvalidData => "Check that it is the right kind of file",
             _ => "Check the file and the disk it is on",
         };

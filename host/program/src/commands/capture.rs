@@ -5,6 +5,7 @@ use super::scene::{SceneArguments, described};
 use super::{Global, remark};
 use palpate::capture::{self, ObjectSummary, Settings, Summary};
 use palpate::error::{CaptureProblem, Problem, TouchesProblem};
+use palpate::mesh::BACKGROUND;
 use palpate::mesh::facts::Facts;
 use palpate::output;
 use palpate::probe::approach::Aim;
@@ -84,7 +85,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let mut objects = arguments.size.objects(&arguments.sources, settings.origin.seed)?;
     arguments.scene.weigh(&mut objects)?;
     let objects = arguments.size.touchable(objects, &settings.origin)?;
-    for object in &objects {
+    // Shapes of the background are as they are meant to be.
+    let has_background =
+        arguments.sources.iter().any(|source| source == BACKGROUND) && !std::path::Path::new(BACKGROUND).exists();
+    for object in objects.iter().filter(|object| !has_background || object.name != BACKGROUND) {
         for instance in object.instances() {
             let complaints = Facts::of(&instance.mesh).complaints(object.millimeters);
             if !complaints.is_empty() {
@@ -170,8 +174,8 @@ pub(super) fn hint(error: &Error, has: &dyn Fn(&str) -> bool) -> Option<String> 
         CaptureProblem::HoldsOtherObjects { .. } if has("add") => "--add adds to what is there, --force replaces it.",
         CaptureProblem::HoldsOtherObjects { .. }
         | CaptureProblem::HoldsOtherSettings { .. }
-        | CaptureProblem::HoldsFiles { .. }
         | CaptureProblem::Shorter { .. } => "--force replaces what is there.",
+        CaptureProblem::HoldsFiles { .. } => "--force replaces what is there, also touches of other objects.",
         CaptureProblem::HoldsUnfinished { .. } if has("resume") => "--resume resumes it, --force replaces it.",
         CaptureProblem::NotWritten { .. } if has("resume") => "To resume, repeat the command with --resume.",
         CaptureProblem::Untouchable { is_true_size, .. } => {

@@ -239,8 +239,10 @@ fn hint(error: &Error, command: &str) -> Option<String> {
     let said = match (error.problem(), error.problem(), error.problem()) {
         (Some(Foreign), ..) => "--force replaces it.",
         (_, Some(TouchesProblem::Incomplete), _) => "Repeat the command of the capture with --resume.",
-        (.., Some(MeshProblem::Unread { .. })) if has("skip-bad") => "--skip-bad goes on without them.",
-        (.., Some(MeshProblem::SameName { .. })) if has("instances") => {
+        (.., Some(MeshProblem::Unread { .. })) if has("skip-bad") => "--skip-bad goes on without what cannot be read.",
+        (.., Some(MeshProblem::SameName { first, second, .. }))
+            if has("instances") && first.parent() != second.parent() && first.file_stem() == second.file_stem() =>
+        {
             "--instances takes each directory as one object, called like the directory."
         }
         _ => return capture::hint(error, &has),

@@ -217,6 +217,7 @@ impl Problem for MeshProblem {
             }
             Self::NoMeshes => "Give a directory that holds such files.".into(),
             Self::NoneRead { .. } => "Convert them, then give the directory again.".into(),
+            Self::Unread { errors, .. } if errors.len() == 1 => "Repair the file, or leave it out.".into(),
             Self::Unread { .. } => "Repair these files, or leave them out.".into(),
             Self::LfsPointer => "Fetch it: git lfs pull.".into(),
             Self::SeveralObjects { .. } => "Give one mesh file, or the name of one built-in object.".into(),

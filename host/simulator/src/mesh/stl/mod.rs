@@ -40,8 +40,7 @@ fn bytes_of(count: u32) -> u64 {
 /// there, a coordinate is not finite, or no face is left.
 pub(super) fn parse(mut reader: impl BufRead, length: u64, path: &Path) -> Result<(Moved, Vec<String>)> {
     let head = reader.fill_buf().map_err(|source| Error::io(path, "read the mesh", source))?;
-    let is_text = !head.is_empty() && !head.iter().take(HEADER).any(|&byte| byte == 0);
-    let (welder, note) = if !is_binary(head, length) && is_text {
+    let (welder, note) = if !is_binary(head, length) && is_text(head) {
         Text { reader, path, line: 0, raw: Vec::new(), next: 0 }.parse()?
     } else {
         binary(reader, length, path)?
@@ -50,6 +49,15 @@ pub(super) fn parse(mut reader: impl BufRead, length: u64, path: &Path) -> Resul
     let mesh = mesh.usable().map_err(|problem| Error::at(Place::file(path), problem))?;
     let notes = note.into_iter().map(|note| format!("{} {note}", path.display())).collect();
     Ok(((mesh, moved), notes))
+}
+
+/// True if a file that starts with `head`, and is not binary by its length, is meant as text.
+fn is_text(head: &[u8]) -> bool {
+    let start = head.get(..HEADER).unwrap_or(head);
+    let word = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start).trim_ascii_start();
+    // The name of a solid may be in any encoding.
+    let is_solid = word.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    !head.is_empty() && !start.contains(&0) && (is_solid || start.is_ascii())
 }
 
 /// What was read, and a note on what is odd about the file.
@@ -89,7 +97,7 @@ fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Noted> {
         welder.triangles.push(corners);
     }
     let bytes = if rest == 1 { "byte" } else { "bytes" };
-    Ok((welder, (rest > 0).then(|| format!("has {rest} {bytes} after its last triangle, which are not read"))))
+    Ok((welder, (rest > 0).then(|| format!("has {rest} {bytes} after its last triangle, left out"))))
 }
 
 const AXES: [char; 3] = ['x', 'y', 'z'];

@@ -50,6 +50,9 @@ fn a_count_that_disagrees_with_the_length_is_refused_whichever_is_wrong() {
         assert!(text.contains(&format!("it states {triangles} triangles")), "{text}");
     }
     assert!(complaint(&whole[..84 - 50]).contains("ends in the middle"));
+    // A program that writes as it goes may leave no count, and a header without zeros.
+    let uncounted = [&[b'x'; 80], [0xff; 4].as_slice(), &whole[84..]].concat();
+    assert!(complaint(uncounted).contains("cup.stl: byte 80: the STL file is damaged: it states 4294967295 triangles"));
 }
 
 #[test]
