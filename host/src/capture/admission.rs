@@ -38,7 +38,8 @@ pub(super) fn admit(directory: &Path, settings: &Settings, objects: &[Entry]) ->
     };
     // Files that a capture of these objects writes, and that no capture has listed.
     let is_listed = |name: &str| found.iter().any(|found| found.objects.iter().any(|entry| entry.name == name));
-    let unlisted = objects.iter().filter(|entry| !is_listed(&entry.name)).flat_map(|entry| own_files(directory, &entry.name));
+    let unlisted =
+        objects.iter().filter(|entry| !is_listed(&entry.name)).flat_map(|entry| own_files(directory, &entry.name));
     let mut foreign: Vec<String> = unlisted.filter(|path| path.exists()).filter_map(|path| file_name(&path)).collect();
     if found.is_none() {
         foreign.extend(files(directory)?.iter().filter_map(|(_, path, _)| file_name(path)));

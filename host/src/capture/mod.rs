@@ -185,7 +185,10 @@ fn untouched(samplers: &[Sampler<'_>], origin: &Origin) -> Result<Option<Capture
     let mut all: Option<CaptureProblem> = None;
     for error in tried.into_iter().filter_map(Result::err) {
         match (error.problem::<CaptureProblem>().cloned(), &mut all) {
-            (Some(CaptureProblem::Untouchable { objects: more, .. }), Some(CaptureProblem::Untouchable { objects, .. })) => {
+            (
+                Some(CaptureProblem::Untouchable { objects: more, .. }),
+                Some(CaptureProblem::Untouchable { objects, .. }),
+            ) => {
                 objects.extend(more);
             }
             (Some(problem @ CaptureProblem::Untouchable { .. }), all) => *all = Some(problem),

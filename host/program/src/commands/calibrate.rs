@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
     /// Shares of placements it holds for: stated or any
     #[arg(long, value_parser = prior, default_value = "stated", value_name = "OF", conflicts_with_all = ["recorded", "label"])]
     placement_prior: PlacementPrior,
-    /// The probability that the promise is kept
+    /// Probability that it is kept
     #[arg(long, default_value = "0.95", value_name = "SHARE", value_parser = share)]
     confidence: f64,
     /// Sequences of touches to draw; of all objects together, at most

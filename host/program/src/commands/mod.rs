@@ -137,7 +137,7 @@ pub(crate) struct Global {
     /// Print neither progress nor remarks
     #[arg(long, global = true)]
     quiet: bool,
-    /// Write all the same; over other results, over files that Palpate did not write
+    /// Write all the same; over whatever is there
     #[arg(long, global = true)]
     force: bool,
 }

@@ -1,8 +1,8 @@
 //! Options for the probe and the sizes of objects.
 
 use super::remark;
-use palpate::ensemble::StatedProbe;
 use palpate::capture;
+use palpate::ensemble::StatedProbe;
 use palpate::error::{CaptureProblem, ProbeProblem};
 use palpate::mesh::facts::sides;
 use palpate::mesh::source::{self, Search};
@@ -122,16 +122,9 @@ pub(crate) struct UnitArguments {
     /// Several meshes per object: those of a subdirectory, or N variants of a built-in one
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "0", value_parser = instances)]
     instances: Option<usize>,
-    #[command(flatten)]
-    skip: SkipArguments,
-}
-
-/// Meshes that are left out.
-#[derive(clap::Args, Clone, Copy, Debug, Default)]
-pub(crate) struct SkipArguments {
-    /// Go on without what is bad; meshes that cannot be read, objects that cannot be touched
+    /// Leave out bad meshes; also untouchable ones
     #[arg(long)]
-    pub(crate) skip_bad: bool,
+    skip_bad: bool,
 }
 
 impl UnitArguments {
@@ -150,7 +143,7 @@ impl UnitArguments {
         let search = Search {
             instances: self.instances.is_some(),
             prefers_units: self.true_size.contains(&MeshUnit::Stated),
-            skips_bad: self.skip.skip_bad,
+            skips_bad: self.skip_bad,
         };
         let loaded = source::load(sources, search)?;
         loaded.notes.iter().for_each(|note| remark(&format!("palpate: {note}")));
@@ -249,7 +242,7 @@ impl UnitArguments {
             words.push("--instances".to_owned());
             words.extend((count > 0).then(|| count.to_string()));
         }
-        words.extend(self.skip.skip_bad.then(|| "--skip-bad".to_owned()));
+        words.extend(self.skip_bad.then(|| "--skip-bad".to_owned()));
         words
     }
 }
@@ -270,7 +263,7 @@ impl SizeArguments {
     /// # Errors
     /// As [`capture::untouchable`], and if no object is left.
     pub(crate) fn touchable(&self, objects: Vec<Object>, origin: &Origin) -> Result<Vec<Object>> {
-        if !self.units.skip.skip_bad {
+        if !self.units.skip_bad {
             return Ok(objects);
         }
         let Some(problem) = capture::untouchable(&objects, origin, &())? else { return Ok(objects) };

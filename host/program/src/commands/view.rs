@@ -55,7 +55,7 @@ pub(crate) struct Arguments {
     /// A compiled model for the page; may be given several times, with --port once
     #[arg(long, value_name = "FILE", requires = "recognizes", conflicts_with = "touches")]
     model: Vec<PathBuf>,
-    /// For tests of the page: also write what it has to compute, as this program computes it
+    /// For tests of the page: also what it has to compute
     #[arg(long, value_name = "FILE", requires = "play")]
     trace: Option<PathBuf>,
     #[command(flatten)]

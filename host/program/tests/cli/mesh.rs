@@ -117,7 +117,10 @@ fn bad_meshes_are_named_at_once_and_with_skip_bad_the_rest_is_captured() {
     std::fs::write(set.join("mug.step"), "ISO-10303-21;").unwrap();
     let said = captured(at, "set -o data --touches 5", 1);
     assert!(said.starts_with("palpate: 2 of 5 meshes cannot be read:\n  set/cut.stl:2: the STL file"), "{said}");
-    assert!(said.contains("\n  set/empty.ply:1: ") && said.ends_with("--skip-bad goes on without what cannot be read.\n"), "{said}");
+    assert!(
+        said.contains("\n  set/empty.ply:1: ") && said.ends_with("--skip-bad goes on without what cannot be read.\n"),
+        "{said}"
+    );
     assert!(!at.join("data").exists());
     let said = captured(at, "set -o data --touches 5 --skip-bad", 0);
     for expected in [
@@ -137,32 +140,31 @@ fn bad_meshes_are_named_at_once_and_with_skip_bad_the_rest_is_captured() {
 }
 
 #[test]
-fn an_object_that_cannot_be_touched_is_named_with_its_size_before_anything_is_captured() {
+fn objects_that_cannot_be_touched_are_named_with_their_sizes_before_anything_is_captured() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    for name in ["one", "two", "three"] {
-        globe(at, name, 4);
-    }
+    globe(at, "one", 4);
     // Two flat sheets, which a table hides.
     for name in ["flat", "sheet"] {
-        std::fs::write(at.join(format!("{name}.obj")), "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n").unwrap();
+        std::fs::write(at.join(format!("{name}.obj")), "v 0 0 0\nv 9 0 0\nv 9 8 0\nv 0 8 0\nf 1 2 3 4\n").unwrap();
     }
-    let said = captured(at, "one.obj flat.obj sheet.obj -o data --touches 5 --scene table", 1);
-    let expected = "palpate: flat (10 × 10 × 0 units), sheet (10 × 10 × 0 units): none of 4194304 approaches touched with all \
-                    three fingers, 3 units from the first to the third, of radius 0.15 units. Give a larger radius";
-    assert!(said.contains(expected), "{said}");
-    assert!(said.contains("--approaches N keeps every approach. --skip-bad leaves such objects out. See also --probe and --length."));
-    assert!(!at.join("data").exists());
-    let said = captured(at, "one.obj flat.obj two.obj -o data --touches 5 --scene table --skip-bad", 0);
-    assert!(said.contains("palpate: left out: flat (10 × 10 × 0 units)"), "{said}");
-    assert_eq!(crate::listing(&at.join("data")), [".lock", "dataset.json", "one.txt", "two.txt"]);
-    // A wrong unit: sizes are said, and the length is no option.
     std::fs::write(at.join("probe.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\n").unwrap();
-    let said = captured(at, "three.obj -o small --touches 5 --true-size mm --probe probe.toml", 1);
-    assert!(said.contains("three: 1.9") && said.contains(" mm\npalpate: three ("), "{said}");
-    assert!(said.contains("state another unit of the mesh") && said.contains("See also --probe and --true-size."), "{said}");
-    assert!(!said.contains("--length"), "{said}");
-    assert!(captured(at, "three.obj -o none --approaches 0", 2).starts_with("palpate: --approaches is 0. Use 1 or more."));
+    let true_size = "flat.obj sheet.obj -o data --touches 5 --scene table --true-size mm --probe probe.toml";
+    let said = captured(at, true_size, 1);
+    assert!(said.contains("flat: 9 × 8 × 0 mm\n") && said.contains("sheet: 9 × 8 × 0 mm\n"), "{said}");
+    let expected = "palpate: flat (9 × 8 × 0 mm), sheet (9 × 8 × 0 mm): none of 4194304 approaches touched with all three \
+                    fingers, 30 mm from the first to the third, of radius 1.5 mm. If that is not the size, state another unit";
+    assert!(said.contains(expected), "{said}");
+    let options =
+        "\n--approaches N keeps every approach. --skip-bad leaves such objects out. See also --probe and --true-size.";
+    assert!(said.contains(options) && !said.contains("--length"), "{said}");
+    assert!(!at.join("data").exists());
+    let said = captured(at, "one.obj flat.obj -o data --touches 5 --scene table --skip-bad", 0);
+    assert!(said.contains("palpate: left out: flat (10 × 8.89 × 0 units): none of"), "{said}");
+    assert_eq!(crate::listing(&at.join("data")), [".lock", "dataset.json", "one.txt"]);
+    assert!(
+        captured(at, "one.obj -o none --approaches 0", 2).starts_with("palpate: --approaches is 0. Use 1 or more.")
+    );
 }
 
 #[test]
@@ -174,7 +176,10 @@ fn two_directories_with_a_file_of_one_name_lead_to_the_option_for_that() {
         globe(&at.join("set").join(name), "mesh", 4);
     }
     let said = captured(at, "set -o data --touches 5", 1);
-    assert!(said.contains("two objects are called mesh") && said.contains("\n--instances takes each directory as one object"));
+    assert!(
+        said.contains("two objects are called mesh")
+            && said.contains("\n--instances takes each directory as one object")
+    );
     captured(at, "set -o data --touches 5 --instances", 0);
 }
 
@@ -213,7 +218,7 @@ fn objects_without_a_known_unit_are_named_together_and_files_that_state_one_are_
     let said = captured(at, stated, 0);
     assert!(said.contains("cup.gltf is used; set/cup.obj") || said.contains("cup.gltf is used; cup.obj"), "{said}");
     assert!(said.contains("cup: 100 × 100 × 100 mm"), "{said}");
-    assert!(captured(at, &stated.replace("stated", "mm").replace("data", "other"), 1).contains("cup: 1.9"));
+    assert!(captured(at, &stated.replace("stated", "mm").replace("data", "other"), 1).contains("cup: 2 × 2 × 2 mm"));
 }
 
 #[cfg(target_os = "linux")]
@@ -239,11 +244,13 @@ fn touches_of_one_object_of_a_model_are_evaluated() {
     let data = directory.path().join("one");
     stdout(command(["capture", "bowl", "--approaches", "150", "-o"]).arg(&data).output().unwrap());
     let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/household.palpate");
-    let evaluate = |more: &[&str]| {
-        command(["evaluate", "--sequences", "20"]).arg(&model).arg(&data).args(more).output().unwrap()
-    };
+    let evaluate =
+        |more: &[&str]| command(["evaluate", "--sequences", "20"]).arg(&model).arg(&data).args(more).output().unwrap();
     let text = stdout(evaluate(&["--confusion", "5"]));
-    assert!(text.contains("\nbowl ") && text.contains("promised for all 10 objects of the model, tested on 1"), "{text}");
+    assert!(
+        text.contains("\nbowl ") && text.contains("promised for all 10 objects of the model, tested on 1"),
+        "{text}"
+    );
     assert!(text.contains("Taken for, after 5 touches"), "{text}");
     // What needs a second object says so, and neither a model nor a promise comes of one.
     let error = stderr(evaluate(&["--switch"]), 1);

@@ -28,10 +28,16 @@ const fn slow(words: &'static str, files: &'static [&'static str]) -> Writer {
 /// Every command that writes, by every option that names or adds a file. What writes through the same call as another one, such
 /// as a page, is tried once to its end.
 const WRITERS: &[Writer] = &[
-    quick("export ensemble.json -o out/m.palpate --emit c,rust,json", &["m.palpate", "m.h", "palpate.h", "m.rs", "m.json"]),
+    quick(
+        "export ensemble.json -o out/m.palpate --emit c,rust,json",
+        &["m.palpate", "m.h", "palpate.h", "m.rs", "m.json"],
+    ),
     quick("export ensemble.json -o out/t.palpate --emit thumb", &["t.palpate", "t.s", "t.rs"]),
     quick("export ensemble.json -o out/c.palpate --emit c-code", &["c.palpate", "c.h", "palpate.h"]),
-    quick("export model.palpate -o out/copy.palpate --emit rust,c", &["copy.palpate", "copy.rs", "copy.h", "palpate.h"]),
+    quick(
+        "export model.palpate -o out/copy.palpate --emit rust,c",
+        &["copy.palpate", "copy.rs", "copy.h", "palpate.h"],
+    ),
     quick("verify model.palpate ensemble.json --prove out/proof.txt", &["proof.txt"]),
     quick("recognize model.palpate touches.txt --mcap out/log.mcap", &["log.mcap"]),
     quick("train data -o out/trained.json --trees rounds=2", &["trained.json"]),
@@ -44,10 +50,7 @@ const WRITERS: &[Writer] = &[
     slow("train data -o out/t.json --teach touches.txt --page out/page.html", &["t.json", "page.html"]),
     slow("calibrate model.palpate data -o out/sure.palpate", &["sure.palpate"]),
     slow("calibrate model.palpate data -o out/planned.palpate --plan 1", &["planned.palpate"]),
-    slow(
-        "calibrate model.palpate casts.csv -o out/rows.palpate --label kind --sequence-column id",
-        &["rows.palpate"],
-    ),
+    slow("calibrate model.palpate casts.csv -o out/rows.palpate --label kind --sequence-column id", &["rows.palpate"]),
     slow("evaluate rows.palpate casts.csv --label kind --sequence-column id --page out/page.html", &["page.html"]),
     slow("tune data --max-bytes 2K -o out/tuned.palpate --ensemble out/tuned.json", &["tuned.palpate", "tuned.json"]),
     slow("view --play ball.obj -o out/play.html", &["play.html"]),
@@ -79,7 +82,11 @@ fn set_up() -> Place {
     std::fs::write(at.join("touches.txt"), "0 0 0.08\n0 0 0.01\n").unwrap();
     std::fs::write(at.join("casts.csv"), "a,-9,0,0,1,0,0\n").unwrap();
     let rows = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/import/xgboost-3.4-softprob.ubj");
-    stdout(command(["export".as_ref(), rows.as_os_str(), "-o".as_ref(), at.join("rows.palpate").as_os_str()]).output().unwrap());
+    stdout(
+        command(["export".as_ref(), rows.as_os_str(), "-o".as_ref(), at.join("rows.palpate").as_os_str()])
+            .output()
+            .unwrap(),
+    );
     place
 }
 
@@ -99,7 +106,8 @@ fn no_command_replaces_a_file_that_palpate_did_not_write() {
             let error = stderr(run(&at, words, &[]), 1);
             assert!(error.contains(file), "{words}, {file}: {error}");
             assert_eq!(std::fs::read_to_string(out.join(file)).unwrap(), FOREIGN, "{words}, {file}");
-            let others: Vec<String> = listing(&out).into_iter().filter(|other| other != file && other != ".lock").collect();
+            let others: Vec<String> =
+                listing(&out).into_iter().filter(|other| other != file && other != ".lock").collect();
             assert!(others.is_empty(), "{words}, {file}: wrote {others:?}");
             std::fs::remove_dir_all(&out).unwrap();
         }

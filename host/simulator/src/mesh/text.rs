@@ -29,7 +29,8 @@ impl Written {
         match self {
             Self::Utf16 { is_little } => {
                 let (units, _) = bytes.as_chunks::<2>();
-                let unit = |unit: &[u8; 2]| if is_little { u16::from_le_bytes(*unit) } else { u16::from_be_bytes(*unit) };
+                let unit =
+                    |unit: &[u8; 2]| if is_little { u16::from_le_bytes(*unit) } else { u16::from_be_bytes(*unit) };
                 // After the mark that says which byte is first.
                 let decoded = char::decode_utf16(units.iter().skip(1).map(unit));
                 decoded.map(|read| read.unwrap_or(char::REPLACEMENT_CHARACTER)).collect::<String>().into_bytes()

@@ -27,7 +27,12 @@ const FORMATS: [Unread; 17] = [
         begins: &[b"OFF\n", b"OFF\r", b"OFF ", b"COFF", b"NOFF"],
         instead: MESHLAB,
     },
-    Unread { name: "3MF", extensions: &["3mf"], begins: &[], instead: "Export it as STL with a slicer or with FreeCAD" },
+    Unread {
+        name: "3MF",
+        extensions: &["3mf"],
+        begins: &[],
+        instead: "Export it as STL with a slicer or with FreeCAD",
+    },
     Unread { name: "AMF", extensions: &["amf"], begins: &[], instead: "Export it as STL with a slicer" },
     Unread { name: "STEP", extensions: &["step", "stp"], begins: &[b"ISO-10303-21"], instead: FREECAD },
     Unread { name: "IGES", extensions: &["iges", "igs"], begins: &[], instead: FREECAD },
@@ -54,7 +59,12 @@ const FORMATS: [Unread; 17] = [
     Unread { name: "a file of Blender", extensions: &["blend"], begins: &[b"BLENDER"], instead: BLENDER },
     Unread { name: "3DS", extensions: &["3ds"], begins: &[], instead: MESHLAB },
     Unread { name: "VTK", extensions: &["vtk", "vtp", "vtu"], begins: &[b"# vtk DataFile"], instead: PARAVIEW },
-    Unread { name: "a mesh of Gmsh", extensions: &["msh"], begins: &[b"$MeshFormat"], instead: "Export it as STL with Gmsh" },
+    Unread {
+        name: "a mesh of Gmsh",
+        extensions: &["msh"],
+        begins: &[b"$MeshFormat"],
+        instead: "Export it as STL with Gmsh",
+    },
     Unread { name: "LAS", extensions: &["las", "laz"], begins: &[b"LASF"], instead: CLOUDCOMPARE },
     Unread { name: "E57", extensions: &["e57"], begins: &[b"ASTM-E57"], instead: CLOUDCOMPARE },
     Unread { name: "PTS or PTX", extensions: &["pts", "ptx"], begins: &[], instead: CLOUDCOMPARE },
@@ -119,7 +129,11 @@ mod tests {
         );
         for (bytes, name, expected) in [
             (&off[..], "box.obj", "box.obj: OFF is not read"),
-            (b"ISO-10303-21;\nHEADER;\n", "mug.step", "STEP is not read. Export a mesh of it as STL, for example with FreeCAD."),
+            (
+                b"ISO-10303-21;\nHEADER;\n",
+                "mug.step",
+                "STEP is not read. Export a mesh of it as STL, for example with FreeCAD.",
+            ),
             (b"#VRML V2.0 utf8\nShape {}\n", "mug.wrl", "VRML or X3D is not read"),
             (b"PK\x03\x04\x14\x00", "mug.3MF", "3MF is not read. Export it as STL with a slicer"),
             (b"PK\x03\x04\x14\x00", "mug.stl", "a ZIP archive is not read. Unpack it"),
@@ -142,7 +156,10 @@ mod tests {
         let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:094d\nsize 625707\n";
         for extension in EXTENSIONS {
             let said = said(pointer, &format!("cup.{extension}"));
-            assert!(said.contains("this is a pointer of Git LFS, and not the file itself. Fetch it: git lfs pull."), "{said}");
+            assert!(
+                said.contains("this is a pointer of Git LFS, and not the file itself. Fetch it: git lfs pull."),
+                "{said}"
+            );
         }
     }
 

@@ -1,6 +1,6 @@
 //! `palpate data objects`.
 
-use crate::commands::probe::{SkipArguments, tell};
+use crate::commands::probe::tell;
 use crate::commands::{Global, remark};
 use palpate::mesh::builtin;
 use palpate::mesh::obj;
@@ -35,8 +35,9 @@ pub(super) struct Arguments {
     /// Also draw a contact sheet of the objects into this PNG file
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    #[command(flatten)]
-    skip: SkipArguments,
+    /// Leave out bad meshes
+    #[arg(long)]
+    skip_bad: bool,
 }
 
 /// A file that was written.
@@ -86,7 +87,7 @@ fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
     }
     let objects = match arguments.varied {
         None => {
-            let search = Search { skips_bad: arguments.skip.skip_bad, ..Search::default() };
+            let search = Search { skips_bad: arguments.skip_bad, ..Search::default() };
             let loaded = source::load(&arguments.sources, search)?;
             loaded.notes.iter().for_each(|note| remark(&format!("palpate: {note}")));
             loaded.objects

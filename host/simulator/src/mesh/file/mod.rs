@@ -186,9 +186,7 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
         }
     };
     Ok(match parsed {
-        Parsed::Mesh((mesh, moved)) => {
-            Contents { mesh, moved, millimeters, format, points: Vec::new(), notes }
-        }
+        Parsed::Mesh((mesh, moved)) => Contents { mesh, moved, millimeters, format, points: Vec::new(), notes },
         #[cfg(feature = "scans")]
         Parsed::Points(points) => {
             let scan::Scanned { mesh, points, moved, notes } = scan::surface(points, path)?;

@@ -111,7 +111,8 @@ fn leads_back(path: &Path, directory: &Path) -> bool {
 
 /// True if files of this extension may state their unit.
 fn states_unit(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| ["gltf", "glb", "dae"].iter().any(|own| extension.eq_ignore_ascii_case(own)))
+    path.extension()
+        .is_some_and(|extension| ["gltf", "glb", "dae"].iter().any(|own| extension.eq_ignore_ascii_case(own)))
 }
 
 /// The name of a file or directory as text.

@@ -187,8 +187,10 @@ fn hidden_files_and_what_macs_put_beside_files_are_no_meshes() {
 #[test]
 fn files_of_formats_that_are_not_read_are_named_with_what_converts_them() {
     let directory = tempfile::tempdir().unwrap();
-    let source =
-        place(directory.path(), &["box.obj", "cup.off", "deep/mug.step", "jug.OFF", "box.fbx", "box.blend", "notes.txt"]);
+    let source = place(
+        directory.path(),
+        &["box.obj", "cup.off", "deep/mug.step", "jug.OFF", "box.fbx", "box.blend", "notes.txt"],
+    );
     let loaded = load(std::slice::from_ref(&source), Search::default()).unwrap();
     assert_eq!(loaded.objects.len(), 1);
     let expected = format!(
@@ -200,7 +202,10 @@ fn files_of_formats_that_are_not_read_are_named_with_what_converts_them() {
     assert!(loaded.objects[0].notes[0].ends_with("box.blend, box.fbx are passed over, of the same object"));
     let only = place(&directory.path().join("only"), &["1.off", "2.off", "3.off", "4.off", "5.off", "6.off", "7.off"]);
     let error = objects(&[only]).unwrap_err().to_string();
-    assert!(error.contains("no mesh that is read here") && error.contains("5.off and 2 more are not read. OFF: "), "{error}");
+    assert!(
+        error.contains("no mesh that is read here") && error.contains("5.off and 2 more are not read. OFF: "),
+        "{error}"
+    );
     assert!(object(&source).unwrap().notes.last().unwrap().contains("mug.step"));
 }
 
@@ -220,7 +225,10 @@ fn all_meshes_that_cannot_be_read_are_named_at_once_and_left_out_if_that_is_want
         let error = load(sources, search).unwrap_err();
         let text = error.to_string();
         assert!(text.starts_with(&format!("{} of {} meshes cannot be read:\n  ", 2 + dead, 4 + dead)), "{text}");
-        assert!(text.contains("two.obj:1: a vertex without z") && text.contains("four.obj: the mesh has no faces"), "{text}");
+        assert!(
+            text.contains("two.obj:1: a vertex without z") && text.contains("four.obj: the mesh has no faces"),
+            "{text}"
+        );
         assert_eq!((error.exit_code(), text.contains("dead.obj: cannot read the mesh")), (1, cfg!(unix)), "{text}");
         let loaded = load(sources, Search { skips_bad: true, ..search }).unwrap();
         let expected = if instances { ["a", "b"] } else { ["one", "three"] };
@@ -230,8 +238,14 @@ fn all_meshes_that_cannot_be_read_are_named_at_once_and_left_out_if_that_is_want
     // One file alone is refused as it always was, and nothing is left out of nothing.
     let alone = format!("{source}/c");
     for skips_bad in [false, true] {
-        let error = load(std::slice::from_ref(&alone), Search { skips_bad, ..Search::default() }).unwrap_err().to_string();
-        assert!(error.ends_with("four.obj: the mesh has no faces. Export the mesh as a file with faces: OBJ, STL, PLY, GLB or COLLADA."), "{error}");
+        let error =
+            load(std::slice::from_ref(&alone), Search { skips_bad, ..Search::default() }).unwrap_err().to_string();
+        assert!(
+            error.ends_with(
+                "four.obj: the mesh has no faces. Export the mesh as a file with faces: OBJ, STL, PLY, GLB or COLLADA."
+            ),
+            "{error}"
+        );
     }
 }
 
@@ -248,7 +262,10 @@ fn objects_with_the_same_mesh_are_named() {
 fn files_that_may_state_their_unit_come_first_where_that_is_wanted() {
     let directory = tempfile::tempdir().unwrap();
     let source = place(directory.path(), &["cup.obj", "cup.glb", "cup.stl", "fork.stl"]);
-    let first = |prefers_units| match &super::found(std::slice::from_ref(&source), Search { prefers_units, ..Search::default() }) {
+    let first = |prefers_units| match &super::found(
+        std::slice::from_ref(&source),
+        Search { prefers_units, ..Search::default() },
+    ) {
         Ok((found, _)) => match &found[0] {
             Source::File { path, .. } => path.file_name().unwrap().to_owned(),
             other => panic!("{other:?}"),

@@ -226,7 +226,8 @@ impl<R: BufRead> Text<'_, R> {
         match state {
             State::Outside => Ok((welder, None)),
             State::Solid if welder.triangles.len() > before => {
-                let note = "ends after a facet, without \"endsolid\": if it was cut there, the rest of the mesh is missing";
+                let note =
+                    "ends after a facet, without \"endsolid\": if it was cut there, the rest of the mesh is missing";
                 Ok((welder, Some(note.into())))
             }
             state => Err(self.unexpected(None, state.expected())),

@@ -77,7 +77,8 @@ fn a_text_without_its_last_word_with_colors_or_with_more_lines_in_front_is_read(
     let color = "color 0.5 0.5 1\n";
     let colored = format!("solid x\n{color}{}endsolid", FACET.replace("outer", &format!("{color}outer")));
     assert_eq!(parse_bytes(&colored).unwrap().triangles.len(), 1);
-    let remarks = format!("solid x\nCreated by hand\n\nCOMMENT facet\n{FACET}endsolid\nsolid y\n# 2\n{FACET}endsolid x");
+    let remarks =
+        format!("solid x\nCreated by hand\n\nCOMMENT facet\n{FACET}endsolid\nsolid y\n# 2\n{FACET}endsolid x");
     assert_eq!(parse_bytes(&remarks).unwrap().triangles.len(), 2);
     assert!(notes(&remarks).is_empty() && notes(&colored).is_empty());
     let between = format!("solid x\n{FACET}Created by hand\n{FACET}endsolid");
