@@ -121,7 +121,7 @@ impl Ensemble {
         Ok(Self { ensemble: Arc::new(ensemble) })
     }
 
-    /// Writes an ensemble over touches as XGBoost's JSON.
+    /// Writes an ensemble over touches as XGBoost's JSON. A file that Palpate did not write is not replaced.
     fn save(&self, py: Python<'_>, path: PathBuf) -> Result<(), Failure> {
         Ok(py.detach(|| self.ensemble.save(&path))?)
     }

@@ -153,7 +153,7 @@ impl Model {
         Ok(py.detach(|| CompiledModel::read(&path).and_then(|model| Self::of(model.into_bytes())))?)
     }
 
-    /// Writes the model, whole or not at all.
+    /// Writes the model, whole or not at all. A file that Palpate did not write is not replaced.
     fn save(&self, py: Python<'_>, path: PathBuf) -> Result<(), Failure> {
         Ok(py.detach(|| output::write_bytes(&path, self.model().bytes()))?)
     }

@@ -8,7 +8,7 @@ use super::results::json;
 use palpate::chip::instructions::Chip;
 use palpate::error::{Error, Result};
 use palpate::mesh::{Instance, Object};
-use palpate::output::write_json;
+use palpate::output::replace_json;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
@@ -72,7 +72,7 @@ impl Cache {
         let began = Instant::now();
         let result = measure()?;
         let stage = Stage { result, seconds: began.elapsed().as_secs_f64() };
-        write_json(&path, &stage)?;
+        replace_json(&path, &stage)?;
         Ok(stage)
     }
 

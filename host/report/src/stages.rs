@@ -15,7 +15,7 @@ use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
 use palpate::mesh::{Object, source};
-use palpate::output::write_json;
+use palpate::output::{refuse_foreign, write_json};
 use palpate::progress::{self, Progress};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -122,6 +122,7 @@ pub fn report_on(
     let made_from = json!({ "job": "report", "settings": Settings { command: String::new(), ..settings.clone() } });
     if !existing.replace {
         results::refuse_others(directory, &made_from, &["index.html"], cache::DIRECTORY)?;
+        refuse_foreign(&directory.join("index.html"))?;
     }
     let objects = objects()?;
     if objects.len() < 2 {

@@ -2,8 +2,8 @@
 
 use super::Settings;
 use crate::error::{CaptureProblem, Error, Place, Result};
-use crate::touches::{Entry, Listing, Lying, Origin, files};
-use std::path::Path;
+use crate::touches::{Entry, Format, Listing, Lying, Origin, files};
+use std::path::{Path, PathBuf};
 
 /// State that a capture begins with.
 pub(super) struct Admission {
@@ -11,6 +11,19 @@ pub(super) struct Admission {
     pub(super) replaced: Option<Listing>,
     /// The listing to start or go on from: it names every object of the capture.
     pub(super) listing: Listing,
+}
+
+/// The file that an object's touches are in until it is complete.
+pub(super) fn part(directory: &Path, name: &str) -> PathBuf {
+    directory.join(format!("{name}.part"))
+}
+
+/// The files that hold an object's touches, complete or not, in any format.
+pub(super) fn own_files(directory: &Path, name: &str) -> impl Iterator<Item = PathBuf> {
+    let entry = Entry { name: name.into(), ..Entry::default() };
+    let done = Format::ALL.map(|format| entry.file(directory, format));
+    let unfinished = [part(directory, name), directory.join(format!("{name}.parquet.part"))];
+    done.into_iter().chain(unfinished)
 }
 
 /// Compares what is in a directory with what a capture would write, and refuses what would be lost.
@@ -23,13 +36,20 @@ pub(super) fn admit(directory: &Path, settings: &Settings, objects: &[Entry]) ->
         Err(Error::At { .. }) if settings.force => None,
         found => found?,
     };
-    let Some(found) = found else {
-        let files: Vec<String> = files(directory)?.iter().filter_map(|(_, path, _)| file_name(path)).collect();
-        if !settings.force && !files.is_empty() {
-            return refuse(CaptureProblem::HoldsFiles { files });
-        }
-        return Ok(Admission { replaced: None, listing: wanted });
-    };
+    // Files that a capture of these objects writes, and that no capture has listed.
+    let is_listed = |name: &str| found.iter().any(|found| found.objects.iter().any(|entry| entry.name == name));
+    let unlisted =
+        objects.iter().filter(|entry| !is_listed(&entry.name)).flat_map(|entry| own_files(directory, &entry.name));
+    let mut foreign: Vec<String> = unlisted.filter(|path| path.exists()).filter_map(|path| file_name(&path)).collect();
+    if found.is_none() {
+        foreign.extend(files(directory)?.iter().filter_map(|(_, path, _)| file_name(path)));
+    }
+    foreign.sort();
+    foreign.dedup();
+    if !settings.force && !foreign.is_empty() {
+        return refuse(CaptureProblem::HoldsFiles { files: foreign });
+    }
+    let Some(found) = found else { return Ok(Admission { replaced: None, listing: wanted }) };
     if found.is_recorded() {
         let touches = touches(&found.objects);
         return refuse(CaptureProblem::HoldsRecorded { touches, objects: found.names() });

@@ -18,18 +18,28 @@ pub enum CaptureProblem {
         fix: String,
     },
     /// The true size of an object is needed and not known.
-    #[error("{name}: the unit of its mesh is not known, and so its true size is not")]
+    #[error("{name}: the unit of the mesh is not known, and so the true size is not")]
     NoTrueSize {
         /// The object.
         name: String,
     },
-    /// An object cannot be touched with all fingers.
-    #[error("{name}: none of {approaches} approaches touched with all three fingers")]
+    /// Objects cannot be touched with all fingers.
+    #[error(
+        "{}: none of {approaches} approaches touched with all three fingers, {span} from the first to the third, of radius \
+         {radius}",
+        objects.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    )]
     Untouchable {
-        /// The object.
-        name: String,
-        /// Number of approaches tried.
+        /// The objects.
+        objects: Vec<Untouched>,
+        /// Number of approaches to each that were tried.
         approaches: u64,
+        /// Distance of the outer fingers, with its unit.
+        span: String,
+        /// Radius of the fingers, with its unit.
+        radius: String,
+        /// True if the objects have their true size.
+        is_true_size: bool,
     },
     /// Another capture has locked the directory.
     #[error("another capture is writing into this directory")]
@@ -51,7 +61,7 @@ pub enum CaptureProblem {
         differences: String,
     },
     /// The directory holds files of touches that no listing names.
-    #[error("holds {}, which no capture has listed: after this capture, they would never be used", list(files))]
+    #[error("holds {}, which no capture has listed, and which this one would replace or never use", list(files))]
     HoldsFiles {
         /// The files' names.
         files: Vec<String>,
@@ -135,8 +145,13 @@ impl Problem for CaptureProblem {
     fn fix(&self) -> String {
         match self {
             Self::Object { fix, .. } => return fix.clone(),
-            Self::Untouchable { .. } => {
-                "Leave the object out, or give a larger radius, a smaller spacing or a greater length."
+            Self::Untouchable { is_true_size: false, .. } => {
+                "Give a larger radius, a smaller spacing or a greater length, keep every approach, also those that miss, or \
+                 leave the object out."
+            }
+            Self::Untouchable { is_true_size: true, .. } => {
+                "If that is not the size, state another unit of the mesh. Otherwise give a larger radius or a smaller spacing, \
+                 keep every approach, also those that miss, or leave the object out."
             }
             Self::NoTrueSize { .. } => "State the unit of the mesh: mm, cm, m or in.",
             Self::Busy => "Wait until it is done, or give another directory.",
@@ -163,6 +178,21 @@ impl Problem for CaptureProblem {
             Self::WorkerStopped => "Report this as a bug.",
         }
         .into()
+    }
+}
+
+/// An object that cannot be touched with all fingers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Untouched {
+    /// Its name.
+    pub name: String,
+    /// The sides of its bounding box, with their unit.
+    pub size: String,
+}
+
+impl std::fmt::Display for Untouched {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({})", self.name, self.size)
     }
 }
 

@@ -43,7 +43,7 @@ use crate::probe::approach::FINGERS;
 use crate::probe::scene::{Scene, Table};
 use crate::progress::{self, Progress};
 use crate::touches::{Entry, Lying, ObjectTouches, Origin, Source};
-pub use error::CaptureProblem;
+pub use error::{CaptureProblem, Untouched};
 use palpate_shared::format::Length;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -150,12 +150,52 @@ pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progre
         .zip(&scenes)
         .map(|(object, scenes)| Sampler::of_instances(scenes, &object.name, &settings.origin))
         .collect();
+    if let Some(problem) = untouched(&samplers, &settings.origin)? {
+        return Err(problem.into());
+    }
     let entries: Vec<Entry> =
         objects.iter().zip(&scenes).map(|(object, scenes)| entry(object, scenes, &settings.origin)).collect();
     let mut store = store::Store::open(directory, settings, &entries)?;
     let objects = pipeline::run(&samplers, settings, &mut store, progress)?;
     store.finish()?;
     Ok(Summary { objects, seconds: start.elapsed().as_secs_f64() })
+}
+
+/// The objects of these that cannot be touched with all fingers, as [`CaptureProblem::Untouchable`]; none if all can, or if every
+/// approach is kept.
+///
+/// # Errors
+/// As [`scenes`].
+pub fn untouchable(objects: &[Object], origin: &Origin, progress: &dyn Progress) -> Result<Option<CaptureProblem>> {
+    let objects: Vec<&Object> = objects.iter().collect();
+    let scenes = scenes(&objects, origin, progress)?;
+    let samplers: Vec<Sampler<'_>> = objects
+        .iter()
+        .zip(&scenes)
+        .map(|(object, scenes)| Sampler::of_instances(scenes, &object.name, origin))
+        .collect();
+    untouched(&samplers, origin)
+}
+
+fn untouched(samplers: &[Sampler<'_>], origin: &Origin) -> Result<Option<CaptureProblem>> {
+    if origin.approaches {
+        return Ok(None);
+    }
+    let tried: Vec<Result<()>> = samplers.par_iter().map(Sampler::try_each).collect();
+    let mut all: Option<CaptureProblem> = None;
+    for error in tried.into_iter().filter_map(Result::err) {
+        match (error.problem::<CaptureProblem>().cloned(), &mut all) {
+            (
+                Some(CaptureProblem::Untouchable { objects: more, .. }),
+                Some(CaptureProblem::Untouchable { objects, .. }),
+            ) => {
+                objects.extend(more);
+            }
+            (Some(problem @ CaptureProblem::Untouchable { .. }), all) => *all = Some(problem),
+            _ => return Err(error),
+        }
+    }
+    Ok(all)
 }
 
 /// Entry of the listing for an object before it is touched.

@@ -3,14 +3,19 @@
 //! The stream of random numbers is that of version 0.1.0 and must stay it, byte for byte: data sets are resumed, added
 //! to and compared across versions. It is therefore not one of the streams of `random`.
 
+use super::error::Untouched;
 use crate::error::{CaptureProblem, Result};
+use crate::mesh::facts::sides;
+use crate::probe::Probe;
 use crate::probe::approach::{Approach, FINGERS};
 use crate::probe::hand;
 use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::random::{self, Purpose};
 use crate::touches::Origin;
+use glam::DVec3;
 use palpate_shared::Touch;
+use palpate_shared::format::Length;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -76,9 +81,9 @@ impl<'a> Sampler<'a> {
     pub fn drawn(&self, index: u64) -> Result<Drawn> {
         let mut rng = self.rng(index);
         let probe = &self.origin.probe;
-        let untouchable = || CaptureProblem::Untouchable { name: self.name.into(), approaches: MOST_ATTEMPTS };
         let turn = index % self.scenes.len().max(1) as u64;
-        let scene = usize::try_from(turn).ok().and_then(|turn| self.scenes.get(turn)).ok_or_else(untouchable)?;
+        let scene = usize::try_from(turn).ok().and_then(|turn| self.scenes.get(turn));
+        let scene = scene.ok_or_else(|| self.untouchable(DVec3::ZERO))?;
         let clearance = self.origin.clearance(scene.bounds());
         // What the real probe adds has a stream of its own, so that the approaches stay the same with it and without.
         let mut added = (!self.origin.real.is_none())
@@ -108,7 +113,32 @@ impl<'a> Sampler<'a> {
                 return Ok(Drawn { touch, approaches, late, turned_back });
             }
         }
-        Err(untouchable().into())
+        let [low, high] = scene.bounds();
+        Err(self.untouchable(high - low).into())
+    }
+
+    /// The problem of an object of this size that cannot be touched with all fingers.
+    fn untouchable(&self, size: DVec3) -> CaptureProblem {
+        let Probe { radius, spacing, .. } = self.origin.probe;
+        let is_true_size = self.origin.unit == Length::Millimeter;
+        let unit = if is_true_size { "mm" } else { "units" };
+        CaptureProblem::Untouchable {
+            objects: vec![Untouched { name: self.name.into(), size: format!("{} {unit}", sides(size)) }],
+            approaches: MOST_ATTEMPTS,
+            span: format!("{} {unit}", 2.0 * spacing),
+            radius: format!("{radius} {unit}"),
+            is_true_size,
+        }
+    }
+
+    /// Samples of each of its scenes: where one of them cannot be touched, the object cannot be captured.
+    ///
+    /// # Errors
+    /// As [`sample`](Self::sample).
+    pub(super) fn try_each(&self) -> Result<()> {
+        let samples = self.origin.samples();
+        let each = samples.take(self.scenes.len().max(1));
+        each.map(|sample| self.drawn(sample).map(drop)).collect()
     }
 
     /// The first approach that sample `index` draws, to this scene of the object: the sample itself where every approach is

@@ -8,7 +8,7 @@
 //! listing name files that are gone.
 
 use super::Settings;
-use super::admission::{Admission, admit};
+use super::admission::{Admission, admit, own_files, part};
 use crate::error::{CaptureProblem, Error, Place, Result};
 use crate::output;
 use crate::touches::{Entry, Format, Listing, checksum};
@@ -161,10 +161,6 @@ impl Store {
     }
 }
 
-fn part(directory: &Path, name: &str) -> PathBuf {
-    directory.join(format!("{name}.part"))
-}
-
 /// Turns a complete part into a Parquet file.
 #[cfg(feature = "parquet")]
 fn convert(part: &Path, done: &Path, object: &str) -> Result<()> {
@@ -182,10 +178,7 @@ fn convert(_: &Path, done: &Path, _: &str) -> Result<()> {
 }
 
 fn remove_touches(directory: &Path, name: &str) -> Result<()> {
-    let entry = Entry { name: name.into(), ..Entry::default() };
-    let done = Format::ALL.map(|format| entry.file(directory, format));
-    let unfinished = [part(directory, name), directory.join(format!("{name}.parquet.part"))];
-    done.iter().chain(&unfinished).try_for_each(|path| remove(path))
+    own_files(directory, name).try_for_each(|path| remove(&path))
 }
 
 /// Removes a file, if it is there.

@@ -2,6 +2,7 @@
 
 use super::{ChipModel, Update};
 use crate::error::{Error, Result};
+use crate::output;
 use palpate_shared::Pose;
 use palpate_shared::link::{ApproachMessage, Decision, Event};
 use serde::{Deserialize, Serialize};
@@ -78,11 +79,12 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Begins a journal. A file of this name is replaced, not emptied: whoever still follows it can read the rest of it.
+    /// Begins a journal. A journal of this name is replaced, not emptied: whoever still follows it can read the rest of it.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// When the file cannot be written, and [`Foreign`](crate::error::Foreign) if one is there that is no journal.
     pub fn create(path: &Path) -> Result<Self> {
+        output::refuse_foreign(path)?;
         let io = |source| Error::io(path, "write the journal", source);
         match std::fs::canonicalize(path) {
             // Only files are removed: devices and pipes are written to, and links stay.

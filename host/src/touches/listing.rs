@@ -159,12 +159,12 @@ impl Listing {
         Ok(listing)
     }
 
-    /// Writes the listing, whole or not at all.
+    /// Writes the listing, whole or not at all, and replaces what is there.
     ///
     /// # Errors
     /// When it cannot be written.
     pub fn write(&self, directory: &Path) -> Result<()> {
-        output::write_json(&Self::path(directory), self)
+        output::replace_json(&Self::path(directory), self)
     }
 
     /// The touches of a listed object, and what each of them is of.

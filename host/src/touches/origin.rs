@@ -77,7 +77,8 @@ impl Origin {
     /// [`Setting`](crate::error::Setting) naming the field.
     pub fn check(&self) -> Result<()> {
         if self.touches == 0 {
-            return Err(Error::setting("touches", 0, "1 or more"));
+            let name = if self.approaches { "approaches" } else { "touches" };
+            return Err(Error::setting(name, 0, "1 or more"));
         }
         if !self.format.is_built_in() {
             return Err(Error::setting("format", self.format.name(), "text, or build with the feature parquet"));

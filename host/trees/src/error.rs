@@ -90,6 +90,17 @@ impl Problem for Setting {
     }
 }
 
+/// A file is where another one is to be written, and Palpate did not write it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("a file is there already that Palpate did not write, and it is not replaced")]
+pub struct Foreign;
+
+impl Problem for Foreign {
+    fn fix(&self) -> String {
+        "Give another path, or move that file away.".into()
+    }
+}
+
 /// An error: where it is, what is wrong, what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -155,7 +166,7 @@ impl Error {
             ErrorKind::PermissionDenied => "Check the permissions, or choose another place",
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space, then run the command again",
             ErrorKind::IsADirectory => "Give a file, not a directory",
-            ErrorKind::NotADirectory => "Give a directory, not a file",
+            ErrorKind::NotADirectory | ErrorKind::AlreadyExists => "Give a directory, not a file",
             ErrorKind::InvalidData => "Check that it is the right kind of file",
             _ => "Check the file and the disk it is on",
         };

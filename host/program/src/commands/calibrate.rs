@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
     /// Shares of placements it holds for: stated or any
     #[arg(long, value_parser = prior, default_value = "stated", value_name = "OF", conflicts_with_all = ["recorded", "label"])]
     placement_prior: PlacementPrior,
-    /// The probability that the promise is kept
+    /// Probability that it is kept
     #[arg(long, default_value = "0.95", value_name = "SHARE", value_parser = share)]
     confidence: f64,
     /// Sequences of touches to draw; of all objects together, at most
@@ -125,7 +125,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if arguments.rows.label.is_some() {
         return rows(&arguments, global);
     }
-    output::refuse_input(&arguments.output, super::files_of(&arguments.directory))?;
+    output::admit(&arguments.output, super::files_of(&arguments.directory))?;
     if let Some(recorded) = &arguments.recorded {
         output::refuse_input(&arguments.output, super::files_of(recorded))?;
     }

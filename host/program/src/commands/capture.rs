@@ -5,6 +5,7 @@ use super::scene::{SceneArguments, described};
 use super::{Global, remark};
 use palpate::capture::{self, ObjectSummary, Settings, Summary};
 use palpate::error::{CaptureProblem, Problem, TouchesProblem};
+use palpate::mesh::BACKGROUND;
 use palpate::mesh::facts::Facts;
 use palpate::output;
 use palpate::probe::approach::Aim;
@@ -61,29 +62,33 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "K/N", value_parser = parsed::<Shard>)]
     shard: Option<Shard>,
     /// Continue what was interrupted
-    #[arg(long, conflicts_with = "force")]
+    #[arg(long)]
     resume: bool,
     /// Add the objects to the data set that is there
-    #[arg(long, conflicts_with = "force")]
-    add: bool,
-    /// Write all the same; replaces what is there
     #[arg(long)]
-    force: bool,
+    add: bool,
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
+    if global.force && (arguments.resume || arguments.add) {
+        return Err(Error::setting("force", "given", "it without --resume and --add, which keep what is there"));
+    }
     let settings = Settings {
         origin: arguments.origin(global.seed)?,
         resume: arguments.resume,
         add: arguments.add,
-        force: arguments.force,
+        force: global.force,
         threads: global.threads,
     };
     settings.check()?;
     let mut objects = arguments.size.objects(&arguments.sources, settings.origin.seed)?;
     arguments.scene.weigh(&mut objects)?;
-    for object in &objects {
+    let objects = arguments.size.touchable(objects, &settings.origin)?;
+    // Shapes of the background are as they are meant to be.
+    let has_background =
+        arguments.sources.iter().any(|source| source == BACKGROUND) && !std::path::Path::new(BACKGROUND).exists();
+    for object in objects.iter().filter(|object| !has_background || object.name != BACKGROUND) {
         for instance in object.instances() {
             let complaints = Facts::of(&instance.mesh).complaints(object.millimeters);
             if !complaints.is_empty() {
@@ -163,20 +168,30 @@ fn parsed<T: std::str::FromStr<Err = TouchesProblem>>(text: &str) -> Result<T, S
     text.parse().map_err(|problem: TouchesProblem| format!("{problem}. {}", problem.fix()))
 }
 
-/// Options that help where the library refuses the contents of the directory.
-pub(super) fn hint(error: &Error) -> Option<&'static str> {
-    match error.problem::<CaptureProblem>()? {
-        CaptureProblem::HoldsOtherObjects { .. } => Some("--add adds to what is there, --force replaces it."),
-        CaptureProblem::HoldsOtherSettings { .. } | CaptureProblem::Shorter { .. } => {
-            Some("--force replaces what is there.")
+/// Options that help where a capture is refused, of those that the command has.
+pub(super) fn hint(error: &Error, has: &dyn Fn(&str) -> bool) -> Option<String> {
+    let said = match error.problem::<CaptureProblem>()? {
+        CaptureProblem::HoldsOtherObjects { .. } if has("add") => "--add adds to what is there, --force replaces it.",
+        CaptureProblem::HoldsOtherObjects { .. }
+        | CaptureProblem::HoldsOtherSettings { .. }
+        | CaptureProblem::Shorter { .. } => "--force replaces what is there.",
+        CaptureProblem::HoldsFiles { .. } => "--force replaces what is there, also touches of other objects.",
+        CaptureProblem::HoldsUnfinished { .. } if has("resume") => "--resume resumes it, --force replaces it.",
+        CaptureProblem::NotWritten { .. } if has("resume") => "To resume, repeat the command with --resume.",
+        CaptureProblem::Untouchable { is_true_size, .. } => {
+            let size = if *is_true_size { "--true-size" } else { "--length" };
+            let options = [
+                (has("approaches") && has("resume")).then_some("--approaches N keeps every approach."),
+                has("skip-bad").then_some("--skip-bad leaves such objects out."),
+            ];
+            let options: String = options.into_iter().flatten().map(|option| format!("{option} ")).collect();
+            return Some(format!("{options}See also --probe and {size}."));
         }
-        CaptureProblem::HoldsUnfinished { .. } => Some("--resume resumes it, --force replaces it."),
-        CaptureProblem::NotWritten { .. } => Some("To resume, repeat the command with --resume."),
-        CaptureProblem::Untouchable { .. } => Some("See --probe and --length."),
-        CaptureProblem::Threads { .. } => Some("See --threads."),
-        CaptureProblem::NoTrueSize { .. } => Some("See --true-size."),
-        _ => None,
-    }
+        CaptureProblem::Threads { .. } => "See --threads.",
+        CaptureProblem::NoTrueSize { .. } => "See --true-size.",
+        _ => return None,
+    };
+    Some(said.into())
 }
 
 /// Counts of a capture that keeps every approach: none of them has to be a touch.

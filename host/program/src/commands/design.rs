@@ -140,10 +140,11 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
 
 fn run_design(arguments: &DesignArguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
+    let files = [arguments.output.join("probe.toml"), arguments.output.join("design.html")];
+    files.iter().try_for_each(|file| output::refuse_foreign(file))?;
     let objects = arguments.units.objects(&arguments.sources, global.seed())?;
     let settings = arguments.settings(&objects, global.seed())?;
     let found = design(&objects, &settings, &Bar::new())?;
-    let files = [arguments.output.join("probe.toml"), arguments.output.join("design.html")];
     output::write_bytes(&files[0], found.toml().as_bytes())?;
     palpate_report::design::page(&found, &arguments.words(&settings))?.write(&files[1])?;
     if global.json {

@@ -23,7 +23,7 @@ use std::path::PathBuf;
 /// Measure how often a model is right, and after how many touches.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Evaluate on touches that the model was not trained on: capture them with another seed. A compiled model is evaluated by the code that runs on the chip, an ensemble in f32. A compiled model stops by its own thresholds; if it was calibrated, the figures show whether it keeps its promise. Two shares of wrong names are shown: of all sequences, and of those that got a name. docs/reference/options.md explains every figure.
+Evaluate on touches that the model was not trained on. A compiled model is evaluated by the code that runs on the chip, an ensemble in f32. A compiled model stops by its own thresholds; if it was calibrated, the figures show whether it keeps its promise. Wrong names are shares of all sequences, and of those that got a name. docs/reference/options.md explains every figure.
 
 Examples:
   palpate capture builtin -o unseen --approaches 6000 --seed 2
@@ -103,7 +103,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             None => rows(&arguments, &file, label, global),
         };
     }
-    let mut dataset = super::dataset(&arguments.directory)?.matching(&file.names());
+    let mut dataset = super::checked(Dataset::read_any(&arguments.directory)?).matching(&file.names());
     let touches = || dataset.touches();
     if counts_patterns(&file) {
         super::warn_of_full(touches().count(), touches().any(|touch| !touch.is_full()));

@@ -193,7 +193,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if is_compiled(&arguments.ensemble) {
         return emit_compiled(&arguments, global);
     }
-    output::refuse_input(&arguments.output, arguments.inputs())?;
+    output::admit(&arguments.output, arguments.inputs())?;
     let emitted = places(&arguments)?;
     let names = arguments.names.as_deref().map(names).transpose()?;
     let mut ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(names.as_deref()))?;
@@ -388,7 +388,10 @@ fn places(arguments: &Arguments) -> Result<Vec<(Emitted, PathBuf)>> {
                     ),
                 ));
             }
-            output::refuse_input(&path, arguments.inputs())?;
+            output::admit(&path, arguments.inputs())?;
+            if *extension == "h" {
+                output::refuse_foreign(&path.with_file_name(HEADER))?;
+            }
             places.push((emitted, path));
         }
     }

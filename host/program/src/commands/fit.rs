@@ -37,9 +37,6 @@ pub(super) struct FitArguments {
     /// Presses on a flat plate, half a turn of the probe after each, one line per press
     #[arg(long, value_name = "FILE")]
     plate: Option<PathBuf>,
-    /// Write all the same; although recordings look wrong
-    #[arg(long)]
-    force: bool,
     /// Approaches to each object; simulated
     #[arg(long, value_name = "N", value_parser = count, default_value_t = Settings::default().approaches)]
     approaches: u64,
@@ -49,7 +46,7 @@ pub(super) struct FitArguments {
 
 pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
     let inputs = super::files_of(&arguments.recorded).into_iter().chain(arguments.plate.clone());
-    output::refuse_input(&arguments.output, inputs)?;
+    output::admit(&arguments.output, inputs)?;
     let recorded = super::checked(palpate::touches::Dataset::read_any(&arguments.recorded)?);
     let base = recorded.origin.clone().unwrap_or_default();
     if recorded.origin.as_ref().is_none_or(|origin| origin.probe == Origin::default().probe) {
@@ -71,7 +68,7 @@ pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
     let settings = Settings { origin, approaches: arguments.approaches, seed: global.seed() };
     let found = fit(&recorded, &objects, plate.as_deref(), &settings, &Bar::new())?;
     let suspects: Vec<String> = found.suspects.iter().map(ToString::to_string).collect();
-    if arguments.force || suspects.is_empty() {
+    if global.force || suspects.is_empty() {
         output::write_bytes(&arguments.output, found.toml().as_bytes())?;
     }
     if global.json {
@@ -79,7 +76,7 @@ pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
     } else {
         output::print_about(&arguments.output, &table(&found))?;
     }
-    if !suspects.is_empty() && !arguments.force {
+    if !suspects.is_empty() && !global.force {
         return Err(Error::from(FitProblem::Suspects { suspects }).in_file(&arguments.recorded));
     }
     for suspect in suspects {

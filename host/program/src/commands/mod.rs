@@ -42,7 +42,7 @@ mod view;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use palpate::error::{CaptureProblem, Setting, TouchesProblem};
+use palpate::error::{CaptureProblem, Foreign, MeshProblem, Setting, TouchesProblem};
 use palpate::touches::{Dataset, Format, Listing, Log, Warning};
 use palpate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -137,6 +137,9 @@ pub(crate) struct Global {
     /// Print neither progress nor remarks
     #[arg(long, global = true)]
     quiet: bool,
+    /// Write all the same; over whatever is there
+    #[arg(long, global = true)]
+    force: bool,
 }
 
 impl Global {
@@ -148,6 +151,7 @@ impl Global {
     /// Makes the options count that concern the whole process.
     fn apply(&self) -> Result<()> {
         QUIET.store(self.quiet, Ordering::Relaxed);
+        palpate::output::replace_foreign(self.force);
         // More are of no use, and cost memory.
         let Some(asked) = self.threads.map(|asked| asked.min(MOST_THREADS)) else { return Ok(()) };
         let built = rayon::ThreadPoolBuilder::new().num_threads(asked).build_global();
@@ -211,6 +215,7 @@ Global options:
   --threads <N>  Threads, which change no result
   --seed <N>     Seed of all that is random
   --quiet        Print neither progress nor remarks
+  --force        Write all the same, over what is there
   --help         Print help; `palpate help capture`, with examples
   --version      Print the version
 
@@ -223,17 +228,26 @@ More:
   docs/reference/options.md  what options take, and how commands work"
 }
 
-impl Command {
-    /// Addition to an error with which the command ends: its options that help.
-    fn hint(&self) -> fn(&Error) -> Option<&'static str> {
-        match self {
-            Self::Capture(_) => capture::hint,
-            _ => |error| match error.problem() {
-                Some(TouchesProblem::Incomplete) => Some("Repeat the command of the capture with --resume."),
-                _ => None,
-            },
+/// Addition to an error with which `command` ends: its options that help.
+fn hint(error: &Error, command: &str) -> Option<String> {
+    let cli = cli();
+    let command = cli.find_subcommand(command)?;
+    let has = |option: &str| {
+        let all = std::iter::once(command).chain(command.get_subcommands());
+        all.flat_map(clap::Command::get_arguments).any(|argument| argument.get_long() == Some(option))
+    };
+    let said = match (error.problem(), error.problem(), error.problem()) {
+        (Some(Foreign), ..) => "--force replaces it.",
+        (_, Some(TouchesProblem::Incomplete), _) => "Repeat the command of the capture with --resume.",
+        (.., Some(MeshProblem::Unread { .. })) if has("skip-bad") => "--skip-bad goes on without what cannot be read.",
+        (.., Some(MeshProblem::SameName { first, second, .. }))
+            if has("instances") && first.parent() != second.parent() && first.file_stem() == second.file_stem() =>
+        {
+            "--instances takes each directory as one object, called like the directory."
         }
-    }
+        _ => return capture::hint(error, &has),
+    };
+    Some(said.into())
 }
 
 /// The program's commands and arguments.
@@ -278,13 +292,13 @@ pub fn main() -> ExitCode {
         without_trailing(error).exit()
     });
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    let hint = cli.command.hint();
     match cli.global.apply().and_then(|()| cli.command.run(&cli.global)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if !matches!(error, Error::Closed) {
-                eprintln!("palpate: {}", message(&error, matches.subcommand_name().unwrap_or_default()));
-                if let Some(hint) = hint(&error) {
+                let command = matches.subcommand_name().unwrap_or_default();
+                eprintln!("palpate: {}", message(&error, command));
+                if let Some(hint) = hint(&error, command) {
                     eprintln!("{hint}");
                 }
             }
@@ -429,7 +443,7 @@ mod tests {
         println!("{} commands, {total} options, {} of them global: {}", listed.len(), global.len(), each.join(", "));
         assert!(listed.len() <= 18, "{}", listed.len());
         assert!(total <= 190, "{total}");
-        assert_eq!(global, BTreeSet::from(["json", "quiet", "seed", "threads"]));
+        assert_eq!(global, BTreeSet::from(["force", "json", "quiet", "seed", "threads"]));
     }
 
     #[test]

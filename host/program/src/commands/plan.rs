@@ -36,7 +36,7 @@ pub(super) struct Wanted<'a> {
 pub(super) fn run(wanted: &Wanted<'_>, global: &Global) -> Result<()> {
     let Wanted { directory, output: path, .. } = *wanted;
     let inputs = super::files_of(directory);
-    output::refuse_input(path, inputs.iter().chain([wanted.model]))?;
+    output::admit(path, inputs.iter().chain([wanted.model]))?;
     let compiled = CompiledModel::read(wanted.model)?;
     let mut dataset = super::dataset(directory)?.matching(&compiled.names());
     let file = wanted.probe.read()?;

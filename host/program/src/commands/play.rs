@@ -40,11 +40,11 @@ pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
     if sources.is_empty() {
         sources.push("builtin".into());
     }
-    output::refuse_input(&output, model.iter().chain(sources.iter().map(PathBuf::from).collect::<Vec<_>>().iter()))?;
+    output::admit(&output, model.iter().chain(sources.iter().map(PathBuf::from).collect::<Vec<_>>().iter()))?;
     let file = size.probe.read()?;
     let origin = size.origin(Origin { touches, seed, ..Origin::default() })?;
     refuse_unstated(&size)?;
-    let objects = size.objects(&sources, seed)?;
+    let objects = size.touchable(size.objects(&sources, seed)?, &origin)?;
     let stated = file.map(|file| file.real).filter(|real| !real.is_none());
     let noise = real.over(stated.unwrap_or_else(Noise::switch)).map_err(|error| size.probe.named(error))?;
     let progress = Bar::new();
@@ -72,7 +72,7 @@ pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
     let page = play::page(&objects, &contenders, &settings)?;
     output::write_bytes(&output, page.as_bytes())?;
     if let Some(trace) = trace {
-        output::write_bytes(&trace, play::trace(&surfaces, &contenders, &settings, ROUNDS)?.as_bytes())?;
+        output::write_unmarked(&trace, play::trace(&surfaces, &contenders, &settings, ROUNDS)?.as_bytes())?;
     }
     if global.json {
         return output::print_json_about(&output, &serde_json::json!({ "page": output }));

@@ -1,15 +1,19 @@
 //! Options for the probe and the sizes of objects.
 
 use super::remark;
+use palpate::capture;
 use palpate::ensemble::StatedProbe;
-use palpate::error::ProbeProblem;
-use palpate::mesh::{BACKGROUND, Object, builtin, source};
+use palpate::error::{CaptureProblem, ProbeProblem};
+use palpate::mesh::facts::sides;
+use palpate::mesh::source::{self, Search};
+use palpate::mesh::{BACKGROUND, Object, builtin};
 use palpate::probe::Probe;
 use palpate::probe::file::ProbeFile;
 use palpate::probe::noise::Noise;
 use palpate::touches::{Dataset, Origin};
 use palpate::{Error, Result};
 use palpate_shared::format::Length;
+use std::cell::OnceCell;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -19,6 +23,9 @@ pub(crate) struct ProbeArguments {
     /// The probe: published (the default), or a file that states it
     #[arg(long, value_name = "FILE", default_value = PUBLISHED, hide_default_value = true)]
     probe: PathBuf,
+    /// Contents of the file, once they were read: a pipe cannot be read twice.
+    #[arg(skip)]
+    contents: OnceCell<ProbeFile>,
 }
 
 /// The name of the probe that needs no file.
@@ -40,7 +47,12 @@ impl ProbeArguments {
 
     /// Contents of the file, if one is given.
     pub(crate) fn read(&self) -> Result<Option<ProbeFile>> {
-        self.path().map(ProbeFile::read).transpose()
+        let Some(path) = self.path() else { return Ok(None) };
+        let file = match self.contents.get() {
+            Some(file) => *file,
+            None => ProbeFile::read(path)?,
+        };
+        Ok(Some(*self.contents.get_or_init(|| file)))
     }
 
     /// The option as words of a command line, to repeat it.
@@ -110,13 +122,16 @@ pub(crate) struct UnitArguments {
     /// Several meshes per object: those of a subdirectory, or N variants of a built-in one
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "0", value_parser = instances)]
     instances: Option<usize>,
+    /// Leave out bad meshes; also untouchable ones
+    #[arg(long)]
+    skip_bad: bool,
 }
 
 impl UnitArguments {
     /// The objects of the sources, with their true sizes as far as they are known.
     pub(crate) fn objects(&self, sources: &[String], seed: u64) -> Result<Vec<Object>> {
         let mut objects = match self.instances {
-            None => source::objects(sources)?,
+            None => self.load(sources)?,
             Some(count) => self.of_instances(sources, count, seed)?,
         };
         tell(&objects);
@@ -124,9 +139,20 @@ impl UnitArguments {
         Ok(objects)
     }
 
+    fn load(&self, sources: &[String]) -> Result<Vec<Object>> {
+        let search = Search {
+            instances: self.instances.is_some(),
+            prefers_units: self.true_size.contains(&MeshUnit::Stated),
+            skips_bad: self.skip_bad,
+        };
+        let loaded = source::load(sources, search)?;
+        loaded.notes.iter().for_each(|note| remark(&format!("palpate: {note}")));
+        Ok(loaded.objects)
+    }
+
     fn of_instances(&self, sources: &[String], count: usize, seed: u64) -> Result<Vec<Object>> {
         if count == 0 {
-            return source::objects_of_instances(sources);
+            return self.load(sources);
         }
         let (mut objects, mut others) = (Vec::new(), Vec::new());
         let mut background = false;
@@ -145,7 +171,7 @@ impl UnitArguments {
             objects.push(builtin::background(count, seed)?);
         }
         if !others.is_empty() {
-            objects.extend(source::objects_of_instances(&others)?);
+            objects.extend(self.load(&others)?);
         }
         objects.sort_by(|a, b| a.name.cmp(&b.name));
         match objects.windows(2).find(|pair| pair[0].name == pair[1].name) {
@@ -183,7 +209,21 @@ impl UnitArguments {
                 }
             }
         }
-        Ok(())
+        if !self.is_true_size() {
+            return Ok(());
+        }
+        for object in &*objects {
+            for instance in object.instances() {
+                let of = if instance.name == object.name { String::new() } else { format!(", {}", instance.name) };
+                let size = object.true_size(instance).map(|size| format!("{}{of}: {} mm", object.name, sides(size)));
+                size.iter().for_each(|size| remark(size));
+            }
+        }
+        let unknown = objects.iter().filter(|object| object.millimeters.is_none()).map(|object| object.name.as_str());
+        match unknown.collect::<Vec<_>>().join(", ") {
+            name if name.is_empty() => Ok(()),
+            name => Err(CaptureProblem::NoTrueSize { name }.into()),
+        }
     }
 
     /// True if objects are touched at their true size.
@@ -202,6 +242,7 @@ impl UnitArguments {
             words.push("--instances".to_owned());
             words.extend((count > 0).then(|| count.to_string()));
         }
+        words.extend(self.skip_bad.then(|| "--skip-bad".to_owned()));
         words
     }
 }
@@ -215,6 +256,24 @@ impl SizeArguments {
     /// One object, with its true size as far as it is known.
     pub(crate) fn object(&self, source: &str) -> Result<Object> {
         self.units.object(source)
+    }
+
+    /// The objects without those that cannot be touched, if that is wanted.
+    ///
+    /// # Errors
+    /// As [`capture::untouchable`], and if no object is left.
+    pub(crate) fn touchable(&self, objects: Vec<Object>, origin: &Origin) -> Result<Vec<Object>> {
+        if !self.units.skip_bad {
+            return Ok(objects);
+        }
+        let Some(problem) = capture::untouchable(&objects, origin, &())? else { return Ok(objects) };
+        let CaptureProblem::Untouchable { objects: bad, .. } = &problem else { return Err(problem.into()) };
+        let is_bad = |object: &Object| bad.iter().any(|bad| bad.name == object.name);
+        if objects.iter().all(is_bad) {
+            return Err(problem.into());
+        }
+        remark(&format!("palpate: left out: {problem}"));
+        Ok(objects.into_iter().filter(|object| !is_bad(object)).collect())
     }
 
     /// Probe and unit of a capture: those of the file, or else of `base`.

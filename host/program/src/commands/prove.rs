@@ -42,6 +42,8 @@ pub(super) fn run(asked: &Asked<'_>, options: &Options<'_>, global: &Global) -> 
         let text = proof_text(&proof, &format!("The certificate {} holds", certificate.display()));
         return if global.json { output::print_json(&proof) } else { output::print(&text) };
     }
+    let written = asked.written.unwrap_or_else(|| Path::new("-"));
+    output::admit(written, [asked.model, path].into_iter().chain(asked.rows))?;
     let names = ensemble.inputs.names();
     let rows = match asked.rows {
         Some(_) if ensemble.descriptor().is_some() => {
@@ -61,8 +63,6 @@ pub(super) fn run(asked: &Asked<'_>, options: &Options<'_>, global: &Global) -> 
         }
         Proved::Code(bytes, code) => (prove_code(bytes, code, &ensemble, &file).map_err(in_model)?, None),
     };
-    let written = asked.written.unwrap_or_else(|| Path::new("-"));
-    output::refuse_input(written, [asked.model, path])?;
     output::write_bytes(written, certificate.to_string().as_bytes())?;
     if global.json {
         match moved {

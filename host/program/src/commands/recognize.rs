@@ -146,7 +146,7 @@ fn log_to(path: &Path, arguments: &Arguments, objects: &[String]) -> Result<LogW
     if output::is_stdout(path) {
         return Err(Error::setting("mcap", "standard output", "a file: the verdicts are printed there"));
     }
-    output::refuse_input(path, [&arguments.model, &arguments.file])?;
+    output::admit(path, [&arguments.model, &arguments.file])?;
     LogWriter::new(objects)
 }
 

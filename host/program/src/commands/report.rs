@@ -40,9 +40,6 @@ pub(crate) struct Arguments {
     /// Continue what was interrupted; with the same program, settings and objects
     #[arg(long)]
     resume: bool,
-    /// Write all the same; replaces results of another report or run
-    #[arg(long)]
-    force: bool,
     #[command(flatten)]
     size: SizeArguments,
     #[command(flatten)]
@@ -50,7 +47,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
-    let Arguments { sources, output, quick, growth, recorded, resume, force, size, real: given } = arguments;
+    let Arguments { sources, output, quick, growth, recorded, resume, size, real: given } = arguments;
     let seed = global.seed();
     refuse_stdout(&output)?;
     let compared = recorded.iter().flat_map(|path| ["--recorded".to_owned(), path.to_string_lossy().into_owned()]);
@@ -76,8 +73,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     noise.check()?;
     let real = real.unwrap_or_default();
     let settings = Settings { command, growth, noise, real, recorded, capture, ..settings };
-    let objects = || size.objects(&settings.sources, seed);
-    let existing = Existing { resume, replace: force };
+    let objects = || size.touchable(size.objects(&settings.sources, seed)?, &settings.capture);
+    let existing = Existing { resume, replace: global.force };
     let written = palpate_report::report_on(&objects, &settings, &output, existing, &Bar::new())?;
     if global.json {
         return print_json(&written.summary);

@@ -37,9 +37,6 @@ pub(crate) struct Arguments {
     /// Approaches to each object; all of them kept, a tenth to test on [default: three per touch]
     #[arg(long, value_name = "N", value_parser = touches)]
     approaches: Option<u64>,
-    /// Write all the same; replaces results of another run
-    #[arg(long)]
-    force: bool,
     #[command(flatten)]
     size: SizeArguments,
     #[command(flatten)]
@@ -48,13 +45,13 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
-    let Arguments { sources, output: out, touches, approaches, force, size, real } = arguments;
+    let Arguments { sources, output: out, touches, approaches, size, real } = arguments;
     let (seed, json) = (global.seed(), global.json);
     let approaches = approaches.unwrap_or_else(|| touches.saturating_mul(3));
     let stated = size.probe.read()?.map(|file| file.real);
     let origin = size.origin(Origin { touches, seed, ..Origin::default() })?;
     super::probe::refuse_unstated(&size)?;
-    let objects = size.objects(&sources, seed)?;
+    let objects = size.touchable(size.objects(&sources, seed)?, &origin)?;
     if !json {
         // At once: the capture takes a while.
         output::print(&format!(
@@ -67,7 +64,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let settings = run::Settings {
         capture: origin.into(),
         approaches,
-        replace: force,
+        replace: global.force,
         command: shell::command(
             ["palpate", "run"]
                 .into_iter()

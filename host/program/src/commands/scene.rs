@@ -11,7 +11,7 @@ pub(crate) struct SceneArguments {
     /// Scene: floating or table [default: floating]
     #[arg(long, value_name = "WHERE", value_parser = scene)]
     scene: Option<Surroundings>,
-    /// Table: most degrees from straight down [default: 60]
+    /// Table: most degrees off vertical [default: 60]
     #[arg(long, value_name = "DEGREES")]
     cone: Option<f64>,
     /// Weights of placements, such as mug/+z=3; the rest of the object's are left out

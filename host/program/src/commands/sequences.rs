@@ -70,7 +70,7 @@ pub(crate) struct Calibration<'a> {
 /// Calibrates a model on sequences of rows.
 pub(crate) fn calibrate(asked: Calibration<'_>, global: &Global) -> Result<()> {
     let Calibration { model: path, rows, output: written, columns, mut settings, held, background } = asked;
-    output::refuse_input(written, [path, rows].into_iter().chain(background.map(PathBuf::as_path)))?;
+    output::admit(written, [path, rows].into_iter().chain(background.map(PathBuf::as_path)))?;
     let compiled = CompiledModel::read(path)?;
     let model = compiled.model();
     stream::check(&model).map_err(|error| error.in_file(path))?;
@@ -181,10 +181,12 @@ pub(crate) struct Evaluation<'a> {
 pub(crate) fn evaluate(asked: Evaluation<'_>, compiled: &CompiledModel, global: &Global) -> Result<()> {
     let model = compiled.model();
     stream::check(&model).map_err(|error| error.in_file(asked.model))?;
+    if let Some(page) = asked.page {
+        output::admit(page, [asked.rows, asked.model])?;
+    }
     let sequences = read(asked.rows, &model, &asked.columns)?;
     let evaluated = stream::evaluate(&model, &sequences, &asked.wanted).map_err(|error| error.in_file(asked.rows))?;
     if let Some(page) = asked.page {
-        output::refuse_input(page, [asked.rows, asked.model])?;
         let SequenceColumns { label, sequence, group } = asked.columns;
         let group = group.map_or_else(String::new, |group| format!(" --group-column {group}"));
         let command = format!(

@@ -114,8 +114,8 @@ struct Made {
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let read = arguments.directory.iter().flat_map(|directory| super::files_of(directory));
     let read: Vec<PathBuf> = read.chain(arguments.teach.files()).collect();
-    output::refuse_input(&arguments.output, &read)?;
-    arguments.teach.page.iter().try_for_each(|page| output::refuse_input(page, &read))?;
+    output::admit(&arguments.output, &read)?;
+    arguments.teach.page.iter().try_for_each(|page| output::admit(page, &read))?;
     let start = Instant::now();
     let recorded = arguments.teach.read()?;
     let made = match (&arguments.directory, recorded) {

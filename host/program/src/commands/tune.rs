@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     for path in [&arguments.output, &arguments.ensemble].into_iter().flatten() {
-        output::refuse_input(path, super::files_of(&arguments.directory))?;
+        output::admit(path, super::files_of(&arguments.directory))?;
     }
     let dataset = super::dataset(&arguments.directory)?;
     let file = arguments.probe.read()?;

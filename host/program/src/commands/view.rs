@@ -55,7 +55,7 @@ pub(crate) struct Arguments {
     /// A compiled model for the page; may be given several times, with --port once
     #[arg(long, value_name = "FILE", requires = "recognizes", conflicts_with = "touches")]
     model: Vec<PathBuf>,
-    /// For tests of the page: also write what it has to compute, as this program computes it
+    /// For tests of the page: also what it has to compute
     #[arg(long, value_name = "FILE", requires = "play")]
     trace: Option<PathBuf>,
     #[command(flatten)]
@@ -96,7 +96,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if real.is_given() {
         return Err(Error::setting("real", "given", "it with --play: touches are shown as the simulator makes them"));
     }
-    output::refuse_input(output, [source])?;
+    output::admit(output, [source])?;
     let origin = size.origin(Origin::default())?;
     refuse_unstated(size)?;
     let mut object = [size.object(source)?];
@@ -135,7 +135,7 @@ fn watches(Arguments { model, output, .. }: &Arguments, global: &Global) -> Resu
     if model.len() > 1 {
         return Err(Error::setting("model", "given several times", "one with --port: a chip has one"));
     }
-    output::refuse_input(output, model)?;
+    output::admit(output, model)?;
     let shown = output.to_string_lossy();
     let paths = model.iter().flat_map(|path| ["--model".into(), path.to_string_lossy()]);
     let words: Vec<_> = ["palpate", "view", "--port", "-o", &shown].map(Into::into).into_iter().chain(paths).collect();

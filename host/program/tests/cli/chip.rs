@@ -93,6 +93,9 @@ fn link_recognizes_as_the_host_does_and_watch_shows_its_journal() {
     let kinds = |kind: &str| entries.iter().filter(|entry| entry["is"] == kind).count();
     assert_eq!((kinds("model"), kinds("object"), kinds("touch"), kinds("link")), (1, 8, 40, 1));
 
+    // A journal is replaced by the next one.
+    let mut again = crate::command(["link", &chip()]);
+    json(again.args(arguments).args(["--journal", &journal, "--json"]).output().unwrap());
     let watched = stdout(run(["link", &journal, "--watch"]));
     let lines: Vec<&str> = watched.lines().collect();
     assert_eq!(lines.len(), entries.len(), "{watched}");

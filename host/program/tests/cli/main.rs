@@ -15,6 +15,7 @@ mod mesh;
 mod models;
 mod newcomer;
 mod objects;
+mod outputs;
 mod plan;
 mod play;
 mod probe;

@@ -203,7 +203,8 @@ fn tuning_writes_a_model_within_the_limit() {
 fn what_cannot_be_trained_is_refused_and_an_older_ensemble_stays() {
     let directory = set_up();
     let at = directory.path();
-    std::fs::write(at.join("ensemble.json"), "older").unwrap();
+    let older = "{\"learner\":{\"attributes\":{\"palpate_objects\":\"older\"}}}";
+    std::fs::write(at.join("ensemble.json"), older).unwrap();
     let train = |data, more: &[&'static str]| [&["train", data, "-o", "ensemble.json"], more].concat();
     std::fs::create_dir(at.join("lonely")).unwrap();
     std::fs::copy(at.join("data/bowl.txt"), at.join("lonely/bowl.txt")).unwrap();
@@ -223,7 +224,7 @@ fn what_cannot_be_trained_is_refused_and_an_older_ensemble_stays() {
     fails(at, &train("data", &["--no-such-option"]), 2, "--no-such-option");
     fails(at, &["tune", "data", "--max-bytes", "9", "--sequences", "5", "-o", "ensemble.json"], 1, "the smallest has");
     fails(at, &["tune", "data", "--max-bytes", "many"], 2, "16K");
-    assert_eq!(std::fs::read(at.join("ensemble.json")).unwrap(), b"older");
+    assert_eq!(std::fs::read_to_string(at.join("ensemble.json")).unwrap(), older);
     assert_eq!(std::fs::read_dir(at).unwrap().count(), 5, "something was left behind");
 }
 

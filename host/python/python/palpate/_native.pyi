@@ -202,7 +202,7 @@ class Ensemble:
         """
     def save(self, /, path: str | PathLike[str]) -> None:
         """
-        Writes an ensemble over touches as XGBoost's JSON.
+        Writes an ensemble over touches as XGBoost's JSON. A file that Palpate did not write is not replaced.
         """
     @property
     def trees(self, /) -> int:
@@ -290,7 +290,7 @@ class Model:
         """
     def save(self, /, path: str | PathLike[str]) -> None:
         """
-        Writes the model, whole or not at all.
+        Writes the model, whole or not at all. A file that Palpate did not write is not replaced.
         """
     @property
     def size(self, /) -> int:

@@ -6,7 +6,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, PreEscaped, html};
 use palpate::error::Result;
-use palpate::output::write_bytes;
+use palpate::output;
 use std::path::{Path, PathBuf};
 
 /// The page's style.
@@ -179,27 +179,37 @@ impl Page {
     }
 
     /// Writes the page to `path`, and with [`Page::files`] every figure's SVG and CSV and every table's CSV beside it.
-    /// The page comes last, each file whole or not at all. Returns what was written.
+    /// The page comes last, each file whole or not at all. Returns what was written. Files that Palpate did not write are not
+    /// replaced, and then none is: those of figures and tables are its own if the page that is there links them, or if their first
+    /// line is the same.
     ///
     /// # Errors
-    /// [`palpate::Error::Io`] naming the file.
+    /// [`palpate::Error::Io`] naming the file, and [`Foreign`](palpate::error::Foreign).
     pub fn write(&self, path: &Path) -> Result<Vec<PathBuf>> {
-        let mut written = Vec::new();
-        let mut put = |path: PathBuf, bytes: &[u8]| -> Result<()> {
-            write_bytes(&path, bytes)?;
-            written.push(path);
-            Ok(())
-        };
+        output::refuse_foreign(path)?;
+        let mut files = Vec::new();
         if self.files {
             for figure in self.figures() {
-                put(path.with_file_name(format!("{}.svg", figure.id)), figure.whole_svg().text.as_bytes())?;
-                put(path.with_file_name(format!("{}.csv", figure.id)), &figure.data.csv()?)?;
+                files.push((format!("{}.svg", figure.id), figure.whole_svg().text.into_bytes()));
+                files.push((format!("{}.csv", figure.id), figure.data.csv()?));
             }
             for table in self.tables() {
-                put(path.with_file_name(format!("{}.csv", table.id)), &table.data.csv()?)?;
+                files.push((format!("{}.csv", table.id), table.data.csv()?));
             }
         }
-        put(path.to_path_buf(), self.html().as_bytes())?;
+        let before = if self.files { std::fs::read_to_string(path).unwrap_or_default() } else { String::new() };
+        let is_linked = |name: &str| before.contains(&format!("href=\"{name}\""));
+        for (name, bytes) in files.iter().filter(|(name, _)| !is_linked(name)) {
+            output::refuse_unlike(&path.with_file_name(name), bytes)?;
+        }
+        let mut written = Vec::new();
+        for (name, bytes) in files {
+            let file = path.with_file_name(name);
+            output::replace_whole(&file, |out| out.write_all(&bytes))?;
+            written.push(file);
+        }
+        output::write_bytes(path, self.html().as_bytes())?;
+        written.push(path.to_path_buf());
         Ok(written)
     }
 

@@ -24,6 +24,8 @@ fn whole(title: &str, styles: &[&str], scripts: &str, body: &Markup) -> String {
         html lang="en" {
             head {
                 meta charset="utf-8";
+                // By this, a page is recognized as one that may be replaced.
+                meta name="generator" content={ "Palpate " (env!("CARGO_PKG_VERSION")) };
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 meta http-equiv="Content-Security-Policy"

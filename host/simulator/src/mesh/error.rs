@@ -18,6 +18,23 @@ pub enum MeshProblem {
         "no mesh here: no file ends in .obj, .stl, .ply, .gltf, .glb, .dae, .pcd or .xyz, and none is called scene_camera.json"
     )]
     NoMeshes,
+    /// A directory holds no mesh, but files of formats that are not read.
+    #[error("no mesh that is read here: {files}")]
+    NoneRead {
+        /// The files, and what reads them.
+        files: String,
+    },
+    /// Of several files, some cannot be read.
+    #[error("{} of {count} meshes cannot be read:\n  {}", errors.len(), errors.join("\n  "))]
+    Unread {
+        /// Number of files.
+        count: usize,
+        /// What is wrong with each of those that cannot be read, with its name.
+        errors: Vec<String>,
+    },
+    /// Git LFS left a pointer in the place of a file.
+    #[error("this is a pointer of Git LFS, and not the file itself")]
+    LfsPointer,
     /// Several objects where one is asked for.
     #[error("{count} objects, where one is needed")]
     SeveralObjects {
@@ -145,7 +162,7 @@ pub enum MeshProblem {
     #[error("no surface fits the points: all of them are at one place")]
     OnePlace,
     /// Too few points for a surface, or too many.
-    #[error("{count} points with coordinates, where a surface needs {fewest} to {most}")]
+    #[error("{count} point{} with coordinates, where a surface needs {fewest} to {most}", if *count == 1 { "" } else { "s" })]
     PointCount {
         /// Number of points.
         count: usize,
@@ -199,6 +216,10 @@ impl Problem for MeshProblem {
                 format!("Check the path, or give one of the built-in objects: {}.", builtin.join(", "))
             }
             Self::NoMeshes => "Give a directory that holds such files.".into(),
+            Self::NoneRead { .. } => "Convert them, then give the directory again.".into(),
+            Self::Unread { errors, .. } if errors.len() == 1 => "Repair the file, or leave it out.".into(),
+            Self::Unread { .. } => "Repair these files, or leave them out.".into(),
+            Self::LfsPointer => "Fetch it: git lfs pull.".into(),
             Self::SeveralObjects { .. } => "Give one mesh file, or the name of one built-in object.".into(),
             Self::SameName { .. } => "Rename one of the files, or leave one out.".into(),
             Self::MissingCoordinate { .. }
@@ -211,7 +232,8 @@ impl Problem for MeshProblem {
                 "Export the mesh again, or convert it to another of OBJ, STL, PLY, GLB and COLLADA.".into()
             }
             Self::Unsupported { instead, .. } => format!("{instead}."),
-            Self::TooLarge { .. } | Self::TooManyVertices => "Simplify the mesh, or export it in parts.".into(),
+            Self::TooLarge { .. } => "Simplify the mesh, or export it without instances or in parts.".into(),
+            Self::TooManyVertices => "Simplify the mesh, or export it in parts.".into(),
             Self::Unreadable { .. } | Self::NoFaces | Self::NoExtent => {
                 "Export the mesh as a file with faces: OBJ, STL, PLY, GLB or COLLADA.".into()
             }

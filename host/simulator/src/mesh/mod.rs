@@ -55,7 +55,10 @@ pub mod source;
 mod stl;
 #[cfg(test)]
 mod tests;
+mod text;
 mod triangles;
+mod unread;
+mod weld;
 mod words;
 
 pub use error::MeshProblem;
@@ -137,7 +140,12 @@ impl Object {
 
     /// The longest side of an instance's bounding box in millimeters, where its units are known.
     pub fn true_length(&self, instance: &Instance) -> Option<f64> {
+        self.true_size(instance).map(|size| size.max_element())
+    }
+
+    /// The sides of an instance's bounding box in millimeters, where its units are known.
+    pub fn true_size(&self, instance: &Instance) -> Option<glam::DVec3> {
         let [low, high] = instance.mesh.bounds();
-        Some(f64::from((high - low).max_element()) * self.millimeters?)
+        Some((high - low).as_dvec3() * self.millimeters?)
     }
 }

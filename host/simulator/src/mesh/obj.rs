@@ -93,6 +93,19 @@ struct FacesOnly<'a, R> {
     error: Option<Error>,
 }
 
+/// True if a backslash joins the next line to this one, which ends in `raw`. In a comment, or in the name of a material or a
+/// file, it is part of a path.
+fn goes_on(raw: &[u8]) -> bool {
+    let line = raw.trim_ascii();
+    let first = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+    line.ends_with(b"\\") && matches!(without_mark(first), b"v" | b"f") && !line.contains(&b'#')
+}
+
+/// Bytes without the mark that some programs write at the beginning of a text.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
 /// Clean lines are passed to `tobj` in portions of about this many bytes.
 const PORTION: usize = 1 << 16;
 
@@ -119,7 +132,7 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
             let read = read.map_err(|source| Error::io(self.path, "read the mesh", source))?;
             self.line += u64::from(read > 0);
             let end = self.raw.trim_ascii_end().len();
-            if read > 0 && end > 0 && self.raw[end - 1] == b'\\' {
+            if read > 0 && goes_on(&self.raw) {
                 self.raw.truncate(end - 1);
                 self.raw.push(b' ');
             } else {
@@ -132,7 +145,7 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
     fn clean_line(&mut self) -> Result<(), MeshProblem> {
         let Self { raw, clean, .. } = self;
         let line = raw.split(|&byte| byte == b'#').next().unwrap_or_default();
-        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
+        let line = without_mark(line);
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         match words.next() {
             Some(b"v") => {
@@ -208,12 +221,16 @@ impl<R: BufRead> Read for FacesOnly<'_, R> {
     }
 }
 
-/// Writes a mesh as OBJ: `v` and `f` lines from which [`read`] gives the same triangles, coordinates bit for bit (vertices
-/// in the order in which the triangles use them).
+/// The first line of a mesh that [`write`] wrote, by which it is recognized.
+const FIRST: &str = "# Written by Palpate.";
+
+/// Writes a mesh as OBJ: a comment, then `v` and `f` lines from which [`read`] gives the same triangles, coordinates bit for
+/// bit (vertices in the order in which the triangles use them).
 ///
 /// # Errors
 /// Those of `out`.
 pub fn write(mesh: &Mesh, out: &mut dyn Write) -> std::io::Result<()> {
+    writeln!(out, "{FIRST}")?;
     for [x, y, z] in &mesh.vertices {
         writeln!(out, "v {x} {y} {z}")?;
     }
@@ -260,6 +277,16 @@ mod tests {
         assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (4, 3));
         assert_eq!(mesh.triangles[1], mesh.triangles[2]);
         assert_eq!(area(&mesh), 1.5);
+    }
+
+    #[test]
+    fn a_backslash_at_the_end_of_a_comment_or_a_name_does_not_join_the_next_line() {
+        for line in ["# in C:\\parts\\", "usemtl steel\\", "mtllib C:\\", "g one\\", "v 9 9 9 # C:\\", "o \\"] {
+            let text = format!("{SQUARE}{line}\nf 1 2 3\n{line}\r\nf 1 3 4\n{line}");
+            assert_eq!(parse_text(&text).unwrap().triangles.len(), 2, "{text}");
+        }
+        let text = "\u{feff}v 0 \\\n0 0\nv 1 0 0\nv 1 1 0\nf \\\n1 2 \\\n3";
+        assert_eq!(parse_text(text).unwrap().triangles.len(), 1);
     }
 
     #[test]

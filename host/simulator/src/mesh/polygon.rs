@@ -1,5 +1,7 @@
 //! Polygons to triangles, concave ones too.
 
+use glam::DVec2;
+
 /// Cuts polygons into triangles.
 #[derive(Default)]
 pub(super) struct Cutter {
@@ -9,9 +11,14 @@ pub(super) struct Cutter {
     cut: Vec<u32>,
 }
 
+/// The most corners of a polygon that is cut corner by corner, which takes time with the square of their number.
+const MOST_CORNERS: usize = 4096;
+
+/// Twice the area of a triangle that is flat but for rounding, in a polygon whose coordinates are at most 1.
+const FLAT: f64 = 1e-12;
+
 impl Cutter {
-    /// Appends the triangles of `face`, a polygon of vertices whose places `corner` gives; none if it has fewer than
-    /// three.
+    /// Appends the triangles of `face`, a polygon of vertices whose places `corner` gives: two fewer than it has corners.
     pub(super) fn cut(&mut self, face: &[u32], corner: impl Fn(u32) -> [f64; 3], triangles: &mut Vec<[u32; 3]>) {
         let [first, others @ ..] = face else { return };
         if others.len() > 2 {
@@ -25,17 +32,49 @@ impl Cutter {
         triangles.extend(others.windows(2).map(|pair| [*first, pair[0], pair[1]]));
     }
 
-    /// Cuts `corners` into `cut`. False when the polygon is too degenerate to be flattened: then a fan serves as well.
+    /// Cuts `corners` into `cut`. False for a polygon that has no area, or crosses itself when it is flattened: then a fan
+    /// serves as well.
     fn cut_ears(&mut self) -> bool {
         let size = self.corners.iter().flatten().fold(0.0, |size: f64, c| size.max(c.abs()));
         self.corners.iter_mut().flatten().for_each(|c| *c /= size);
         self.cut.clear();
-        if size > 0.0 && earcut::utils3d::project3d_to_2d(&self.corners, self.corners.len(), &mut self.flat) {
-            let earcut = self.earcut.get_or_insert_with(earcut::Earcut::new);
-            earcut.earcut(self.flat.iter().copied(), &[] as &[u32], &mut self.cut);
+        let count = self.corners.len();
+        if size == 0.0 || !earcut::utils3d::project3d_to_2d(&self.corners, count, &mut self.flat) {
+            return false;
         }
-        !self.cut.is_empty()
+        let earcut = self.earcut.get_or_insert_with(earcut::Earcut::new);
+        earcut.earcut(self.flat.iter().copied(), &[] as &[u32], &mut self.cut);
+        // It leaves out corners that are in line with their neighbors, which other faces may have.
+        self.cut.len() == 3 * (count - 2) || (count <= MOST_CORNERS && clip(&self.flat, &mut self.cut))
     }
+}
+
+/// Cuts a flat polygon, anticlockwise, into `cut`, corner by corner, none left out. False if it crosses itself.
+fn clip(flat: &[[f64; 2]], cut: &mut Vec<u32>) -> bool {
+    cut.clear();
+    let place = |corner: u32| flat.get(corner as usize).map_or(DVec2::ZERO, |&place| DVec2::from(place));
+    let turn = |[a, b, c]: [u32; 3]| (place(b) - place(a)).perp_dot(place(c) - place(b));
+    let covers = |[a, b, c]: [u32; 3], other: u32| {
+        let is_corner = [a, b, c].iter().any(|&corner| place(corner) == place(other));
+        !is_corner && [[a, b, other], [b, c, other], [c, a, other]].into_iter().all(|side| turn(side) >= 0.0)
+    };
+    let mut rest: Vec<u32> = (0..).take(flat.len()).collect();
+    let mut start = 0;
+    while let count @ 4.. = rest.len() {
+        let ear = |at: usize| [at + count - 1, at, at + 1].map(|at| rest[at % count]);
+        let all = (start..start + count).map(|at| at % count);
+        let is_ear = |&at: &usize| {
+            let ear = ear(at);
+            turn(ear) > 0.0 && !rest.iter().any(|&other| covers(ear, other))
+        };
+        let is_flat = |&at: &usize| turn(ear(at)).abs() <= FLAT;
+        let Some(at) = all.clone().find(is_ear).or_else(|| all.clone().find(is_flat)) else { return false };
+        cut.extend(ear(at));
+        rest.remove(at);
+        start = at;
+    }
+    cut.extend(&rest);
+    <[u32; 3]>::try_from(rest).is_ok_and(|last| turn(last) >= -FLAT)
 }
 
 /// True if the polygon turns the same way at every corner.
@@ -44,4 +83,90 @@ fn is_convex(corners: &[[f64; 3]]) -> bool {
     let turn = |i: usize| (corner(i + 1) - corner(i)).cross(corner(i + 2) - corner(i + 1));
     let normal: glam::DVec3 = (0..corners.len()).map(|i| corner(i).cross(corner(i + 1))).sum();
     corners.len() <= 3 || (0..corners.len()).all(|i| turn(i).dot(normal) >= 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+
+    fn cut(corners: &[[f64; 3]]) -> Vec<[u32; 3]> {
+        let face: Vec<u32> = (0..corners.len() as u32).collect();
+        let mut triangles = Vec::new();
+        Cutter::default().cut(&face, |index| corners[index as usize], &mut triangles);
+        triangles
+    }
+
+    fn area(corners: &[[f64; 3]], triangles: &[[u32; 3]]) -> f64 {
+        let corner = |index: u32| glam::DVec3::from(corners[index as usize]);
+        let double = |&[a, b, c]: &[u32; 3]| (corner(b) - corner(a)).cross(corner(c) - corner(a)).length();
+        triangles.iter().map(double).sum::<f64>() / 2.0
+    }
+
+    /// Checks that the triangles are as many as they must be and that inside the polygon each edge is shared: with its outline
+    /// they are closed.
+    fn check(corners: &[[f64; 3]]) -> Vec<[u32; 3]> {
+        let triangles = cut(corners);
+        assert_eq!(triangles.len(), corners.len() - 2, "{corners:?}");
+        let mut edges = std::collections::BTreeMap::new();
+        for &[a, b, c] in &triangles {
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                *edges.entry((from.min(to), from.max(to))).or_insert(0) += if from < to { 1 } else { -1 };
+            }
+        }
+        let count = corners.len() as u32;
+        for corner in 0..count {
+            let next = (corner + 1) % count;
+            *edges.entry((corner.min(next), corner.max(next))).or_insert(0) -= if corner < next { 1 } else { -1 };
+        }
+        assert!(edges.values().all(|&sum| sum == 0), "{corners:?}: {triangles:?}");
+        triangles
+    }
+
+    #[test]
+    fn a_polygon_has_two_triangles_fewer_than_corners_however_it_is_warped() {
+        let mut random = rand::rngs::Xoshiro256PlusPlus::seed_from_u64(2);
+        for count in 4..14 {
+            for warp in [0.0, 1e-3, 0.1, 1.0, 5.0] {
+                for _ in 0..60 {
+                    let corner = |index: usize| {
+                        let (sin, cos) = libm::sincos(std::f64::consts::TAU * index as f64 / count as f64);
+                        let radius = random.random_range(0.1..1.0);
+                        [radius * cos, radius * sin, warp * random.random_range(-1.0..1.0)]
+                    };
+                    check(&(0..count).map(corner).collect::<Vec<_>>());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn corners_in_line_with_their_neighbors_are_not_left_out() {
+        // An L with further corners on its sides, one of them twice, in a plane and in a tilted one.
+        let outline = [
+            [2.0, 1.0],
+            [1.5, 1.0],
+            [1.0, 1.0],
+            [1.0, 1.5],
+            [1.0, 2.0],
+            [0.0, 2.0],
+            [0.0, 2.0],
+            [0.0, 1.0],
+            [0.0, 0.0],
+            [1.0, 0.0],
+            [2.0, 0.0],
+        ];
+        for slope in [0.0, 0.7] {
+            let corners: Vec<[f64; 3]> = outline.iter().map(|&[x, y]| [x, y, slope * x]).collect();
+            let triangles = check(&corners);
+            let expected = 3.0 * f64::sqrt(1.0 + slope * slope);
+            assert!((area(&corners, &triangles) - expected).abs() < 1e-9, "{slope}: {triangles:?}");
+        }
+    }
+
+    #[test]
+    fn a_polygon_that_crosses_itself_when_it_is_flattened_is_a_fan() {
+        let corners = [[0.0, 0.0, 0.0], [-0.06, -0.02, 0.06], [0.06, 0.06, -0.8], [0.0, -0.1, -0.85]];
+        assert_eq!(check(&corners), [[0, 1, 2], [0, 2, 3]]);
+    }
 }

@@ -1,8 +1,8 @@
 //! The triangle mesh itself.
 
+use super::weld::Places;
 use crate::error::MeshProblem;
 use glam::Vec3;
-use std::collections::HashMap;
 
 /// An indexed triangle mesh, in its file's own units.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,28 +33,18 @@ impl Mesh {
         digest.finalize()
     }
 
-    /// The mesh with vertices at the same place merged into one, without the triangles that thereby lose a corner. Files
-    /// often repeat a vertex for each triangle; merged, neighbors share their edges.
+    /// The mesh with vertices at the same place (closer than a billionth of the longest side) merged into one, without the
+    /// triangles that thereby lose a corner. Files often repeat a vertex for each triangle, and some round it differently;
+    /// merged, neighbors share their edges.
     ///
     /// # Panics
     /// If a triangle names a vertex that the mesh does not have.
     pub fn welded(&self) -> Self {
-        let mut places = HashMap::new();
-        let mut vertices = Vec::new();
-        let merged: Vec<u32> = self
-            .vertices
-            .iter()
-            .map(|&vertex| {
-                // Zeros of either sign are the same place.
-                *places.entry(vertex.map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
-                    vertices.push(vertex);
-                    vertices.len() as u32 - 1
-                })
-            })
-            .collect();
+        let mut places = Places::new(self.bounds());
+        let merged: Vec<u32> = self.vertices.iter().map(|&vertex| places.of(vertex)).collect();
         let triangles = self.triangles.iter().map(|triangle| triangle.map(|i| merged[i as usize]));
         let triangles = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect();
-        Self { vertices, triangles }
+        Self { vertices: places.vertices, triangles }
     }
 
     /// The mesh without the triangles whose corners are one point: they are no surface. Left in, they could still be
@@ -123,6 +113,7 @@ impl Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::HashMap;
 
     #[test]
     fn a_globe_is_closed_and_right_side_out() {

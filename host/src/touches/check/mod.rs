@@ -95,12 +95,11 @@ impl Check {
         match objects {
             [] => findings.problem(directory, TouchesProblem::NoObjects),
             // Objects are recorded one after the other, and one is enough to teach or to compare.
-            [one] if is_recorded => findings.note(
+            [one] => findings.note(
                 directory,
-                &format!("only {} has been recorded", one.name),
-                "Record other objects into the same directory to train on them alone.",
+                &format!("only {} {}", one.name, if is_recorded { "has been recorded" } else { "is here" }),
+                "That is enough to evaluate a model, and to train one other objects are needed in the same directory.",
             ),
-            [one] => findings.problem(directory, TouchesProblem::OneObject { name: one.name.clone() }),
             _ => {}
         }
         objects.iter().for_each(|object| findings.object(object, origin.as_ref()));

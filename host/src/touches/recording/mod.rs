@@ -111,6 +111,11 @@ impl Recording {
             }
         };
         let path = Entry { name: object.into(), ..Entry::default() }.file(directory, Format::Text);
+        let is_listed = listing.objects.iter().any(|entry| entry.name == object);
+        if !is_listed && path.metadata().is_ok_and(|there| there.len() > 0) {
+            let files = path.file_name().unwrap_or_default().display().to_string();
+            return Err(wrong(TouchesProblem::Unlisted { files }));
+        }
         let recorded = Recorded {
             object: object.into(),
             began: humantime::format_rfc3339_seconds(began).to_string(),

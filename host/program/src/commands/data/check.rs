@@ -114,6 +114,7 @@ fn summary(summary: &Summary) -> String {
             );
         }
     }
-    _ = writeln!(text, "{} objects, {} touches", objects.len(), summary.touches());
+    let plural = if objects.len() == 1 { "" } else { "s" };
+    _ = writeln!(text, "{} object{plural}, {} touches", objects.len(), summary.touches());
     text
 }

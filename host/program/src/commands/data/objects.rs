@@ -1,10 +1,10 @@
 //! `palpate data objects`.
 
-use crate::commands::Global;
 use crate::commands::probe::tell;
+use crate::commands::{Global, remark};
 use palpate::mesh::builtin;
 use palpate::mesh::obj;
-use palpate::mesh::source::{self, Source};
+use palpate::mesh::source::{self, Search, Source};
 use palpate::mesh::{Instance, Object};
 use palpate::output;
 use palpate::{Error, Result};
@@ -35,6 +35,9 @@ pub(super) struct Arguments {
     /// Also draw a contact sheet of the objects into this PNG file
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    /// Leave out bad meshes
+    #[arg(long)]
+    skip_bad: bool,
 }
 
 /// A file that was written.
@@ -52,7 +55,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     tell(&made);
     let meshes: Vec<_> = made.iter().flat_map(|object| meshes(object, &arguments.output)).collect();
     for file in meshes.iter().map(|(file, _)| file).chain(&arguments.picture) {
-        output::refuse_input(file, &files)?;
+        output::admit(file, &files)?;
     }
     let written = meshes.into_iter().map(|(file, instance)| write(file, instance)).collect::<Result<Vec<_>>>()?;
     if let Some(picture) = &arguments.picture {
@@ -83,7 +86,12 @@ fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
         }
     }
     let objects = match arguments.varied {
-        None => sources.into_iter().map(Source::read).collect::<Result<_>>()?,
+        None => {
+            let search = Search { skips_bad: arguments.skip_bad, ..Search::default() };
+            let loaded = source::load(&arguments.sources, search)?;
+            loaded.notes.iter().for_each(|note| remark(&format!("palpate: {note}")));
+            loaded.objects
+        }
         Some(seed) if names.len() == sources.len() => builtin::make(&names, Some(seed))?,
         Some(_) => {
             let instead = "it with built-in objects: only they can be varied";

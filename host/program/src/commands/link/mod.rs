@@ -13,7 +13,7 @@ use palpate::chip::{
 };
 use palpate::compile::CompiledModel;
 use palpate::error::{ChipProblem, Place};
-use palpate::output::{print, print_json};
+use palpate::output::{print, print_json, refuse_foreign};
 use palpate::progress::Progress;
 use palpate::touches::{Log, is_log};
 use palpate::{Error, Result};
@@ -152,6 +152,7 @@ impl Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    arguments.journal.iter().try_for_each(|journal| refuse_foreign(journal))?;
     if arguments.watch {
         return watch::run(&arguments, global);
     }

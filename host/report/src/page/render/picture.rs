@@ -70,6 +70,8 @@ impl Picture {
         encoder.set_compression(png::Compression::High);
         let channels = if opaque { 3 } else { 4 };
         let data: Vec<u8> = self.pixels.iter().flat_map(|pixel| pixel.iter().copied().take(channels)).collect();
+        // By this, a picture is recognized as one that may be replaced. Latin letters are always taken.
+        let _ = encoder.add_text_chunk("Software".into(), "Palpate".into());
         // Writing to memory fails only if the picture is empty or its data has another size, and then it stays empty.
         if let Ok(mut writer) = encoder.write_header() {
             let _ = writer.write_image_data(&data);

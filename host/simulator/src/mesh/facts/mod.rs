@@ -16,7 +16,7 @@ pub use stray::Piece;
 use crate::mesh::Mesh;
 use glam::Vec3;
 
-/// Facts about a mesh, in the units of its file. Vertices at the same place count as one.
+/// Facts about a mesh, in the units of its file. Vertices closer than a billionth of its size count as one.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Facts {
@@ -241,6 +241,19 @@ fn edges(count: usize) -> String {
 
 fn counted(count: usize, name: &str) -> String {
     if count == 1 { format!("1 {name}") } else { format!("{count} {name}s") }
+}
+
+/// The sides of a box in words, with about three significant digits: "90 × 80.5 × 90".
+pub fn sides(size: glam::DVec3) -> String {
+    let side = |side: f64| {
+        let text = short(side);
+        if text.contains('.') && !text.contains('e') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
+        }
+    };
+    size.to_array().map(side).join(" × ")
 }
 
 /// A number with about three significant digits.

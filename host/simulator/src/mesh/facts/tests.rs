@@ -46,6 +46,24 @@ fn vertices_at_the_same_place_are_one() {
 }
 
 #[test]
+fn vertices_that_differ_by_rounding_alone_leave_no_gap() {
+    let mut mesh = cube().stretched([2.0; 3]);
+    // One side has its own corners, on which an exporter left 1e-16 of the size where 0 belongs.
+    for vertex in mesh.triangles[8..10].iter_mut().flatten() {
+        let place = mesh.vertices[*vertex as usize].map(|x| if x == 0.0 { 2.73e-16 } else { x });
+        *vertex = mesh.vertices.len() as u32;
+        mesh.vertices.push(place);
+    }
+    let facts = Facts::of(&mesh);
+    assert!(facts.is_right_side_out() && (facts.volume - 8.0).abs() < 1e-6, "{facts:?}");
+    assert!(facts.complaints(None).is_empty());
+    assert_eq!(facts.verdict(0.03), "usable");
+    // A millionth of the size is a gap.
+    mesh.vertices.iter_mut().skip(8).for_each(|vertex| vertex[0] = vertex[0].max(2e-6));
+    assert_eq!(Facts::of(&mesh).open_edges, 8);
+}
+
+#[test]
 fn an_edge_of_four_triangles_is_not_that_of_a_manifold() {
     // Two tetrahedra that share an edge.
     let mut mesh = crate::mesh::obj::parse(
@@ -157,6 +175,13 @@ fn coordinates_whose_squares_are_too_large_and_corners_on_edges_of_cells_are_in_
         };
         assert!(Facts::of(&mesh).stray.is_empty());
     }
+}
+
+#[test]
+fn sides_have_three_digits_and_no_zeros_after_them() {
+    assert_eq!(sides(glam::DVec3::new(90.0, 80.0001, 0.5)), "90 × 80 × 0.5");
+    assert_eq!(sides(glam::DVec3::new(100.0, 1234.4, 7.256)), "100 × 1234 × 7.26");
+    assert_eq!(sides(glam::DVec3::new(0.0, 1e-5, 1e7)), "0 × 1.00e-5 × 1.00e7");
 }
 
 #[test]

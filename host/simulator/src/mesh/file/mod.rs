@@ -3,7 +3,8 @@
 use super::parsed::Parsed;
 #[cfg(feature = "scans")]
 use super::scan;
-use super::{Mesh, collada, gltf, obj, ply, stl};
+use super::text::Written;
+use super::{Mesh, collada, gltf, obj, ply, stl, unread};
 use crate::error::{Error, MeshProblem, Place, Result};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -89,7 +90,7 @@ pub struct Contents {
     pub format: Format,
     /// The points that the mesh was made of, in its coordinates; none if the file holds triangles.
     pub points: Vec<[f32; 3]>,
-    /// Of points: what was left out, how noisy they are, how large the holes were that are closed.
+    /// What is odd about the file. Of points: what was left out, how noisy they are, how large the holes were that are closed.
     pub notes: Vec<String>,
 }
 
@@ -129,17 +130,37 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Contents> {
     parse_buffered(bytes, bytes.len() as u64, path, None)
 }
 
-/// Reads a mesh of `length` bytes. Files that it names are looked for in `folder`.
+/// Reads a mesh of `length` bytes, however its text is written. Files that it names are looked for in `folder`.
 fn parse_buffered(mut reader: impl BufRead, length: u64, path: &Path, folder: Option<&Path>) -> Result<Contents> {
     let io = |source| Error::io(path, "read the mesh", source);
     let head = reader.fill_buf().map_err(io)?;
+    let Some(written) = Written::of(head, length) else { return parse_usual(reader, length, path, folder) };
+    let mut bytes = Vec::new();
+    reader.take(length).read_to_end(&mut bytes).map_err(io)?;
+    let text = written.usual(bytes);
+    parse_usual(text.as_slice(), text.len() as u64, path, folder)
+}
+
+fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Option<&Path>) -> Result<Contents> {
+    let io = |source| Error::io(path, "read the mesh", source);
+    let head = reader.fill_buf().map_err(io)?;
+    if !stl::is_binary(head, length)
+        && let Some(problem) = unread::problem(head, path)
+    {
+        return Err(Error::at(Place::file(path), problem));
+    }
+    let mut notes = Vec::new();
     let format = match path.file_name() {
         Some(name) if name == DEPTH_LIST => Format::Depth,
         _ => Format::of(head, length, path.extension().and_then(|extension| extension.to_str())),
     };
     let (parsed, millimeters) = match format {
         Format::Obj => (Parsed::Mesh(obj::parse_moved(reader, path)?), None),
-        Format::Stl => (Parsed::Mesh(stl::parse(reader, length, path)?), None),
+        Format::Stl => {
+            let (moved, odd) = stl::parse(reader, length, path)?;
+            notes = odd;
+            (Parsed::Mesh(moved), None)
+        }
         Format::Ply => (ply::parse(reader, path)?, None),
         #[cfg(feature = "scans")]
         Format::Pcd => (Parsed::Points(scan::pcd::parse(reader, length, path)?), None),
@@ -165,9 +186,7 @@ fn parse_buffered(mut reader: impl BufRead, length: u64, path: &Path, folder: Op
         }
     };
     Ok(match parsed {
-        Parsed::Mesh((mesh, moved)) => {
-            Contents { mesh, moved, millimeters, format, points: Vec::new(), notes: Vec::new() }
-        }
+        Parsed::Mesh((mesh, moved)) => Contents { mesh, moved, millimeters, format, points: Vec::new(), notes },
         #[cfg(feature = "scans")]
         Parsed::Points(points) => {
             let scan::Scanned { mesh, points, moved, notes } = scan::surface(points, path)?;

@@ -51,7 +51,8 @@ fn what_is_nothing_is_refused_as_what_its_extension_says() {
         ("cup.dae", b"nothing", "cup.dae:1: the COLLADA file is damaged"),
         ("cup.obj", b"nothing", "cup.obj: the mesh has no faces"),
         ("cup", b"\x89PNG\r\n", "cup: the mesh has no faces"),
-        ("page.dae", b"<html></html>", "page.dae: the COLLADA file is damaged: its root is <html>, not <COLLADA>"),
+        ("scene.dae", b"<X3D></X3D>", "scene.dae: the COLLADA file is damaged: its root is <X3D>, not <COLLADA>"),
+        ("page.dae", b"<html></html>", "page.dae: a web page is not read"),
     ] {
         let error = parse(bytes, Path::new(name)).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
@@ -94,7 +95,9 @@ fn a_file_that_is_cut_anywhere_is_refused() {
         let end = bytes.trim_ascii_end().len() - if name == "text.ply" { 2 } else { 0 };
         for length in (0..end).step_by(if text { 7 } else { 1 }) {
             let cut = &bytes[..length];
-            assert!(parse(cut, Path::new(name)).is_err(), "{name} of {length} bytes");
+            // A text of STL that is cut between two facets is as some programs write it.
+            let is_said = |read: Contents| read.notes.concat().contains("if it was cut there");
+            assert!(parse(cut, Path::new(name)).map_or(true, is_said), "{name} of {length} bytes");
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::damaged;
 use super::document::{Buffer, Document};
 use crate::error::{Error, MeshProblem, Place, Result};
+use crate::mesh::unread::is_pointer;
 use base64::Engine;
 use std::borrow::Cow;
 use std::io::Read;
@@ -30,10 +31,7 @@ pub(super) fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>> {
         (Some(2), Some(length)) => {
             return Err(wrong(8, format!("it states a length of {length} bytes, but has {}", bytes.len())));
         }
-        (Some(version), Some(_)) => {
-            let (what, instead) = (format!("glTF of version {version}"), "Export it as glTF 2.0");
-            return Err(Error::at(Place::byte(path, 4), MeshProblem::Unsupported { what, instead }));
-        }
+        (Some(version), Some(_)) => return Err(Error::at(Place::byte(path, 4), super::other_version(version))),
         _ => return Err(wrong(bytes.len(), "it ends in its header".into())),
     }
     let (mut json, mut binary) = (None, None);
@@ -120,6 +118,13 @@ fn outside(uri: &str, index: usize, buffer: &Buffer, path: &Path, folder: Option
     let file = std::fs::File::open(&place).map_err(io)?;
     let metadata = file.metadata().map_err(io)?;
     if !metadata.is_file() || metadata.len() < buffer.byte_length {
+        let mut head = Vec::new();
+        if metadata.is_file() {
+            file.take(1024).read_to_end(&mut head).map_err(io)?;
+        }
+        if is_pointer(&head) {
+            return Err(Error::at(Place::file(&place), MeshProblem::LfsPointer));
+        }
         let what = format!("buffers[{index}] of {} states {} bytes", path.display(), buffer.byte_length);
         return Err(damaged(&place, format!("{what}, but the file has {}", metadata.len())));
     }

@@ -27,6 +27,15 @@ pub(super) struct Document {
     pub(super) extensions_required: Vec<String>,
 }
 
+/// What a document of glTF 1.0 has: there, meshes and accessors have names instead of numbers.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+#[expect(dead_code, reason = "they are only read")]
+pub(super) struct Version1 {
+    meshes: BTreeMap<String, IgnoredAny>,
+    accessors: BTreeMap<String, IgnoredAny>,
+}
+
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Asset {

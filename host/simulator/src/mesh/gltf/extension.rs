@@ -9,7 +9,7 @@ pub(super) const COMPRESSED: [&str; 3] =
     ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 /// Prefixes of the names of extensions that a surface does not depend on: materials, textures, lights, remarks.
-const HARMLESS: [&str; 14] = [
+const HARMLESS: [&str; 15] = [
     "KHR_materials_",
     "EXT_materials_",
     "ADOBE_materials_",
@@ -22,7 +22,8 @@ const HARMLESS: [&str; 14] = [
     "KHR_xmp",
     "KHR_audio",
     "KHR_animation_",
-    "KHR_techniques_webgl",
+    "KHR_technique",
+    "GOOGLE_texture_",
     "EXT_structural_metadata",
 ];
 

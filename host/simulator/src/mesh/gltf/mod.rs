@@ -26,6 +26,9 @@ use std::path::Path;
 pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<Moved> {
     let parts = container::parts(bytes, path)?;
     let document: Document = serde_json::from_slice(parts.json).map_err(|error| {
+        if serde_json::from_slice::<document::Version1>(parts.json).is_ok() {
+            return Error::at(Place::file(path), other_version("1.0"));
+        }
         let mut reason = error.to_string();
         reason.truncate(reason.rfind(" at line ").unwrap_or(reason.len()));
         let place = match parts.start {
@@ -65,10 +68,15 @@ fn check(document: &Document) -> Result<(), MeshProblem> {
         None => version.split('.').next() == Some("2"),
     };
     if !is_known {
-        let what = format!("glTF of version {}", version.chars().take(20).collect::<String>());
-        return Err(MeshProblem::Unsupported { what, instead: "Export it as glTF 2.0" });
+        return Err(other_version(version));
     }
     extension::check_required(&document.extensions_required)
+}
+
+/// The refusal of a version that is not read.
+fn other_version(version: impl std::fmt::Display) -> MeshProblem {
+    let what = format!("glTF of version {}", version.to_string().chars().take(20).collect::<String>());
+    MeshProblem::Unsupported { what, instead: "Export it as glTF 2.0" }
 }
 
 struct Scene<'a> {

@@ -180,6 +180,8 @@ fn buffers_beside_the_file_are_read_also_with_escaped_names_and_never_more_than_
     let directory = tempfile::tempdir().unwrap();
     let square = square();
     std::fs::write(directory.path().join("a b.bin"), buffer(&square)).unwrap();
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n";
+    std::fs::write(directory.path().join("pointer.bin"), pointer).unwrap();
     let mut document = document(&square, Some("a%20b.bin".into()));
     let path = directory.path().join("cup.gltf");
     let read = |document: &Value| {
@@ -191,11 +193,23 @@ fn buffers_beside_the_file_are_read_also_with_escaped_names_and_never_more_than_
         ("gone.bin", "gone.bin: cannot read the buffer of a glTF file"),
         (".", "buffers[0] of"),
         ("../../../../../../../../../dev/zero", "but the file has 0"),
+        ("pointer.bin", "pointer.bin: this is a pointer of Git LFS"),
     ] {
         document["buffers"][0]["uri"] = uri.into();
         let error = read(&document).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     }
+}
+
+#[test]
+fn a_document_of_version_1_is_called_that_and_not_damaged() {
+    let document = json!({
+        "asset": {"generator": "collada2gltf", "version": "1.0"},
+        "accessors": {"accessor_1": {"bufferView": "view_1", "componentType": 5123, "count": 3, "type": "SCALAR"}},
+        "meshes": {"mesh_1": {"primitives": [{"attributes": {"POSITION": "accessor_2"}, "mode": 4}]}},
+    });
+    let error = parse(document.to_string().as_bytes(), Path::new("cup.gltf"), None).unwrap_err().to_string();
+    assert_eq!(error, "cup.gltf: glTF of version 1.0 is not read. Export it as glTF 2.0.");
 }
 
 #[test]

@@ -55,15 +55,20 @@ impl Header {
                 |what: String| Error::at(Place::line(path, lines), MeshProblem::Damaged { format: "PLY", what });
             let words: Vec<&[u8]> = raw.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).collect();
             if lines == 1 && words != [b"ply"] {
-                let cause = if raw.contains(&b'\r') && !raw.ends_with(b"\r\n") { ", ended by \\n" } else { "" };
-                return Err(damaged(format!("its first line is not \"ply\"{cause}")));
+                let is_of_old_mac = raw.starts_with(b"ply\r") && !raw.ends_with(b"\r\n");
+                let what = match is_of_old_mac {
+                    true => "its header's lines end in CR alone, as on old Macs, which is read in text only",
+                    false => "its first line is not \"ply\"",
+                };
+                return Err(damaged(what.into()));
             }
             if !raw.ends_with(b"\n") {
                 let what = if bytes == MOST { "its header has more than 1 MB" } else { "it ends in its header" };
                 return Err(damaged(what.into()));
             }
             match words.as_slice() {
-                [] | [b"ply" | b"comment" | b"obj_info", ..] => {}
+                // The last one stands in files of Blender 2.4.
+                [] | [b"ply" | b"comment" | b"obj_info", ..] | [b"Created", b"by", ..] => {}
                 [b"end_header"] => break,
                 [b"format", kind, b"1.0"] if format.is_none() => {
                     format = Some(match *kind {

@@ -35,6 +35,13 @@ fn polygons_strips_and_short_faces_are_cut_and_other_elements_skipped() {
 }
 
 #[test]
+fn a_remark_of_the_exporter_without_the_word_comment_is_skipped() {
+    let remark = "format ascii 1.0\nCreated by Blender3D 247 - www.blender.org, source file: ";
+    let text = text(FACES, "3 0 1 2\n").replace("format ascii 1.0", remark);
+    assert_eq!(parse_bytes(text).unwrap().triangles, [[0, 1, 2]]);
+}
+
+#[test]
 fn windows_line_ends_are_read_in_text_and_before_binary_rows() {
     let windows = text(FACES, "3 0 1 2\n").replace('\n', "\r\n");
     assert_eq!(parse_bytes(windows).unwrap().triangles, [[0, 1, 2]]);
@@ -79,7 +86,7 @@ fn damage_is_named_with_its_line_or_byte() {
         ),
         (text(FACES, "3 0 1 2").replace("format ascii 1.0\n", ""), "has no line \"format"),
         (text(FACES, "3 0 1 2").replace("1.0", "2.0"), "cup.ply:2: the PLY file is damaged"),
-        (text(FACES, "3 0 1 2").replace('\n', "\r"), "ended by"),
+        (text(FACES, "3 0 1 2").replace('\n', "\r"), "its header's lines end in CR alone"),
     ] {
         let said = complaint(&bytes);
         assert!(said.contains(expected), "{said}\n{bytes}");

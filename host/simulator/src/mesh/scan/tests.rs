@@ -153,7 +153,7 @@ fn a_bad_line_of_xyz_is_named() {
     let error = refusal(b"1 2 3 4\n", "cup.xyz");
     assert!(error.starts_with("cup.xyz:1: ") && error.contains("4 numbers"), "{error}");
     let error = refusal(b"1 2 3 0 0 1\n", "cup.xyz");
-    assert!(error.contains("1 points with coordinates, where a surface needs 100"), "{error}");
+    assert!(error.contains("1 point with coordinates, where a surface needs 100"), "{error}");
 }
 
 const FIELDS: &str =

@@ -4,12 +4,11 @@ mod layout;
 mod search;
 
 use crate::error::{Error, MeshProblem, Place, Result};
-use crate::in_order::in_order;
 use crate::mesh::file;
 use crate::mesh::{BACKGROUND, builtin};
 use crate::mesh::{Instance, Object};
 use rayon::prelude::*;
-use search::{Found, LEVELS, lossy, search};
+use search::{Finder, Found, LEVELS, lossy};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -30,11 +29,92 @@ use std::path::{Path, PathBuf};
 ///   others;
 /// - Google Scanned Objects (`Name/meshes/model.obj`): after the first folder.
 ///
+/// Hidden files and directories, and the directory `__MACOSX`, are passed over.
+///
 /// # Errors
 /// When a source does not exist, holds no mesh file, or a file is not a usable mesh, and when two objects have the same
 /// name.
 pub fn objects(sources: &[String]) -> Result<Vec<Object>> {
-    in_order(files(sources)?.into_par_iter().map(Source::read))
+    load(sources, Search::default()).map(|loaded| loaded.objects)
+}
+
+/// How directories are searched and meshes are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Search {
+    /// True to take a directory inside a directory as one object, of which each mesh in it is an instance.
+    pub instances: bool,
+    /// True to take files that may state their unit before others of the same name.
+    pub prefers_units: bool,
+    /// True to go on without meshes that cannot be read.
+    pub skips_bad: bool,
+}
+
+/// Objects that were found and read, and what a user should know about that.
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub struct Loaded {
+    /// The objects, sorted by name.
+    pub objects: Vec<Object>,
+    /// What was left out, and objects with the same mesh. Each object has its own notes besides.
+    pub notes: Vec<String>,
+}
+
+/// The objects of all `sources`, found as [`objects`](fn@objects) finds them, with notes on the search.
+///
+/// # Errors
+/// As [`objects`](fn@objects); of several meshes all that cannot be read are named, in [`MeshProblem::Unread`].
+pub fn load(sources: &[String], search: Search) -> Result<Loaded> {
+    let (found, note) = found(sources, search)?;
+    let count = found.iter().map(Source::count).sum();
+    let read: Vec<(Option<Object>, Vec<Error>)> = found.into_par_iter().map(Source::read_each).collect();
+    let (objects, errors): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+    let (objects, errors): (Vec<Object>, Vec<Error>) =
+        (objects.into_iter().flatten().collect(), errors.into_iter().flatten().collect());
+    let mut notes: Vec<String> = note.into_iter().collect();
+    if objects.is_empty() || !search.skips_bad {
+        refuse(errors, count)?;
+    } else {
+        notes.extend(errors.iter().map(|error| format!("left out: {}", said(error))));
+    }
+    notes.extend(same(&objects));
+    Ok(Loaded { objects, notes })
+}
+
+/// Refuses errors of some of `count` meshes.
+fn refuse(mut errors: Vec<Error>, count: usize) -> Result<()> {
+    match (errors.len(), count) {
+        (0, _) => Ok(()),
+        (1, 1) => errors.pop().map_or(Ok(()), Err),
+        _ => Err(MeshProblem::Unread { count, errors: errors.iter().map(said).collect() }.into()),
+    }
+}
+
+/// An error without advice.
+fn said(error: &Error) -> String {
+    match error {
+        Error::At { place, problem } => format!("{place}{problem}"),
+        Error::Io { path, action, source, .. } => format!("{}: cannot {action}: {source}", path.display()),
+        other => other.to_string(),
+    }
+}
+
+/// Notes on objects that have the same mesh, which no touch distinguishes.
+fn same(objects: &[Object]) -> Vec<String> {
+    let mut named: BTreeMap<u64, Vec<&str>> = BTreeMap::new();
+    let checksums: Vec<Vec<u64>> = objects
+        .par_iter()
+        .map(|object| object.instances().map(|instance| instance.mesh.checksum()).collect())
+        .collect();
+    for (object, mut checksums) in objects.iter().zip(checksums) {
+        checksums.sort_unstable();
+        checksums.dedup();
+        checksums.into_iter().for_each(|checksum| named.entry(checksum).or_default().push(&object.name));
+    }
+    let mut groups: Vec<Vec<&str>> = named.into_values().filter(|names| names.len() > 1).collect();
+    groups.sort_unstable();
+    groups.dedup();
+    let note = |names: Vec<&str>| format!("{} have the same mesh: no touch distinguishes them", names.join(" and "));
+    groups.into_iter().map(note).collect()
 }
 
 /// The only object of `source`, found as [`objects`](fn@objects) finds it.
@@ -42,9 +122,13 @@ pub fn objects(sources: &[String]) -> Result<Vec<Object>> {
 /// # Errors
 /// As [`objects`](fn@objects), and [`MeshProblem::SeveralObjects`].
 pub fn object(source: &str) -> Result<Object> {
-    let mut found = files(&[source.to_owned()])?;
+    let (mut found, note) = found(&[source.to_owned()], Search::default())?;
     match (found.pop(), found.len()) {
-        (Some(only), 0) => only.read(),
+        (Some(only), 0) => {
+            let mut object = only.read()?;
+            object.notes.extend(note);
+            Ok(object)
+        }
         (_, others) => Err(Error::at(Place::file(source), MeshProblem::SeveralObjects { count: others + 1 })),
     }
 }
@@ -86,38 +170,62 @@ impl Source {
         }
     }
 
+    /// Number of its meshes.
+    fn count(&self) -> usize {
+        match self {
+            Self::Instances { files, .. } => files.len(),
+            _ => 1,
+        }
+    }
+
     /// The object itself.
     ///
     /// # Errors
     /// As [`file::read`] and [`builtin::one`].
     pub fn read(self) -> Result<Object> {
+        let count = self.count();
+        let (object, errors) = self.read_each();
+        refuse(errors, count)?;
+        object.ok_or_else(|| MeshProblem::NoMeshes.into())
+    }
+
+    /// The object with those of its meshes that can be read, and what is wrong with the others.
+    fn read_each(self) -> (Option<Object>, Vec<Error>) {
+        let whole = |read: Result<Object>| match read {
+            Ok(object) => (Some(object), Vec::new()),
+            Err(error) => (None, vec![error]),
+        };
         match self {
-            Self::BuiltIn(name) => builtin::one(name),
-            Self::Background => builtin::background(builtin::BACKGROUND_SHAPES, 1),
-            Self::File { name, path, notes } => {
-                let contents = file::read(&path)?;
+            Self::BuiltIn(name) => whole(builtin::one(name)),
+            Self::Background => whole(builtin::background(builtin::BACKGROUND_SHAPES, 1)),
+            Self::File { name, path, notes } => whole(file::read(&path).map(|contents| {
                 let notes = notes.into_iter().chain(moved(&path, contents.moved)).chain(contents.notes).collect();
                 let object = Object::new(name, contents.mesh);
-                Ok(Object { millimeters: contents.millimeters, notes, points: contents.points, ..object })
-            }
+                Object { millimeters: contents.millimeters, notes, points: contents.points, ..object }
+            })),
             Self::Instances { name, files, notes } => {
                 let read = |(name, path): (String, PathBuf)| {
                     let file::Contents { mesh, millimeters, moved: by, notes, points, .. } = file::read(&path)?;
                     let notes: Vec<String> = moved(&path, by).into_iter().chain(notes).collect();
                     Ok((Instance { name, mesh }, (millimeters, (notes, points))))
                 };
-                let read = in_order(files.into_par_iter().map(read))?;
-                let (mut instances, stated): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+                let read: Vec<Result<_>> = files.into_par_iter().map(read).collect();
+                let (mut good, mut errors) = (Vec::new(), Vec::new());
+                read.into_iter().for_each(|read| match read {
+                    Ok(read) => good.push(read),
+                    Err(error) => errors.push(error),
+                });
+                let (mut instances, stated): (Vec<_>, Vec<_>) = good.into_iter().unzip();
                 let (units, read): (Vec<_>, Vec<_>) = stated.into_iter().unzip();
                 let (read, points): (Vec<_>, Vec<_>) = read.into_iter().unzip();
                 let (millimeters, note) = one_unit(&mut instances, &units);
-                let object = Object::of_instances(name, instances).ok_or(MeshProblem::NoMeshes)?;
-                Ok(Object {
+                let object = Object::of_instances(name, instances).map(|object| Object {
                     millimeters,
                     notes: notes.into_iter().chain(read.into_iter().flatten()).chain(note).collect(),
                     points: points.into_iter().next().unwrap_or_default(),
                     ..object
-                })
+                });
+                (object, errors)
             }
         }
     }
@@ -156,7 +264,7 @@ fn one_unit(instances: &mut [Instance], units: &[Option<f64>]) -> (Option<f64>, 
 /// # Errors
 /// As [`objects`](fn@objects).
 pub fn objects_of_instances(sources: &[String]) -> Result<Vec<Object>> {
-    in_order(found(sources, true)?.into_par_iter().map(Source::read))
+    load(sources, Search { instances: true, ..Search::default() }).map(|loaded| loaded.objects)
 }
 
 /// The objects of all `sources` as [`objects`](fn@objects) finds them, neither made nor read; sorted by name.
@@ -164,16 +272,17 @@ pub fn objects_of_instances(sources: &[String]) -> Result<Vec<Object>> {
 /// # Errors
 /// As [`objects`](fn@objects), except for what is wrong inside a file.
 pub fn files(sources: &[String]) -> Result<Vec<Source>> {
-    found(sources, false)
+    found(sources, Search::default()).map(|(found, _)| found)
 }
 
-fn found(sources: &[String], instances: bool) -> Result<Vec<Source>> {
-    let mut paths = Vec::new();
+/// The objects of all sources, and which files of formats that are not read were found.
+fn found(sources: &[String], search: Search) -> Result<(Vec<Source>, Option<String>)> {
+    let mut finder = Finder { prefers_units: search.prefers_units, ..Finder::default() };
     let mut found = BTreeMap::new();
     for source in sources {
         if source == "builtin" {
             if builtin::names().is_empty() {
-                return builtin::one(source).map(|_| Vec::new());
+                return builtin::one(source).map(|_| Default::default());
             }
             for name in builtin::names() {
                 insert(&mut found, name.into(), Source::BuiltIn(name))?;
@@ -193,23 +302,26 @@ fn found(sources: &[String], instances: bool) -> Result<Vec<Source>> {
                 _ => Error::io(path, "read the mesh", error),
             })?;
             if metadata.is_dir() {
-                let before = paths.len() + found.len();
-                if instances {
-                    search(path, 0, &mut paths)?;
-                    for object in directories(path)? {
+                let before = finder.found.len() + found.len();
+                if search.instances {
+                    finder.search(path, 0)?;
+                    for object in directories(path, &mut finder)? {
                         insert(&mut found, object.name().into(), object)?;
                     }
                 } else {
-                    search(path, LEVELS, &mut paths)?;
+                    finder.search(path, LEVELS)?;
                 }
-                if paths.len() + found.len() == before {
-                    return Err(Error::at(Place::file(path), MeshProblem::NoMeshes));
+                if finder.found.len() + found.len() == before {
+                    let problem = finder.note().map_or(MeshProblem::NoMeshes, |files| MeshProblem::NoneRead { files });
+                    return Err(Error::at(Place::file(path), problem));
                 }
             } else {
-                paths.push(Found { path: path.to_owned(), passed: Vec::new() });
+                finder.found.push(Found { path: path.to_owned(), passed: Vec::new() });
             }
         }
     }
+    let note = finder.note();
+    let mut paths = finder.found;
     layout::choose(&mut paths);
     let mut in_category = BTreeMap::new();
     for (category, _) in paths.iter().filter_map(|found| layout::shapenet(&found.path)) {
@@ -225,7 +337,7 @@ fn found(sources: &[String], instances: bool) -> Result<Vec<Source>> {
         let notes = one.note().into_iter().collect();
         insert(&mut found, name.clone(), Source::File { name, path: one.path, notes })?;
     }
-    Ok(found.into_values().collect())
+    Ok((found.into_values().collect(), note))
 }
 
 fn insert(found: &mut BTreeMap<String, Source>, name: String, source: Source) -> Result<()> {
@@ -243,16 +355,12 @@ fn insert(found: &mut BTreeMap<String, Source>, name: String, source: Source) ->
 }
 
 /// The objects that the directories in `directory` stand for, one each.
-fn directories(directory: &Path) -> Result<Vec<Source>> {
-    let io = |error| Error::io(directory, "read the directory", error);
+fn directories(directory: &Path, finder: &mut Finder) -> Result<Vec<Source>> {
     let mut objects = Vec::new();
-    for entry in std::fs::read_dir(directory).map_err(io)? {
-        let path = entry.map_err(io)?.path();
-        if !path.is_dir() {
-            continue;
-        }
-        let mut paths = Vec::new();
-        search(&path, LEVELS - 1, &mut paths)?;
+    for path in search::entries(directory)?.into_iter().filter(|path| path.is_dir()) {
+        let others = std::mem::take(&mut finder.found);
+        finder.search(&path, LEVELS - 1)?;
+        let mut paths = std::mem::replace(&mut finder.found, others);
         if paths.is_empty() {
             continue;
         }

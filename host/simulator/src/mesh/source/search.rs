@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::mesh::file::{DEPTH_LIST, EXTENSIONS};
+use crate::mesh::unread;
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -37,29 +38,81 @@ pub(super) fn rank(path: &Path) -> Option<usize> {
     EXTENSIONS.iter().position(|known| extension.eq_ignore_ascii_case(known))
 }
 
-/// Appends the mesh files in a directory and in its subdirectories: of one name, the one with the first extension.
-pub(super) fn search(directory: &Path, levels: usize, found: &mut Vec<Found>) -> Result<()> {
+/// A search of directories.
+#[derive(Default)]
+pub(super) struct Finder {
+    /// True if files that may state their unit are taken before others of the same name.
+    pub(super) prefers_units: bool,
+    pub(super) found: Vec<Found>,
+    /// Files of formats that are not read, whose names no mesh has that is read.
+    pub(super) unread: Vec<PathBuf>,
+}
+
+impl Finder {
+    /// Finds the mesh files in a directory and in its subdirectories: of one name, the one with the first extension.
+    pub(super) fn search(&mut self, directory: &Path, levels: usize) -> Result<()> {
+        let paths = entries(directory)?;
+        let mut names: BTreeMap<&OsStr, Vec<(usize, &PathBuf)>> = BTreeMap::new();
+        let order = |path: &PathBuf| match rank(path)? {
+            rank if self.prefers_units && !states_unit(path) => Some(rank + EXTENSIONS.len()),
+            rank => Some(rank),
+        };
+        let is_unread = |path: &PathBuf| unread::of_name(path).is_some();
+        for path in paths.iter().filter(|path| !path.is_dir()) {
+            // What is not read comes last.
+            if let Some(order) = order(path).or_else(|| is_unread(path).then_some(usize::MAX)) {
+                names.entry(path.file_stem().unwrap_or_default()).or_default().push((order, path));
+            }
+        }
+        names.values_mut().for_each(|files| files.sort());
+        for path in &paths {
+            match names.get(path.file_stem().unwrap_or_default()).map(Vec::as_slice) {
+                Some([(usize::MAX, first), ..]) if *first == path => self.unread.push(path.clone()),
+                Some([(_, first), others @ ..]) if *first == path => {
+                    let passed = others.iter().map(|(_, other)| (*other).clone()).collect();
+                    self.found.push(Found { path: path.clone(), passed });
+                }
+                _ if path.is_dir() && levels > 0 && !leads_back(path, directory) => self.search(path, levels - 1)?,
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Says which files of formats that are not read there are, and what converts them.
+    pub(super) fn note(&self) -> Option<String> {
+        const SHOWN: usize = 5;
+        let (first, rest) = self.unread.split_at(SHOWN.min(self.unread.len()));
+        let shown = first.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        let more = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
+        let are = if self.unread.len() == 1 { "is" } else { "are" };
+        let mut formats: Vec<_> = self.unread.iter().filter_map(|path| unread::of_name(path)).collect();
+        formats.sort_unstable();
+        formats.dedup();
+        let advice: Vec<String> = formats.iter().map(|(name, instead)| format!("{name}: {instead}.")).collect();
+        (!first.is_empty()).then(|| format!("{shown}{more} {are} not read. {}", advice.join(" ")))
+    }
+}
+
+/// What is in a directory, without what is hidden, and without the copies of that which archives of a Mac hold.
+pub(super) fn entries(directory: &Path) -> Result<Vec<PathBuf>> {
     let io = |error| Error::io(directory, "read the directory", error);
     let mut entries = std::fs::read_dir(directory).map_err(io)?.collect::<std::io::Result<Vec<_>>>().map_err(io)?;
     entries.sort_by_key(std::fs::DirEntry::file_name);
-    let paths: Vec<PathBuf> = entries.into_iter().map(|entry| entry.path()).collect();
-    let mut names: BTreeMap<&OsStr, Vec<(usize, &PathBuf)>> = BTreeMap::new();
-    let files = paths.iter().filter(|path| !path.is_dir()).filter_map(|path| Some((rank(path)?, path)));
-    for (rank, path) in files {
-        names.entry(path.file_stem().unwrap_or_default()).or_default().push((rank, path));
-    }
-    names.values_mut().for_each(|files| files.sort());
-    for path in &paths {
-        if let Some([(_, first), others @ ..]) = names.get(path.file_stem().unwrap_or_default()).map(Vec::as_slice)
-            && *first == path
-        {
-            found
-                .push(Found { path: path.clone(), passed: others.iter().map(|(_, other)| (*other).clone()).collect() });
-        } else if path.is_dir() && levels > 0 {
-            search(path, levels - 1, found)?;
-        }
-    }
-    Ok(())
+    let is_hidden = |name: &OsStr| name.as_encoded_bytes().starts_with(b".") || name == "__MACOSX";
+    Ok(entries.into_iter().filter(|entry| !is_hidden(&entry.file_name())).map(|entry| entry.path()).collect())
+}
+
+/// True if a directory is a link to the one that it is in, or to one above that.
+fn leads_back(path: &Path, directory: &Path) -> bool {
+    path.is_symlink()
+        && path.canonicalize().ok().zip(directory.canonicalize().ok()).is_some_and(|(to, own)| own.starts_with(to))
+}
+
+/// True if files of this extension may state their unit.
+fn states_unit(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| ["gltf", "glb", "dae"].iter().any(|own| extension.eq_ignore_ascii_case(own)))
 }
 
 /// The name of a file or directory as text.

@@ -144,7 +144,7 @@ fn data_sets_of_meshes_give_the_names_of_their_objects() {
     for (file, name) in [(files[0], "025_mug"), (files[6], "Threshold_Bowl"), (files[8], "02958343")] {
         assert_eq!(super::files(&[format!("{source}/{file}")]).unwrap()[0].name(), name);
     }
-    let instances = super::found(&[source], true).unwrap();
+    let instances = super::found(&[source], Search { instances: true, ..Search::default() }).unwrap().0;
     let Source::Instances { name, files, .. } = &instances[0] else { panic!("{instances:?}") };
     assert_eq!((name.as_str(), files.len(), files[0].0.as_str()), ("025_mug", 1, "google_16k/textured"));
 }
@@ -166,4 +166,121 @@ fn instances_whose_files_state_their_units_are_brought_to_one() {
     place(&directory.path().join("cup"), &["c.obj"]);
     let cup = read(&source);
     assert!(cup.millimeters.is_none() && cup.notes[0].contains("its size is unknown"));
+}
+
+#[test]
+fn hidden_files_and_what_macs_put_beside_files_are_no_meshes() {
+    let directory = tempfile::tempdir().unwrap();
+    let source = place(
+        directory.path(),
+        &["cup.obj", "._cup.obj", ".hidden.stl", "__MACOSX/._cup.obj", "__MACOSX/jug.obj", ".git/jug.obj", ".DS_Store"],
+    );
+    assert_eq!(names(std::slice::from_ref(&source)), ["cup"]);
+    let cups = objects_of_instances(std::slice::from_ref(&source)).unwrap();
+    assert_eq!(cups.iter().map(|object| object.name.as_str()).collect::<Vec<_>>(), ["cup"]);
+    // Named outright, they are read.
+    assert_eq!(names(&[format!("{source}/.git")]), ["jug"]);
+    let only = place(&directory.path().join("only"), &["._cup.obj"]);
+    assert!(objects(&[only]).unwrap_err().to_string().contains("no mesh here"));
+}
+
+#[test]
+fn files_of_formats_that_are_not_read_are_named_with_what_converts_them() {
+    let directory = tempfile::tempdir().unwrap();
+    let source = place(
+        directory.path(),
+        &["box.obj", "cup.off", "deep/mug.step", "jug.OFF", "box.fbx", "box.blend", "notes.txt"],
+    );
+    let loaded = load(std::slice::from_ref(&source), Search::default()).unwrap();
+    assert_eq!(loaded.objects.len(), 1);
+    let expected = format!(
+        "{source}/cup.off, {source}/deep/mug.step, {source}/jug.OFF are not read. OFF: Convert it to PLY or STL, for example \
+         with MeshLab. STEP: Export a mesh of it as STL, for example with FreeCAD."
+    );
+    assert_eq!(loaded.notes, [expected]);
+    // A name that is read in another format is passed over as others are.
+    assert!(loaded.objects[0].notes[0].ends_with("box.blend, box.fbx are passed over, of the same object"));
+    let only = place(&directory.path().join("only"), &["1.off", "2.off", "3.off", "4.off", "5.off", "6.off", "7.off"]);
+    let error = objects(&[only]).unwrap_err().to_string();
+    assert!(
+        error.contains("no mesh that is read here") && error.contains("5.off and 2 more are not read. OFF: "),
+        "{error}"
+    );
+    assert!(object(&source).unwrap().notes.last().unwrap().contains("mug.step"));
+}
+
+#[test]
+fn all_meshes_that_cannot_be_read_are_named_at_once_and_left_out_if_that_is_wanted() {
+    let directory = tempfile::tempdir().unwrap();
+    let source = place(directory.path(), &["a/one.obj", "a/two.obj", "b/three.obj", "c/four.obj"]);
+    let path = |name: &str| directory.path().join(name);
+    std::fs::write(path("a/two.obj"), "v 0 0\n").unwrap();
+    std::fs::write(path("c/four.obj"), "").unwrap();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("nowhere", path("a/dead.obj")).unwrap();
+    let dead = if cfg!(unix) { 1 } else { 0 };
+    let sources = std::slice::from_ref(&source);
+    for instances in [false, true] {
+        let search = Search { instances, ..Search::default() };
+        let error = load(sources, search).unwrap_err();
+        let text = error.to_string();
+        assert!(text.starts_with(&format!("{} of {} meshes cannot be read:\n  ", 2 + dead, 4 + dead)), "{text}");
+        assert!(
+            text.contains("two.obj:1: a vertex without z") && text.contains("four.obj: the mesh has no faces"),
+            "{text}"
+        );
+        assert_eq!((error.exit_code(), text.contains("dead.obj: cannot read the mesh")), (1, cfg!(unix)), "{text}");
+        let loaded = load(sources, Search { skips_bad: true, ..search }).unwrap();
+        let expected = if instances { ["a", "b"] } else { ["one", "three"] };
+        assert_eq!(loaded.objects.iter().map(|object| object.name.as_str()).collect::<Vec<_>>(), expected);
+        assert_eq!(loaded.notes.iter().filter(|note| note.starts_with("left out: ")).count(), 2 + dead);
+    }
+    // One file alone is refused as it always was, and nothing is left out of nothing.
+    let alone = format!("{source}/c");
+    for skips_bad in [false, true] {
+        let error =
+            load(std::slice::from_ref(&alone), Search { skips_bad, ..Search::default() }).unwrap_err().to_string();
+        assert!(
+            error.ends_with(
+                "four.obj: the mesh has no faces. Export the mesh as a file with faces: OBJ, STL, PLY, GLB or COLLADA."
+            ),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn objects_with_the_same_mesh_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let source = place(directory.path(), &["cup.obj", "mug.obj", "jug.obj"]);
+    std::fs::write(directory.path().join("jug.obj"), TRIANGLE.replace("v 1 0 0", "v 2 0 0")).unwrap();
+    let notes = load(&[source], Search::default()).unwrap().notes;
+    assert_eq!(notes, ["cup and mug have the same mesh: no touch distinguishes them"]);
+}
+
+#[test]
+fn files_that_may_state_their_unit_come_first_where_that_is_wanted() {
+    let directory = tempfile::tempdir().unwrap();
+    let source = place(directory.path(), &["cup.obj", "cup.glb", "cup.stl", "fork.stl"]);
+    let first = |prefers_units| match &super::found(
+        std::slice::from_ref(&source),
+        Search { prefers_units, ..Search::default() },
+    ) {
+        Ok((found, _)) => match &found[0] {
+            Source::File { path, .. } => path.file_name().unwrap().to_owned(),
+            other => panic!("{other:?}"),
+        },
+        Err(error) => panic!("{error}"),
+    };
+    assert_eq!((first(false), first(true)), ("cup.obj".into(), "cup.glb".into()));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_to_the_directory_that_it_is_in_is_not_followed() {
+    let directory = tempfile::tempdir().unwrap();
+    let source = place(directory.path(), &["deep/cup.obj"]);
+    std::os::unix::fs::symlink(".", directory.path().join("self")).unwrap();
+    std::os::unix::fs::symlink("..", directory.path().join("deep/up")).unwrap();
+    assert_eq!(names(&[source]), ["cup"]);
 }

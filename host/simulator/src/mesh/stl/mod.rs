@@ -1,8 +1,9 @@
 //! STL files, binary and text. Corners at the same place become one vertex.
 //!
 //! A reader of our own: a file is binary if its length is that of the triangles that it counts, or cannot be text. Then
-//! the count must hold. All solids of a text file are read, and the last must be closed, so that a file that was cut does
-//! not pass for a smaller one. Normals and attributes say nothing that the corners do not.
+//! the count must hold: after the last triangle there may be a few bytes, but not another one. All solids of a text file
+//! are read. One that is not closed may be of a program that does not close them, or of a file that was cut between two facets:
+//! a note says so. Normals, colors and attributes say nothing that the corners do not.
 
 use super::Mesh;
 use super::exact::Moved;
@@ -32,32 +33,46 @@ fn bytes_of(count: u32) -> u64 {
     HEADER as u64 + TRIANGLE as u64 * u64::from(count)
 }
 
-/// Reads the mesh of an STL file of `length` bytes; errors name `path`.
+/// Reads the mesh of an STL file of `length` bytes, with notes on what is odd about the file; errors name `path`.
 ///
 /// # Errors
 /// Where the number of triangles is not the one that the file states, a word or a number of a text is not what must stand
 /// there, a coordinate is not finite, or no face is left.
-pub(super) fn parse(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Moved> {
+pub(super) fn parse(mut reader: impl BufRead, length: u64, path: &Path) -> Result<(Moved, Vec<String>)> {
     let head = reader.fill_buf().map_err(|source| Error::io(path, "read the mesh", source))?;
-    let is_text = !head.is_empty() && !head.iter().take(HEADER).any(|&byte| byte == 0);
-    let welder = if !is_binary(head, length) && is_text {
+    let (welder, note) = if !is_binary(head, length) && is_text(head) {
         Text { reader, path, line: 0, raw: Vec::new(), next: 0 }.parse()?
     } else {
         binary(reader, length, path)?
     };
     let (mesh, moved) = Mesh::from_f64(&welder.vertices, welder.triangles);
-    Ok((mesh.usable().map_err(|problem| Error::at(Place::file(path), problem))?, moved))
+    let mesh = mesh.usable().map_err(|problem| Error::at(Place::file(path), problem))?;
+    let notes = note.into_iter().map(|note| format!("{} {note}", path.display())).collect();
+    Ok(((mesh, moved), notes))
 }
 
-fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Welder> {
+/// True if a file that starts with `head`, and is not binary by its length, is meant as text.
+fn is_text(head: &[u8]) -> bool {
+    let start = head.get(..HEADER).unwrap_or(head);
+    let word = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start).trim_ascii_start();
+    // The name of a solid may be in any encoding.
+    let is_solid = word.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    !head.is_empty() && !start.contains(&0) && (is_solid || start.is_ascii())
+}
+
+/// What was read, and a note on what is odd about the file.
+type Noted = (Welder, Option<String>);
+
+fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Noted> {
     let cut = |offset: u64| move |source| ended(source, path, offset);
     let mut header = [0; HEADER];
     reader.read_exact(&mut header).map_err(cut(length))?;
     let count = stated(&header).unwrap_or_default();
-    if length != bytes_of(count) {
+    let rest = length.checked_sub(bytes_of(count)).filter(|&rest| rest < TRIANGLE as u64);
+    let Some(rest) = rest.filter(|&rest| rest == 0 || count > 0) else {
         let what = format!("it states {count} triangles, which are {} bytes, but has {length} bytes", bytes_of(count));
         return Err(Error::at(Place::byte(path, HEADER as u64 - 4), MeshProblem::Damaged { format: "STL", what }));
-    }
+    };
     let mut welder = Welder::default();
     let mut triangle = [0; TRIANGLE];
     for index in 0..count {
@@ -81,7 +96,8 @@ fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Welder> 
         }
         welder.triangles.push(corners);
     }
-    Ok(welder)
+    let bytes = if rest == 1 { "byte" } else { "bytes" };
+    Ok((welder, (rest > 0).then(|| format!("has {rest} {bytes} after its last triangle, left out"))))
 }
 
 const AXES: [char; 3] = ['x', 'y', 'z'];
@@ -155,21 +171,33 @@ struct Text<'a, R> {
 }
 
 impl<R: BufRead> Text<'_, R> {
-    fn parse(mut self) -> Result<Welder> {
+    fn parse(mut self) -> Result<Noted> {
         let mut welder = Welder::default();
         let mut state = State::Outside;
         let mut corners = [0; 3];
+        // The number of triangles before the solid.
+        let mut before = 0;
         while let Some(word) = self.word()? {
             let is = |expected: &[u8]| word.eq_ignore_ascii_case(expected);
             state = match state {
                 State::Outside if is(b"solid") => {
                     self.skip_line();
+                    before = welder.triangles.len();
                     State::Solid
                 }
                 State::Solid if is(b"facet") => State::Facet,
                 State::Solid if is(b"endsolid") => {
                     self.skip_line();
                     State::Outside
+                }
+                // Some programs write further lines of remarks before the first facet.
+                State::Solid | State::Facet | State::Closed if is(b"color") => {
+                    self.skip_line();
+                    state
+                }
+                State::Solid if welder.triangles.len() == before => {
+                    self.skip_line();
+                    State::Solid
                 }
                 State::Facet if is(b"normal") || !word.first().is_some_and(u8::is_ascii_alphabetic) => State::Facet,
                 // Normals of flat triangles, as some exporters write them.
@@ -195,7 +223,15 @@ impl<R: BufRead> Text<'_, R> {
                 state => return Err(self.unexpected(Some(word), state.expected())),
             };
         }
-        if state == State::Outside { Ok(welder) } else { Err(self.unexpected(None, state.expected())) }
+        match state {
+            State::Outside => Ok((welder, None)),
+            State::Solid if welder.triangles.len() > before => {
+                let note =
+                    "ends after a facet, without \"endsolid\": if it was cut there, the rest of the mesh is missing";
+                Ok((welder, Some(note.into())))
+            }
+            state => Err(self.unexpected(None, state.expected())),
+        }
     }
 
     /// The next word; none at the end of the file.

@@ -3,7 +3,12 @@ use crate::mesh::tests::samples;
 
 fn parse_bytes(bytes: impl AsRef<[u8]>) -> Result<Mesh> {
     let bytes = bytes.as_ref();
-    parse(bytes, bytes.len() as u64, Path::new("cup.stl")).map(|(mesh, _)| mesh)
+    parse(bytes, bytes.len() as u64, Path::new("cup.stl")).map(|((mesh, _), _)| mesh)
+}
+
+fn notes(bytes: impl AsRef<[u8]>) -> Vec<String> {
+    let bytes = bytes.as_ref();
+    parse(bytes, bytes.len() as u64, Path::new("cup.stl")).unwrap().1
 }
 
 fn complaint(bytes: impl AsRef<[u8]>) -> String {
@@ -40,8 +45,44 @@ fn a_count_that_disagrees_with_the_length_is_refused_whichever_is_wrong() {
     for length in [whole.len() - 50, whole.len() - 1, whole.len() - 500] {
         assert!(complaint(&whole[..length]).contains(&format!("it states {triangles} triangles")));
     }
-    assert!(complaint([whole.as_slice(), b"!"].concat()).contains("damaged"));
+    for rest in [50, 51, 500] {
+        let text = complaint([whole.clone(), vec![b'!'; rest]].concat());
+        assert!(text.contains(&format!("it states {triangles} triangles")), "{text}");
+    }
     assert!(complaint(&whole[..84 - 50]).contains("ends in the middle"));
+    // A program that writes as it goes may leave no count, and a header without zeros.
+    let uncounted = [&[b'x'; 80], [0xff; 4].as_slice(), &whole[84..]].concat();
+    assert!(complaint(uncounted).contains("cup.stl: byte 80: the STL file is damaged: it states 4294967295 triangles"));
+}
+
+#[test]
+fn a_few_bytes_after_the_last_triangle_are_left_out_and_said() {
+    let globe = Mesh::globe(4);
+    let whole = samples::stl_binary(&globe);
+    assert!(notes(&whole).is_empty());
+    for (rest, said) in [(1, "1 byte after"), (49, "49 bytes after")] {
+        let longer = [whole.clone(), vec![b'\n'; rest]].concat();
+        assert_eq!(parse_bytes(&longer).unwrap().triangles.len(), globe.triangles.len());
+        assert!(notes(&longer).concat().starts_with(&format!("cup.stl has {said} its last triangle")));
+        let text = format!("{}{}", samples::stl_text(&globe), "\n".repeat(rest));
+        assert!(notes(text).is_empty());
+    }
+}
+
+#[test]
+fn a_text_without_its_last_word_with_colors_or_with_more_lines_in_front_is_read() {
+    let open = format!("solid\n{FACET}{FACET}");
+    assert_eq!(parse_bytes(&open).unwrap().triangles.len(), 2);
+    assert!(notes(&open).concat().contains("without \"endsolid\": if it was cut there"));
+    let color = "color 0.5 0.5 1\n";
+    let colored = format!("solid x\n{color}{}endsolid", FACET.replace("outer", &format!("{color}outer")));
+    assert_eq!(parse_bytes(&colored).unwrap().triangles.len(), 1);
+    let remarks =
+        format!("solid x\nCreated by hand\n\nCOMMENT facet\n{FACET}endsolid\nsolid y\n# 2\n{FACET}endsolid x");
+    assert_eq!(parse_bytes(&remarks).unwrap().triangles.len(), 2);
+    assert!(notes(&remarks).is_empty() && notes(&colored).is_empty());
+    let between = format!("solid x\n{FACET}Created by hand\n{FACET}endsolid");
+    assert!(complaint(between).contains("cup.stl:9: the STL file is damaged: \"Created\" stands where \"facet\""));
 }
 
 #[test]
@@ -58,7 +99,7 @@ fn all_solids_of_a_text_are_read_with_names_or_without_in_any_case_and_layout() 
 #[test]
 fn damage_to_a_text_is_named_with_its_line() {
     for (text, expected) in [
-        (format!("solid x\n{FACET}"), "cup.stl:8: the STL file is damaged: it ends where \"facet\" or \"endsolid\""),
+        ("solid x\n".into(), "cup.stl:1: the STL file is damaged: it ends where \"facet\" or \"endsolid\""),
         (
             format!("solid x\n{FACET}endsolid\nrest\n"),
             "cup.stl:10: the STL file is damaged: \"rest\" stands where \"solid\"",

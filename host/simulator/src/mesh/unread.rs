@@ -1,0 +1,171 @@
+//! Files that are not read although they may hold a mesh, and what reads them.
+
+use crate::error::MeshProblem;
+use std::path::Path;
+
+/// A format that is not read.
+struct Unread {
+    name: &'static str,
+    /// In lower case.
+    extensions: &'static [&'static str],
+    /// First bytes of its files; any of them.
+    begins: &'static [&'static [u8]],
+    /// Advice, as a sentence without its full stop.
+    instead: &'static str,
+}
+
+const BLENDER: &str = "Export it as GLB or STL with Blender";
+const MESHLAB: &str = "Convert it to PLY or STL, for example with MeshLab";
+const FREECAD: &str = "Export a mesh of it as STL, for example with FreeCAD";
+const CLOUDCOMPARE: &str = "Convert it to PLY with normals, for example with CloudCompare";
+const PARAVIEW: &str = "Convert its surface to PLY or STL, for example with ParaView";
+
+const FORMATS: [Unread; 17] = [
+    Unread {
+        name: "OFF",
+        extensions: &["off", "coff"],
+        begins: &[b"OFF\n", b"OFF\r", b"OFF ", b"COFF", b"NOFF"],
+        instead: MESHLAB,
+    },
+    Unread {
+        name: "3MF",
+        extensions: &["3mf"],
+        begins: &[],
+        instead: "Export it as STL with a slicer or with FreeCAD",
+    },
+    Unread { name: "AMF", extensions: &["amf"], begins: &[], instead: "Export it as STL with a slicer" },
+    Unread { name: "STEP", extensions: &["step", "stp"], begins: &[b"ISO-10303-21"], instead: FREECAD },
+    Unread { name: "IGES", extensions: &["iges", "igs"], begins: &[], instead: FREECAD },
+    Unread { name: "BREP", extensions: &["brep", "brp"], begins: &[b"DBRep_DrawableShape"], instead: FREECAD },
+    Unread {
+        name: "a file of a CAD program",
+        extensions: &["sldprt", "sldasm", "ipt", "iam", "catpart", "f3d", "x_t", "x_b", "jt", "fcstd", "skp"],
+        begins: &[],
+        instead: "Export a mesh of it as STL with that program",
+    },
+    Unread {
+        name: "VRML or X3D",
+        extensions: &["wrl", "vrml", "x3d", "x3dv"],
+        begins: &[b"#VRML", b"#X3D"],
+        instead: MESHLAB,
+    },
+    Unread { name: "FBX", extensions: &["fbx"], begins: &[b"Kaydara FBX", b"; FBX"], instead: BLENDER },
+    Unread {
+        name: "USD",
+        extensions: &["usd", "usda", "usdc", "usdz"],
+        begins: &[b"#usda", b"PXR-USDC"],
+        instead: BLENDER,
+    },
+    Unread { name: "a file of Blender", extensions: &["blend"], begins: &[b"BLENDER"], instead: BLENDER },
+    Unread { name: "3DS", extensions: &["3ds"], begins: &[], instead: MESHLAB },
+    Unread { name: "VTK", extensions: &["vtk", "vtp", "vtu"], begins: &[b"# vtk DataFile"], instead: PARAVIEW },
+    Unread {
+        name: "a mesh of Gmsh",
+        extensions: &["msh"],
+        begins: &[b"$MeshFormat"],
+        instead: "Export it as STL with Gmsh",
+    },
+    Unread { name: "LAS", extensions: &["las", "laz"], begins: &[b"LASF"], instead: CLOUDCOMPARE },
+    Unread { name: "E57", extensions: &["e57"], begins: &[b"ASTM-E57"], instead: CLOUDCOMPARE },
+    Unread { name: "PTS or PTX", extensions: &["pts", "ptx"], begins: &[], instead: CLOUDCOMPARE },
+];
+
+/// Files that are no mesh, by their first bytes: their names, and advice.
+const OTHERS: [(&[u8], &str, &str); 5] = [
+    (b"PK\x03\x04", "a ZIP archive", "Unpack it, then give what is in it"),
+    (b"\x1f\x8b", "a file compressed by gzip", "Unpack it"),
+    (b"<!doctype html", "a web page", "Download the file itself; on GitHub, what its button Raw gives"),
+    (b"<html", "a web page", "Download the file itself; on GitHub, what its button Raw gives"),
+    (b"%PDF", "a PDF document", "Give a mesh"),
+];
+
+fn by_extension(path: &Path) -> Option<&'static Unread> {
+    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    FORMATS.iter().find(|format| format.extensions.contains(&extension.as_str()))
+}
+
+/// The format of a file that is not read, by its extension, with what to do.
+pub(super) fn of_name(path: &Path) -> Option<(&'static str, &'static str)> {
+    by_extension(path).map(|format| (format.name, format.instead))
+}
+
+/// True if a file starts as one that Git LFS left in the place of another.
+pub(super) fn is_pointer(head: &[u8]) -> bool {
+    head.starts_with(b"version https://git-lfs.github.com/spec/")
+}
+
+/// Problem of a file that starts with `head` and is of a format that is not read, by its content or else by its name; none if
+/// it may be read.
+pub(super) fn problem(head: &[u8], path: &Path) -> Option<MeshProblem> {
+    if is_pointer(head) {
+        return Some(MeshProblem::LfsPointer);
+    }
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+    let begins = |begin: &&[u8]| text.get(..begin.len()).is_some_and(|start| start.eq_ignore_ascii_case(begin));
+    let unsupported = |what: &str, instead| Some(MeshProblem::Unsupported { what: what.into(), instead });
+    let by_content = FORMATS.iter().find(|format| format.begins.iter().any(begins));
+    if let Some(format) = by_content.or_else(|| by_extension(path)) {
+        return unsupported(format.name, format.instead);
+    }
+    let (_, what, instead) = OTHERS.iter().find(|(begin, ..)| begins(begin))?;
+    unsupported(what, *instead)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::file::{EXTENSIONS, parse};
+
+    fn said(bytes: &[u8], name: &str) -> String {
+        parse(bytes, Path::new(name)).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_format_that_is_not_read_is_named_with_what_converts_it() {
+        let off = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+        assert_eq!(
+            said(off, "box.off"),
+            "box.off: OFF is not read. Convert it to PLY or STL, for example with MeshLab."
+        );
+        for (bytes, name, expected) in [
+            (&off[..], "box.obj", "box.obj: OFF is not read"),
+            (
+                b"ISO-10303-21;\nHEADER;\n",
+                "mug.step",
+                "STEP is not read. Export a mesh of it as STL, for example with FreeCAD.",
+            ),
+            (b"#VRML V2.0 utf8\nShape {}\n", "mug.wrl", "VRML or X3D is not read"),
+            (b"PK\x03\x04\x14\x00", "mug.3MF", "3MF is not read. Export it as STL with a slicer"),
+            (b"PK\x03\x04\x14\x00", "mug.stl", "a ZIP archive is not read. Unpack it"),
+            (b"\x1f\x8b\x08\x00", "mug.stl.gz", "a file compressed by gzip is not read"),
+            (b"Kaydara FBX Binary  \x00", "mug.fbx", "FBX is not read. Export it as GLB or STL with Blender."),
+            (b"; FBX 7.3.0 project file", "mug", "FBX is not read"),
+            (b"#usda 1.0\n", "mug.usda", "USD is not read"),
+            (b"LASF\x00\x00", "mug.las", "LAS is not read. Convert it to PLY with normals"),
+            (b"12\n0 0 0 1\n", "mug.pts", "PTS or PTX is not read"),
+            (b"\n<!DOCTYPE html>\n<html>", "mug.obj", "a web page is not read. Download the file itself"),
+            (b"", "mug.fbx", "FBX is not read"),
+        ] {
+            let said = said(bytes, name);
+            assert!(said.contains(expected), "{said}");
+        }
+    }
+
+    #[test]
+    fn what_git_lfs_left_is_called_that_in_every_format() {
+        let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:094d\nsize 625707\n";
+        for extension in EXTENSIONS {
+            let said = said(pointer, &format!("cup.{extension}"));
+            assert!(
+                said.contains("this is a pointer of Git LFS, and not the file itself. Fetch it: git lfs pull."),
+                "{said}"
+            );
+        }
+    }
+
+    #[test]
+    fn no_format_that_is_read_is_among_those_that_are_not() {
+        let read = EXTENSIONS.map(|extension| of_name(Path::new(&format!("cup.{extension}"))));
+        assert_eq!(read, [None; EXTENSIONS.len()]);
+    }
+}
