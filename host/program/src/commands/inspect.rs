@@ -41,9 +41,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
 /// Prediction of a model over rows, in words.
 fn predicts_text(predicts: &Predicts) -> String {
     let what = match predicts.link {
-        None if predicts.last_of_ties => "the class with the largest margin, of several the last",
-        None => "the class with the largest margin, of several the first",
-        Some(link) => super::export::formula(link),
+        None if predicts.last_of_ties => "the class with the largest margin, of several the last".into(),
+        None => "the class with the largest margin, of several the first".into(),
+        Some(link) => super::export::formula(link, predicts.average),
     };
     let of_each = if predicts.what == "targets" { "of each target " } else { "" };
     let what = format!("{of_each}{what}");

@@ -328,6 +328,7 @@ fn option_of(setting: &str) -> &str {
     match setting {
         "groups" => "sequences",
         "rolls" => "plan",
+        "scales" => "scale",
         other => other,
     }
 }

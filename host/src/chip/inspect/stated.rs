@@ -148,11 +148,19 @@ pub struct Predicts {
     pub link: Option<&'static str>,
     /// Factor from a margin of the model to the library's.
     pub scale: f32,
+    /// Number that a margin is divided by before the link; absent if that is 1.
+    #[serde(skip_serializing_if = "is_one")]
+    pub average: u32,
     /// True if the last of several largest margins names the class.
     pub last_of_ties: bool,
     /// The least and the largest of the features that stand for a missing value: whole numbers, or keys of f32 values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<[i32; 2]>,
+}
+
+/// True for 1.
+fn is_one(number: &u32) -> bool {
+    *number == 1
 }
 
 pub(super) fn predicts(model: &Model<'_>) -> Option<Predicts> {
@@ -166,6 +174,7 @@ pub(super) fn predicts(model: &Model<'_>) -> Option<Predicts> {
         },
         link: is_value.then(|| prediction.link.name()),
         scale: prediction.scale,
+        average: prediction.average,
         last_of_ties: prediction.last_of_ties,
         missing: model.sentinel().map(|sentinel| [sentinel.low, sentinel.high]),
     })
