@@ -2,8 +2,8 @@ use super::Global;
 use super::chips::{core, instructions};
 use palpate::Result;
 use palpate::chip::inspect::{
-    Defaults, Feature, Inspected, Noise, OnChip, PlanOf, Predicts, Probe, Promised, Tested, Touches, TrainedOn,
-    inspect, on_chip,
+    Defaults, Feature, Inspected, Noise, OnChip, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches,
+    TrainedOn, inspect, on_chip,
 };
 use palpate::compile::{CompiledModel, Core, Memory};
 use palpate::output;
@@ -109,6 +109,10 @@ fn what_it_is(lines: &mut Lines, inspected: &Inspected<'_>) {
             None => name.clone(),
         };
         lines.line("features", features.iter().map(feature).collect::<Vec<_>>().join(", "));
+    }
+    if let Some(SomeColumns { all, used }) = &inspected.columns {
+        let used: Vec<String> = used.iter().map(ToString::to_string).collect();
+        lines.line("columns", format!("{} (from 0) of the library's {all}", used.join(", ")));
     }
     let objects = inspected.objects.join(", ");
     match &inspected.predicts {

@@ -138,6 +138,15 @@ pub struct Noise {
     pub pose_degrees: f64,
 }
 
+/// Columns of the library's rows that a model has as its features.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct SomeColumns {
+    /// Columns of the library's rows.
+    pub all: usize,
+    /// The number of each feature's column, from 0.
+    pub used: Vec<usize>,
+}
+
 /// The prediction of a model over rows.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Predicts {

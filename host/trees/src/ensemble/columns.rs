@@ -37,6 +37,12 @@ pub(super) fn features(
     if used.len() > MAX_FEATURES {
         return Err(EnsembleProblem::FeatureCount { count, used: used.len(), most: MAX_FEATURES });
     }
+    if let Some(&feature) = used.last().filter(|&&feature| feature >= count) {
+        return Err(EnsembleProblem::Damaged {
+            kind: "trees",
+            what: format!("a split is of feature {feature} of {count}"),
+        });
+    }
     if used.is_empty() {
         used.insert(0);
     }
@@ -139,6 +145,7 @@ mod tests {
         let refused = features(vec![String::new(); 300], &mut many, &mut notes).unwrap_err();
         assert_eq!(refused, EnsembleProblem::FeatureCount { count: 300, used: 257, most: 256 });
         assert!(features(vec![String::new(); MAX_COLUMNS + 1], &mut [tree(0)], &mut notes).is_err());
+        assert!(features(vec![String::new(); 300], &mut [tree(300)], &mut notes).is_err(), "there is no such column");
     }
 
     #[test]

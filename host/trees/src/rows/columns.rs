@@ -87,7 +87,7 @@ impl Features {
     /// Where both have names, each feature has to be one of the columns; there may be more of them, in any order. Names are
     /// equal also where one has `_` for the other one's blanks, brackets and control characters, as LightGBM writes them.
     /// `Column_3`, `f3` and `3` are no names, but numbers: they are found by them. Where one side has none, columns are taken by
-    /// their position.
+    /// their position. Numbers alone are a row without a header, unless they count from 0 or are the features' own names.
     ///
     /// # Errors
     /// [`RowsProblem::Unmatched`], [`RowsProblem::Repeated`], [`RowsProblem::NumbersAlone`], [`RowsProblem::Columns`].
@@ -105,13 +105,13 @@ impl Features {
         let names: Vec<&str> = open.iter().filter_map(|&column| header.get(column).copied()).collect();
         let theirs = numbers(names.iter().copied());
         let is_counted = theirs.as_ref().is_some_and(|numbers| numbers.iter().copied().eq(0..names.len()));
+        if is_numbers_alone(&names) && !is_counted {
+            return Err(RowsProblem::NumbersAlone { cells: names.iter().map(ToString::to_string).collect() });
+        }
         if let (Some(own), Some(theirs)) = (numbers(self.names()), &theirs)
             && let Some(positions) = found(own.iter(), &theirs.iter().collect::<Vec<_>>())
         {
             return by_name(positions.into_iter().filter_map(|position| open.get(position).copied()).collect());
-        }
-        if is_numbers_alone(&names) && !is_counted {
-            return Err(RowsProblem::NumbersAlone { cells: names.iter().map(ToString::to_string).collect() });
         }
         if is_counted || !is_unique || numbers(self.names()).is_some() {
             return self.by_position(&open);
@@ -225,8 +225,8 @@ mod tests {
     #[test]
     fn generated_names_count_as_numbers_and_as_no_names() {
         for model in [&["f0", "f1", "f2"], &["Column_0", "Column_1", "Column_2"], &["0", "1", "2"]] {
-            assert_eq!(among(model, &["2", "1", "0"]), Ok((vec![2, 1, 0], false)), "{model:?}");
-            assert_eq!(among(model, &["Column_0", "Column_1", "Column_2"]), Ok((vec![0, 1, 2], false)));
+            assert_eq!(among(model, &["0", "1", "2"]), Ok((vec![0, 1, 2], false)), "{model:?}");
+            assert_eq!(among(model, &["Column_2", "Column_1", "Column_0"]), Ok((vec![2, 1, 0], false)));
             assert_eq!(among(model, &["f3", "f2", "f1", "f0"]), Ok((vec![3, 2, 1], false)));
             // Names on one side alone.
             assert_eq!(among(model, &["a", "b", "c"]), Ok((vec![0, 1, 2], true)));
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn a_header_of_numbers_alone_is_refused_unless_they_count_or_are_the_models_own() {
-        for header in [&["0.35", "0.82"][..], &["1", "2"], &["-1e3", "nan"], &["", "7"]] {
+        for header in [&["0.35", "0.82"][..], &["1", "2"], &["1", "0"], &["-1e3", "nan"], &["", "7"]] {
             let cells = header.iter().map(ToString::to_string).collect();
             assert_eq!(among(&SIZES, header), Err(RowsProblem::NumbersAlone { cells }));
             assert!(matches!(among(&["f0", "f1"], header), Err(RowsProblem::NumbersAlone { .. })));
@@ -278,7 +278,7 @@ mod tests {
         let header: Vec<String> = (0..300).map(|column| format!("c{column}")).collect();
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
         assert_eq!(features.among(&header, &[]), Ok(Matched { columns: vec![7, 299], by_position: true }));
-        let header: Vec<String> = (0..300).rev().map(|column| column.to_string()).collect();
+        let header: Vec<String> = (0..300).rev().map(|column| format!("Column_{column}")).collect();
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
         assert_eq!(features.among(&header, &[]), Ok(Matched { columns: vec![292, 0], by_position: false }));
     }
