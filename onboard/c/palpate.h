@@ -541,9 +541,12 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 }
                 model->table_ = content + 4;
             } else if (last == 13) {
-                /* The prediction: a link, a rule for ties, a scale that is positive and finite. */
-                if (!palpate_holds_(length, 8, 0, 0) || PALPATE_BYTE(content) > 4 || PALPATE_BYTE(content + 1) > 1 ||
+                /* The prediction: a link, a rule for ties, a scale that is positive and finite; a divisor that is not 0. */
+                if (!palpate_holds_(length, 8, 0, 0) || (PALPATE_BYTE(content) & 127) > 4 || PALPATE_BYTE(content + 1) > 1 ||
                     palpate_u32_(content + 4) - 1 >= 0x7f7fffffu) {
+                    return PALPATE_FIELD;
+                }
+                if (PALPATE_BYTE(content) > 127 && (!palpate_holds_(length, 12, 0, 0) || palpate_u32_(content + 8) == 0)) {
                     return PALPATE_FIELD;
                 }
             } else if (PALPATE_SENTINEL && last == 14) {
@@ -2208,11 +2211,16 @@ static inline float palpate_ln_1p_(float e)
     return 2.0f * s * sum;
 }
 
-/* The library's prediction for a margin, by the model's inverse link. Error, relative to the result: at most 5e-7. */
+/* The library's prediction for a margin, by the model's inverse link, of averaged trees that of their mean. Error, relative to
+ * the result: at most 5e-7. */
 PALPATE_API float palpate_inverse_link(const palpate_model *model, float margin)
 {
     const uint8_t *prediction = palpate_prediction_(model);
-    switch (prediction == NULL ? 0 : PALPATE_BYTE(prediction)) {
+    const uint8_t link = PALPATE_AS_(uint8_t, prediction == NULL ? 0 : PALPATE_BYTE(prediction));
+    if (link > 127) {
+        margin /= PALPATE_AS_(float, palpate_u32_(prediction + 8));
+    }
+    switch (link & 127) {
     case 1:
         if (margin >= 0) {
             return 1.0f / (1.0f + palpate_exp_(-margin));

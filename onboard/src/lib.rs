@@ -90,7 +90,7 @@ pub use exponential::exp2_negative;
 pub use layouts::batch::Batch;
 #[cfg(feature = "code")]
 pub use model::Code;
-pub use model::{Model, Refused, inverse_link};
+pub use model::{Model, Refused, inverse_link, predicted_value};
 pub use palpate_shared as shared;
 
 /// `palpate.h`, which reads the same models in C99 and gives the same bits: for programs that write it beside a model. No

@@ -412,12 +412,19 @@ fn tables(put: Put<'_>) {
 fn predictions(put: Put<'_>) {
     let plain = model(Layout::Compact, Leaf::I8, true);
     let [optional, ..] = places(&plain);
-    let prediction = Prediction { link: Link::Exponential, last_of_ties: true, scale: 64.0, targets: false }.to_bytes();
+    let content = |average: u32| {
+        let mut content = Vec::new();
+        let prediction =
+            Prediction { link: Link::Exponential, last_of_ties: true, scale: 64.0, targets: false, average };
+        prediction.write(&mut |part| content.extend_from_slice(part));
+        content
+    };
+    let prediction = content(1);
     let mut with = |name: &str, tag: Tag, content: &[u8]| {
         put(name, "field", optional, with_sections(&plain, &section(tag.code() | MUST_UNDERSTAND, content)));
     };
     let changed = |at: usize, value: u8| {
-        let mut bytes = prediction;
+        let mut bytes = prediction.clone();
         bytes[at] = value;
         bytes
     };
@@ -425,6 +432,8 @@ fn predictions(put: Put<'_>) {
     with("a link that does not exist", Tag::Prediction, &changed(0, 5));
     with("a rule for ties that does not exist", Tag::Prediction, &changed(1, 2));
     with("a scale of nothing", Tag::Prediction, &[&prediction[..4], &[0; 4]].concat());
+    with("a mean of trees without their number", Tag::Prediction, &content(50)[..11]);
+    with("a mean of no trees", Tag::Prediction, &[&content(50)[..8], &[0; 4]].concat());
     let sentinel = Sentinel { low: 1, high: 0 }.to_bytes();
     with("a sentinel that is too short", Tag::Sentinel, &sentinel[..7]);
     with("a sentinel that ends before it begins", Tag::Sentinel, &sentinel);

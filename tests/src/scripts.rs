@@ -73,8 +73,12 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
     if rng.random_bool(0.7) {
         let link = Link::ALL[rng.random_range(0..Link::ALL.len())];
         let scale = [1.0, 0.5, 4096.0, 0.7][rng.random_range(0..4)];
-        let prediction = Prediction { link, last_of_ties: rng.random_bool(0.5), scale, targets: false };
-        write_section(Tag::Prediction, scale != 1.0, &prediction.to_bytes(), &mut put);
+        let last_of_ties = rng.random_bool(0.5);
+        let average = if last_of_ties { 1 } else { 7 };
+        let prediction = Prediction { link, last_of_ties, scale, targets: false, average };
+        let mut content = Vec::new();
+        prediction.write(&mut |part| content.extend_from_slice(part));
+        write_section(Tag::Prediction, scale != 1.0, &content, &mut put);
     }
     if rng.random_bool(0.5) {
         let low = rng.random_range(-300..300);

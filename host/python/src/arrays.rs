@@ -1,15 +1,32 @@
 //! Arrays in and out, with the types that the stub states: numpy's own types state none.
 
 use numpy::ndarray::{Dimension, Ix1, Ix2};
-use numpy::{Element, IntoPyArray, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArrayMethods, dtype};
+use numpy::{
+    Element, IntoPyArray, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods, dtype,
+};
+use palpate::rows::{BY_POSITION, Features};
 use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
 use pyo3::types::IntoPyDict;
 use pyo3::{Borrowed, type_hint_identifier, type_hint_subscript};
+use std::borrow::Cow;
 use std::convert::Infallible;
 
 /// The hint of what numpy can make an array of.
 pub(crate) const ARRAY_LIKE: PyStaticExpr = type_hint_identifier!("numpy.typing", "ArrayLike");
+
+/// An array, or what numpy can make one of, as it was given.
+pub(crate) struct ArrayLike<'py>(pub(crate) Bound<'py, PyAny>);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for ArrayLike<'py> {
+    type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = ARRAY_LIKE;
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        Ok(Self(object.to_owned()))
+    }
+}
 
 /// A number that arrays are made of.
 pub(crate) trait Number: Element {
@@ -77,6 +94,34 @@ impl<T: Element> Input<'_, T, Ix2> {
         let columns = self.0.shape().get(1).copied().unwrap_or_default();
         Ok((self.0.as_slice()?, columns))
     }
+}
+
+/// The rows as an array: of a table whose columns have names those that are the features of `owner`, which has a `_columns`.
+pub(crate) fn features<'py>(owner: &Bound<'py, PyAny>, rows: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let is_table =
+        rows.cast::<PyUntypedArray>().is_err() && (rows.hasattr("columns")? || rows.hasattr("column_names")?);
+    if !is_table {
+        return Ok(rows);
+    }
+    rows.py().import("palpate._rows")?.call_method1("rows_of", (owner, rows))
+}
+
+/// The features of rows of `found` values without names: all of them, or of all columns of the library's rows those that the
+/// model has.
+pub(crate) fn taken<'v, V: Copy>(
+    features: &Features,
+    (values, found): (&'v [V], usize),
+) -> palpate::Result<Cow<'v, [V]>> {
+    let Some(used) = features.of_width(found)? else { return Ok(Cow::Borrowed(values)) };
+    // The columns are among those found.
+    Ok(values.chunks_exact(found).flat_map(|row| used.iter().filter_map(|&column| row.get(column).copied())).collect())
+}
+
+/// The positions of features among columns with these names, and what to know about that.
+pub(crate) fn columns(features: &Features, header: &[String]) -> palpate::Result<(Vec<usize>, Option<&'static str>)> {
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let matched = features.among(&header, &[])?;
+    Ok((matched.columns, matched.by_position.then_some(BY_POSITION)))
 }
 
 /// An array of three numbers in each row.

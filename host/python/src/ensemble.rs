@@ -1,6 +1,6 @@
 //! Full models: trained here, or by other libraries.
 
-use crate::arrays::{Input, Output, two};
+use crate::arrays::{ArrayLike, Input, Output, columns, features, taken, two};
 use crate::data::DataSet;
 use crate::failure::Failure;
 use crate::named::{descriptor_of, noise_of};
@@ -9,7 +9,8 @@ use numpy::ndarray::{Ix1, Ix2};
 use palpate::ensemble::import::{self, Options, PartTree, Parts};
 use palpate::ensemble::train::{self as library, Outputs, Settings, Small};
 use palpate::ensemble::{self, Inputs, StatedProbe};
-use palpate::error::{Error, EvaluateProblem, RowsProblem};
+use palpate::error::{Error, EvaluateProblem};
+use palpate::rows::{Features, notes};
 use palpate::shared::Descriptor;
 use palpate::shared::format::{Counted, Link, Prediction};
 use pyo3::prelude::*;
@@ -153,25 +154,29 @@ impl Ensemble {
     /// Caveats of an ensemble that another library trained, each a sentence.
     #[getter]
     fn notes(&self) -> Vec<String> {
-        self.ensemble.origin.imported.as_ref().map(|imported| imported.notes.clone()).unwrap_or_default()
+        notes(&self.ensemble, None)
+    }
+
+    /// The positions of the features among columns with these names, and what to know about that.
+    fn _columns(&self, header: Vec<String>) -> Result<(Vec<usize>, Option<&'static str>), Failure> {
+        Ok(columns(&Features::from(&*self.ensemble), &header)?)
     }
 
     /// The margins of rows of features (of an ensemble over touches, of its descriptor's), one column per object: added
-    /// in f32, as XGBoost does.
-    fn margins<'py>(&self, py: Python<'py>, rows: Input<'py, f32, Ix2>) -> Result<Output<'py, f32, Ix2>, Failure> {
-        let (values, found) = rows.rows()?;
-        let wanted = self.ensemble.inputs.count();
-        if found != wanted {
-            return Err(Error::from(RowsProblem::Columns { found, wanted, missing: String::new() }).into());
-        }
+    /// in f32, as XGBoost does. The columns of a table are found by their names.
+    #[pyo3(signature = (rows))]
+    fn margins<'py>(slf: &Bound<'py, Self>, rows: ArrayLike<'py>) -> Result<Output<'py, f32, Ix2>, Failure> {
+        let (py, ensemble) = (slf.py(), &slf.get().ensemble);
+        let rows: Input<'_, f32, Ix2> = features(slf, rows.0)?.extract()?;
+        let values = taken(&Features::from(&**ensemble), rows.rows()?)?;
         let margins = py.detach(|| {
             values
-                .par_chunks_exact(wanted)
+                .par_chunks_exact(ensemble.inputs.count())
                 .with_min_len(64)
-                .flat_map_iter(|row| self.ensemble.margins_of_features(row))
+                .flat_map_iter(|row| ensemble.margins_of_features(row))
                 .collect()
         });
-        Ok(two(py, margins, self.ensemble.objects.len())?)
+        Ok(two(py, margins, ensemble.objects.len())?)
     }
 
     /// The margins of each touch of a data set.

@@ -1,6 +1,6 @@
 //! Compiled models.
 
-use crate::arrays::{ARRAY_LIKE, Input, Output, one, two};
+use crate::arrays::{ARRAY_LIKE, Input, Output, columns, features, one, taken, two};
 use crate::cells::OpenedModel;
 use crate::data::DataSet;
 use crate::ensemble::Ensemble;
@@ -13,7 +13,7 @@ use palpate::evaluate::predict::{Predicted, predict};
 use palpate::evaluate::together::{AT_ONCE, Together};
 use palpate::onboard;
 use palpate::output;
-use palpate::rows::{Encoder, feature_names};
+use palpate::rows::{Encoder, Features, feature_names, notes};
 use palpate::shared::{Descriptor, Touch};
 use palpate::touches::touch_of_seconds;
 use pyo3::inspect::PyStaticExpr;
@@ -40,6 +40,10 @@ pub(crate) struct Model {
     pub(crate) opened: Arc<OpenedModel>,
     /// Encoder of a row of features into the values that the model compares.
     pub(crate) encoder: Encoder,
+    /// Its features among the columns of tables and arrays.
+    pub(crate) features: Features,
+    /// Facts about what it was compiled from.
+    notes: Vec<String>,
 }
 
 impl Model {
@@ -48,7 +52,8 @@ impl Model {
             onboard::Model::new(bytes).map_err(|error| Error::from(CompileProblem::Model(error)))
         })?;
         let encoder = Encoder::of(opened.borrow_dependent());
-        Ok(Self { opened: Arc::new(opened), encoder })
+        let features = Features::from(opened.borrow_dependent());
+        Ok(Self { opened: Arc::new(opened), encoder, features, notes: Vec::new() })
     }
 
     pub(crate) fn model(&self) -> &onboard::Model<'_> {
@@ -108,17 +113,11 @@ impl Model {
         Ok(all)
     }
 
-    /// The margins of rows of features, of which each has `found`.
-    fn of_rows<V: Copy + Into<f64> + Sync>(
-        &self,
-        py: Python<'_>,
-        (values, found): (&[V], usize),
-    ) -> Result<Vec<f64>, Failure> {
+    /// The margins of rows of features, with the number of values in each.
+    fn of_rows<V: Copy + Into<f64> + Sync>(&self, py: Python<'_>, rows: (&[V], usize)) -> Result<Vec<f64>, Failure> {
         let (model, wanted) = (self.model(), self.model().feature_count());
-        if found != wanted {
-            return Err(Error::from(RowsProblem::Columns { found, wanted, missing: String::new() }).into());
-        }
-        let margins = self.fill(py, values, wanted, |together, values, slots| {
+        let values = taken(&self.features, rows)?;
+        let margins = self.fill(py, &values, wanted, |together, values, slots| {
             together.rows(model, &self.encoder, values, slots);
         });
         Ok(margins?)
@@ -127,10 +126,11 @@ impl Model {
     fn predicted<V: Copy + Into<f64> + Sync>(
         &self,
         py: Python<'_>,
-        (values, features): (&[V], usize),
+        rows: (&[V], usize),
         raw: bool,
     ) -> palpate::Result<Predicted> {
-        py.detach(|| predict(Candidate::Compiled(self.model()), values, features, raw))
+        let values = taken(&self.features, rows)?;
+        py.detach(|| predict(Candidate::Compiled(self.model()), &values, self.features.count(), raw))
     }
 
     fn of_touches(&self, py: Python<'_>, touches: &[Touch]) -> PyResult<Vec<f64>> {
@@ -180,6 +180,17 @@ impl Model {
         library::names(self.model())
     }
 
+    /// Facts about what the model was compiled from, each a sentence; none of a model that was loaded.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    /// The positions of the features among columns with these names, and what to know about that.
+    fn _columns(&self, header: Vec<String>) -> Result<(Vec<usize>, Option<&'static str>), Failure> {
+        Ok(columns(&self.features, &header)?)
+    }
+
     /// The features' names.
     #[getter]
     fn features(&self) -> Vec<String> {
@@ -224,58 +235,72 @@ impl Model {
     ///
     /// A model over touches takes a data set, or rows of three contact times in seconds (NaN where a finger did not
     /// touch), with the probe's direction and alignment nine numbers. A model over features takes rows of those, NaN where
-    /// one is missing; with leaves as f32 its margins are an XGBoost model's own, bit for bit.
-    fn margins<'py>(&self, py: Python<'py>, rows: Rows<'py>) -> Result<Output<'py, f64, Ix2>, Failure> {
-        let objects = self.model().object_count();
-        let margins = match (rows, self.model().descriptor()) {
+    /// one is missing; with leaves as f32 its margins are an XGBoost model's own, bit for bit. Of a table (pandas, polars, pyarrow)
+    /// the columns are found by their names, in any order and among others.
+    #[pyo3(signature = (rows))]
+    fn margins<'py>(slf: &Bound<'py, Self>, rows: Rows<'py>) -> Result<Output<'py, f64, Ix2>, Failure> {
+        let (py, owner) = (slf.py(), slf);
+        let own = slf.get();
+        let objects = own.model().object_count();
+        let rows = match rows {
+            Rows::Array(array) if own.model().descriptor().is_none() => Rows::Array(features(owner, array)?),
+            other => other,
+        };
+        let margins = match (rows, own.model().descriptor()) {
             (Rows::Data(_), None) => return Err(Error::from(palpate::error::EvaluateProblem::RawFeatures).into()),
             (Rows::Data(data), Some(_)) => {
                 let touches: Vec<Touch> = data.get().touches().copied().collect();
-                self.of_touches(py, &touches)?
+                own.of_touches(py, &touches)?
             }
             (Rows::Array(array), Some(_)) => {
                 let array: Input<'_, f64, Ix2> = array.extract()?;
                 let (values, columns) = array.rows()?;
                 let touches = touches(values, columns)?;
-                self.of_touches(py, &touches)?
+                own.of_touches(py, &touches)?
             }
-            (Rows::Array(array), None) => match &self.encoder {
+            (Rows::Array(array), None) => match &own.encoder {
                 Encoder::Real => {
                     let array: Input<'_, f32, Ix2> = array.extract()?;
-                    self.of_rows(py, array.rows()?)?
+                    own.of_rows(py, array.rows()?)?
                 }
                 // f32 does not hold all whole numbers.
                 Encoder::Scaled(_) => {
                     let array: Input<'_, f64, Ix2> = array.extract()?;
-                    self.of_rows(py, array.rows()?)?
+                    own.of_rows(py, array.rows()?)?
                 }
             },
         };
         Ok(two(py, margins, objects)?)
     }
 
-    /// The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value (its values, a column for each of several targets),
-    /// with `raw` the margin before the inverse link. Rows are as for `margins`.
+    /// The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value
+    /// (its values, a column for each of several targets), with `raw` the margin before the inverse link. Rows are as for
+    /// `margins`.
     #[pyo3(signature = (rows, *, raw=false))]
-    fn predict<'py>(&self, py: Python<'py>, rows: Rows<'py>, raw: bool) -> Result<Predictions<'py>, Failure> {
+    fn predict<'py>(slf: &Bound<'py, Self>, rows: Rows<'py>, raw: bool) -> Result<Predictions<'py>, Failure> {
         let Rows::Array(array) = rows else { return Err(Error::from(RowsProblem::Touches).into()) };
-        let predicted = match &self.encoder {
+        let (py, own) = (slf.py(), slf.get());
+        if own.model().descriptor().is_some() {
+            return Err(Error::from(RowsProblem::Touches).into());
+        }
+        let array = features(slf, array)?;
+        let predicted = match &own.encoder {
             Encoder::Real => {
                 let array: Input<'_, f32, Ix2> = array.extract()?;
-                self.predicted(py, array.rows()?, raw)?
+                own.predicted(py, array.rows()?, raw)?
             }
             Encoder::Scaled(_) => {
                 let array: Input<'_, f64, Ix2> = array.extract()?;
-                self.predicted(py, array.rows()?, raw)?
+                own.predicted(py, array.rows()?, raw)?
             }
         };
         Ok(match predicted {
-            Predicted::Values(values) if self.model().object_count() > 1 => {
-                Predictions::Targets(two(py, values, self.model().object_count())?)
+            Predicted::Values(values) if own.model().object_count() > 1 => {
+                Predictions::Targets(two(py, values, own.model().object_count())?)
             }
             Predicted::Values(values) => Predictions::Values(one(py, values)),
             Predicted::Classes(classes) => {
-                let names = self.objects();
+                let names = own.objects();
                 Predictions::Classes(classes.into_iter().filter_map(|class| names.get(class).cloned()).collect())
             }
         })
@@ -388,5 +413,5 @@ pub(crate) fn compile(
         None => library::compile(ensemble, &settings),
         Some(most) => library::compile_within(ensemble, &settings, most),
     })?;
-    Ok(Model::of(compiled.bytes)?)
+    Ok(Model { notes: notes(ensemble, settings.scales.as_deref()), ..Model::of(compiled.bytes)? })
 }

@@ -1,15 +1,15 @@
 //! Touch by touch to a verdict.
 
-use crate::arrays::Input;
+use crate::arrays::{ArrayLike, Input, columns, taken};
 use crate::cells::OpenedRecognizer;
 use crate::failure::Failure;
 use crate::model::{Model, touch};
 use crate::objects::{self, class};
 use numpy::ndarray::Ix1;
 use palpate::compile::{self, longest_time};
-use palpate::error::{Error, EvaluateProblem, RowsProblem, TouchesProblem};
+use palpate::error::{Error, EvaluateProblem, TouchesProblem};
 use palpate::onboard::{Refused, Stopping, Verdict};
-use palpate::rows::Encoder;
+use palpate::rows::{Encoder, Features};
 use palpate::shared::Touch;
 use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
@@ -71,6 +71,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for TouchInput {
 pub(crate) struct Recognizer {
     cell: OpenedRecognizer,
     encoder: Encoder,
+    features: Features,
     names: Vec<Py<PyString>>,
     /// The longest time between contacts that makes sense, in seconds.
     longest: f64,
@@ -100,7 +101,7 @@ impl Recognizer {
         })?;
         let names = compile::names(model.model()).iter().map(|name| PyString::new(py, name).unbind()).collect();
         let longest = if model.model().descriptor().is_some() { longest_time(model.model()) } else { f64::INFINITY };
-        Ok(Self { cell, encoder: model.encoder.clone(), names, longest })
+        Ok(Self { cell, encoder: model.encoder.clone(), features: model.features.clone(), names, longest })
     }
 
     /// Takes in a touch: three contact times in seconds on any clock, `None` or NaN for a finger that did not touch, with
@@ -119,17 +120,26 @@ impl Recognizer {
         self.say(py, pushed)
     }
 
-    /// Takes in a row of features, for a model over those; NaN where one is missing.
-    fn push_row<'py>(&mut self, py: Python<'py>, row: Input<'py, f64, Ix1>) -> Result<objects::Verdict<'py>, Failure> {
-        let row = row.values()?;
-        let model = self.cell.borrow_dependent().model();
-        if model.descriptor().is_none() && row.len() != model.feature_count() {
-            let (found, wanted) = (row.len(), model.feature_count());
-            return Err(Error::from(RowsProblem::Columns { found, wanted, missing: String::new() }).into());
-        }
-        let row = self.encoder.row(row);
-        let pushed = self.cell.with_dependent_mut(|_, recognizer| recognizer.push_features(&row));
-        self.say(py, pushed)
+    /// Takes in a row of features, for a model over those; NaN where one is missing. Of a series of pandas the features are
+    /// found by their names.
+    #[pyo3(signature = (row))]
+    fn push_row<'py>(slf: &Bound<'py, Self>, row: ArrayLike<'py>) -> Result<objects::Verdict<'py>, Failure> {
+        let (py, ArrayLike(row)) = (slf.py(), row);
+        let is_series = row.hasattr("to_frame")?;
+        let row = if is_series { py.import("palpate._rows")?.call_method1("row_of", (slf, row))? } else { row };
+        let row: Input<'_, f64, Ix1> = row.extract()?;
+        let mut own = slf.try_borrow_mut().map_err(PyErr::from)?;
+        let row = match own.cell.borrow_dependent().model().descriptor() {
+            None => own.encoder.row(&taken(&own.features, (row.values()?, row.values()?.len()))?),
+            Some(_) => own.encoder.row(row.values()?),
+        };
+        let pushed = own.cell.with_dependent_mut(|_, recognizer| recognizer.push_features(&row));
+        own.say(py, pushed)
+    }
+
+    /// The positions of the features among columns with these names, and what to know about that.
+    fn _columns(&self, header: Vec<String>) -> Result<(Vec<usize>, Option<&'static str>), Failure> {
+        Ok(columns(&self.features, &header)?)
     }
 
     /// The verdict after the last touch.

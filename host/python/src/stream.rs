@@ -1,7 +1,7 @@
 //! Sequences of rows: thresholds that keep a promise, and verdicts. Results come as JSON, which `palpate` turns into values of
 //! its own classes.
 
-use crate::arrays::Input;
+use crate::arrays::{Input, taken};
 use crate::failure::Failure;
 use crate::model::Model;
 use crate::work::{Callback, long};
@@ -9,7 +9,7 @@ use numpy::ndarray::Ix2;
 use palpate::calibrate::Per;
 use palpate::compile;
 use palpate::error::{Error, RowsProblem};
-use palpate::rows::{RowOf, Sequences, SequencesBuilder};
+use palpate::rows::{Features, RowOf, Sequences, SequencesBuilder};
 use palpate::shared::format::Held;
 use palpate::strangers;
 use palpate::stream::{self, Settings, Strangers, Wanted};
@@ -23,11 +23,8 @@ fn sequences(
     ids: &[String],
     groups: Option<&[String]>,
 ) -> Result<Sequences, Failure> {
-    let (values, columns) = rows.rows()?;
     let wanted = model.feature_count();
-    if columns != wanted {
-        return Err(Error::from(RowsProblem::Columns { found: columns, wanted, missing: String::new() }).into());
-    }
+    let values = taken(&Features::from(model), rows.rows()?)?;
     let count = values.len() / wanted;
     let lengths =
         [("y", labels.map(<[String]>::len)), ("sequence", Some(ids.len())), ("groups", groups.map(<[String]>::len))];

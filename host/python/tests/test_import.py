@@ -437,7 +437,7 @@ def test_categories_are_decided_as_the_library_decides_them() -> None:
 
 def test_what_has_no_trees_that_can_be_read_is_refused_by_name() -> None:
     categories = ensemble.HistGradientBoostingClassifier(categorical_features=[3], max_iter=2)
-    categories.fit(np.abs(rows(200, False, 5)), np.arange(200) % 2)
+    categories.fit(np.abs(rows(200, False, 5)), np.abs(rows(200, False, 5))[:, 3] % 2)
     several = ensemble.RandomForestClassifier(3).fit(rows(50, False, 6), np.stack([np.arange(50) % 2, np.arange(50) % 3], axis=1))
     halves = {"objective": "binary", "verbose": -1, "num_threads": 1}
     folds = lightgbm.cv(halves, lightgbm.Dataset(TRAIN, labels(TRAIN, 2)), 2, return_cvbooster=True)["cvbooster"]
@@ -519,6 +519,50 @@ def test_catboost_gives_its_own_scores(classes: int) -> None:
         estimator.set_probability_threshold(0.8)
         with pytest.raises(palpate.InputError, match="probability threshold 0.8"):
             palpate.compile(estimator)
+
+
+@pytest.mark.parametrize("objective", ["regression_l1", "huber", "fair", "quantile", "mape", "poisson"])
+@pytest.mark.parametrize("boosting", ["gbdt", "rf"])
+def test_lightgbms_values_are_those_of_its_link_and_of_the_mean_of_a_forest(objective: str, boosting: str) -> None:
+    target = 1.0 + labels(TRAIN, 3)
+    forest = {"bagging_freq": 1, "bagging_fraction": 0.6} if boosting == "rf" else {}
+    estimator = lightgbm.LGBMRegressor(
+        n_estimators=9, objective=objective, boosting_type=boosting, reg_sqrt=True, verbose=-1, n_jobs=1, **forest
+    ).fit(TRAIN, target)
+    model = palpate.compile(estimator, leaf="f32")
+    np.testing.assert_allclose(model.predict(TEST), estimator.predict(TEST), rtol=1e-5)
+    assert np.abs(model.margins(TEST)[:, 0] - estimator.predict(TEST, raw_score=True)).max() <= 1e-4
+
+
+def test_catboosts_values_are_what_it_predicts_by_default() -> None:
+    for loss in ("LogLinQuantile", "Poisson", "Tweedie:variance_power=1.5", "Quantile:alpha=0.7"):
+        estimator = catboost.CatBoostRegressor(
+            iterations=9, depth=3, loss_function=loss, verbose=0, thread_count=1, allow_writing_files=False
+        ).fit(TRAIN, 1.0 + labels(TRAIN, 3))
+        model = palpate.compile(estimator, leaf="f32")
+        np.testing.assert_allclose(model.predict(TEST), estimator.predict(TEST), rtol=1e-5, atol=1e-6)
+
+
+def test_histograms_over_columns_of_categories_that_no_tree_splits_on_are_read() -> None:
+    train, test = rows(600, False, 1), rows(500, False, 2)
+    # The third column is a category, and the only one that is the same in all rows of the training.
+    train[:, 2], test[:, 2] = 1.0, 1.0
+    estimator = ensemble.HistGradientBoostingClassifier(max_iter=8, categorical_features=[2], random_state=1)
+    estimator.fit(train, labels(train, 3))
+    model = palpate.compile(estimator, leaf="f32")
+    assert np.abs(model.margins(test) - estimator.decision_function(test)).max() <= model.margin_error
+
+
+def test_classifiers_of_one_class_are_refused_or_have_the_other_ones_margin() -> None:
+    for estimator in (
+        ensemble.RandomForestClassifier(2).fit(TRAIN, np.full(len(TRAIN), 3)),
+        lightgbm.LGBMClassifier(n_estimators=2, verbose=-1).fit(TRAIN, np.full(len(TRAIN), "cup")),
+    ):
+        with pytest.raises(palpate.InputError, match="knows one class, (3|cup), and nothing to distinguish"):
+            palpate.compile(estimator)
+    estimator = xgboost.XGBClassifier(n_estimators=2).fit(TRAIN, np.zeros(len(TRAIN), int))
+    model = palpate.compile(estimator, leaf="f32")
+    np.testing.assert_array_equal(model.margins(TEST)[:, 1], estimator.predict(TEST, output_margin=True))
 
 
 def test_a_model_over_features_recognizes_rows() -> None:

@@ -48,7 +48,7 @@ pub use shape::Gain;
 use crate::error::{Result, RowsProblem};
 use crate::evaluate::together::units_of_rows;
 use palpate_onboard::Model;
-use palpate_trees::rows::{Encoder, SequenceColumns, Sequences};
+use palpate_trees::rows::{Encoder, Features, SequenceColumns, Sequences};
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -76,7 +76,7 @@ impl Rows<'_> {
         check(model)?;
         let (found, wanted) = (sequences.features, model.feature_count());
         if found != wanted {
-            return Err(RowsProblem::Columns { found, wanted, missing: "features".into() }.into());
+            return Err(RowsProblem::Columns { found, wanted, all: None }.into());
         }
         Ok(Self::of(model, units_of_rows(model, &Encoder::of(model), &sequences.values).into()))
     }
@@ -114,7 +114,12 @@ pub fn check(model: &Model<'_>) -> Result<()> {
 ///
 /// # Errors
 /// As [`Sequences::read`]; in Parquet rows are counted as lines of a CSV file, from 2.
-pub fn read(path: &Path, features: &[&str], columns: &SequenceColumns<'_>, classes: &[String]) -> Result<Sequences> {
+pub fn read(
+    path: &Path,
+    features: impl Into<Features>,
+    columns: &SequenceColumns<'_>,
+    classes: &[String],
+) -> Result<Sequences> {
     #[cfg(feature = "parquet")]
     if path.extension().is_some_and(|extension| extension == "parquet") {
         return parquet::read(path, features, columns, classes);

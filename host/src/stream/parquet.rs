@@ -2,13 +2,13 @@
 
 use crate::error::{Error, Place, Result, RowsProblem};
 use crate::touches::parquet_table;
-use palpate_trees::rows::{SequenceColumns, Sequences};
+use palpate_trees::rows::{Features, SequenceColumns, Sequences};
 use std::path::Path;
 
 /// Reads the file.
 pub(super) fn read(
     path: &Path,
-    features: &[&str],
+    features: impl Into<Features>,
     columns: &SequenceColumns<'_>,
     classes: &[String],
 ) -> Result<Sequences> {

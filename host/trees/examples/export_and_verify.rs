@@ -13,7 +13,7 @@ use palpate_trees::ensemble::Ensemble;
 use palpate_trees::onboard::Model;
 use palpate_trees::output;
 use palpate_trees::rows::Rows;
-use palpate_trees::verify::verify;
+use palpate_trees::verify::{Library, verify};
 use std::error::Error;
 use std::path::PathBuf;
 
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Every comparison is tried at its threshold and one step to each side of it.
     let model: Model<'_> = compile::open(&compiled.bytes)?;
     let rows = Rows::read(rows, &ensemble.inputs.names(), None)?;
-    let verified = verify(&model, &ensemble, &rows, None, &())?;
+    let verified = verify(&model, &ensemble, &rows, Library::default(), &())?;
     verified.check()?;
     println!(
         "{} rows and {} made at thresholds: margins differ by at most {:.2e}, {} classes differ",

@@ -15,7 +15,7 @@ mod rows;
 
 #[cfg(feature = "code")]
 pub use code::Code;
-pub use predict::inverse_link;
+pub use predict::{inverse_link, predicted_value};
 pub use refused::Refused;
 
 use crate::bytes::{ModelError, at, take};

@@ -76,18 +76,18 @@ impl Model<'_> {
 
     /// The same as the library predicts them: [`Model::predict_raw_each`] after the model's inverse link.
     pub fn predict_each(&self, features: &[i32], room: &mut [i32], values: &mut [f32]) -> bool {
-        let link = self.prediction().link;
+        let prediction = self.prediction();
         let is_long = self.predict_raw_each(features, room, values);
         if is_long {
-            values.iter_mut().take(self.object_count()).for_each(|value| *value = inverse_link(link, *value));
+            values.iter_mut().take(self.object_count()).for_each(|value| *value = predicted_value(prediction, *value));
         }
         is_long
     }
 
     /// The value of a row as the library predicts it: [`Model::predict_raw`] after the model's inverse link, see
-    /// [`inverse_link`]. `None` for a model with several outputs.
+    /// [`predicted_value`]. `None` for a model with several outputs.
     pub fn predict_value(&self, features: &[i32]) -> Option<f32> {
-        self.predict_raw(features).map(|margin| inverse_link(self.prediction().link, margin))
+        self.predict_raw(features).map(|margin| predicted_value(self.prediction(), margin))
     }
 
     /// Rule that turns margins into a class or a value: the [default](Prediction::default) unless the model states it.
@@ -96,6 +96,15 @@ impl Model<'_> {
     pub fn prediction(&self) -> Prediction {
         Prediction::from_bytes(self.stated_prediction()).unwrap_or_default()
     }
+}
+
+/// The value that the library predicts where its raw score is `margin`: through the [`inverse_link`], divided by
+/// [`Prediction::average`] before.
+///
+/// Cost: that of the link, and a division where margins are averaged. Cannot fail.
+pub fn predicted_value(prediction: Prediction, margin: f32) -> f32 {
+    let margin = if prediction.average == 1 { margin } else { margin / prediction.average as f32 };
+    inverse_link(prediction.link, margin)
 }
 
 /// The value that a margin stands for.
@@ -202,6 +211,13 @@ mod tests {
         }
         let stated = [0.0, 3e-7, 1e-7, 6e-8, 5e-7];
         assert!(worst.iter().zip(stated).all(|(worst, stated)| *worst <= stated), "{worst:?}");
+    }
+
+    #[test]
+    fn an_averaged_margin_is_divided_before_its_link() {
+        let of = |link, average| predicted_value(Prediction { link, average, ..Prediction::default() }, 10.0);
+        assert_eq!([of(Link::Identity, 1), of(Link::Identity, 4), of(Link::Square, 4)], [10.0, 2.5, 6.25]);
+        assert_eq!(of(Link::Exponential, 5), inverse_link(Link::Exponential, 2.0));
     }
 
     #[test]

@@ -19,8 +19,8 @@ codes! {
     }
 }
 
-/// Rule that turns margins of a model over rows into a class or a value: 8 bytes. A model without this section has
-/// the [default](Prediction::default).
+/// Rule that turns margins of a model over rows into a class or a value: 8 bytes, or 12 where margins are averaged. A model
+/// without this section has the [default](Prediction::default).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// Function that turns a scaled margin into a value.
@@ -31,37 +31,49 @@ pub struct Prediction {
     pub scale: f32,
     /// True if each output is a target with a value of its own, and none is a class.
     pub targets: bool,
+    /// Number that a scaled margin is divided by before the link: of trees whose mean is predicted, how many were added; 1
+    /// for all others, and never 0.
+    pub average: u32,
 }
 
 impl Default for Prediction {
     fn default() -> Self {
-        Self { link: Link::Identity, last_of_ties: false, scale: 1.0, targets: false }
+        Self { link: Link::Identity, last_of_ties: false, scale: 1.0, targets: false, average: 1 }
     }
 }
 
+/// Set in the byte of the link where margins are divided first. Whoever does not know it finds a link that does not exist.
+const AVERAGED: u8 = 0x80;
+
 impl Prediction {
-    /// Bytes of the section.
+    /// Bytes of the section where margins are not divided.
     pub const LENGTH: usize = 8;
 
-    /// The section's content.
-    pub fn to_bytes(self) -> [u8; Self::LENGTH] {
+    /// Hands the section's content to `put`.
+    pub fn write(self, put: &mut impl FnMut(&[u8])) {
         let [a, b, c, d] = self.scale.to_le_bytes();
-        [self.link.code(), self.last_of_ties.into(), self.targets.into(), 0, a, b, c, d]
+        let averaged = if self.average == 1 { 0 } else { AVERAGED };
+        put(&[self.link.code() | averaged, self.last_of_ties.into(), self.targets.into(), 0, a, b, c, d]);
+        if self.average != 1 {
+            put(&self.average.to_le_bytes());
+        }
     }
 
-    /// Reads a section; `None` for a link that does not exist, a scale that is not positive and finite, or too few bytes.
-    /// Bytes after those that are known are ignored.
+    /// Reads a section; `None` for a link that does not exist, a scale that is not positive and finite, a division by 0, or
+    /// too few bytes. Bytes after those that are known are ignored.
     ///
     /// Cost: a few instructions. Cannot fail otherwise.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let (&[link, ties, targets, _, a, b, c, d], _) = bytes.split_first_chunk()?;
+        let (&[link, ties, targets, _, a, b, c, d], rest) = bytes.split_first_chunk()?;
         let scale = u32::from_le_bytes([a, b, c, d]);
+        let average = if link & AVERAGED == 0 { 1 } else { u32::from_le_bytes(*rest.first_chunk()?) };
         // Positive and finite, without floating point.
-        if ties > 1 || scale.wrapping_sub(1) >= f32::INFINITY.to_bits() - 1 {
+        if ties > 1 || scale.wrapping_sub(1) >= f32::INFINITY.to_bits() - 1 || average == 0 {
             return None;
         }
         let (last_of_ties, targets) = (ties == 1, targets == 1);
-        Some(Self { link: Link::from_code(link)?, last_of_ties, scale: f32::from_bits(scale), targets })
+        let link = Link::from_code(link & !AVERAGED)?;
+        Some(Self { link, last_of_ties, scale: f32::from_bits(scale), targets, average })
     }
 }
 
@@ -102,23 +114,35 @@ impl Sentinel {
 mod tests {
     use super::*;
 
+    fn content(prediction: Prediction) -> std::vec::Vec<u8> {
+        let mut content = std::vec::Vec::new();
+        prediction.write(&mut |part| content.extend_from_slice(part));
+        content
+    }
+
     #[test]
     fn sections_are_read_back_and_what_makes_no_sense_is_refused() {
         for &link in Link::ALL {
-            for last_of_ties in [false, true] {
-                let prediction = Prediction { link, last_of_ties, scale: 64.0, targets: !last_of_ties };
-                assert_eq!(Prediction::from_bytes(&prediction.to_bytes()), Some(prediction));
+            for (last_of_ties, average, length) in [(false, 1, 8), (true, 1, 8), (false, 500, 12)] {
+                let prediction = Prediction { link, last_of_ties, scale: 64.0, targets: !last_of_ties, average };
+                let bytes = content(prediction);
+                assert_eq!((bytes.len(), Prediction::from_bytes(&bytes)), (length, Some(prediction)));
             }
         }
-        let bytes = Prediction::default().to_bytes();
+        // A reader of eight bytes knows no such link.
+        let averaged = content(Prediction { average: 500, ..Prediction::default() });
+        assert_eq!(Link::from_code(averaged[0]), None);
+        assert_eq!(Prediction::from_bytes(&averaged[..11]), None, "too short");
+        assert_eq!(Prediction::from_bytes(&[&averaged[..8], &[0; 4]].concat()), None, "divided by 0");
+        let bytes = content(Prediction::default());
         assert_eq!(Prediction::from_bytes(&bytes[..7]), None);
         for (at, wrong) in [(0, 5), (1, 2)] {
-            let mut bytes = bytes;
+            let mut bytes = bytes.clone();
             bytes[at] = wrong;
             assert_eq!(Prediction::from_bytes(&bytes), None, "byte {at}");
         }
         for scale in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            assert_eq!(Prediction::from_bytes(&Prediction { scale, ..Prediction::default() }.to_bytes()), None);
+            assert_eq!(Prediction::from_bytes(&content(Prediction { scale, ..Prediction::default() })), None);
         }
         let sentinel = Sentinel { low: -3, high: 3 };
         assert_eq!(Sentinel::from_bytes(&sentinel.to_bytes()), Some(sentinel));

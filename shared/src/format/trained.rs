@@ -45,6 +45,8 @@ pub enum Tag {
     EarlyExit,
     /// Outputs that belong to one object: [`Outputs`](super::Outputs).
     Outputs,
+    /// Columns of the library's rows that a model over some of them has: how many there were, and the number of each, as u32.
+    Columns,
 }
 
 impl Tag {
@@ -69,6 +71,7 @@ impl Tag {
             Self::RowEvidence => 16,
             Self::EarlyExit => 17,
             Self::Outputs => 18,
+            Self::Columns => 19,
         }
     }
 }

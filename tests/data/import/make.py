@@ -5,13 +5,16 @@
 
 and the same with XGBoost 1.6.2, 1.7.6, 3.0.5, 3.2.0 and (Python 3.12) 3.4.0, then, each with the packages that it imports,
 `make.py lightgbm`, `make.py catboost`, `make.py onnx` (scikit-learn, skl2onnx, onnx, onnxruntime) and `make.py onnxmltools`
-(onnxmltools, xgboost, lightgbm). Every model gets two files beside it:
+(onnxmltools, xgboost, lightgbm). `make.py predictions`, with all of these packages, opens the models that have no
+NAME.predictions.csv yet with the library at hand, and asks it. Every model gets three files beside it:
 
 NAME.rows.csv     a header with the features' names, then 20 rows like the training's, 20 with values that equal thresholds
                   of the model, the numbers beside them or zero, and 20 with missing values (empty)
 NAME.margins.csv  the library's raw scores of these rows: one column per output, one for a binary model. f32 scores have as
                   many digits as distinguish them, f64 scores seventeen
-NAME.predictions.csv  of some: what the library's `predict` says, the number of a class or a value
+NAME.predictions.csv  what the library's `predict` says: a class by name or number, of boosters that with the largest
+                  probability; or the value, a column for each of several targets
+NAME.probabilities.csv  of some: the probability of each class
 """
 
 import sys
@@ -97,9 +100,22 @@ def write(name, x, margins, names=NAMES, predictions=None):
     lines = [",".join(text(value) for value in row) for row in margins]
     (HERE / f"{name}.margins.csv").write_text("\n".join(lines) + "\n")
     if predictions is not None:
-        lines = [text(value) for value in np.asarray(predictions).reshape(len(x))]
-        (HERE / f"{name}.predictions.csv").write_text("\n".join(lines) + "\n")
+        write_predictions(name, predictions)
     print(name, margins.dtype, margins.shape)
+
+
+def write_predictions(name, predictions):
+    predictions = np.asarray(predictions)
+    rows = predictions.reshape(len(predictions), -1)
+    plain = lambda value: str(value) if isinstance(value, (str, np.integer)) else text(value)
+    lines = [",".join(plain(value) for value in row) for row in rows]
+    (HERE / f"{name}.predictions.csv").write_text("\n".join(lines) + "\n")
+
+
+def most_likely(probabilities):
+    """The class of each row by a booster's probabilities: of two classes it has that of the second one."""
+    probabilities = np.asarray(probabilities)
+    return probabilities.argmax(axis=1) if probabilities.ndim == 2 else (probabilities > 0.5).astype(int)
 
 
 def xgboost_thresholds(booster):
@@ -121,18 +137,19 @@ def make_xgboost():
     release = tuple(int(part) for part in version.split("."))
     plain = {"max_depth": 2, "eta": 0.4, "tree_method": "hist", "max_bin": 16, "seed": 1, "nthread": 1}
 
-    def save(kind, extension, classes, settings, rounds=3, missing=True, label=None, predict=False):
+    def save(kind, extension, classes, settings, rounds=3, missing=True, label=None, predict=False, about=lambda train: None):
         x, y = data(max(classes, 2))
         x = with_missing(x) if missing else x
         y = y if label is None else label(x, y)
         train = xgb.DMatrix(x, y, feature_names=NAMES)
+        about(train)
         booster = xgb.train({**plain, **settings}, train, rounds)
         name = f"xgboost-{version}-{kind}"
         booster.save_model(HERE / f"{name}.{extension}")
         thresholds = xgboost_thresholds(booster) if settings.get("multi_strategy") is None else json_thresholds(booster)
         test = rows(thresholds, True, max(classes, 2))
         margins = booster.predict(xgb.DMatrix(test, feature_names=NAMES), output_margin=True)
-        predictions = booster.predict(xgb.DMatrix(test, feature_names=NAMES)) if predict else None
+        predictions = xgboost_predictions(booster, test) if predict else None
         write(name, test, margins, predictions=predictions)
 
     def json_thresholds(booster):
@@ -201,6 +218,21 @@ def make_xgboost():
             target = amount if objective == "count:poisson" else (lambda x, y: y * 0.8 + 0.1)
             kind = objective.replace(":", "-")
             save(kind, "json", 0, {"objective": objective}, label=target, predict=True)
+        # Every other objective whose trees can be read.
+        for objective in ["squarederror", "squaredlogerror", "pseudohubererror", "absoluteerror", "quantileerror", "gamma",
+                          "tweedie"]:
+            more = {"quantile_alpha": 0.7} if objective == "quantileerror" else {}
+            save(f"reg-{objective}", "json", 0, {"objective": f"reg:{objective}", **more}, rounds=2, label=amount, predict=True)
+        for objective in ["pairwise", "ndcg", "map"]:
+            relevant = (lambda x, y: y) if objective == "map" else (lambda x, y: np.digitize(x[:, 0], [-1, 0, 1]))
+            save(f"rank-{objective}", "json", 0, {"objective": f"rank:{objective}"}, rounds=2, label=relevant, predict=True,
+                 about=lambda train: train.set_info(qid=np.arange(400) // 20))
+        save("survival-cox", "json", 0, {"objective": "survival:cox"}, rounds=2, label=amount, predict=True)
+        times = lambda train: (train.set_float_info("label_lower_bound", train.get_label()),
+                               train.set_float_info("label_upper_bound", train.get_label()))
+        save("survival-aft", "json", 0, {"objective": "survival:aft"}, rounds=2, label=amount, predict=True, about=times)
+        save("hinge", "json", 2, {"objective": "binary:hinge"}, rounds=2, predict=True)
+        save("one-class", "json", 2, {"objective": "binary:logistic"}, rounds=2, label=lambda x, y: 0 * y, predict=True)
     if release == (2, 1):
         save("forest", "json", 2, {**binary, "num_parallel_tree": 3, "subsample": 0.7, "eta": 1}, rounds=2)
         save("squarederror", "ubj", 0, {"objective": "reg:squarederror"}, label=amount)
@@ -220,6 +252,20 @@ def make_xgboost():
         save("intercepts", "ubj", 3, softprob, label=lambda x, y: np.where(y == 2, 0, y), rounds=2)
 
 
+def xgboost_predictions(booster, x):
+    import json
+
+    import xgboost as xgb
+
+    objective = json.loads(booster.save_config())["learner"]["objective"]["name"]
+    predicted = booster.predict(xgb.DMatrix(x, feature_names=NAMES, feature_types=booster.feature_types))
+    if objective in ("binary:logistic", "multi:softprob"):
+        return most_likely(predicted)
+    if objective == "binary:logitraw":
+        return (predicted > 0).astype(int)
+    return predicted.astype(int) if objective in ("binary:hinge", "multi:softmax") else predicted
+
+
 def make_lightgbm():
     import lightgbm as lgb
 
@@ -227,11 +273,11 @@ def make_lightgbm():
              "min_data_in_leaf": 5, "deterministic": True}
 
     def save(kind, classes, settings, rounds=3, missing=False, label=None, change=lambda x: x, predict=False,
-             test=None):
+             test=None, group=None):
         x, y = data(max(classes, 2))
         x = change(with_missing(x) if missing else x)
         y = y if label is None else label(x, y)
-        booster = lgb.train({**plain, **settings}, lgb.Dataset(x, y, feature_name=NAMES), rounds)
+        booster = lgb.train({**plain, **settings}, lgb.Dataset(x, y, feature_name=NAMES, group=group), rounds)
         name = f"lightgbm-{lgb.__version__.rsplit('.', 1)[0]}-{kind}"
         # The same without the parameters of the training (half of the file).
         booster.save_model(HERE / f"{name}.txt")
@@ -244,7 +290,13 @@ def make_lightgbm():
                 at = np.float32(threshold)
                 thresholds[NAMES.index(feature)].append(at)
         test = rows(thresholds, True, max(classes, 2)) if test is None else test
-        write(name, test, booster.predict(test, raw_score=True), predictions=booster.predict(test) if predict else None)
+        predictions = booster.predict(test)
+        if classes and predict:
+            shares = np.asarray(predictions).reshape(len(test), -1)
+            lines = [",".join(text(value) for value in row) for row in shares]
+            (HERE / f"{name}.probabilities.csv").write_text("\n".join(lines) + "\n")
+        predictions = most_likely(predictions) if classes else predictions
+        write(name, test, booster.predict(test, raw_score=True), predictions=predictions if predict else None)
 
     amount = lambda x, y: np.abs(x[:, 0]) * 3 + y
     often_missing = lambda x: np.where(np.random.default_rng(9).uniform(size=x.shape) < 0.3, np.nan, x)
@@ -256,6 +308,23 @@ def make_lightgbm():
         save(objective, 0, {"objective": objective}, predict=True,
              label=(lambda x, y: y * 0.8 + 0.1) if share else (lambda x, y: amount(x, y) + 0.1))
     save("sqrt", 0, {"objective": "regression", "reg_sqrt": True}, label=lambda x, y: amount(x, y) - 4, predict=True)
+    # Objectives that are derived from it: all of them may learn roots, but for huber, which then says that it does not.
+    positive = lambda x, y: amount(x, y) + 0.1
+    for objective in ["regression_l1", "huber", "fair", "quantile", "mape"]:
+        save(objective, 0, {"objective": objective}, label=positive, predict=True)
+        save(f"sqrt-{objective}", 0, {"objective": objective, "reg_sqrt": True}, label=lambda x, y: amount(x, y) - 4, predict=True)
+    save("tweedie", 0, {"objective": "tweedie"}, label=positive, predict=True)
+    save("multiclassova", 3, {"objective": "multiclassova", "num_class": 3}, predict=True)
+    save("sigmoid", 2, {"objective": "binary", "sigmoid": 2.5}, predict=True)
+    relevant = lambda x, y: np.digitize(x[:, 0], [-1, 0, 1])
+    for objective in ["lambdarank", "rank_xendcg"]:
+        save(objective, 0, {"objective": objective}, label=relevant, predict=True, group=[20] * 20)
+    # Predictions of a forest are those of its trees' mean.
+    forest = {"boosting": "rf", "bagging_fraction": 0.6, "bagging_freq": 1}
+    save("forest-regression", 0, {"objective": "regression", **forest}, rounds=5, label=amount, predict=True)
+    save("forest-sqrt", 0, {"objective": "quantile", "reg_sqrt": True, **forest}, rounds=5, label=amount, predict=True)
+    save("forest-gamma", 0, {"objective": "gamma", **forest}, rounds=5, label=positive, predict=True)
+    save("forest-multiclass", 3, {"objective": "multiclass", "num_class": 3, **forest}, rounds=5, predict=True)
     save("large-target", 0, {"objective": "regression"}, label=lambda x, y: 1e6 * amount(x, y), predict=True)
     save("small-target", 0, {"objective": "regression"}, label=lambda x, y: 1e-6 * amount(x, y), predict=True)
     # Seconds since 1970: f32 holds every 128th.
@@ -268,7 +337,8 @@ def make_lightgbm():
     save("binary", 2, {"objective": "binary"}, missing=True)
     save("multiclass", 3, {"objective": "multiclass", "num_class": 3})
     save("zero-as-missing", 2, {"objective": "binary", "zero_as_missing": True}, rounds=6)
-    save("forest", 2, {"objective": "binary", "boosting": "rf", "bagging_fraction": 0.6, "bagging_freq": 1}, missing=True)
+    save("forest", 2, {"objective": "binary", "boosting": "rf", "bagging_fraction": 0.6, "bagging_freq": 1}, missing=True,
+         predict=True)
     save("regression", 0, {"objective": "regression"}, label=lambda x, y: np.abs(x[:, 0]) * 3 + y)
     save("dart", 3, {"objective": "multiclass", "num_class": 3, "boosting": "dart", "drop_rate": 0.5}, missing=True)
     def save_kinds(kind, settings, number=20):
@@ -320,7 +390,7 @@ def make_catboost():
         path.write_text(json.dumps(document, separators=(",", ":")) + "\n")
         borders = booster.get_borders()
         test = rows([borders[index] for index in range(4)], missing, max(classes, 2))
-        write(name, test, booster.predict(test, prediction_type="RawFormulaVal"))
+        write(name, test, booster.predict(test, prediction_type="RawFormulaVal"), predictions=booster.predict(test))
 
     def save_kinds(kind, settings, strings=False, alone=False):
         x, y = data(2)
@@ -377,6 +447,13 @@ def make_catboost():
     save("lossguide", catboost.CatBoostClassifier, 3, {"grow_policy": "Lossguide", "max_leaves": 5, "depth": 4})
     save("depthwise", catboost.CatBoostClassifier, 2, {"grow_policy": "Depthwise"})
     save("regression", catboost.CatBoostRegressor, 0, {}, label=amount)
+    positive = lambda x, y: amount(x, y) + 0.1
+    for loss in ["MAE", "Quantile:alpha=0.7", "LogLinQuantile:alpha=0.7", "MAPE", "Poisson", "Tweedie:variance_power=1.5",
+                 "Huber:delta=1", "Expectile:alpha=0.7", "Lq:q=1.5", "Cox"]:
+        save(loss.split(":")[0].lower(), catboost.CatBoostRegressor, 0, {"loss_function": loss}, label=positive)
+    save("onevsall", catboost.CatBoostClassifier, 3, {"loss_function": "MultiClassOneVsAll"})
+    save("crossentropy", catboost.CatBoostClassifier, 2, {"loss_function": "CrossEntropy"})
+    save("focal", catboost.CatBoostClassifier, 2, {"loss_function": "Focal:focal_alpha=0.5;focal_gamma=2"})
 
 
 def onnx_raw(model):
@@ -504,6 +581,65 @@ def make_onnxmltools():
     save_onnx("onnxmltools-xgboost-softprob", onnxmltools.convert_xgboost(booster, initial_types=shape), 3)
     booster = lightgbm.LGBMClassifier(n_estimators=2, num_leaves=4, verbose=-1).fit(x, y)
     save_onnx("onnxmltools-lightgbm-multiclass", onnxmltools.convert_lightgbm(booster, initial_types=shape), 3)
+
+
+def make_predictions():
+    """What the libraries predict with the models that have no predictions yet, categories as the library takes them.
+    XGBoost is not asked about files of later versions, whose dart it misreads, nor about leaves with several values of
+    earlier ones, which it opens and does not survive."""
+    import xgboost
+
+    number = lambda version: tuple(int(part) for part in version.split(".")[:2])
+    version = number(xgboost.__version__)
+
+    def table(name):
+        lines = (HERE / f"{name}.rows.csv").read_text().splitlines()[1:]
+        return np.array([[float(cell or "nan") for cell in line.split(",")] for line in lines], np.float32)
+
+    for path in sorted(HERE.iterdir()):
+        name = path.name.rsplit(".", 1)[0]
+        if path.suffix not in (".json", ".ubj", ".txt", ".onnx") or (HERE / f"{name}.predictions.csv").exists():
+            continue
+        x = table(name)
+        if name.startswith("xgboost"):
+            own, several = number(name.split("-")[1]), "-targets" in name or "-vector-leaves" in name
+            if own > version or (several and own != version):
+                continue
+            try:
+                booster = xgboost.Booster(model_file=path)
+                predictions = xgboost_predictions(booster, x)
+            except xgboost.core.XGBoostError as error:
+                print(name, "not by this version:", str(error).splitlines()[0][:100])
+                continue
+        elif name.startswith("lightgbm"):
+            import lightgbm
+
+            booster = lightgbm.Booster(model_file=str(path))
+            is_class = any(line.startswith(("objective=binary", "objective=multiclass")) for line in path.read_text().splitlines())
+            predictions = booster.predict(x)
+            predictions = most_likely(predictions) if is_class else predictions
+        elif name.startswith("catboost"):
+            if "-one-hot-words" in name or "-statistics" in name:
+                continue
+            import catboost
+
+            is_class = "class_params" in path.read_text()
+            model = (catboost.CatBoostClassifier if is_class else catboost.CatBoostRegressor)().load_model(str(path), format="json")
+            if "-one-hot" in name:
+                x = np.array([[int(cell) if at == KIND else cell for at, cell in enumerate(row)] for row in x], object)
+                x = catboost.Pool(x, feature_names=NAMES, cat_features=[KIND])
+            predictions = model.predict(x)
+        else:
+            import onnxruntime
+
+            session = onnxruntime.InferenceSession(str(path))
+            kind = session.get_inputs()[0].type
+            given = x.astype(np.float64 if "double" in kind else np.float32)
+            predictions = session.run(None, {session.get_inputs()[0].name: given})[0]
+            # It does not say that its outputs are classes, but is taken for such.
+            predictions = predictions.argmax(axis=1) if name == "onnx-opset5" else predictions
+        write_predictions(name, predictions)
+        print(name)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ use palpate::evaluate::{self, Classes, Confusion, Evaluated, Regression, RowsEva
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
-use palpate::rows::{SequenceColumns, feature_names};
+use palpate::rows::{Features, SequenceColumns};
 use palpate::stream;
 use palpate::touches::Dataset;
 use palpate::{Error, Result};
@@ -166,12 +166,11 @@ fn rows(arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -
     if file.with(|candidate| Ok(candidate.is_of_touches()))? {
         return Err(Error::from(RowsProblem::Touches).in_file(&arguments.model));
     }
-    let names = match file {
-        ModelFile::Full(ensemble) => ensemble.inputs.names().into_iter().map(String::from).collect(),
-        ModelFile::Compiled(compiled) => feature_names(&compiled.model()),
+    let features = match file {
+        ModelFile::Full(ensemble) => Features::from(&**ensemble),
+        ModelFile::Compiled(compiled) => Features::from(&compiled.model()),
     };
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let rows = super::rows::read_rows(&arguments.directory, &names, Some(label))?;
+    let rows = super::rows::read_rows(&arguments.directory, features, Some(label))?;
     let evaluated = file.with(|candidate| evaluate_rows(candidate, &rows)).map_err(|error| match error.problem() {
         Some(RowsProblem::Label { .. }) => error.in_file(&arguments.directory),
         _ => error.in_file(&arguments.model),
@@ -194,8 +193,8 @@ fn rows(arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -
     }
     if let Some(Regression { mean_absolute_error, root_mean_square_error }) = regression {
         text = format!(
-            "{rows} rows: margins are off by {mean_absolute_error:.4} on average, {root_mean_square_error:.4} in the root \
-             mean square\n"
+            "{rows} rows: values are off by {mean_absolute_error:.4} on average, {root_mean_square_error:.4} in the root mean \
+             square\n"
         );
     }
     output::print(&text)

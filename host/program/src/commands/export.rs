@@ -12,8 +12,8 @@ use palpate::compile::{
 use palpate::ensemble::{Ensemble, Inputs, train};
 use palpate::error::Error;
 use palpate::output;
-use palpate::rows::Rows;
 use palpate::rows::scales::{self, Effect, Merged};
+use palpate::rows::{Rows, notes};
 use palpate_shared::format::{Link, MAGIC};
 use std::fmt::Write as _;
 use std::fs::File;
@@ -246,7 +246,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         predicts: Predicts::of(&ensemble),
         merged: if settings.scales.is_some() { Vec::new() } else { scales::merged(&ensemble) },
         imported: imported.map(|imported| imported.kind.clone()),
-        notes: imported.map(|imported| imported.notes.clone()).unwrap_or_default(),
+        notes: notes(&ensemble, settings.scales.as_deref()),
         scales: settings
             .scales
             .as_ref()
@@ -490,6 +490,9 @@ struct Predicts {
     /// True if the last of several largest margins names the class.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     last_of_ties: bool,
+    /// Number that a margin is divided by before the link.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    average: Option<u32>,
     /// The least and the largest of the numbers that stand for a missing value, beside NaN.
     #[serde(skip_serializing_if = "Option::is_none")]
     missing: Option<[f32; 2]>,
@@ -508,6 +511,7 @@ impl Predicts {
             },
             link: is_value.then(|| imported.prediction.link.name()),
             last_of_ties: imported.prediction.last_of_ties,
+            average: Some(imported.prediction.average).filter(|average| is_value && *average != 1),
             missing: imported.sentinel,
         })
     }
@@ -516,8 +520,8 @@ impl Predicts {
         let what = match self.link {
             None if self.last_of_ties => "the class with the largest margin, of several the last".into(),
             None => "the class with the largest margin, of several the first".into(),
-            Some(link) if self.what == "targets" => format!("the targets, each {}", formula(link)),
-            Some(link) => format!("{}{}", formula(link), if link == "identity" { "" } else { " of the margin x" }),
+            Some(link) if self.what == "targets" => format!("the targets, each {}", formula(link, 1)),
+            Some(link) => formula(link, self.average.unwrap_or(1)),
         };
         let missing = match self.missing {
             None => String::new(),
@@ -528,14 +532,19 @@ impl Predicts {
     }
 }
 
-/// Formula of a link, from a margin to a value.
-pub(super) fn formula(link: &str) -> &'static str {
-    match link {
-        "logistic" => "the value 1 / (1 + e^-x)",
-        "exponential" => "the value e^x",
-        "square" => "the value x |x|",
-        "softplus" => "the value ln(1 + e^x)",
-        _ => "the value, which is the margin",
+/// Formula of a link, from a margin to a value; of trees whose mean is predicted `average` is their number.
+pub(super) fn formula(link: &str, average: u32) -> String {
+    let formula = match link {
+        "logistic" => "1 / (1 + e^-x)",
+        "exponential" => "e^x",
+        "square" => "x |x|",
+        "softplus" => "ln(1 + e^x)",
+        _ if average == 1 => return "the value, which is the margin".into(),
+        _ => "x",
+    };
+    match average {
+        1 => format!("the value {formula} of the margin x"),
+        _ => format!("the value {formula} of the mean x of the trees, the margin / {average}"),
     }
 }
 
@@ -561,7 +570,7 @@ fn early_exit(arguments: &Arguments, ensemble: &Ensemble) -> Result<Option<Early
     if path.as_os_str() == "yes" {
         return Ok(Some(EarlyExit::Always));
     }
-    super::rows::read_rows(path, &ensemble.inputs.names(), None).map(|rows| Some(EarlyExit::IfItPays(rows)))
+    super::rows::read_rows(path, ensemble, None).map(|rows| Some(EarlyExit::IfItPays(rows)))
 }
 
 fn early_exit_text(found: &EarlyExitFound) -> String {
@@ -585,7 +594,7 @@ fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<(Option<Vec<f32>
         return Err(Error::setting("scale", format!("{files} files of rows"), "one file of rows"));
     }
     let path = arguments.rows();
-    let rows = path.map(|path| super::rows::read_rows(path, &names, None)).transpose()?;
+    let rows = path.map(|path| super::rows::read_rows(path, ensemble, None)).transpose()?;
     let mut scales = rows.as_ref().map_or_else(|| vec![1.0; names.len()], |rows| scales::fit(ensemble, rows));
     let mut named = Vec::new();
     for scale in &arguments.scale {
@@ -643,13 +652,6 @@ fn text(path: &Path, exported: &Exported, features: &str) -> String {
     _ = writeln!(text, "Instructions per {each}, estimated: {}", instructions(exported.instructions));
     text += &exported.early_exit.as_ref().map_or(String::new(), early_exit_text);
     text += &exported.predicts.as_ref().map_or(String::new(), Predicts::text);
-    for Merged { feature, thresholds, different } in &exported.merged {
-        _ = writeln!(
-            text,
-            "{feature}: of {thresholds} thresholds {different} stay different in f32, so that values between the others go \
-             another way than in the library; --scale {feature}=UNITS compares whole numbers instead"
-        );
-    }
     text += &effects(&exported.scales);
     for source in &exported.sources {
         _ = writeln!(text, "Source code: {}", source.display());
@@ -680,14 +682,9 @@ fn effects(all: &[Effect]) -> String {
             exact.join(", ")
         );
     }
-    for Effect { feature, scale, thresholds, different, largest_step, .. } in
-        all.iter().filter(|effect| !is_exact(effect))
-    {
-        _ = writeln!(
-            text,
-            "{feature}: {scale} units make up 1; of {thresholds} thresholds {different} stay different; a value within \
-             {largest_step:e} of one may go the other way"
-        );
+    // Those of which thresholds fall together are notes.
+    for effect in all.iter().filter(|effect| !is_exact(effect) && effect.different == effect.thresholds) {
+        _ = writeln!(text, "{effect}");
     }
     text
 }

@@ -2,8 +2,8 @@ use super::Global;
 use super::chips::{core, instructions};
 use palpate::Result;
 use palpate::chip::inspect::{
-    Defaults, Feature, Inspected, Noise, OnChip, PlanOf, Predicts, Probe, Promised, Tested, Touches, TrainedOn,
-    inspect, on_chip,
+    Defaults, Feature, Inspected, Noise, OnChip, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches,
+    TrainedOn, inspect, on_chip,
 };
 use palpate::compile::{CompiledModel, Core, Memory};
 use palpate::output;
@@ -41,9 +41,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
 /// Prediction of a model over rows, in words.
 fn predicts_text(predicts: &Predicts) -> String {
     let what = match predicts.link {
-        None if predicts.last_of_ties => "the class with the largest margin, of several the last",
-        None => "the class with the largest margin, of several the first",
-        Some(link) => super::export::formula(link),
+        None if predicts.last_of_ties => "the class with the largest margin, of several the last".into(),
+        None => "the class with the largest margin, of several the first".into(),
+        Some(link) => super::export::formula(link, predicts.average),
     };
     let of_each = if predicts.what == "targets" { "of each target " } else { "" };
     let what = format!("{of_each}{what}");
@@ -109,6 +109,10 @@ fn what_it_is(lines: &mut Lines, inspected: &Inspected<'_>) {
             None => name.clone(),
         };
         lines.line("features", features.iter().map(feature).collect::<Vec<_>>().join(", "));
+    }
+    if let Some(SomeColumns { all, used }) = &inspected.columns {
+        let used: Vec<String> = used.iter().map(ToString::to_string).collect();
+        lines.line("columns", format!("{} (from 0) of the library's {all}", used.join(", ")));
     }
     let objects = inspected.objects.join(", ");
     match &inspected.predicts {

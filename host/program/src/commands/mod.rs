@@ -342,6 +342,7 @@ fn option_of(setting: &str) -> &str {
     match setting {
         "groups" => "sequences",
         "rolls" => "plan",
+        "scales" => "scale",
         other => other,
     }
 }

@@ -7,8 +7,10 @@ use palpate::Result;
 use palpate::compile::CompiledModel;
 use palpate::ensemble::import::{Options, read_with};
 use palpate::error::{CompileProblem, Error, Place, RowsProblem};
+use palpate::evaluate::verify::Verified;
 use palpate::output;
 use palpate::prove::{Certificate, Moves, Proof, check, check_code, moves, prove, prove_code};
+use palpate::rows::Rows;
 use palpate_onboard::ModelError;
 use std::path::Path;
 
@@ -24,8 +26,13 @@ pub(super) struct Asked<'a> {
     pub(super) certificate: Option<&'a Path>,
 }
 
-/// Proves the model, or checks a certificate.
-pub(super) fn run(asked: &Asked<'_>, options: &Options<'_>, global: &Global) -> Result<()> {
+/// Proves the model, or checks a certificate; `verified` is what was found before on the rows, and its text.
+pub(super) fn run(
+    asked: &Asked<'_>,
+    verified: Option<(&Verified, String)>,
+    options: &Options<'_>,
+    global: &Global,
+) -> Result<()> {
     let path = asked.ensemble;
     let model = Proved::read(asked.model)?;
     // The very bytes whose checksum is stated.
@@ -45,11 +52,15 @@ pub(super) fn run(asked: &Asked<'_>, options: &Options<'_>, global: &Global) -> 
     let written = asked.written.unwrap_or_else(|| Path::new("-"));
     output::admit(written, [asked.model, path].into_iter().chain(asked.rows))?;
     let names = ensemble.inputs.names();
+    let has_classes = ensemble.objects.len() > 1 && !ensemble.prediction().targets;
     let rows = match asked.rows {
         Some(_) if ensemble.descriptor().is_some() => {
             return Err(Error::at(Place::file(asked.model), RowsProblem::Touches));
         }
-        Some(data) => Some(read_rows(data, &names, None)?),
+        // They were read, and said how, before; a regression has no class that could change.
+        Some(data) if verified.is_some() && has_classes => Some(Rows::read(data, &ensemble, None)?),
+        Some(_) if verified.is_some() => None,
+        Some(data) => Some(read_rows(data, &ensemble, None)?),
         None => None,
     };
     let ((proof, certificate), moved) = match &model {
@@ -64,14 +75,19 @@ pub(super) fn run(asked: &Asked<'_>, options: &Options<'_>, global: &Global) -> 
         Proved::Code(bytes, code) => (prove_code(bytes, code, &ensemble, &file).map_err(in_model)?, None),
     };
     output::write_bytes(written, certificate.to_string().as_bytes())?;
-    if global.json {
-        match moved {
-            Some(rows) => output::print_json_about(written, &serde_json::json!({ "proof": proof, "rows": rows })),
-            None => output::print_json_about(written, &proof),
+    if !global.json {
+        let classes: Vec<String> = proof.ranges.iter().map(|(name, ..)| name.clone()).collect();
+        let moved = moved.map_or_else(String::new, |rows| moves_text(&rows, &names, &classes));
+        let before = verified.map_or_else(String::new, |(_, text)| text);
+        return output::print_about(written, &(before + &proof_text(&proof, "Proved") + &moved));
+    }
+    match (verified, moved) {
+        (None, None) => output::print_json_about(written, &proof),
+        (None, Some(rows)) => output::print_json_about(written, &serde_json::json!({ "proof": proof, "rows": rows })),
+        (Some((verified, _)), moved) => {
+            let all = serde_json::json!({ "proof": proof, "rows": moved, "verified": verified });
+            output::print_json_about(written, &all)
         }
-    } else {
-        let moved = moved.map_or_else(String::new, |rows| moves_text(&rows, &names, &ensemble.objects));
-        output::print_about(written, &(proof_text(&proof, "Proved") + &moved))
     }
 }
 
@@ -131,8 +147,14 @@ fn proof_text(proof: &Proof, what: &str) -> String {
          {stated:.2e}.\n"
     );
     if margin_error > stated {
-        text +=
-            "The model states less than the sum of its trees' largest differences, which no single row need reach.\n";
+        text += "That bound is proved: it is the sum of the trees' largest differences, which no single row need reach. The smaller \
+                 one that the model states is not: `export` went through all cells between thresholds for it, and this proof did \
+                 not.\n";
+    }
+    if let Some([own, of_ensemble]) = proof.other_link {
+        text += &format!(
+            "Margins are proved, and not what the model makes of them: its link is {own}, the file's {of_ensemble} (`export --link`).\n"
+        );
     }
     text += "Bounds of each margin, and how near to them a search for rows came:\n";
     for ((name, least, most), (from, to)) in ranges.iter().zip(&proof.found) {

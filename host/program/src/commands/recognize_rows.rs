@@ -5,7 +5,7 @@ use palpate::Result;
 use palpate::error::RowsProblem;
 use palpate::evaluate::verify::margins;
 use palpate::output;
-use palpate::rows::{Encoder, feature_names};
+use palpate::rows::Encoder;
 use palpate_onboard::{Recognizer, Verdict};
 use std::path::Path;
 
@@ -51,10 +51,8 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked) -
     if model.descriptor().is_some() {
         return Err(RowsProblem::Touches.into());
     }
-    let names = feature_names(&model);
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
-    let rows = read_rows(path, &names, None)?;
+    let rows = read_rows(path, &model, None)?;
     let encoder = Encoder::of(&model);
     let has_targets = model.prediction().targets;
     let has_classes = model.object_count() > 1 && !has_targets;

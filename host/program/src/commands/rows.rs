@@ -2,17 +2,19 @@
 
 use super::remark;
 use palpate::Result;
-use palpate::rows::Rows;
+use palpate::rows::{BY_POSITION, Features, Rows};
 use std::path::Path;
 
-/// Reads rows for features with these names; says on stderr if columns are taken by their position.
-pub(super) fn read_rows(path: &Path, features: &[&str], label: Option<&str>) -> Result<Rows> {
+/// Reads rows of these features; says on stderr if columns are taken by their position.
+pub(super) fn read_rows(path: &Path, features: impl Into<Features>, label: Option<&str>) -> Result<Rows> {
     let rows = Rows::read(path, features, label)?;
-    if rows.by_position {
-        remark(&format!(
-            "palpate: note: {}: columns are taken by their position, since the header does not name all features",
-            path.display()
-        ));
-    }
+    say_by_position(path, rows.by_position);
     Ok(rows)
+}
+
+/// Says on stderr that columns of a file were taken by their position, if they were.
+pub(super) fn say_by_position(path: &Path, by_position: bool) {
+    if by_position {
+        remark(&format!("palpate: note: {}: {BY_POSITION}", path.display()));
+    }
 }

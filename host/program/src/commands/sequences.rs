@@ -9,7 +9,7 @@ use palpate::compile::{self, CompiledModel};
 use palpate::error::{Error, Place, RowsProblem};
 use palpate::evaluate::{Confusion, Finding};
 use palpate::output;
-use palpate::rows::{SequenceColumns, Sequences, feature_names};
+use palpate::rows::{SequenceColumns, Sequences};
 use palpate::strangers;
 use palpate::stream::{self, Calibrated, Evaluated, Gain, Strangers};
 use palpate_onboard::Model;
@@ -41,17 +41,15 @@ impl SequenceArguments {
 
 /// Reads sequences for a model; says on stderr if columns are taken by their position.
 pub(crate) fn read(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>) -> Result<Sequences> {
-    let names = feature_names(model);
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let mut classes = compile::names(model);
     classes.truncate(model.known_count());
-    let sequences = stream::read(path, &names, columns, &classes)?;
-    if sequences.by_position {
-        super::remark(&format!(
-            "palpate: note: {}: columns are taken by their position, since the header does not name all features",
-            path.display()
-        ));
-    }
+    read_of(path, model, columns, &classes)
+}
+
+/// Reads sequences of these classes.
+fn read_of(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>, classes: &[String]) -> Result<Sequences> {
+    let sequences = stream::read(path, model, columns, classes)?;
+    super::rows::say_by_position(path, sequences.by_position);
     Ok(sequences)
 }
 
@@ -98,10 +96,8 @@ pub(crate) fn calibrate(asked: Calibration<'_>, global: &Global) -> Result<()> {
 
 /// Sequences of what the model does not know: any column of labels is as good as another.
 fn others(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>) -> Result<Sequences> {
-    let names = feature_names(model);
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let columns = SequenceColumns { label: None, group: None, ..*columns };
-    stream::read(path, &names, &columns, &[String::new()])
+    read_of(path, model, &columns, &[String::new()])
 }
 
 fn percent(share: f64) -> String {

@@ -6,9 +6,9 @@ use palpate::Result;
 use palpate::compile::CompiledModel;
 use palpate::ensemble::Ensemble;
 use palpate::error::{Error, Place, RowsProblem};
-use palpate::evaluate::verify::{Verified, verify};
+use palpate::evaluate::verify::{Library, Verified, verify};
 use palpate::output;
-use palpate::rows::read_margins;
+use palpate::rows::{read_margins, read_values};
 use std::path::PathBuf;
 
 /// Compare a compiled model with what it was exported from.
@@ -16,11 +16,11 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Of a model of touches, every touch of DATA, a directory, goes through model and ensemble: margins, and the best object. Then random sequences of touches, each of one object, go through both until there is a verdict.
 
-Of a model of another library, every row of DATA, a CSV file, goes through the model and the file's own trees, and so do rows that are made at every split: at the threshold, one step to each side, missing. Columns are matched by name, or by position. With --library-margins the model is also compared with the library's own raw scores: no header, one row per line, one column per output.
+Of a model of another library, every row of DATA, a CSV file, goes through the model and the file's own trees, and so do rows that are made at every split: at the threshold, one step to each side, missing. Columns are matched by name, or by position where one side has no names. With --library-margins the model is also compared with the library's own raw scores: no header, one row per line, one column per output; with --library-values with what its `predict` says: a class, or a value.
 
 --prove needs no data: each tree of the model is compared with its trees in ENSEMBLE on every possible row, and a certificate is written. With a CSV file of rows it also says how far one feature can move before the class changes. --certificate checks a certificate with an independent reader of the model. Of a model whose trees are assembly, that is read back from the file beside it (.s).
 
-The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class where the stated rounding does not explain it.
+The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class, or predicts another value, where the stated rounding does not explain it.
 
 Examples:
   palpate verify model.palpate ensemble.json data
@@ -37,66 +37,81 @@ pub(crate) struct Arguments {
     #[arg(value_name = "DATA", required_unless_present_any = ["prove", "certificate"])]
     data: Option<PathBuf>,
     /// Prove that both match on every possible row, and write a certificate
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["certificate", "library_margins", "sequences"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["certificate", "sequences"])]
     prove: Option<PathBuf>,
     /// Check a certificate that --prove wrote
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["data", "library_margins", "sequences"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["data", "library_margins", "library_values", "sequences"])]
     certificate: Option<PathBuf>,
     /// Sequences of touches to draw; of all objects together
     #[arg(long, value_name = "N", default_value = "10000", value_parser = super::numbers::sequences)]
     sequences: usize,
     /// The library's own raw scores of the rows
-    #[arg(long, value_name = "CSV")]
+    #[arg(long, value_name = "CSV", requires = "data")]
     library_margins: Option<PathBuf>,
+    /// What the library predicts of the rows: classes or values
+    #[arg(long, value_name = "CSV", requires = "data")]
+    library_values: Option<PathBuf>,
     #[command(flatten)]
     unstated: UnstatedArguments,
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let options = arguments.unstated.options(None);
+    let has_library = arguments.library_margins.is_some() || arguments.library_values.is_some();
     let data = match &arguments.data {
-        Some(data) if arguments.prove.is_none() => data,
-        _ => {
-            let asked = Asked {
-                model: &arguments.model,
-                ensemble: &arguments.ensemble,
-                rows: arguments.data.as_deref(),
-                written: arguments.prove.as_deref(),
-                certificate: arguments.certificate.as_deref(),
-            };
-            return super::prove::run(&asked, &options, global);
-        }
+        Some(data) if arguments.prove.is_none() || has_library => data,
+        _ => return super::prove::run(&arguments.proof(), None, &options, global),
     };
     let compiled = CompiledModel::read(&arguments.model)?;
     let ensemble = Ensemble::load_with(&arguments.ensemble, &options)?;
     if ensemble.descriptor().is_some() {
-        return match (&arguments.library_margins, data.is_file()) {
-            (Some(margins), _) => {
-                Err(Error::setting("library_margins", margins.display(), "it with a model of another library"))
-            }
-            // A log is a data set, too.
-            (None, true) if !palpate::touches::is_log(data) => {
-                Err(Error::at(Place::file(&arguments.ensemble), RowsProblem::Touches))
-            }
-            (None, _) => {
-                let data = (data.as_path(), arguments.sequences);
-                super::parity::run((&arguments.model, &compiled), &ensemble, data, global)
-            }
-        };
+        let names = [("library_margins", &arguments.library_margins), ("library_values", &arguments.library_values)];
+        if let Some((name, Some(path))) = names.into_iter().find(|(_, path)| path.is_some()) {
+            return Err(Error::setting(name, path.display(), "it with a model of another library"));
+        }
+        // A log is a data set, too.
+        if data.is_file() && !palpate::touches::is_log(data) {
+            return Err(Error::at(Place::file(&arguments.ensemble), RowsProblem::Touches));
+        }
+        let data = (data.as_path(), arguments.sequences);
+        return super::parity::run((&arguments.model, &compiled), &ensemble, data, global);
     }
-    let rows = super::rows::read_rows(data, &ensemble.inputs.names(), None)?;
-    let library = arguments.library_margins.as_deref().map(read_margins).transpose()?;
-    let place = |error: Error| match (&arguments.library_margins, error.problem()) {
-        (Some(path), Some(problem)) if RowsProblem::is_about_margins(problem) => error.in_file(path),
-        _ => error.in_file(&arguments.model),
+    let rows = super::rows::read_rows(data, &ensemble, None)?;
+    let margins = arguments.library_margins.as_deref().map(read_margins).transpose()?;
+    let values = arguments.library_values.as_deref().map(read_values).transpose()?;
+    let place = |error: Error| {
+        let file = match error.problem() {
+            Some(problem) if RowsProblem::is_about_margins(problem) => arguments.library_margins.as_ref(),
+            Some(problem) if RowsProblem::is_about_values(problem) => arguments.library_values.as_ref(),
+            _ => None,
+        };
+        error.in_file(file.unwrap_or(&arguments.model))
     };
-    let verified = verify(&compiled.model(), &ensemble, &rows, library.as_deref(), &Bar::new()).map_err(place)?;
+    let library = Library { margins: margins.as_deref(), values: values.as_deref() };
+    let verified = verify(&compiled.model(), &ensemble, &rows, library, &Bar::new()).map_err(place)?;
+    let checked = verified.check().map_err(|problem| Error::at(Place::file(&arguments.model), problem));
+    if arguments.prove.is_some() && checked.is_ok() {
+        return super::prove::run(&arguments.proof(), Some((&verified, text(&verified))), &options, global);
+    }
     if global.json {
         output::print_json(&verified)?;
     } else {
         output::print(&text(&verified))?;
     }
-    verified.check().map_err(|problem| Error::at(Place::file(&arguments.model), problem))
+    checked
+}
+
+impl Arguments {
+    /// The proof or the certificate that is asked for.
+    fn proof(&self) -> Asked<'_> {
+        Asked {
+            model: &self.model,
+            ensemble: &self.ensemble,
+            rows: self.data.as_deref(),
+            written: self.prove.as_deref(),
+            certificate: self.certificate.as_deref(),
+        }
+    }
 }
 
 fn text(verified: &Verified) -> String {
@@ -111,6 +126,18 @@ fn text(verified: &Verified) -> String {
             "The library's own margins differ by at most {error:.2e}; another class for {classes} rows, of which the \
              rounding that the model states does not explain {unexplained}\n"
         );
+    }
+    if let (Some(rows), Some(unexplained)) = (verified.library_values_differ, verified.library_values_unexplained) {
+        text += &match verified.library_max_value_error {
+            Some(error) => format!(
+                "The library predicts values that differ by at most {error:.2e}; for {rows} rows by more than the rounding of \
+                 margins that the model states explains\n"
+            ),
+            None => format!(
+                "The library predicts another class for {rows} rows, of which the rounding that the model states does not \
+                 explain {unexplained}\n"
+            ),
+        };
     }
     if let Some((change, classes)) = verified.scaling {
         text += &format!(

@@ -134,13 +134,139 @@ fn each_row_gets_a_verdict_of_its_own_or_adds_to_the_last() {
     assert_eq!(text.lines().count(), lines.len());
     let most = text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap()["rows"].as_u64().unwrap()).max();
     assert!(most > Some(1));
-    // Nothing but a note where names differ and their number is right.
-    std::fs::write(path("unnamed.csv"), "a,b,c,d\n1,990,2,0.5\n").unwrap();
-    let by_position = run(["recognize", &model, &path("unnamed.csv"), "--features"]);
-    assert!(String::from_utf8_lossy(&by_position.stderr).contains("by their position"));
-    std::fs::write(path("few.csv"), "a,b,c\n1,990,2\n").unwrap();
-    let message = stderr(run(["recognize", &model, &path("few.csv"), "--features"]), 1);
-    assert!(message.contains("3 columns for 4 features, and no column \"width\""), "{message}");
+}
+
+#[test]
+fn columns_are_found_by_their_names_in_every_command_and_by_position_only_where_there_are_none() {
+    let (_directory, path) = place();
+    let (model, source) = (path("model.palpate"), data("xgboost-2.1-softprob.ubj"));
+    stdout(run(["export", &source, "-o", &model, "--names", "cup,jug,pan"]));
+    let file = path("rows.csv");
+    let asked = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        run(["recognize", &model, &file, "--features", "--json"])
+    };
+    let margins = |text: &str| {
+        let said = asked(text);
+        let note = String::from_utf8_lossy(&said.stderr).into_owned();
+        (json(said)["margins"].clone(), note)
+    };
+    let (by_name, note) = margins("width,height,count,angle\n1,990,2,0.5\n");
+    assert_eq!(note, "");
+    // In another order, with more columns.
+    assert_eq!(margins("angle,count,who,height,width\n0.5,2,ann,990,1\n"), (by_name.clone(), String::new()));
+    let (by_position, note) = margins("0,1,2,3\n1,990,2,0.5\n");
+    assert_eq!(by_position, by_name);
+    assert_eq!(note.matches("columns are taken by their position").count(), 1, "{note}");
+    // One name of four is another one: no column takes its place, in any command.
+    let labeled = "width,Height,count,angle,kind,id\n1,990,2,0.5,cup,1\n";
+    std::fs::write(path("labeled.csv"), labeled).unwrap();
+    let (rows, output) = (path("labeled.csv"), path("no.palpate"));
+    let sequences = ["--label", "kind", "--sequence-column", "id"];
+    for words in [
+        vec!["recognize", &model, &rows, "--features"],
+        vec!["verify", &model, &source, &rows],
+        vec!["verify", &model, &source, &rows, "--prove", &output],
+        vec!["evaluate", &model, &rows, "--label", "kind"],
+        [&["evaluate", &model, &rows][..], &sequences].concat(),
+        [&["calibrate", &model, &rows, "-o", &output][..], &sequences].concat(),
+        vec!["export", &source, "-o", &output, "--scale", &rows],
+        vec!["export", &source, "-o", &output, "--early-exit", &rows],
+    ] {
+        let message = stderr(run(&words), 1);
+        let expected =
+            "labeled.csv:1: no column is named height; its columns are width, Height, count, angle, kind, id";
+        assert!(message.contains(expected), "{words:?}: {message}");
+    }
+    for (text, expected) in [
+        ("1,990,2,0.5\n2,980,1,0.25\n", "rows.csv:1: its columns are named 1, 990, 2, 0.5: numbers alone"),
+        ("0,1,2\n1,990,2\n", "rows.csv:1: it has 3 columns for 4 features"),
+        ("width,height,count,angle,width\n1,990,2,0.5,1\n", "two columns are named \"width\""),
+        ("width;height;count;angle\n1;990;2;0,5\n", "rows.csv:1: its cells are separated by \";\""),
+        ("width,height,count,angle\n1,990,2\n", "rows.csv:2: it has 3 cells, where the header has 4"),
+        ("width,height,count,angle\n1,990,2,0\n\n1,990,2,0\n", "rows.csv:3: the line is empty"),
+    ] {
+        let message = stderr(asked(text), 1);
+        assert!(message.contains(expected), "{message}");
+    }
+}
+
+#[test]
+fn what_the_library_predicts_is_compared_too() {
+    let (_directory, path) = place();
+    let model = path("model.palpate");
+    for (name, file) in [("lightgbm-4.7-forest-gamma", "txt"), ("sklearn-1.9-forest", "onnx")] {
+        let source = data(&format!("{name}.{file}"));
+        let of = |kind: &str| data(&format!("{name}.{kind}.csv"));
+        let (rows, margins, values) = (of("rows"), of("margins"), of("predictions"));
+        let exported = stdout(run(["export", &source, "-o", &model]));
+        let with = ["--library-margins", &margins, "--library-values", &values];
+        let text = stdout(run([&["verify", &model, &source, &rows][..], &with].concat()));
+        if file == "txt" {
+            assert!(
+                exported.contains("Predicts the value e^x of the mean x of the trees, the margin / 5"),
+                "{exported}"
+            );
+            assert!(text.contains("The library predicts values that differ by at most"), "{text}");
+            assert!(stdout(run(["inspect", &model])).contains("the mean x of the trees, the margin / 5"));
+        } else {
+            assert!(text.contains("The library predicts another class for 0 rows"), "{text}");
+        }
+        // The proof beside it, in one run.
+        let proof = path("proof.txt");
+        let proved = stdout(run([&["verify", &model, &source, &rows, "--prove", &proof][..], &with].concat()));
+        assert!(proved.starts_with("60 rows and ") && proved.contains("Proved: on every possible row"), "{proved}");
+        assert_eq!(proved.contains("changes a row's class"), file == "onnx", "{proved}");
+        let all = json(run([&["verify", &model, &source, &rows, "--prove", &proof, "--json"][..], &with].concat()));
+        assert_eq!((&all["verified"]["rows"], all["proof"]["boxes"].as_u64() > Some(0)), (&60.into(), true), "{all}");
+        let text = std::fs::read_to_string(&values).unwrap();
+        std::fs::write(path("others.csv"), text.replace(text.lines().nth(4).unwrap(), "17")).unwrap();
+        let message = stderr(run(["verify", &model, &source, &rows, "--library-values", &path("others.csv")]), 1);
+        let expected = if file == "txt" {
+            "the library predicts other values"
+        } else {
+            "others.csv: the prediction \"17\" of row"
+        };
+        assert!(message.contains(expected), "{message}");
+    }
+    let message = stderr(run(["verify", &model, &data("sklearn-1.9-forest.onnx"), "--library-values", &model]), 2);
+    assert!(message.contains("DATA"), "{message}");
+}
+
+#[test]
+fn a_model_with_names_or_another_link_of_its_own_is_proved() {
+    let (_directory, path) = place();
+    let (model, proof, source) = (path("model.palpate"), path("proof.txt"), data("xgboost-3.4-softprob.ubj"));
+    stdout(run(["export", &source, "-o", &model, "--names", "cup,jug,pan"]));
+    let text = stdout(run(["verify", &model, &source, "--prove", &proof]));
+    assert!(text.starts_with("Proved: on every possible row") && text.contains("\n  jug: "), "{text}");
+    stdout(run(["verify", &model, &source, "--certificate", &proof]));
+    let rows = data("xgboost-3.4-softprob.rows.csv");
+    let text = stdout(run(["verify", &model, &source, &rows, "--prove", &proof]));
+    assert!(text.contains(" makes it cup\n"), "{text}");
+    // The same names in another order are other classes.
+    stdout(run(["export", &source, "-o", &model, "--names", "2,1,0"]));
+    let message = stderr(run(["verify", &model, &source, "--prove", &proof]), 1);
+    assert!(message.contains("the model's outputs are not the ensemble's: 2, 1, 0, and not 0, 1, 2"), "{message}");
+    let source = data("lightgbm-4.7-poisson.txt");
+    stdout(run(["export", &source, "-o", &model, "--link", "identity"]));
+    let text = stdout(run(["verify", &model, &source, "--prove", &proof]));
+    assert!(text.contains("its link is identity, the file's exponential"), "{text}");
+}
+
+#[test]
+fn a_split_on_missing_values_has_whole_units_as_others_do() {
+    let (_directory, path) = place();
+    for name in ["catboost-1.2-binary", "catboost-1.2-max-missing", "lightgbm-4.7-missing-alone"] {
+        let source = data(&format!("{name}.{}", if name.starts_with("cat") { "json" } else { "txt" }));
+        let rows = data(&format!("{name}.rows.csv"));
+        for scale in ["width=1000,height=100,count=10,angle=1000", &rows] {
+            let text = stdout(run(["export", &source, "-o", &path("m"), "--scale", scale]));
+            assert!(!text.contains("e38"), "{text}");
+            stdout(run(["verify", &path("m"), &source, &rows]));
+            stdout(run(["verify", &path("m"), &source, "--prove", &path("proof.txt")]));
+        }
+    }
 }
 
 #[test]
@@ -316,7 +442,7 @@ fn whole_numbers_in_the_users_units_split_as_the_values_do_and_say_what_they_cha
     for (scale, expected) in [
         ("width=100", "a scale for height too"),
         ("depth=100", "--scale is depth=100. Use a feature: width, height, count, angle"),
-        ("width=1,height=1e9,count=1,angle=1", "scales is 1000000000 for height"),
+        ("width=1,height=1e9,count=1,angle=1", "--scale is 1000000000 for height"),
     ] {
         let message = stderr(run(["export", &model, "-o", &path("m"), "--scale", scale]), 2);
         assert!(message.contains(expected), "{message}");

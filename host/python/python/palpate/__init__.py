@@ -12,7 +12,7 @@ microcontroller (`compile`), whose code also runs here (`Recognizer`, `Model.mar
 True
 """
 
-from ._errors import FileError, InputError, PalpateError, SettingError
+from ._errors import FileError, InputError, ModelWarning, PalpateError, SettingError
 from ._evaluate import Evaluation, Parity, Sequential, evaluate, parity
 from ._import import compile, to_ensemble
 from ._native import DataSet, Ensemble, Model, Recognizer, Surface, capture, train
@@ -29,6 +29,7 @@ __all__ = [
     "InputError",
     "Meshes",
     "Model",
+    "ModelWarning",
     "PalpateError",
     "Parity",
     "Probe",

@@ -19,6 +19,10 @@ class PalpateError(Exception):
         return type(self), (str(self), self.path, self.line)
 
 
+class ModelWarning(UserWarning):
+    """Something to know about a model or its rows, which is no error: what `palpate export` notes."""
+
+
 class SettingError(PalpateError, ValueError):
     """A setting is out of its range: a mistake of the caller, not of the data."""
 

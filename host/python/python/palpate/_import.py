@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import _native, _sklearn
-from ._errors import InputError, SettingError
+from ._errors import InputError, ModelWarning, SettingError
 from ._native import Ensemble, Model
 
 
@@ -72,8 +73,9 @@ def compile(
 ) -> Model:
     """Compiles an ensemble, or a model of another library, to the bytes that a microcontroller reads.
 
-    `model`, `names`, `all_trees` and `missing` are as for `to_ensemble`, whose `notes` say what to know about the trees. `leaf` is "i8", "i16" or "f32": what leaves are stored as; with "f32" the
-    margins of an XGBoost model stay its own, bit for bit. `layout` is "compact", "complete", "grid", "wide" or "patterns";
+    `model`, `names`, `all_trees` and `missing` are as for `to_ensemble`. `leaf` is "i8", "i16" or "f32": what leaves are stored
+    as; with "f32" the margins of an XGBoost model stay its own, bit for bit. What to know about the model is a `ModelWarning`,
+    and is in its `notes`. `layout` is "compact", "complete", "grid", "wide" or "patterns";
     without one, the best for the `goal` ("balanced", "speed" or "size") is taken.
 
     With `max_bytes`, the layout is chosen for size and leaves are stored in fewer bits where the model would be larger; if
@@ -87,7 +89,7 @@ def compile(
     >>> model.size <= 4000
     True
     """
-    return _native.compile(
+    compiled = _native.compile(
         to_ensemble(model, names, all_trees=all_trees, missing=missing),
         max_bytes=max_bytes,
         leaf=leaf,
@@ -98,6 +100,9 @@ def compile(
         priors=None if priors is None else list(priors),
         scales=None if scales is None else list(scales),
     )
+    for note in compiled.notes:
+        warnings.warn(note, ModelWarning, stacklevel=2)
+    return compiled
 
 
 def _class(kind: type) -> tuple[str, str]:
@@ -131,9 +136,13 @@ def _refusal(model: object) -> InputError:
 def _classes(model: object) -> list[str] | None:
     """The names of a classifier's classes, where it has some."""
     classes = getattr(model, "classes_", None)
-    if classes is None or len(classes) < 2:
+    if classes is None:
         return None
-    return [str(name) for name in classes]
+    names = [str(name) for name in classes]
+    # Of one class, 0, XGBoost and LightGBM have a margin for the other one as well.
+    if len(names) == 1 and names != ["0"]:
+        raise InputError(f"the {type(model).__name__} knows one class, {names[0]}, and nothing to distinguish. Train on two or more.")
+    return names if len(names) > 1 else None
 
 
 def _cut(taken: int, rounds: int) -> list[str]:
@@ -173,16 +182,10 @@ def _lightgbm(model: Any, asked: _Asked) -> Ensemble:
 
 def _catboost(model: Any, asked: _Asked) -> Ensemble:
     # CatBoost predicts with every tree that it kept.
-    threshold = model.get_probability_threshold() if hasattr(model, "get_probability_threshold") else 0.5
-    if len(asked.names or []) == 2 and threshold not in (None, 0.5):
-        raise InputError(
-            f"the {type(model).__name__} has the probability threshold {threshold} for its second class: a model here gives "
-            "the class with the greatest margin. Call `set_probability_threshold(0.5)`, and compare posteriors yourself."
-        )
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory) / "model.json"
         model.save_model(str(path), format="json")
-        return Ensemble.load(path, asked.names)
+        return Ensemble.from_bytes(path.read_bytes(), asked.names)
 
 
 def _onnx(model: Any, asked: _Asked) -> Ensemble:

@@ -148,6 +148,10 @@ class Ensemble:
     (['bowl', 'mouse'], ['curvature', 'slope'], 5)
     """
     def __repr__(self, /) -> str: ...
+    def _columns(self, /, header: SupportsGetItem[int, str]) -> tuple[list[int], str | None]:
+        """
+        The positions of the features among columns with these names, and what to know about that.
+        """
     @property
     def descriptor(self, /) -> str | None:
         """
@@ -184,7 +188,7 @@ class Ensemble:
     def margins(self, /, rows: ArrayLike) -> NDArray[float32]:
         """
         The margins of rows of features (of an ensemble over touches, of its descriptor's), one column per object: added
-        in f32, as XGBoost does.
+        in f32, as XGBoost does. The columns of a table are found by their names.
         """
     def margins_of(self, /, data: DataSet) -> NDArray[float32]:
         """
@@ -234,6 +238,10 @@ class Model:
         A model in memory; `content` is checked.
         """
     def __repr__(self, /) -> str: ...
+    def _columns(self, /, header: SupportsGetItem[int, str]) -> tuple[list[int], str | None]:
+        """
+        The positions of the features among columns with these names, and what to know about that.
+        """
     @property
     def checksum(self, /) -> int:
         """
@@ -276,7 +284,13 @@ class Model:
 
         A model over touches takes a data set, or rows of three contact times in seconds (NaN where a finger did not
         touch), with the probe's direction and alignment nine numbers. A model over features takes rows of those, NaN where
-        one is missing; with leaves as f32 its margins are an XGBoost model's own, bit for bit.
+        one is missing; with leaves as f32 its margins are an XGBoost model's own, bit for bit. Of a table (pandas, polars, pyarrow)
+        the columns are found by their names, in any order and among others.
+        """
+    @property
+    def notes(self, /) -> list[str]:
+        """
+        Facts about what the model was compiled from, each a sentence; none of a model that was loaded.
         """
     @property
     def objects(self, /) -> list[str]:
@@ -285,8 +299,9 @@ class Model:
         """
     def predict(self, /, rows: DataSet | ArrayLike, *, raw: bool = False) -> list[str] | NDArray[float32]:
         """
-        The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value (its values, a column for each of several targets),
-        with `raw` the margin before the inverse link. Rows are as for `margins`.
+        The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value
+        (its values, a column for each of several targets), with `raw` the margin before the inverse link. Rows are as for
+        `margins`.
         """
     def save(self, /, path: str | PathLike[str]) -> None:
         """
@@ -320,6 +335,10 @@ class Recognizer:
     'bowl'
     """
     def __new__(cls, /, model: Model, *, error_rate: SupportsFloat | SupportsIndex | None = None, max_touches: SupportsIndex | None = None) -> Recognizer: ...
+    def _columns(self, /, header: SupportsGetItem[int, str]) -> tuple[list[int], str | None]:
+        """
+        The positions of the features among columns with these names, and what to know about that.
+        """
     @property
     def best(self, /) -> str:
         """
@@ -338,7 +357,8 @@ class Recognizer:
         """
     def push_row(self, /, row: ArrayLike) -> Verdict:
         """
-        Takes in a row of features, for a model over those; NaN where one is missing.
+        Takes in a row of features, for a model over those; NaN where one is missing. Of a series of pandas the features are
+        found by their names.
         """
     def reset(self, /, weights: SupportsGetItem[int, SupportsIndex] | None = None) -> None:
         """

@@ -44,6 +44,8 @@ def read(model: Any, names: list[str] | None) -> Ensemble:
         raise InputError(f"the {kind} is not fitted. Call its `fit` first.")
     if getattr(model, "n_outputs_", 1) > 1 and _is_classifier(model):
         raise InputError(f"the {kind} has classes of several kinds, each of which is a question of its own. Train a model for each.")
+    if _is_classifier(model) and len(model.classes_) < 2:
+        raise InputError(f"the {kind} knows one class, {model.classes_[0]}, and nothing to distinguish. Train on two or more.")
     parts = KNOWN[kind](model)
     features = [str(name) for name in getattr(model, "feature_names_in_", [""] * model.n_features_in_)]
     return Ensemble.from_trees(
@@ -230,12 +232,10 @@ def _tree(tree: Any, output: int | None, values: _Floats) -> _Tree:
 
 def _histogram(model: Any) -> _Parts:
     """Boosted trees over histograms, which no file format of scikit-learn's holds."""
-    categories = getattr(model, "is_categorical_", None)
-    if categories is not None and np.any(categories):
-        raise InputError(
-            "the model splits on categories. Encode categories as numbers before training, one column of 0 and 1 for each "
-            "(one-hot)."
-        )
+    # Its trees number the columns of categories first, and then the others.
+    of_categories = getattr(model, "is_categorical_", None)
+    is_category = np.zeros(model.n_features_in_, dtype=bool) if of_categories is None else np.asarray(of_categories, dtype=bool)
+    order = np.concatenate([np.flatnonzero(is_category), np.flatnonzero(~is_category)])
     first = np.ravel(model._baseline_prediction)
     is_binary = len(first) == 1 and _is_classifier(model)
     trees: list[_Tree] = []
@@ -243,12 +243,17 @@ def _histogram(model: Any) -> _Parts:
         for output, predictor in enumerate(stage):
             nodes = predictor.nodes
             leaf = nodes["is_leaf"].astype(bool)
+            if np.any(nodes["is_categorical"][~leaf]):
+                raise InputError(
+                    "the model splits on categories. Encode categories as numbers before training, one column of 0 and 1 for each "
+                    "(one-hot)."
+                )
             trees.append(
                 (
                     output + is_binary,
                     np.where(leaf, -1, nodes["left"].astype(np.int64)),
                     nodes["right"].astype(np.int64),
-                    nodes["feature_idx"].astype(np.int64),
+                    np.where(leaf, 0, order[np.where(leaf, 0, nodes["feature_idx"].astype(np.int64))]),
                     nodes["num_threshold"].astype(np.float64),
                     nodes["missing_go_to_left"].astype(bool),
                     nodes["value"].astype(np.float64),

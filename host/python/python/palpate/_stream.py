@@ -14,6 +14,7 @@ from . import _native
 from ._errors import InputError
 from ._import import compile
 from ._native import Model, Recognizer
+from ._rows import rows_of, take
 from ._types import Progress, Verdict
 
 _Ids = Sequence[object] | npt.NDArray[Any]
@@ -61,10 +62,6 @@ def _texts(values: _Ids) -> list[str]:
     return [str(value) for value in np.asarray(values).tolist()]
 
 
-def _rows(rows: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    return np.ascontiguousarray(rows, dtype=np.float64)
-
-
 def calibrate(
     model: object,
     rows: npt.ArrayLike,
@@ -104,7 +101,7 @@ def calibrate(
     compiled = model if isinstance(model, Model) else compile(model, max_touches=max_rows or 200)
     calibrated, text = _native.calibrate(
         compiled,
-        _rows(rows),
+        rows_of(compiled, rows),
         _texts(labels),
         _texts(sequence),
         groups=None if groups is None else _texts(groups),
@@ -113,7 +110,7 @@ def calibrate(
         confidence=confidence,
         max_rows=max_rows,
         strangers=strangers,
-        background=None if background is None else _rows(background),
+        background=None if background is None else rows_of(compiled, background),
         background_sequence=None if background_sequence is None else _texts(background_sequence),
         seed=seed,
         progress=progress,
@@ -138,7 +135,7 @@ def evaluate_sequences(
     `calibrate`. Without an `error_rate` the model stops at its own thresholds."""
     text = _native.evaluate_sequences(
         model,
-        _rows(rows),
+        rows_of(model, rows),
         _texts(labels),
         _texts(sequence),
         groups=None if groups is None else _texts(groups),
@@ -201,18 +198,18 @@ class SequenceRecognizer:
 
     def fit(self, X: npt.ArrayLike, y: _Ids, *, sequence: _Ids, groups: _Ids | None = None) -> SequenceRecognizer:
         """Trains on some sequences, and calibrates on the others."""
-        rows, labels, ids = np.asarray(X), np.asarray(y), np.asarray(sequence)
+        labels, ids = np.asarray(y), np.asarray(sequence)
         units = ids if groups is None else np.asarray(groups)
-        calibrated = np.ones(len(rows), dtype=bool)
+        calibrated = np.ones(len(labels), dtype=bool)
         if not hasattr(self.estimator, "classes_"):
             names = np.unique(units)
             np.random.default_rng(self.seed).shuffle(names)
             train = np.isin(units, names[: int(len(names) * self.train_share)])
-            self.estimator.fit(rows[train], labels[train])
+            self.estimator.fit(take(X, train), labels[train])
             calibrated = ~train
         self.calibrated_ = calibrate(
             self.estimator,
-            rows[calibrated],
+            take(X, calibrated),
             labels[calibrated],
             sequence=ids[calibrated],
             groups=None if groups is None else np.asarray(groups)[calibrated],
@@ -230,7 +227,7 @@ class SequenceRecognizer:
     def verdicts(self, X: npt.ArrayLike, *, sequence: _Ids) -> list[Verdict]:
         """The verdict on each sequence, in their order: its class as text, and the rows that it took."""
         recognizer = Recognizer(self.model_)
-        rows, ids = _rows(X), np.asarray(sequence)
+        rows, ids = rows_of(self.model_, X), np.asarray(sequence)
         starts = [0, *(np.flatnonzero(ids[1:] != ids[:-1]) + 1).tolist(), len(ids)]
         return [_verdict(recognizer, rows[start:end]) for start, end in zip(starts[:-1], starts[1:])]
 

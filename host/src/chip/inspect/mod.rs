@@ -2,7 +2,9 @@
 
 mod stated;
 
-pub use stated::{Defaults, Feature, Noise, PlanOf, Predicts, Probe, Promised, Tested, Touches, TrainedOn};
+pub use stated::{
+    Defaults, Feature, Noise, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches, TrainedOn,
+};
 
 use super::instructions::Chip;
 use crate::compile::{self, Core, Instructions, Memory};
@@ -30,6 +32,9 @@ pub struct Inspected<'a> {
     /// Of a model over rows: each feature's name, and how many units make up 1 (null where f32 values are compared).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feature_names: Option<Vec<Feature>>,
+    /// Of a model over some of the columns of the library's rows: their numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub columns: Option<SomeColumns>,
     /// The objects' names.
     pub objects: Vec<&'a str>,
     /// Of a model over rows: what it predicts.
@@ -123,6 +128,7 @@ pub fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         descriptor: model.descriptor().map_or("none (rows of features)", palpate_shared::Descriptor::name),
         features: model.feature_count(),
         feature_names: model.descriptor().is_none().then(|| features(model)),
+        columns: palpate_trees::rows::columns_of(model).map(|(all, used)| SomeColumns { all, used }),
         objects: (0..model.known_count()).map(|object| model.object_name(object)).collect(),
         predicts: predicts(model),
         layout: model.layout().name(),

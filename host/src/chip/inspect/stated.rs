@@ -138,6 +138,15 @@ pub struct Noise {
     pub pose_degrees: f64,
 }
 
+/// Columns of the library's rows that a model has as its features.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct SomeColumns {
+    /// Columns of the library's rows.
+    pub all: usize,
+    /// The number of each feature's column, from 0.
+    pub used: Vec<usize>,
+}
+
 /// The prediction of a model over rows.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Predicts {
@@ -148,11 +157,19 @@ pub struct Predicts {
     pub link: Option<&'static str>,
     /// Factor from a margin of the model to the library's.
     pub scale: f32,
+    /// Number that a margin is divided by before the link; absent if that is 1.
+    #[serde(skip_serializing_if = "is_one")]
+    pub average: u32,
     /// True if the last of several largest margins names the class.
     pub last_of_ties: bool,
     /// The least and the largest of the features that stand for a missing value: whole numbers, or keys of f32 values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<[i32; 2]>,
+}
+
+/// True for 1.
+fn is_one(number: &u32) -> bool {
+    *number == 1
 }
 
 pub(super) fn predicts(model: &Model<'_>) -> Option<Predicts> {
@@ -166,6 +183,7 @@ pub(super) fn predicts(model: &Model<'_>) -> Option<Predicts> {
         },
         link: is_value.then(|| prediction.link.name()),
         scale: prediction.scale,
+        average: prediction.average,
         last_of_ties: prediction.last_of_ties,
         missing: model.sentinel().map(|sentinel| [sentinel.low, sentinel.high]),
     })

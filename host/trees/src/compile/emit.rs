@@ -127,7 +127,8 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
          static const uint8_t {name}_model[{length}]\n\
          #if defined(__AVR__)\n    PROGMEM\n#elif defined(__GNUC__)\n    __attribute__((aligned(4)))\n#endif\n    = {{\n\
          {array}}};\n\n{functions}#endif\n",
-        about = about(model).replace("*/", "* /"),
+        // Neither ends the comment nor seems to begin another.
+        about = about(model).replace("*/", "* /").replace("/*", "/ *"),
         checks = checks(&name.to_uppercase(), &layout, &leaf, [strangers, shared, sentinel, row_evidence], objects),
         array = array(model.bytes()),
         open = match functions {
@@ -251,17 +252,20 @@ mod tests {
     }
 
     #[test]
-    fn names_of_objects_do_not_end_the_comment() {
+    fn names_of_objects_neither_end_the_comment_nor_begin_one() {
         let mut bytes = HOUSEHOLD.to_vec();
         // The first object's name is "bowl", after the exporter's version.
-        let at = bytes.windows(4).position(|window| window == b"bowl").unwrap();
-        bytes[at..at + 4].copy_from_slice(b"*/\n\x1b");
+        for (name, other) in [(b"bowl", b"*/\n\x1b"), (b"fork", b"a/*b")] {
+            let at = bytes.windows(4).position(|window| window == name).unwrap();
+            bytes[at..at + 4].copy_from_slice(other);
+        }
         let body = bytes.len() - 4;
         let sum = palpate_shared::format::checksum(&bytes[..body]);
         bytes[body..].copy_from_slice(&sum.to_le_bytes());
         let source = emit(&Model::new(&bytes).unwrap(), "model", Language::C);
         let first = source.split("*/").next().unwrap();
         assert!(first.contains("wristwatch") && first.ends_with("not to be edited. "), "{first}");
+        assert_eq!(first.matches("/*").count(), 1, "{first}");
         assert!(!emit(&Model::new(&bytes).unwrap(), "model", Language::Rust).lines().next().unwrap().contains('\x1b'));
     }
 }

@@ -209,8 +209,18 @@ impl<'a> Reader<'a, '_> {
                 let (left, left_splits, left_depth) = self.branch(left, depth + 1)?;
                 let (right, right_splits, right_depth) = self.branch(right, depth + 1)?;
                 let own = (self.own)(index).unwrap_or(Threshold::below(f64::from(threshold)));
-                let cut = self.thresholds.cut(feature, threshold, own);
-                let split = Split { feature: number, cut, missing_left, left, right, left_splits };
+                let split = match self.thresholds.cut(feature, threshold, own) {
+                    Some(cut) => Split { feature: number, cut, missing_left, left, right, left_splits },
+                    // Every number goes left: with sides changed, none is below the least one.
+                    None => Split {
+                        feature: number,
+                        cut: -i32::MAX,
+                        missing_left: !missing_left,
+                        left: right,
+                        right: left,
+                        left_splits: right_splits,
+                    },
+                };
                 let depth = 1 + left_depth.max(right_depth);
                 Ok((Branch::Split(Box::new(split)), 1 + left_splits + right_splits, depth))
             }
@@ -251,16 +261,21 @@ impl<'a> Thresholds<'a> {
         }
     }
 
-    /// Returns an error unless whole thresholds fit 32 bits: beyond, all values would be the same.
+    /// Returns an error unless whole thresholds fit 32 bits: beyond, all values would be the same. Those that part missing
+    /// values from all others may be anywhere.
     fn check_range(self, ensemble: &Ensemble) -> Result<()> {
         let Self::Scaled(scales) = self else { return Ok(()) };
-        for node in ensemble.trees.iter().flat_map(|tree| &tree.nodes) {
-            let &Node::Split { feature, threshold, .. } = node else { continue };
-            let Some(&scale) = scales.get(feature) else { continue };
-            if threshold.is_finite() && (f64::from(threshold) * f64::from(scale)).abs() > f64::from(i32::MAX - 1) {
-                let name = ensemble.inputs.names().get(feature).map(ToString::to_string).unwrap_or_default();
-                let allowed = format!("a smaller scale: its threshold {threshold} is beyond 2^31 units");
-                return Err(Error::setting("scales", format!("{scale} for {name}"), allowed));
+        for (number, tree) in ensemble.trees.iter().enumerate() {
+            for (index, node) in tree.nodes.iter().enumerate() {
+                let &Node::Split { feature, threshold, .. } = node else { continue };
+                let Some(&scale) = scales.get(feature) else { continue };
+                let is_beyond_all = ensemble.threshold(number, index).is_some_and(Threshold::is_beyond_all);
+                let units = (f64::from(threshold) * f64::from(scale)).abs();
+                if units > f64::from(i32::MAX - 1) && !is_beyond_all {
+                    let name = ensemble.inputs.names().get(feature).map(ToString::to_string).unwrap_or_default();
+                    let allowed = format!("a smaller scale: its threshold {threshold} is beyond 2^31 units");
+                    return Err(Error::setting("scales", format!("{scale} for {name}"), allowed));
+                }
             }
         }
         Ok(())
@@ -274,14 +289,15 @@ impl<'a> Thresholds<'a> {
     }
 
     /// The integer threshold that splits keys as `threshold` splits the values of `feature`; `own` is the same as the
-    /// file has it.
-    fn cut(self, feature: usize, threshold: f32, own: Threshold) -> i32 {
+    /// file has it. `None` if every number goes left.
+    fn cut(self, feature: usize, threshold: f32, own: Threshold) -> Option<i32> {
         // `as` keeps a value beyond an i32 at its limits; -2^31 is a missing value.
         let whole = |threshold: f64| (threshold.ceil() as i32).max(i32::MIN + 1);
         match self {
-            Self::Whole => whole(f64::from(threshold)),
-            Self::Real => f32_key(threshold),
-            Self::Scaled(scales) => whole(own.units(scales[feature])),
+            Self::Whole => Some(whole(f64::from(threshold))),
+            Self::Real => Some(f32_key(threshold)),
+            Self::Scaled(_) if own.is_beyond_all() && own.value > 0.0 => None,
+            Self::Scaled(scales) => Some(whole(own.units(scales[feature]))),
         }
     }
 }

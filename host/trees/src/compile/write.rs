@@ -33,6 +33,7 @@ pub(super) fn write(
         captured(ensemble, settings),
         parts.exits_section(),
         outputs(settings),
+        columns(ensemble),
     ]
     .concat();
     let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
@@ -91,7 +92,8 @@ pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest
     let sections = optional(ensemble, settings, forest)?.len()
         + of_rows(ensemble, settings).len()
         + captured(ensemble, settings).len()
-        + outputs(settings).len();
+        + outputs(settings).len()
+        + columns(ensemble).len();
     Ok(text(ensemble)?.len().next_multiple_of(4) + sections + CHECKSUM_LENGTH)
 }
 
@@ -137,8 +139,10 @@ fn of_rows(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
     let mut put = |part: &[u8]| bytes.extend_from_slice(part);
     let prediction = imported.prediction;
     if prediction != Prediction::default() {
+        let mut content = Vec::new();
+        prediction.write(&mut |part| content.extend_from_slice(part));
         // Whoever does not know it would take scaled margins for values, or targets for classes.
-        write_section(Tag::Prediction, prediction.scale != 1.0 || prediction.targets, &prediction.to_bytes(), &mut put);
+        write_section(Tag::Prediction, prediction.scale != 1.0 || prediction.targets, &content, &mut put);
     }
     if let Some(sentinel) = sentinel(ensemble, settings) {
         write_section(Tag::Sentinel, true, &sentinel.to_bytes(), &mut put);
@@ -174,6 +178,19 @@ fn outputs(settings: &Settings) -> Vec<u8> {
         let mut content = Vec::new();
         Outputs::write(outputs.iter().copied(), &mut |part| content.extend_from_slice(part));
         write_section(Tag::Outputs, true, &content, &mut |part| bytes.extend_from_slice(part));
+    }
+    bytes
+}
+
+/// The section about the columns that the features are of the library's rows.
+fn columns(ensemble: &Ensemble) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    if let Some(columns) = ensemble.origin.imported.as_ref().and_then(|imported| imported.columns.as_ref()) {
+        // Their number was checked: it is the last one's number that is written.
+        let number = |column: usize| u16::try_from(column).unwrap_or(u16::MAX).to_le_bytes();
+        let all = std::iter::once(columns.names.len().saturating_sub(1)).chain(columns.used.iter().copied());
+        let content: Vec<u8> = all.flat_map(number).collect();
+        write_section(Tag::Columns, false, &content, &mut |part| bytes.extend_from_slice(part));
     }
     bytes
 }

@@ -1,5 +1,6 @@
 //! Checks of an ensemble that was not read from a file: a reader checks while it reads.
 
+use super::columns::MAX_NAME;
 use super::{Ensemble, Inputs, Node, Output, Tree};
 use crate::error::{EnsembleProblem, NameProblem, TreeProblem};
 use std::collections::HashSet;
@@ -8,8 +9,6 @@ use std::collections::HashSet;
 pub const MAX_OBJECTS: usize = 256;
 /// The most features that a compiled model can have.
 pub const MAX_FEATURES: usize = 256;
-/// The most bytes of an object's name: a compiled model has one byte for its length.
-const MAX_NAME: usize = 255;
 
 impl Ensemble {
     /// Checks an ensemble that was put together by hand: 2 to 256 objects (over rows of 1 to 256 features also one) with

@@ -50,8 +50,13 @@ impl Inputs {
     pub fn are_named(&self) -> bool {
         match self {
             Self::Touches(_) => true,
-            Self::Rows(names) => names.iter().enumerate().any(|(index, name)| *name != Self::default_name(index)),
+            Self::Rows(names) => Self::has_names(names),
         }
+    }
+
+    /// True if some of these names are not the default ones.
+    pub(super) fn has_names(names: &[String]) -> bool {
+        names.iter().enumerate().any(|(index, name)| *name != Self::default_name(index))
     }
 }
 

@@ -5,6 +5,7 @@
 //! chip reads.
 
 mod check;
+pub(crate) mod columns;
 mod error;
 pub mod import;
 mod inputs;
@@ -17,7 +18,7 @@ pub use check::{MAX_FEATURES, MAX_OBJECTS, check_names};
 pub use error::{EnsembleProblem, NameProblem, TreeProblem};
 pub use inputs::Inputs;
 pub use nodes::Threshold;
-pub use origin::{Imported, Origin, Trained};
+pub use origin::{Columns, Imported, Origin, Trained};
 
 use palpate_shared::format::{Prediction, TrainedTouches};
 use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};

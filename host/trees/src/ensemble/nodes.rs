@@ -33,6 +33,12 @@ impl Threshold {
         }
     }
 
+    /// True if all whole numbers of units are on one side: the other one is of missing and infinite values alone, as with
+    /// CatBoost's border next to the least f32.
+    pub(crate) fn is_beyond_all(self) -> bool {
+        self.value.abs() >= f64::from(f32::MAX.next_down())
+    }
+
     /// The least whole number of units that goes right, where `scale` units make up 1.
     pub fn units(self, scale: f32) -> f64 {
         let units = self.value * f64::from(scale);

@@ -39,6 +39,18 @@ pub struct Imported {
     /// For each node of each tree the threshold as the file has it, of no meaning for leaves; empty where all are the
     /// ensemble's own.
     pub thresholds: Vec<Vec<Threshold>>,
+    /// Columns of the library's rows, where there are more than a model can have features: the ensemble has only those that
+    /// its trees use.
+    pub columns: Option<Columns>,
+}
+
+/// Columns of a library's rows, and those that an ensemble has as its features.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Columns {
+    /// The names of all columns; those that have none of their own are f0, f1 and so on.
+    pub names: Vec<String>,
+    /// The column of each feature.
+    pub used: Vec<usize>,
 }
 
 /// The touches that an ensemble was trained on.

@@ -184,6 +184,8 @@ impl Keys {
         match self {
             Self::Whole => whole(threshold.value),
             Self::Real => threshold.single().map_or(i64::MAX, |single| f32_key(single).into()),
+            // Every number is below.
+            Self::Scaled(_) if threshold.is_beyond_all() && threshold.value > 0.0 => i64::from(i32::MAX) + 1,
             Self::Scaled(scales) => whole(threshold.units(scales.get(feature).copied().unwrap_or(1.0))),
         }
     }

@@ -18,8 +18,8 @@ pub(super) struct Plain {
     pub(super) sentinel: Option<[i64; 2]>,
     /// Size of a unit in the library's margins.
     pub(super) unit: f64,
-    /// Code of the link, and true if the last of several equal classes is predicted.
-    pub(super) link: (u8, bool),
+    /// Code of the link, true if the last of several equal classes is predicted, and the divisor of a margin before the link.
+    pub(super) link: (u8, bool, u32),
     /// True if outputs are targets, and none is a class.
     pub(super) targets: bool,
     /// The largest whole number of a leaf; 0 for f32 leaves.
@@ -168,7 +168,7 @@ struct Stated<'b> {
     shared: Option<(usize, &'b [u8])>,
     sentinel: Option<[i64; 2]>,
     scale: f64,
-    link: (u8, bool),
+    link: (u8, bool, u32),
     targets: bool,
     scales: Vec<f32>,
     feature_names: Vec<String>,
@@ -182,7 +182,7 @@ impl<'b> Stated<'b> {
             shared: None,
             sentinel: None,
             scale: 1.0,
-            link: (0, false),
+            link: (0, false, 1),
             targets: false,
             scales: vec![1.0; features],
             feature_names: Vec::new(),
@@ -207,10 +207,12 @@ impl<'b> Stated<'b> {
                     stated.shared = Some((width, content.0));
                 }
                 13 => {
-                    stated.link = (content.byte()?, content.byte()? == 1);
+                    let (link, is_last) = (content.byte()?, content.byte()? == 1);
                     stated.targets = content.byte()? == 1;
                     content.take(1)?;
                     stated.scale = f64::from(content.float()?);
+                    let average = if link >= 128 { content.number(4)? as u32 } else { 1 };
+                    stated.link = (link & 127, is_last, average);
                 }
                 14 => stated.sentinel = Some([content.signed(4)?, content.signed(4)?]),
                 17 => {

@@ -34,7 +34,7 @@ use crate::verify::unit;
 use boxes::{Keys, Rows, Tree, Values, of_ensemble};
 use chip::Chip;
 use format::Plain;
-use palpate_shared::format::f32_key;
+use palpate_shared::format::{Link, f32_key};
 
 /// Result of a proof.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -65,6 +65,9 @@ pub struct Proof {
     /// The same of a layout of data, estimated: see [`Instructions`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimated: Option<Instructions>,
+    /// The links of the model and of the ensemble, where `export --link` set another one: what is proved are margins.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub other_link: Option<[&'static str; 2]>,
 }
 
 /// CRC-64 (XZ) of a file.
@@ -277,8 +280,8 @@ impl Subject<'_> {
             largest_difference: largest,
             margin_error: found.outputs.iter().map(|[error, ..]| *error).fold(0.0, f64::max),
             stated: plain.stated,
-            ranges: ensemble
-                .objects
+            ranges: plain
+                .names
                 .iter()
                 .zip(&found.outputs)
                 .map(|(name, &[_, least, most])| (name.clone(), least, most))
@@ -287,7 +290,15 @@ impl Subject<'_> {
             splits: plain.trees.iter().map(|(tree, _)| tree.depth()).sum(),
             instructions: None,
             estimated: None,
+            other_link: self.other_link(),
         }
+    }
+
+    /// The links of the model and of the ensemble, if they differ.
+    fn other_link(self) -> Option<[&'static str; 2]> {
+        let own = self.ensemble.prediction().link;
+        let link = Link::from_code(self.plain.link.0).filter(|link| *link != own)?;
+        Some([link.name(), own.name()])
     }
 
     /// Rows in words: the features that are bound.
@@ -319,7 +330,16 @@ fn statements(plain: &Plain, ensemble: &Ensemble) -> Result<(), ProofProblem> {
     let same = |what, model: String, ensemble: String| {
         if model == ensemble { Ok(()) } else { Err(ProofProblem::Statement { what, model, ensemble }) }
     };
-    same("outputs", plain.names.join(", "), ensemble.objects.join(", "))?;
+    // They are matched by position, since `export --names` names them otherwise; the same names in another order are others.
+    let sorted = |names: &[String]| {
+        let mut sorted = names.to_vec();
+        sorted.sort_unstable();
+        sorted
+    };
+    let [own, theirs] = [&plain.names, &ensemble.objects];
+    if own.len() != theirs.len() || (own != theirs && sorted(own) == sorted(theirs)) {
+        same("outputs", own.join(", "), theirs.join(", "))?;
+    }
     same("features", plain.features.to_string(), ensemble.inputs.count().to_string())?;
     let descriptor = ensemble.descriptor().map_or(255, |descriptor| descriptor.code());
     same("descriptor codes", plain.descriptor.to_string(), descriptor.to_string())?;
@@ -329,9 +349,11 @@ fn statements(plain: &Plain, ensemble: &Ensemble) -> Result<(), ProofProblem> {
         same("names of features", plain.feature_names.join(", "), names.join(", "))?;
     }
     let own = ensemble.prediction();
-    let link =
-        |(link, last): (u8, bool)| format!("link {link}, the {} of equal classes", if last { "last" } else { "first" });
-    same("predictions", link(plain.link), link((own.link.code(), own.last_of_ties)))?;
+    let rule = |last: bool, average: u32| {
+        format!("the {} of equal classes, values of a margin over {average}", if last { "last" } else { "first" })
+    };
+    let (_, last, average) = plain.link;
+    same("predictions", rule(last, average), rule(own.last_of_ties, own.average))?;
     let kind = |targets| if targets { "targets" } else { "classes, or one value" };
     same("kinds of outputs", kind(plain.targets).into(), kind(own.targets).into())?;
     let missing = ensemble.origin.imported.as_ref().and_then(|imported| imported.sentinel);

@@ -104,15 +104,21 @@ fn choices(chip: &Chip<'_>, subject: Subject<'_>) -> Vec<Vec<Vec<Values>>> {
     let all = plain.keys.all(plain.features);
     // Each feature's intervals between thresholds, without a missing value.
     let intervals = |(feature, values): (usize, &Values)| {
-        let cuts = chip.cuts_of(feature).into_iter().chain(cuts_of(sources.iter(), feature));
-        between(*values, cuts.collect())
+        let cuts: Vec<i64> = chip.cuts_of(feature).into_iter().chain(cuts_of(sources.iter(), feature)).collect();
+        let is_split = !cuts.is_empty();
+        // Values that stand for a missing one are no interval of their own, nor in one.
+        let ends = plain.sentinel.filter(|_| is_split).map(|[low, high]| [low, high + 1]);
+        let mut own = between(*values, cuts.into_iter().chain(ends.into_iter().flatten()).collect());
+        own.retain(|values| !plain.is_sentinel(values));
+        (is_split, own)
     };
-    let intervals: Vec<Vec<Values>> = all.iter().enumerate().map(intervals).collect();
+    // Whether a missing value may go another way than all others, even where no threshold is between those.
+    let (is_split, intervals): (Vec<bool>, Vec<Vec<Values>>) = all.iter().enumerate().map(intervals).unzip();
     if ensemble.descriptor() != Some(Descriptor::ContactsCurvature) {
-        let with_missing = |(own, &all): (Vec<Values>, &Values)| {
-            if own.len() == 1 { vec![all] } else { own.into_iter().chain([Values::MISSING]).collect() }
+        let with_missing = |((own, is_split), &all): ((Vec<Values>, bool), &Values)| {
+            if is_split { own.into_iter().chain([Values::MISSING]).collect() } else { vec![all] }
         };
-        return vec![intervals.into_iter().zip(&all).map(with_missing).collect()];
+        return vec![intervals.into_iter().zip(is_split).zip(&all).map(with_missing).collect()];
     }
     // A pattern fixes which differences are there.
     let there = [[false; 3], [false; 3], [false; 3], [false, false, true], [false, true, false], [true, true, false]];

@@ -1,9 +1,13 @@
 //! Problems with rows of features, and with comparing models on them.
 
+use crate::ensemble::Columns;
 use crate::error::Problem;
 
 /// Advice on the margins that `verify` compares with.
 const RAW_SCORES: &str = "Give the library's raw scores, before the softmax or the logistic function: one column per output, or one for a binary model (its second class), in the order of the classes. XGBoost: `output_margin=True`; LightGBM: `raw_score=True`; CatBoost: `prediction_type=\"RawFormulaVal\"`; scikit-learn: `decision_function`, of forests `predict_proba`; onnxruntime: a model converted with `options={id(model): {\"raw_scores\": True}}`, of forests its probabilities.";
+
+/// Advice on the predictions that `verify` compares with.
+const VALUES: &str = "Give what the library's `predict` says of each row: a class, or the value of a regression, a column for each of several targets. Where it gives probabilities (XGBoost's and LightGBM's boosters), give the class with the largest one, of two classes the second one above 0.5.";
 
 /// Problems with rows of features, and with comparing models on them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -24,16 +28,53 @@ pub enum RowsProblem {
     /// There is no row.
     #[error("it has no rows")]
     Empty,
-    /// Columns cannot be matched to features.
-    #[error("it has {found} columns for {wanted} features, and no column {missing:?}")]
+    /// There are as many columns without names as neither the model nor the library's rows have.
+    #[error("it has {found} columns for {wanted} features{}", all.map(|all| format!(" of the library's {all} columns")).unwrap_or_default())]
     Columns {
         /// Columns.
         found: usize,
         /// Features.
         wanted: usize,
-        /// A feature that no column is named after.
-        missing: String,
+        /// The columns of the library's rows, where the model has only some of them.
+        all: Option<usize>,
     },
+    /// Features and columns have names, and some feature is none of the columns.
+    #[error("no column is named {}; its columns are {}", some(missing), some(header))]
+    Unmatched {
+        /// The features that no column is named after.
+        missing: Vec<String>,
+        /// The columns.
+        header: Vec<String>,
+    },
+    /// Two columns have the same name.
+    #[error("two columns are named {name:?}")]
+    Repeated {
+        /// The name.
+        name: String,
+    },
+    /// The first line is a row, and no header.
+    #[error("its columns are named {}: numbers alone", some(cells))]
+    NumbersAlone {
+        /// The cells of the first line.
+        cells: Vec<String>,
+    },
+    /// Cells are not separated by commas.
+    #[error("its cells are separated by {:?}", separator.to_string())]
+    Separator {
+        /// The character between them.
+        separator: char,
+    },
+    /// A row has another number of cells than the header.
+    #[error("it has {found} cell{}, where the header has {wanted}", if *found == 1 { "" } else { "s" })]
+    Ragged {
+        /// Its cells.
+        found: u64,
+        /// Those of the header, or of the first row of a file without one.
+        wanted: u64,
+    },
+    /// There is nothing between two line ends.
+    #[error("the line is empty")]
+    EmptyLine,
     /// One label cannot be compared with several targets.
     #[error("the model has {targets} targets, and a row has one label")]
     Targets {
@@ -71,6 +112,45 @@ pub enum RowsProblem {
         found: usize,
         /// Outputs of the model.
         outputs: usize,
+    },
+    /// There are the library's predictions of other rows.
+    #[error("it has predictions of {values} rows, but there are {rows} rows")]
+    ValueRows {
+        /// Rows of predictions.
+        values: usize,
+        /// Rows of features.
+        rows: usize,
+    },
+    /// There are the library's predictions of other outputs.
+    #[error("row {row} has {found} predictions, where {wanted} {} needed", if *wanted == 1 { "is" } else { "are" })]
+    ValueColumns {
+        /// The row, counted from 1.
+        row: usize,
+        /// Its predictions.
+        found: usize,
+        /// One class or value, or a value for each target.
+        wanted: usize,
+    },
+    /// A prediction of the library is neither a class of the model nor a number.
+    #[error("the prediction {text:?} of row {row} is {}", if known.is_empty() { "no number".into() } else { format!("none of the model's classes: {}", some(known)) })]
+    ValueText {
+        /// The prediction.
+        text: String,
+        /// The row, counted from 1.
+        row: usize,
+        /// The classes; none for a regression.
+        known: Vec<String>,
+    },
+    /// The library predicts another value.
+    #[error(
+        "the library predicts other values for {rows} rows, and the rounding that the model states does not explain them: the first is row {}, of {} instead of {}",
+        first.row, first.values[0], first.values[1]
+    )]
+    Value {
+        /// Number of rows.
+        rows: usize,
+        /// The first of them.
+        first: ValueDiffers,
     },
     /// The model is over touches.
     #[error("the model is over touches, not over rows of features")]
@@ -160,6 +240,11 @@ pub enum RowsProblem {
     },
 }
 
+/// The first names of many.
+fn some(names: &[String]) -> String {
+    Columns::first(names.iter().map(String::as_str), 12)
+}
+
 fn of([features, outputs, trees]: [usize; 3]) -> String {
     format!("{features} features, {outputs} outputs and {trees} trees")
 }
@@ -168,6 +253,11 @@ impl RowsProblem {
     /// True if the file of the library's margins is at fault.
     pub fn is_about_margins(&self) -> bool {
         matches!(self, Self::MarginRows { .. } | Self::MarginColumns { .. } | Self::Probabilities)
+    }
+
+    /// True if the file of the library's predictions is at fault.
+    pub fn is_about_values(&self) -> bool {
+        matches!(self, Self::ValueRows { .. } | Self::ValueColumns { .. } | Self::ValueText { .. })
     }
 }
 
@@ -178,7 +268,20 @@ impl Problem for RowsProblem {
             Self::NotTable { .. } => "Give a Parquet file with a column for each feature, numbers or text.",
             Self::Empty => "Give at least one row below the header.",
             Self::Columns { .. } => {
-                "Name the columns as the features (`palpate inspect` lists them), or give as many columns as features."
+                "Name the columns as the features (`palpate inspect` lists them), or give as many columns as features, in their order."
+            }
+            Self::Unmatched { .. } => {
+                "Name the columns as the model's features, in any order; or 0, 1 and so on, to take them by their position."
+            }
+            Self::Repeated { .. } => "Give each column a name of its own.",
+            Self::NumbersAlone { .. } => "Write the features' names into the first line, above the first row.",
+            Self::Separator { .. } => "Separate cells by commas, and write decimals with a point.",
+            Self::Ragged { .. } => "Give each row as many cells as there are names, with nothing between commas where a value is missing.",
+            Self::EmptyLine => "Remove it; or write \"\" for a missing value of the only column.",
+            Self::ValueRows { .. } => "Give one line for each row, without a header.",
+            Self::ValueColumns { .. } | Self::ValueText { .. } => VALUES,
+            Self::Value { .. } => {
+                "Check that the predictions are those of these rows, by the very model of this file; `--link` sets another link at export."
             }
             Self::NoColumn { .. } => "Name one of the columns in the header.",
             Self::Number { .. } => "Give a number, or leave the cell empty where the value is missing.",
@@ -208,6 +311,15 @@ impl Problem for RowsProblem {
         }
         .into()
     }
+}
+
+/// A row of which the library predicts another value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ValueDiffers {
+    /// The row, counted from 1.
+    pub row: usize,
+    /// The model's value and the library's.
+    pub values: [f64; 2],
 }
 
 /// A row that the library puts into another class.

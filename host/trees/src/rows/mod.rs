@@ -1,13 +1,19 @@
 //! Rows of features, for models that other libraries trained: CSV files, sequences, and what a chip gets of a row.
 
+mod columns;
 mod error;
 mod generate;
+mod label;
+mod notes;
 pub mod scales;
 mod sequences;
+mod table;
 
-pub use error::{ClassDiffers, RowsProblem};
+pub use columns::{BY_POSITION, Features, Matched, columns_of};
+pub use error::{ClassDiffers, RowsProblem, ValueDiffers};
 pub use generate::generate;
-pub(crate) use sequences::class;
+pub(crate) use label::class;
+pub use notes::notes;
 pub use sequences::{RowOf, RowSequence, SequenceColumns, Sequences, SequencesBuilder};
 
 use crate::error::{Error, Place, Result};
@@ -15,6 +21,7 @@ use palpate_onboard::Model;
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Key, f32_key};
 use std::path::Path;
+use table::Table;
 
 /// Rows of features, NaN where one is missing.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +32,7 @@ pub struct Rows {
     pub values: Vec<f64>,
     /// The label of each row, if a column of them was asked for.
     pub labels: Vec<String>,
-    /// True if columns were taken by their position, since the header does not hold all of the features' names.
+    /// True if columns were taken by their position: see [`BY_POSITION`].
     pub by_position: bool,
 }
 
@@ -41,32 +48,24 @@ pub enum Encoder {
 impl Rows {
     /// Reads a CSV file: a header, then one row per line; a cell that is empty or NaN is missing.
     ///
-    /// Columns are matched by name if the header holds the names of all `features`; other columns are ignored then.
-    /// Otherwise they are taken by position, if there are as many as features. The column `label` is none of them.
+    /// Columns are matched as [`Features::among`] does it. The column `label` is no feature.
     ///
     /// # Errors
     /// [`Error::Io`]; [`RowsProblem`] naming the line: a file that is not such a table or has no rows, columns that cannot
-    /// be matched, a cell that is no number.
-    pub fn read(path: &Path, features: &[&str], label: Option<&str>) -> Result<Self> {
-        let file = std::fs::File::open(path).map_err(|source| Error::io(path, "read the rows", source))?;
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(std::io::BufReader::new(file));
-        let wrong = |problem: RowsProblem| Error::at(Place::file(path), problem);
-        let header = reader.headers().map_err(|error| not_rows(path, &error))?.clone();
-        let position = |name: &str| header.iter().position(|column| column == name);
-        let label = match label {
-            Some(name) => Some(position(name).ok_or_else(|| wrong(RowsProblem::NoColumn { name: name.into() }))?),
-            None => None,
-        };
-        let names: Vec<&str> = header.iter().collect();
-        let (columns, by_position) = columns(&names, features, label.as_slice()).map_err(wrong)?;
+    /// be matched, a cell that is no number, an empty line.
+    pub fn read(path: &Path, features: impl Into<Features>, label: Option<&str>) -> Result<Self> {
+        let features = features.into();
+        let table = Table::read(path)?;
+        let label = label.map(|name| table.column(name)).transpose()?;
+        let header: Vec<&str> = table.header.iter().map(String::as_str).collect();
+        let matched = features.among(&header, label.as_slice()).map_err(|problem| table.in_header(problem))?;
         let (mut values, mut labels) = (Vec::new(), Vec::new());
-        let mut record = csv::StringRecord::new();
-        while reader.read_record(&mut record).map_err(|error| not_rows(path, &error))? {
-            let line = record.position().map_or(0, csv::Position::line);
-            for &column in &columns {
+        for record in table.records() {
+            let (line, record) = record?;
+            for &column in &matched.columns {
                 let text = record.get(column).unwrap_or_default();
                 let value = number(text).ok_or_else(|| {
-                    let column = header.get(column).unwrap_or_default().to_owned();
+                    let column = header.get(column).copied().unwrap_or_default().to_owned();
                     Error::at(Place::line(path, line), RowsProblem::Number { column, text: text.into() })
                 })?;
                 values.push(value);
@@ -74,9 +73,9 @@ impl Rows {
             labels.extend(label.map(|column| record.get(column).unwrap_or_default().to_owned()));
         }
         if values.is_empty() {
-            return Err(wrong(RowsProblem::Empty));
+            return Err(Error::at(Place::file(path), RowsProblem::Empty));
         }
-        Ok(Self { features: features.len(), values, labels, by_position })
+        Ok(Self { features: features.count(), values, labels, by_position: matched.by_position })
     }
 
     /// Number of rows.
@@ -95,43 +94,31 @@ impl Rows {
     }
 }
 
-/// The column of each feature: by name if the header holds the names of all, otherwise by position, if there are as many
-/// columns but the `others`; whether it is by position.
-fn columns(header: &[&str], features: &[&str], others: &[usize]) -> Result<(Vec<usize>, bool), RowsProblem> {
-    let position = |name: &str| header.iter().position(|column| *column == name);
-    let by_name: Option<Vec<usize>> = features.iter().map(|name| position(name)).collect();
-    if let Some(columns) = by_name {
-        return Ok((columns, false));
-    }
-    let columns: Vec<usize> = (0..header.len()).filter(|column| !others.contains(column)).collect();
-    if columns.len() != features.len() {
-        let missing = features.iter().find(|name| position(name).is_none()).map_or("", |name| name);
-        let (found, wanted) = (columns.len(), features.len());
-        return Err(RowsProblem::Columns { found, wanted, missing: missing.into() });
-    }
-    Ok((columns, true))
-}
-
 /// Reads a CSV file of margins: no header, one row per line, as many numbers in each.
 ///
 /// # Errors
 /// [`Error::Io`]; [`RowsProblem`] naming the line.
 pub fn read_margins(path: &Path) -> Result<Vec<Vec<f64>>> {
-    let file = std::fs::File::open(path).map_err(|source| Error::io(path, "read the margins", source))?;
-    let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).has_headers(false).from_reader(std::io::BufReader::new(file));
-    let mut margins = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|error| not_rows(path, &error))?;
-        let line = record.position().map_or(0, csv::Position::line);
+    let finite = |text: &str| text.parse::<f64>().ok().filter(|margin| margin.is_finite());
+    let table = Table::without_header(path, "read the margins")?;
+    let row = |record: Result<(u64, csv::StringRecord)>| {
+        let (line, record) = record?;
         let number = |(column, text): (usize, &str)| {
-            let margin = text.parse::<f64>().ok().filter(|margin| margin.is_finite());
             let problem = || RowsProblem::Number { column: (column + 1).to_string(), text: text.into() };
-            margin.ok_or_else(|| Error::at(Place::line(path, line), problem()))
+            finite(text).ok_or_else(|| Error::at(Place::line(path, line), problem()))
         };
-        margins.push(record.iter().enumerate().map(number).collect::<Result<Vec<f64>>>()?);
-    }
-    Ok(margins)
+        record.iter().enumerate().map(number).collect()
+    };
+    table.records().map(row).collect()
+}
+
+/// Reads a CSV file of a library's predictions: no header, one row per line, a class or a value in each, or one for each target.
+///
+/// # Errors
+/// [`Error::Io`]; [`RowsProblem`] naming the line.
+pub fn read_values(path: &Path) -> Result<Vec<Vec<String>>> {
+    let table = Table::without_header(path, "read the values")?;
+    table.records().map(|record| Ok(record?.1.iter().map(String::from).collect())).collect()
 }
 
 /// A cell's number; NaN if it is empty.
@@ -140,14 +127,6 @@ fn number(text: &str) -> Option<f64> {
         return Some(f64::NAN);
     }
     text.parse().ok()
-}
-
-fn not_rows(path: &Path, error: &csv::Error) -> Error {
-    let place = match error.position() {
-        Some(position) => Place::line(path, position.line()),
-        None => Place::file(path),
-    };
-    Error::at(place, RowsProblem::NotRows { detail: error.to_string() })
 }
 
 impl Encoder {
@@ -207,16 +186,22 @@ mod tests {
         let rows = read("b,x,a\n1,9,2\n,8,inf\n", &["a", "b"], None).unwrap();
         assert_eq!((rows.values[..2].to_vec(), rows.by_position), (vec![2.0, 1.0], false));
         assert_eq!((rows.values[2], rows.values[3].is_nan(), rows.len()), (f64::INFINITY, true, 2));
-        let rows = read("p,q\n1,2\n", &["a", "b"], None).unwrap();
+        let rows = read("0,1\n1,2\n", &["a", "b"], None).unwrap();
         assert_eq!((rows.values, rows.by_position), (vec![1.0, 2.0], true));
-        let rows = read("p,kind,q\n1,cup,2\n", &["a", "b"], Some("kind")).unwrap();
+        let rows = read("p,kind,q\n1,cup,2\n", &["f0", "f1"], Some("kind")).unwrap();
         assert_eq!((rows.values, rows.labels), (vec![1.0, 2.0], vec!["cup".to_owned()]));
         for (text, expected) in [
-            ("p,q,r\n1,2,3\n", "3 columns for 2 features, and no column \"a\""),
+            ("p,q\n1,2\n", ":1: no column is named a, b; its columns are p, q"),
+            ("a,q\n1,2\n", ":1: no column is named b; its columns are a, q"),
+            ("0,1,2\n1,2,3\n", ":1: it has 3 columns for 2 features"),
+            ("0.5,1\n1,2\n", ":1: its columns are named 0.5, 1: numbers alone"),
+            ("a;b\n1;2\n", ":1: its cells are separated by \";\""),
+            ("a,b\n1,2\n\n3,4\n", ":3: the line is empty"),
+            ("a,b,a\n1,2,3\n", ":1: two columns are named \"a\""),
             ("a,b\n", "no rows"),
-            ("", "for 2 features"),
+            ("", ":1: no column is named a, b"),
             ("a,b\n1,x\n", ":2: \"x\" in the column b is not a number"),
-            ("a,b\n1\n", ":2: "),
+            ("a,b\n1\n", ":2: it has 1 cell, where the header has 2"),
         ] {
             let complaint = read(text, &["a", "b"], None).unwrap_err();
             assert!(complaint.contains(expected), "{complaint}");

@@ -3,6 +3,7 @@
 use super::Rows;
 use crate::ensemble::{Ensemble, Node, Threshold};
 use std::collections::BTreeSet;
+use std::fmt;
 
 /// Effect of whole numbers on a feature.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -33,6 +34,29 @@ pub struct Merged {
     pub thresholds: usize,
     /// Those that stay different in f32.
     pub different: usize,
+}
+
+impl fmt::Display for Merged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { feature, thresholds, different } = self;
+        write!(
+            f,
+            "{feature}: of {thresholds} thresholds {different} stay different in f32, so that values between the others go \
+             another way than in the library. A scale compares whole numbers instead (--scale {feature}=UNITS, in Python \
+             scales=)."
+        )
+    }
+}
+
+impl fmt::Display for Effect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { feature, scale, thresholds, different, largest_step, .. } = self;
+        write!(
+            f,
+            "{feature}: {scale} units make up 1; of {thresholds} thresholds {different} stay different; a value within \
+             {largest_step:e} of one may go the other way"
+        )
+    }
 }
 
 /// The different thresholds of a feature as the file has them, in order, each with the f32 that stands for it.
@@ -85,7 +109,7 @@ pub fn effects(ensemble: &Ensemble, scales: &[f32], rows: Option<&Rows>) -> Vec<
         // other way than they would.
         let units = |threshold: &Threshold| threshold.value * f64::from(scale);
         let step = |threshold: &Threshold| (threshold.units(scale) - 0.5 - units(threshold)).abs() / f64::from(scale);
-        let finite = thresholds.iter().filter(|threshold| threshold.value.is_finite());
+        let finite = thresholds.iter().filter(|threshold| !threshold.is_beyond_all());
         let largest_step = finite.map(step).fold(0.0, f64::max);
         let (thresholds, different) = (thresholds.len(), cuts.len());
         let values_are_whole = rows.map(|rows| rows.iter().all(|row| is_whole(row[feature], scale.into())));
@@ -110,8 +134,9 @@ const LARGEST: f64 = 1e7;
 pub fn fit(ensemble: &Ensemble, rows: &Rows) -> Vec<f32> {
     let of_feature = |feature: usize| {
         let values: Vec<f64> = rows.iter().map(|row| row[feature]).filter(|value| value.is_finite()).collect();
-        let thresholds = thresholds(ensemble, feature).into_iter().map(|(threshold, _)| threshold.value);
-        let finite = values.iter().copied().chain(thresholds.filter(|threshold| threshold.is_finite()));
+        let thresholds = thresholds(ensemble, feature).into_iter().map(|(threshold, _)| threshold);
+        let thresholds = thresholds.filter(|threshold| !threshold.is_beyond_all()).map(|threshold| threshold.value);
+        let finite = values.iter().copied().chain(thresholds);
         let largest = finite.map(f64::abs).fold(0.0, f64::max);
         let mut scale = 1.0;
         while !values.iter().all(|&value| is_whole(value, scale)) && largest * scale * 10.0 <= LARGEST && scale < 1e30 {

@@ -1,6 +1,7 @@
 //! Sequences of rows: the rows of one object, in their order, with the object's class.
 
-use super::{RowsProblem, columns, not_rows, number};
+use super::table::Table;
+use super::{Features, RowsProblem, class, number};
 use crate::error::{Error, Place, Result};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -28,7 +29,7 @@ pub struct Sequences {
     pub sequences: Vec<RowSequence>,
     /// The names of the groups, if sequences belong to some.
     pub groups: Vec<String>,
-    /// True if columns were taken by their position, since the header does not hold all of the features' names.
+    /// True if columns were taken by their position: see [`BY_POSITION`](super::BY_POSITION).
     pub by_position: bool,
 }
 
@@ -129,12 +130,6 @@ impl SequencesBuilder {
     }
 }
 
-/// The position of a class by its name, or by its number.
-pub(crate) fn class(classes: &[String], label: &str) -> Option<usize> {
-    let by_number = || label.parse().ok().filter(|number| *number < classes.len());
-    classes.iter().position(|name| name == label).or_else(by_number)
-}
-
 impl Sequences {
     /// Reads a CSV file with a header, then one row per line; a cell that is empty or NaN is missing. Columns are matched
     /// as by [`Rows::read`](super::Rows::read).
@@ -142,14 +137,21 @@ impl Sequences {
     /// # Errors
     /// [`Error::Io`]; [`RowsProblem`] naming the line, as [`SequencesBuilder::push`], and for a column that is not there
     /// or a cell that is no number.
-    pub fn read(path: &Path, features: &[&str], names: &SequenceColumns<'_>, classes: &[String]) -> Result<Self> {
-        let file = std::fs::File::open(path).map_err(|source| Error::io(path, "read the rows", source))?;
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(std::io::BufReader::new(file));
-        let header = reader.headers().map_err(|error| not_rows(path, &error))?.clone();
-        let header: Vec<&str> = header.iter().collect();
-        let records = reader.into_records().map(|record| {
-            let record = record.map_err(|error| not_rows(path, &error))?;
-            let line = record.position().map_or(0, csv::Position::line);
+    pub fn read(
+        path: &Path,
+        features: impl Into<Features>,
+        names: &SequenceColumns<'_>,
+        classes: &[String],
+    ) -> Result<Self> {
+        let table = Table::read(path)?;
+        // Before others, since cells may be separated by something else.
+        [Some(names.sequence), names.label, names.group].into_iter().flatten().try_for_each(|name| {
+            table.column(name)?;
+            Ok::<_, Error>(())
+        })?;
+        let header: Vec<&str> = table.header.iter().map(String::as_str).collect();
+        let records = table.records().map(|record| {
+            let (line, record) = record?;
             Ok((line, record.iter().map(String::from).collect()))
         });
         Self::from_table(&header, records, features, names, classes, |line| Place::line(path, line))
@@ -163,7 +165,7 @@ impl Sequences {
     pub fn from_table(
         header: &[&str],
         records: impl Iterator<Item = Result<(u64, Vec<String>)>>,
-        features: &[&str],
+        features: impl Into<Features>,
         names: &SequenceColumns<'_>,
         classes: &[String],
         place: impl Fn(u64) -> Place,
@@ -175,14 +177,14 @@ impl Sequences {
         let [label, group] = [names.label.map(&position).transpose()?, names.group.map(&position).transpose()?];
         let sequence = position(names.sequence)?;
         let others: Vec<usize> = [sequence].into_iter().chain(label).chain(group).collect();
-        let (columns, by_position) =
-            columns(header, features, &others).map_err(|problem| Error::at(place(1), problem))?;
-        let mut builder = SequencesBuilder::new(features.len(), classes);
-        let mut values = vec![0.0; features.len()];
+        let features = features.into();
+        let matched = features.among(header, &others).map_err(|problem| Error::at(place(1), problem))?;
+        let mut builder = SequencesBuilder::new(features.count(), classes);
+        let mut values = vec![0.0; features.count()];
         for record in records {
             let (line, record) = record?;
             let cell = |column: usize| record.get(column).map_or("", String::as_str);
-            for (value, &column) in values.iter_mut().zip(&columns) {
+            for (value, &column) in values.iter_mut().zip(&matched.columns) {
                 *value = number(cell(column)).ok_or_else(|| {
                     let name = header.get(column).copied().unwrap_or_default().to_owned();
                     Error::at(place(line), RowsProblem::Number { column: name, text: cell(column).into() })
@@ -192,7 +194,7 @@ impl Sequences {
             builder.push(&values, row).map_err(|problem| Error::at(place(line), problem))?;
         }
         let built = builder.finish().map_err(|problem| Error::at(place(1), problem))?;
-        Ok(Self { by_position, ..built })
+        Ok(Self { by_position: matched.by_position, ..built })
     }
 
     /// Number of rows.
@@ -244,12 +246,16 @@ mod tests {
                 &own,
                 ":2: the label \"pan\" in row 1 is none of the model's classes: cup, jug",
             ),
-            ("id,a,x,y,kind\n1,1,2,3,cup\n", &own, ":1: it has 3 columns for 2 features, and no column \"b\""),
+            ("id,a,x,y,kind\n1,1,2,3,cup\n", &own, ":1: no column is named b; its columns are id, a, x, y, kind"),
+            // As many columns as features, of which one is missing.
+            ("id,a,x,kind\n1,1,2,cup\n", &own, ":1: no column is named b; its columns are id, a, x, kind"),
+            ("id;a;b;kind\n1;1;2;cup\n", &own, ":1: its cells are separated by \";\""),
+            ("id,a,b,kind\n\n1,1,2,cup\n", &own, ":2: the line is empty"),
             ("id,a,b\n1,1,2\n", &own, ":1: it has no column \"kind\""),
             ("a,b,kind\n1,2,cup\n", &own, ":1: it has no column \"id\""),
             ("id,a,b,kind\n1,1,2,cup\n", &COLUMNS, ":1: it has no column \"who\""),
             ("id,a,b,kind\n1,1,x,cup\n", &own, ":2: \"x\" in the column b is not a number"),
-            ("id,a,b,kind\n1,1,cup\n", &own, ":2: "),
+            ("id,a,b,kind\n1,1,cup\n", &own, ":2: it has 3 cells, where the header has 4"),
             ("id,a,b,kind\n", &own, ":1: it has no rows"),
             (
                 "id,a,b,kind,who\n1,1,2,cup,ann\n1,1,2,cup,bo\n",
@@ -264,7 +270,7 @@ mod tests {
 
     #[test]
     fn columns_that_are_no_features_do_not_count_by_position() {
-        let read = read("id,p,kind,q\n1,1,cup,2\n", &SequenceColumns { group: None, ..COLUMNS }).unwrap();
+        let read = read("id,0,kind,1\n1,1,cup,2\n", &SequenceColumns { group: None, ..COLUMNS }).unwrap();
         assert_eq!((read.values, read.by_position), (vec![1.0, 2.0], true));
     }
 }

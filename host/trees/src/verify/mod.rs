@@ -8,6 +8,7 @@ pub mod predict;
 mod reference;
 mod score;
 pub mod together;
+mod values;
 
 pub use crate::rows::ClassDiffers;
 pub use candidate::Candidate;
@@ -18,14 +19,14 @@ pub use score::{Classes, Regression, RowsEvaluation, evaluate_rows};
 use crate::ensemble::{Ensemble, Threshold};
 use crate::error::{Result, RowsProblem};
 use crate::progress::{self, Progress};
-use crate::rows::{Encoder, Rows, generate};
+use crate::rows::{Encoder, Rows, ValueDiffers, generate};
 use isolated::first_different_tree;
 use palpate_onboard::Model;
-use palpate_shared::format::LeafType;
 use predict::class_by;
 use rayon::prelude::*;
-use reference::Reference;
+use reference::{Reference, Rounding};
 use together::margins_of_rows;
+use values::OfPredictions;
 
 /// Distance between a model and its source.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -47,9 +48,25 @@ pub struct Verified {
     /// Those of them that the rounding that the model states does not explain: the library's margins of the two classes are
     /// farther apart, or equal where nothing that decides between the two was rounded.
     pub library_class_unexplained: Option<usize>,
-    /// The first of these.
+    /// The largest difference of a value to what the library predicts; `None` without its predictions, or for classes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub library_max_value_error: Option<f64>,
+    /// Given rows that the library predicts another class for, or a value farther away than the rounding of margins that the
+    /// model states explains; `None` without its predictions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub library_values_differ: Option<usize>,
+    /// Those of them that this rounding does not explain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub library_values_unexplained: Option<usize>,
+    /// The first row with another class than by the library's margins or its predictions.
     #[serde(skip)]
     pub first_class: Option<ClassDiffers>,
+    /// The first row with another value than the library predicts.
+    #[serde(skip)]
+    pub first_value: Option<ValueDiffers>,
+    /// Rounding of the library's margins as text: half a unit in the last place of the largest, as f32.
+    #[serde(skip)]
+    pub library_text_error: f64,
     /// True if the library's margins look like probabilities.
     #[serde(skip)]
     pub are_probabilities: bool,
@@ -74,14 +91,26 @@ impl Verified {
             return beyond("the ensemble's", self.max_margin_error, self.first_tree.clone());
         }
         match self.library_max_margin_error {
-            Some(_) if self.are_probabilities => Err(RowsProblem::Probabilities),
-            Some(error) if error > bound => beyond("the library's", error, None),
-            _ => match (&self.first_class, self.library_class_unexplained) {
-                (Some(first), Some(rows)) => Err(RowsProblem::Class { rows, first: first.clone() }),
-                _ => Ok(()),
-            },
+            Some(_) if self.are_probabilities => return Err(RowsProblem::Probabilities),
+            Some(error) if error > bound + self.library_text_error => return beyond("the library's", error, None),
+            _ => {}
+        }
+        let rows = self.library_class_unexplained.filter(|&rows| rows > 0).or(self.library_values_unexplained);
+        match (&self.first_class, &self.first_value, rows) {
+            (Some(first), _, Some(rows)) => Err(RowsProblem::Class { rows, first: first.clone() }),
+            (_, Some(first), Some(rows)) => Err(RowsProblem::Value { rows, first: first.clone() }),
+            _ => Ok(()),
         }
     }
+}
+
+/// Answers of the library that trained a model, for the rows that are given.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Library<'l> {
+    /// Its margins: one for each output, or one for a binary model, that of its second class.
+    pub margins: Option<&'l [Vec<f64>]>,
+    /// Its predictions: a class by name, or the value of a regression, one for each target.
+    pub values: Option<&'l [Vec<String>]>,
 }
 
 /// Result of comparing rows.
@@ -110,17 +139,16 @@ impl Difference {
 /// Rows compared at once.
 const BATCH: usize = 4096;
 
-/// Compares a model with its ensemble on `rows` and on rows made at every threshold, and with `library`, the library's own
-/// margins of `rows`: one for each output, or one for a binary model, that of its second class.
+/// Compares a model with its ensemble on `rows` and on rows made at every threshold, and with what `library` says of `rows`.
 ///
 /// # Errors
-/// [`RowsProblem`] if model, ensemble, rows and margins do not belong together;
+/// [`RowsProblem`] if model, ensemble, rows and the library's answers do not belong together;
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn verify(
     model: &Model<'_>,
     ensemble: &Ensemble,
     rows: &Rows,
-    library: Option<&[Vec<f64>]>,
+    library: Library<'_>,
     progress: &dyn Progress,
 ) -> Result<Verified> {
     if model.descriptor().is_some() || ensemble.descriptor().is_some() {
@@ -155,8 +183,12 @@ pub fn verify(
     result?;
     let rest = compare_all(model, &reference, &batch, rows.len() + generated - generated % BATCH, progress)?;
     difference = difference.with(rest);
-    let library =
-        library.map(|library| compare_library(model, &reference, rows, library)).transpose()?.unwrap_or_default();
+    let predicted = library.values.map(|said| values::compare(model, &reference, rows, said)).transpose()?;
+    let library = library.margins.map(|library| compare_library(model, &reference, rows, library)).transpose()?;
+    let library = library.unwrap_or_default();
+    let (values_differ, values_unexplained) =
+        predicted.as_ref().map(|predicted| (predicted.differ, predicted.unexplained)).unzip();
+    let OfPredictions { error: max_value_error, first_class, first_value, .. } = predicted.unwrap_or_default();
     let first_tree = difference.example.as_ref().and_then(|(number, row)| {
         let tree = first_different_tree(model, &reference, ensemble, row)?;
         let place = match number.checked_sub(rows.len()) {
@@ -174,7 +206,12 @@ pub fn verify(
         library_max_margin_error: library.margin_error,
         library_class_differs: library.margin_error.map(|_| library.class_differs),
         library_class_unexplained: library.margin_error.map(|_| library.unexplained),
-        first_class: library.first,
+        library_max_value_error: max_value_error,
+        library_values_differ: values_differ,
+        library_values_unexplained: values_unexplained,
+        first_class: library.first.or(first_class),
+        first_value,
+        library_text_error: library.text_error,
         are_probabilities: library.are_probabilities,
         first_tree,
         scaling: scaling(&reference, rows),
@@ -231,6 +268,7 @@ struct OfLibrary {
     class_differs: usize,
     unexplained: usize,
     first: Option<ClassDiffers>,
+    text_error: f64,
     are_probabilities: bool,
 }
 
@@ -246,13 +284,9 @@ fn compare_library(
     }
     let outputs = model.object_count();
     let prediction = model.prediction();
-    let imported = reference.ensemble.origin.imported.as_ref();
-    let of_import = imported.map_or(0.0, |imported| imported.rounding);
     let stated = bound(model);
-    // What the model's margins are rounded by, and whether sums of votes are exact, so that ties are ties.
-    let rounding = if model.leaf_type() == LeafType::F32 { of_import } else { stated };
-    let is_vote = reference.ensemble.prediction().scale != 1.0 && outputs > 1;
-    let ties_are_exact = is_vote && (model.leaf_type() == LeafType::F32 || stated <= of_import * (1.0 + 1e-6));
+    let rounding = Rounding::of(model, reference);
+    let is_vote = reference.is_vote();
     let mut found =
         OfLibrary { are_probabilities: !is_vote && are_probabilities(library, outputs), ..OfLibrary::default() };
     let mut error = 0.0_f64;
@@ -272,6 +306,8 @@ fn compare_library(
             }
         };
         error = error.max(largest_difference(&own, &expected));
+        let half = |margin: &f64| margin.abs() * f64::from(f32::EPSILON) / 2.0;
+        found.text_error = expected.iter().map(half).fold(found.text_error, f64::max);
         let class = class_by(&expected, &prediction);
         let own = if prediction.targets { 0 } else { model.predict_class(&encoded, &mut scratch).unwrap_or_default() };
         if own == class {
@@ -279,8 +315,7 @@ fn compare_library(
         }
         found.class_differs += 1;
         let gap = (expected[class] - expected[own]).abs();
-        let is_explained = rounding > 0.0 && gap <= 2.0 * rounding && !(gap == 0.0 && ties_are_exact);
-        if !is_explained {
+        if !rounding.explains(gap) {
             found.unexplained += 1;
             let classes = [own, class].map(|class| model.object_name(class).to_owned());
             found.first.get_or_insert(ClassDiffers { row: number + 1, classes, gap });

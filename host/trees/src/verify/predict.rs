@@ -4,7 +4,7 @@ use super::Candidate;
 use super::together::AT_ONCE;
 use crate::error::{Result, RowsProblem};
 use crate::rows::Encoder;
-use palpate_onboard::inverse_link;
+use palpate_onboard::predicted_value;
 use palpate_shared::format::Prediction;
 use rayon::prelude::*;
 
@@ -49,7 +49,7 @@ pub fn predict<V: Copy + Into<f64> + Sync>(
         return Err(RowsProblem::Touches.into());
     }
     if features != wanted {
-        return Err(RowsProblem::Columns { found: features, wanted, missing: String::new() }.into());
+        return Err(RowsProblem::Columns { found: features, wanted, all: None }.into());
     }
     let rows = values.par_chunks_exact(features).with_min_len(AT_ONCE / 16);
     Ok(match candidate {
@@ -60,7 +60,7 @@ pub fn predict<V: Copy + Into<f64> + Sync>(
                 ensemble.margins_of_features(&row)
             };
             if outputs == 1 || prediction.targets {
-                let link = move |margin| if raw { margin } else { inverse_link(prediction.link, margin) };
+                let link = move |margin| if raw { margin } else { predicted_value(prediction, margin) };
                 Predicted::Values(rows.flat_map_iter(|row| margins(row).into_iter().map(link)).collect())
             } else {
                 let nats = |row: &[V]| margins(row).into_iter().map(f64::from).collect::<Vec<_>>();

@@ -25,6 +25,17 @@ impl<'a> Reference<'a> {
         self.ensemble.trees.iter().any(|tree| tree.output != Output::One(1))
     }
 
+    /// The farthest that the file's trees in f32 can be from the library's margins.
+    pub(super) fn rounding(&self) -> f64 {
+        self.ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding)
+    }
+
+    /// True if each tree votes for the classes, so that sums of votes are whole and may be equal.
+    pub(super) fn is_vote(&self) -> bool {
+        let is_each = self.ensemble.trees.iter().all(|tree| tree.output == Output::Each);
+        is_each && self.ensemble.objects.len() > 1 && self.ensemble.prediction().scale != 1.0
+    }
+
     /// The margins of what the model gets.
     pub(super) fn margins(&self, row: &[f64], encoded: &[i32]) -> Vec<f32> {
         match &self.encoder {
@@ -62,6 +73,30 @@ impl<'a> Reference<'a> {
                 }
             }
         }
+    }
+}
+
+/// Rounding that may put two classes into another order than the library's.
+#[derive(Clone, Copy)]
+pub(super) struct Rounding {
+    /// The farthest that a margin can be from the library's.
+    largest: f64,
+    /// True if sums of votes are exact, so that equal ones are equal in the library.
+    ties_are_exact: bool,
+}
+
+impl Rounding {
+    /// Rounding of a model's margins, and of its file's in f32.
+    pub(super) fn of(model: &Model<'_>, reference: &Reference<'_>) -> Self {
+        let (of_import, stated) = (reference.rounding(), bound(model));
+        let is_f32 = model.leaf_type() == LeafType::F32;
+        let ties_are_exact = reference.is_vote() && (is_f32 || stated <= of_import * (1.0 + 1e-6));
+        Self { largest: if is_f32 { of_import } else { stated }, ties_are_exact }
+    }
+
+    /// True if it explains another class than the library's, of which the margins are this far apart.
+    pub(super) fn explains(self, gap: f64) -> bool {
+        self.largest > 0.0 && gap <= 2.0 * self.largest && !(gap == 0.0 && self.ties_are_exact)
     }
 }
 

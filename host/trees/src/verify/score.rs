@@ -57,8 +57,7 @@ pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvalua
         return Err(RowsProblem::Touches.into());
     }
     if features != rows.features {
-        let missing = "features".into();
-        return Err(RowsProblem::Columns { found: rows.features, wanted: features, missing }.into());
+        return Err(RowsProblem::Columns { found: rows.features, wanted: features, all: None }.into());
     }
     let predicted = predict(candidate, &rows.values, rows.features, false)?;
     let label = |row: usize| rows.labels.get(row).map_or("", String::as_str);

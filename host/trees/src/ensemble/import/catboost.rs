@@ -77,6 +77,9 @@ struct ModelInfo {
     class_params: Value,
     #[serde(default)]
     params: Value,
+    /// The probability from which on the second class is predicted, as a text.
+    #[serde(default)]
+    binclass_probability_threshold: Value,
 }
 
 #[derive(Deserialize)]
@@ -196,7 +199,9 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     if loss == "MultiClassOneVsAll" {
         draft.notes.push("Posteriors are those of softmax, the model's of one class against all others.".into());
     }
-    if matches!(loss, "Poisson" | "Tweedie" | "LogLinQuantile") {
+    check_threshold(&document.model_info.binclass_probability_threshold)?;
+    // As its `predict` says by default: LogLinQuantile's values are margins there.
+    if matches!(loss, "Poisson" | "Tweedie") {
         draft.prediction.link = Link::Exponential;
     }
     draft.prediction.targets = are_targets;
@@ -227,6 +232,21 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
         draft.trees.push(DraftTree { nodes, output });
     }
     draft.finish(names)
+}
+
+/// Returns an error for another threshold than one half: a model's class is that with the largest margin.
+fn check_threshold(stated: &Value) -> Result<()> {
+    let text = stated.as_str().map_or_else(|| stated.to_string(), String::from);
+    if stated.is_null() || text.parse() == Ok(0.5) {
+        return Ok(());
+    }
+    Err(unsupported(
+        format!(
+            "it has the probability threshold {text} for its second class, and a model here gives the class with the greatest \
+             margin"
+        ),
+        "Call `set_probability_threshold(0.5)` before saving it, and compare posteriors yourself.",
+    ))
 }
 
 fn class_names(params: &Value) -> Vec<String> {

@@ -4,10 +4,9 @@ use super::draft_node::DraftNode;
 use super::options::{default_names, named};
 use super::spelled_out::spelled_out;
 use super::votes;
-use crate::ensemble::{Ensemble, Imported, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Origin, Output, Threshold, Tree};
+use crate::ensemble::{Ensemble, Imported, Inputs, MAX_OBJECTS, Node, Origin, Output, Threshold, Tree, columns};
 use crate::error::EnsembleProblem;
 use palpate_shared::format::Prediction;
-use std::collections::BTreeSet;
 
 /// An ensemble that is being read.
 #[derive(Default)]
@@ -27,6 +26,8 @@ pub(super) struct Draft {
     pub(super) prediction: Prediction,
     /// The numbers that stand for a missing value, beside NaN.
     pub(super) sentinel: Option<[f32; 2]>,
+    /// Divisor of the library's raw scores that makes log-odds of them, whose softmax are its probabilities.
+    pub(super) divisor: Option<f64>,
 }
 
 /// A tree whose leaves have values in f64.
@@ -49,21 +50,12 @@ impl Draft {
         if self.names.is_empty() {
             self.names = default_names(outputs, self.prediction.targets);
         }
-        let count = self.features.len();
-        if count > MAX_FEATURES {
-            let used = self.used_features();
-            return Err(EnsembleProblem::FeatureCount { count, used, most: MAX_FEATURES });
-        }
-        for (index, name) in self.features.iter_mut().enumerate() {
-            if name.is_empty() {
-                *name = Inputs::default_name(index);
-            }
-        }
         let base = self.base.clone();
         let leaves = self.leaves();
         if let Some(scale) = self.count_votes() {
             self.prediction.scale = scale;
         }
+        self.divide();
         let scale = f64::from(self.prediction.scale);
         let rounding = self.rounding(&base, &leaves, scale);
         let objects = named(names, self.names)?;
@@ -80,6 +72,7 @@ impl Draft {
         if thresholds.iter().flatten().all(is_single) {
             thresholds.clear();
         }
+        let (features, columns) = columns::features(self.features, &mut trees, &mut self.notes)?;
         let imported = Imported {
             kind: self.kind,
             rounding,
@@ -87,20 +80,21 @@ impl Draft {
             prediction: self.prediction,
             sentinel: self.sentinel,
             thresholds,
+            columns,
         };
         let origin = Origin { imported: Some(imported), ..Origin::default() };
-        let ensemble = Ensemble { inputs: Inputs::Rows(self.features), objects, base_margins, trees, origin };
+        let ensemble = Ensemble { inputs: Inputs::Rows(features), objects, base_margins, trees, origin };
         ensemble.check()?;
         Ok(ensemble)
     }
 
-    pub(super) fn used_features(&self) -> usize {
-        let nodes = self.trees.iter().flat_map(|tree| &tree.nodes);
-        let features = nodes.filter_map(|node| match node {
-            DraftNode::Split { feature, .. } | DraftNode::Set { feature, .. } => Some(feature),
-            DraftNode::Leaf(_) => None,
-        });
-        features.collect::<BTreeSet<_>>().len()
+    /// Makes log-odds of raw scores: margins are divided, and the scale makes the library's of them again.
+    fn divide(&mut self) {
+        let Some(divisor) = self.divisor.filter(|divisor| *divisor != 1.0) else { return };
+        let nodes = self.trees.iter_mut().flat_map(|tree| &mut tree.nodes);
+        let leaves = nodes.filter_map(|node| if let DraftNode::Leaf(values) = node { Some(values) } else { None });
+        leaves.flatten().chain(&mut self.base).for_each(|value| *value /= divisor);
+        self.prediction.scale = divisor as f32;
     }
 
     /// Turns shares of votes into whole numbers, if all trees vote and start from nothing: see [`votes::count`].

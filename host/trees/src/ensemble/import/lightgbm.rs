@@ -86,7 +86,10 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     }
     let version = head.text("version").unwrap_or_default();
     let mut draft = Draft { features: own, kind: format!("LightGBM text {version}"), ..Draft::default() };
-    let first = objective(head.text("objective"), outputs, &mut draft)?;
+    // The library divides what such a model's trees add up to by their number before its link.
+    let is_averaged = head.values.contains_key("average_output");
+    let rounds = if is_averaged { (blocks.len() / outputs).max(1) } else { 1 };
+    let first = objective(head.text("objective"), outputs, rounds, &mut draft)?;
     draft.base = vec![0.0; outputs + first];
     let trees: Vec<_> = blocks
         .iter()
@@ -111,13 +114,6 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
         let nodes = grower.nodes;
         draft.trees.push(DraftTree { nodes, output });
     }
-    if head.values.contains_key("average_output") {
-        let rounds = (blocks.len() / outputs).max(1);
-        draft.notes.push(format!(
-            "A random forest: margins are the library's raw scores, which are sums. Its probabilities are computed \
-             from averages: the posteriors here use margins {rounds} times as large."
-        ));
-    }
     Ok(draft.finish(names)?)
 }
 
@@ -141,20 +137,23 @@ fn blocks(text: &str) -> Result<(Block<'_>, Vec<Block<'_>>)> {
     Err(damaged(text.lines().count() as u64, "it ends before the line \"end of trees\"".into()))
 }
 
-/// The first tree's object: 1 for a binary model. Says what is unusual about the objective.
-fn objective(text: Option<&str>, outputs: usize, draft: &mut Draft) -> Result<usize> {
+/// The first tree's object: 1 for a binary model. Says what is unusual about the objective; `rounds` are averaged.
+fn objective(text: Option<&str>, outputs: usize, rounds: usize, draft: &mut Draft) -> Result<usize> {
     let text = text.unwrap_or("custom");
     let mut words = text.split_ascii_whitespace();
     let name = words.next().unwrap_or("custom");
     let sigmoid = words.find_map(|word| word.strip_prefix("sigmoid:")).unwrap_or("1");
+    let sigmoid: f64 = sigmoid.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor > 0.0).unwrap_or(1.0);
     let is_classes = matches!(name, "multiclass" | "multiclassova");
     if outputs > 1 && !is_classes && name != "custom" {
         return Err(EnsembleProblem::Objective { found: name.into() }.into());
     }
-    if matches!(name, "binary" | "multiclassova") && sigmoid.parse() != Ok(1.0) {
-        draft.notes.push(format!(
-            "Posteriors take margins as log-odds, but the model's must be multiplied by {sigmoid} first."
-        ));
+    if is_classes || name == "binary" {
+        // Of these, and of no others, margins are evidence.
+        let sigmoid = if name == "multiclass" { 1.0 } else { sigmoid };
+        draft.divisor = Some(rounds as f64 / sigmoid);
+    } else {
+        draft.prediction.average = u32::try_from(rounds).unwrap_or(u32::MAX);
     }
     if name == "multiclassova" {
         draft.notes.push("Posteriors are those of softmax, the model's of one class against all others.".into());
@@ -163,7 +162,12 @@ fn objective(text: Option<&str>, outputs: usize, draft: &mut Draft) -> Result<us
         "poisson" | "gamma" | "tweedie" => Link::Exponential,
         "cross_entropy" => Link::Logistic,
         "cross_entropy_lambda" => Link::Softplus,
-        "regression" if text.split_ascii_whitespace().any(|word| word == "sqrt") => Link::Square,
+        // Every objective that is derived from this one may learn the roots of its targets.
+        "regression" | "regression_l1" | "huber" | "fair" | "quantile" | "mape"
+            if text.split_ascii_whitespace().any(|word| word == "sqrt") =>
+        {
+            Link::Square
+        }
         _ => Link::Identity,
     };
     Ok(usize::from(name == "binary"))

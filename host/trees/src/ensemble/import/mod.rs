@@ -110,6 +110,8 @@ pub fn read_with(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
 fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
     let names = options.names;
     let wrong = |problem| Error::at(Place::file(path), problem);
+    // The mark that Windows puts before a text.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     match kind(bytes).map_err(wrong)? {
         Kind::Json => match json_kind(bytes) {
             JsonKind::CatBoost => catboost::read(bytes, names).map_err(wrong),
@@ -169,8 +171,8 @@ fn kind(bytes: &[u8]) -> Result<Kind, EnsembleProblem> {
         [0x80, 2..=5, ..] => refused(
             "it is a Python pickle, which only Python can open",
             "Convert a scikit-learn model with `skl2onnx.to_onnx(model, X[:1])`, and save the bytes of its \
-             SerializeToString(); a model of another library with its own save_model. HistGradientBoosting cannot be \
-             converted: train XGBoost or LightGBM with the same settings.",
+             SerializeToString(); a model of another library with its own save_model. skl2onnx drops where missing values go: \
+             with such rows, and for HistGradientBoosting, which it cannot convert, use palpate.compile of the Python package.",
         ),
         [0x1f, 0x8b, ..] | [b'P', b'K', 3, 4, ..] | [0x28, 0xb5, 0x2f, 0xfd, ..] => {
             refused("it is compressed", "Unpack it first.")

@@ -23,6 +23,14 @@ pub(in crate::ensemble) const MISSING_UNKNOWN: &str = "The file does not state t
 pub(in crate::ensemble) const CATEGORIES: &str = "Categories are the numbers that the library saw in training: of a pandas \
                                                   column their codes, from 0 on in the order of its categories.";
 
+/// A classifier of one class is no regression.
+pub(in crate::ensemble) fn one_class() -> EnsembleProblem {
+    EnsembleProblem::Unsupported {
+        what: "it has one class, and nothing to distinguish".into(),
+        way: "Train on two classes or more.".into(),
+    }
+}
+
 /// The names of outputs that have none: the labels 0, 1 and so on, or the value or targets of a regression.
 pub(in crate::ensemble) fn default_names(outputs: usize, are_targets: bool) -> Vec<String> {
     match outputs {

@@ -61,6 +61,9 @@ impl Objective {
     }
 }
 
+/// The least probability of a base score.
+const LEAST: f32 = 1e-6;
+
 impl Link {
     /// The margin of a base score, in f32 as XGBoost computes it. C libraries' logarithms of f32 are the nearest f32
     /// nearly always; that of an f64, rounded, is always.
@@ -68,7 +71,8 @@ impl Link {
         let ln = |value: f32| f64::from(value).ln() as f32;
         match self {
             Self::Identity => base_score,
-            Self::Logit => -ln(1.0 / base_score - 1.0),
+            // XGBoost keeps probabilities this far from 0 and 1: of a class that all labels have.
+            Self::Logit => -ln(1.0 / base_score.clamp(LEAST, 1.0 - LEAST) - 1.0),
             Self::Log => ln(base_score),
         }
     }

@@ -4,12 +4,12 @@ use super::objective::{Kind, Objective};
 use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
 use super::trees::{Shape, has_sets, tree};
 use crate::ensemble::check::check_names;
-use crate::ensemble::import::options::{CATEGORIES, MISSING_UNKNOWN, Options, default_names, named};
-use crate::ensemble::{Ensemble, Imported, Inputs, MAX_FEATURES, Node, Origin};
+use crate::ensemble::import::options::{CATEGORIES, MISSING_UNKNOWN, Options, default_names, named, one_class};
+use crate::ensemble::{Ensemble, Imported, Inputs, Node, Origin, Tree, columns};
 use crate::error::EnsembleProblem;
 use palpate_shared::Descriptor;
 use palpate_shared::format::{Link as Inverse, Prediction};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 type Attributes = BTreeMap<String, String>;
 
@@ -27,6 +27,7 @@ impl Document {
         let classes = count("num_class", &learner_model_param.num_class)?;
         let targets = count("num_target", &learner_model_param.num_target)?;
         let groups = match outputs {
+            Kind::Classes if classes == 1 => return Err(one_class()),
             Kind::Classes => classes,
             Kind::One => targets.max(1),
             Kind::Binary if targets > 1 => {
@@ -65,7 +66,7 @@ impl Document {
                 if own.len() != objects {
                     return Err(EnsembleProblem::Classes { classes: objects, objects: own.len() });
                 }
-                check_feature_count(features, &forest)?;
+                columns::check_count(features)?;
                 let are_named = feature_names.len() == features;
                 let inputs = if are_named { Inputs::Rows(feature_names) } else { Inputs::unnamed(features) };
                 (inputs, named(names, own)?)
@@ -74,7 +75,13 @@ impl Document {
         let mut base_margins = vec![0.0; first];
         base_margins.extend(base_scores(&learner_model_param.base_score, groups)?.into_iter().map(|b| link.margin(b)));
         if base_margins.iter().any(|margin| !margin.is_finite()) {
-            return Err(EnsembleProblem::BaseScore { text: learner_model_param.base_score, objects: groups });
+            return Err(EnsembleProblem::Unsupported {
+                what: format!(
+                    "its base_score {} is no margin under {}",
+                    learner_model_param.base_score, objective.name
+                ),
+                way: "Train on labels that are not all the same.".into(),
+            });
         }
         let mut notes = Vec::new();
         let taken = taken(&forest, &attributes, groups, options.all_trees, &mut notes)?;
@@ -99,16 +106,20 @@ impl Document {
         if trees.iter().any(has_sets) {
             notes.push(CATEGORIES.into());
         }
-        let trees = trees.iter().enumerate().zip(tree_info).take(taken).map(read).collect::<Result<_, _>>()?;
+        let mut trees: Vec<Tree> =
+            trees.iter().enumerate().zip(tree_info).take(taken).map(read).collect::<Result<_, _>>()?;
         let mut origin = origin(&attributes)?;
-        if inputs.descriptor().is_none() {
+        let mut inputs = inputs;
+        if let Inputs::Rows(names) = inputs {
+            let (features, columns) = columns::features(names, &mut trees, &mut notes)?;
+            inputs = Inputs::Rows(features);
             let Rows { mut prediction, sentinel } = rows(&attributes, inverse)?;
             prediction.targets = outputs == Kind::One && objects.len() > 1;
             if sentinel.is_none() {
                 notes.push(MISSING_UNKNOWN.into());
             }
             let kind = format!("XGBoost {version} {kind}");
-            origin.imported = Some(Imported { kind, notes, prediction, sentinel, ..Imported::default() });
+            origin.imported = Some(Imported { kind, notes, prediction, sentinel, columns, ..Imported::default() });
         }
         let mut ensemble = Ensemble { inputs, objects, base_margins, trees, origin };
         if let Some(weights) = weights {
@@ -161,6 +172,17 @@ pub(super) struct StatedRows {
     /// As text, since JSON has no infinities.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) sentinel: Option<[String; 2]>,
+    /// Divisor of a margin before the link.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub(super) average: u32,
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn is_one(number: &u32) -> bool {
+    *number == 1
 }
 
 #[derive(Default)]
@@ -183,14 +205,18 @@ fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows, EnsembleProbl
     if !(stated.scale.is_finite() && stated.scale > 0.0) {
         return Err(wrong(format!("the scale {}", stated.scale)));
     }
-    let number = |text: String| text.parse::<f32>().ok().filter(|number| !number.is_nan());
-    let sentinel = stated.sentinel.map(|ends| ends.map(number));
+    let number = |text: &String| text.parse::<f32>().ok().filter(|number| !number.is_nan());
+    let sentinel = stated.sentinel.as_ref().map(|ends| ends.each_ref().map(number));
     let sentinel = match sentinel {
         None => None,
         Some([Some(low), Some(high)]) if low <= high => Some([low, high]),
         Some(_) => return Err(wrong("the sentinel is not a range of numbers".into())),
     };
-    let prediction = Prediction { link, last_of_ties: stated.last_of_ties, scale: stated.scale, targets: false };
+    if stated.average == 0 {
+        return Err(wrong("a mean of no trees".into()));
+    }
+    let StatedRows { last_of_ties, scale, average, .. } = stated;
+    let prediction = Prediction { link, last_of_ties, scale, targets: false, average };
     Ok(Rows { prediction, sentinel })
 }
 
@@ -202,22 +228,15 @@ fn forest(booster: GradientBooster) -> Result<(Forest, Option<Vec<f32>>), Ensemb
         return Err(EnsembleProblem::Booster { found });
     }
     let inner = booster.gbtree.map_or((None, None), |inner| (inner.model, inner.weight_drop));
-    let Some(mut forest) = booster.model.or(inner.0) else { return Err(EnsembleProblem::NoTrees) };
+    let Some(mut forest) = booster.model.or(inner.0) else {
+        return Err(EnsembleProblem::Unsupported {
+            what: "it has settings and no trees, as XGBoost's save_config writes them".into(),
+            way: "Save the model with `booster.save_model(\"model.json\")`.".into(),
+        });
+    };
     let weights = booster.weight_drop.or(inner.1).or(forest.weight_drop.take());
     // gbtree writes no weights, or none for its trees.
     Ok((forest, weights.filter(|weights| !weights.is_empty())))
-}
-
-fn check_feature_count(count: usize, forest: &Forest) -> Result<(), EnsembleProblem> {
-    if (1..=MAX_FEATURES).contains(&count) {
-        return Ok(());
-    }
-    let splits = |tree: &TreeColumns| {
-        let splits = tree.left_children.iter().zip(&tree.split_indices).filter(|(left, _)| **left != -1);
-        splits.map(|(_, &feature)| feature).collect::<Vec<_>>()
-    };
-    let used = forest.trees.iter().flat_map(splits).collect::<BTreeSet<_>>().len();
-    Err(EnsembleProblem::FeatureCount { count, used, most: MAX_FEATURES })
 }
 
 /// Multiplies leaves by their tree's weight, in f32 as XGBoost does.

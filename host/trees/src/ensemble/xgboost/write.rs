@@ -15,10 +15,14 @@ impl Document {
     /// The document of an ensemble that [`Ensemble::check`] accepts.
     pub(super) fn new(ensemble: &Ensemble) -> Self {
         let outputs = Outputs::of(ensemble);
-        let features = ensemble.inputs.count();
         let trees = trees_of_one_kind(ensemble);
-        let feature_names = match &ensemble.inputs {
-            Inputs::Rows(names) if ensemble.inputs.are_named() => names.clone(),
+        // Rows have all columns there.
+        let all = ensemble.origin.imported.as_ref().and_then(|imported| imported.columns.as_ref());
+        let features = all.map_or(ensemble.inputs.count(), |all| all.names.len());
+        let column = |feature: usize| all.map_or(Some(feature), |all| all.used.get(feature).copied());
+        let feature_names = match (&ensemble.inputs, all) {
+            (Inputs::Rows(_), Some(all)) if Inputs::has_names(&all.names) => all.names.clone(),
+            (Inputs::Rows(names), None) if Inputs::has_names(names) => names.clone(),
             _ => Vec::new(),
         };
         Self {
@@ -37,7 +41,7 @@ impl Document {
                         trees: trees
                             .iter()
                             .zip(0..)
-                            .map(|(tree, id)| columns(tree, id, features, outputs.groups))
+                            .map(|(tree, id)| columns(tree, id, (features, &column), outputs.groups))
                             .collect(),
                         weight_drop: None,
                     }),
@@ -74,6 +78,7 @@ pub(super) fn attributes(inputs: &Inputs, objects: &[String], origin: &Origin) -
             last_of_ties: prediction.last_of_ties,
             scale: prediction.scale,
             sentinel: sentinel.map(|ends| ends.map(|end| end.to_string())),
+            average: prediction.average,
         };
         if let Ok(text) = serde_json::to_string(&stated) {
             attributes.insert("palpate_prediction".into(), text);
@@ -122,7 +127,12 @@ fn rounds(trees: &[Tree], outputs: &Outputs) -> Vec<u64> {
     (0..=trees.len()).step_by(per_round).filter_map(|tree| u64::try_from(tree).ok()).collect()
 }
 
-fn columns(tree: &Tree, id: u64, features: usize, objects: usize) -> TreeColumns {
+fn columns(
+    tree: &Tree,
+    id: u64,
+    (features, column): (usize, &dyn Fn(usize) -> Option<usize>),
+    objects: usize,
+) -> TreeColumns {
     let each = tree.output == Output::Each;
     let width = if each { objects } else { 1 };
     let nodes = tree.nodes.len();
@@ -157,7 +167,8 @@ fn columns(tree: &Tree, id: u64, features: usize, objects: usize) -> TreeColumns
                 }
                 columns.left_children.push(index(*left));
                 columns.right_children.push(index(*right));
-                columns.split_indices.push(u64::try_from(*feature).unwrap_or(u64::MAX));
+                let column = column(*feature).and_then(|column| u64::try_from(column).ok());
+                columns.split_indices.push(column.unwrap_or(u64::MAX));
                 columns.split_conditions.push(threshold);
                 columns.default_left.push(Flag::Number(u8::from(missing_left)));
                 columns.base_weights.extend(std::iter::repeat_n(0.0, width));

@@ -2,6 +2,7 @@
 
 use super::wire::Node;
 use super::{Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
+use crate::ensemble::import::options::one_class;
 use palpate_shared::format::Link;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -185,6 +186,9 @@ fn classes(
     let texts = texts.iter().map(ToString::to_string);
     draft.names = texts.chain(numbers.iter().map(ToString::to_string)).collect();
     let classes = outputs(draft.names.len() as i64)?;
+    if classes == 1 {
+        return Err(one_class());
+    }
     let named: BTreeSet<i64> = targets.iter().copied().collect();
     let is_votes = transform == "NONE" && weights.iter().all(|&weight| weight >= 0.0);
     if is_votes {

@@ -2,9 +2,12 @@
 
 use super::wire::Node;
 use super::{Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
+use palpate_shared::format::Link;
 
 /// The modes' names, by their codes.
 const MODES: [&str; 7] = ["LEQ", "LT", "GTE", "GT", "EQ", "NEQ", "MEMBER"];
+/// The names of what may be done to the sums, by their codes.
+const TRANSFORMS: [&str; 5] = ["NONE", "SOFTMAX", "LOGISTIC", "SOFTMAX_ZERO", "PROBIT"];
 /// The aggregate functions' names, by their codes.
 const AGGREGATES: [&str; 4] = ["AVERAGE", "SUM", "MIN", "MAX"];
 
@@ -31,6 +34,15 @@ pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
     draft.base = vec![0.0; wanted];
     if wanted > 1 {
         draft.notes.push("The file does not say what its outputs are: they are taken for classes.".into());
+    }
+    // Of one output a value; of classes margins are those before it.
+    match integer("post_transform").and_then(|code| usize::try_from(code).ok()).unwrap_or(0) {
+        0 => {}
+        2 if wanted == 1 => draft.prediction.link = Link::Logistic,
+        code => {
+            let name = TRANSFORMS.get(code).copied().unwrap_or("unknown");
+            draft.notes.push(format!("The file's post_transform is {name}: margins are those before it."));
+        }
     }
     let aggregate = usize::try_from(integer("aggregate_function").unwrap_or(1)).ok();
     let aggregate = aggregate.and_then(|code| AGGREGATES.get(code)).copied().unwrap_or("unknown function");

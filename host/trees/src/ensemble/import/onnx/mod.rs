@@ -10,7 +10,7 @@ mod wire;
 
 use super::draft::{Draft, DraftTree, Targeted};
 use super::unsupported;
-use crate::ensemble::{Ensemble, MAX_FEATURES, MAX_OBJECTS, Threshold};
+use crate::ensemble::{Ensemble, MAX_OBJECTS, Threshold, columns::check_count};
 use crate::error::EnsembleProblem;
 use wire::{Attribute, Graph, Node};
 
@@ -55,10 +55,10 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
         ));
     }
     let columns = columns(&model.graph, node)?;
-    let mut draft = Draft { kind: format!("ONNX {} ({})", node.operation, model.producer), ..Draft::default() };
-    if model.producer.is_empty() {
-        draft.kind = format!("ONNX {}", node.operation);
-    }
+    // CatBoost states its sources and its compiler there as well.
+    let producer = model.producer.lines().next().unwrap_or_default().trim_end();
+    let producer = if producer.is_empty() { String::new() } else { format!(" ({producer})") };
+    let mut draft = Draft { kind: format!("ONNX {}{producer}", node.operation), ..Draft::default() };
     draft.f32_sums = true;
     let features = match node.operation {
         "TreeEnsemble" => five::read(node, &mut draft)?,
@@ -71,9 +71,7 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     if count < features {
         return Err(damaged(format!("it splits on feature {}, but there are {count}", features - 1)));
     }
-    if count > MAX_FEATURES {
-        return Err(EnsembleProblem::FeatureCount { count, used: draft.used_features(), most: MAX_FEATURES });
-    }
+    check_count(count)?;
     draft.features = vec![String::new(); count];
     draft.finish(names)
 }

@@ -1,0 +1,285 @@
+//! Columns of a table that are a model's features: found by name, or taken by position where there are no names.
+
+use super::RowsProblem;
+use crate::ensemble::{Ensemble, columns::holdable};
+use palpate_onboard::Model;
+use palpate_shared::format::Tag;
+use std::collections::HashSet;
+
+/// Features of a model or an ensemble, as the columns of a table have to hold them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Features {
+    names: Vec<String>,
+    /// The columns of the library's rows, and the one of each feature, where it had more than the model has.
+    columns: Option<(usize, Vec<usize>)>,
+}
+
+/// Columns of the features.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Matched {
+    /// For each feature the position of its column.
+    pub columns: Vec<usize>,
+    /// True if they were taken by their position: the table has no names, or the model has none.
+    pub by_position: bool,
+}
+
+/// Note about columns that were taken by their position.
+pub const BY_POSITION: &str =
+    "columns are taken by their position, since the model's features have no names, or the columns have none";
+
+impl From<&[&str]> for Features {
+    fn from(names: &[&str]) -> Self {
+        Self { names: names.iter().map(ToString::to_string).collect(), columns: None }
+    }
+}
+
+impl From<&Vec<&str>> for Features {
+    fn from(names: &Vec<&str>) -> Self {
+        names.as_slice().into()
+    }
+}
+
+impl<const COUNT: usize> From<&[&str; COUNT]> for Features {
+    fn from(names: &[&str; COUNT]) -> Self {
+        names.as_slice().into()
+    }
+}
+
+impl From<&Model<'_>> for Features {
+    fn from(model: &Model<'_>) -> Self {
+        Self { names: super::feature_names(model), columns: columns_of(model) }
+    }
+}
+
+impl From<&Ensemble> for Features {
+    fn from(ensemble: &Ensemble) -> Self {
+        let columns = ensemble.origin.imported.as_ref().and_then(|imported| imported.columns.as_ref());
+        Self {
+            names: ensemble.inputs.names().into_iter().map(String::from).collect(),
+            columns: columns.map(|columns| (columns.names.len(), columns.used.clone())),
+        }
+    }
+}
+
+/// The number of columns that the library's rows had, and the one of each feature, if a model states them: the content of the
+/// section [`Tag::Columns`].
+pub fn columns_of(model: &Model<'_>) -> Option<(usize, Vec<usize>)> {
+    let section = model.optional_sections().find(|section| section.tag == Tag::Columns.code())?;
+    let mut numbers = section.content.as_chunks().0.iter().map(|bytes| usize::from(u16::from_le_bytes(*bytes)));
+    let all = numbers.next()? + 1;
+    let used: Vec<usize> = numbers.take(model.feature_count()).collect();
+    (used.len() == model.feature_count() && used.iter().all(|&column| column < all)).then_some((all, used))
+}
+
+impl Features {
+    /// Number of features.
+    pub fn count(&self) -> usize {
+        self.names.len()
+    }
+
+    /// The features' names.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.names.iter().map(String::as_str)
+    }
+
+    /// The features among the columns of a table with this header, of which `others` are none.
+    ///
+    /// Where both have names, each feature has to be one of the columns; there may be more of them, in any order. Names are
+    /// equal also where one has `_` for the other one's blanks, brackets and control characters, as LightGBM writes them.
+    /// `Column_3`, `f3` and `3` are no names, but numbers: they are found by them. Where one side has none, columns are taken by
+    /// their position. Numbers alone are a row without a header, unless they count from 0 or are the features' own names.
+    ///
+    /// # Errors
+    /// [`RowsProblem::Unmatched`], [`RowsProblem::Repeated`], [`RowsProblem::NumbersAlone`], [`RowsProblem::Columns`].
+    pub fn among(&self, header: &[&str], others: &[usize]) -> Result<Matched, RowsProblem> {
+        let mut seen = HashSet::new();
+        if let Some(name) = header.iter().find(|name| !name.is_empty() && !seen.insert(**name)) {
+            return Err(RowsProblem::Repeated { name: (*name).into() });
+        }
+        let by_name = |columns| Ok(Matched { columns, by_position: false });
+        let is_unique = self.names().collect::<HashSet<_>>().len() == self.count();
+        if let Some(columns) = found(self.names(), header).filter(|_| is_unique) {
+            return by_name(columns);
+        }
+        let open: Vec<usize> = (0..header.len()).filter(|column| !others.contains(column)).collect();
+        let names: Vec<&str> = open.iter().filter_map(|&column| header.get(column).copied()).collect();
+        let theirs = numbers(names.iter().copied());
+        let is_counted = theirs.as_ref().is_some_and(|numbers| numbers.iter().copied().eq(0..names.len()));
+        if is_numbers_alone(&names) && !is_counted {
+            return Err(RowsProblem::NumbersAlone { cells: names.iter().map(ToString::to_string).collect() });
+        }
+        if let (Some(own), Some(theirs)) = (numbers(self.names()), &theirs)
+            && let Some(positions) = found(own.iter(), &theirs.iter().collect::<Vec<_>>())
+        {
+            return by_name(positions.into_iter().filter_map(|position| open.get(position).copied()).collect());
+        }
+        if is_counted || !is_unique || numbers(self.names()).is_some() {
+            return self.by_position(&open);
+        }
+        let plain: Vec<String> = header.iter().map(|name| self::plain(name)).collect();
+        let own: Vec<String> = self.names().map(self::plain).collect();
+        let plain: Vec<&str> = plain.iter().map(String::as_str).collect();
+        let used = |name: &&String| plain.iter().filter(|column| **column == name.as_str()).count();
+        if let Some(name) = own.iter().find(|name| used(name) > 1) {
+            return Err(RowsProblem::Repeated { name: name.clone() });
+        }
+        found(own.iter().map(String::as_str), &plain).map_or_else(
+            || {
+                let missing = self.names().zip(&own).filter(|(_, plain)| used(plain) == 0);
+                Err(RowsProblem::Unmatched {
+                    missing: missing.map(|(name, _)| name.into()).collect(),
+                    header: header.iter().map(ToString::to_string).collect(),
+                })
+            },
+            by_name,
+        )
+    }
+
+    /// The features among columns without names, given their positions.
+    fn by_position(&self, open: &[usize]) -> Result<Matched, RowsProblem> {
+        let columns = match self.of_width(open.len())? {
+            None => open.to_vec(),
+            Some(used) => used.iter().filter_map(|&column| open.get(column).copied()).collect(),
+        };
+        Ok(Matched { columns, by_position: true })
+    }
+
+    /// The positions of the features in rows of `found` values without names; `None` if the values are the features.
+    ///
+    /// # Errors
+    /// [`RowsProblem::Columns`] if there are neither as many as features nor as many as the library had columns.
+    pub fn of_width(&self, found: usize) -> Result<Option<&[usize]>, RowsProblem> {
+        match &self.columns {
+            _ if found == self.names.len() => Ok(None),
+            Some((all, used)) if found == *all => Ok(Some(used)),
+            columns => {
+                let all = columns.as_ref().map(|(all, _)| *all);
+                Err(RowsProblem::Columns { found, wanted: self.names.len(), all })
+            }
+        }
+    }
+}
+
+/// The position of each of these in a header, if all are there.
+fn found<T: PartialEq>(wanted: impl Iterator<Item = T>, header: &[T]) -> Option<Vec<usize>> {
+    wanted.map(|name| header.iter().position(|column| *column == name)).collect()
+}
+
+/// The numbers of columns without names, if none of them has one.
+fn numbers<'n>(names: impl Iterator<Item = &'n str>) -> Option<Vec<usize>> {
+    let numbers: Option<Vec<usize>> = names.map(number).collect();
+    numbers.filter(|numbers| !numbers.is_empty() && numbers.iter().collect::<HashSet<_>>().len() == numbers.len())
+}
+
+/// The number of a column whose name a library or pandas made of it: `Column_3`, `f3` or `3`.
+fn number(name: &str) -> Option<usize> {
+    let digits = name.strip_prefix("Column_").or_else(|| name.strip_prefix('f')).unwrap_or(name);
+    let is_number = digits.bytes().all(|byte| byte.is_ascii_digit()) && (digits.len() == 1 || !digits.starts_with('0'));
+    digits.parse().ok().filter(|_| is_number)
+}
+
+/// True if a header has nothing but numbers, and so is probably the first row of a file without one.
+fn is_numbers_alone(names: &[&str]) -> bool {
+    let is_number = |name: &&str| name.parse::<f64>().is_ok();
+    names.iter().any(is_number) && names.iter().all(|name| name.is_empty() || is_number(name))
+}
+
+/// The name as LightGBM writes it, and a model holds it: without blanks, brackets and control characters.
+fn plain(name: &str) -> String {
+    let replaced = |character: char| match character {
+        ' ' | '[' | ']' | '{' | '}' | '(' | ')' | '<' | '>' | ',' | ':' | '"' => '_',
+        other => other,
+    };
+    holdable(name.trim()).chars().map(replaced).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZES: [&str; 2] = ["width", "height"];
+
+    fn among(features: impl Into<Features>, header: &[&str]) -> Result<(Vec<usize>, bool), RowsProblem> {
+        features.into().among(header, &[]).map(|Matched { columns, by_position }| (columns, by_position))
+    }
+
+    #[test]
+    fn names_are_found_in_any_order_among_more_columns() {
+        assert_eq!(among(&SIZES, &["", "height", "age", "width"]), Ok((vec![3, 1], false)));
+        let others = Features::from(&SIZES).among(&["0", "kind", "1"], &[1]);
+        assert_eq!(others, Ok(Matched { columns: vec![0, 2], by_position: true }));
+    }
+
+    #[test]
+    fn a_feature_that_no_column_is_named_after_is_an_error_that_lists_both() {
+        // As many columns as features, or more: none takes another one's place.
+        for header in [&["width", "Height"][..], &["width", "person", "id"], &["f1", "f0"], &["f1", "f2"]] {
+            let Err(RowsProblem::Unmatched { missing, header: listed }) = among(&SIZES, header) else {
+                panic!("{header:?}")
+            };
+            assert_eq!(listed, header);
+            assert!(missing.ends_with(&["height".to_owned()]), "{missing:?}");
+        }
+    }
+
+    #[test]
+    fn generated_names_count_as_numbers_and_as_no_names() {
+        for model in [&["f0", "f1", "f2"], &["Column_0", "Column_1", "Column_2"], &["0", "1", "2"]] {
+            assert_eq!(among(model, &["0", "1", "2"]), Ok((vec![0, 1, 2], false)), "{model:?}");
+            assert_eq!(among(model, &["Column_2", "Column_1", "Column_0"]), Ok((vec![2, 1, 0], false)));
+            assert_eq!(among(model, &["f3", "f2", "f1", "f0"]), Ok((vec![3, 2, 1], false)));
+            // Names on one side alone.
+            assert_eq!(among(model, &["a", "b", "c"]), Ok((vec![0, 1, 2], true)));
+            let found = RowsProblem::Columns { found: 4, wanted: 3, all: None };
+            assert_eq!(among(model, &["a", "b", "c", "d"]), Err(found));
+        }
+        assert_eq!(among(&SIZES, &["0", "1"]), Ok((vec![0, 1], true)));
+        assert_eq!(among(&SIZES, &["Column_0", "Column_1"]), Ok((vec![0, 1], true)));
+        // What only looks like a number.
+        assert!(matches!(among(&["f00", "f1"], &["a", "b"]), Err(RowsProblem::Unmatched { .. })));
+    }
+
+    #[test]
+    fn a_header_of_numbers_alone_is_refused_unless_they_count_or_are_the_models_own() {
+        for header in [&["0.35", "0.82"][..], &["1", "2"], &["1", "0"], &["-1e3", "nan"], &["", "7"]] {
+            let cells = header.iter().map(ToString::to_string).collect();
+            assert_eq!(among(&SIZES, header), Err(RowsProblem::NumbersAlone { cells }));
+            assert!(matches!(among(&["f0", "f1"], header), Err(RowsProblem::NumbersAlone { .. })));
+        }
+        assert_eq!(among(&["3", "7"], &["7", "3"]), Ok((vec![1, 0], false)));
+        assert_eq!(among(&["3", "7"], &["0", "1"]), Ok((vec![0, 1], true)));
+    }
+
+    #[test]
+    fn underscores_stand_for_what_lightgbm_and_models_replace() {
+        let features = &["mean_of_x", "max_y_", "two_words"];
+        assert_eq!(among(features, &["two\twords", "max[y]", "mean of x"]), Ok((vec![2, 1, 0], false)));
+        // Names that only differ in that.
+        let repeated = RowsProblem::Repeated { name: "a_b".into() };
+        assert_eq!(among(&["a_b", "c_d"], &["a b", "a[b", "c d"]), Err(repeated));
+    }
+
+    #[test]
+    fn a_name_that_is_there_twice_is_an_error() {
+        assert_eq!(among(&SIZES, &["width", "height", "width"]), Err(RowsProblem::Repeated { name: "width".into() }));
+        // Columns without a name, such as pandas' index, may be several.
+        assert_eq!(among(&SIZES, &["", "", "width", "height"]), Ok((vec![2, 3], false)));
+        assert_eq!(among(&["a", "a"], &["0", "1"]), Ok((vec![0, 1], true)));
+    }
+
+    #[test]
+    fn rows_without_names_have_all_columns_of_the_library_or_the_features() {
+        let names = ["f7", "f299"].map(String::from).to_vec();
+        let features = Features { names, columns: Some((300, vec![7, 299])) };
+        assert_eq!(features.of_width(2), Ok(None));
+        assert_eq!(features.of_width(300), Ok(Some(&[7, 299][..])));
+        let wrong = RowsProblem::Columns { found: 299, wanted: 2, all: Some(300) };
+        assert_eq!(features.of_width(299), Err(wrong));
+        let header: Vec<String> = (0..300).map(|column| format!("c{column}")).collect();
+        let header: Vec<&str> = header.iter().map(String::as_str).collect();
+        assert_eq!(features.among(&header, &[]), Ok(Matched { columns: vec![7, 299], by_position: true }));
+        let header: Vec<String> = (0..300).rev().map(|column| format!("Column_{column}")).collect();
+        let header: Vec<&str> = header.iter().map(String::as_str).collect();
+        assert_eq!(features.among(&header, &[]), Ok(Matched { columns: vec![292, 0], by_position: false }));
+    }
+}

@@ -1,0 +1,195 @@
+//! CSV files, record by record, each with its line; no line is left out.
+
+use super::RowsProblem;
+use crate::error::{Error, Place, Result};
+use std::path::{Path, PathBuf};
+
+/// A CSV file in memory.
+pub(super) struct Table {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    /// The cells of the first line; empty for a file without a header.
+    pub(super) header: Vec<String>,
+    has_header: bool,
+}
+
+impl Table {
+    /// Reads a file; its first line is a header.
+    ///
+    /// # Errors
+    /// [`Error::Io`], and [`RowsProblem`] for what is no text.
+    pub(super) fn read(path: &Path) -> Result<Self> {
+        let mut table = Self::without_header(path, "read the rows")?;
+        table.has_header = true;
+        let header = table.reader().headers().map_err(|error| table.wrong(&error))?.clone();
+        table.header = header.iter().map(String::from).collect();
+        Ok(table)
+    }
+
+    /// Reads a file whose first line is a record like the others.
+    ///
+    /// # Errors
+    /// [`Error::Io`], where `action` failed.
+    pub(super) fn without_header(path: &Path, action: &'static str) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|source| Error::io(path, action, source))?;
+        Ok(Self { path: path.into(), bytes, header: Vec::new(), has_header: false })
+    }
+
+    fn reader(&self) -> csv::Reader<&[u8]> {
+        let mut builder = csv::ReaderBuilder::new();
+        builder.trim(csv::Trim::All).has_headers(self.has_header).from_reader(self.bytes.as_slice())
+    }
+
+    /// The problem in the header, or another one that explains it: cells that something else than commas separates.
+    pub(super) fn in_header(&self, problem: RowsProblem) -> Error {
+        let separator = match self.header.as_slice() {
+            [only] => [';', '\t'].into_iter().find(|separator| only.contains(*separator)),
+            _ => None,
+        };
+        let problem = separator.map_or(problem, |separator| RowsProblem::Separator { separator });
+        Error::at(Place::line(&self.path, 1), problem)
+    }
+
+    /// The position of a column.
+    ///
+    /// # Errors
+    /// [`RowsProblem::NoColumn`].
+    pub(super) fn column(&self, name: &str) -> Result<usize> {
+        let found = self.header.iter().position(|column| column == name);
+        found.ok_or_else(|| self.in_header(RowsProblem::NoColumn { name: name.into() }))
+    }
+
+    /// The records below the header, each with its line.
+    ///
+    /// # Errors
+    /// [`RowsProblem`] for one with another number of cells, or no text, and for an empty line above another one: it may be a row
+    /// with a missing value.
+    pub(super) fn records(&self) -> impl Iterator<Item = Result<(u64, csv::StringRecord)>> {
+        let mut lines = Lines { bytes: &self.bytes, at: 0, line: 1 };
+        let mut reader = self.reader();
+        // Where records begin is known after the header.
+        let mut result = if self.has_header { reader.headers().map(|_| ()) } else { Ok(()) };
+        let mut from = if self.has_header { reader.position().byte() } else { 0 };
+        std::iter::from_fn(move || {
+            if let Err(error) = std::mem::replace(&mut result, Ok(())) {
+                return Some(Err(self.wrong(&error)));
+            }
+            let mut record = csv::StringRecord::new();
+            match reader.read_record(&mut record) {
+                Ok(false) => None,
+                Err(error) => Some(Err(self.wrong(&error))),
+                Ok(true) => {
+                    let start = usize::try_from(from).unwrap_or(usize::MAX);
+                    from = reader.position().byte();
+                    Some(match lines.first(start) {
+                        Ok(line) => Ok((line, record)),
+                        Err(line) => Err(Error::at(Place::line(&self.path, line), RowsProblem::EmptyLine)),
+                    })
+                }
+            }
+        })
+    }
+
+    /// A problem of the CSV reader.
+    fn wrong(&self, error: &csv::Error) -> Error {
+        let problem = match error.kind() {
+            csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+                RowsProblem::Ragged { found: *len, wanted: *expected_len }
+            }
+            csv::ErrorKind::Utf8 { .. } => RowsProblem::NotRows { detail: "it is not UTF-8".into() },
+            _ => RowsProblem::NotRows { detail: error.to_string() },
+        };
+        let place = match error.position() {
+            // From where the record before ended, which may be within the end of its line.
+            Some(position) => {
+                let start = usize::try_from(position.byte()).unwrap_or(usize::MAX);
+                let mut lines = Lines { bytes: &self.bytes, at: 0, line: 1 };
+                Place::line(&self.path, lines.first(start).unwrap_or_else(|line| line))
+            }
+            None => Place::file(&self.path),
+        };
+        Error::at(place, problem)
+    }
+}
+
+/// Lines of a text, counted once.
+struct Lines<'b> {
+    bytes: &'b [u8],
+    /// Bytes that were counted.
+    at: usize,
+    /// The line that begins there, or goes on.
+    line: u64,
+}
+
+impl Lines<'_> {
+    /// The line of the record that begins after `start`, where the one before ended; an error with the line if it is an empty
+    /// one.
+    fn first(&mut self, start: usize) -> Result<u64, u64> {
+        // The second half of a line's end.
+        let half = matches!(self.bytes.get(start.saturating_sub(1)..=start), Some(b"\r\n"));
+        let start = start + usize::from(half && start > 0);
+        let passed = self.bytes.get(self.at..start.max(self.at)).unwrap_or_default();
+        self.line += passed.iter().filter(|&&byte| byte == b'\n').count() as u64;
+        self.at = start.max(self.at);
+        match self.bytes.get(start..) {
+            Some([b'\n', ..] | [b'\r', b'\n', ..]) => Err(self.line),
+            _ => Ok(self.line),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The line and the cells of each record, or the complaint without its path.
+    fn read(text: &str) -> Vec<Result<(u64, String), String>> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        let table = Table::read(file.path()).unwrap();
+        let of = |record: Result<(u64, csv::StringRecord)>| match record {
+            Ok((line, record)) => Ok((line, record.iter().collect::<Vec<_>>().join("|"))),
+            Err(error) => Err(error.to_string().split_once(": ").unwrap().1.to_owned())
+                .map_err(|text: String| format!("{}{text}", line_of(&error))),
+        };
+        table.records().map(of).collect()
+    }
+
+    fn line_of(error: &Error) -> String {
+        let Error::At { place: Place::Line(_, line), .. } = error else { panic!("{error}") };
+        format!("{line}: ")
+    }
+
+    #[test]
+    fn records_have_their_lines_whatever_ends_one() {
+        for end in ["\n", "\r\n"] {
+            let text = ["a,b", "1,2", "\"x\ny\",4", "5,6", ""].join(end);
+            let found = read(&text);
+            let lines: Vec<u64> = found.iter().map(|found| found.as_ref().unwrap().0).collect();
+            assert_eq!(lines, [2, 3, 5], "{end:?}");
+            let ragged = read(&["a,b", "1,2", "3", "4,5"].join(end));
+            let complaint = ragged[1].as_ref().unwrap_err();
+            assert!(complaint.starts_with("3: it has 1 cell, where the header has 2"), "{complaint}");
+        }
+    }
+
+    #[test]
+    fn an_empty_line_within_a_file_is_an_error_with_its_number_and_one_at_the_end_is_none() {
+        for end in ["\n", "\r\n"] {
+            let found = read(&["x", "1", "", "-1", ""].join(end));
+            assert_eq!(found[0], Ok((2, "1".into())));
+            let complaint = found[1].as_ref().unwrap_err();
+            assert!(complaint.starts_with("3: the line is empty"), "{complaint}");
+            assert_eq!(read(&["x", "1", "\"\"", "-1", "", "", ""].join(end)).len(), 3);
+            assert_eq!(read(&["x", "", "1"].join(end))[0].as_ref().unwrap_err()[..2], *"2:");
+        }
+    }
+
+    #[test]
+    fn cells_that_semicolons_separate_are_told_from_columns_that_are_missing() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "a;kind\n1;cup\n").unwrap();
+        let complaint = Table::read(file.path()).unwrap().column("kind").unwrap_err().to_string();
+        assert!(complaint.contains(":1: its cells are separated by \";\""), "{complaint}");
+    }
+}

@@ -1,0 +1,124 @@
+//! A model's classes and values compared with what the library's own `predict` says.
+
+use super::reference::{Reference, Rounding, bound, margins};
+use crate::error::{Result, RowsProblem};
+use crate::rows::{ClassDiffers, Rows, ValueDiffers, class};
+use palpate_onboard::Model;
+use palpate_shared::format::{Link, Prediction};
+
+/// Distance between a model's predictions and the library's.
+#[derive(Default)]
+pub(super) struct OfPredictions {
+    /// The largest difference of a value; `None` for classes.
+    pub(super) error: Option<f64>,
+    /// Rows with another class, or with a value farther away than rounding explains.
+    pub(super) differ: usize,
+    /// Those of them that the rounding that the model states does not explain.
+    pub(super) unexplained: usize,
+    pub(super) first_class: Option<ClassDiffers>,
+    pub(super) first_value: Option<ValueDiffers>,
+}
+
+/// Compares the given rows' classes or values with the library's.
+pub(super) fn compare(
+    model: &Model<'_>,
+    reference: &Reference<'_>,
+    rows: &Rows,
+    library: &[Vec<String>],
+) -> Result<OfPredictions> {
+    if library.len() != rows.len() {
+        return Err(RowsProblem::ValueRows { values: library.len(), rows: rows.len() }.into());
+    }
+    let outputs = model.object_count();
+    let is_value = outputs == 1 || model.prediction().targets;
+    let wanted = if is_value { outputs } else { 1 };
+    let mut found = OfPredictions { error: is_value.then_some(0.0), ..OfPredictions::default() };
+    for (number, (row, said)) in (1..).zip(rows.iter().zip(library)) {
+        if said.len() != wanted {
+            return Err(RowsProblem::ValueColumns { row: number, found: said.len(), wanted }.into());
+        }
+        if is_value {
+            values(model, reference, (number, row), said, &mut found)?;
+        } else {
+            classes(model, reference, (number, row), said.first().map_or("", String::as_str), &mut found)?;
+        }
+    }
+    Ok(found)
+}
+
+fn classes(
+    model: &Model<'_>,
+    reference: &Reference<'_>,
+    (number, row): (usize, &[f64]),
+    said: &str,
+    found: &mut OfPredictions,
+) -> Result<()> {
+    let names = crate::compile::names(model);
+    let expected = class(&names, said);
+    let unknown = || RowsProblem::ValueText { text: said.into(), row: number, known: names.clone() };
+    let expected = expected.ok_or_else(unknown)?;
+    let encoded = reference.encoder.row(row);
+    let own = model.predict_class(&encoded, &mut vec![0; model.object_count()]).unwrap_or_default();
+    if own == expected {
+        return Ok(());
+    }
+    found.differ += 1;
+    let full = reference.margins(row, &encoded);
+    let gap = (f64::from(full[expected]) - f64::from(full[own])).abs();
+    if !Rounding::of(model, reference).explains(gap) {
+        found.unexplained += 1;
+        let classes = [own, expected].map(|class| names[class].clone());
+        found.first_class.get_or_insert(ClassDiffers { row: number, classes, gap });
+    }
+    Ok(())
+}
+
+/// How far a value may be from the library's beside the rounding of margins: links are within 5e-7 of the value.
+const LINK_ERROR: f64 = 2e-6;
+
+fn values(
+    model: &Model<'_>,
+    reference: &Reference<'_>,
+    (number, row): (usize, &[f64]),
+    said: &[String],
+    found: &mut OfPredictions,
+) -> Result<()> {
+    let prediction = model.prediction();
+    let encoded = reference.encoder.row(row);
+    let outputs = model.object_count();
+    let mut own = vec![0.0; outputs];
+    model.predict_each(&encoded, &mut vec![0; outputs], &mut own);
+    let mut is_within = true;
+    let mut first = None;
+    for ((text, &own), margin) in said.iter().zip(&own).zip(margins(model, &encoded)) {
+        let own = f64::from(own);
+        let expected: f64 =
+            text.parse().map_err(|_| RowsProblem::ValueText { text: text.clone(), row: number, known: Vec::new() })?;
+        let ends = [-1.0, 1.0].map(|sign| exact(prediction, margin + sign * bound(model)));
+        let slack = LINK_ERROR * ends[0].abs().max(ends[1].abs()) + f64::from(f32::MIN_POSITIVE);
+        if !(ends[0] - slack..=ends[1] + slack).contains(&expected) {
+            is_within = false;
+            first.get_or_insert(ValueDiffers { row: number, values: [own, expected] });
+        }
+        let error = (own - expected).abs();
+        found.error = found.error.map(|worst| if error > worst || error.is_nan() { error } else { worst });
+    }
+    if !is_within {
+        found.differ += 1;
+        found.unexplained += 1;
+        found.first_value = found.first_value.take().or(first);
+    }
+    Ok(())
+}
+
+/// The value that a margin stands for, in f64.
+fn exact(prediction: Prediction, margin: f64) -> f64 {
+    let x = margin / f64::from(prediction.average);
+    match prediction.link {
+        Link::Identity => x,
+        Link::Logistic => 1.0 / (1.0 + (-x).exp()),
+        Link::Exponential => x.exp(),
+        Link::Square => x * x.abs(),
+        Link::Softplus => x.max(0.0) + (-x.abs()).exp().ln_1p(),
+    }
+}
