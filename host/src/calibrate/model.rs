@@ -1,6 +1,6 @@
 //! A model's thresholds, its promise and its temperature.
 
-use super::choose::{Chosen, Terms, chosen};
+use super::choose::{By, Chosen, Terms, Way, chosen, most_starts, share_tested, spread, tallies};
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
 use super::sequence::{Odds, Sequence, margin_of, odds_of};
 use super::temperature::temperature;
@@ -67,6 +67,9 @@ pub struct Calibrated {
     /// Its promise.
     #[serde(skip)]
     pub promise: Promise,
+    /// Its thresholds.
+    #[serde(skip)]
+    pub odds: Odds,
     /// The promised error rate.
     pub promised: f64,
     /// Of what: "average", "name" or "object".
@@ -177,7 +180,18 @@ pub fn calibrate(
     calibrate_from(model, dataset, settings, None, progress)
 }
 
-/// The same with the strictest threshold given, as a margin in nats, instead of one that a few sequences suggest.
+/// Where a calibration begins that other touches say something of.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Start {
+    /// The strictest threshold, as a margin in nats.
+    pub(crate) strictest: f64,
+    /// The share of sequences of each object, or of all, that are expected to get a name there.
+    pub(crate) named: f64,
+    /// Thresholds that those to be kept must be as strict as.
+    pub(crate) loosest: Option<Odds>,
+}
+
+/// The same from a start that is given, instead of one that a few sequences suggest.
 ///
 /// # Errors
 /// As [`calibrate`].
@@ -185,7 +199,7 @@ pub(crate) fn calibrate_from(
     model: &Model<'_>,
     mut dataset: Dataset,
     settings: &Settings,
-    strictest: Option<f64>,
+    start: Option<Start>,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
     let material = material(model, &dataset, settings)?;
@@ -197,7 +211,7 @@ pub(crate) fn calibrate_from(
         supplies: touched.map(|(touched, &object)| Supply::new(object, touched, settings.seed)).collect(),
     };
     let temperature = || Ok(temperature(model, &dataset, &material.known));
-    calibrate_drawn(model, &material, drawn, settings, strictest, temperature, progress)
+    calibrate_drawn(model, &material, drawn, settings, start, temperature, progress)
 }
 
 /// Touches that a model can be calibrated on.
@@ -243,7 +257,7 @@ pub(super) fn calibrate_drawn(
     Material { names, known, max_touches }: &Material,
     Drawn { dataset, fewest, mut supplies }: Drawn<'_>,
     settings: &Settings,
-    strictest: Option<f64>,
+    start: Option<Start>,
     temperature: impl FnOnce() -> Result<f64>,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
@@ -271,18 +285,23 @@ pub(super) fn calibrate_drawn(
         follow_plan(&mut first, names, &plan)?;
         follow_plan(&mut supplies, names, &plan)?;
     }
-    let strictest = match strictest {
-        Some(margin) => margin,
+    let start = match start {
+        Some(start) => start,
         None => {
             let pilot = draw(&mut first, (settings.sequences / PILOT).max(1), naive + STRICTEST[1])?;
             let is_enough = is_kept_well(&pilot, naive + STRICTEST[0], settings.rate);
-            naive + if is_enough { STRICTEST[0] } else { STRICTEST[1] }
+            let strictest = naive + if is_enough { STRICTEST[0] } else { STRICTEST[1] };
+            Start { strictest, named: named_share(&pilot, strictest, names.len(), &terms), loosest: None }
         }
     };
-    let sequences = draw(&mut supplies, settings.sequences, strictest)?;
+    let sequences = draw(&mut supplies, settings.sequences, start.strictest)?;
     let supplied = (sequences.len() < wanted(settings.sequences).iter().sum())
         .then(|| Supplied { approaches: dataset.holds_approaches(), fewest });
-    let chosen = chosen(&sequences, names, strictest, &terms, supplied)?;
+    let cases = By::of(settings.per, names.len()).count().max(1) as f64;
+    let expected = start.named * share_tested(settings.per) * sequences.len() as f64 / cases;
+    let starts = spread(start.strictest, most_starts(expected, &terms), settings.rate);
+    let way = Way { starts: &starts, loosest: start.loosest.as_ref() };
+    let chosen = chosen(&sequences, names, &way, &terms, supplied)?;
     finished(model, dataset, settings, *max_touches, names, &chosen, temperature()?)
 }
 
@@ -341,6 +360,15 @@ pub(super) fn shares(model: &Model<'_>, known: &[usize]) -> Vec<f64> {
         known.iter().map(|&object| (f64::from(model.prior(object)) * f64::from(model.unit())).exp()).collect();
     let sum: f64 = weights.iter().sum();
     weights.into_iter().map(|weight| weight / sum).collect()
+}
+
+/// The share of sequences that get a name at a margin, as far as a few tell: of all, or of the case that the rate is promised of
+/// with the fewest names if each had as many sequences.
+fn named_share(pilot: &[Sequence], margin: f64, objects: usize, terms: &Terms) -> f64 {
+    let by = By::of(terms.per, objects);
+    let tallies = tallies(&pilot.iter().collect::<Vec<_>>(), &Odds::All(odds_of(margin)), by);
+    let fewest = tallies.iter().map(|tally| tally.all).min().unwrap_or(0);
+    (fewest as f64 * by.count() as f64 / pilot.len().max(1) as f64).min(1.0)
 }
 
 /// True if at this margin clearly fewer names are wrong than promised, as far as a few sequences tell.
@@ -420,6 +448,7 @@ pub(super) fn finished(
     Ok(Calibrated {
         model: restate(model, &restated)?,
         promise,
+        odds: chosen.odds.clone(),
         promised: settings.rate,
         per: settings.per.name(),
         confidence: settings.confidence,

@@ -1,13 +1,15 @@
-//! The threshold at which a walk begins.
+//! The thresholds at which a walk begins.
 //!
 //! Fixed-sequence testing ends at the first threshold that fails, so the first of all has to pass. The strictest one is not
 //! the surest: few sequences get a name there, and of thirty names none may be wrong to promise 10 %. The walk begins where the
-//! test passes with the greatest probability, as far as the sequences that are learned from tell. The test does not see
-//! these, so that the order in which it tries thresholds is fixed before (Learn then Test, arXiv 2110.01052, on learning
-//! hypotheses and their order from other data). What is predicted here decides whether a promise can be made, and never
-//! whether it is kept.
+//! test passes with the greatest probability, as far as the sequences that are learned from tell; these are few, so errors are
+//! also taken to become rarer with the margin as the evidence itself says. Where names are many enough that it costs next to
+//! nothing, there are more starts, each with its share of the level: where the test passes with the greatest probabilities but
+//! that one. The test does not see these sequences, so that the order in which it tries thresholds is fixed before (Learn then
+//! Test, arXiv 2110.01052, on learning hypotheses and their order from other data). What is predicted here decides whether a
+//! promise can be made, and never whether it is kept.
 
-use crate::calibrate::{Odds, Per, Sequence, Terms, allowed, odds_of};
+use crate::calibrate::{MOST_STARTS, Odds, Per, Sequence, Terms, allowed, most_starts, of_share, odds_of};
 use palpate_trees::rows::RowSequence;
 use std::collections::BTreeMap;
 
@@ -17,11 +19,21 @@ const STEP: f64 = 0.5;
 const NEARLY: f64 = 1e-3;
 /// Beyond the margin of the posterior itself, in nats: where a walk begins if nothing can be predicted.
 const BEYOND: f64 = 2.5;
+/// Names that count beside those that were seen, wrong as often as the evidence itself says.
+const PRIOR: f64 = 3.0;
+/// The share of the greatest probability that several starts may cost.
+const COST: f64 = 0.01;
+/// Two starts are at least that far apart, in nats.
+const APART: f64 = 1.0;
+/// The share of the greatest probability that a start has at least.
+const WORTHWHILE: f64 = 0.5;
 
-/// Margins, in nats, at which the test passes with nearly the greatest probability.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Margins, in nats, at which the test passes with the greatest probabilities.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Begin {
-    pub(super) strictest: f64,
+    /// From strict to loose.
+    pub(super) starts: Vec<f64>,
+    /// The loosest at which it passes with nearly the greatest probability.
     pub(super) loosest: f64,
 }
 
@@ -37,62 +49,108 @@ impl Begin {
     /// the units that the walk is over.
     pub(super) fn new(followed: &[Sequence], of: &[&RowSequence], tested: usize, terms: &Terms, most: f64) -> Self {
         let steps = (most / STEP) as u32;
-        let margins = (1..=steps).map(|step| f64::from(step) * STEP);
-        let passes: Vec<(f64, f64)> =
-            margins.map(|margin| (margin, pass(followed, of, tested, terms, margin))).collect();
-        let greatest = passes.iter().map(|(_, chance)| *chance).fold(0.0, f64::max);
-        let near = || passes.iter().filter(|(_, chance)| *chance > 0.0 && *chance >= greatest - NEARLY);
-        match (near().next(), near().next_back()) {
-            (Some((loosest, _)), Some((strictest, _))) => Self { strictest: *strictest, loosest: *loosest },
-            _ => {
-                let margin = (((1.0 - terms.rate) / terms.rate).ln() + BEYOND).min(most);
-                Self { strictest: margin, loosest: margin }
-            }
-        }
+        let margins = (1..=steps).rev().map(|step| f64::from(step) * STEP);
+        let seen: Vec<Seen> = margins.map(|margin| Seen::new(followed, of, tested, terms, margin)).collect();
+        let passes = |starts: usize| -> Vec<f64> {
+            let own = Terms { confidence: of_share(terms.confidence, starts), ..*terms };
+            seen.iter().map(|seen| seen.pass(&own)).collect()
+        };
+        let one = passes(1);
+        let greatest = |passes: &[f64]| passes.iter().copied().fold(0.0, f64::max);
+        let is_near = |passes: &[f64], at: usize| passes[at] > 0.0 && passes[at] >= greatest(passes) - NEARLY;
+        let Some(loosest) = (0..seen.len()).rev().find(|&at| is_near(&one, at)) else {
+            let margin = (((1.0 - terms.rate) / terms.rate).ln() + BEYOND).min(most);
+            return Self { starts: vec![margin], loosest: margin };
+        };
+        let several = (2..=MOST_STARTS).rev().find_map(|count| {
+            let passes = passes(count);
+            let first = (0..seen.len()).find(|&at| is_near(&passes, at))?;
+            let is_cheap = greatest(&passes) >= (1.0 - COST) * greatest(&one);
+            let chosen = apart(&seen, &passes, first, count);
+            (is_cheap && most_starts(seen[first].fewest(), terms) >= count && chosen.len() == count).then_some(chosen)
+        });
+        let mut starts = several.or_else(|| Some(vec![(0..seen.len()).find(|&at| is_near(&one, at))?])).unwrap_or_default();
+        starts.sort_unstable();
+        Self { starts: starts.into_iter().map(|at| seen[at].margin).collect(), loosest: seen[loosest].margin }
     }
 }
 
-/// The probability that the test passes at a margin: of all names, or of each case that the rate is promised of.
-fn pass(followed: &[Sequence], of: &[&RowSequence], tested: usize, terms: &Terms, margin: f64) -> f64 {
-    let odds = Odds::All(odds_of(margin));
-    // Of each case and unit: wrong names, names, sequences.
-    let mut sums: BTreeMap<(usize, usize), (f64, f64, f64)> = BTreeMap::new();
-    let mut units = std::collections::BTreeSet::new();
-    for (number, (sequence, of)) in followed.iter().zip(of).enumerate() {
-        let look = sequence.given(&odds);
-        let unit = of.group.unwrap_or(number);
-        units.insert(unit);
-        let case = match terms.per {
-            Per::Average => Some(0),
-            Per::Object => Some(sequence.object),
-            Per::Name => look.map(|look| look.name),
-        };
-        let Some(case) = case else { continue };
-        let sum = sums.entry((case, unit)).or_default();
-        sum.0 += f64::from(u8::from(look.is_some_and(|look| look.name != sequence.object)));
-        sum.1 += f64::from(u8::from(look.is_some()));
-        sum.2 += 1.0;
+/// The first start, and others where the test passes with the next greatest probabilities, up to so many.
+fn apart(seen: &[Seen], passes: &[f64], first: usize, count: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..seen.len()).filter(|&at| passes[at] >= WORTHWHILE * passes[first]).collect();
+    order.sort_by(|&a, &b| passes[b].total_cmp(&passes[a]).then(a.cmp(&b)));
+    let mut chosen = vec![first];
+    for at in order {
+        let is_apart = |other: &usize| (seen[at].margin - seen[*other].margin).abs() >= APART;
+        if chosen.len() < count && chosen.iter().all(is_apart) {
+            chosen.push(at);
+        }
     }
-    let mut cases: BTreeMap<usize, Names> = BTreeMap::new();
-    for ((case, _), (wrong, given, all)) in sums {
-        let names = cases.entry(case).or_default();
-        names.wrong += wrong / all;
-        names.given += given / all;
+    chosen
+}
+
+/// Names at a margin, for so many times the units that they were seen of.
+struct Seen {
+    margin: f64,
+    /// Of each case that the rate is promised of.
+    cases: Vec<Names>,
+    times: f64,
+}
+
+impl Seen {
+    fn new(followed: &[Sequence], of: &[&RowSequence], tested: usize, terms: &Terms, margin: f64) -> Self {
+        let odds = Odds::All(odds_of(margin));
+        // Of each case and unit: wrong names, names, sequences.
+        let mut sums: BTreeMap<(usize, usize), (f64, f64, f64)> = BTreeMap::new();
+        let mut units = std::collections::BTreeSet::new();
+        for (number, (sequence, of)) in followed.iter().zip(of).enumerate() {
+            let look = sequence.given(&odds);
+            let unit = of.group.unwrap_or(number);
+            units.insert(unit);
+            let case = match terms.per {
+                Per::Average => Some(0),
+                Per::Object => Some(sequence.object),
+                Per::Name => look.map(|look| look.name),
+            };
+            let Some(case) = case else { continue };
+            let sum = sums.entry((case, unit)).or_default();
+            sum.0 += f64::from(u8::from(look.is_some_and(|look| look.name != sequence.object)));
+            sum.1 += f64::from(u8::from(look.is_some()));
+            sum.2 += 1.0;
+        }
+        let mut cases: BTreeMap<usize, Names> = BTreeMap::new();
+        for ((case, _), (wrong, given, all)) in sums {
+            let names = cases.entry(case).or_default();
+            names.wrong += wrong / all;
+            names.given += given / all;
+        }
+        let times = tested as f64 / units.len().max(1) as f64;
+        Self { margin, cases: cases.into_values().collect(), times }
     }
-    let times = tested as f64 / units.len().max(1) as f64;
-    if cases.is_empty() {
-        return 0.0;
+
+    /// The names that are expected of the case with the fewest.
+    fn fewest(&self) -> f64 {
+        self.cases.iter().map(|names| names.given * self.times).reduce(f64::min).unwrap_or(0.0)
     }
-    cases.values().map(|names| names.pass(times, terms)).product()
+
+    /// The probability that the test passes: of all names, or of each case that the rate is promised of.
+    fn pass(&self, terms: &Terms) -> f64 {
+        if self.cases.is_empty() {
+            return 0.0;
+        }
+        // As the posterior says.
+        let wrong = (PRIOR / (1.0 + self.margin.exp())).max(f64::MIN_POSITIVE.sqrt());
+        self.cases.iter().map(|names| names.pass(self.times, [wrong, PRIOR - wrong], terms)).product()
+    }
 }
 
 impl Names {
-    /// The probability that so many times as many names pass the test: their errors are beta-binomial, as these names leave
-    /// the error rate of Jeffreys' prior.
-    fn pass(self, times: f64, terms: &Terms) -> f64 {
+    /// The probability that so many times as many names pass the test: their errors are beta-binomial, as these names and a
+    /// prior of wrong and right ones leave the error rate.
+    fn pass(self, times: f64, [wrong, right]: [f64; 2], terms: &Terms) -> f64 {
         let all = (self.given * times) as u64;
         let Some(allowed) = allowed(all, terms.rate, terms.confidence) else { return 0.0 };
-        beta_binomial(allowed, all, self.wrong + 0.5, self.given - self.wrong + 0.5)
+        beta_binomial(allowed, all, self.wrong + wrong, self.given - self.wrong + right)
     }
 }
 
@@ -168,12 +226,31 @@ mod tests {
             })
             .collect();
         let found = begin(&all, 300, 0.1);
-        assert!((4.0..=6.0).contains(&found.strictest) && (3.0..=6.0).contains(&found.loosest), "{found:?}");
+        let within = |range: std::ops::RangeInclusive<f64>, margin: &f64| range.contains(margin);
+        assert!(within(4.0..=6.0, &found.starts[0]) && within(3.0..=6.0, &found.loosest), "{found:?}");
+    }
+
+    #[test]
+    fn a_walk_begins_where_errors_are_rarer_than_a_few_sequences_can_show() {
+        // Of 37 sequences none is wrong at 1.5 nats; at 3 nats, where as many get a name, fewer will be.
+        let all: Vec<(f64, bool)> = (0..37).map(|number| (if number < 33 { 3.2 } else { 1.6 }, true)).collect();
+        let found = begin(&all, 113, 0.05);
+        assert_eq!(found.starts, [3.0], "{found:?}");
+    }
+
+    #[test]
+    fn several_starts_are_for_where_names_are_many() {
+        let all: Vec<(f64, bool)> = (0..100).map(|number| (f64::from(number % 20) * 0.5 + 0.6, number % 20 > 2)).collect();
+        for (tested, starts) in [(60, 1..=1), (400, 2..=7), (4_000, 5..=7)] {
+            let found = begin(&all, tested, 0.05);
+            assert!(starts.contains(&found.starts.len()), "{tested}: {found:?}");
+            assert!(found.starts.windows(2).all(|two| two[0] - two[1] >= APART), "{found:?}");
+        }
     }
 
     #[test]
     fn without_a_prediction_it_begins_beyond_the_posteriors_own_margin() {
         let found = begin(&[], 299, 0.01);
-        assert!((found.strictest - (99.0_f64.ln() + BEYOND)).abs() < 1e-9, "{found:?}");
+        assert!((found.starts[0] - (99.0_f64.ln() + BEYOND)).abs() < 1e-9 && found.starts.len() == 1, "{found:?}");
     }
 }

@@ -25,6 +25,7 @@
 mod background;
 mod begin;
 mod calibrate;
+mod copies;
 mod evaluate;
 mod follow;
 #[cfg(feature = "parquet")]
