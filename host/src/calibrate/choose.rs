@@ -1,7 +1,8 @@
 //! Thresholds that keep a promise, from sequences.
 
+use super::begin::Seen;
 use super::sequence::{Odds, Sequence, odds_of};
-use super::walk::{Kept, Stop, Tally, needed, of_share, walk};
+use super::walk::{Kept, Stop, Tally, walk};
 use crate::error::{CalibrateProblem, Result, Supplied};
 use palpate_shared::format::Per;
 use rayon::prelude::*;
@@ -19,10 +20,6 @@ const LEARNED: usize = 3;
 /// From how much stricter than the learned thresholds by name to how much looser the tested ones are, in nats.
 const AROUND: [f64; 2] = [2.0, -1.0];
 
-/// The most starts of a walk.
-pub(crate) const MOST_STARTS: usize = 7;
-/// Names of each case that are expected, for each that a walk takes at least: with fewer it has fewer starts.
-const NAMES_TO_SPARE: f64 = 1.5;
 /// From the first start to where the one after the last would be, at least, in nats; otherwise to the posterior's own threshold.
 const SPREAD: f64 = 2.5;
 
@@ -51,12 +48,6 @@ impl Way<'_> {
     pub(super) fn strictest(&self) -> f64 {
         self.starts.first().copied().unwrap_or(LOOSEST)
     }
-}
-
-/// The most starts for which so many names, expected of each case that a rate is promised of, are enough; one, if they are few.
-pub(crate) fn most_starts(names: f64, terms: &Terms) -> usize {
-    let takes = |starts: usize| needed(terms.rate, of_share(terms.confidence, starts)) as f64;
-    (1..=MOST_STARTS).rev().find(|&starts| names >= NAMES_TO_SPARE * takes(starts)).unwrap_or(1)
 }
 
 /// So many starts, the first of them the strictest, in equal steps: where nothing says which would do best.
@@ -107,7 +98,8 @@ pub struct Chosen {
 /// [`CalibrateProblem`], if no threshold keeps the promise or too few names are given to know.
 pub fn choose(sequences: &[Sequence], objects: &[String], strictest: f64, terms: &Terms) -> Result<Chosen> {
     let names = sequences.len() as f64 / By::of(terms.per, objects.len()).count().max(1) as f64;
-    let starts = spread(strictest, most_starts(names * share_tested(terms.per), terms), terms.rate);
+    let count = Seen::nothing(names * share_tested(terms.per), strictest).most_starts(terms);
+    let starts = spread(strictest, count, terms.rate);
     Ok(chosen(sequences, objects, &Way { starts: &starts, loosest: None }, terms, None)?)
 }
 

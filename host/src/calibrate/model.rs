@@ -1,6 +1,7 @@
 //! A model's thresholds, its promise and its temperature.
 
-use super::choose::{By, Chosen, Terms, Way, chosen, most_starts, share_tested, spread, tallies};
+use super::begin::{Begin, Seen};
+use super::choose::{Chosen, Terms, Way, chosen, share_tested, spread};
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
 use super::sequence::{Odds, Sequence, margin_of, odds_of};
 use super::temperature::temperature;
@@ -183,10 +184,8 @@ pub fn calibrate(
 /// Where a calibration begins that other touches say something of.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Start {
-    /// The strictest threshold, as a margin in nats.
-    pub(crate) strictest: f64,
-    /// The share of sequences of each object, or of all, that are expected to get a name there.
-    pub(crate) named: f64,
+    /// The threshold at which the walk begins, as a margin in nats.
+    pub(crate) margin: f64,
     /// Thresholds that those to be kept must be as strict as.
     pub(crate) loosest: Option<Odds>,
 }
@@ -212,6 +211,52 @@ pub(crate) fn calibrate_from(
     };
     let temperature = || Ok(temperature(model, &dataset, &material.known));
     calibrate_drawn(model, &material, drawn, settings, start, temperature, progress)
+}
+
+/// The threshold, a margin in nats, at which a walk over `times` as many touches as there are in a part of them best begins: the
+/// loosest one at which it passes with nearly the greatest probability, up to where a calibration that knows nothing begins.
+///
+/// # Errors
+/// As [`calibrate`], but for a rate that is not kept.
+pub(crate) fn begin(
+    model: &Model<'_>,
+    mut part: Dataset,
+    times: f64,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<f64> {
+    let Material { names, known, max_touches } = material(model, &part, settings)?;
+    add_noise(model, &mut part, &settings.noise, max_touches, noise_seed(settings));
+    let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
+    let naive = ((1.0 - settings.rate) / settings.rate).ln();
+    let most = ((settings.sequences as f64 / times) as usize).max(1);
+    let wanted = wanted(model, &known, settings.per, most);
+    let followed = |beyond: f64| {
+        let touched = part.objects.iter().zip(&known);
+        let mut supplies: Vec<Supply<'_>> =
+            touched.map(|(touched, &object)| Supply::new(object, touched, settings.seed)).collect();
+        if settings.active {
+            follow_plan(&mut supplies, &names, &model.plan().ok_or(EvaluateProblem::NoPlan)?)?;
+        }
+        let until = Until { margin: naive + beyond, max_touches };
+        follow(model, &mut supplies, &wanted, until, || |_: &Moment<'_>| true, progress)
+    };
+    let [near, far] = STRICTEST;
+    let sequences = followed(near)?;
+    let (sequences, beyond) =
+        if is_kept_well(&sequences, naive + near, settings.rate) { (sequences, near) } else { (followed(far)?, far) };
+    let tested = (times * share_tested(settings.per) * sequences.len() as f64) as usize;
+    Ok(Begin::new(&sequences, &(0..sequences.len()).collect::<Vec<_>>(), tested, &terms, naive + beyond).loosest)
+}
+
+/// The sequences of each object of so many in all: as often as the model's priors say.
+fn wanted(model: &Model<'_>, known: &[usize], per: Per, count: usize) -> Vec<usize> {
+    // Each placement has a promise of its own, however rare it is.
+    let shares = match model.outputs() {
+        Some(_) if per == Per::Object => vec![1.0 / known.len() as f64; known.len()],
+        _ => shares(model, known),
+    };
+    shares.iter().map(|share| (share * count as f64).round().max(1.0) as usize).collect()
 }
 
 /// Touches that a model can be calibrated on.
@@ -264,14 +309,7 @@ pub(super) fn calibrate_drawn(
     progress.begin("calibrating", Some((settings.sequences + settings.sequences / PILOT) as u64));
     let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
     let naive = ((1.0 - settings.rate) / settings.rate).ln();
-    // Each placement has a promise of its own, however rare it is.
-    let shares = match model.outputs() {
-        Some(_) if settings.per == Per::Object => vec![1.0 / known.len() as f64; known.len()],
-        _ => shares(model, known),
-    };
-    let wanted = |count: usize| -> Vec<usize> {
-        shares.iter().map(|share| (share * count as f64).round().max(1.0) as usize).collect()
-    };
+    let wanted = |count: usize| wanted(model, known, settings.per, count);
     let draw = |supplies: &mut [Supply<'_>], count: usize, margin: f64| {
         let until = Until { margin, max_touches: *max_touches };
         follow(model, supplies, &wanted(count), until, || |_: &Moment<'_>| true, progress)
@@ -285,22 +323,21 @@ pub(super) fn calibrate_drawn(
         follow_plan(&mut first, names, &plan)?;
         follow_plan(&mut supplies, names, &plan)?;
     }
-    let start = match start {
-        Some(start) => start,
+    let (starts, loosest, sequences) = match start {
+        Some(Start { margin, loosest }) => (vec![margin], loosest, draw(&mut supplies, settings.sequences, margin)?),
         None => {
             let pilot = draw(&mut first, (settings.sequences / PILOT).max(1), naive + STRICTEST[1])?;
             let is_enough = is_kept_well(&pilot, naive + STRICTEST[0], settings.rate);
             let strictest = naive + if is_enough { STRICTEST[0] } else { STRICTEST[1] };
-            Start { strictest, named: named_share(&pilot, strictest, names.len(), &terms), loosest: None }
+            let sequences = draw(&mut supplies, settings.sequences, strictest)?;
+            let tested = (share_tested(settings.per) * sequences.len() as f64) as usize;
+            let seen = Seen::new(&pilot, &(0..pilot.len()).collect::<Vec<_>>(), tested, &terms, strictest);
+            (spread(strictest, seen.most_starts(&terms), settings.rate), None, sequences)
         }
     };
-    let sequences = draw(&mut supplies, settings.sequences, start.strictest)?;
     let supplied = (sequences.len() < wanted(settings.sequences).iter().sum())
         .then(|| Supplied { approaches: dataset.holds_approaches(), fewest });
-    let cases = By::of(settings.per, names.len()).count().max(1) as f64;
-    let expected = start.named * share_tested(settings.per) * sequences.len() as f64 / cases;
-    let starts = spread(start.strictest, most_starts(expected, &terms), settings.rate);
-    let way = Way { starts: &starts, loosest: start.loosest.as_ref() };
+    let way = Way { starts: &starts, loosest: loosest.as_ref() };
     let chosen = chosen(&sequences, names, &way, &terms, supplied)?;
     finished(model, dataset, settings, *max_touches, names, &chosen, temperature()?)
 }
@@ -360,15 +397,6 @@ pub(super) fn shares(model: &Model<'_>, known: &[usize]) -> Vec<f64> {
         known.iter().map(|&object| (f64::from(model.prior(object)) * f64::from(model.unit())).exp()).collect();
     let sum: f64 = weights.iter().sum();
     weights.into_iter().map(|weight| weight / sum).collect()
-}
-
-/// The share of sequences that get a name at a margin, as far as a few tell: of all, or of the case that the rate is promised of
-/// with the fewest names if each had as many sequences.
-fn named_share(pilot: &[Sequence], margin: f64, objects: usize, terms: &Terms) -> f64 {
-    let by = By::of(terms.per, objects);
-    let tallies = tallies(&pilot.iter().collect::<Vec<_>>(), &Odds::All(odds_of(margin)), by);
-    let fewest = tallies.iter().map(|tally| tally.all).min().unwrap_or(0);
-    (fewest as f64 * by.count() as f64 / pilot.len().max(1) as f64).min(1.0)
 }
 
 /// True if at this margin clearly fewer names are wrong than promised, as far as a few sequences tell.

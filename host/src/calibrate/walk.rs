@@ -140,7 +140,7 @@ pub fn walk<T>(
 }
 
 /// The confidence with which a threshold is tested that has the share of one start of so many.
-pub(crate) fn of_share(confidence: f64, starts: usize) -> f64 {
+pub(super) fn of_share(confidence: f64, starts: usize) -> f64 {
     1.0 - (1.0 - confidence) / starts.max(1) as f64
 }
 

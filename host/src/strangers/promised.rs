@@ -5,7 +5,7 @@
 //! found in an order in which neither makes the other untrue, each on touches of its own:
 //!
 //! ```text
-//! an eighth ─────► thresholds without a test, made stricter (no promise)
+//! an eighth ─────► where thresholds begin: where as many names as there will be pass the test, most probably
 //! three eighths ─► the test under these: at most so many false alarms, by Learn-then-Test
 //! half ──────────► looser thresholds under the test: at most so many wrong names, by Learn-then-Test
 //! ```
@@ -18,7 +18,7 @@
 //! without the test too.
 
 use super::{Calibrated, Settings, calibrate, calibrate_recorded, tested_means, without};
-use crate::calibrate::{self, STRICTEST, Start, add_noise, calibrate_from, odds_of};
+use crate::calibrate::{self, Start, add_noise, begin, calibrate_from, odds_of};
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};
 use crate::mesh::BACKGROUND;
@@ -31,11 +31,6 @@ use palpate_shared::format::Tag;
 /// The share of touches that the promise is tested on, and of the others the share that thresholds begin with.
 const PROMISED: f64 = 0.5;
 const BEGUN: f64 = 0.25;
-/// Amount by which sequences are followed beyond the first thresholds, in nats: room for the walk's starts, since an eighth of
-/// the touches says no better where the promise is kept.
-const STRICTER: f64 = 2.5;
-/// The confidence of the first thresholds, which promise nothing: that of an estimate.
-const EVEN: f64 = 0.5;
 
 /// Gives a model a misfit test, or replaces the one that it has, and thresholds that keep a promised error rate with that
 /// test: a sequence that ends as unknown is one without a name, and a name is given when the test lets it be. `promise.noise`
@@ -58,7 +53,9 @@ pub fn calibrate_with_promise(
     let halves = split(dataset, PROMISED, promise.seed)?;
     let parts = split(&halves.train, BEGUN, promise.seed)?;
     let without = without_test(calibrate::calibrate(&untested, dataset.clone(), promise, progress))?;
-    let (strictest, named) = strictest(&untested, parts.test, promise, progress)?;
+    // As many times the touches say where to begin.
+    let times = PROMISED / ((1.0 - PROMISED) * BEGUN);
+    let strictest = begin(&untested, parts.test, times, promise, progress)?;
     let max_touches = promise.max_touches.unwrap_or(Stopping::from_model(&untested).max_touches());
     let begun = Restated {
         odds: Some(odds_of(strictest)),
@@ -81,26 +78,11 @@ pub fn calibrate_with_promise(
         Some(recorded) => calibrate_recorded(&begun, &learned, recorded, &shapes, settings)?,
         None => calibrate(&begun, &learned, &shapes, settings)?,
     };
-    let start = Start { strictest, named, loosest: without.map(|without| without.odds) };
+    let start = Start { margin: strictest, loosest: without.map(|without| without.odds) };
     let promised = calibrate_from(&compile::open(&tested.bytes)?, halves.test, promise, Some(start), progress)?;
     let [mean_touches, mean_touches_without] = tested_means(&compile::open(&promised.model)?, &learned, settings)?;
     let tested = Calibrated { bytes: promised.model.clone(), mean_touches, mean_touches_without, ..tested };
     Ok((promised, tested))
-}
-
-/// The margin in nats that thresholds begin with, and the share of sequences that are expected to get a name there.
-fn strictest(
-    untested: &Model<'_>,
-    part: Dataset,
-    promise: &calibrate::Settings,
-    progress: &dyn Progress,
-) -> Result<(f64, f64)> {
-    let settings = calibrate::Settings { confidence: EVEN, ..promise.clone() };
-    let Some(calibrated) = without_test(calibrate::calibrate(untested, part, &settings, progress))? else {
-        // Nothing is known of names.
-        return Ok((((1.0 - promise.rate) / promise.rate).ln() + STRICTEST[0], 0.0));
-    };
-    Ok((calibrated.margins.values().copied().fold(0.0, f64::max) + STRICTER, 1.0 - calibrated.undecided))
 }
 
 /// A calibration without a test; none where it promises nothing.

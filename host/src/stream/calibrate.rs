@@ -1,13 +1,12 @@
 //! A model's shape, thresholds and promise, from sequences of rows.
 
-use super::begin::Begin;
 use super::copies::copies;
 use super::parts::Parts;
 use super::settings::Settings;
 use super::shape::{self, Fitted, Gain, STRICTEST};
 use super::{Rows, check, follow};
 use crate::calibrate::{
-    Chosen, Grouped, Odds, OfObject, Per, Sequence, Stop, Tally, Terms, Until, Way, Worse, choose_groups, choose_independent,
+    Begin, Chosen, Grouped, Odds, OfObject, Per, Sequence, Stop, Tally, Terms, Until, Way, Worse, choose_groups, choose_independent,
     margin_of, share_tested, worse,
 };
 use crate::compile::{self, Restated, restate};
@@ -227,7 +226,8 @@ fn begin(model: &Model<'_>, rows: &Rows<'_>, parts: &Parts<'_>, settings: &Setti
         share *= share_tested(settings.per);
     }
     let tested = (share * parts.units_tested() as f64) as usize;
-    Begin::new(&followed, &parts.learned, tested, &terms(settings), STRICTEST)
+    let units = parts.learned.iter().enumerate().map(|(number, sequence)| sequence.group.unwrap_or(number));
+    Begin::new(&followed, &units.collect::<Vec<_>>(), tested, &terms(settings), STRICTEST)
 }
 
 fn terms(settings: &Settings) -> Terms {

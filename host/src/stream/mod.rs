@@ -23,7 +23,6 @@
 
 #[cfg(feature = "train")]
 mod background;
-mod begin;
 mod calibrate;
 mod copies;
 mod evaluate;

@@ -4,25 +4,30 @@
 //! the surest: few sequences get a name there, and of thirty names none may be wrong to promise 10 %. The walk begins where the
 //! test passes with the greatest probability, as far as the sequences that are learned from tell; these are few, so errors are
 //! also taken to become rarer with the margin as the evidence itself says. Where names are many enough that it costs next to
-//! nothing, there are more starts, each with its share of the level: where the test passes with the greatest probabilities but
-//! that one. The test does not see these sequences, so that the order in which it tries thresholds is fixed before (Learn then
-//! Test, arXiv 2110.01052, on learning hypotheses and their order from other data). What is predicted here decides whether a
-//! promise can be made, and never whether it is kept.
+//! nothing, there are more starts, each with its share of the level. The test does not see these sequences, so that the order
+//! in which it tries thresholds is fixed before (Learn then Test, arXiv 2110.01052, on learning hypotheses and their order from
+//! other data). What is predicted here decides whether a promise can be made, and never whether it is kept.
 
-use crate::calibrate::{MOST_STARTS, Odds, Per, Sequence, Terms, allowed, most_starts, of_share, odds_of};
-use palpate_trees::rows::RowSequence;
-use std::collections::BTreeMap;
+use super::choose::Terms;
+use super::sequence::{Odds, Sequence, odds_of};
+use super::walk::{allowed, needed, of_share};
+use palpate_shared::format::Per;
+use std::collections::{BTreeMap, BTreeSet};
 
+/// The most starts of a walk.
+const MOST_STARTS: usize = 7;
+/// The share of the greatest probability that several starts may cost.
+const COST: f64 = 0.01;
+/// Names of each case that are expected, for each that several starts take at least.
+const NAMES_TO_SPARE: f64 = 1.5;
+/// Names that count beside those that were seen, wrong as often as the evidence itself says.
+const PRIOR: f64 = 3.0;
 /// Between two margins that are compared, in nats.
 const STEP: f64 = 0.5;
 /// Margins at which the test passes with nearly the greatest probability: less by at most this.
 const NEARLY: f64 = 1e-3;
 /// Beyond the margin of the posterior itself, in nats: where a walk begins if nothing can be predicted.
 const BEYOND: f64 = 2.5;
-/// Names that count beside those that were seen, wrong as often as the evidence itself says.
-const PRIOR: f64 = 3.0;
-/// The share of the greatest probability that several starts may cost.
-const COST: f64 = 0.01;
 /// Two starts are at least that far apart, in nats.
 const APART: f64 = 1.0;
 /// The share of the greatest probability that a start has at least.
@@ -30,46 +35,37 @@ const WORTHWHILE: f64 = 0.5;
 
 /// Margins, in nats, at which the test passes with the greatest probabilities.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Begin {
+pub(crate) struct Begin {
     /// From strict to loose.
-    pub(super) starts: Vec<f64>,
+    pub(crate) starts: Vec<f64>,
     /// The loosest at which it passes with nearly the greatest probability.
-    pub(super) loosest: f64,
-}
-
-/// Names of a unit: a sequence, or a group, each sequence of which counts as much.
-#[derive(Clone, Copy, Debug, Default)]
-struct Names {
-    wrong: f64,
-    given: f64,
+    pub(crate) loosest: f64,
 }
 
 impl Begin {
-    /// From sequences that are learned from, followed up to a margin of `most`, and what they are sequences of; `tested` are
-    /// the units that the walk is over.
-    pub(super) fn new(followed: &[Sequence], of: &[&RowSequence], tested: usize, terms: &Terms, most: f64) -> Self {
+    /// From sequences that are learned from, followed up to a margin of `most`; `units` are the groups that they belong to, or
+    /// their own numbers, and `tested` is how many of these the walk is over.
+    pub(crate) fn new(followed: &[Sequence], units: &[usize], tested: usize, terms: &Terms, most: f64) -> Self {
         let steps = (most / STEP) as u32;
         let margins = (1..=steps).rev().map(|step| f64::from(step) * STEP);
-        let seen: Vec<Seen> = margins.map(|margin| Seen::new(followed, of, tested, terms, margin)).collect();
-        let passes = |starts: usize| -> Vec<f64> {
-            let own = Terms { confidence: of_share(terms.confidence, starts), ..*terms };
-            seen.iter().map(|seen| seen.pass(&own)).collect()
-        };
-        let one = passes(1);
+        let seen: Vec<Seen> = margins.map(|margin| Seen::new(followed, units, tested, terms, margin)).collect();
+        let passes = |starts: usize| -> Vec<f64> { seen.iter().map(|seen| seen.pass(starts, terms)).collect() };
         let greatest = |passes: &[f64]| passes.iter().copied().fold(0.0, f64::max);
         let is_near = |passes: &[f64], at: usize| passes[at] > 0.0 && passes[at] >= greatest(passes) - NEARLY;
-        let Some(loosest) = (0..seen.len()).rev().find(|&at| is_near(&one, at)) else {
+        let one = passes(1);
+        let near = || (0..seen.len()).filter(|&at| is_near(&one, at));
+        let (Some(strictest), Some(loosest)) = (near().next(), near().next_back()) else {
             let margin = (((1.0 - terms.rate) / terms.rate).ln() + BEYOND).min(most);
             return Self { starts: vec![margin], loosest: margin };
         };
         let several = (2..=MOST_STARTS).rev().find_map(|count| {
             let passes = passes(count);
-            let first = (0..seen.len()).find(|&at| is_near(&passes, at))?;
-            let is_cheap = greatest(&passes) >= (1.0 - COST) * greatest(&one);
+            let first = (0..seen.len()).find(|&at| is_near(&passes, at) && seen[at].has_names_for(count, terms))?;
+            let is_cheap = passes[first] >= (1.0 - COST) * greatest(&one);
             let chosen = apart(&seen, &passes, first, count);
-            (is_cheap && most_starts(seen[first].fewest(), terms) >= count && chosen.len() == count).then_some(chosen)
+            (is_cheap && chosen.len() == count).then_some(chosen)
         });
-        let mut starts = several.or_else(|| Some(vec![(0..seen.len()).find(|&at| is_near(&one, at))?])).unwrap_or_default();
+        let mut starts = several.unwrap_or_else(|| vec![strictest]);
         starts.sort_unstable();
         Self { starts: starts.into_iter().map(|at| seen[at].margin).collect(), loosest: seen[loosest].margin }
     }
@@ -89,68 +85,89 @@ fn apart(seen: &[Seen], passes: &[f64], first: usize, count: usize) -> Vec<usize
     chosen
 }
 
-/// Names at a margin, for so many times the units that they were seen of.
-struct Seen {
+/// Names of a case that a rate is promised of.
+#[derive(Clone, Copy, Debug, Default)]
+struct Names {
+    /// Those seen, each sequence of a group weighing as much, and the wrong ones.
+    wrong: f64,
+    given: f64,
+    /// Those that are expected where it is tested.
+    expected: f64,
+}
+
+/// Names at a margin.
+#[derive(Clone, Debug)]
+pub(super) struct Seen {
+    /// In nats.
     margin: f64,
-    /// Of each case that the rate is promised of.
     cases: Vec<Names>,
-    times: f64,
 }
 
 impl Seen {
-    fn new(followed: &[Sequence], of: &[&RowSequence], tested: usize, terms: &Terms, margin: f64) -> Self {
+    /// Of sequences, and the units that they belong to, as for [`Begin::new`].
+    pub(super) fn new(followed: &[Sequence], units: &[usize], tested: usize, terms: &Terms, margin: f64) -> Self {
         let odds = Odds::All(odds_of(margin));
         // Of each case and unit: wrong names, names, sequences.
         let mut sums: BTreeMap<(usize, usize), (f64, f64, f64)> = BTreeMap::new();
-        let mut units = std::collections::BTreeSet::new();
-        for (number, (sequence, of)) in followed.iter().zip(of).enumerate() {
+        for (sequence, unit) in followed.iter().zip(units) {
             let look = sequence.given(&odds);
-            let unit = of.group.unwrap_or(number);
-            units.insert(unit);
             let case = match terms.per {
                 Per::Average => Some(0),
                 Per::Object => Some(sequence.object),
                 Per::Name => look.map(|look| look.name),
             };
             let Some(case) = case else { continue };
-            let sum = sums.entry((case, unit)).or_default();
+            let sum = sums.entry((case, *unit)).or_default();
             sum.0 += f64::from(u8::from(look.is_some_and(|look| look.name != sequence.object)));
             sum.1 += f64::from(u8::from(look.is_some()));
             sum.2 += 1.0;
         }
+        let times = tested as f64 / units.iter().collect::<BTreeSet<_>>().len().max(1) as f64;
         let mut cases: BTreeMap<usize, Names> = BTreeMap::new();
         for ((case, _), (wrong, given, all)) in sums {
             let names = cases.entry(case).or_default();
             names.wrong += wrong / all;
             names.given += given / all;
+            names.expected += times * given / all;
         }
-        let times = tested as f64 / units.len().max(1) as f64;
-        Self { margin, cases: cases.into_values().collect(), times }
+        Self { margin, cases: cases.into_values().collect() }
     }
 
-    /// The names that are expected of the case with the fewest.
-    fn fewest(&self) -> f64 {
-        self.cases.iter().map(|names| names.given * self.times).reduce(f64::min).unwrap_or(0.0)
+    /// So many names of each case are expected, of which none was seen.
+    pub(super) fn nothing(expected: f64, margin: f64) -> Self {
+        Self { margin, cases: vec![Names { expected, ..Names::default() }] }
     }
 
-    /// The probability that the test passes: of all names, or of each case that the rate is promised of.
-    fn pass(&self, terms: &Terms) -> f64 {
+    /// The probability that the test passes with the share of one of so many starts: of all names, or of each case that the rate
+    /// is promised of.
+    fn pass(&self, starts: usize, terms: &Terms) -> f64 {
         if self.cases.is_empty() {
             return 0.0;
         }
         // As the posterior says.
         let wrong = (PRIOR / (1.0 + self.margin.exp())).max(f64::MIN_POSITIVE.sqrt());
-        self.cases.iter().map(|names| names.pass(self.times, [wrong, PRIOR - wrong], terms)).product()
+        let confidence = of_share(terms.confidence, starts);
+        let pass = |names: &Names| {
+            let all = names.expected as u64;
+            let Some(allowed) = allowed(all, terms.rate, confidence) else { return 0.0 };
+            // Errors are beta-binomial, as the names seen and the prior ones leave the error rate.
+            beta_binomial(allowed, all, names.wrong + wrong, names.given - names.wrong + PRIOR - wrong)
+        };
+        self.cases.iter().map(pass).product()
     }
-}
 
-impl Names {
-    /// The probability that so many times as many names pass the test: their errors are beta-binomial, as these names and a
-    /// prior of wrong and right ones leave the error rate.
-    fn pass(self, times: f64, [wrong, right]: [f64; 2], terms: &Terms) -> f64 {
-        let all = (self.given * times) as u64;
-        let Some(allowed) = allowed(all, terms.rate, terms.confidence) else { return 0.0 };
-        beta_binomial(allowed, all, self.wrong + wrong, self.given - self.wrong + right)
+    /// True if names are expected to be enough for so many starts, of the case with the fewest.
+    fn has_names_for(&self, starts: usize, terms: &Terms) -> bool {
+        let needed = needed(terms.rate, of_share(terms.confidence, starts)) as f64;
+        !self.cases.is_empty() && self.cases.iter().all(|names| names.expected >= NAMES_TO_SPARE * needed)
+    }
+
+    /// The most starts that cost next to nothing at the first of them.
+    pub(super) fn most_starts(&self, terms: &Terms) -> usize {
+        let is_cheap = |starts: &usize| {
+            self.has_names_for(*starts, terms) && self.pass(*starts, terms) >= (1.0 - COST) * self.pass(1, terms)
+        };
+        (2..=MOST_STARTS).rev().find(is_cheap).unwrap_or(1)
     }
 }
 
@@ -176,7 +193,7 @@ fn beta_binomial(most: u64, all: u64, a: f64, b: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::Look;
+    use super::super::sequence::Look;
 
     #[test]
     fn a_flat_prior_makes_every_number_of_errors_as_probable() {
@@ -191,28 +208,23 @@ mod tests {
 
     #[test]
     fn a_rate_that_is_known_well_makes_errors_binomial() {
-        let tally = crate::calibrate::Tally { wrong: 23, all: 400 };
-        let exact = crate::calibrate::binomial_tail(tally, 0.05);
+        let tally = super::super::walk::Tally { wrong: 23, all: 400 };
+        let exact = super::super::walk::binomial_tail(tally, 0.05);
         let found = beta_binomial(23, 400, 5e7, 95e7);
         assert!((found - exact).abs() < 1e-4, "{found} {exact}");
     }
 
-    /// Sequences that are named at a margin, rightly or not.
-    fn named(at: &[(f64, bool)]) -> (Vec<Sequence>, Vec<RowSequence>) {
+    /// Where to begin after sequences that are named at a margin, rightly or not.
+    fn begin(at: &[(f64, bool)], tested: usize, rate: f64) -> Begin {
         let sequence = |&(margin, right): &(f64, bool)| {
             let mut sequence = Sequence::new(0);
             let look = Look { name: usize::from(!right), odds: odds_of(margin), touches: 1, approaches: 1 };
             sequence.look(look, true);
             sequence
         };
-        let of = (0..at.len()).map(|row| RowSequence { rows: row..row + 1, class: 0, group: None }).collect();
-        (at.iter().map(sequence).collect(), of)
-    }
-
-    fn begin(at: &[(f64, bool)], tested: usize, rate: f64) -> Begin {
-        let (followed, of) = named(at);
+        let followed: Vec<Sequence> = at.iter().map(sequence).collect();
         let terms = Terms { rate, confidence: 0.95, per: Per::Average };
-        Begin::new(&followed, &of.iter().collect::<Vec<_>>(), tested, &terms, 36.0)
+        Begin::new(&followed, &(0..at.len()).collect::<Vec<_>>(), tested, &terms, 36.0)
     }
 
     #[test]
@@ -252,5 +264,14 @@ mod tests {
     fn without_a_prediction_it_begins_beyond_the_posteriors_own_margin() {
         let found = begin(&[], 299, 0.01);
         assert!((found.starts[0] - (99.0_f64.ln() + BEYOND)).abs() < 1e-9 && found.starts.len() == 1, "{found:?}");
+    }
+
+    #[test]
+    fn as_many_starts_are_taken_without_a_prediction_as_cost_next_to_nothing() {
+        let terms = Terms { rate: 0.01, confidence: 0.95, per: Per::Average };
+        // At 7 nats one name of 1,000 is wrong, at 5 nats seven.
+        let starts = |names: f64, margin: f64| Seen::nothing(names, margin).most_starts(&terms);
+        assert_eq!([200.0, 500.0, 100_000.0].map(|names| starts(names, 7.0)), [1, 1, 7]);
+        assert!(starts(3_000.0, 7.0) >= starts(3_000.0, 5.0));
     }
 }
