@@ -521,22 +521,20 @@ fn sequences_of_rows_are_calibrated_evaluated_and_recognized_verdict_after_verdi
 #[test]
 fn evidence_ends_where_a_sequence_does_and_nothing_is_said_of_one_after_its_verdict() {
     let (_directory, path) = place();
-    let (model, sure, unseen) = (path("model.palpate"), path("sure.palpate"), path("unseen.csv"));
+    let (model, unseen) = (path("model.palpate"), path("unseen.csv"));
     let rows = data("xgboost-3.4-softprob.rows.csv");
     stdout(run(["export", &data("xgboost-3.4-softprob.ubj"), "-o", &model, "--names", "cup,jug,pan"]));
-    std::fs::write(path("fresh.csv"), sequences(&model, &rows, 300, 0)).unwrap();
     let text = sequences(&model, &rows, 300, 300);
     // Every other sequence is cut short, so that many are undecided.
     let (header, lines) = text.split_once('\n').unwrap();
     let is_kept = |(at, _): &(usize, &str)| (at / 6) % 2 == 0 || at % 6 < 1;
     let lines: Vec<&str> = lines.lines().enumerate().filter(is_kept).map(|(_, line)| line).collect();
     std::fs::write(&unseen, format!("{header}\n{}\n", lines.join("\n"))).unwrap();
-    let columns = ["--label", "kind", "--sequence-column", "id"];
-    let rate = ["--error-rate", "10%", "-o", &sure];
-    stdout(run([&["calibrate", &model, &path("fresh.csv")][..], &columns, &rate].concat()));
-    let found = json(run([&["evaluate", &sure, &unseen, "--json"][..], &columns].concat()));
-    let said = run(["recognize", &sure, &unseen, "--features", "--add-up", "--sequence-column", "id", "--json"]);
-    assert!(!String::from_utf8_lossy(&said.stderr).contains("promise"));
+    // A rate that takes two rows or more.
+    let columns = ["--label", "kind", "--sequence-column", "id", "--error-rate", "20%"];
+    let found = json(run([&["evaluate", &model, &unseen, "--json"][..], &columns].concat()));
+    let recognize = ["recognize", &model, &unseen, "--features", "--add-up", "--error-rate", "20%"];
+    let said = run([&recognize[..], &["--sequence-column", "id", "--json"]].concat());
     let said: Vec<Value> = stdout(said).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let (mut wrong, mut named, mut undecided) = (0, 0, 0);
     for number in 300..600 {
@@ -549,20 +547,20 @@ fn evidence_ends_where_a_sequence_does_and_nothing_is_said_of_one_after_its_verd
         let is_wrong = last["class"] != ["cup", "jug", "pan"][number % 3];
         wrong += u32::from(last["verdict"] == "recognized" && is_wrong);
     }
-    assert!(undecided > 50 && named > 100, "{undecided} {named}");
+    assert!(undecided > 50 && named > 50, "{undecided} {named}");
     assert!((found["error"].as_f64().unwrap() - f64::from(wrong) / f64::from(named)).abs() < 1e-9, "{found}");
     assert!((found["undecided"].as_f64().unwrap() - f64::from(undecided) / 300.0).abs() < 1e-9, "{found}");
     // What evaluate refuses, too.
     let text = std::fs::read_to_string(&unseen).unwrap();
     let recognize = |text: String| {
         std::fs::write(&unseen, text).unwrap();
-        stderr(run(["recognize", &sure, &unseen, "--features", "--add-up", "--sequence-column", "id"]), 1)
+        stderr(run(["recognize", &model, &unseen, "--features", "--add-up", "--sequence-column", "id"]), 1)
     };
     let missing = recognize(text.replacen("\n301,", "\n,", 1));
     assert!(missing.contains("row 7: the sequence is missing"), "{missing}");
     let back = recognize(text.replacen("\n302,", "\n300,", 1));
     assert!(back.contains("row 8: the sequence \"300\" comes back"), "{back}");
-    let alone = stderr(run(["recognize", &sure, &unseen, "--features", "--sequence-column", "id"]), 2);
+    let alone = stderr(run(["recognize", &model, &unseen, "--features", "--sequence-column", "id"]), 2);
     assert!(alone.contains("--add-up"), "{alone}");
 }
 
@@ -591,7 +589,7 @@ fn a_promise_for_groups_says_when_none_are_given_and_copies_are_noted() {
     let alone = evaluate(&[]);
     assert!(alone.contains(" were, each sequence as a group of its own, as none are given (--group-column): "), "{alone}");
     // There are as many different rows as the fixture has, so that sequences repeat.
-    let copied = format!("{made}{}\n", lines.lines().take(600).map(|line| format!("1{line}")).collect::<Vec<_>>().join("\n"));
+    let copied = format!("{made}{}\n", lines.lines().take(600).map(|line| format!("c{line}")).collect::<Vec<_>>().join("\n"));
     std::fs::write(&fresh, copied).unwrap();
     let text = calibrate(&[]);
     assert!(text.contains("\nnote: ") && text.contains(" of 400 sequences are copies, value by value, of others under another id"), "{text}");

@@ -249,7 +249,9 @@ class SequenceRecognizer:
 
     def fit(self, X: npt.ArrayLike, y: _Ids, *, sequence: _Ids, groups: _Ids | None = None) -> SequenceRecognizer:
         """Trains on some sequences, and calibrates on the others."""
-        rows = X if hasattr(X, "iloc") else np.asarray(X)
+        if y is None:
+            raise InputError("a SequenceRecognizer requires y to be passed, but the target y is None. Give a class for each row.")
+        rows = _table(X)
         labels, ids = np.asarray(y), np.asarray(sequence)
         owners = None if groups is None else np.asarray(groups)
         _agree(len(rows), y=len(labels), sequence=len(ids), groups=None if owners is None else len(owners))
@@ -299,14 +301,25 @@ class SequenceRecognizer:
         if not 0 < self.train_share < 1:
             raise SettingError(f"train_share is {self.train_share}. Use a share above 0 and below 1.")
         names = np.unique(units)
+        count = int(len(names) * self.train_share)
+        if count == 0:
+            raise InputError(
+                f"there are {len(names)} sequences or groups, too few to train on some and calibrate on others. Record more."
+            )
         np.random.default_rng(self.seed).shuffle(names)
-        return np.isin(units, names[: int(len(names) * self.train_share)])
+        return np.isin(units, names[:count])
 
     def verdicts(self, X: npt.ArrayLike, *, sequence: _Ids) -> list[Verdict]:
         """The verdict on each sequence, in their order: its class as text, and the rows that it took."""
         if not hasattr(self, "model_"):
             raise _not_fitted()
-        rows, ids = _rows(X), _ids(sequence, "sequence")
+        table, ids = _table(X), _ids(sequence, "sequence")
+        found, wanted = table.shape[1], getattr(self, "n_features_in_", None)
+        # The columns of a table are found by their names.
+        if wanted is not None and found != wanted and not hasattr(X, "iloc"):
+            kind = type(self).__name__
+            raise InputError(f"X has {found} features, but {kind} is expecting {wanted} features as input. Give those of the fit.")
+        rows = _rows(table)
         _agree(len(rows), sequence=len(ids))
         recognizer = Recognizer(self.model_)
         return [_verdict(recognizer, rows[stretch]) for stretch in _stretches(ids)]
@@ -340,6 +353,16 @@ _PARAMETERS = (
     "prefit",
     "seed",
 )
+
+
+def _table(X: Any) -> Any:
+    """Rows of features, as they are given or as an array."""
+    if hasattr(X, "toarray"):
+        raise InputError("X is sparse, which is not supported. Give `X.toarray()`.")
+    table = X if hasattr(X, "iloc") else np.asarray(X)
+    if table.ndim != 2:
+        raise InputError(f"X has {table.ndim} dimensions, not 2. Reshape your data: a line for each row, a column for each feature.")
+    return table
 
 
 def _clone(estimator: Any) -> Any:
