@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import lightgbm
 import numpy as np
 import numpy.typing as npt
 import palpate
+import pandas as pd
 import pytest
 import xgboost
-from sklearn import base, ensemble
+from sklearn import base, ensemble, tree
+from sklearn.exceptions import NotFittedError
+from sklearn.frozen import FrozenEstimator
+from sklearn.utils.estimator_checks import parametrize_with_checks
 
 LENGTH = 12
 
@@ -98,3 +103,145 @@ def test_what_is_wrong_with_a_sequence_is_said_with_its_row() -> None:
     value = ensemble.HistGradientBoostingRegressor(max_iter=3).fit(X, np.arange(len(X)))
     with pytest.raises(palpate.InputError, match="predicts a value"):
         palpate.calibrate(value, X, y, sequence=sequence)
+
+
+def test_a_second_fit_with_the_same_estimator_trains_a_clone_again_and_calibrates_on_other_rows() -> None:
+    X, y, sequence, _ = streams(900, 1)
+    own = estimators()[2]
+    recognizer = palpate.SequenceRecognizer(own, error_rate=0.1, max_rows=LENGTH)
+    first = recognizer.fit(X, y, sequence=sequence)
+    models = [first.model_.checksum]
+    assert not hasattr(own, "classes_") and hasattr(first.estimator_, "classes_")
+    sequences = [first.calibrated_.sequences]
+    # What a cell that is run twice does, and a loop over rates.
+    again = recognizer.set_params(error_rate=0.1).fit(X, y, sequence=sequence)
+    models.append(again.model_.checksum)
+    sequences.append(again.calibrated_.sequences)
+    assert models[0] == models[1] and sequences[0] == sequences[1] < 450
+    # A fitted one is trained again, too, unless it is said that it is fitted.
+    fitted = base.clone(own).fit(X, y)
+    refitted = palpate.SequenceRecognizer(fitted, error_rate=0.1, max_rows=LENGTH).fit(X, y, sequence=sequence)
+    assert refitted.model_.checksum == models[0]
+
+
+def test_a_fitted_estimator_is_taken_as_it_is_where_that_is_said() -> None:
+    X, y, sequence, _ = streams(300, 1)
+    fitted = estimators()[2].fit(X, y)
+    X, y, sequence, _ = streams(300, 2)
+    prefit = palpate.SequenceRecognizer(fitted, error_rate=0.2, prefit=True).fit(X, y, sequence=sequence)
+    frozen = palpate.SequenceRecognizer(FrozenEstimator(fitted), error_rate=0.2).fit(X, y, sequence=sequence)
+    assert prefit.estimator_ is fitted and frozen.estimator_ is fitted
+    assert prefit.model_.checksum == frozen.model_.checksum
+    assert prefit.calibrated_.sequences + prefit.calibrated_.raw["learned"] == 300
+    with pytest.raises(palpate.InputError, match="the RandomForestClassifier is not fitted"):
+        palpate.SequenceRecognizer(estimators()[2], prefit=True).fit(X, y, sequence=sequence)
+
+
+def test_rows_and_what_they_belong_to_agree_in_every_call() -> None:
+    X, y, sequence, persons = streams(300, 1)
+    recognizer = palpate.SequenceRecognizer(estimators()[2], error_rate=0.2, max_rows=LENGTH)
+    with pytest.raises(palpate.SettingError, match="y is 3599 values. Use 3600, one for each row"):
+        recognizer.fit(X, y[1:], sequence=sequence)
+    with pytest.raises(palpate.SettingError, match="sequence is 3599 values"):
+        recognizer.fit(X, y, sequence=sequence[1:])
+    with pytest.raises(palpate.SettingError, match="groups is 3599 values"):
+        recognizer.fit(X, y, sequence=sequence, groups=persons[1:])
+    with pytest.raises(NotFittedError, match="Call its `fit` first"):
+        recognizer.predict(X, sequence=sequence)
+    recognizer.fit(X, y, sequence=sequence)
+    for call in (recognizer.predict, recognizer.verdicts):
+        with pytest.raises(palpate.SettingError, match="sequence is 3599 values"):
+            call(X, sequence=sequence[1:])
+        with pytest.raises(palpate.SettingError, match="sequence is 3600 values"):
+            call(X[1:], sequence=sequence)
+    assert len(recognizer.predict(X[:0], sequence=[])) == 0
+
+
+def test_rows_without_a_sequence_and_sequences_that_come_back_are_refused_in_every_call() -> None:
+    X, y, sequence, _ = streams(300, 1)
+    recognizer = palpate.SequenceRecognizer(estimators()[2], error_rate=0.2, max_rows=LENGTH).fit(X, y, sequence=sequence)
+    texts = [f"s{number}" for number in sequence]
+    back = sequence.copy()
+    back[-1] = 0
+    calls: list[Any] = [
+        lambda ids: recognizer.predict(X, sequence=ids),
+        lambda ids: recognizer.verdicts(X, sequence=ids),
+        lambda ids: palpate.SequenceRecognizer(estimators()[2]).fit(X, y, sequence=ids),
+        lambda ids: palpate.calibrate(recognizer.estimator_, X, y, sequence=ids),
+        lambda ids: palpate.evaluate_sequences(recognizer.model_, X, y, sequence=ids),
+    ]
+    for call in calls:
+        for missing in (None, float("nan"), "", pd.NA, pd.NaT):
+            for ids in (texts[:5] + [missing] + texts[6:], pd.Series(texts[:5] + [missing] + texts[6:], dtype=object)):
+                with pytest.raises(palpate.InputError, match="row 6: the sequence is missing"):
+                    call(ids)
+        with pytest.raises(palpate.InputError, match="row 6: the sequence is missing"):
+            call(np.where(np.arange(len(sequence)) == 5, np.nan, sequence))
+        with pytest.raises(palpate.InputError, match='row 3600: the sequence "0" comes back'):
+            call(back)
+    with pytest.raises(palpate.InputError, match="row 2: the group is missing"):
+        palpate.calibrate(recognizer.estimator_, X, y, sequence=sequence, groups=[1, None, *sequence[2:]])
+
+
+def test_copies_of_sequences_under_other_ids_are_noted() -> None:
+    X, y, sequence, _ = streams(300, 1)
+    fitted = estimators()[2].fit(X, y)
+    X, y, sequence, _ = streams(100, 2)
+    four = [np.concatenate([part] * 4) for part in (X, y)]
+    ids = np.concatenate([sequence + 1000 * copy for copy in range(4)])
+    with pytest.warns(UserWarning, match="300 of 400 sequences are copies, value by value, of others"):
+        noted = palpate.calibrate(fitted, *four, sequence=ids, error_rate=0.2)
+    assert noted.raw["note"].startswith("300 of 400 sequences")
+    # Within a group that is what groups are for.
+    palpate.calibrate(fitted, *four, sequence=ids, groups=ids % 1000, error_rate=0.2)
+
+
+def test_a_limit_of_no_rows_is_called_by_its_name() -> None:
+    X, y, sequence, _ = streams(300, 1)
+    fitted = estimators()[2].fit(X, y)
+    with pytest.raises(palpate.SettingError, match="max_rows is 0. Use at least 1"):
+        palpate.calibrate(fitted, X, y, sequence=sequence, max_rows=0)
+    model = palpate.compile(fitted)
+    with pytest.raises(palpate.SettingError, match="max_rows is 0. Use at least 1"):
+        palpate.evaluate_sequences(model, X, y, sequence=sequence, max_rows=0)
+
+
+class PerRow(palpate.SequenceRecognizer):
+    """What scikit-learn's checks can call: they know no sequences, so that each row is one of its own. Their labels are drawn by
+    chance, of which nothing can be promised, so that here the first column says the class."""
+
+    def fit(self, X: Any, y: Any, *, sequence: Any = None, groups: Any = None) -> PerRow:
+        if y is not None and np.ndim(X) == 2 and not hasattr(X, "toarray") and np.shape(X)[1] > 0:
+            columns = np.asarray(X, dtype=float)[:, 0]
+            y = (columns > np.nanmedian(columns)).astype(int)[: len(y)]
+        super().fit(X, y, sequence=np.arange(np.shape(X)[0]) if sequence is None else sequence, groups=groups)
+        return self
+
+    def predict(self, X: Any, *, sequence: Any = None) -> npt.NDArray[Any]:
+        found = super().predict(X, sequence=np.arange(np.shape(X)[0]) if sequence is None else sequence)
+        # They compare numbers.
+        return np.array([-1 if one is None else one for one in found])
+
+
+# Rates that the few rows of the checks can promise.
+LENIENT: dict[str, Any] = {"error_rate": 0.49, "confidence": 0.5, "train_share": 0.6}
+
+
+def expected_failures(_: Any) -> dict[str, str]:
+    return {"check_fit2d_1sample": "one sequence cannot be divided, and the message counts sequences, not samples"}
+
+
+with warnings.catch_warnings():
+    # It is of scikit-learn's kind, and does not import it.
+    warnings.filterwarnings("ignore", message=".*does not inherit from `sklearn.base.BaseEstimator`")
+    CHECKS = parametrize_with_checks(
+        [PerRow(tree.DecisionTreeClassifier(max_depth=2, random_state=1), **LENIENT)],
+        expected_failed_checks=expected_failures,
+    )
+
+
+@CHECKS
+def test_scikit_learns_checks_hold(estimator: Any, check: Any) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        check(estimator)

@@ -1,7 +1,8 @@
 //! Thresholds that keep a promise, from sequences.
 
+use super::begin::Seen;
 use super::sequence::{Odds, Sequence, odds_of};
-use super::walk::{Kept, Stop, Tally, needed, walk};
+use super::walk::{Kept, Stop, Tally, walk};
 use crate::error::{CalibrateProblem, Result, Supplied};
 use palpate_shared::format::Per;
 use rayon::prelude::*;
@@ -19,6 +20,9 @@ const LEARNED: usize = 3;
 /// From how much stricter than the learned thresholds by name to how much looser the tested ones are, in nats.
 const AROUND: [f64; 2] = [2.0, -1.0];
 
+/// From the first start to where the one after the last would be, at least, in nats; otherwise to the posterior's own threshold.
+const SPREAD: f64 = 2.5;
+
 /// Terms of a promise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Terms {
@@ -28,6 +32,29 @@ pub struct Terms {
     pub confidence: f64,
     /// Of what the rate is promised.
     pub per: Per,
+}
+
+/// Where walks over thresholds begin, and where they end at the latest.
+#[derive(Clone, Copy, Debug)]
+pub struct Way<'w> {
+    /// Margins, in nats, at which a walk may begin, from strict to loose. Sequences were followed to the first of them or
+    /// to the limit of touches. Those that are tested had no part in the choice.
+    pub starts: &'w [f64],
+    /// Thresholds that those to be kept must be as strict as.
+    pub loosest: Option<&'w Odds>,
+}
+
+impl Way<'_> {
+    pub(super) fn strictest(&self) -> f64 {
+        self.starts.first().copied().unwrap_or(LOOSEST)
+    }
+}
+
+/// So many starts, the first of them the strictest, in equal steps: where nothing says which would do best.
+pub(super) fn spread(strictest: f64, count: usize, rate: f64) -> Vec<f64> {
+    let beyond = strictest - ((1.0 - rate) / rate).ln();
+    let step = beyond.max(SPREAD) / count.max(1) as f64;
+    (0..count.max(1)).map(|start| (strictest - step * start as f64).max(LOOSEST)).collect()
 }
 
 /// Thresholds that keep a promise, and the results of the sequences that they were tested on.
@@ -58,7 +85,9 @@ pub struct Chosen {
 ///
 /// A sequence that ends without a name is neither right nor wrong: the error rate is that of names that are given. One
 /// threshold is walked from strict to loose for an average as for each object ([`walk`]: fixed-sequence testing, with an
-/// intersection-union test at each step), so that the rates of all objects are kept at once with the stated probability.
+/// intersection-union test at each step), so that the rates of all objects are kept at once with the stated probability. The
+/// walk has up to seven starts, in equal steps from the strictest threshold to the posterior's own; as many as the number of
+/// sequences allows.
 ///
 /// Thresholds by name depend on each other, so there is no one order from strict to loose. One is learned on a third of the
 /// sequences of each object: thresholds that seem to keep each rate, and those about them. It is walked on the other two
@@ -68,75 +97,104 @@ pub struct Chosen {
 /// # Errors
 /// [`CalibrateProblem`], if no threshold keeps the promise or too few names are given to know.
 pub fn choose(sequences: &[Sequence], objects: &[String], strictest: f64, terms: &Terms) -> Result<Chosen> {
-    Ok(chosen(sequences, objects, strictest, terms, None)?)
+    let names = sequences.len() as f64 / By::of(terms.per, objects.len()).count().max(1) as f64;
+    let count = Seen::nothing(names * share_tested(terms.per), strictest).most_starts(terms);
+    let starts = spread(strictest, count, terms.rate);
+    Ok(chosen(sequences, objects, &Way { starts: &starts, loosest: None }, terms, None)?)
+}
+
+/// The share of sequences that are not learned from.
+pub(crate) fn share_tested(per: Per) -> f64 {
+    let share = 1.0 / LEARNED as f64;
+    if per == Per::Name { 1.0 - share } else { 1.0 }
 }
 
 /// The same of sequences that used up what was `supplied`, if they did.
 pub(super) fn chosen(
     sequences: &[Sequence],
     objects: &[String],
-    strictest: f64,
+    way: &Way<'_>,
     terms: &Terms,
     supplied: Option<Supplied>,
 ) -> Result<Chosen, CalibrateProblem> {
-    let Terms { rate, confidence, per } = *terms;
-    let count = objects.len();
+    let Terms { rate, per, .. } = *terms;
     let of = |position: usize| (per != Per::Average).then(|| objects.get(position).cloned()).flatten();
-    let (kept, tested) = kept(sequences, count, strictest, terms).map_err(|stop| match stop {
-        Stop::TooFew { position, found } => {
-            CalibrateProblem::TooFew { object: of(position), rate, found, needed: needed(rate, confidence), supplied }
+    choose_independent(sequences, objects.len(), way, terms).map_err(|stop| match stop {
+        Stop::TooFew { position, found, needed } => {
+            CalibrateProblem::TooFew { object: of(position), rate, found, needed, supplied }
         }
-        Stop::TooMany { position, tally: Tally { wrong, all } } => {
-            CalibrateProblem::NotKept { object: of(position), rate, wrong, given: all }
+        Stop::TooMany { position, tally: Tally { wrong, all }, needed } => {
+            CalibrateProblem::NotKept { object: of(position), rate, wrong, given: all, needed }
         }
-    })?;
-    Ok(summary(kept.threshold, kept.tallies, &tested, count))
+        Stop::Looser => CalibrateProblem::Looser { rate },
+    })
 }
 
 /// The thresholds that are kept, and the sequences that they were tested on.
 fn kept<'s>(
     sequences: &'s [Sequence],
     count: usize,
-    strictest: f64,
+    way: &Way<'_>,
     terms: &Terms,
 ) -> Result<(Kept<Odds>, Vec<&'s Sequence>), Stop> {
     let Terms { rate, confidence, per } = *terms;
-    let mut tested: Vec<&Sequence> = sequences.iter().collect();
-    let kept: Result<Kept<Odds>, Stop> = match per {
-        Per::Average | Per::Object => {
-            let margins = grid(strictest, LOOSEST).map(|margin| Odds::All(odds_of(margin)));
-            let steps = margins.map(|odds| {
-                let tallies = tallies(&tested, &odds, By::of(per, count));
-                (odds, tallies)
-            });
-            walk(steps, rate, confidence)
-        }
-        Per::Name => {
-            let (learn, test) = learned_and_tested(&tested);
-            let steps = around(&learned(&learn, count, strictest, rate), strictest);
-            tested = test;
-            let tally = |odds| {
-                let tallies = tallies(&tested, &odds, By::Named(count));
-                (odds, tallies)
-            };
-            walk(steps.into_iter().map(tally), rate, confidence)
-        }
+    let (learn, tested) = match per {
+        Per::Average | Per::Object => (Vec::new(), sequences.iter().collect()),
+        Per::Name => learned_and_tested(sequences),
     };
-    Ok((kept?, tested))
+    let Steps { odds, starts } = Steps::new(&learn, count, way, terms)?;
+    let tally = |odds| {
+        let tallies = tallies(&tested, &odds, By::of(per, count));
+        (odds, tallies)
+    };
+    let kept = walk(odds.into_iter().map(tally), &starts, rate, confidence)?;
+    Ok((kept, tested))
 }
 
-/// The same of independent sequences that were not drawn from a supply; `objects` is the number of objects.
+/// The same as [`choose`] of independent sequences that were not drawn from a supply; `objects` is the number of objects.
 ///
 /// # Errors
 /// [`Stop`], if no threshold can be kept.
 pub fn choose_independent(
     sequences: &[Sequence],
     objects: usize,
-    strictest: f64,
+    way: &Way<'_>,
     terms: &Terms,
 ) -> Result<Chosen, Stop> {
-    let (kept, tested) = kept(sequences, objects, strictest, terms)?;
+    let (kept, tested) = kept(sequences, objects, way, terms)?;
     Ok(summary(kept.threshold, kept.tallies, &tested, objects))
+}
+
+/// Thresholds that are walked over, from strict to loose, and the positions of the starts among them.
+pub(super) struct Steps {
+    pub(super) odds: Vec<Odds>,
+    pub(super) starts: Vec<usize>,
+}
+
+impl Steps {
+    /// One threshold for all names; for a promise per name one for each, about those learned on sequences that are not tested
+    /// on: as if a test of strangers had held no name back, which makes a threshold look better than it is.
+    ///
+    /// # Errors
+    /// [`Stop::Looser`], if all are looser than they may be.
+    pub(super) fn new(learn: &[&Sequence], objects: usize, way: &Way<'_>, terms: &Terms) -> Result<Self, Stop> {
+        let strictest = way.strictest();
+        let Self { mut odds, starts } = match terms.per {
+            Per::Average | Per::Object => {
+                let odds = grid(strictest, LOOSEST).map(|margin| Odds::All(odds_of(margin))).collect();
+                let position = |margin: &f64| ((strictest - margin) / STEP).round().max(0.0) as usize;
+                Self { odds, starts: way.starts.iter().map(position).collect() }
+            }
+            Per::Name => {
+                let ungated: Vec<Sequence> = learn.iter().map(|sequence| sequence.ungated()).collect();
+                around(&learned(&ungated.iter().collect::<Vec<_>>(), objects, strictest, terms.rate), strictest, way.starts.len())
+            }
+        };
+        if let Some(loosest) = way.loosest {
+            odds.truncate(odds.partition_point(|odds| odds.is_as_strict_as(loosest)));
+        }
+        if odds.is_empty() { Err(Stop::Looser) } else { Ok(Self { odds, starts }) }
+    }
 }
 
 /// Margins from `strict` to `loose`.
@@ -160,7 +218,7 @@ pub(super) fn steps(sequences: &[Sequence], objects: usize, strictest: f64, term
         }
         Per::Name => {
             let learn: Vec<&Sequence> = sequences.iter().collect();
-            around(&learned(&learn, objects, strictest, terms.rate), strictest)
+            around(&learned(&learn, objects, strictest, terms.rate), strictest, 1).odds
         }
     }
 }
@@ -219,7 +277,7 @@ pub(super) fn tallies(sequences: &[&Sequence], odds: &Odds, by: By) -> Vec<Tally
 }
 
 /// The sequences that thresholds by name are learned on, the first of each object, and those that they are tested on.
-fn learned_and_tested<'s>(sequences: &[&'s Sequence]) -> (Vec<&'s Sequence>, Vec<&'s Sequence>) {
+fn learned_and_tested(sequences: &[Sequence]) -> (Vec<&Sequence>, Vec<&Sequence>) {
     let objects = sequences.iter().map(|sequence| sequence.object + 1).max().unwrap_or(0);
     let mut left = vec![0_usize; objects];
     sequences.iter().for_each(|sequence| left[sequence.object] += 1);
@@ -269,18 +327,26 @@ pub(super) fn learned(sequences: &[&Sequence], count: usize, strictest: f64, rat
     }
 }
 
-/// Thresholds by name about the learned ones, from strict to loose: all names' by as much.
-pub(super) fn around(learned: &[f64], strictest: f64) -> Vec<Odds> {
+/// Thresholds by name about the learned ones, from strict to loose: all names' by as much. So many starts are in equal steps
+/// above the learned ones.
+fn around(learned: &[f64], strictest: f64, starts: usize) -> Steps {
     let [strict, loose] = AROUND;
-    let steps = ((strict - loose) / (STEP * NAMES_STEP as f64)).round() as usize;
-    let odds = (0..=steps).map(|step| {
-        let beyond = strict - STEP * (NAMES_STEP * step) as f64;
+    let step = STEP * NAMES_STEP as f64;
+    let steps = ((strict - loose) / step).round() as usize;
+    let of_starts = |start: usize| (strict * start as f64 / starts.max(1) as f64 / step).round() as usize;
+    let mut all = Steps { odds: Vec::new(), starts: Vec::new() };
+    for number in 0..=steps {
+        let beyond = strict - step * number as f64;
         let margin = |learned: &f64| stored((learned + beyond).clamp(LOOSEST, strictest.max(LOOSEST)));
-        Odds::ByObject(learned.iter().map(margin).collect())
-    });
-    let mut odds: Vec<Odds> = odds.collect();
-    odds.dedup();
-    odds
+        let odds = Odds::ByObject(learned.iter().map(margin).collect());
+        // Where all are as strict or as loose as can be, nothing is tested twice.
+        if all.odds.last() != Some(&odds) {
+            all.odds.push(odds);
+        }
+        let here = (0..starts.max(1)).filter(|start| of_starts(*start) == number);
+        all.starts.extend(here.map(|_| all.odds.len() - 1));
+    }
+    all
 }
 
 pub(super) fn summary(odds: Odds, kept: Vec<Tally>, tested: &[&Sequence], count: usize) -> Chosen {

@@ -22,35 +22,67 @@ pub enum CalibrateProblem {
         supplied: Option<Supplied>,
     },
     /// No threshold keeps the promise.
-    #[error("no threshold keeps {} %: at the strictest {wrong} of {given} names{} are wrong", percent(*rate), of_object(object))]
+    #[error("{}", seen(object, *rate, Tally { wrong: *wrong, all: *given }, *needed, ""))]
     NotKept {
         /// The object that is named, or touched, if the promise is for each.
         object: Option<String>,
         /// The promised rate.
         rate: f64,
-        /// Wrong names.
+        /// Wrong names, at the threshold that was nearest to keeping it.
         wrong: u64,
         /// Names given.
         given: u64,
+        /// The names with which as many wrong ones would do.
+        needed: Option<u64>,
+    },
+    /// With a test of strangers no threshold as strict as without it was tested.
+    #[error("with the test of strangers no threshold keeps {} % that is as strict as without it", percent(*rate))]
+    Looser {
+        /// The promised rate.
+        rate: f64,
     },
     /// There are too few sequences of rows, or groups of them, for a promise, even without any error.
-    #[error("{found} {}{} are too few to promise {} %: at least {needed} are needed, none of them wrong; {}", what(*groups, object.is_some()), of_object(object), percent(*rate), could(*possible))]
+    #[error("{}{} are too few to promise {} %: at least {needed} are needed, none of them wrong; {}", how_many(*found, *groups, *names_in), of_object(object), percent(*rate), could(*possible, *held))]
     TooFewSequences {
         /// The class whose names are too few, if the promise is for each.
         object: Option<String>,
         /// The promised rate.
         rate: f64,
-        /// Sequences, or groups.
+        /// Sequences, or groups, or the names that were given in some.
         found: u64,
+        /// The sequences, or groups, that the names were given in, where it is names that are too few.
+        names_in: Option<u64>,
         /// As many as are needed.
         needed: u64,
         /// The least rate that as many as there are could promise, if any below one half.
         possible: Option<f64>,
         /// True if it is groups that are too few.
         groups: bool,
+        /// The row from which a test of strangers lets names be given, and the rows of the longest sequence, where it has none.
+        held: Option<[u64; 2]>,
+    },
+    /// There are too few sequences of rows for a test of strangers.
+    #[error("{found} {} are too few for a test of strangers with at most {} % false alarms: at least {needed} are needed, as a part of them tests it", what(*groups), percent(*alarms))]
+    TooFewForTest {
+        /// Sequences, or groups.
+        found: u64,
+        /// About as many as are needed.
+        needed: u64,
+        /// The share of false alarms.
+        alarms: f64,
+        /// True if it is groups.
+        groups: bool,
+    },
+    /// Rows of known classes often do not fit them.
+    #[error("of the {found} sequences that test for strangers more than {} % end as unknown at every threshold", percent(*alarms))]
+    TooManyAlarms {
+        /// Sequences that the test was tested on.
+        found: u64,
+        /// The share of false alarms.
+        alarms: f64,
     },
     /// No threshold keeps the promise on sequences of rows.
-    #[error("no threshold keeps {} %: at the strictest {wrong} of {given} names{} are wrong, of {units} {}", percent(*rate), of_object(object), what(*groups, false))]
+    #[error("{}", seen(object, *rate, Tally { wrong: *wrong, all: *given }, *needed, &format!(" in {units} {}", what(*groups))))]
     NotKeptByRows {
         /// The class that is named, or right, if the promise is for each.
         object: Option<String>,
@@ -60,7 +92,9 @@ pub enum CalibrateProblem {
         wrong: u64,
         /// Names given.
         given: u64,
-        /// Sequences, or groups, that there are.
+        /// The names with which as many wrong ones would do; none where groups count, and not names.
+        needed: Option<u64>,
+        /// Sequences, or groups, that were tested on.
         units: u64,
         /// True if the promise is for groups.
         groups: bool,
@@ -141,7 +175,16 @@ impl Problem for CalibrateProblem {
             Self::TooFewSequences { groups: true, .. } => {
                 "Record more groups, or promise a higher error rate; more sequences of the same groups do not help."
             }
+            Self::TooFewSequences { held: Some(_), .. } => "Give sequences of more rows, or use `--strangers likely`.",
             Self::TooFewSequences { .. } => "Record more sequences, or promise a higher error rate.",
+            Self::TooFewForTest { .. } => "Record more, or calibrate without the test.",
+            Self::TooManyAlarms { .. } => {
+                "Train the model on rows like these, so that they fit their classes, or calibrate without the test."
+            }
+            Self::Looser { .. } => "Calibrate on more, or without the test.",
+            Self::NotKeptByRows { wrong, given, rate, .. } if is_too_few(Tally { wrong: *wrong, all: *given }, *rate) => {
+                "Record more sequences, or promise a higher error rate."
+            }
             Self::NotKeptByRows { .. } => {
                 "Promise a higher error rate, give sequences of more rows, or train the model on rows like these."
             }
@@ -165,19 +208,43 @@ impl Problem for CalibrateProblem {
     }
 }
 
-fn what(groups: bool, names: bool) -> &'static str {
-    match (groups, names) {
-        (true, _) => "groups of sequences",
-        (false, true) => "names given",
-        (false, false) => "sequences",
+fn what(groups: bool) -> &'static str {
+    if groups { "groups of sequences" } else { "sequences" }
+}
+
+fn how_many(found: u64, groups: bool, names_in: Option<u64>) -> String {
+    match names_in {
+        Some(all) if groups => format!("names given in as many as {found} of {all} groups of sequences"),
+        Some(all) => format!("{found} names given in {all} sequences"),
+        None => format!("{found} {}", what(groups)),
     }
 }
 
-fn could(possible: Option<f64>) -> String {
-    possible.map_or_else(
-        || "as many could promise nothing".into(),
-        |rate| format!("as many could promise {} %", percent(rate)),
-    )
+fn could(possible: Option<f64>, held: Option<[u64; 2]>) -> String {
+    match (held, possible) {
+        (Some([first, longest]), _) => {
+            format!("the test of strangers lets names be given from row {first} on, and the longest sequence has {longest}")
+        }
+        (None, None) => "as many could promise nothing".into(),
+        (None, Some(rate)) => format!("as many could promise {} %", percent(rate)),
+    }
+}
+
+/// True if a higher share of these names would have to be wrong to say that the rate is not kept.
+fn is_too_few(Tally { wrong, all }: Tally, rate: f64) -> bool {
+    wrong as f64 <= rate * all as f64
+}
+
+/// Statement of what was seen where no threshold was kept.
+fn seen(object: &Option<String>, rate: f64, tally: Tally, needed: Option<u64>, units: &str) -> String {
+    let (Tally { wrong, all }, of, rate_text) = (tally, of_object(object), percent(rate));
+    if !is_too_few(tally, rate) {
+        return format!("no threshold that was tested keeps {rate_text} %: at the best {wrong} of {all} names given{of}{units} are wrong");
+    }
+    let needed = needed.map_or_else(String::new, |needed| {
+        format!(": with {wrong} wrong it takes {needed}, and fewer the fewer are wrong")
+    });
+    format!("{all} names given{of}{units}, {wrong} wrong, are too few to know whether {rate_text} % is kept{needed}")
 }
 
 fn percent(rate: f64) -> f64 {

@@ -10,12 +10,13 @@
 //! most 1 under the hypothesis. So by Markov's inequality the product reaches 1 / (1 − confidence) with a probability of at
 //! most 1 − confidence. λ is chosen on groups that the test does not see, for the number of groups that it sees. With
 //! λ = 1 / (1 − rate) and no error at all the product is (1 − rate)^−groups, so as many groups are needed as independent
-//! sequences for a binomial test: 299 at 1 %.
+//! sequences for a binomial test: 299 at 1 %. The inverse of the product is thus a p-value, and thresholds are walked over as
+//! binomial tests are, from as many starts ([`walk`](super::walk())).
 
-use super::choose::{By, around, grid, learned, summary, tallies};
+use super::choose::{By, Steps, Way, grid, summary, tallies};
 use super::sequence::{Odds, Sequence, odds_of};
-use super::walk::Stop;
-use super::{Chosen, Per, Terms};
+use super::walk::{Level, Nearest, Stop, needed, of_share};
+use super::{Chosen, Terms};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The most fractions that are tried.
@@ -126,67 +127,74 @@ pub fn choose_groups(
     learned_on: &[Grouped<'_>],
     tested: &[Grouped<'_>],
     objects: usize,
-    strictest: f64,
+    way: &Way<'_>,
     terms: &Terms,
 ) -> Result<Chosen, Stop> {
-    let by = match terms.per {
-        Per::Average => By::All,
-        Per::Object => By::Touched(objects),
-        Per::Name => By::Named(objects),
-    };
+    let by = By::of(terms.per, objects);
     let groups: BTreeSet<usize> = tested.iter().map(|grouped| grouped.group).collect();
-    let bets = bets(learned_on, by, strictest, groups.len(), terms);
-    let steps: Vec<Odds> = match terms.per {
-        Per::Average | Per::Object => {
-            grid(strictest, super::choose::LOOSEST).map(|margin| Odds::All(odds_of(margin))).collect()
-        }
-        Per::Name => {
-            let own: Vec<&Sequence> = learned_on.iter().map(|grouped| grouped.sequence).collect();
-            around(&learned(&own, objects, strictest, terms.rate), strictest)
-        }
-    };
-    let odds = walk(tested, steps, by, &bets, terms)?;
+    // So that the share of one start is enough.
+    let terms_of_start = Terms { confidence: of_share(terms.confidence, way.starts.len()), ..*terms };
+    let bets = bets(learned_on, by, way.strictest(), groups.len(), &terms_of_start);
+    let own: Vec<&Sequence> = learned_on.iter().map(|grouped| grouped.sequence).collect();
+    let odds = walk(tested, Steps::new(&own, objects, way, terms)?, by, &bets, terms)?;
     let sequences: Vec<&Sequence> = tested.iter().map(|grouped| grouped.sequence).collect();
     let kept = tallies(&sequences, &odds, by);
     Ok(summary(odds, kept, &sequences, objects))
 }
 
-/// Fixed-sequence testing, as [`walk`](super::walk()) does for tallies. Thresholds at which no bet could be won even without an
-/// error are passed over: how many names there are decides that, not how many are errors.
-fn walk(tested: &[Grouped<'_>], steps: Vec<Odds>, by: By, bets: &[f64], terms: &Terms) -> Result<Odds, Stop> {
+/// Fixed-sequence testing, as [`walk`](super::walk()) does for tallies. Thresholds at which no bet could be won with the share
+/// of one start even without an error are passed over: how many names there are decides that, not how many are errors.
+fn walk(tested: &[Grouped<'_>], steps: Steps, by: By, bets: &[f64], terms: &Terms) -> Result<Odds, Stop> {
+    let mut level = Level::new(&steps.starts, terms.confidence);
+    let share = of_share(terms.confidence, steps.starts.len());
     // Slack for the last bits of a sum.
-    let enough = -(1.0 - terms.confidence).ln() - 1e-9;
+    let enough = -(1.0 - share).ln() - 1e-9;
     let mut kept = None;
+    let mut nearest = Nearest::default();
     let mut most = vec![0.0_f64; by.count()];
-    for odds in steps {
+    for (position, odds) in steps.odds.into_iter().enumerate() {
         let losses = losses(tested, &odds, by, terms.rate);
         most.iter_mut().zip(&losses).for_each(|(most, losses)| *most = losses.whole().max(*most));
+        let own = level.at(position);
         let could_pass = |(losses, bet): (&Losses, &f64)| {
             losses.named.iter().map(|named| (bet * terms.rate * named).ln_1p()).sum::<f64>() >= enough
         };
         if !losses.iter().zip(bets).all(could_pass) {
             continue;
         }
-        let passes =
-            |(losses, bet): (&Losses, &f64)| losses.of.iter().map(|loss| (-bet * loss).ln_1p()).sum::<f64>() >= enough;
-        match losses.iter().zip(bets).position(|case| !passes(case)) {
+        let Some(own) = own else { continue };
+        let p_value = |(losses, bet): (&Losses, &f64)| {
+            let product: f64 = losses.of.iter().map(|loss| (-bet * loss).ln_1p()).sum();
+            (-product - 1e-9).exp()
+        };
+        let p_values: Vec<f64> = losses.iter().zip(bets).map(p_value).collect();
+        match Nearest::failed(&p_values, own) {
             None => kept = Some(odds),
-            Some(position) if kept.is_none() => {
-                let sequences: Vec<&Sequence> = tested.iter().map(|grouped| grouped.sequence).collect();
-                let tally = tallies(&sequences, &odds, by).get(position).copied().unwrap_or_default();
-                return Err(Stop::TooMany { position, tally });
+            Some(position) => {
+                nearest.see(p_values[position], || {
+                    let sequences: Vec<&Sequence> = tested.iter().map(|grouped| grouped.sequence).collect();
+                    let tally = tallies(&sequences, &odds, by).get(position).copied().unwrap_or_default();
+                    Stop::TooMany { position, tally, needed: None }
+                });
+                level.fail();
+                if level.is_over() {
+                    break;
+                }
             }
-            Some(_) => break,
         }
     }
     kept.ok_or_else(|| {
-        let position = (0..most.len()).min_by(|&a, &b| most[a].total_cmp(&most[b])).unwrap_or(0);
-        Stop::TooFew { position, found: most.get(position).copied().unwrap_or(0.0).round() as u64 }
+        nearest.stop().unwrap_or_else(|| {
+            let position = (0..most.len()).min_by(|&a, &b| most[a].total_cmp(&most[b])).unwrap_or(0);
+            let found = most.get(position).copied().unwrap_or(0.0).round() as u64;
+            Stop::TooFew { position, found, needed: needed(terms.rate, share) }
+        })
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::Per;
     use super::super::sequence::Look;
     use super::*;
 
@@ -207,7 +215,7 @@ mod tests {
             sequences.iter().map(|(sequence, group)| Grouped { sequence, group: *group }).collect();
         // As if a fifth as many others had been learned from.
         let learned = &grouped[..grouped.len() / 5 / of * of];
-        choose_groups(learned, &grouped, 2, 8.0, &Terms { rate, confidence: 0.95, per: Per::Average })
+        choose_groups(learned, &grouped, 2, &Way { starts: &[8.0], loosest: None }, &Terms { rate, confidence: 0.95, per: Per::Average })
     }
 
     #[test]
@@ -216,7 +224,7 @@ mod tests {
             assert!(chosen(&vec![0; least], 3, rate).is_ok(), "{rate}");
             assert_eq!(
                 chosen(&vec![0; least - 1], 3, rate).unwrap_err(),
-                Stop::TooFew { position: 0, found: least as u64 - 1 }
+                Stop::TooFew { position: 0, found: least as u64 - 1, needed: least as u64 }
             );
         }
     }

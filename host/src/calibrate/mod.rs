@@ -33,6 +33,7 @@
 //! ```
 
 mod ahead;
+mod begin;
 mod choose;
 mod demand;
 mod draw;
@@ -49,7 +50,9 @@ mod temperature;
 mod tests;
 mod walk;
 
-pub use choose::{Chosen, Terms, choose, choose_independent};
+pub(crate) use begin::Begin;
+pub(crate) use choose::share_tested;
+pub use choose::{Chosen, Terms, Way, choose, choose_independent};
 pub use draw::{Moment, Supply, Until, follow, follow_plan};
 pub use error::{CalibrateProblem, Enough, Forecast, Supplied};
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
@@ -57,7 +60,7 @@ pub use groups::{Grouped, choose_groups};
 pub(crate) use model::worse;
 pub use model::{Calibrated, OfObject, OfRecorded, Settings, Worse, added_bytes, calibrate};
 #[cfg(feature = "train")]
-pub(crate) use model::{STRICTEST, add_noise, calibrate_from};
+pub(crate) use model::{STRICTEST, Start, add_noise, begin, calibrate_from};
 pub use palpate_shared::format::Per;
 pub use recorded::calibrate_recorded;
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
@@ -71,4 +74,4 @@ pub fn of_what(per: Per) -> &'static str {
     }
 }
 
-pub use walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};
+pub use walk::{Kept, Stop, Tally, allowed, binomial_tail, enough, needed, walk};

@@ -1,6 +1,7 @@
 //! A model's thresholds, its promise and its temperature.
 
-use super::choose::{Chosen, Terms, chosen};
+use super::begin::{Begin, Seen};
+use super::choose::{Chosen, Terms, Way, chosen, share_tested, spread};
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
 use super::sequence::{Odds, Sequence, margin_of, odds_of};
 use super::temperature::temperature;
@@ -67,6 +68,9 @@ pub struct Calibrated {
     /// Its promise.
     #[serde(skip)]
     pub promise: Promise,
+    /// Its thresholds.
+    #[serde(skip)]
+    pub odds: Odds,
     /// The promised error rate.
     pub promised: f64,
     /// Of what: "average", "name" or "object".
@@ -177,7 +181,16 @@ pub fn calibrate(
     calibrate_from(model, dataset, settings, None, progress)
 }
 
-/// The same with the strictest threshold given, as a margin in nats, instead of one that a few sequences suggest.
+/// Where a calibration begins that other touches say something of.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Start {
+    /// The threshold at which the walk begins, as a margin in nats.
+    pub(crate) margin: f64,
+    /// Thresholds that those to be kept must be as strict as.
+    pub(crate) loosest: Option<Odds>,
+}
+
+/// The same from a start that is given, instead of one that a few sequences suggest.
 ///
 /// # Errors
 /// As [`calibrate`].
@@ -185,7 +198,7 @@ pub(crate) fn calibrate_from(
     model: &Model<'_>,
     mut dataset: Dataset,
     settings: &Settings,
-    strictest: Option<f64>,
+    start: Option<Start>,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
     let material = material(model, &dataset, settings)?;
@@ -197,7 +210,53 @@ pub(crate) fn calibrate_from(
         supplies: touched.map(|(touched, &object)| Supply::new(object, touched, settings.seed)).collect(),
     };
     let temperature = || Ok(temperature(model, &dataset, &material.known));
-    calibrate_drawn(model, &material, drawn, settings, strictest, temperature, progress)
+    calibrate_drawn(model, &material, drawn, settings, start, temperature, progress)
+}
+
+/// The threshold, a margin in nats, at which a walk over `times` as many touches as there are in a part of them best begins: the
+/// loosest one at which it passes with nearly the greatest probability, up to where a calibration that knows nothing begins.
+///
+/// # Errors
+/// As [`calibrate`], but for a rate that is not kept.
+pub(crate) fn begin(
+    model: &Model<'_>,
+    mut part: Dataset,
+    times: f64,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<f64> {
+    let Material { names, known, max_touches } = material(model, &part, settings)?;
+    add_noise(model, &mut part, &settings.noise, max_touches, noise_seed(settings));
+    let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
+    let naive = ((1.0 - settings.rate) / settings.rate).ln();
+    let most = ((settings.sequences as f64 / times) as usize).max(1);
+    let wanted = wanted(model, &known, settings.per, most);
+    let followed = |beyond: f64| {
+        let touched = part.objects.iter().zip(&known);
+        let mut supplies: Vec<Supply<'_>> =
+            touched.map(|(touched, &object)| Supply::new(object, touched, settings.seed)).collect();
+        if settings.active {
+            follow_plan(&mut supplies, &names, &model.plan().ok_or(EvaluateProblem::NoPlan)?)?;
+        }
+        let until = Until { margin: naive + beyond, max_touches };
+        follow(model, &mut supplies, &wanted, until, || |_: &Moment<'_>| true, progress)
+    };
+    let [near, far] = STRICTEST;
+    let sequences = followed(near)?;
+    let (sequences, beyond) =
+        if is_kept_well(&sequences, naive + near, settings.rate) { (sequences, near) } else { (followed(far)?, far) };
+    let tested = (times * share_tested(settings.per) * sequences.len() as f64) as usize;
+    Ok(Begin::new(&sequences, &(0..sequences.len()).collect::<Vec<_>>(), tested, &terms, naive + beyond).loosest)
+}
+
+/// The sequences of each object of so many in all: as often as the model's priors say.
+fn wanted(model: &Model<'_>, known: &[usize], per: Per, count: usize) -> Vec<usize> {
+    // Each placement has a promise of its own, however rare it is.
+    let shares = match model.outputs() {
+        Some(_) if per == Per::Object => vec![1.0 / known.len() as f64; known.len()],
+        _ => shares(model, known),
+    };
+    shares.iter().map(|share| (share * count as f64).round().max(1.0) as usize).collect()
 }
 
 /// Touches that a model can be calibrated on.
@@ -243,21 +302,14 @@ pub(super) fn calibrate_drawn(
     Material { names, known, max_touches }: &Material,
     Drawn { dataset, fewest, mut supplies }: Drawn<'_>,
     settings: &Settings,
-    strictest: Option<f64>,
+    start: Option<Start>,
     temperature: impl FnOnce() -> Result<f64>,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
     progress.begin("calibrating", Some((settings.sequences + settings.sequences / PILOT) as u64));
     let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
     let naive = ((1.0 - settings.rate) / settings.rate).ln();
-    // Each placement has a promise of its own, however rare it is.
-    let shares = match model.outputs() {
-        Some(_) if settings.per == Per::Object => vec![1.0 / known.len() as f64; known.len()],
-        _ => shares(model, known),
-    };
-    let wanted = |count: usize| -> Vec<usize> {
-        shares.iter().map(|share| (share * count as f64).round().max(1.0) as usize).collect()
-    };
+    let wanted = |count: usize| wanted(model, known, settings.per, count);
     let draw = |supplies: &mut [Supply<'_>], count: usize, margin: f64| {
         let until = Until { margin, max_touches: *max_touches };
         follow(model, supplies, &wanted(count), until, || |_: &Moment<'_>| true, progress)
@@ -271,18 +323,22 @@ pub(super) fn calibrate_drawn(
         follow_plan(&mut first, names, &plan)?;
         follow_plan(&mut supplies, names, &plan)?;
     }
-    let strictest = match strictest {
-        Some(margin) => margin,
+    let (starts, loosest, sequences) = match start {
+        Some(Start { margin, loosest }) => (vec![margin], loosest, draw(&mut supplies, settings.sequences, margin)?),
         None => {
             let pilot = draw(&mut first, (settings.sequences / PILOT).max(1), naive + STRICTEST[1])?;
             let is_enough = is_kept_well(&pilot, naive + STRICTEST[0], settings.rate);
-            naive + if is_enough { STRICTEST[0] } else { STRICTEST[1] }
+            let strictest = naive + if is_enough { STRICTEST[0] } else { STRICTEST[1] };
+            let sequences = draw(&mut supplies, settings.sequences, strictest)?;
+            let tested = (share_tested(settings.per) * sequences.len() as f64) as usize;
+            let seen = Seen::new(&pilot, &(0..pilot.len()).collect::<Vec<_>>(), tested, &terms, strictest);
+            (spread(strictest, seen.most_starts(&terms), settings.rate), None, sequences)
         }
     };
-    let sequences = draw(&mut supplies, settings.sequences, strictest)?;
     let supplied = (sequences.len() < wanted(settings.sequences).iter().sum())
         .then(|| Supplied { approaches: dataset.holds_approaches(), fewest });
-    let chosen = chosen(&sequences, names, strictest, &terms, supplied)?;
+    let way = Way { starts: &starts, loosest: loosest.as_ref() };
+    let chosen = chosen(&sequences, names, &way, &terms, supplied)?;
     finished(model, dataset, settings, *max_touches, names, &chosen, temperature()?)
 }
 
@@ -420,6 +476,7 @@ pub(super) fn finished(
     Ok(Calibrated {
         model: restate(model, &restated)?,
         promise,
+        odds: chosen.odds.clone(),
         promised: settings.rate,
         per: settings.per.name(),
         confidence: settings.confidence,

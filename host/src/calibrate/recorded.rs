@@ -79,7 +79,8 @@ pub fn calibrate_recorded(
         let fewest = (0..tallies.len()).min_by_key(|&position| tallies[position].all).unwrap_or(0);
         let found = tallies.get(fewest).map_or(0, |tally| tally.all);
         if found < needed(terms.rate, terms.confidence) {
-            return Err(foreseen.problem(Stop::TooFew { position: fewest, found }, &names, &terms).into());
+            let needed = needed(terms.rate, terms.confidence);
+            return Err(foreseen.problem(Stop::TooFew { position: fewest, found, needed }, &names, &terms).into());
         }
     }
     let mut failed = None;
@@ -90,7 +91,8 @@ pub fn calibrate_recorded(
             None
         }
     });
-    let kept = walk(tested, settings.rate, settings.confidence);
+    // Recordings are few: the walk has one start.
+    let kept = walk(tested, &[0], settings.rate, settings.confidence);
     if let Some(error) = failed {
         return Err(error);
     }
@@ -237,12 +239,13 @@ impl Foreseen {
         let enough = (0..GROWN).map(|step| GROWTH.powi(step)).find(|&times| is_likely(times, rate));
         let enough = enough.map(|times| self.enough(times, self.best(times, rate, confidence).1, names));
         let (position, tally, supported) = match stop {
-            Stop::TooFew { position, found } => {
+            Stop::TooFew { position, found, .. } => {
                 let tally = Tally { wrong: 0, all: found };
                 (position, tally, higher().find(|&rate| is_likely(1.0, rate)))
             }
+            Stop::Looser => (0, Tally::default(), None),
             // What was found says more than what was foreseen.
-            Stop::TooMany { position, tally } => {
+            Stop::TooMany { position, tally, .. } => {
                 (position, tally, higher().find(|&rate| binomial_tail(tally, rate) <= 1.0 - confidence))
             }
         };

@@ -12,6 +12,15 @@ pub enum Odds {
 }
 
 impl Odds {
+    /// True if no object's threshold is looser than that of `other`.
+    pub fn is_as_strict_as(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::All(own), Self::All(other)) => own <= other,
+            (Self::All(own), Self::ByObject(others)) => others.iter().all(|other| own <= other),
+            (Self::ByObject(own), _) => (0..).zip(own).all(|(object, own)| *own <= other.of(object)),
+        }
+    }
+
     /// The threshold of an object; 0, which hardly ever is passed, beyond those that there are.
     pub fn of(&self, object: usize) -> u64 {
         match self {
@@ -66,6 +75,8 @@ pub struct Sequence {
     /// Approaches at its end.
     pub approaches: u32,
     looks: Vec<Look>,
+    /// The same without what holds names back, once a name was.
+    ungated: Option<Vec<Look>>,
     /// True if it ended since it fits no object that the model knows.
     unknown: bool,
 }
@@ -73,7 +84,7 @@ pub struct Sequence {
 impl Sequence {
     /// A sequence of touches of an object, by its index in the model, without any touch yet.
     pub fn new(object: usize) -> Self {
-        Self { object, touches: 0, approaches: 0, looks: Vec::new(), unknown: false }
+        Self { object, touches: 0, approaches: 0, looks: Vec::new(), ungated: None, unknown: false }
     }
 
     /// Takes in what a recognizer knows after the approach with this number. `may_name` is false where a verdict would be
@@ -92,10 +103,22 @@ impl Sequence {
     /// The same with what is known given.
     pub fn look(&mut self, look: Look, may_name: bool) {
         (self.touches, self.approaches) = (look.touches, look.approaches);
-        let own = self.looks.iter().rev().find(|earlier| earlier.name == look.name);
-        if may_name && own.is_none_or(|own| look.odds < own.odds) {
-            self.looks.push(look);
+        if !may_name && self.ungated.is_none() {
+            self.ungated = Some(self.looks.clone());
         }
+        let gated = may_name.then_some(&mut self.looks);
+        for looks in gated.into_iter().chain(&mut self.ungated) {
+            let own = looks.iter().rev().find(|earlier| earlier.name == look.name);
+            if own.is_none_or(|own| look.odds < own.odds) {
+                looks.push(look);
+            }
+        }
+    }
+
+    /// The same sequence as if no name had been held back.
+    pub fn ungated(&self) -> Self {
+        let looks = self.ungated.as_ref().unwrap_or(&self.looks).clone();
+        Self { looks, ungated: None, ..*self }
     }
 
     /// Takes in that the sequence ended after this approach, whose touch was no evidence.
@@ -167,5 +190,25 @@ mod tests {
         sequence.look(look(0, 50, 2), true);
         assert_eq!(sequence.given(&Odds::All(60)).map(|look| look.touches), Some(2));
         assert_eq!(sequence.given(&Odds::All(10)), None);
+        let ungated = sequence.ungated();
+        assert_eq!(ungated.given(&Odds::All(10)).map(|look| look.touches), Some(1));
+        assert_eq!((ungated.object, ungated.touches, ungated.looks().len()), (0, 2, 1));
+    }
+
+    #[test]
+    fn thresholds_are_as_strict_as_others_if_that_of_each_object_is() {
+        let by = |odds: [u64; 2]| Odds::ByObject(odds.to_vec());
+        for (own, other, expected) in [
+            (Odds::All(5), Odds::All(5), true),
+            (Odds::All(6), Odds::All(5), false),
+            (by([5, 3]), by([5, 4]), true),
+            (by([5, 5]), by([6, 4]), false),
+            (Odds::All(4), by([5, 4]), true),
+            (Odds::All(5), by([5, 4]), false),
+            (by([5, 4]), Odds::All(5), true),
+            (by([5, 6]), Odds::All(5), false),
+        ] {
+            assert_eq!(own.is_as_strict_as(&other), expected, "{own:?} {other:?}");
+        }
     }
 }

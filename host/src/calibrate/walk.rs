@@ -1,10 +1,28 @@
-//! Learn-then-Test with fixed-sequence testing (Angelopoulos and others, 2022, arXiv 2110.01052).
+//! Learn-then-Test with fixed-sequence testing from several starts (Angelopoulos and others, 2022, arXiv 2110.01052).
 //!
 //! Thresholds are tried from strict to loose, an order that is fixed before the data are looked at. Each is a hypothesis:
-//! "at this threshold the error rate is above the promised one". It is rejected if as few errors as were found have a
-//! probability of at most 1 − confidence under it, by the binomial tail. The walk ends before the first threshold whose
-//! hypothesis is not rejected; the one before is kept. So the probability that a threshold is kept whose error rate is
-//! above the promised one is at most 1 − confidence, however many are tried.
+//! "at this threshold the error rate is above the promised one". Its p-value is the probability of as few errors as were
+//! found if the rate were the promised one: the binomial tail. The walk may begin at several thresholds, its *starts*, each of
+//! which has an equal share of the level 1 − confidence:
+//!
+//! - at a start, its share is added to the level that the walk brings with it;
+//! - a threshold whose p-value is at most that level is rejected, and the walk goes on to the next looser one with it;
+//! - at a failure the walk ends, and goes on at the next start with that start's share alone.
+//!
+//! The loosest threshold that was rejected is kept. With one start that is fixed-sequence testing; shares that are handed on
+//! make it the fallback procedure (Wiens, A fixed sequence Bonferroni procedure for testing multiple endpoints, 2003).
+//!
+//! *Theorem (Wiens and Dmitrienko, The fallback procedure for evaluating a single family of hypotheses, 2005).* With
+//! probability of at least the confidence, no threshold that was rejected has an error rate above the promised one.
+//!
+//! *Proof.* Let t₁, t₂, … be the thresholds whose rate is above, in the order of the walk, and sⱼ the sum of the shares of the
+//! starts after tⱼ₋₁, up to and including tⱼ. Let Eⱼ be the event that the p-value of tⱼ is at most sⱼ. If no Eⱼ happens, no tⱼ
+//! is rejected: t₁ is tested at s₁ at most, so the walk fails there; what it brings to t₂ are shares of later starts only, at
+//! most s₂, so it fails there too, and so on. A p-value is at most s with a probability of at most s, so that P(Eⱼ) ≤ sⱼ; and
+//! no share is in two of the sums, so that the probability of any Eⱼ is at most 1 − confidence (Bonferroni). ∎
+//!
+//! Nothing is assumed of how errors at different thresholds depend on each other. All rejected thresholds hold at once, so any
+//! rule may choose among them.
 //!
 //! The tail is exact for independent cases that are all wrong with the same probability. Where each object has its own and
 //! has equally many cases, the lower tail is no heavier than the binomial one (Hoeffding, On the distribution of the number
@@ -38,63 +56,170 @@ pub enum Stop {
         position: usize,
         /// The most cases.
         found: u64,
+        /// As many as are needed, if none is an error.
+        needed: u64,
     },
-    /// This tally had too many errors at the strictest threshold that could be tried.
+    /// This tally had too many errors at each start, and the fewest too many here.
     TooMany {
         /// The position of the tally.
         position: usize,
         /// Its tally.
         tally: Tally,
+        /// The cases with which as many errors would pass; none where cases do not count alike.
+        needed: Option<u64>,
     },
+    /// No threshold may be kept: all are looser than they may be.
+    Looser,
 }
 
-/// Walks over `steps`, thresholds from strict to loose with what happened at each, and keeps the last one at which every
-/// tally passes: an error rate of at most `rate`, with probability `confidence`.
+/// Walks over `steps`, thresholds from strict to loose with what happened at each, and keeps the loosest one at which every
+/// tally passes: an error rate of at most `rate`, with probability `confidence`. `starts` are the positions of the thresholds
+/// at which the walk may begin, ascending; before the first of them nothing is tested. They are chosen without a look at
+/// what happened. With one, and [`needed`] cases without an error, the rate can be promised; with several it takes more
+/// cases, and fewer walks end before they have begun.
 ///
 /// With several tallies all rates are kept at once with that probability, without dividing it among them: the
 /// hypothesis is that one of the rates is above, and to reject it every test has to (an intersection-union test).
-/// Thresholds whose tally is so small that it could not pass even without an error are uninformative and skipped
-/// (Tarone, 1990): how many cases there are decides that, not how many are errors. That is exact as long as how many there
-/// are at one threshold says nothing about how many are errors at another.
+/// Thresholds whose tally is so small that it could not pass with the share of one start, even without an error, are
+/// uninformative and skipped (Tarone, 1990): how many cases there are decides that, not how many are errors. That is exact as
+/// long as how many there are at one threshold says nothing about how many are errors at another.
 ///
 /// ```
 /// use palpate::calibrate::{Tally, walk};
 ///
 /// // Of 10,000 sequences 83 may be wrong, to promise 1 %.
 /// let steps = [(9.0, 2), (5.0, 60), (4.0, 83), (3.5, 84), (3.4, 84)];
-/// let kept = walk(steps.map(|(margin, wrong)| (margin, vec![Tally { wrong, all: 10_000 }])), 0.01, 0.95).unwrap();
-/// assert_eq!(kept.threshold, 4.0);
+/// let steps = steps.map(|(margin, wrong)| (margin, vec![Tally { wrong, all: 10_000 }]));
+/// assert_eq!(walk(steps.clone(), &[0], 0.01, 0.95).unwrap().threshold, 4.0);
+/// // Two starts that both pass have their whole level in the end.
+/// assert_eq!(walk(steps, &[0, 1], 0.01, 0.95).unwrap().threshold, 4.0);
 /// ```
 ///
 /// # Errors
 /// [`Stop`], if no threshold can be kept.
-pub fn walk<T>(steps: impl IntoIterator<Item = (T, Vec<Tally>)>, rate: f64, confidence: f64) -> Result<Kept<T>, Stop> {
-    let needed = needed(rate, confidence);
+pub fn walk<T>(
+    steps: impl IntoIterator<Item = (T, Vec<Tally>)>,
+    starts: &[usize],
+    rate: f64,
+    confidence: f64,
+) -> Result<Kept<T>, Stop> {
+    let needed = needed(rate, of_share(confidence, starts.len()));
+    let mut level = Level::new(starts, confidence);
     let mut kept = None;
+    let mut nearest = Nearest::default();
     let mut most = Vec::new();
-    for (threshold, tallies) in steps {
+    for (position, (threshold, tallies)) in steps.into_iter().enumerate() {
         most.resize(tallies.len(), 0);
         most.iter_mut().zip(&tallies).for_each(|(most, tally): (&mut u64, _)| *most = tally.all.max(*most));
+        let own = level.at(position);
         if tallies.iter().any(|tally| tally.all < needed) {
             continue;
         }
-        let passes = |tally: &Tally| binomial_tail(*tally, rate) <= 1.0 - confidence;
-        match tallies.iter().position(|tally| !passes(tally)) {
+        let Some(own) = own else { continue };
+        let tails: Vec<f64> = tallies.iter().map(|tally| binomial_tail(*tally, rate)).collect();
+        match Nearest::failed(&tails, own) {
             None => kept = Some(Kept { threshold, tallies }),
             Some(position) => {
-                return kept.ok_or(Stop::TooMany { position, tally: tallies[position] });
+                nearest.see(tails[position], || {
+                    let tally = tallies[position];
+                    Stop::TooMany { position, tally, needed: Some(enough(tally.wrong, rate, 1.0 - own)) }
+                });
+                level.fail();
+                if level.is_over() {
+                    break;
+                }
             }
         }
     }
     kept.ok_or_else(|| {
-        let fewest = (0..most.len()).min_by_key(|&position| most[position]).unwrap_or(0);
-        Stop::TooFew { position: fewest, found: most.get(fewest).copied().unwrap_or(0) }
+        nearest.stop().unwrap_or_else(|| {
+            let fewest = (0..most.len()).min_by_key(|&position| most[position]).unwrap_or(0);
+            Stop::TooFew { position: fewest, found: most.get(fewest).copied().unwrap_or(0), needed }
+        })
     })
+}
+
+/// The confidence with which a threshold is tested that has the share of one start of so many.
+pub(super) fn of_share(confidence: f64, starts: usize) -> f64 {
+    1.0 - (1.0 - confidence) / starts.max(1) as f64
+}
+
+/// The level at which thresholds are tested along a walk.
+pub(super) struct Level<'s> {
+    starts: &'s [usize],
+    whole: f64,
+    /// Starts that were passed, and how many of their shares the walk has.
+    passed: usize,
+    held: usize,
+}
+
+impl<'s> Level<'s> {
+    pub(super) fn new(starts: &'s [usize], confidence: f64) -> Self {
+        Self { starts, whole: 1.0 - confidence, passed: 0, held: 0 }
+    }
+
+    /// The level at the threshold in this position, after all before; none where nothing is tested.
+    pub(super) fn at(&mut self, position: usize) -> Option<f64> {
+        let new = self.starts.iter().skip(self.passed).take_while(|start| **start <= position).count();
+        self.passed += new;
+        self.held += new;
+        // All shares are the whole, to the last bit.
+        (self.held > 0).then(|| self.whole * (self.held as f64 / self.starts.len() as f64))
+    }
+
+    /// The threshold there was not rejected.
+    pub(super) fn fail(&mut self) {
+        self.held = 0;
+    }
+
+    /// True if nothing more will be tested.
+    pub(super) fn is_over(&self) -> bool {
+        self.held == 0 && self.passed == self.starts.len()
+    }
+}
+
+/// The failure that was nearest to passing.
+#[derive(Default)]
+pub(super) struct Nearest(Option<(f64, Stop)>);
+
+impl Nearest {
+    /// The position of the largest p-value, if it is above the level.
+    pub(super) fn failed(p_values: &[f64], level: f64) -> Option<usize> {
+        let largest = (0..p_values.len()).max_by(|&a, &b| p_values[a].total_cmp(&p_values[b]).then(b.cmp(&a)))?;
+        (p_values[largest] > level).then_some(largest)
+    }
+
+    /// A failure with this p-value.
+    pub(super) fn see(&mut self, p_value: f64, stop: impl FnOnce() -> Stop) {
+        if self.0.as_ref().is_none_or(|(nearest, _)| p_value < *nearest) {
+            self.0 = Some((p_value, stop()));
+        }
+    }
+
+    pub(super) fn stop(self) -> Option<Stop> {
+        self.0.map(|(_, stop)| stop)
+    }
 }
 
 /// Smallest number of cases that allows a promise of `rate` with probability `confidence`, if none is an error.
 pub fn needed(rate: f64, confidence: f64) -> u64 {
     ((1.0 - confidence).ln() / (-rate).ln_1p()).ceil() as u64
+}
+
+/// Smallest number of cases with which `wrong` errors allow a promise of `rate` with probability `confidence`.
+pub fn enough(wrong: u64, rate: f64, confidence: f64) -> u64 {
+    let passes = |all: u64| binomial_tail(Tally { wrong, all }, rate) <= 1.0 - confidence;
+    let mut high = needed(rate, confidence).max(wrong + 1);
+    while !passes(high) {
+        high = high.saturating_mul(2);
+    }
+    // The tail falls with the cases.
+    let mut low = wrong;
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        if passes(middle) { high = middle } else { low = middle }
+    }
+    high
 }
 
 /// The most errors of `all` cases with which `rate` can be promised with probability `confidence`, if it can be.
@@ -187,28 +312,68 @@ mod tests {
     #[test]
     fn a_walk_ends_before_the_first_failure_even_if_a_later_threshold_would_pass() {
         let steps = tallies(&[0, 3, 5, 2], 1_000);
-        let kept = walk((0..).zip(steps), 0.01, 0.95).unwrap();
+        let kept = walk((0..).zip(steps), &[0], 0.01, 0.95).unwrap();
         assert_eq!((kept.threshold, kept.tallies), (1, vec![Tally { wrong: 3, all: 1_000 }]));
-        let stop = walk((0..).zip(tallies(&[5, 0, 0], 1_000)), 0.01, 0.95);
-        assert_eq!(stop, Err(Stop::TooMany { position: 0, tally: Tally { wrong: 5, all: 1_000 } }));
-        assert_eq!(walk((0..).zip(tallies(&[0], 298)), 0.01, 0.95), Err(Stop::TooFew { position: 0, found: 298 }));
-        assert_eq!(walk(Vec::<(u8, _)>::new(), 0.01, 0.95), Err(Stop::TooFew { position: 0, found: 0 }));
+        let stop = walk((0..).zip(tallies(&[5, 0, 0], 1_000)), &[0], 0.01, 0.95);
+        assert_eq!(stop, Err(Stop::TooMany { position: 0, tally: Tally { wrong: 5, all: 1_000 }, needed: Some(1_049) }));
+        let few = |found| Err(Stop::TooFew { position: 0, found, needed: 299 });
+        assert_eq!(walk((0..).zip(tallies(&[0], 298)), &[0], 0.01, 0.95), few(298));
+        assert_eq!(walk(Vec::<(i32, _)>::new(), &[0], 0.01, 0.95), few(0));
     }
 
     #[test]
     fn thresholds_at_which_too_little_happened_are_passed_over() {
         let step = |all| vec![Tally { wrong: 0, all }];
-        let kept = walk([(0, step(10)), (1, step(400)), (2, step(500))], 0.01, 0.95).unwrap();
+        let kept = walk([(0, step(10)), (1, step(400)), (2, step(500))], &[0], 0.01, 0.95).unwrap();
         assert_eq!(kept.threshold, 2);
     }
 
     #[test]
     fn every_tally_has_to_pass() {
         let step = |wrong| vec![Tally { wrong: 0, all: 1_000 }, Tally { wrong, all: 1_000 }];
-        let kept = walk([(0, step(0)), (1, step(4)), (2, step(5))], 0.01, 0.95).unwrap();
+        let kept = walk([(0, step(0)), (1, step(4)), (2, step(5))], &[0], 0.01, 0.95).unwrap();
         assert_eq!(kept.threshold, 1);
-        let stop = walk([(0, step(9))], 0.01, 0.95);
-        assert_eq!(stop, Err(Stop::TooMany { position: 1, tally: Tally { wrong: 9, all: 1_000 } }));
+        let stop = walk([(0, step(9))], &[0], 0.01, 0.95);
+        let needed = Some(enough(9, 0.01, 0.95));
+        assert_eq!(stop, Err(Stop::TooMany { position: 1, tally: Tally { wrong: 9, all: 1_000 }, needed }));
+    }
+
+    #[test]
+    fn a_walk_that_fails_at_one_start_goes_on_at_the_next_with_its_share() {
+        // 1,000 cases allow 4 errors at 5 %, and 3 at half or a third of that.
+        let walked = |wrong: &[u64], starts: &[usize]| {
+            walk((0..).zip(tallies(wrong, 1_000)), starts, 0.01, 0.95).map(|kept| kept.threshold)
+        };
+        assert_eq!(walked(&[4, 3, 3, 4], &[0, 1]), Ok(2));
+        assert_eq!(walked(&[3, 4, 4, 5], &[0, 1]), Ok(2), "shares of both");
+        assert_eq!(walked(&[3, 4, 3, 4], &[0, 2]), Ok(2), "the first walk ends at 4, which its own share does not allow");
+        assert_eq!(walked(&[0, 0, 9, 3, 3, 4, 0], &[0, 3]), Ok(4), "the loosest of both walks");
+        // A failure leaves nothing of the shares before it.
+        assert_eq!(walked(&[9, 9, 3, 4], &[0, 1, 2]), Ok(2));
+        assert_eq!(walked(&[9, 0, 9, 0], &[0]), walked(&[9], &[0]));
+        // The failure that is told is the one that was nearest to passing.
+        let stop = walk((0..).zip(tallies(&[9, 4, 7], 1_000)), &[0, 1, 2], 0.01, 0.95).unwrap_err();
+        let needed = Some(enough(4, 0.01, 1.0 - 0.05 / 3.0));
+        assert_eq!(stop, Stop::TooMany { position: 0, tally: Tally { wrong: 4, all: 1_000 }, needed });
+    }
+
+    #[test]
+    fn several_starts_take_as_many_names_as_the_share_of_one_does() {
+        for (starts, least) in [(1, 299), (2, 368), (7, 492)] {
+            let positions: Vec<usize> = (0..starts).collect();
+            let walked = |all| walk((0..).zip(tallies(&vec![0; 9], all)), &positions, 0.01, 0.95).map(|kept| kept.threshold);
+            assert_eq!(walked(least), Ok(8), "{starts}");
+            let few = Stop::TooFew { position: 0, found: least - 1, needed: least };
+            assert_eq!(walked(least - 1), Err(few), "{starts}");
+        }
+    }
+
+    #[test]
+    fn as_many_cases_are_enough_as_the_errors_among_them_take() {
+        for (wrong, rate, least) in [(0, 0.01, 299), (0, 0.05, 59), (1, 0.05, 93), (2, 0.05, 124), (4, 0.01, 913)] {
+            assert_eq!(enough(wrong, rate, 0.95), least);
+            assert_eq!((allowed(least, rate, 0.95), allowed(least - 1, rate, 0.95)), (Some(wrong), wrong.checked_sub(1)));
+        }
     }
 
     #[test]
@@ -218,15 +383,18 @@ mod tests {
         use crate::random::{Purpose, generator};
         use rand::RngExt;
         let rates: Vec<f64> = (2..=20).map(|k| f64::from(k) * 0.001).collect();
-        let mut broken = 0;
+        let mut broken = [0; 3];
         for run in 0..1_000 {
             let mut random = generator(1, Purpose::Calibration, "walk", run);
             let numbers: Vec<f64> = (0..2_000).map(|_| random.random()).collect();
             let wrong = |rate: f64| numbers.iter().filter(|number| **number < rate).count() as u64;
-            let steps = rates.iter().map(|&rate| (rate, vec![Tally { wrong: wrong(rate), all: 2_000 }]));
-            broken += u32::from(walk(steps, 0.01, 0.95).is_ok_and(|kept| kept.threshold > 0.01));
+            // Starts below the rate, above it, and on both sides.
+            for (broken, starts) in broken.iter_mut().zip([&[0][..], &[9, 12, 15], &[0, 5, 9, 10, 11, 12, 13]]) {
+                let steps = rates.iter().map(|&rate| (rate, vec![Tally { wrong: wrong(rate), all: 2_000 }]));
+                *broken += u32::from(walk(steps, starts, 0.01, 0.95).is_ok_and(|kept| kept.threshold > 0.01));
+            }
         }
         // 50 at most are expected, with a standard deviation of 7.
-        assert!((1..=65).contains(&broken), "{broken}");
+        assert!(broken.iter().all(|broken| (1..=65).contains(broken)), "{broken:?}");
     }
 }

@@ -158,10 +158,9 @@ fn is_decided(model: &Model<'_>, evidence: &[i64], touches: u32) -> bool {
     rivals <= Stopping::from_model(model).odds_of(leader, model) as f64 / 2.0_f64.powi(56)
 }
 
-/// The level that this share of sequences stays at or below, each object weighted equally.
-pub(super) fn quantile(sequences: &[Vec<Sequence>], share: f64) -> f64 {
-    let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);
-    let mut levels: Vec<f64> = sequences.iter().flat_map(|of| of.iter().take(fewest)).map(Sequence::highest).collect();
+/// The level that this share of sequences stays at or below.
+pub(super) fn quantile(sequences: &[&Sequence], share: f64) -> f64 {
+    let mut levels: Vec<f64> = sequences.iter().map(|sequence| sequence.highest()).collect();
     levels.sort_unstable_by(f64::total_cmp);
     let position = (levels.len() as f64 * share).floor() as usize;
     levels.get(position.min(levels.len().saturating_sub(1))).copied().unwrap_or(0.0)

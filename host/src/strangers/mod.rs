@@ -221,7 +221,8 @@ pub(crate) fn calibrate_supplies(
     let follow = |of: &[Supply], policy: &Policy| follow::sequences(&untested, of, policy, settings.sequences);
 
     let free = Policy { until: follow::Until::Touches(MOST_HELD.min(model.header().max_touches())), least: FIRST };
-    let rough = follow::quantile(&follow(&learn, &free), 1.0 - settings.alarms);
+    let is_short = learn.iter().any(|supply| supply.is_short);
+    let rough = follow::quantile(&counted(&follow(&learn, &free), is_short), 1.0 - settings.alarms);
     let left_out = misfit::left_out(&moments, &learn, rough, unit, free.last());
     let least = match settings.held {
         Held::Likely => FIRST,
@@ -229,15 +230,15 @@ pub(crate) fn calibrate_supplies(
     };
     let loosest = rough - below(settings.held);
     let to_the_end = Policy { until: follow::Until::Touches(model.header().max_touches()), least: FIRST };
-    let is_short = learn.iter().any(|supply| supply.is_short);
     let strictest = strictest(is_short.then(|| follow(&learn, &to_the_end)), settings, loosest);
     let policy = Policy { until: follow::Until::Named { level: loosest - doubt(settings.held) }, least };
     let sequences = follow(&test, &policy);
-    let all = equally_many(&sequences);
+    let all = counted(&sequences, is_short);
     let tried = Tried { loosest, strictest, least, gap: doubt(settings.held) };
     let simulated = tried.threshold(&all, settings.alarms, settings.confidence).ok_or_else(|| {
-        let needed = needed(settings.alarms, settings.confidence).div_ceil(known.max(1) as u64);
-        EvaluateProblem::TooFewForAlarms { object_sequences: all.len() / known.max(1), needed }
+        let objects = if is_short { 1 } else { known.max(1) };
+        let needed = needed(settings.alarms, settings.confidence).div_ceil(objects as u64);
+        EvaluateProblem::TooFewForAlarms { object_sequences: all.len() / objects, needed }
     })?;
     let on_recordings = match &recorded_test {
         Some(test) => Some(recorded::tested(&follow(test, &policy), &tried, simulated, settings)?),
@@ -323,6 +324,11 @@ fn tested_means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Re
     };
     let with = mean(&|sequence| sequence.end(threshold, doubt, least).touches);
     Ok([with, mean(&|sequence| sequence.decided_after().into())])
+}
+
+/// The sequences that are counted: equally many of each object, and of rows all, with classes as often as they are there.
+fn counted(sequences: &[Vec<Sequence>], is_short: bool) -> Vec<&Sequence> {
+    if is_short { sequences.iter().flatten().collect() } else { equally_many(sequences) }
 }
 
 /// Equally many sequences of each object.
@@ -439,7 +445,7 @@ fn found_out(left_out: &[Vec<f64>]) -> u32 {
 /// growing: then where those that were learned from have half as many false alarms as are allowed, if that is beyond.
 fn strictest(learned: Option<Vec<Vec<Sequence>>>, settings: &Settings, loosest: f64) -> f64 {
     let own = loosest + STEP * STEPS as f64;
-    let few = learned.map_or(own, |learned| follow::quantile(&learned, 1.0 - 0.5 * settings.alarms));
+    let few = learned.map_or(own, |learned| follow::quantile(&counted(&learned, true), 1.0 - 0.5 * settings.alarms));
     few.max(own).min(loosest + MOST_BEYOND)
 }
 

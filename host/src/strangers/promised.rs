@@ -5,15 +5,20 @@
 //! found in an order in which neither makes the other untrue, each on touches of its own:
 //!
 //! ```text
-//! an eighth ─────► thresholds without a test, made stricter (no promise)
+//! an eighth ─────► where thresholds begin: where as many names as there will be pass the test, most probably
 //! three eighths ─► the test under these: at most so many false alarms, by Learn-then-Test
 //! half ──────────► looser thresholds under the test: at most so many wrong names, by Learn-then-Test
 //! ```
 //!
 //! A looser threshold gives a name no later, in every single sequence, so there are no more false alarms than were tested.
+//!
+//! Names that are held back for the test come later, with more evidence, and fewer of them are wrong: so the last step alone
+//! would go on to looser thresholds than without the test, at which more strangers get a name as soon as the test lets them.
+//! It ends where the same calibration without the test ends, on all touches; then every sequence that gets a name has one
+//! without the test too.
 
 use super::{Calibrated, Settings, calibrate, calibrate_recorded, tested_means, without};
-use crate::calibrate::{self, STRICTEST, add_noise, calibrate_from, odds_of};
+use crate::calibrate::{self, Start, add_noise, begin, calibrate_from, odds_of};
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};
 use crate::mesh::BACKGROUND;
@@ -26,11 +31,6 @@ use palpate_shared::format::Tag;
 /// The share of touches that the promise is tested on, and of the others the share that thresholds begin with.
 const PROMISED: f64 = 0.5;
 const BEGUN: f64 = 0.25;
-/// Amount by which sequences are followed beyond the first thresholds, in nats: room for the loosest that keeps the
-/// promise, as far as fewer touches say where it is.
-const STRICTER: f64 = 0.5;
-/// The confidence of the first thresholds, which promise nothing: that of an estimate.
-const EVEN: f64 = 0.5;
 
 /// Gives a model a misfit test, or replaces the one that it has, and thresholds that keep a promised error rate with that
 /// test: a sequence that ends as unknown is one without a name, and a name is given when the test lets it be. `promise.noise`
@@ -52,7 +52,10 @@ pub fn calibrate_with_promise(
     let untested = compile::open(&untested)?;
     let halves = split(dataset, PROMISED, promise.seed)?;
     let parts = split(&halves.train, BEGUN, promise.seed)?;
-    let strictest = strictest(&untested, parts.test, promise, progress)?;
+    let without = without_test(calibrate::calibrate(&untested, dataset.clone(), promise, progress))?;
+    // As many times the touches say where to begin.
+    let times = PROMISED / ((1.0 - PROMISED) * BEGUN);
+    let strictest = begin(&untested, parts.test, times, promise, progress)?;
     let max_touches = promise.max_touches.unwrap_or(Stopping::from_model(&untested).max_touches());
     let begun = Restated {
         odds: Some(odds_of(strictest)),
@@ -75,26 +78,19 @@ pub fn calibrate_with_promise(
         Some(recorded) => calibrate_recorded(&begun, &learned, recorded, &shapes, settings)?,
         None => calibrate(&begun, &learned, &shapes, settings)?,
     };
-    let promised = calibrate_from(&compile::open(&tested.bytes)?, halves.test, promise, Some(strictest), progress)?;
+    let start = Start { margin: strictest, loosest: without.map(|without| without.odds) };
+    let promised = calibrate_from(&compile::open(&tested.bytes)?, halves.test, promise, Some(start), progress)?;
     let [mean_touches, mean_touches_without] = tested_means(&compile::open(&promised.model)?, &learned, settings)?;
     let tested = Calibrated { bytes: promised.model.clone(), mean_touches, mean_touches_without, ..tested };
     Ok((promised, tested))
 }
 
-/// The margin in nats that thresholds begin with.
-fn strictest(
-    untested: &Model<'_>,
-    part: Dataset,
-    promise: &calibrate::Settings,
-    progress: &dyn Progress,
-) -> Result<f64> {
-    let settings = calibrate::Settings { confidence: EVEN, ..promise.clone() };
-    match calibrate::calibrate(untested, part, &settings, progress) {
-        Ok(calibrated) => Ok(calibrated.margins.values().copied().fold(0.0, f64::max) + STRICTER),
+/// A calibration without a test; none where it promises nothing.
+fn without_test(calibrated: Result<calibrate::Calibrated>) -> Result<Option<calibrate::Calibrated>> {
+    match calibrated {
+        Ok(calibrated) => Ok(Some(calibrated)),
         Err(error) => match error.problem() {
-            Some(CalibrateProblem::TooFew { .. } | CalibrateProblem::NotKept { .. }) => {
-                Ok(((1.0 - promise.rate) / promise.rate).ln() + STRICTEST[0])
-            }
+            Some(CalibrateProblem::TooFew { .. } | CalibrateProblem::NotKept { .. }) => Ok(None),
             _ => Err(error),
         },
     }

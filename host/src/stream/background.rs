@@ -1,12 +1,11 @@
 //! A test of whether rows fit any class that the model knows, with a false alarm rate that is kept on sequences.
 
 use super::Rows;
-use super::begin::Begin;
 use super::parts::Parts;
-use super::settings::Settings;
-use crate::calibrate::odds_of;
+use super::settings::Strangers;
+use crate::calibrate::{needed, odds_of};
 use crate::compile::{self, Restated, restate};
-use crate::error::Result;
+use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result};
 use crate::strangers::{self, Found, Supply};
 use palpate_shared::format::Tag;
 use palpate_trees::rows::RowSequence;
@@ -15,19 +14,17 @@ use palpate_trees::rows::RowSequence;
 /// others.
 pub(super) const TESTED: f64 = 3.0 / 7.0;
 
-/// Adds the test to a model, if one is wanted: its bytes, the parts of the sequences without those that the test used, where
-/// the thresholds begin, and what was found. The test is made under the thresholds at which the walk begins: under looser
-/// ones no sequence is longer, so that there are no more false alarms.
+/// Adds the test that is wanted to a model: its bytes, the parts of the sequences without those that the test used, and what was
+/// found. The test is made under the threshold at which the walk begins, a margin in nats: under looser ones no sequence is
+/// longer, so that there are no more false alarms.
 pub(super) fn test<'s>(
     shaped: &[u8],
     rows: &Rows<'_>,
     parts: Parts<'s>,
-    settings: &Settings,
-    begin: Begin,
-) -> Result<(Vec<u8>, Parts<'s>, f64, Option<Found>)> {
-    let Some(wanted) = &settings.strangers else { return Ok((shaped.to_vec(), parts, begin.strictest, None)) };
+    wanted: &Strangers,
+    begin: f64,
+) -> Result<(Vec<u8>, Parts<'s>, Found)> {
     let model = compile::open(shaped)?;
-    let begin = begin.loosest;
     let restated =
         Restated { odds: Some(odds_of(begin)), sections: vec![(Tag::ThresholdsByObject, None)], ..Restated::default() };
     let begun = restate(&model, &restated)?;
@@ -56,7 +53,25 @@ pub(super) fn test<'s>(
             .collect()
     };
     let shapes: Vec<Vec<f64>> = wanted.background.iter().filter(|margins| !margins.is_empty()).map(mean).collect();
-    let tested = strangers::calibrate_supplies(&begun, supplies, None, &shapes, &wanted.settings)?;
+    let tested = strangers::calibrate_supplies(&begun, supplies, None, &shapes, &wanted.settings);
+    let tested = tested.map_err(|error| problem(error, &parts, &wanted.settings))?;
     let found = Found::new(&wanted.settings, &tested);
-    Ok((tested.bytes, parts, begin, Some(found)))
+    Ok((tested.bytes, parts, found))
+}
+
+/// The problem of a test that sequences are too few for, in numbers of these.
+fn problem(error: Error, parts: &Parts<'_>, settings: &strangers::Settings) -> Error {
+    let strangers::Settings { alarms, confidence, .. } = *settings;
+    match error.problem() {
+        Some(&EvaluateProblem::TooFewForAlarms { object_sequences, needed }) if object_sequences as u64 >= needed => {
+            CalibrateProblem::TooManyAlarms { found: object_sequences as u64, alarms }.into()
+        }
+        Some(EvaluateProblem::TooFewForAlarms { .. } | EvaluateProblem::TooFewForMisfit { .. }) => {
+            // Three quarters of the part that is for the test are tested on.
+            let needed = needed(alarms, confidence) as f64 / (0.75 * TESTED * parts.share_tested());
+            let needed = needed.ceil() as u64;
+            CalibrateProblem::TooFewForTest { found: parts.units as u64, needed, alarms, groups: parts.has_groups }.into()
+        }
+        _ => error,
+    }
 }

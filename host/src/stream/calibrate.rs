@@ -1,13 +1,13 @@
 //! A model's shape, thresholds and promise, from sequences of rows.
 
-use super::begin::Begin;
+use super::copies::copies;
 use super::parts::Parts;
 use super::settings::Settings;
 use super::shape::{self, Fitted, Gain, STRICTEST};
 use super::{Rows, check, follow};
 use crate::calibrate::{
-    Chosen, Grouped, Odds, OfObject, Per, Sequence, Tally, Terms, Until, Worse, choose_groups, choose_independent,
-    margin_of, worse,
+    Begin, Chosen, Grouped, Odds, OfObject, Per, Sequence, Stop, Tally, Terms, Until, Way, Worse, choose_groups, choose_independent,
+    margin_of, share_tested, worse,
 };
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};
@@ -19,9 +19,6 @@ use palpate_shared::format::{OddsByObject, Promise, PromisedNoise, Tag};
 use palpate_trees::rows::{RowSequence, Sequences};
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// Thresholds by name are tested on this share of independent sequences: [`choose_independent`] learns them on the others.
-const SHARE_OF_NAMES: f64 = 2.0 / 3.0;
 
 /// A calibrated model, and what its calibration found.
 #[derive(Clone, Debug, Serialize)]
@@ -72,6 +69,9 @@ pub struct Calibrated {
     #[cfg(feature = "train")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strangers: Option<strangers::Found>,
+    /// Doubts about the sequences, in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
 }
 
 impl Calibrated {
@@ -99,7 +99,15 @@ pub fn calibrate(
     progress.begin("computing margins", None);
     let rows = Rows::new(model, sequences)?;
     progress.begin("calibrating", None);
-    calibrate_margins(model, &rows, &sequences.sequences, settings)
+    let calibrated = calibrate_margins(model, &rows, &sequences.sequences, settings)?;
+    let (copies, all) = (copies(sequences), sequences.sequences.len());
+    let note = (copies > 0).then(|| {
+        format!(
+            "{copies} of {all} sequences are copies, value by value, of others under another id. Copies are not independent, so that \
+             the promise may not hold: leave them out, or name what they come from as their group."
+        )
+    });
+    Ok(Calibrated { note, ..calibrated })
 }
 
 /// The same of margins that were computed before.
@@ -123,29 +131,57 @@ pub fn calibrate_margins(
         return Err(CalibrateProblem::MissingSequences { objects: missing }.into());
     }
     let parts = Parts::new(sequences, settings)?;
-    let terms = terms(settings);
     let fitted = shape::fit(rows, &parts.learned, settings.rate, max_rows);
     let shaped = shaped(model, &fitted, max_rows)?;
+    let followed = Followed { rows, names: names.len(), terms: terms(settings), max_rows };
     let begin = begin(&compile::open(&shaped)?, rows, &parts, settings, max_rows);
-    #[cfg(not(feature = "train"))]
-    let strictest = begin.strictest;
     #[cfg(feature = "train")]
-    let (shaped, parts, strictest, tested) = super::background::test(&shaped, rows, parts, settings, begin)?;
-    let shaped_model = compile::open(&shaped)?;
-    let until = Until { margin: strictest, max_touches: max_rows };
-    let tested_on = follow(&shaped_model, rows, &parts.tested, until);
-    let chosen = if parts.has_groups {
-        let learned_on = follow(&shaped_model, rows, &parts.learned, until);
-        let [learned_on, tested_on] = [(&learned_on, &parts.learned), (&tested_on, &parts.tested)].map(grouped);
-        choose_groups(&learned_on, &tested_on, names.len(), strictest, &terms)
-    } else {
-        choose_independent(&tested_on, names.len(), strictest, &terms)
-    };
-    let chosen = chosen.map_err(|stop| parts.problem(stop, &names, settings))?;
-    let calibrated = finished(&shaped_model, &chosen, &parts, settings, max_rows, &fitted)?;
-    #[cfg(feature = "train")]
-    let calibrated = Calibrated { strangers: tested, ..calibrated };
-    Ok(calibrated)
+    if let Some(wanted) = &settings.strangers {
+        // Names that the test holds back are wrong less often, which no looser threshold is to use up.
+        let without = followed.choose(&compile::open(&shaped)?, &parts, &begin.starts, None).ok();
+        let (shaped, parts, found) = super::background::test(&shaped, rows, parts, wanted, begin.loosest)?;
+        let model = compile::open(&shaped)?;
+        let loosest = without.as_ref().map(|without| &without.odds);
+        let chosen = followed.choose(&model, &parts, &[begin.loosest], loosest);
+        let chosen = chosen.map_err(|stop| parts.problem(stop, &names, settings, found.least_touches))?;
+        let calibrated = finished(&model, &chosen, &parts, settings, max_rows, &fitted)?;
+        return Ok(Calibrated { strangers: Some(found), ..calibrated });
+    }
+    let model = compile::open(&shaped)?;
+    let chosen = followed.choose(&model, &parts, &begin.starts, None);
+    let chosen = chosen.map_err(|stop| parts.problem(stop, &names, settings, 0))?;
+    finished(&model, &chosen, &parts, settings, max_rows, &fitted)
+}
+
+/// Sequences to follow, and what is to be promised of them.
+struct Followed<'f> {
+    rows: &'f Rows<'f>,
+    /// Number of names.
+    names: usize,
+    terms: Terms,
+    max_rows: u32,
+}
+
+impl Followed<'_> {
+    /// Thresholds from these starts on, margins in nats, that are no looser than others.
+    fn choose(
+        &self,
+        model: &Model<'_>,
+        parts: &Parts<'_>,
+        starts: &[f64],
+        loosest: Option<&Odds>,
+    ) -> Result<Chosen, Stop> {
+        let way = Way { starts, loosest };
+        let margin = starts.first().copied().unwrap_or(STRICTEST);
+        let until = Until { margin, max_touches: self.max_rows };
+        let tested = follow(model, self.rows, &parts.tested, until);
+        if !parts.has_groups {
+            return choose_independent(&tested, self.names, &way, &self.terms);
+        }
+        let learned = follow(model, self.rows, &parts.learned, until);
+        let [learned, tested] = [(&learned, &parts.learned), (&tested, &parts.tested)].map(grouped);
+        choose_groups(&learned, &tested, self.names, &way, &self.terms)
+    }
 }
 
 fn names(model: &Model<'_>) -> Vec<String> {
@@ -177,7 +213,7 @@ fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Result<Vec<u8>> 
     Ok(shaped)
 }
 
-/// The threshold at which a walk begins.
+/// The thresholds at which a walk begins.
 fn begin(model: &Model<'_>, rows: &Rows<'_>, parts: &Parts<'_>, settings: &Settings, max_rows: u32) -> Begin {
     let until = Until { margin: STRICTEST, max_touches: max_rows };
     let followed = follow(model, rows, &parts.learned, until);
@@ -186,11 +222,12 @@ fn begin(model: &Model<'_>, rows: &Rows<'_>, parts: &Parts<'_>, settings: &Setti
     if settings.strangers.is_some() {
         share -= super::background::TESTED;
     }
-    if settings.per == Per::Name && !parts.has_groups {
-        share *= SHARE_OF_NAMES;
+    if !parts.has_groups {
+        share *= share_tested(settings.per);
     }
     let tested = (share * parts.units_tested() as f64) as usize;
-    Begin::new(&followed, &parts.learned, tested, &terms(settings), STRICTEST)
+    let units = parts.learned.iter().enumerate().map(|(number, sequence)| sequence.group.unwrap_or(number));
+    Begin::new(&followed, &units.collect::<Vec<_>>(), tested, &terms(settings), STRICTEST)
 }
 
 fn terms(settings: &Settings) -> Terms {
@@ -261,5 +298,6 @@ fn finished(
         weights_by_doubling: shape::stated(model),
         #[cfg(feature = "train")]
         strangers: None,
+        note: None,
     })
 }

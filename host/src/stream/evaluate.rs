@@ -1,8 +1,9 @@
 //! Verdicts on sequences of rows: how often they are wrong, after how many rows, and what a fixed number of rows would give.
 
+use super::settings::check_rows;
 use super::{Rows, check};
 use crate::compile;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::evaluate::Finding;
 use crate::evaluate::promise::{BY_CHANCE, at_least};
 use palpate_onboard::{Forgetting, Model, Recognizer, Stopping, Verdict};
@@ -141,6 +142,15 @@ pub struct Switched {
     pub changed: [Point; 2],
 }
 
+impl Switched {
+    /// True if forgetting makes fewer names wrong where the class changes, of so many streams: by more than two standard errors.
+    pub fn helps(&self, streams: usize) -> bool {
+        let [without, with] = self.changed;
+        let variance = |point: &Point| point.error * (1.0 - point.error) / (point.named * streams as f64).max(1.0);
+        without.error - with.error > 2.0 * (variance(&without) + variance(&with)).sqrt()
+    }
+}
+
 /// End of a sequence.
 #[derive(Clone, Copy, Debug)]
 struct End {
@@ -180,11 +190,11 @@ pub(super) fn measured(
     compares: bool,
 ) -> Result<Evaluated> {
     check(model)?;
+    check_rows(wanted.max_rows)?;
     let own = Stopping::from_model(model);
     let max_rows = wanted.max_rows.unwrap_or(own.max_touches());
     let stopping = match wanted.error_rate {
         Some(rate) => compile::stopping(rate, max_rows)?,
-        None if max_rows == 0 => return Err(Error::setting("max_touches", 0, "at least 1")),
         None => own.with_max_touches(max_rows),
     };
     let run = Run { model, rows, weights: wanted.weights.as_deref() };

@@ -23,8 +23,8 @@
 
 #[cfg(feature = "train")]
 mod background;
-mod begin;
 mod calibrate;
+mod copies;
 mod evaluate;
 mod follow;
 #[cfg(feature = "parquet")]

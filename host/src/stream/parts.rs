@@ -18,7 +18,7 @@ pub(super) struct Parts<'s> {
     pub(super) tested: Vec<&'s RowSequence>,
     pub(super) has_groups: bool,
     /// Groups, or sequences without groups, of both parts.
-    units: usize,
+    pub(super) units: usize,
 }
 
 impl<'s> Parts<'s> {
@@ -46,7 +46,7 @@ impl<'s> Parts<'s> {
         let units = order.len();
         let least = needed(settings.rate, settings.confidence) as usize;
         if units < least {
-            return Err(Self::too_few(units, has_groups, None, settings).into());
+            return Err(Self::too_few(units, least as u64, has_groups, None, settings).into());
         }
         // As many as a promise takes are tested on, if there are no more.
         let learned = (units / LEARNED).min(units - least);
@@ -85,31 +85,53 @@ impl<'s> Parts<'s> {
         (taken, Self { tested, ..self })
     }
 
-    fn too_few(found: usize, groups: bool, object: Option<String>, settings: &Settings) -> CalibrateProblem {
+    /// The share of groups, or sequences, that are not learned from.
+    #[cfg(feature = "train")]
+    pub(super) fn share_tested(&self) -> f64 {
+        1.0 - 1.0 / LEARNED as f64
+    }
+
+    fn too_few(
+        found: usize,
+        needed: u64,
+        groups: bool,
+        object: Option<String>,
+        settings: &Settings,
+    ) -> CalibrateProblem {
         let Settings { rate, confidence, .. } = *settings;
         // The rate that as many could promise without an error, rounded up to two digits.
         let possible = 1.0 - (1.0 - confidence).powf(1.0 / found.max(1) as f64);
         let digit = 10.0_f64.powf(possible.log10().floor() - 1.0);
         let possible = Some((possible / digit).ceil() * digit).filter(|rate| *rate < 0.5);
-        let needed = needed(rate, confidence);
-        CalibrateProblem::TooFewSequences { found: found as u64, needed, rate, possible, groups, object }
+        let found = found as u64;
+        CalibrateProblem::TooFewSequences { found, needed, rate, possible, groups, object, names_in: None, held: None }
     }
 
-    /// The problem that a walk ended with.
-    pub(super) fn problem(&self, stop: Stop, names: &[String], settings: &Settings) -> CalibrateProblem {
+    /// The problem that a walk ended with; `least` is the row before which no name is given.
+    pub(super) fn problem(&self, stop: Stop, names: &[String], settings: &Settings, least: u32) -> CalibrateProblem {
         let of = |position: usize| (settings.per != Per::Average).then(|| names.get(position).cloned()).flatten();
+        let units = self.units_tested() as u64;
         match stop {
-            Stop::TooFew { position, found } => {
-                Self::too_few(usize::try_from(found).unwrap_or(usize::MAX), self.has_groups, of(position), settings)
+            Stop::TooFew { position, found, needed } => {
+                let count = usize::try_from(found).unwrap_or(usize::MAX);
+                let mut problem = Self::too_few(count, needed, self.has_groups, of(position), settings);
+                let longest = self.tested.iter().map(|sequence| sequence.rows.len()).max().unwrap_or(0) as u64;
+                if let CalibrateProblem::TooFewSequences { names_in, held, .. } = &mut problem {
+                    *names_in = Some(units);
+                    *held = (longest < u64::from(least)).then(|| [u64::from(least), longest]);
+                }
+                problem
             }
-            Stop::TooMany { position, tally: Tally { wrong, all } } => CalibrateProblem::NotKeptByRows {
+            Stop::TooMany { position, tally: Tally { wrong, all }, needed } => CalibrateProblem::NotKeptByRows {
                 object: of(position),
                 rate: settings.rate,
                 wrong,
                 given: all,
-                units: self.units as u64,
+                needed,
+                units,
                 groups: self.has_groups,
             },
+            Stop::Looser => CalibrateProblem::Looser { rate: settings.rate },
         }
     }
 

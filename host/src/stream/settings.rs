@@ -59,8 +59,13 @@ impl Settings {
         if sequences == 0 {
             return Err(Error::setting("sequences", sequences, "at least 1"));
         }
-        Ok(())
+        check_rows(self.max_rows)
     }
+}
+
+/// Refuses a limit of no rows.
+pub(super) fn check_rows(max_rows: Option<u32>) -> Result<()> {
+    if max_rows == Some(0) { Err(Error::setting("max_rows", 0, "at least 1")) } else { Ok(()) }
 }
 
 /// A test for what the model does not know.

@@ -341,6 +341,7 @@ fn message(error: &Error, command: &str) -> String {
 fn option_of(setting: &str) -> &str {
     match setting {
         "groups" => "sequences",
+        "max_rows" => "max_touches",
         "rolls" => "plan",
         "scales" => "scale",
         other => other,

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and six numbers of the probe's direction and alignment if the model needs them. Each line out is the verdict so far: undecided, recognized, unknown or gave-up. After a verdict, and after an empty line, the next touch is the first of another object. FILE may be a robot's log (MCAP) as well.
 
-With --features each line in is a row of features for a model of another library: CSV with the features' names in the header; out is the class of each row, or a regression's value. With --add-up out is the verdict so far; after one the next row is the first of another object.
+With --features each line in is a row of features for a model of another library: CSV with the features' names in the header; out is the class of each row, or a regression's value. With --add-up out is the verdict so far. With --sequence-column evidence begins where a sequence does, and nothing more is said of one after its verdict; without it the row after a verdict is the first of another object, and a promise is for the first verdict alone.
 
 Examples:
   palpate recognize model.palpate data/fork.txt
@@ -30,7 +30,8 @@ Examples:
   palpate recognize model.palpate data/fork.txt --prior fork=0.3,spoon=0.3
   probe | palpate recognize planned.palpate --active
   palpate recognize model.palpate monday.mcap --mcap verdicts.mcap
-  palpate recognize model.palpate rows.csv --features --json")]
+  palpate recognize model.palpate rows.csv --features --json
+  palpate recognize sure.palpate rows.csv --features --add-up --sequence-column id")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,
@@ -43,6 +44,9 @@ pub(crate) struct Arguments {
     /// Add up the evidence of rows until there is a verdict, as that of touches
     #[arg(long, requires = "features")]
     add_up: bool,
+    /// Column that says which rows are one sequence
+    #[arg(long, value_name = "COL", requires = "add_up")]
+    sequence_column: Option<String>,
     /// The share of wrong names to accept, such as 1%; stops there [default: the model's own thresholds]
     #[arg(long, value_name = "RATE", value_parser = error_rate)]
     error_rate: Option<f64>,
@@ -109,7 +113,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         if arguments.expected.is_given() && !arguments.add_up {
             return Err(Error::setting("features", "each row alone", "--only and --prior with --add-up only"));
         }
-        let rows = super::recognize_rows::Asked { adds_up: arguments.add_up, json: global.json, weights };
+        let sequence = arguments.sequence_column.as_deref();
+        let rows = super::recognize_rows::Asked { adds_up: arguments.add_up, sequence, json: global.json, weights };
         return super::recognize_rows::run(recognizer, &arguments.file, &rows)
             .map_err(|error| error.in_file(&arguments.model));
     }

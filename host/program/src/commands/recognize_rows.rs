@@ -2,11 +2,12 @@
 
 use super::rows::read_rows;
 use palpate::Result;
-use palpate::error::RowsProblem;
+use palpate::error::{Error, Place, RowsProblem};
 use palpate::evaluate::verify::margins;
 use palpate::output;
-use palpate::rows::Encoder;
+use palpate::rows::{Encoder, RowOf, SequencesBuilder};
 use palpate_onboard::{Recognizer, Verdict};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Answer to a row.
@@ -14,6 +15,9 @@ use std::path::Path;
 struct Line<'a> {
     /// Counted from 1.
     row: usize,
+    /// The sequence that the row is of, where the file says so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sequence: Option<&'a str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     verdict: Option<&'static str>,
     /// The predicted class of the row, or the leading one of the rows so far.
@@ -35,31 +39,48 @@ struct Line<'a> {
 }
 
 /// Options for rows.
-pub(super) struct Asked {
+pub(super) struct Asked<'a> {
     /// True if evidence is added up: a verdict, of a row and those before it since the last verdict.
     pub(super) adds_up: bool,
+    /// The column of the sequences, if it is added up within these.
+    pub(super) sequence: Option<&'a str>,
     pub(super) json: bool,
     /// Frequencies of the classes, if they are not the model's.
     pub(super) weights: Option<Vec<u32>>,
 }
 
 /// Prints the class or the value of each row, or the verdict so far.
-pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked) -> Result<()> {
-    let &Asked { adds_up, json, ref weights } = asked;
+pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_>) -> Result<()> {
+    let &Asked { adds_up, sequence, json, ref weights } = asked;
     let mut recognizer = recognizer;
     let model = *recognizer.model();
     if model.descriptor().is_some() {
         return Err(RowsProblem::Touches.into());
     }
     let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
-    let rows = read_rows(path, &model, None)?;
+    let rows = read_rows(path, &model, sequence)?;
+    let starts = starts(&rows.labels).map_err(|problem| Error::at(Place::file(path), problem))?;
+    if let Some(promise) = model.promise().filter(|_| adds_up && sequence.is_none()) {
+        super::remark(&format!(
+            "palpate: note: {}: nothing says where a sequence ends (--sequence-column), so the promise of {} % is for the first \
+             verdict alone, and none is made for those after it",
+            path.display(),
+            super::percent(promise.rate)
+        ));
+    }
     let encoder = Encoder::of(&model);
     let has_targets = model.prediction().targets;
     let has_classes = model.object_count() > 1 && !has_targets;
     let mut scratch = vec![0; model.object_count()];
     for (number, row) in (1..).zip(rows.iter()) {
         let encoded = encoder.row(row);
-        if number == 1 || !adds_up || recognizer.verdict() != Verdict::Undecided {
+        let is_over = recognizer.verdict() != Verdict::Undecided;
+        let is_first = if sequence.is_some() { starts.contains(&(number - 1)) } else { number == 1 || is_over };
+        if is_over && !is_first && adds_up {
+            // The sequence has its verdict.
+            continue;
+        }
+        if is_first || !adds_up {
             match weights {
                 // One of them is above 0.
                 Some(weights) => _ = recognizer.reset_to(weights),
@@ -77,6 +98,7 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked) -
         };
         let line = Line {
             row: number,
+            sequence: rows.labels.get(number - 1).map(String::as_str),
             verdict: (has_classes && adds_up).then_some(verdict),
             class: has_classes.then(|| model.object_name(class)),
             posterior: has_classes.then(|| recognizer.posterior(class).to_f64()),
@@ -94,6 +116,18 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked) -
     Ok(())
 }
 
+/// The rows with which sequences begin, of the sequences' names.
+fn starts(ids: &[String]) -> Result<BTreeSet<usize>, RowsProblem> {
+    let mut sequences = SequencesBuilder::new(1, &[String::new()]);
+    for (number, id) in ids.iter().enumerate() {
+        sequences
+            .push(&[0.0], RowOf { label: "", sequence: id, group: None })
+            .map_err(|problem| RowsProblem::InRow { row: number + 1, problem: Box::new(problem) })?;
+    }
+    let sequences = sequences.finish().map_or_else(|_| Vec::new(), |built| built.sequences);
+    Ok(sequences.into_iter().map(|sequence| sequence.rows.start).collect())
+}
+
 fn print(line: &Line<'_>, json: bool) -> Result<()> {
     if json {
         // Numbers and strings are always JSON.
@@ -101,9 +135,10 @@ fn print(line: &Line<'_>, json: bool) -> Result<()> {
         return output::print(&format!("{text}\n"));
     }
     let row = line.row;
+    let sequence = line.sequence.map_or_else(String::new, |sequence| format!("  {sequence}"));
     match (line.verdict, line.class, line.posterior) {
         (Some(verdict), Some(class), Some(posterior)) => {
-            output::print(&format!("{row:4}  {verdict:10}  {class} {posterior:.4}\n"))
+            output::print(&format!("{row:4}  {verdict:10}  {class} {posterior:.4}{sequence}\n"))
         }
         (None, Some(class), Some(posterior)) => output::print(&format!("{row:4}  {class} {posterior:.4}\n")),
         _ => {

@@ -4,7 +4,7 @@ use super::Global;
 use super::figures::shares_table;
 use super::progress::Bar;
 use palpate::Result;
-use palpate::calibrate::{Per, of_what};
+use palpate::calibrate::Per;
 use palpate::compile::{self, CompiledModel};
 use palpate::error::{Error, Place, RowsProblem};
 use palpate::evaluate::{Confusion, Finding};
@@ -106,13 +106,9 @@ fn percent(share: f64) -> String {
 
 fn calibrated_text(path: &Path, calibrated: &Calibrated) -> String {
     let Calibrated { sequences, learned, error, undecided, mean_rows, max_rows, .. } = calibrated;
-    let of = calibrated.groups.map_or_else(String::new, |_| " in new groups".into());
-    let mut text = format!(
-        "Promised: at most {} % of {} wrong{of}, with a probability of {} %.\n",
-        super::percent(calibrated.promised),
-        of_what(calibrated.promise.per),
-        super::percent(calibrated.confidence),
-    );
+    let cases = if calibrated.groups.is_some() { " in new groups" } else { "" };
+    let mut text =
+        super::thresholds::promised(calibrated.promised, calibrated.promise.per, cases, calibrated.confidence);
     let groups = calibrated.groups.map_or_else(String::new, |groups| format!(" of {groups} groups"));
     // Writing to a string cannot fail.
     _ = writeln!(
@@ -141,6 +137,7 @@ fn calibrated_text(path: &Path, calibrated: &Calibrated) -> String {
         calibrated.promise.per,
         calibrated.objects.values().any(|of| 2 * of.given < *sequences as u64 / calibrated.objects.len() as u64),
     );
+    text += &calibrated.note.as_ref().map_or_else(String::new, |note| format!("note: {note}\n"));
     text + &format!("{}: {} bytes\n", path.display(), calibrated.model.len())
 }
 
@@ -218,7 +215,11 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
     );
     if let Some(promise) = &evaluated.promise {
         let of = promise.of.as_ref().map_or_else(String::new, |of| format!(" ({of})"));
-        let groups = if promise.groups { ", each group weighing the same" } else { "" };
+        let groups = match (promise.groups, evaluated.groups) {
+            (false, _) => "",
+            (true, Some(_)) => ", each group weighing the same",
+            (true, None) => ", each sequence as a group of its own, as none are given (--group-column)",
+        };
         // Writing to a string cannot fail.
         _ = writeln!(
             text,
@@ -265,6 +266,11 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
             percent(cost.error),
             cost.rows,
         );
+        text += match (switched.helps(*sequences), forgetting.error > plain.error) {
+            (true, _) => "",
+            (false, true) => "Forgetting does not help: no fewer names are wrong where the class changes.\n",
+            (false, false) => "Forgetting does not help: as few wrong names less may be by chance.\n",
+        };
     }
     let mut recognized = evaluated.names.clone();
     recognized.push("no name".into());

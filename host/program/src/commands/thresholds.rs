@@ -1,8 +1,20 @@
 //! Thresholds of a calibration, as text.
 
-use palpate::calibrate::{Per, Worse};
+use palpate::calibrate::{Per, Worse, of_what};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+
+/// What is promised, in what cases, and what the confidence is a share of.
+pub(super) fn promised(rate: f64, per: Per, cases: &str, confidence: f64) -> String {
+    format!(
+        "Promised: at most {} % of {} wrong{cases}, with a confidence of {} %: of all calibrations, those included that promise \
+         nothing, at most {} % promise what does not hold.\n",
+        super::percent(rate),
+        of_what(per),
+        super::percent(confidence),
+        super::percent(1.0 - confidence),
+    )
+}
 
 /// Where names are given, and uncalibrated would be: in nats ahead of all others; with the share of wrong ones of each case that
 /// the rate is promised for, if it is of cases.

@@ -634,10 +634,91 @@ fn sequences_of_rows_are_calibrated_evaluated_and_recognized_verdict_after_verdi
     }
     let text = stdout(evaluate(&[]));
     assert!(text.contains("promised: at most 10 % wrong") && text.contains("no name"), "{text}");
-    let said = stdout(run(["recognize", &sure, &unseen, "--features", "--add-up"]));
+    let streamed = run(["recognize", &sure, &unseen, "--features", "--add-up"]);
+    let note = String::from_utf8_lossy(&streamed.stderr).into_owned();
+    let about = "nothing says where a sequence ends (--sequence-column), so the promise of 10 % is for the first verdict alone";
+    assert_eq!(note.matches(about).count(), 1, "{note}");
+    let said = stdout(streamed);
     assert!(said.lines().filter(|line| line.contains("recognized")).count() > 100, "{said}");
     let only = stdout(run(["recognize", &sure, &unseen, "--features", "--add-up", "--only", "cup,pan"]));
     assert!(!only.lines().any(|line| line.contains("recognized") && line.contains("jug")), "{only}");
+}
+
+#[test]
+fn evidence_ends_where_a_sequence_does_and_nothing_is_said_of_one_after_its_verdict() {
+    let (_directory, path) = place();
+    let (model, unseen) = (path("model.palpate"), path("unseen.csv"));
+    let rows = data("xgboost-3.4-softprob.rows.csv");
+    stdout(run(["export", &data("xgboost-3.4-softprob.ubj"), "-o", &model, "--names", "cup,jug,pan"]));
+    let text = sequences(&model, &rows, 300, 300);
+    // Every other sequence is cut short, so that many are undecided.
+    let (header, lines) = text.split_once('\n').unwrap();
+    let is_kept = |(at, _): &(usize, &str)| (at / 6) % 2 == 0 || at % 6 < 1;
+    let lines: Vec<&str> = lines.lines().enumerate().filter(is_kept).map(|(_, line)| line).collect();
+    std::fs::write(&unseen, format!("{header}\n{}\n", lines.join("\n"))).unwrap();
+    // A rate that takes two rows or more.
+    let columns = ["--label", "kind", "--sequence-column", "id", "--error-rate", "20%"];
+    let found = json(run([&["evaluate", &model, &unseen, "--json"][..], &columns].concat()));
+    let recognize = ["recognize", &model, &unseen, "--features", "--add-up", "--error-rate", "20%"];
+    let said = run([&recognize[..], &["--sequence-column", "id", "--json"]].concat());
+    let said: Vec<Value> = stdout(said).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let (mut wrong, mut named, mut undecided) = (0, 0, 0);
+    for number in 300..600 {
+        let own: Vec<&Value> = said.iter().filter(|line| line["sequence"] == number.to_string()).collect();
+        let (last, before) = own.split_last().unwrap();
+        assert!(before.iter().all(|line| line["verdict"] == "undecided"), "{own:?}");
+        assert_eq!(last["rows"], own.len());
+        named += u32::from(last["verdict"] == "recognized");
+        undecided += u32::from(last["verdict"] == "undecided");
+        let is_wrong = last["class"] != ["cup", "jug", "pan"][number % 3];
+        wrong += u32::from(last["verdict"] == "recognized" && is_wrong);
+    }
+    assert!(undecided > 50 && named > 50, "{undecided} {named}");
+    assert!((found["error"].as_f64().unwrap() - f64::from(wrong) / f64::from(named)).abs() < 1e-9, "{found}");
+    assert!((found["undecided"].as_f64().unwrap() - f64::from(undecided) / 300.0).abs() < 1e-9, "{found}");
+    // What evaluate refuses, too.
+    let text = std::fs::read_to_string(&unseen).unwrap();
+    let recognize = |text: String| {
+        std::fs::write(&unseen, text).unwrap();
+        stderr(run(["recognize", &model, &unseen, "--features", "--add-up", "--sequence-column", "id"]), 1)
+    };
+    let missing = recognize(text.replacen("\n301,", "\n,", 1));
+    assert!(missing.contains("row 7: the sequence is missing"), "{missing}");
+    let back = recognize(text.replacen("\n302,", "\n300,", 1));
+    assert!(back.contains("row 8: the sequence \"300\" comes back"), "{back}");
+    let alone = stderr(run(["recognize", &model, &unseen, "--features", "--sequence-column", "id"]), 2);
+    assert!(alone.contains("--add-up"), "{alone}");
+}
+
+#[test]
+fn a_promise_for_groups_says_when_none_are_given_and_copies_are_noted() {
+    let (_directory, path) = place();
+    let (model, sure, fresh) = (path("model.palpate"), path("sure.palpate"), path("fresh.csv"));
+    let rows = data("xgboost-3.4-softprob.rows.csv");
+    stdout(run(["export", &data("xgboost-3.4-softprob.ubj"), "-o", &model, "--names", "cup,jug,pan"]));
+    let made = sequences(&model, &rows, 300, 0);
+    let (header, lines) = made.split_once('\n').unwrap();
+    // A person for each two sequences.
+    let person = |line: &str| line.split(',').next().unwrap().parse::<u32>().unwrap() / 2;
+    let with: Vec<String> = lines.lines().map(|line| format!("{line},{}", person(line))).collect();
+    std::fs::write(&fresh, format!("{header},person\n{}\n", with.join("\n"))).unwrap();
+    let columns = ["--label", "kind", "--sequence-column", "id"];
+    let groups = ["--group-column", "person"];
+    let calibrate = |more: &[&str]| {
+        stdout(run([&["calibrate", &model, &fresh, "-o", &sure, "--error-rate", "20%"][..], &columns, more].concat()))
+    };
+    let text = calibrate(&groups);
+    assert!(text.starts_with("Promised: at most 20 % of all names given, on average, wrong in new groups, with a confidence of 95 %"), "{text}");
+    assert!(text.contains("of all calibrations, those included that promise nothing, at most 5 % promise what does not hold"), "{text}");
+    let evaluate = |more: &[&str]| stdout(run([&["evaluate", &sure, &fresh][..], &columns, more].concat()));
+    assert!(evaluate(&groups).contains(" were, each group weighing the same: "), "{}", evaluate(&groups));
+    let alone = evaluate(&[]);
+    assert!(alone.contains(" were, each sequence as a group of its own, as none are given (--group-column): "), "{alone}");
+    // There are as many different rows as the fixture has, so that sequences repeat.
+    let copied = format!("{made}{}\n", lines.lines().take(600).map(|line| format!("c{line}")).collect::<Vec<_>>().join("\n"));
+    std::fs::write(&fresh, copied).unwrap();
+    let text = calibrate(&[]);
+    assert!(text.contains("\nnote: ") && text.contains(" of 400 sequences are copies, value by value, of others under another id"), "{text}");
 }
 
 #[test]

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+import importlib
+import importlib.util
 import json
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._errors import InputError
+from ._errors import InputError, SettingError
 from ._import import compile
 from ._native import Model, Recognizer
-from ._rows import rows_of, take
+from ._rows import names_of, rows_of, take
 from ._types import Progress, Verdict
 
 _Ids = Sequence[object] | npt.NDArray[Any]
@@ -62,6 +66,44 @@ def _texts(values: _Ids) -> list[str]:
     return [str(value) for value in np.asarray(values).tolist()]
 
 
+def _ids(values: _Ids, what: str) -> list[str]:
+    """The name of what each row belongs to."""
+    # A list as it is: NumPy would make text of a missing value among texts.
+    given = np.asarray(values) if hasattr(values, "dtype") else np.array([*values, None], dtype=object)[:-1]
+    for number, value in enumerate([] if given.dtype.kind in "biu" else given.tolist()):
+        if _is_missing(value):
+            raise InputError(f"row {number + 1}: the {what} is missing ({value!r}). Give each row the {what} that it belongs to.")
+    return _texts(given)
+
+
+def _is_missing(value: object) -> bool:
+    try:
+        return value is None or str(value) == "" or bool(value != value)
+    except (TypeError, ValueError):  # pandas.NA is not equal, and not unequal, to itself.
+        return True
+
+
+def _agree(rows: int, **columns: int | None) -> None:
+    """Refuses columns of another length than the rows'."""
+    for name, length in columns.items():
+        if length is not None and length != rows:
+            raise SettingError(f"{name} is {length} values. Use {rows}, one for each row.")
+
+
+def _stretches(sequence: list[str]) -> list[slice]:
+    """The rows of each sequence."""
+    starts = [at for at in range(len(sequence)) if at == 0 or sequence[at] != sequence[at - 1]]
+    seen: set[str] = set()
+    for at in starts:
+        if sequence[at] in seen:
+            raise InputError(
+                f'row {at + 1}: the sequence "{sequence[at]}" comes back after another. Sort the rows by sequence, each in its '
+                "order, or give each stretch of rows an id of its own."
+            )
+        seen.add(sequence[at])
+    return [slice(start, end) for start, end in zip(starts, [*starts[1:], len(sequence)])]
+
+
 def calibrate(
     model: object,
     rows: npt.ArrayLike,
@@ -85,7 +127,9 @@ def calibrate(
     other, and are of one class. Without `groups` sequences must be independent of each other; with them, such as a person for
     each row, the promise is for new groups. The rows must be others than those of the training. `per` is what the rate is
     promised of: "average", "name" or "object". With `strangers` ("likely" or "certain") the model also tests whether rows fit
-    any class; rows of others can be given as a `background`, with their own sequences.
+    any class; rows of others can be given as a `background`, with their own sequences. `seed` says which sequences are learned
+    from: calibrate once. Of several seeds, rates or models tried on the same sequences, the one that looks best keeps its promise
+    less often than stated.
 
     >>> import numpy as np, palpate
     >>> from sklearn.ensemble import HistGradientBoostingClassifier
@@ -103,19 +147,21 @@ def calibrate(
         compiled,
         rows_of(compiled, rows),
         _texts(labels),
-        _texts(sequence),
-        groups=None if groups is None else _texts(groups),
+        _ids(sequence, "sequence"),
+        groups=None if groups is None else _ids(groups, "group"),
         error_rate=error_rate,
         per=per,
         confidence=confidence,
         max_rows=max_rows,
         strangers=strangers,
         background=None if background is None else rows_of(compiled, background),
-        background_sequence=None if background_sequence is None else _texts(background_sequence),
+        background_sequence=None if background_sequence is None else _ids(background_sequence, "sequence"),
         seed=seed,
         progress=progress,
     )
     raw: dict[str, Any] = json.loads(text)
+    if note := raw.get("note"):
+        warnings.warn(note, stacklevel=2)
     return Calibrated(
         calibrated, raw["error"], raw["undecided"], raw["mean_rows"], raw["sequences"], raw.get("groups"), raw
     )
@@ -137,8 +183,8 @@ def evaluate_sequences(
         model,
         rows_of(model, rows),
         _texts(labels),
-        _texts(sequence),
-        groups=None if groups is None else _texts(groups),
+        _ids(sequence, "sequence"),
+        groups=None if groups is None else _ids(groups, "group"),
         error_rate=error_rate,
         max_rows=max_rows,
     )
@@ -151,9 +197,10 @@ def evaluate_sequences(
 class SequenceRecognizer:
     """An estimator of scikit-learn's kind whose verdicts on sequences of rows keep a promised error rate.
 
-    It takes an estimator that `palpate.compile` takes, fitted or not. `fit` trains it on one half of the sequences, or groups
-    (unless it is fitted already), and calibrates on the others; `predict` gives a class for each sequence, or `None` without
-    a verdict.
+    It takes a classifier that `palpate.compile` takes. `fit` trains a clone of it, `estimator_`, on a share of the sequences, or
+    groups, and calibrates on the others; `predict` gives a class for each sequence, or `None` without a verdict. A classifier that
+    is fitted already is taken as it is with `prefit`, or in scikit-learn's `FrozenEstimator`; all sequences are calibrated on
+    then, and must be others than those that it was trained on.
     """
 
     def __init__(
@@ -166,6 +213,7 @@ class SequenceRecognizer:
         max_rows: int | None = None,
         strangers: str | None = None,
         train_share: float = 0.5,
+        prefit: bool = False,
         seed: int = 1,
     ) -> None:
         self.estimator = estimator
@@ -175,13 +223,13 @@ class SequenceRecognizer:
         self.max_rows = max_rows
         self.strangers = strangers
         self.train_share = train_share
+        self.prefit = prefit
         self.seed = seed
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """The arguments, for `sklearn.base.clone` and searches."""
-        names = ("estimator", "error_rate", "per", "confidence", "max_rows", "strangers", "train_share", "seed")
-        params = {name: getattr(self, name) for name in names}
-        if deep and hasattr(self.estimator, "get_params"):
+        params = {name: getattr(self, name) for name in _PARAMETERS}
+        if deep and hasattr(self.estimator, "get_params") and not isinstance(self.estimator, type):
             params |= {f"estimator__{name}": value for name, value in self.estimator.get_params().items()}
         return params
 
@@ -190,29 +238,36 @@ class SequenceRecognizer:
         for name, value in params.items():
             if name.startswith("estimator__"):
                 self.estimator.set_params(**{name.removeprefix("estimator__"): value})
-            elif name in self.get_params(deep=False):
+            elif name in _PARAMETERS:
                 setattr(self, name, value)
             else:
-                raise InputError(f"a SequenceRecognizer has no {name}. Use {', '.join(self.get_params(deep=False))}.")
+                raise InputError(f"a SequenceRecognizer has no {name}. Use {', '.join(_PARAMETERS)}.")
         return self
 
     def fit(self, X: npt.ArrayLike, y: _Ids, *, sequence: _Ids, groups: _Ids | None = None) -> SequenceRecognizer:
         """Trains on some sequences, and calibrates on the others."""
+        if y is None:
+            raise InputError("a SequenceRecognizer requires y to be passed, but the target y is None. Give a class for each row.")
+        table = _table(X)
         labels, ids = np.asarray(y), np.asarray(sequence)
-        units = ids if groups is None else np.asarray(groups)
-        calibrated = np.ones(len(labels), dtype=bool)
-        if not hasattr(self.estimator, "classes_"):
-            names = np.unique(units)
-            np.random.default_rng(self.seed).shuffle(names)
-            train = np.isin(units, names[: int(len(names) * self.train_share)])
-            self.estimator.fit(take(X, train), labels[train])
+        owners = None if groups is None else np.asarray(groups)
+        _agree(len(table), y=len(labels), sequence=len(ids), groups=None if owners is None else len(owners))
+        _stretches(_ids(sequence, "sequence"))
+        if groups is not None:
+            _ids(groups, "group")
+        calibrated = np.ones(len(table), dtype=bool)
+        fitted = self._fitted()
+        if fitted is None:
+            train = self._train(ids if owners is None else owners)
+            fitted = _clone(self.estimator).fit(take(table, train), labels[train])
             calibrated = ~train
+        self.estimator_ = fitted
         self.calibrated_ = calibrate(
-            self.estimator,
-            take(X, calibrated),
+            fitted,
+            take(table, calibrated),
             labels[calibrated],
             sequence=ids[calibrated],
-            groups=None if groups is None else np.asarray(groups)[calibrated],
+            groups=None if owners is None else owners[calibrated],
             error_rate=self.error_rate,
             per=self.per,
             confidence=self.confidence,
@@ -221,21 +276,107 @@ class SequenceRecognizer:
             seed=self.seed,
         )
         self.model_ = self.calibrated_.model
-        self.classes_ = self.estimator.classes_
+        self.classes_ = fitted.classes_
+        for name in ("n_features_in_", "feature_names_in_"):
+            if hasattr(fitted, name):
+                setattr(self, name, getattr(fitted, name))
         return self
+
+    def _fitted(self) -> Any:
+        """The classifier that is fitted already, if one is given."""
+        kind = type(self.estimator)
+        is_frozen = kind.__name__ == "FrozenEstimator" and kind.__module__.startswith("sklearn.")
+        if not (self.prefit or is_frozen):
+            return None
+        fitted = self.estimator.estimator if is_frozen else self.estimator
+        if not hasattr(fitted, "classes_"):
+            raise InputError(f"the {type(fitted).__name__} is not fitted. Call its `fit` first, or leave `prefit` out.")
+        return fitted
+
+    def _train(self, units: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+        """The rows to train on: of whole sequences, or groups."""
+        if not 0 < self.train_share < 1:
+            raise SettingError(f"train_share is {self.train_share}. Use a share above 0 and below 1.")
+        names = np.unique(units)
+        count = int(len(names) * self.train_share)
+        if count == 0:
+            raise InputError(
+                f"there are {len(names)} sequences or groups, too few to train on some and calibrate on others. Record more."
+            )
+        np.random.default_rng(self.seed).shuffle(names)
+        return np.isin(units, names[:count])
 
     def verdicts(self, X: npt.ArrayLike, *, sequence: _Ids) -> list[Verdict]:
         """The verdict on each sequence, in their order: its class as text, and the rows that it took."""
+        if not hasattr(self, "model_"):
+            raise _not_fitted()
+        table, ids = _table(X), _ids(sequence, "sequence")
+        found, wanted = table.shape[1], getattr(self, "n_features_in_", None)
+        # The columns of a table are found by their names.
+        if wanted is not None and found != wanted and names_of(table) is None:
+            kind = type(self).__name__
+            raise InputError(f"X has {found} features, but {kind} is expecting {wanted} features as input. Give those of the fit.")
+        rows = rows_of(self.model_, table)
+        _agree(len(rows), sequence=len(ids))
         recognizer = Recognizer(self.model_)
-        rows, ids = rows_of(self.model_, X), np.asarray(sequence)
-        starts = [0, *(np.flatnonzero(ids[1:] != ids[:-1]) + 1).tolist(), len(ids)]
-        return [_verdict(recognizer, rows[start:end]) for start, end in zip(starts[:-1], starts[1:])]
+        return [_verdict(recognizer, rows[stretch]) for stretch in _stretches(ids)]
 
     def predict(self, X: npt.ArrayLike, *, sequence: _Ids) -> npt.NDArray[Any]:
         """The class of each sequence, in their order; `None` without a verdict, or for what the model does not know."""
+        verdicts = self.verdicts(X, sequence=sequence)
         by_name = {str(value): value for value in np.asarray(self.classes_).tolist()}
-        found = [by_name.get(verdict.object or "") for verdict in self.verdicts(X, sequence=sequence)]
-        return np.array(found, dtype=object)
+        return np.array([by_name.get(verdict.object or "") for verdict in verdicts], dtype=object)
+
+    def __sklearn_tags__(self) -> Any:
+        """What scikit-learn asks of estimators. A verdict is on a sequence, not on a row: it is no classifier there."""
+        utils, base = importlib.import_module("sklearn.utils"), importlib.import_module("sklearn.base")
+        has_tags = hasattr(self.estimator, "__sklearn_tags__")
+        inputs = base.get_tags(self.estimator).input_tags if has_tags else utils.InputTags()
+        return utils.Tags(
+            estimator_type=None,
+            target_tags=utils.TargetTags(required=True),
+            input_tags=utils.InputTags(allow_nan=inputs.allow_nan),
+        )
+
+
+_PARAMETERS = (
+    "estimator",
+    "error_rate",
+    "per",
+    "confidence",
+    "max_rows",
+    "strangers",
+    "train_share",
+    "prefit",
+    "seed",
+)
+
+
+def _table(X: Any) -> Any:
+    """Rows of features, as they are given or as an array."""
+    if hasattr(X, "toarray"):
+        raise InputError("X is sparse, which is not supported. Give `X.toarray()`.")
+    if names_of(X) is not None:
+        return X
+    table = np.asarray(X)
+    if table.ndim != 2:
+        raise InputError(f"X has {table.ndim} dimensions, not 2. Reshape your data: a line for each row, a column for each feature.")
+    return table
+
+
+def _clone(estimator: Any) -> Any:
+    """An estimator of the same parameters, which is not fitted."""
+    if importlib.util.find_spec("sklearn") is None:
+        return copy.deepcopy(estimator)
+    return importlib.import_module("sklearn.base").clone(estimator)
+
+
+def _not_fitted() -> Exception:
+    text = "the SequenceRecognizer is not fitted. Call its `fit` first."
+    if importlib.util.find_spec("sklearn") is None:
+        return InputError(text)
+    error: Exception = importlib.import_module("sklearn.exceptions").NotFittedError(text)
+    return error
 
 
 def _verdict(recognizer: Recognizer, rows: Iterable[npt.NDArray[np.float64]]) -> Verdict:

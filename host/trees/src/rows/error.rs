@@ -215,6 +215,12 @@ pub enum RowsProblem {
         /// Its groups.
         groups: [String; 2],
     },
+    /// A row does not say which sequence or group it belongs to.
+    #[error("the {what} is missing")]
+    Nameless {
+        /// "sequence" or "group".
+        what: &'static str,
+    },
     /// A sequence's rows do not follow each other.
     #[error("the sequence {sequence:?} comes back after another one")]
     ComesBack {
@@ -299,6 +305,7 @@ impl Problem for RowsProblem {
                 "Check that the model was exported from this file, with the same --missing and --all-trees, and the margins are the library's raw scores of these rows."
             }
             Self::TwoLabels { .. } | Self::TwoGroups { .. } => "A sequence is of one class and one group: give the rows of another one another id.",
+            Self::Nameless { what } => return format!("Give each row the {what} that it belongs to."),
             Self::ComesBack { .. } => "Sort the rows by sequence, each in its order, or give each stretch of rows an id of its own.",
             Self::InRow { problem, .. } => return problem.fix(),
             Self::NotCompiled => "Compile it with `palpate export`, and give the model.",

@@ -76,9 +76,14 @@ impl SequencesBuilder {
     /// Takes in a row; `values` are as many as there are features.
     ///
     /// # Errors
-    /// [`RowsProblem`]: a label that is no class, another label or group than that of the rows before in the same
-    /// sequence, a sequence that comes back after another.
+    /// [`RowsProblem`]: a sequence or group without a name, a label that is no class, another label or group than that of the rows
+    /// before in the same sequence, a sequence that comes back after another.
     pub fn push(&mut self, values: &[f64], row: RowOf<'_>) -> Result<(), RowsProblem> {
+        for (what, name) in [("sequence", Some(row.sequence)), ("group", row.group)] {
+            if name == Some("") {
+                return Err(RowsProblem::Nameless { what });
+            }
+        }
         let number = self.built.len() + 1;
         let group = row.group.unwrap_or_default();
         match &self.last {
@@ -257,6 +262,8 @@ mod tests {
             ("id,a,b,kind\n1,1,x,cup\n", &own, ":2: \"x\" in the column b is not a number"),
             ("id,a,b,kind\n1,1,cup\n", &own, ":2: it has 3 cells, where the header has 4"),
             ("id,a,b,kind\n", &own, ":1: it has no rows"),
+            ("id,a,b,kind\n1,1,2,cup\n,1,2,cup\n", &own, ":3: the sequence is missing"),
+            ("id,a,b,kind,who\n1,1,2,cup,\n", &COLUMNS, ":2: the group is missing"),
             (
                 "id,a,b,kind,who\n1,1,2,cup,ann\n1,1,2,cup,bo\n",
                 &COLUMNS,
