@@ -79,7 +79,8 @@ impl Holes {
         let whole: f64 = mesh.triangles.iter().map(|triangle| area(mesh, triangle)).sum();
         let stand = Stand::new(mesh, smoothed, points, moved);
         let is_underside = |(_, number): &(f64, usize)| {
-            let within: BTreeSet<u32> = sorted(true).flatten().copied().filter(|&at| numbers[at as usize] == *number).collect();
+            let within: BTreeSet<u32> =
+                sorted(true).flatten().copied().filter(|&at| numbers[at as usize] == *number).collect();
             let rim: BTreeSet<u32> = sorted(false).flatten().copied().filter(|at| within.contains(at)).collect();
             let places = |set: BTreeSet<u32>| set.into_iter().map(corner).collect::<Vec<_>>();
             stand.is_on(&places(rim), &places(within))
@@ -147,7 +148,8 @@ impl<'a> Stand<'a> {
         let up = if heights.sum::<f64>() < 0.0 { -normal } else { normal };
         let height = |place: &DVec3| (*place - middle).dot(up);
         let below = self.places.iter().filter(|place| height(place) < -tolerance).count();
-        let is_flat = variance.max(0.0).sqrt() < tolerance && within.iter().all(|place| height(place) > -4.0 * tolerance);
+        let is_flat =
+            variance.max(0.0).sqrt() < tolerance && within.iter().all(|place| height(place) > -4.0 * tolerance);
         if !is_flat || 100 * below > self.places.len() {
             return false;
         }
@@ -161,8 +163,11 @@ impl<'a> Stand<'a> {
         let angle = |eye: &DVec3| libm::atan2((*eye - middle).dot(ahead), (*eye - middle).dot(right));
         let mut angles: Vec<f64> = self.eyes.iter().map(angle).collect();
         angles.sort_by(f64::total_cmp);
-        let gaps = angles.iter().zip(angles.iter().skip(1).copied().chain(angles.first().map(|first| first + std::f64::consts::TAU)));
-        gaps.map(|(one, next)| next - one).fold(0.0, f64::max) < std::f64::consts::PI && self.eyes.iter().all(|eye| height(eye) > 0.0)
+        let gaps = angles
+            .iter()
+            .zip(angles.iter().skip(1).copied().chain(angles.first().map(|first| first + std::f64::consts::TAU)));
+        gaps.map(|(one, next)| next - one).fold(0.0, f64::max) < std::f64::consts::PI
+            && self.eyes.iter().all(|eye| height(eye) > 0.0)
     }
 }
 

@@ -34,13 +34,22 @@ const ROUNDS: usize = 2;
 
 /// Points that move onto planes fitted to their neighbors; none if all are at one place.
 pub(super) fn smoothed(cloud: Cloud) -> Option<Smoothed> {
-    let Cloud { mut places, mut outward } = cloud;
+    // In an order in which neighbors are close to each other in memory.
+    let order = Near::new(&cloud.places).order().to_vec();
+    let ordered = |values: &[DVec3]| order.iter().map(|&number| values[number as usize]).collect::<Vec<_>>();
+    let [mut places, mut outward] = [ordered(&cloud.places), ordered(&cloud.outward)];
     let mut near = Near::new(&places);
     let step = places.len().div_ceil(2_000).max(1);
     let mut count = FEWEST;
     let noise = loop {
         let is_kept = |number: usize, other: usize| outward[other].dot(outward[number]) > SEEN;
-        let fits = near.some(step, count, AMONG, is_kept, |number, near| fit(number, near, &places, &outward));
+        let fits = near.some(
+            |number| order[number] as usize % step == 0,
+            count,
+            AMONG,
+            is_kept,
+            |number, near| fit(number, near, &places, &outward),
+        );
         let (reach, noise): (Vec<f64>, Vec<f64>) =
             fits.into_iter().flatten().map(|plane| (plane.reach, plane.noise)).unzip();
         let (reach, noise) = (median(reach)?, median(noise)?);
@@ -67,8 +76,10 @@ pub(super) fn smoothed(cloud: Cloud) -> Option<Smoothed> {
         }
     }
     let (mut kept, mut normals, mut areas, mut reach) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for (index, plane) in fits.iter().enumerate() {
-        let Some(plane) = plane else { continue };
+    let mut indices: Vec<usize> = (0..places.len()).collect();
+    indices.sort_unstable_by_key(|&index| order[index]);
+    for index in indices {
+        let Some(plane) = &fits[index] else { continue };
         kept.push(places[index]);
         normals.push(outward[index]);
         areas.push(plane.area);
@@ -108,6 +119,40 @@ fn fit(index: usize, near: &[Neighbor], places: &[DVec3], outward: &[DVec3]) -> 
         reach: farthest.sqrt(),
         noise: variance.max(0.0).sqrt(),
     })
+}
+
+/// Number of neighbors that planes are fitted to, whichever side they are on.
+pub(super) fn neighbors_of_planes(near: &Near, places: &[DVec3]) -> usize {
+    let step = places.len().div_ceil(2_000).max(1);
+    let mut count = FEWEST;
+    loop {
+        let fits = near.some(
+            |number| number % step == 0,
+            count,
+            1,
+            |_, _| true,
+            |_, near| {
+                let farthest = farthest(near);
+                let (_, variance, _) = plane(near, farthest, places);
+                (farthest.sqrt(), variance.max(0.0).sqrt())
+            },
+        );
+        let (reach, noise): (Vec<f64>, Vec<f64>) = fits.into_iter().unzip();
+        if median(reach) >= median(noise).map(|noise| REACH * noise) || count >= MOST {
+            return count;
+        }
+        count = (count * 3 / 2).min(MOST);
+    }
+}
+
+/// The foot of a point on the plane through its neighbors, the plane's normal, which may point to either side, and the area
+/// that the point stands for.
+pub(super) fn plane_at(index: usize, near: &[Neighbor], places: &[DVec3]) -> (DVec3, DVec3, f64) {
+    let farthest = farthest(near).max(f64::MIN_POSITIVE);
+    let (middle, _, normal) = plane(near, farthest, places);
+    let place = places[index];
+    let area = std::f64::consts::PI * farthest / near.len() as f64;
+    (place + normal * (middle - place).dot(normal), normal, area)
 }
 
 /// The plane that fits points best, with those that are farther counting less: a point on it, the variance of the others'

@@ -168,11 +168,12 @@ impl Table {
             is_missing(values) || (length - 1.0).abs() < 0.02
         };
         let threes = || 3..count.saturating_sub(2);
-        let units: Vec<usize> =
-            threes().filter(|&first| fits(first, &is_unit) && !fits(first, &is_missing)).collect();
+        let units: Vec<usize> = threes().filter(|&first| fits(first, &is_unit) && !fits(first, &is_missing)).collect();
         let is_color = |first: usize| {
             fits(first, &|values| values.iter().all(|value| (0.0..=1.0).contains(value)))
-                || fits(first, &|values| values.iter().all(|value| (0.0..=65_535.0).contains(value) && value.fract() == 0.0))
+                || fits(first, &|values| {
+                    values.iter().all(|value| (0.0..=65_535.0).contains(value) && value.fract() == 0.0)
+                })
         };
         let is_signed = |first: usize| !fits(first, &|values| values.iter().all(|value| *value >= 0.0));
         let normal = match units.as_slice() {

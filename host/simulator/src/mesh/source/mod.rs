@@ -95,14 +95,16 @@ impl Source {
             Self::BuiltIn(name) => builtin::one(name),
             Self::Background => builtin::background(builtin::BACKGROUND_SHAPES, 1),
             Self::File { name, path, notes } => {
-                let file::Contents { mesh, millimeters, moved: by, notes: read, points, guessed, .. } = file::read(&path)?;
+                let file::Contents { mesh, millimeters, moved: by, notes: read, points, guessed, .. } =
+                    file::read(&path)?;
                 let notes = notes.into_iter().chain(moved(&path, by)).chain(read).collect();
                 let object = Object::new(name, mesh);
                 Ok(Object { millimeters, notes, points, guessed, ..object })
             }
             Self::Instances { name, files, notes } => {
                 let read = |(name, path): (String, PathBuf)| {
-                    let file::Contents { mesh, millimeters, moved: by, notes, points, guessed, .. } = file::read(&path)?;
+                    let file::Contents { mesh, millimeters, moved: by, notes, points, guessed, .. } =
+                        file::read(&path)?;
                     let notes: Vec<String> = moved(&path, by).into_iter().chain(notes).collect();
                     Ok((Instance { name, mesh }, (millimeters, (notes, points, guessed))))
                 };
@@ -110,7 +112,8 @@ impl Source {
                 let (mut instances, stated): (Vec<_>, Vec<_>) = read.into_iter().unzip();
                 let (units, read): (Vec<_>, Vec<_>) = stated.into_iter().unzip();
                 let guessed = read.iter().map(|(.., guessed)| *guessed).fold(0.0, f64::max);
-                let (read, points): (Vec<_>, Vec<_>) = read.into_iter().map(|(notes, points, _)| (notes, points)).unzip();
+                let (read, points): (Vec<_>, Vec<_>) =
+                    read.into_iter().map(|(notes, points, _)| (notes, points)).unzip();
                 let (millimeters, note) = one_unit(&mut instances, &units);
                 let object = Object::of_instances(name, instances).ok_or(MeshProblem::NoMeshes)?;
                 Ok(Object {
