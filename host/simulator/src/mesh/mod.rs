@@ -83,6 +83,8 @@ pub struct Object {
     pub notes: Vec<String>,
     /// The points that its first mesh was made of, in the mesh's coordinates; none if it is not from a scan.
     pub points: Vec<[f32; 3]>,
+    /// Share of its surface that is a guess, since it closes holes of a scan; of several instances the largest.
+    pub guessed: f64,
     first: Instance,
     others: Vec<Instance>,
 }
@@ -107,6 +109,7 @@ impl Object {
             placement_weights: Vec::new(),
             notes: Vec::new(),
             points: Vec::new(),
+            guessed: 0.0,
             first,
             others: Vec::new(),
         }
@@ -122,6 +125,7 @@ impl Object {
             placement_weights: Vec::new(),
             notes: Vec::new(),
             points: Vec::new(),
+            guessed: 0.0,
             first,
             others: instances.collect(),
         })

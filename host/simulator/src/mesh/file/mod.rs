@@ -92,6 +92,9 @@ pub struct Contents {
     pub points: Vec<[f32; 3]>,
     /// What is odd about the file. Of points: what was left out, how noisy they are, how large the holes were that are closed.
     pub notes: Vec<String>,
+    /// Of points: the share of the surface that is a guess, since it closes holes; without the flat underside of what stood on
+    /// a table.
+    pub guessed: f64,
 }
 
 /// The most bytes that are taken from what is no regular file, such as a pipe: 1 GiB.
@@ -186,11 +189,13 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
         }
     };
     Ok(match parsed {
-        Parsed::Mesh((mesh, moved)) => Contents { mesh, moved, millimeters, format, points: Vec::new(), notes },
+        Parsed::Mesh((mesh, moved)) => {
+            Contents { mesh, moved, millimeters, format, points: Vec::new(), notes, guessed: 0.0 }
+        }
         #[cfg(feature = "scans")]
         Parsed::Points(points) => {
-            let scan::Scanned { mesh, points, moved, notes } = scan::surface(points, path)?;
-            Contents { mesh, moved, millimeters, format, points, notes }
+            let scan::Scanned { mesh, points, moved, notes, guessed } = scan::surface(points, path)?;
+            Contents { mesh, moved, millimeters, format, points, notes, guessed }
         }
     })
 }

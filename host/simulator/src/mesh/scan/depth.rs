@@ -5,7 +5,7 @@
 //! millimeters of a pixel. Image 7 is `depth/000007.png` beside it, gray with 16 bits; 0 is no measurement. Of an object
 //! among others, `mask_visib/000007_000000.png` is not 0 where it is seen.
 
-use super::{Point, Points};
+use super::{Point, Points, Sensors};
 use crate::error::{Error, MeshProblem, Place, Result};
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
@@ -44,7 +44,7 @@ pub(in crate::mesh) fn parse(list: &[u8], path: &Path, folder: Option<&Path>) ->
         .map_err(|error| damaged(Place::line(path, error.line() as u64), error.to_string()))?;
     let whole = |what: String| damaged(Place::file(path), what);
     let folder = folder.ok_or_else(|| whole("its images are files beside it, which it cannot have here".into()))?;
-    let mut points = Points::default();
+    let mut points = Points { sensors: Sensors::Images, ..Points::default() };
     for (number, camera) in cameras {
         let Camera { matrix: [fx, _, cx, _, fy, cy, ..], rotation, translation, depth_scale } = camera;
         let rotation = DMat3::from_cols_array(&rotation).transpose();

@@ -2,17 +2,19 @@
 //!
 //! ```text
 //! file ──► Points ──► Cloud ──► smoothed, with normals ──► Poisson field ──► closed mesh
-//! pcd, xyz, ply, depth  outside   smooth                    field             contour
+//! pcd, xyz, ply, depth  side      smooth                    field             contour
 //! ```
 //!
-//! Each point says on which side of it is outside: by its normal, or by the place it was seen from. A cloud that says
-//! neither is refused, since a guess turns thin objects inside out. The method and its error: [`surface`].
+//! Each point says on which side of it is outside: by its normal, or by the place it was seen from; else its neighbors do, or
+//! the cloud is refused. The method and its error: [`surface`].
 
 mod contour;
 pub(super) mod depth;
 mod field;
 mod holes;
+mod near;
 pub(super) mod pcd;
+mod side;
 mod smooth;
 #[cfg(test)]
 mod tests;
@@ -20,8 +22,10 @@ pub(super) mod xyz;
 
 use super::Mesh;
 use super::exact::{Bounds, rounded};
+use super::facts::short;
 use crate::error::{Error, MeshProblem, Place, Result};
 use glam::DVec3;
+use holes::Holes;
 use std::path::Path;
 
 /// Fewest points of a surface.
@@ -43,11 +47,30 @@ pub(super) struct Point {
     pub(super) viewpoint: Option<[f64; 3]>,
 }
 
+/// What the places of sensors are worth.
+#[derive(Clone, Copy, Default, PartialEq)]
+pub(super) enum Sensors {
+    /// Each point states one; 0 0 0 in all of them is a default.
+    #[default]
+    Points,
+    /// The file states one.
+    File,
+    /// The file has the default of its format, which may be true.
+    Default,
+    /// They are those of images with poses.
+    Images,
+}
+
 /// The points of a file.
 #[derive(Default)]
 pub(super) struct Points {
     measured: Vec<Point>,
     unmeasured: usize,
+    sensors: Sensors,
+    /// The table that the object stood on: the normal of its plane, upward, and its height along it.
+    table: Option<(DVec3, f64)>,
+    /// Notes on how the file was read.
+    notes: Vec<String>,
 }
 
 impl Points {
@@ -66,7 +89,10 @@ pub(super) struct Scanned {
     pub(super) points: Vec<[f32; 3]>,
     /// Offset subtracted from the coordinates, as of meshes.
     pub(super) moved: [f64; 3],
-    /// Notes: the points that were left out, the noise of the others, and the sizes of the holes that were closed.
+    /// Share of the surface that closes holes, without the underside of what stood on a table.
+    pub(super) guessed: f64,
+    /// Notes: the points that were left out, which side is outside where the file does not say it, the noise of the points,
+    /// and the sizes of the holes that were closed.
     pub(super) notes: Vec<String>,
 }
 
@@ -74,28 +100,6 @@ pub(super) struct Scanned {
 struct Cloud {
     places: Vec<DVec3>,
     outward: Vec<DVec3>,
-}
-
-impl Cloud {
-    fn new(points: &Points, offset: DVec3) -> Result<Self, MeshProblem> {
-        let places: Vec<DVec3> = points.measured.iter().map(|point| DVec3::from(point.place) - offset).collect();
-        let bounds = places
-            .iter()
-            .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], &place| [low.min(place), high.max(place)]);
-        let outward = |(point, &place): (&Point, &DVec3)| {
-            let normal = point.normal.and_then(|normal| DVec3::from(normal).try_normalize());
-            let eye = point.viewpoint.map(|eye| DVec3::from(eye) - offset);
-            // A sensor among the points is a default that nobody set.
-            let eye = eye.filter(|eye| eye.cmplt(bounds[0]).any() || eye.cmpgt(bounds[1]).any());
-            let seen = eye.and_then(|eye| (eye - place).try_normalize());
-            match (normal, seen) {
-                (Some(normal), Some(seen)) if normal.dot(seen) < 0.0 => Some(-normal),
-                (normal, seen) => normal.or(seen),
-            }
-        };
-        let outward: Option<Vec<DVec3>> = points.measured.iter().zip(&places).map(outward).collect();
-        Ok(Self { places, outward: outward.ok_or(MeshProblem::NoSide)? })
-    }
 }
 
 /// The closed surface through points.
@@ -124,22 +128,30 @@ pub(super) fn surface(mut points: Points, path: &Path) -> Result<Scanned> {
         number % nth == 0
     });
     let moved = Bounds::of(points.measured.iter().map(|point| point.place)).offset();
-    let cloud = Cloud::new(&points, DVec3::from(moved)).map_err(at)?;
-    let smoothed = smooth::smoothed(&cloud).ok_or_else(|| at(MeshProblem::OnePlace))?;
-    let field = field::Field::new(&smoothed);
-    let mesh = contour::contour(&field);
-    let mut notes = Vec::new();
-    let mut note = |text: String| notes.push(format!("{}: {text}", path.display()));
+    let mut notes = std::mem::take(&mut points.notes);
     if points.unmeasured > 0 {
-        note(format!("{} points without coordinates are left out", points.unmeasured));
+        notes.push(format!("{} without coordinates {} left out", counted(points.unmeasured), are(points.unmeasured)));
     }
     if nth > 1 {
-        note(format!("every {nth}th of {count} points is used, and the others are left out"));
+        notes.push(format!("every {} of {count} points is used, and the others are left out", ordinal(nth)));
     }
-    let count = points.measured.len();
-    if smoothed.outliers > 0 {
-        note(format!("{} of {count} points lie apart from the others and are left out", smoothed.outliers));
+    let shown: Vec<[f32; 3]> = points.measured.iter().map(|point| rounded(point.place, moved)).collect();
+    let mut places: Vec<DVec3> =
+        points.measured.iter().map(|point| DVec3::from(point.place) - DVec3::from(moved)).collect();
+    let is_near = smooth::near_others(&places);
+    let mut kept = is_near.iter();
+    places.retain(|_| kept.next() == Some(&true));
+    let mut kept = is_near.iter();
+    points.measured.retain(|_| kept.next() == Some(&true));
+    let side::Sides { outward, notes: said } = side::sides(&points, &places, DVec3::from(moved)).map_err(at)?;
+    let smoothed = smooth::smoothed(Cloud { places, outward }).ok_or_else(|| at(MeshProblem::OnePlace))?;
+    let (count, outliers) = (shown.len(), shown.len() - smoothed.places.len());
+    if outliers > 0 {
+        notes.push(format!("{outliers} of {count} points lie apart from the others and are left out"));
     }
+    notes.extend(said);
+    let field = field::Field::new(&smoothed);
+    let mesh = contour::contour(&field);
     let (mesh, specks) = holes::without_specks(mesh);
     if specks > 0 {
         let are = if specks == 1 {
@@ -147,15 +159,36 @@ pub(super) fn surface(mut points: Points, path: &Path) -> Result<Scanned> {
         } else {
             "specks of the surface, each below 1 % of it, are"
         };
-        note(format!("{specks} {are} left out"));
+        notes.push(format!("{specks} {are} left out"));
     }
     let mesh = mesh.usable().map_err(at)?;
-    note(format!(
-        "a surface of {} triangles through {count} points with a noise of {}",
+    notes.push(format!(
+        "a surface of {} triangles through {} with a noise of {}",
         mesh.triangles.len(),
-        holes::short(smoothed.noise)
+        counted(count),
+        short(smoothed.noise)
     ));
-    note(holes::said(&mesh, &smoothed));
-    let points = points.measured.iter().map(|point| rounded(point.place, moved)).collect();
-    Ok(Scanned { mesh, points, moved, notes })
+    let Holes { note, guessed } = Holes::of(&mesh, &smoothed, &points, moved);
+    notes.push(note);
+    let notes = notes.into_iter().map(|note| format!("{}: {note}", path.display())).collect();
+    Ok(Scanned { mesh, points: shown, moved, guessed, notes })
+}
+
+fn counted(points: usize) -> String {
+    format!("{points} point{}", if points == 1 { "" } else { "s" })
+}
+
+fn ordinal(number: usize) -> String {
+    let ending = match (number % 10, number % 100) {
+        (_, 11..=13) => "th",
+        (1, _) => "st",
+        (2, _) => "nd",
+        (3, _) => "rd",
+        _ => "th",
+    };
+    format!("{number}{ending}")
+}
+
+fn are(count: usize) -> &'static str {
+    if count == 1 { "is" } else { "are" }
 }

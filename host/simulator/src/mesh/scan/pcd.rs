@@ -4,7 +4,7 @@
 //! bytes and kinds, and the place of the sensor. Fields other than `x y z`, `normal_x normal_y normal_z` and `vp_x vp_y vp_z`
 //! are skipped, but must be whole. A point whose coordinates are not numbers is one that the sensor did not measure.
 
-use super::{Point, Points};
+use super::{Point, Points, Sensors};
 use crate::error::{Error, MeshProblem, Place, Result};
 use crate::mesh::words::{number, shown};
 use std::io::{BufRead, Read};
@@ -30,7 +30,8 @@ struct Field {
 struct Header {
     fields: Vec<Field>,
     points: usize,
-    viewpoint: [f64; 3],
+    /// Place of the sensor, and its direction as a quaternion.
+    viewpoint: [f64; 7],
     data: Data,
     bytes: u64,
     lines: u64,
@@ -52,6 +53,12 @@ pub(in crate::mesh) fn parse(mut reader: impl BufRead, length: u64, path: &Path)
         ));
     }
     let mut points = Points::default();
+    points.sensors = match header.viewpoint {
+        _ if columns[6..].iter().all(Option::is_some) => Sensors::Points,
+        DEFAULT_VIEWPOINT => Sensors::Default,
+        _ => Sensors::File,
+    };
+    let [x, y, z, ..] = header.viewpoint;
     let mut add = |values: [Option<f64>; 9]| {
         let three = |first: usize| match values[first..first + 3] {
             [Some(x), Some(y), Some(z)] => Some([x, y, z]),
@@ -60,7 +67,7 @@ pub(in crate::mesh) fn parse(mut reader: impl BufRead, length: u64, path: &Path)
         points.add(Point {
             place: three(0).unwrap_or([f64::NAN; 3]),
             normal: three(3),
-            viewpoint: three(6).or(Some(header.viewpoint)),
+            viewpoint: three(6).or(Some([x, y, z])),
         });
     };
     if header.data == Data::Text {
@@ -109,6 +116,9 @@ pub(in crate::mesh) fn parse(mut reader: impl BufRead, length: u64, path: &Path)
     }
     Ok(points)
 }
+
+/// What writers that do not know the sensor's place put there.
+const DEFAULT_VIEWPOINT: [f64; 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
 /// The fields that are read.
 const NAMES: [&str; 9] = ["x", "y", "z", "normal_x", "normal_y", "normal_z", "vp_x", "vp_y", "vp_z"];
@@ -170,7 +180,7 @@ impl Header {
         let mut limited = reader.take(MOST);
         let (mut names, mut sizes, mut kinds, mut counts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let (mut points, mut area) = (None, [None; 2]);
-        let mut viewpoint = [0.0; 3];
+        let mut viewpoint = DEFAULT_VIEWPOINT;
         let (mut bytes, mut lines, mut raw) = (0, 0, Vec::new());
         let data = loop {
             raw.clear();

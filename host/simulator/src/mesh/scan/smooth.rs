@@ -1,10 +1,8 @@
 //! Points moved onto their neighbors' planes, with normals.
 
 use super::Cloud;
+use super::near::{Near, Neighbor, farthest};
 use glam::{DMat3, DVec3};
-use rayon::prelude::*;
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
 
 /// Points on the surface, as far as they tell.
 pub(super) struct Smoothed {
@@ -17,12 +15,10 @@ pub(super) struct Smoothed {
     pub(super) reach: f64,
     /// Standard deviation of the distances from planes, as a median.
     pub(super) noise: f64,
-    /// Number of points that were left out.
-    pub(super) outliers: usize,
 }
 
 /// Fewest neighbors that a plane is fitted to.
-const FEWEST: usize = 32;
+pub(super) const FEWEST: usize = 32;
 
 /// Most of them.
 const MOST: usize = 400;
@@ -30,40 +26,43 @@ const MOST: usize = 400;
 /// Distance to the farthest neighbor, in standard deviations of the noise: closer ones do not show where the plane is.
 const REACH: f64 = 5.0;
 
+/// Neighbors that are looked at for one on the same side.
+const AMONG: usize = 4;
+
 /// Times that points are moved.
 const ROUNDS: usize = 2;
 
-pub(super) type Tree = RTree<GeomWithData<[f64; 3], usize>>;
-
-pub(super) fn tree(places: &[DVec3]) -> Tree {
-    RTree::bulk_load(
-        places.iter().enumerate().map(|(index, place)| GeomWithData::new(place.to_array(), index)).collect(),
-    )
-}
-
 /// Points that move onto planes fitted to their neighbors; none if all are at one place.
-pub(super) fn smoothed(cloud: &Cloud) -> Option<Smoothed> {
-    let Cloud { mut places, mut outward } = without_outliers(cloud);
-    let outliers = cloud.places.len() - places.len();
-    let all = tree(&places);
-    let sample: Vec<usize> = (0..places.len()).step_by(places.len().div_ceil(2_000)).collect();
+pub(super) fn smoothed(cloud: Cloud) -> Option<Smoothed> {
+    // In an order in which neighbors are close to each other in memory.
+    let order = Near::new(&cloud.places).order().to_vec();
+    let ordered = |values: &[DVec3]| order.iter().map(|&number| values[number as usize]).collect::<Vec<_>>();
+    let [mut places, mut outward] = [ordered(&cloud.places), ordered(&cloud.outward)];
+    let mut near = Near::new(&places);
+    let step = places.len().div_ceil(2_000).max(1);
     let mut count = FEWEST;
     let noise = loop {
-        let fits = sample.par_iter().filter_map(|&index| fit(index, &places, &outward, &all, count, SEEN));
+        let is_kept = |number: usize, other: usize| outward[other].dot(outward[number]) > SEEN;
+        let fits = near.some(
+            |number| order[number] as usize % step == 0,
+            count,
+            AMONG,
+            is_kept,
+            |number, near| fit(number, near, &places, &outward),
+        );
         let (reach, noise): (Vec<f64>, Vec<f64>) =
-            fits.map(|plane| (plane.reach, plane.noise)).collect::<Vec<_>>().into_iter().unzip();
+            fits.into_iter().flatten().map(|plane| (plane.reach, plane.noise)).unzip();
         let (reach, noise) = (median(reach)?, median(noise)?);
         if reach >= REACH * noise || count >= MOST {
             break noise;
         }
         count = (count * 3 / 2).min(MOST);
     };
-    let mut all = all;
     let mut fits = Vec::new();
     for round in 0..=ROUNDS {
         let side = if round == 0 { SEEN } else { SAME };
-        let planes = (0..places.len()).into_par_iter().map(|index| fit(index, &places, &outward, &all, count, side));
-        fits = planes.collect::<Vec<_>>();
+        let is_kept = |number: usize, other: usize| outward[other].dot(outward[number]) > side;
+        fits = near.each(count, AMONG, is_kept, |number, near| fit(number, near, &places, &outward));
         for (index, plane) in fits.iter().enumerate() {
             let Some(plane) = plane else { continue };
             outward[index] = plane.normal;
@@ -72,18 +71,21 @@ pub(super) fn smoothed(cloud: &Cloud) -> Option<Smoothed> {
                 places[index] = plane.foot;
             }
         }
-        all = tree(&places);
+        if (1..ROUNDS).contains(&round) {
+            near = Near::new(&places);
+        }
     }
     let (mut kept, mut normals, mut areas, mut reach) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for (index, plane) in fits.iter().enumerate() {
-        let Some(plane) = plane else { continue };
+    let mut indices: Vec<usize> = (0..places.len()).collect();
+    indices.sort_unstable_by_key(|&index| order[index]);
+    for index in indices {
+        let Some(plane) = &fits[index] else { continue };
         kept.push(places[index]);
         normals.push(outward[index]);
         areas.push(plane.area);
         reach.push(plane.reach);
     }
-    let outliers = outliers + places.len() - kept.len();
-    Some(Smoothed { places: kept, normals, areas, reach: median(reach)?, noise, outliers })
+    Some(Smoothed { places: kept, normals, areas, reach: median(reach)?, noise })
 }
 
 /// Least cosine between the outward directions of neighbors: of directions to viewpoints, of which neighboring views share
@@ -101,28 +103,14 @@ struct Plane {
     noise: f64,
 }
 
-/// The plane through the neighbors of a point, as far as they are on its side; none if there are too few.
-fn fit(index: usize, places: &[DVec3], outward: &[DVec3], tree: &Tree, count: usize, side: f64) -> Option<Plane> {
+/// The plane through the neighbors of a point on its side; none if there are too few.
+fn fit(index: usize, near: &[Neighbor], places: &[DVec3], outward: &[DVec3]) -> Option<Plane> {
     let (place, direction) = (places[index], outward[index]);
-    let near = tree.nearest_neighbor_iter_with_distance_2(&place.to_array()).take(4 * count);
-    let near: Vec<(usize, f64)> = near
-        .map(|(found, squared)| (found.data, squared))
-        .filter(|&(other, _)| outward[other].dot(direction) > side)
-        .take(count)
-        .collect();
-    let (_, farthest) = *near.last()?;
+    let farthest = farthest(near);
     if near.len() < FEWEST / 2 || farthest <= 0.0 {
         return None;
     }
-    let weights: Vec<f64> = near.iter().map(|&(_, squared)| 1.0 - squared / farthest + 1e-3).collect();
-    let total: f64 = weights.iter().sum();
-    let middle = near.iter().zip(&weights).map(|(&(other, _), weight)| places[other] * *weight).sum::<DVec3>() / total;
-    let mut spread = DMat3::ZERO;
-    for (&(other, _), weight) in near.iter().zip(&weights) {
-        let away = places[other] - middle;
-        spread += DMat3::from_cols(away * away.x, away * away.y, away * away.z) * (*weight / total);
-    }
-    let (variance, normal) = least_axis(spread);
+    let (middle, variance, normal) = plane(near, farthest, places);
     let normal = if normal.dot(direction) < 0.0 { -normal } else { normal };
     Some(Plane {
         foot: place + normal * (middle - place).dot(normal),
@@ -131,6 +119,55 @@ fn fit(index: usize, places: &[DVec3], outward: &[DVec3], tree: &Tree, count: us
         reach: farthest.sqrt(),
         noise: variance.max(0.0).sqrt(),
     })
+}
+
+/// Number of neighbors that planes are fitted to, whichever side they are on.
+pub(super) fn neighbors_of_planes(near: &Near, places: &[DVec3]) -> usize {
+    let step = places.len().div_ceil(2_000).max(1);
+    let mut count = FEWEST;
+    loop {
+        let fits = near.some(
+            |number| number % step == 0,
+            count,
+            1,
+            |_, _| true,
+            |_, near| {
+                let farthest = farthest(near);
+                let (_, variance, _) = plane(near, farthest, places);
+                (farthest.sqrt(), variance.max(0.0).sqrt())
+            },
+        );
+        let (reach, noise): (Vec<f64>, Vec<f64>) = fits.into_iter().unzip();
+        if median(reach) >= median(noise).map(|noise| REACH * noise) || count >= MOST {
+            return count;
+        }
+        count = (count * 3 / 2).min(MOST);
+    }
+}
+
+/// The foot of a point on the plane through its neighbors, the plane's normal, which may point to either side, and the area
+/// that the point stands for.
+pub(super) fn plane_at(index: usize, near: &[Neighbor], places: &[DVec3]) -> (DVec3, DVec3, f64) {
+    let farthest = farthest(near).max(f64::MIN_POSITIVE);
+    let (middle, _, normal) = plane(near, farthest, places);
+    let place = places[index];
+    let area = std::f64::consts::PI * farthest / near.len() as f64;
+    (place + normal * (middle - place).dot(normal), normal, area)
+}
+
+/// The plane that fits points best, with those that are farther counting less: a point on it, the variance of the others'
+/// distances, and its normal, which may point to either side.
+pub(super) fn plane(near: &[Neighbor], farthest: f64, places: &[DVec3]) -> (DVec3, f64, DVec3) {
+    let weighted = || near.iter().map(|&(squared, other)| (1.0 - squared / farthest + 1e-3, places[other as usize]));
+    let total: f64 = weighted().map(|(weight, _)| weight).sum();
+    let middle = weighted().map(|(weight, place)| place * weight).sum::<DVec3>() / total;
+    let mut spread = DMat3::ZERO;
+    for (weight, place) in weighted() {
+        let away = place - middle;
+        spread += DMat3::from_cols(away * away.x, away * away.y, away * away.z) * (weight / total);
+    }
+    let (variance, normal) = least_axis(spread);
+    (middle, variance, normal)
 }
 
 /// The least eigenvalue of a symmetric matrix and its axis (Smith, *Eigenvalues of a symmetric 3 × 3 matrix*, 1961).
@@ -150,25 +187,19 @@ fn least_axis(matrix: DMat3) -> (f64, DVec3) {
     (least, longest.and_then(DVec3::try_normalize).unwrap_or(DVec3::Z))
 }
 
-/// The cloud without the points whose neighbors are far away: those that a sensor makes up at edges.
-fn without_outliers(cloud: &Cloud) -> Cloud {
-    let Cloud { places, outward } = cloud;
-    let tree = tree(places);
-    let distance = |place: &DVec3| {
-        let near = tree.nearest_neighbor_iter_with_distance_2(&place.to_array()).take(FEWEST + 1);
-        near.map(|(_, squared)| squared.sqrt()).sum::<f64>() / FEWEST as f64
-    };
-    let distances: Vec<f64> = places.par_iter().map(distance).collect();
+/// Which points are kept: not those whose neighbors are far away, which a sensor makes up at edges.
+pub(super) fn near_others(places: &[DVec3]) -> Vec<bool> {
+    let near = Near::new(places);
+    let distance = |_, near: &[Neighbor]| near.iter().map(|(squared, _)| squared.sqrt()).sum::<f64>() / FEWEST as f64;
+    let distances = near.each(FEWEST + 1, 1, |_, _| true, distance);
     let typical = median(distances.clone()).unwrap_or(f64::INFINITY);
-    let kept = || distances.iter().map(|&distance| distance <= FAR * typical);
-    let of = |values: &[DVec3]| values.iter().zip(kept()).filter(|(_, kept)| *kept).map(|(value, _)| *value).collect();
-    Cloud { places: of(places), outward: of(outward) }
+    distances.into_iter().map(|distance| distance <= FAR * typical).collect()
 }
 
 /// Distance of an outlier from its neighbors, in those of the median point.
 const FAR: f64 = 4.0;
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }

@@ -199,15 +199,17 @@ impl Source {
             Self::BuiltIn(name) => whole(builtin::one(name)),
             Self::Background => whole(builtin::background(builtin::BACKGROUND_SHAPES, 1)),
             Self::File { name, path, notes } => whole(file::read(&path).map(|contents| {
-                let notes = notes.into_iter().chain(moved(&path, contents.moved)).chain(contents.notes).collect();
-                let object = Object::new(name, contents.mesh);
-                Object { millimeters: contents.millimeters, notes, points: contents.points, ..object }
+                let file::Contents { mesh, millimeters, moved: by, notes: read, points, guessed, .. } = contents;
+                let notes = notes.into_iter().chain(moved(&path, by)).chain(read).collect();
+                let object = Object::new(name, mesh);
+                Object { millimeters, notes, points, guessed, ..object }
             })),
             Self::Instances { name, files, notes } => {
                 let read = |(name, path): (String, PathBuf)| {
-                    let file::Contents { mesh, millimeters, moved: by, notes, points, .. } = file::read(&path)?;
+                    let file::Contents { mesh, millimeters, moved: by, notes, points, guessed, .. } =
+                        file::read(&path)?;
                     let notes: Vec<String> = moved(&path, by).into_iter().chain(notes).collect();
-                    Ok((Instance { name, mesh }, (millimeters, (notes, points))))
+                    Ok((Instance { name, mesh }, (millimeters, (notes, points, guessed))))
                 };
                 let read: Vec<Result<_>> = files.into_par_iter().map(read).collect();
                 let (mut good, mut errors) = (Vec::new(), Vec::new());
@@ -217,12 +219,15 @@ impl Source {
                 });
                 let (mut instances, stated): (Vec<_>, Vec<_>) = good.into_iter().unzip();
                 let (units, read): (Vec<_>, Vec<_>) = stated.into_iter().unzip();
-                let (read, points): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+                let guessed = read.iter().map(|(.., guessed)| *guessed).fold(0.0, f64::max);
+                let (read, points): (Vec<_>, Vec<_>) =
+                    read.into_iter().map(|(notes, points, _)| (notes, points)).unzip();
                 let (millimeters, note) = one_unit(&mut instances, &units);
                 let object = Object::of_instances(name, instances).map(|object| Object {
                     millimeters,
                     notes: notes.into_iter().chain(read.into_iter().flatten()).chain(note).collect(),
                     points: points.into_iter().next().unwrap_or_default(),
+                    guessed,
                     ..object
                 });
                 (object, errors)
