@@ -17,6 +17,7 @@ use palpate::error::Result;
 use palpate::mesh::{Object, source};
 use palpate::output::write_json;
 use palpate::progress::{self, Progress};
+use palpate::wording::count;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::json;
@@ -246,7 +247,8 @@ fn sections(context: &Context, measured: &Measured, summary: &published::Summary
             damaged.join(", ")
         ));
     }
-    first.table(published::table(context, summary));
+    first.table(published::table(context, summary, &measured.noisy)?);
+    first.table(published::large(context, summary, &measured.limit, &measured.sequences));
     let mut costs = cost::section(context, &measured.members)?;
     simulator::add(context, &measured.engines, &mut costs)?;
     let mut sections = vec![
@@ -291,9 +293,9 @@ fn facts(settings: &Settings, stages: &[(String, f64)], seconds: f64) -> Vec<(St
         ("command".to_string(), settings.command.clone()),
         ("version".to_string(), env!("CARGO_PKG_VERSION").to_string()),
         ("seed".to_string(), settings.seed.to_string()),
-        ("touches of each object".to_string(), settings.touches.to_string()),
+        ("touches of each object".to_string(), count(settings.touches)),
         ("folds".to_string(), format!("{} of {}", settings.folds_used, settings.folds)),
-        ("large capture, touches of each object".to_string(), settings.limit_touches.to_string()),
+        ("large capture, touches of each object".to_string(), count(settings.limit_touches)),
         ("threads".to_string(), rayon::current_num_threads().to_string()),
         ("this run".to_string(), format!("{seconds:.0} s")),
     ];
