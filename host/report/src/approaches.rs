@@ -310,7 +310,8 @@ fn training_cost(names: &[String], taken: &[u64], approaches: u64) -> String {
         true => wording::count(most),
         false => format!("{} to {}", wording::count(least), wording::count(most)),
     };
-    let fewer: Vec<&String> = names.iter().zip(taken).filter(|(_, taken)| **taken <= approaches).map(|own| own.0).collect();
+    let fewer: Vec<&String> =
+        names.iter().zip(taken).filter(|(_, taken)| **taken <= approaches).map(|own| own.0).collect();
     let than = match fewer.len() {
         0 => "more for each object".to_owned(),
         all if all == taken.len() => "no more for any object".to_owned(),

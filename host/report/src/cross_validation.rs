@@ -258,9 +258,10 @@ fn recall(context: &Context, folds: &[Fold]) -> Table {
     Table {
         id: "recall".into(),
         title: "Recall and precision after ten touches".into(),
-        caption: "From the matrices above. With equally many groups of each object, mean recall is the accuracy. Click a \
+        caption:
+            "From the matrices above. With equally many groups of each object, mean recall is the accuracy. Click a \
                   heading to sort."
-            .into(),
+                .into(),
         command: context.settings.command.clone(),
         data,
     }

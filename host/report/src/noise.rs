@@ -388,7 +388,9 @@ mod tests {
 
     #[test]
     fn the_caption_of_a_smoothed_line_states_the_filter_of_so_many_levels() {
-        for (levels, said) in [(41, "a cubic Savitzky–Golay filter over 11"), (6, "a quadratic Savitzky–Golay filter over 5")] {
+        for (levels, said) in
+            [(41, "a cubic Savitzky–Golay filter over 11"), (6, "a quadratic Savitzky–Golay filter over 5")]
+        {
             assert!(smoothed_by(levels).contains(said), "{}", smoothed_by(levels));
         }
         assert_eq!(smoothed_by(2), "Points are measured; lines join them.");

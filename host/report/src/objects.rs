@@ -180,7 +180,10 @@ mod tests {
     #[test]
     fn the_caption_of_a_capture_states_the_probe_and_the_sizes_of_the_settings() {
         let published = touched_by(&Origin::default());
-        assert!(published.contains("longest side is 10 units") && published.contains("radius 0.15 units"), "{published}");
+        assert!(
+            published.contains("longest side is 10 units") && published.contains("radius 0.15 units"),
+            "{published}"
+        );
         let probe = Probe { radius: 2.0, spacing: 20.0, speed: 130.0, tilt: 5.0, stroke: Some(7.0), travel: None };
         let own = touched_by(&Origin { unit: Length::Millimeter, probe, ..Origin::default() });
         assert_eq!(
@@ -194,7 +197,11 @@ mod tests {
     fn touches_beyond_the_axes_of_curvature_are_stated_where_there_are_any() {
         let (inside, outside) = (vec![0.0; 4], vec![-500.0, 0.0, 0.0, 500.0]);
         let of = |reach: f64| beyond([("cup", &inside), ("watch", &outside)].into_iter(), reach);
-        assert!(of(400.0).contains("±400 ms") && of(400.0).contains("50 %") && of(400.0).contains("(watch)"), "{}", of(400.0));
+        assert!(
+            of(400.0).contains("±400 ms") && of(400.0).contains("50 %") && of(400.0).contains("(watch)"),
+            "{}",
+            of(400.0)
+        );
         assert_eq!(of(600.0), "");
     }
 

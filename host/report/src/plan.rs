@@ -229,7 +229,8 @@ fn figure(context: &Context, plans: &Plans) -> Result<Figure> {
 
 fn policies(context: &Context, plans: &Plans) -> Table {
     let percent = short_number(100.0 * ERRORS);
-    let columns = ["policy".into(), format!("approaches to {percent} % errors"), "random over this".into(), "bytes".into()];
+    let columns =
+        ["policy".into(), format!("approaches to {percent} % errors"), "random over this".into(), "bytes".into()];
     let mut data = Records::new(columns);
     let random = plans.policies.first().and_then(|policy| policy.at_errors(|stopped| stopped.approaches));
     for policy in &plans.policies {
@@ -257,7 +258,8 @@ fn policies(context: &Context, plans: &Plans) -> Table {
 /// The plans for which there were too few approaches in a pose; nothing if there were enough for all.
 fn left_out(plans: &Plans) -> String {
     let is_there = |rolls: &u8| plans.policies.iter().any(|policy| policy.rolls == Some(*rolls));
-    let missing: Vec<String> = ROLLS.into_iter().filter(|rolls| !is_there(rolls)).map(|rolls| rolls.to_string()).collect();
+    let missing: Vec<String> =
+        ROLLS.into_iter().filter(|rolls| !is_there(rolls)).map(|rolls| rolls.to_string()).collect();
     match missing.is_empty() {
         true => String::new(),
         false => format!(" Left out, for too few approaches in a pose: plans of {} rolls.", list(&missing)),

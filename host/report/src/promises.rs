@@ -368,7 +368,8 @@ mod tests {
 
     #[test]
     fn what_stopping_at_the_posterior_does_is_counted_and_not_supposed() {
-        let stopped = |error: f64, touches: f64| Stopped { margin: 0.0, touches, error, low: 0.0, high: 1.0, undecided: 0.0 };
+        let stopped =
+            |error: f64, touches: f64| Stopped { margin: 0.0, touches, error, low: 0.0, high: 1.0, undecided: 0.0 };
         let promised = |rate: f64, uncalibrated: Stopped, average: Option<Stopped>| Promised {
             rate,
             uncalibrated,

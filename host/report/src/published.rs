@@ -162,7 +162,11 @@ fn method(paper: &Ensemble, rounds: usize) -> String {
     let published = trees / rounds.max(1) * train::Settings::paper().rounds;
     let fewer = match trees == published {
         true => String::new(),
-        false => format!(" ({} as published: {} boosting rounds instead of {rounds})", count(published), train::Settings::paper().rounds),
+        false => format!(
+            " ({} as published: {} boosting rounds instead of {rounds})",
+            count(published),
+            train::Settings::paper().rounds
+        ),
     };
     format!(
         "Here it is {} trees{fewer} on the three contact times of full touches, grown by Palpate's own trainer with XGBoost's \
@@ -256,7 +260,10 @@ mod tests {
             origin: ensemble::Origin::default(),
         };
         let quick = method(&of(500), 50);
-        assert!(quick.contains("Here it is 500 trees (1,000 as published: 100 boosting rounds instead of 50)"), "{quick}");
+        assert!(
+            quick.contains("Here it is 500 trees (1,000 as published: 100 boosting rounds instead of 50)"),
+            "{quick}"
+        );
         let full = method(&of(1_000), 100);
         assert!(full.contains("Here it is 1,000 trees on the three"), "{full}");
     }
@@ -265,6 +272,9 @@ mod tests {
     fn a_difference_below_zero_is_below() {
         let said = difference((-0.012, Some(-0.02), Some(0.004)));
         assert!(said.contains("1.2 points below") && said.contains("\u{2212}2.0 to 0.4"), "{said}");
-        assert_eq!(difference((0.122, None, None)), "After ten touches our accuracy is 12.2 points above that of the paper's method.");
+        assert_eq!(
+            difference((0.122, None, None)),
+            "After ten touches our accuracy is 12.2 points above that of the paper's method."
+        );
     }
 }

@@ -162,8 +162,13 @@ pub(super) fn add(context: &Context, engines: &[Engine], section: &mut Section) 
     let x = Axis::logarithmic(rates().fold(f64::INFINITY, f64::min) * 0.5, rates().fold(0.0, f64::max) * 8.0);
     let shown = |error: f64| error.max(10f64.powi(NO_ERROR));
     let top = engines.iter().map(|engine| shown(engine.largest_error)).fold(1e-6, f64::max);
-    let mut chart = Chart::new("casts per second", x, "largest time error (s)", Axis::logarithmic(0.3 * 10f64.powi(NO_ERROR), top * 10.0))
-        .sized(660, 330);
+    let mut chart = Chart::new(
+        "casts per second",
+        x,
+        "largest time error (s)",
+        Axis::logarithmic(0.3 * 10f64.powi(NO_ERROR), top * 10.0),
+    )
+    .sized(660, 330);
     let mut data = Records::new([
         "decided in",
         "casts per second",

@@ -8,7 +8,7 @@ use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::evaluate::Finding;
 use palpate::stream::{Evaluated, Grown, Point};
-use palpate::wording::{count, percent, rate};
+use palpate::wording::{compared, count, percent, rate};
 
 /// The most classes whose posteriors are drawn.
 const MOST_CLASSES: usize = 8;
@@ -80,13 +80,7 @@ fn instead(way: &str, mean: f64, rows: Option<f64>) -> String {
     let Some(rows) = rows else {
         return format!("{way} does not reach the same error rate, not even with all rows of these sequences.");
     };
-    let share = mean / rows - 1.0;
-    let than = match () {
-        () if share < 0.0 => format!("{} fewer", percent(-share, 0)),
-        () if share > 0.0 => format!("{} more", percent(share, 0)),
-        () => "as many".to_owned(),
-    };
-    format!("{way} needs {} for the same error rate; stopping early needs {than}.", number(rows, 1))
+    format!("{way} needs {} for the same error rate; stopping early needs {}.", number(rows, 1), compared(mean, rows))
 }
 
 /// An error rate of nothing has no place on a logarithmic axis: half an error.
@@ -180,15 +174,13 @@ fn posteriors(evaluated: &Evaluated, grown: &Grown, command: &str) -> Result<Fig
         Some((row, None)) => format!("After row {row} it is called unknown."),
         None => "It ends without a verdict.".into(),
     };
-    let longer = grown.longer.map_or_else(String::new, |share| {
-        format!(" Of the sequences with a name, {} take longer.", percent(share, 0))
-    });
+    let longer = grown
+        .longer
+        .map_or_else(String::new, |share| format!(" Of the sequences with a name, {} take longer.", percent(share, 0)));
     Ok(Figure {
         id: "one-sequence".into(),
         title: format!("The evidence of one sequence of {} as it grows", name(grown.class)),
-        caption: format!(
-            "{ended} Later rows are shown as if there had been no verdict.{longer}"
-        ),
+        caption: format!("{ended} Later rows are shown as if there had been no verdict.{longer}"),
         command: command.into(),
         panels: vec![chart.svg()?],
         data,

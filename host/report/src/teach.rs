@@ -59,9 +59,9 @@ fn objects(taught: &Taught, command: &str) -> Table {
             Cell::Percent(object.taken_for_it, 1),
         ]);
     }
-    let others = taught.others.map_or_else(String::new, |others| {
-        format!(" Of the other objects {} are recognized.", percent(others, 1))
-    });
+    let others = taught
+        .others
+        .map_or_else(String::new, |others| format!(" Of the other objects {} are recognized.", percent(others, 1)));
     Table {
         id: "taught".into(),
         title: "Objects and how they were smoothed".into(),

@@ -61,13 +61,7 @@ impl Margins<'_> {
     ///
     /// # Errors
     /// As [`Margins::confusion`].
-    pub fn confusion_of_first(
-        &self,
-        touches: usize,
-        most: usize,
-        groups: usize,
-        seed: u64,
-    ) -> Result<Vec<Vec<usize>>> {
+    pub fn confusion_of_first(&self, touches: usize, most: usize, groups: usize, seed: u64) -> Result<Vec<Vec<usize>>> {
         self.check(touches, groups)?;
         let most = most.max(touches);
         self.check(most, groups)?;

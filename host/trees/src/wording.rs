@@ -59,6 +59,21 @@ pub fn rate(share: f64) -> String {
     format!("{} %", (share * 1e9).round() / 1e7)
 }
 
+/// A number compared with another one: "41 % fewer", "10 % more" or "as many".
+///
+/// ```
+/// use palpate_trees::wording::compared;
+///
+/// assert_eq!([compared(3.54, 6.0), compared(6.6, 6.0), compared(6.0, 6.0)], ["41 % fewer", "10 % more", "as many"]);
+/// ```
+pub fn compared(number: f64, with: f64) -> String {
+    match number / with - 1.0 {
+        share if share < 0.0 => format!("{} fewer", percent(-share, 0)),
+        share if share > 0.0 => format!("{} more", percent(share, 0)),
+        _ => "as many".to_owned(),
+    }
+}
+
 /// A small number with three digits and an exponent; 0 is "0".
 ///
 /// ```
@@ -115,8 +130,9 @@ mod tests {
         }
         assert_eq!([count(7_u8), count(1_234_u16), count(1_234_567_u32)], ["7", "1,234", "1,234,567"]);
         assert_eq!([percent(0.123, 1), percent(-0.000_1, 1), percent(f64::NAN, 1)], ["12.3 %", "0.0 %", "–"]);
-        assert_eq!([list::<&str>(&[]), list(&["a"]), list(&["a", "b"]), list(&["a", "b", "c"])], [
-            "", "a", "a and b", "a, b and c"
-        ]);
+        assert_eq!(
+            [list::<&str>(&[]), list(&["a"]), list(&["a", "b"]), list(&["a", "b", "c"])],
+            ["", "a", "a and b", "a, b and c"]
+        );
     }
 }

@@ -6,6 +6,7 @@ use super::{Global, remark};
 use palpate::capture::{self, ObjectSummary, Settings, Summary};
 use palpate::error::{CaptureProblem, Problem, TouchesProblem};
 use palpate::mesh::facts::Facts;
+use palpate::mesh::{BACKGROUND, Object};
 use palpate::output;
 use palpate::probe::approach::Aim;
 use palpate::touches::{Format, Listing, Origin, Shard};
@@ -66,7 +67,7 @@ pub(crate) struct Arguments {
     /// Add the objects to the data set that is there
     #[arg(long, conflicts_with = "force")]
     add: bool,
-    /// Write all the same; replaces what is there
+    /// Write anyway; overwrites what is there
     #[arg(long)]
     force: bool,
 }
@@ -83,7 +84,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     settings.check()?;
     let mut objects = arguments.size.objects(&arguments.sources, settings.origin.seed)?;
     arguments.scene.weigh(&mut objects)?;
-    for object in &objects {
+    // Some of the built-in shapes have stray parts, which nobody is to repair.
+    let are_builtin =
+        |object: &&Object| object.name == BACKGROUND && arguments.sources.iter().any(|own| own == BACKGROUND);
+    for object in objects.iter().filter(|object| !are_builtin(object)) {
         for instance in object.instances() {
             let complaints = Facts::of(&instance.mesh).complaints(object.millimeters);
             if !complaints.is_empty() {

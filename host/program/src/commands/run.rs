@@ -7,6 +7,7 @@ use palpate::Result;
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
+use palpate::wording::count;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -37,7 +38,7 @@ pub(crate) struct Arguments {
     /// Approaches to each object; all of them kept, a tenth to test on [default: three per touch]
     #[arg(long, value_name = "N", value_parser = touches)]
     approaches: Option<u64>,
-    /// Write all the same; replaces results of another run
+    /// Write anyway; overwrites the results of another run
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -58,9 +59,11 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if !json {
         // At once: the capture takes a while.
         output::print(&format!(
-            "Touching {} objects {touches} times each with all three fingers, approaching each {approaches} times more, \
-             then training, compiling and testing three methods. Results in {}\n",
+            "Touching {} objects {} times each with all three fingers, approaching each {} times more, then training, \
+             compiling and testing three methods. Results in {}\n",
             objects.len(),
+            count(touches),
+            count(approaches),
             out.display()
         ))?;
     }

@@ -256,8 +256,9 @@ fn html(
     let share = drawn.full as f64 / drawn.tried.max(1) as f64;
     let body = html! {
         main {
-            (scene::figure("Drag to turn, scroll or pinch to zoom, drag with two fingers or the right mouse button to move. \
-                            Click a contact or a row to see one approach alone; Escape shows all."))
+            (scene::figure("Drag to turn, scroll or pinch to zoom, drag with two fingers or the right mouse button to move; or \
+                            use the arrow keys, + and \u{2212}. Click a contact or a row to see one approach alone; Escape \
+                            shows all."))
             aside {
                 h1 { (object.name) }
                 dl {
