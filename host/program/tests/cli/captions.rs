@@ -60,6 +60,7 @@ const NUMBERS: &[(&str, &str)] = &[
     ("Cortex-M4F", "a name"),
     ("Cortex-M0+", "a name"),
     ("M4F", "a name"),
+    ("M0+", "a name"),
     ("f32", "a name"),
     ("f64", "a name"),
     ("errors of 0", "an error of nothing"),
