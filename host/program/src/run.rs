@@ -483,7 +483,6 @@ mod tests {
 
     use super::*;
     use palpate::error::Error;
-    use palpate::evaluate::SequentialSettings;
     use palpate::mesh::Mesh;
 
     fn objects() -> Vec<Object> {

@@ -197,8 +197,8 @@ fn table(evaluation: &Evaluation) -> String {
         100.0 * sequential.error_standard_error,
         100.0 * sequential.undecided,
         sequential.max_touches,
-        evaluation.groups,
-        evaluation.touches,
+        count(evaluation.groups),
+        count(evaluation.touches),
     );
     text
 }

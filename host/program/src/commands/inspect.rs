@@ -7,7 +7,7 @@ use palpate::chip::inspect::{
 };
 use palpate::compile::{CompiledModel, Core, Memory};
 use palpate::output;
-use palpate::wording::{counted, rate, scientific};
+use palpate::wording::{count, counted, rate, scientific};
 use palpate_shared::DIRECTIONS;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -88,9 +88,9 @@ fn text(inspected: &Inspected<'_>) -> String {
     training_lines(&mut lines, inspected);
     let each = if inspected.predicts.is_some() { "row" } else { "touch" };
     lines.line("instructions", format!("{} (per {each}, estimated)", instructions(inspected.instructions)));
-    lines.line("bytes", inspected.bytes);
+    lines.line("bytes", count(inspected.bytes));
     for (part, bytes) in &inspected.bytes_by_part {
-        lines.line("", format!("{bytes:>9} {}", part.replace('_', " ")));
+        lines.line("", format!("{:>9} {}", count(*bytes), part.replace('_', " ")));
     }
     lines.line("checksum", &inspected.checksum);
     lines.line("ensemble", &inspected.ensemble);

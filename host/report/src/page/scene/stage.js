@@ -67,6 +67,13 @@ function openStage() {
     });
   };
   controls.addEventListener("change", draw);
+  // A printer gets a picture, since it may ask for the drawing when it is gone.
+  const picture = Object.assign(new Image(), { alt: "" });
+  stage.prepend(picture);
+  addEventListener("beforeprint", () => {
+    render();
+    picture.src = renderer.domElement.toDataURL();
+  });
 
   // Arrow keys turn by a 24th of a full turn, + and − zoom.
   const STEP = Math.PI / 12, ZOOM = 1.15;
