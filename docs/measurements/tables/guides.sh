@@ -82,10 +82,12 @@ part_scenes() { # placements of the bowl; shares of approaches that touch, float
         sed -n '/^bowl: [0-9]/ { s/; left out.*//; s/[.] The center.*//; p }')
     stated docs/guide/scenes.md "$placements"
     touching() { # of all, and of the flat ones: options of capture
-        "$palpate" capture builtin -o touched --approaches 6000 --force "$@" 2>>log |
+        "$palpate" capture meshes -o touched --approaches 6000 --force "$@" 2>>log |
             awk '$1 == "all" { all = $3 } /^(fork|spoon|scissors|paperclip) / { flat += $3; count++ }
                 END { printf "%.0f %.0f\n", all, flat / count }'
     }
+    # Once, since that takes longer than to touch them.
+    [ -e meshes/bowl.obj ] || quiet data objects -o meshes
     local floating table30 table60 table90
     floating=$(touching)
     table30=$(touching --scene table --cone 30)

@@ -253,7 +253,7 @@ fn smoothing(levels: usize) -> (usize, usize) {
     (half, half.min(DEGREES.len() - 1))
 }
 
-/// How a curve over so many levels is smoothed, in words.
+/// Smoothing of a curve over so many levels, in words.
 fn smoothed_by(levels: usize) -> String {
     let (half, degree) = smoothing(levels);
     match DEGREES.get(degree) {

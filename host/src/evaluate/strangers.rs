@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// Numbers of touches by which strangers are counted as detected.
 pub const DETECTED_BY: [usize; 3] = [30, 60, 120];
 
-/// The share of sequences that may use up their touches before a figure is known.
+/// The largest share of sequences with used up touches at which a figure is given.
 const USED_UP: f64 = 0.01;
 
 /// Results of a recognizer that stops by itself on objects that its model does not know. Touches are those that are

@@ -26,7 +26,7 @@ impl Estimate {
     }
 }
 
-/// What is said of an interval without an end.
+/// Words for an interval without an end.
 pub const NOT_TOLD: &str = "not told";
 
 /// An interval in words: "1.0 to 1.2", "at most 3".

@@ -1,7 +1,7 @@
 //! Numbers as people read them, on a terminal or on a page: one way to write each kind.
 
-/// A number with this many decimals: commas between thousands, a minus sign (not a hyphen), and none before a zero. What is
-/// not finite is a dash.
+/// A number with this many decimals: commas between thousands, a minus sign (not a hyphen), and none before a zero. A number
+/// that is not finite becomes a dash.
 ///
 /// ```
 /// use palpate_trees::wording::decimal;

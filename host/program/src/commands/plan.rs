@@ -60,7 +60,7 @@ pub(super) fn run(wanted: &Wanted<'_>, global: &Global) -> Result<()> {
     let Written { bytes, planned: Planned { plan_bytes, poses, rolls, left_out, fewest, hardest, .. } } = &written;
     let [first, second] = &hardest.objects;
     let text = format!(
-        "{}: {} bytes, of which {} are a plan of {poses} poses: {DIRECTIONS} directions, {} each; {left_out} never touch\n\
+        "{}: {} bytes; {} of them are a plan of {poses} poses: {DIRECTIONS} directions, {} each; {left_out} never touch\n\
          Hardest to distinguish: {first} and {second}, separated by {} in the best pose (1 = fully). Means are of {} approaches \
          or more.\n",
         path.display(),

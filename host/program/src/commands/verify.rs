@@ -113,8 +113,8 @@ fn text(verified: &Verified) -> String {
     if let (Some(error), Some(classes)) = (verified.library_max_margin_error, verified.library_class_differs) {
         let unexplained = verified.library_class_unexplained.unwrap_or_default();
         text += &format!(
-            "The library's own margins differ by at most {}; another class for {} rows, of which the rounding that the model \
-             states does not explain {}\n",
+            "The library's own margins differ by at most {}; another class for {} rows; the rounding that the model states does \
+             not explain {} of these\n",
             scientific(error),
             count(classes),
             count(unexplained)

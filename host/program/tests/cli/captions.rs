@@ -1,6 +1,6 @@
-//! Captions and messages hold no number and no relation that was typed: those that are wrong for another probe, another size
-//! or a quick report. What stands in a text of the report, or in one that says results, is a parameter that is computed, or it
-//! is listed here with the reason why it cannot change.
+//! Captions and messages hold no number and no relation that was typed, since it would be wrong for another probe, another size
+//! or a quick report. A number in a text of the report, or in a text that says results, is a parameter that is computed, or it
+//! is listed here with the reason why it cannot change. Relations are treated alike.
 
 use std::path::{Path, PathBuf};
 
@@ -51,7 +51,7 @@ const NUMBERS: &[(&str, &str)] = &[
     ("features, not two", "density estimation takes two"),
     ("these two", "the signs of curvature"),
     ("the middle half", "a quartile is a quarter"),
-    ("outer tenth", "percentiles 5 and 95, of which the data are"),
+    ("outer tenth", "the percentiles of the data: 5 and 95"),
     ("box of half its sides", "a definition: Aim::Middle"),
     ("half the sides", "a definition: Aim::Middle"),
     ("a box of a quarter", "a definition: Aim::Mass"),
@@ -271,7 +271,7 @@ fn without_parameters(literal: &str) -> String {
     text
 }
 
-/// True of several words, of which one is no name of a thing in code.
+/// True of several words.
 fn is_prose(text: &str) -> bool {
     // Help says what to write.
     if text.contains("Examples:") {

@@ -255,7 +255,7 @@ fn body(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
     }
 }
 
-/// From what the models distinguish so many objects, and how large they are.
+/// The evidence that models distinguish so many objects by, and their sizes.
 fn distinguishing(contenders: &[Contender], objects: usize) -> String {
     let bytes = contenders.iter().map(|contender| contender.model.bytes().len());
     let needs_pose = |contender: &&Contender| contender.model.model().trained_touches().needs_pose;
@@ -270,7 +270,7 @@ fn distinguishing(contenders: &[Contender], objects: usize) -> String {
     format!("{from} {} {verb} {objects} objects.", models("a model", "models", bytes))
 }
 
-/// Where random approaches aim.
+/// The aim of random approaches.
 fn aimed_at(aim: Aim) -> &'static str {
     match aim {
         Aim::Box => "the bounding box",
