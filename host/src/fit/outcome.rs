@@ -236,3 +236,16 @@ fn degrees(angle: &Estimate) -> String {
 fn with_interval(late: &Estimate) -> String {
     format!("{} ({})", offset(late.value, 2), offset_between(late, 2))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_angle_of_which_the_recordings_tell_no_end_is_not_said_to_be_known() {
+        let said = |low, high| degrees(&Estimate { value: 42.0, low, high });
+        assert_eq!(said(None, None), "an angle that is not told");
+        assert_eq!(said(Some(30.0), Some(50.0)), "30 to 50 degrees");
+        assert_eq!(said(Some(30.0), None), "at least 30 degrees");
+    }
+}
