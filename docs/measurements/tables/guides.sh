@@ -4,11 +4,11 @@
 # PALPATE is a built program, DIRECTORY is where to work. Each line is printed as it stands in its document, ready to paste,
 # with the document's name and the seconds that the part took. --check also fails if a document has another line.
 #
-#   part       document                                     seconds of two cores
-#   run        README.md, docs/measurements/accuracy.md     60: `palpate run`; 0 with the output of one in $RUN
-#   scenes     docs/guide/scenes.md                         10
-#   plan       docs/guide/plan.md, docs/guide/first-model.md  60
-#   strangers  docs/guide/strangers.md                      90
+#   part       seconds of two cores, and documents
+#   run        60, or 1 with the output of `palpate run` in $RUN: README.md, docs/measurements/accuracy.md, models/household.md
+#   scenes     15: docs/guide/scenes.md
+#   plan       60: docs/guide/plan.md, docs/guide/first-model.md
+#   strangers  60: docs/guide/strangers.md
 #
 # Without a PART all of them. `.ci/run` checks run and scenes.
 set -euo pipefail
@@ -43,12 +43,15 @@ size() { wc -c <"$1" | sed ':a; s/\([0-9]\)\([0-9]\{3\}\)\($\|,\)/\1,\2\3/; ta';
 part_run() { # every line of the output that states no time
     local output=${RUN:-run.txt}
     [ -n "${RUN:-}" ] || "$palpate" run -o run >run.txt
-    # What is between the fences of a document must be in the output.
+    # Spaces of any kind are as good as each other.
+    sed 's/\xc2\xa0/ /g' "$output" >plain.txt
+    # Lines of figures between the fences of a document must be in the output.
     for document in README.md docs/measurements/accuracy.md; do
-        awk '/^```/ { inside = !inside; next } inside && /±| %  |model bytes|^trees|nats|verdicts that|recognized after/' "$documents/$document" |
+        sed 's/\xc2\xa0/ /g' "$documents/$document" |
+            awk '/^```/ { inside = !inside; next } inside && /± [0-9.]+( %)?$| %$|, a fixed number|^model bytes|^trees|nats|verdicts that|recognized after/' |
             grep -v 'seconds\|per second\| s in all' >lines.txt
         while IFS= read -r line; do
-            grep -qxF -- "$line" "$output" || { echo "$document: the output has no line: $line" >&2; failed=1; }
+            grep -qxF -- "$line" plain.txt || { echo "$document: the output has no line: $line" >&2; failed=1; }
         done <lines.txt
         echo "$document: $(wc -l <lines.txt) lines compared with the output"
     done
@@ -71,9 +74,16 @@ theirs, ours = row("accuracy after 20 approaches")
 print(f"| correct after 20 approaches | {ours} % | published method: {theirs} % |")
 theirs, ours = row("model bytes")
 print(f"| bytes of that model | {ours} | published method: {theirs} |")
+_, wrong = row("wrong verdicts")
+print(f"With this threshold, {wrong} % of sequences end with a wrong name and {later} % stay undecided.")
 PYTHON
 )
-    while IFS= read -r line; do stated README.md "$line"; done <<<"$figures"
+    while IFS= read -r line; do
+        case $line in
+        "|"*) stated README.md "$line" ;;
+        *) stated models/household.md "$line" ;;
+        esac
+    done <<<"$figures"
 }
 
 part_scenes() { # placements of the bowl; shares of approaches that touch, floating and on a table
