@@ -53,7 +53,7 @@ pub(super) struct ByApproach {
     aimed: [Way; 2],
     /// Every contact with objects scaled to one size and at their true sizes, where those are known.
     sizes: Option<[Way; 2]>,
-    /// The probes that objects of one size and of true size are touched with, where both are.
+    /// The probes that objects of one size, and of true size, are touched with, where both are.
     probes: Option<[Probe; 2]>,
 }
 
@@ -393,23 +393,37 @@ fn sizes_table(context: &Context, sizes: &[Way; 2], probes: Option<[Probe; 2]>) 
     for (name, way) in [format!("scaled to {scaled} units"), "true size".to_owned()].iter().zip(sizes) {
         data.push(row(name, way));
     }
-    let [own, one] = probes.unwrap_or_default();
     Table {
         id: "approaches-sizes".into(),
         title: "Scaled to one size, and at true size".into(),
-        caption: format!(
-            "Every contact counts. At true size {}. Scaled, {}.",
-            described(&own, Length::Millimeter),
-            described(&one, Length::Tenth)
-        ),
+        caption: sizes_caption(&probes.unwrap_or_default()),
         command: context.settings.command.clone(),
         data,
     }
 }
 
+/// The probes that touched objects of one size, and of their true sizes.
+fn sizes_caption([scaled, true_size]: &[Probe; 2]) -> String {
+    format!(
+        "Every contact counts. Scaled, {}. At true size {}.",
+        described(scaled, Length::Tenth),
+        described(true_size, Length::Millimeter)
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_probes_of_both_sizes_are_those_that_touched() {
+        let true_size = Probe { radius: 2.0, spacing: 20.0, speed: 130.0, ..Probe::default() };
+        let said = sizes_caption(&[Probe::default(), true_size]);
+        assert!(
+            said.contains("Scaled, fingers of radius 0.15 units") && said.contains("true size fingers of radius 2 mm"),
+            "{said}"
+        );
+    }
 
     fn names() -> Vec<String> {
         ["bowl", "fork"].map(String::from).into()

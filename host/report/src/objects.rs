@@ -82,15 +82,18 @@ pub(super) fn touched_by(capture: &Origin) -> String {
 /// A probe in words.
 pub(super) fn described(probe: &Probe, unit: Length) -> String {
     let Probe { radius, spacing, speed, tilt, stroke, travel } = *probe;
-    let unit = match unit {
-        Length::Tenth => "units",
-        Length::Millimeter => "mm",
+    let length = |length: f64| match unit {
+        Length::Tenth if length == 1.0 => "1 unit".to_owned(),
+        Length::Tenth => format!("{length} units"),
+        Length::Millimeter => format!("{length} mm"),
     };
     let way = [("a stroke", stroke), ("a travel", travel)];
-    let way = way.into_iter().filter_map(|(name, length)| Some(format!(", with {name} of {} {unit}", length?)));
+    let way = way.into_iter().filter_map(|(name, own)| Some(format!(", with {name} of {}", length(own?))));
     format!(
-        "fingers of radius {radius} {unit} are {spacing} {unit} apart and move at {speed} {unit} per second, tilted by up \
-         to {tilt}°{}",
+        "fingers of radius {} are {} apart and move at {} per second, tilted by up to {tilt}°{}",
+        length(radius),
+        length(spacing),
+        length(speed),
         way.collect::<String>()
     )
 }
