@@ -133,5 +133,5 @@ pub use glam;
 pub use palpate_onboard as onboard;
 pub use palpate_shared as shared;
 pub use palpate_simulator::{self as simulator, in_order, mesh, probe, random};
-pub use palpate_trees::{self as trees, output, progress, prove, rows};
+pub use palpate_trees::{self as trees, output, progress, prove, rows, wording};
 pub use rand;

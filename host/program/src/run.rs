@@ -10,7 +10,7 @@ use palpate::compile::{self, Compiled, CompiledModel};
 use palpate::ensemble::{StatedProbe, train};
 use palpate::error::{CalibrateProblem, Result};
 use palpate::evaluate::parity::{self, Parity};
-use palpate::evaluate::{self, Candidate, Curve, Evaluation, Margins, SequentialSettings};
+use palpate::evaluate::{self, Candidate, Curve, Evaluation, Margins, PromiseCheck};
 use palpate::mesh::Object;
 use palpate::output;
 use palpate::probe::noise::Noise;
@@ -190,6 +190,8 @@ pub struct Method {
     pub followed_to: usize,
     /// The compiled model compared with the ensemble, on the test touches.
     pub parity: Parity,
+    /// Check of its promise on the test approaches; null if it promises nothing.
+    pub promise_of_approaches: Option<PromiseCheck>,
     /// Calibration of its thresholds, on touches captured for that; null if there is none.
     pub calibration: Option<Calibrated>,
     /// Reason why there is none.
@@ -379,9 +381,19 @@ impl Trial {
         )?;
         let approached = Margins::new(Candidate::Compiled(&model), approaches)?;
         let fewest_approaches = approached.fewest_approaches();
-        let at: Vec<usize> = AT_APPROACHES.into_iter().filter(|&at| at <= fewest_approaches).collect();
-        let stopping = SequentialSettings { error_rate: None, max_touches: None, sequences: settings.groups, seed };
-        evaluation.approaches = Some(approached.approaches(&at, &stopping)?);
+        let by_approach = evaluate::evaluate(
+            &approached,
+            &evaluate::Settings {
+                at: Vec::new(),
+                at_approaches: AT_APPROACHES.into_iter().filter(|&at| at <= fewest_approaches).collect(),
+                groups: settings.groups,
+                error_rate: None,
+                max_touches: None,
+                seed,
+                noise: settings.noise,
+            },
+        )?;
+        evaluation.approaches = by_approach.approaches;
         let curve = margins.curve(MOST.min(largest_group(fewest)), settings.groups, seed)?;
         stages.end(format!("{name}: testing"));
         let parity = parity::parity(&ensemble, &model, &split.test, PARITY_SEQUENCES, seed, progress)?;
@@ -395,6 +407,7 @@ impl Trial {
             fixed_touches: curve.touches_to_error(settings.error_rate),
             followed_to: curve.most(),
             evaluation,
+            promise_of_approaches: by_approach.promise,
             parity,
             uncalibrated: calibration.as_ref().err().cloned(),
             calibration: calibration.ok(),

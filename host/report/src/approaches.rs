@@ -2,6 +2,7 @@
 //! size.
 
 use super::context::{Context, compiled};
+use super::objects::described;
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Shape};
 use crate::page::color;
@@ -18,6 +19,7 @@ use palpate::probe::scene::Scene;
 use palpate::progress;
 use palpate::touches::{Dataset, Origin};
 use palpate::tune::probe::{median_length, scaled_probe};
+use palpate::wording::{self, decimal, list, percent};
 use palpate_shared::ContactPattern;
 use palpate_shared::format::{Counted, Length};
 use serde::{Deserialize, Serialize};
@@ -51,8 +53,8 @@ pub(super) struct ByApproach {
     aimed: [Way; 2],
     /// Every contact with objects scaled to one size and at their true sizes, where those are known.
     sizes: Option<[Way; 2]>,
-    /// The probe at true size.
-    true_probe: Option<Probe>,
+    /// The probes that objects of one size, and of true size, are touched with, where both are.
+    probes: Option<[Probe; 2]>,
 }
 
 /// Results of one way to use approaches.
@@ -110,7 +112,7 @@ pub(super) fn measure(context: &Context) -> Result<ByApproach> {
     let ways: Vec<Way> = ways.into_iter().collect::<Result<_>>()?;
     let aimed = fewer_misses(&test);
     let aimed = [way(context, &contacts, &aimed)?, way(context, &all, &aimed)?];
-    let (mut sizes, mut true_probe) = (None, None);
+    let (mut sizes, mut probes) = (None, None);
     if let Some(other) = other_size(context.objects, &settings.capture) {
         let origin = Origin { approaches: true, ..other };
         let objects: Vec<&Object> = context.objects.iter().collect();
@@ -120,10 +122,11 @@ pub(super) fn measure(context: &Context) -> Result<ByApproach> {
         let here = ways[CONTACTS].clone();
         let is_true = origin.unit == Length::Millimeter;
         sizes = Some(if is_true { [here, there] } else { [there, here] });
-        true_probe = Some(if is_true { origin.probe } else { settings.capture.probe });
+        let [own, other] = [settings.capture.probe, origin.probe];
+        probes = Some(if is_true { [own, other] } else { [other, own] });
     }
     let shares = test.objects.iter().map(|object| shares(object.touches())).collect();
-    Ok(ByApproach { shares, ways, aimed, sizes, true_probe })
+    Ok(ByApproach { shares, ways, aimed, sizes, probes })
 }
 
 /// Approaches to train on, and a third as many to test on.
@@ -169,12 +172,12 @@ fn fewer_misses(test: &Dataset) -> Dataset {
 }
 
 /// The way to touch objects that the report does not use otherwise: at their true size, where it is known, by the
-/// published probe's likeness at the median object; or scaled to one size by the published probe.
+/// likeness of the report's probe at the median object; or scaled to one size by the published probe.
 fn other_size(objects: &[Object], capture: &Origin) -> Option<Origin> {
     if capture.unit == Length::Millimeter {
         return Some(Origin { seed: capture.seed, aim: capture.aim, ..Origin::default() });
     }
-    let probe = scaled_probe(&Probe::default(), median_length(objects)? / Origin::default().length);
+    let probe = scaled_probe(&capture.probe, median_length(objects)? / capture.length);
     Some(Origin { unit: Length::Millimeter, probe, seed: capture.seed, aim: capture.aim, ..Origin::default() })
 }
 
@@ -191,26 +194,27 @@ pub(super) fn section(context: &Context, by_approach: &ByApproach) -> Result<Sec
     let mut section = Section::new("approaches", "What an approach is worth");
     let [full, contacts] = [1, CONTACTS].map(|way| by_approach.ways[way].approaches.0);
     section.text(format!(
-        "A robot pays for approaches, and most do not end in a full touch. {} approaches to each object were kept \
-         whatever they touched, and {} others to test on. Our model that waits for full touches stops after {} approaches on \
-         average, the one that uses every contact after {}. Contact times are without noise here.",
-        context.settings.approaches,
-        context.settings.approaches / 3,
-        crate::page::axis::number(full, 1),
-        crate::page::axis::number(contacts, 1)
+        "A robot pays for approaches, and not all end in a full touch: {}. {} approaches to each object were kept whatever \
+         they touched, and {} others to test on. Our model that waits for full touches stops after {} approaches on average, \
+         the one that uses every contact after {}. Contact times are without noise here.",
+        full_touches(&context.names(), &by_approach.shares),
+        wording::count(context.settings.approaches),
+        wording::count(context.settings.approaches / 3),
+        decimal(full, 1),
+        decimal(contacts, 1)
     ));
     section.figure(figure(context, by_approach)?);
-    section.table(ways_table(context, by_approach));
+    section.table(ways_table(context, by_approach)?);
     section.table(objects_table(context, by_approach));
     section.text(format!(
-        "A miss is evidence only if the robot aims as the simulation does. The next table tests that assumption: with \
-         a robot that aims better and avoids {} % of the misses, the model that counts misses makes more errors, and \
-         the one that does not becomes faster.",
-        100.0 * AVOIDED
+        "A miss is evidence only if the robot aims as the simulation does. The next table tests that assumption with a \
+         robot that aims better and avoids {} of the misses. {}",
+        wording::rate(AVOIDED),
+        aimed_better(by_approach)
     ));
     section.table(misses_table(context, by_approach));
     match &by_approach.sizes {
-        Some(sizes) => section.table(sizes_table(context, sizes, by_approach.true_probe)),
+        Some(sizes) => section.table(sizes_table(context, sizes, by_approach.probes)),
         None => section.text(
             "How objects compare at their true sizes was not measured: the unit of these meshes is not known. \
              `--true-size mm --probe probe.toml` states it.",
@@ -241,7 +245,7 @@ fn figure(context: &Context, by_approach: &ByApproach) -> Result<Figure> {
     Ok(Figure {
         id: "approaches-accuracy".into(),
         title: "Accuracy against approaches".into(),
-        caption: "Without any evidence, no object counts as recognized.".into(),
+        caption: "Before the first usable contact, a group counts as not recognized.".into(),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
@@ -260,7 +264,7 @@ fn row(name: &str, way: &Way) -> Vec<Cell> {
     std::iter::once(name.into()).chain(TABLE_AT.iter().map(|&at| way.at(at))).chain(way.stopping()).collect()
 }
 
-fn ways_table(context: &Context, by_approach: &ByApproach) -> Table {
+fn ways_table(context: &Context, by_approach: &ByApproach) -> Result<Table> {
     let mut columns = columns("way");
     columns.extend(["share of approaches used".into(), "bytes".into()]);
     let mut data = Records::new(columns);
@@ -269,18 +273,74 @@ fn ways_table(context: &Context, by_approach: &ByApproach) -> Table {
         row.extend([Cell::Percent(way.used, 1), Cell::count(way.bytes)]);
         data.push(row);
     }
-    Table {
+    let captured = context.captured()?;
+    let train = &context.first()?.train;
+    // Of the approaches that full touches took, those to the touches trained on.
+    let taken = train.objects.iter().zip(captured.data.objects.iter().zip(&captured.approaches));
+    let taken = taken.map(|(train, (all, &approaches))| {
+        (approaches as f64 * train.len() as f64 / all.len().max(1) as f64).round() as u64
+    });
+    Ok(Table {
         id: "approaches-ways".into(),
         title: "Waiting for full touches, and using every contact".into(),
         caption: format!(
-            "The first two were trained on {} full touches of each object, which took more approaches than the {} that \
-             the others were trained on. Each gives up after its model's limit of touches.",
-            context.first().map_or(0, |split| split.train.objects.first().map_or(0, |object| object.len())),
-            context.settings.approaches
+            "The first two were trained on {} full touches of each object. {} Each gives up after its model's limit of \
+             touches.",
+            wording::count(train.objects.first().map_or(0, |object| object.len())),
+            training_cost(&context.names(), &taken.collect::<Vec<_>>(), context.settings.approaches)
         ),
         command: context.settings.command.clone(),
         data,
-    }
+    })
+}
+
+/// The share of approaches that are full touches, from the object with the fewest to the one with the most.
+fn full_touches(names: &[String], shares: &[[f64; 6]]) -> String {
+    let full = || names.iter().zip(shares.iter().map(|shares| shares[usize::from(ContactPattern::All.code())]));
+    let of = |(name, share): (&String, f64)| format!("{} ({name})", percent(share, 1));
+    let least = full().min_by(|a, b| a.1.total_cmp(&b.1)).map_or_else(String::new, of);
+    let most = full().max_by(|a, b| a.1.total_cmp(&b.1)).map_or_else(String::new, of);
+    format!("from {least} to {most} do")
+}
+
+/// The approaches that the full touches of a training took, compared with the approaches of the other trainings.
+fn training_cost(names: &[String], taken: &[u64], approaches: u64) -> String {
+    let (least, most) = (taken.iter().min().copied().unwrap_or(0), taken.iter().max().copied().unwrap_or(0));
+    let range = match least == most {
+        true => wording::count(most),
+        false => format!("{} to {}", wording::count(least), wording::count(most)),
+    };
+    let fewer: Vec<&String> =
+        names.iter().zip(taken).filter(|(_, taken)| **taken <= approaches).map(|own| own.0).collect();
+    let than = match fewer.len() {
+        0 => "more for each object".to_owned(),
+        all if all == taken.len() => "no more for any object".to_owned(),
+        _ => format!("more, except for {}", list(&fewer)),
+    };
+    format!(
+        "Capturing these took {range} approaches to an object, where the others were trained on {}: {than}.",
+        wording::count(approaches)
+    )
+}
+
+/// The effect of a robot that aims better on the model that counts misses and on the one that does not.
+fn aimed_better(by_approach: &ByApproach) -> String {
+    let [contacts, all] = &by_approach.aimed;
+    let change = |way: usize, aimed: &Way| {
+        let simulated = &by_approach.ways[way];
+        format!(
+            "{} → {} wrong verdicts, {} → {} approaches",
+            percent(simulated.wrong, 2),
+            percent(aimed.wrong, 2),
+            decimal(simulated.approaches.0, 1),
+            decimal(aimed.approaches.0, 1)
+        )
+    };
+    format!(
+        "The model that counts misses: {}. The one that does not: {}.",
+        change(ALL, all),
+        change(CONTACTS, contacts)
+    )
 }
 
 fn objects_table(context: &Context, by_approach: &ByApproach) -> Table {
@@ -308,7 +368,7 @@ fn objects_table(context: &Context, by_approach: &ByApproach) -> Table {
 
 fn misses_table(context: &Context, by_approach: &ByApproach) -> Table {
     let mut data = Records::new(columns("way and aim"));
-    let better = format!("{} % of misses avoided", 100.0 * AVOIDED);
+    let better = format!("{} of misses avoided", wording::rate(AVOIDED));
     for (way, aimed) in [CONTACTS, ALL].into_iter().zip(&by_approach.aimed) {
         data.push(row(&format!("{}, as simulated", WAYS[way]), &by_approach.ways[way]));
         data.push(row(&format!("{}, {better}", WAYS[way]), aimed));
@@ -324,24 +384,79 @@ fn misses_table(context: &Context, by_approach: &ByApproach) -> Table {
     }
 }
 
-fn sizes_table(context: &Context, sizes: &[Way; 2], probe: Option<Probe>) -> Table {
+fn sizes_table(context: &Context, sizes: &[Way; 2], probes: Option<[Probe; 2]>) -> Table {
     let mut data = Records::new(columns("size of the objects"));
-    for (name, way) in ["scaled to 10 units", "true size"].into_iter().zip(sizes) {
+    let scaled = match context.settings.capture.unit {
+        Length::Tenth => context.settings.capture.length,
+        Length::Millimeter => Origin::default().length,
+    };
+    for (name, way) in [format!("scaled to {scaled} units"), "true size".to_owned()].iter().zip(sizes) {
         data.push(row(name, way));
     }
-    let Probe { radius, spacing, speed, .. } = probe.unwrap_or_default();
-    let millimeters = |length: f64| crate::page::axis::number(length, 1);
     Table {
         id: "approaches-sizes".into(),
         title: "Scaled to one size, and at true size".into(),
-        caption: format!(
-            "Every contact counts. At true size the probe has a radius of {} mm, a spacing of {} mm and a speed of {} mm \
-             per second; scaled, it is the published one.",
-            millimeters(radius),
-            millimeters(spacing),
-            millimeters(speed)
-        ),
+        caption: sizes_caption(&probes.unwrap_or_default()),
         command: context.settings.command.clone(),
         data,
+    }
+}
+
+/// The probes that touched objects of one size, and of their true sizes.
+fn sizes_caption([scaled, true_size]: &[Probe; 2]) -> String {
+    format!(
+        "Every contact counts. Scaled, {}. At true size {}.",
+        described(scaled, Length::Tenth),
+        described(true_size, Length::Millimeter)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_probes_of_both_sizes_are_those_that_touched() {
+        let true_size = Probe { radius: 2.0, spacing: 20.0, speed: 130.0, ..Probe::default() };
+        let said = sizes_caption(&[Probe::default(), true_size]);
+        assert!(
+            said.contains("Scaled, fingers of radius 0.15 units") && said.contains("true size fingers of radius 2 mm"),
+            "{said}"
+        );
+    }
+
+    fn names() -> Vec<String> {
+        ["bowl", "fork"].map(String::from).into()
+    }
+
+    #[test]
+    fn the_approaches_of_full_touches_are_compared_with_those_of_the_others_object_by_object() {
+        let said = |taken: [u64; 2]| training_cost(&names(), &taken, 8_000);
+        assert!(said([9_000, 90_000]).ends_with("took 9,000 to 90,000 approaches to an object, where the others were trained on 8,000: more for each object."));
+        assert!(said([7_000, 90_000]).ends_with("more, except for bowl."), "{}", said([7_000, 90_000]));
+        assert!(said([7_000, 8_000]).ends_with("no more for any object."), "{}", said([7_000, 8_000]));
+    }
+
+    #[test]
+    fn the_share_of_full_touches_and_the_effect_of_aim_are_those_that_were_measured() {
+        let shares = |full: f64| [0.0, 0.0, 0.0, 0.0, 1.0 - full, full];
+        assert_eq!(full_touches(&names(), &[shares(0.5), shares(0.035)]), "from 3.5 % (fork) to 50.0 % (bowl) do");
+        let way = |wrong: f64, approaches: f64| Way {
+            bytes: 1,
+            used: 1.0,
+            accuracy: Vec::new(),
+            approaches: (approaches, 0.0),
+            per_object: Vec::new(),
+            wrong,
+            undecided: 0.0,
+        };
+        let ways = vec![way(0.1, 9.0), way(0.1, 9.0), way(0.01, 60.0), way(0.02, 50.0)];
+        let aimed = [way(0.011, 55.0), way(0.09, 44.0)];
+        let measured = ByApproach { shares: Vec::new(), ways, aimed, sizes: None, probes: None };
+        assert_eq!(
+            aimed_better(&measured),
+            "The model that counts misses: 2.00 % → 9.00 % wrong verdicts, 50.0 → 44.0 approaches. The one that does not: \
+             1.00 % → 1.10 % wrong verdicts, 60.0 → 55.0 approaches."
+        );
     }
 }

@@ -12,6 +12,7 @@ use palpate::calibrate;
 use palpate::compile::{self, Restated, restate};
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Confidence, Margins};
+use palpate::wording::count;
 use palpate_shared::format::{Tag, Temperature};
 use plotters::style::RGBColor;
 use serde::{Deserialize, Serialize};
@@ -127,10 +128,10 @@ pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Se
     let mut section = Section::new("calibration", "Calibration");
     section.text(format!(
         "Calibration: of the objects with a posterior of 90 %, nine in ten should be right. {} groups per object from \
-         the large capture, in ten bins of the best object's posterior. Dividing the evidence by one temperature ({}, \
+         the large capture, in {BINS} bins of the best object's posterior. Dividing the evidence by one temperature ({}, \
          fitted on single touches) changes no verdict, only the posterior that is shown; `palpate calibrate` stores it \
          in the model.",
-        calibration.groups,
+        count(calibration.groups),
         crate::page::axis::number(calibration.temperature, 2)
     ));
     let mut panels = Vec::new();
@@ -172,7 +173,7 @@ pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Se
     section.table(Table {
         id: "calibration".into(),
         title: "Expected calibration error".into(),
-        caption: "The mean distance between posterior and accuracy, over ten bins of equal width.".into(),
+        caption: format!("The mean distance between posterior and accuracy, over {BINS} bins of equal width."),
         command: context.settings.command.clone(),
         data,
     });

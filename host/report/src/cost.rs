@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::instructions::Instructions;
 use super::limit::Large;
-use crate::page::axis::{Axis, short_number};
+use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
@@ -13,6 +13,7 @@ use palpate::ensemble::Ensemble;
 use palpate::ensemble::train;
 use palpate::error::{CompileProblem, Error, Result};
 use palpate::evaluate::{Candidate, Margins, parity};
+use palpate::wording::count;
 use palpate_onboard::Model;
 use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
@@ -312,8 +313,10 @@ fn table(context: &Context, members: &[Member]) -> Table {
         id: "cost".into(),
         title: "The family".into(),
         caption: format!(
-            "The frontier is of bytes and accuracy at ten touches; the smallest model on it has {} bytes.",
-            best.first().map_or("0".into(), |member| short_number(member.bytes as f64))
+            "The frontier is of bytes and accuracy after ten touches{}.",
+            best.first().map_or_else(String::new, |member| {
+                format!("; the smallest model on it has {} bytes", count(member.bytes))
+            })
         ),
         command: context.settings.command.clone(),
         data,

@@ -13,6 +13,7 @@ use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins};
+use palpate::wording::{count, counted};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -21,6 +22,12 @@ pub(super) const METHODS: [&str; 2] = ["paper", "ours"];
 
 /// The longest groups.
 pub(super) const MOST: usize = 120;
+
+/// Groups per object in the paper.
+pub(super) const PAPERS_GROUPS: usize = 10;
+
+/// Touches after which confusion is shown.
+const CONFUSED_AT: usize = 10;
 
 /// Results of one fold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,13 +40,14 @@ pub(super) struct Fold {
 /// [enough distinct groups](super::statistics::LEAST_GROUPS).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct MethodFold {
-    /// Accuracy over the paper's ten groups per object.
+    /// Accuracy over the paper's few groups per object.
     pub(super) few: Vec<f64>,
     /// The same for each object.
     pub(super) few_of_object: Vec<Vec<f64>>,
     /// Accuracy over many groups.
     pub(super) many: Vec<f64>,
-    /// Confusion matrix: number of groups of each object (rows) recognized as each (columns) after ten touches.
+    /// Confusion matrix of the same groups: number of groups of each object (rows) recognized as each (columns) after
+    /// [`CONFUSED_AT`] touches.
     pub(super) confusion: Vec<Vec<usize>>,
     /// Seconds of training.
     pub(super) seconds: f64,
@@ -77,7 +85,7 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
             few: (1..=most).map(|n| few.accuracy(n).value).collect(),
             few_of_object: (0..split.test.objects.len()).map(of_object).collect(),
             many: (1..=most).map(|n| many.accuracy(n).value).collect(),
-            confusion: margins.confusion(10, settings.many_groups, seed)?,
+            confusion: margins.confusion_of_first(CONFUSED_AT, most, settings.many_groups, seed)?,
             seconds,
         })
     };
@@ -102,10 +110,14 @@ pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
     let mut section = Section::new("cross-validation", "Accuracy against touches");
     let settings = context.settings;
     section.text(format!(
-        "Of {} folds, {} were trained and tested; a fold's models never saw its test touches. As in the paper, {} groups \
-         of each number of touches were drawn from each object's test touches. Our method is the compiled model, \
-         evaluated by the code that runs on the chip; the paper's is its ensemble with leaves in f32.",
-        settings.folds, settings.folds_used, settings.groups
+        "Of {}, {} trained and tested; a fold's models never saw its test touches. {}{} of each number of touches were drawn \
+         from each object's test touches; beside them, {} of each object for narrower intervals. Our method is the compiled \
+         model, evaluated by the code that runs on the chip; the paper's is its ensemble with leaves in f32.",
+        counted(settings.folds, "fold", "folds"),
+        counted(settings.folds_used, "was", "were"),
+        if settings.groups == PAPERS_GROUPS { "As in the paper, " } else { "" },
+        counted(settings.groups, "group", "groups"),
+        count(settings.many_groups)
     ));
     section.figure(overall(context, folds)?);
     section.figure(objects(context, folds)?);
@@ -211,8 +223,9 @@ fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
         title: "Confusion matrix after ten touches (figure 9)".into(),
         caption: format!(
             "Percentage of the groups of an object (row) that were recognized as another (column), all folds together, {} \
-             groups per object and fold. Shares below half a percent are blank.",
-            context.settings.many_groups
+             groups per object and fold, the same as those of the accuracy over many groups. Shares below half a percent are \
+             blank.",
+            count(context.settings.many_groups)
         ),
         command: context.settings.command.clone(),
         panels,
@@ -245,7 +258,10 @@ fn recall(context: &Context, folds: &[Fold]) -> Table {
     Table {
         id: "recall".into(),
         title: "Recall and precision after ten touches".into(),
-        caption: "From the matrices above. Click a heading to sort.".into(),
+        caption:
+            "From the matrices above. With equally many groups of each object, mean recall is the accuracy. Click a \
+                  heading to sort."
+                .into(),
         command: context.settings.command.clone(),
         data,
     }

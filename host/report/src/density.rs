@@ -15,7 +15,7 @@ use palpate_shared::Descriptor;
 use rayon::prelude::*;
 
 /// Cells along each feature, at most.
-const CELLS: usize = 256;
+pub(super) const CELLS: usize = 256;
 /// Kernel widths to choose from, in cells.
 const WIDTHS: [f64; 7] = [0.5, 0.8, 1.2, 1.8, 2.7, 4.0, 6.0];
 /// Densities are mixed with this share of the mean density of all objects, so that no single cell rules an object out.

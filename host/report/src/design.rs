@@ -8,6 +8,7 @@ use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::probe::approach::Aim;
 use palpate::tune::probe::{Design, Trial};
+use palpate::wording::{count, rate};
 use palpate_shared::format::Length;
 
 /// The page. `command` is what remakes it.
@@ -26,14 +27,14 @@ pub fn page(design: &Design, command: &str) -> Result<Page> {
     Ok(Page {
         title: "The best probe to build".into(),
         summary: format!(
-            "{}: {} approaches to {}\u{a0}% errors, compared with {} with {}. {}",
+            "{}: {} approaches to {} errors, compared with {} with {}. {}",
             described(&design.best),
             approaches(&design.best),
-            100.0 * design.error_rate,
+            rate(design.error_rate),
             approaches(&design.published),
             published(design).to_lowercase(),
             match design.unit {
-                Length::Tenth => "Lengths are in units: a tenth of the object's longest side.",
+                Length::Tenth => "Lengths are in units: tenths of the object's longest side.",
                 Length::Millimeter => "Lengths are in millimeters: objects have their true sizes.",
             }
         ),
@@ -89,9 +90,9 @@ fn assumed(design: &Design) -> String {
     format!(
         "Every probe touched the objects {} times each in the simulator at {} {} per second, with Gaussian noise of {} \
          ms on every contact time. A model of the descriptor {} was trained on these approaches and tested on as many \
-         others; {} count as evidence. The stopping rule was varied until {} % of the verdicts on the test approaches \
+         others; {} count as evidence. The stopping rule was varied until {} of the verdicts on the test approaches \
          were wrong.",
-        design.best.trained_on,
+        count(design.best.trained_on),
         design.best.probe.speed,
         unit(design),
         design.noise / 1e3,
@@ -101,9 +102,12 @@ fn assumed(design: &Design) -> String {
             "contacts" => "approaches with at least one contact",
             _ => "all approaches, also those that touched nothing",
         },
-        100.0 * design.error_rate,
+        rate(design.error_rate),
     )
 }
+
+/// Names of the rounds of the search.
+const ROUNDS: [&str; 3] = ["coarse", "finer", "last"];
 
 /// Columns of a table of trials.
 const COLUMNS: [&str; 14] = [
@@ -162,32 +166,51 @@ fn by_aim(design: &Design, command: &str) -> Table {
     Table {
         id: "aims".into(),
         title: "Benefit of aiming".into(),
-        caption:
-            "The best probe of the coarse round for each aim: box is anywhere in the bounding box, middle the box of \
-                  half its sides, mass a box of a quarter of them about the surface's center of mass. A robot that \
-                  cannot aim well should search with --aim box."
-                .into(),
+        caption: format!(
+            "The best probe of the coarse round for each aim that was tried: {}. A robot that cannot aim well should search \
+             with --search aim=box.",
+            aims(round)
+        ),
         command: command.into(),
         data,
     }
 }
 
+/// The aims that were tried, in words.
+fn aims(round: &[Trial]) -> String {
+    let about = |aim: &Aim| match aim {
+        Aim::Box => "box is anywhere in the bounding box",
+        Aim::Middle => "middle is in the box of half its sides",
+        Aim::Mass => "mass is in a box of a quarter of them about the surface's center of mass",
+    };
+    let tried: Vec<Aim> = Aim::ALL.into_iter().filter(|aim| round.iter().any(|trial| trial.aim == *aim)).collect();
+    tried.iter().map(about).collect::<Vec<_>>().join(", ")
+}
+
 fn rounds(design: &Design, command: &str) -> Table {
     let mut data = Records::new(COLUMNS);
-    let names = ["coarse", "finer"];
-    for (name, round) in names.into_iter().zip(&design.rounds) {
+    let all = design.rounds.iter().chain([&design.by_spacing]);
+    for (name, round) in ROUNDS.into_iter().zip(all) {
         round.iter().for_each(|trial| data.push(row(name, trial)));
     }
-    design.by_spacing.iter().for_each(|trial| data.push(row("last", trial)));
     Table {
         id: "trials".into(),
         title: "All probes tried".into(),
-        caption: "The coarse round uses a quarter of the approaches per object, the finer one half of them. Fewer \
-                  approaches make weaker models, so compare within a round only."
-            .into(),
+        caption: format!(
+            "Approaches to each object that a model was trained on: {}. Fewer approaches make weaker models, so compare \
+             within a round only.",
+            trained_on(design)
+        ),
         command: command.into(),
         data,
     }
+}
+
+/// The rounds, and the approaches that a model of each was trained on.
+fn trained_on(design: &Design) -> String {
+    let rounds = design.rounds.iter().map(Vec::as_slice).chain([design.by_spacing.as_slice()]);
+    let of = |(name, round): (&str, &[Trial])| Some(format!("{name} {}", count(round.first()?.trained_on)));
+    ROUNDS.into_iter().zip(rounds).filter_map(of).collect::<Vec<_>>().join(", ")
 }
 
 /// A curve of all objects together, and of each.
@@ -230,7 +253,7 @@ fn curve(design: &Design, trials: &[Trial], of: impl Fn(&Trial) -> f64, curve: C
 fn unreached(trials: &[Trial]) -> String {
     match trials.iter().filter(|trial| !trial.reached).count() {
         0 => String::new(),
-        count => format!(" {count} of these probes did not reach the error rate, whatever the stopping rule."),
+        missed => format!(" {missed} of these probes did not reach the error rate, whatever the stopping rule."),
     }
 }
 

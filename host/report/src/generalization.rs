@@ -13,6 +13,7 @@ use palpate::evaluate::{Candidate, Margins};
 use palpate::mesh::Object;
 use palpate::probe::scene::Scene;
 use palpate::touches::{Dataset, ObjectTouches, Origin};
+use palpate::wording::{count, counted};
 use serde::{Deserialize, Serialize};
 
 /// Numbers of touches looked at.
@@ -87,10 +88,10 @@ pub(super) fn section(context: &Context, results: &[Instances]) -> Result<Sectio
     let settings = context.settings;
     let mut section = Section::new("generalization", "Objects never touched");
     section.text(format!(
-        "Our method was trained on some instances of each built-in kind, their proportions varied by up to a fifth, and \
-         tested on {} others of each that it never touched. Each kind has the same number of touches ({}), however many \
-         instances share them.",
-        settings.test_instances, settings.instance_touches
+        "Our method was trained on some instances of each built-in kind, of varied proportions, and tested on {} of each that \
+         it never touched. Each kind has the same number of touches ({}), however many instances share them.",
+        counted(settings.test_instances, "other", "others"),
+        count(settings.instance_touches)
     ));
     let most = results.iter().map(|result| result.count as f64).fold(2.0, f64::max);
     let ticks = results.iter().map(|result| (result.count as f64, result.count.to_string())).collect();

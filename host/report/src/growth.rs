@@ -15,6 +15,7 @@ use palpate::mesh::{Mesh, Object, builtin};
 use palpate::probe::scene::Scene;
 use palpate::progress;
 use palpate::touches::{Dataset, ObjectTouches, Origin};
+use palpate::wording::{count, rate};
 use palpate_onboard::Refused;
 use palpate_shared::Touch;
 use serde::{Deserialize, Serialize};
@@ -174,11 +175,12 @@ pub(super) fn left_out() -> Section {
 pub(super) fn section(context: &Context, growth: &Growth) -> Result<Section> {
     let mut section = Section::new("growth", "Growth");
     section.text(format!(
-        "More objects: the ten built-in ones, then in turn ten shapes of no kind and ten others of the same kinds with \
-         varied proportions, which are harder to distinguish; {} approaches to each train our method on every contact, a \
-         quarter as many test it. With more than {} objects leaves are of one byte, as is usual then. Finer meshes: the \
-         same bumpy globe, cut into more and more triangles. Times are of this machine, all threads.",
-        context.settings.growth_approaches,
+        "More objects, in this order: the built-in ones, then in turn as many shapes of no kind and others of the same kinds \
+         with varied proportions; {} approaches to each train our method on every contact, {} test it. With more than {} \
+         objects leaves are of one byte, as is usual then. Finer meshes: the same bumpy globe, cut into more and more \
+         triangles. Times are of this machine, all threads.",
+        count(context.settings.growth_approaches),
+        count(context.settings.growth_approaches / 4),
         compile::MANY
     ));
     section.figure(objects_figure(context, growth)?);
@@ -287,12 +289,25 @@ fn objects_table(context: &Context, growth: &Growth) -> Table {
     Table {
         id: "growth-objects".into(),
         title: "More objects, in numbers".into(),
-        caption: "Accuracies are over all objects: beyond ten objects, a fork can be mistaken for another fork. A \
-                  recognizer stops at a posterior of 99 %, or gives up after 400 touches."
-            .into(),
+        caption: stopping(growth),
         command: context.settings.command.clone(),
         data: objects_data(growth),
     }
+}
+
+/// Meaning of the accuracies, and where a recognizer stops.
+fn stopping(growth: &Growth) -> String {
+    let kinds = builtin::names().len();
+    let several = growth.objects.iter().any(|objects| objects.count > 2 * kinds);
+    let mistaken = match several {
+        true => format!(": beyond {} objects, an object can be mistaken for another of its kind", 2 * kinds),
+        false => String::new(),
+    };
+    format!(
+        "Accuracies are over all objects{mistaken}. A recognizer stops at a posterior of {}, or gives up after {MAX_TOUCHES} \
+         touches.",
+        rate(1.0 - compile::Settings::default().error_rate)
+    )
 }
 
 fn triangles_figure(context: &Context, growth: &Growth) -> Result<Figure> {

@@ -1,7 +1,7 @@
 //! The limit: the best that any classifier could do with the curvature descriptor, and how far each model is from it.
 
 use super::context::{Context, compiled, compiled_f32};
-use super::density::density_model;
+use super::density::{CELLS, density_model};
 use super::statistics::z95;
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Shape, Stroke};
@@ -14,6 +14,7 @@ use palpate::ensemble::train;
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins};
 use palpate::touches::Dataset;
+use palpate::wording::{count, decimal};
 use palpate_shared::Descriptor;
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +22,10 @@ use serde::{Deserialize, Serialize};
 const MOST: usize = 60;
 /// Numbers of touches in the table.
 const AT: [usize; 5] = [5, 10, 20, 30, 60];
+/// Percent of the capture that are trained on, and that the kernel's width is chosen on; the others test.
+const PARTS: [usize; 2] = [85, 5];
+/// Depth of the large ensemble's trees.
+const DEPTH: usize = 7;
 
 /// Results of the large capture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -68,13 +73,14 @@ pub(super) struct Large {
 
 /// Captures again, with another seed than that of the folds' touches.
 pub(super) fn large(context: &Context) -> Result<Large> {
-    let count = context.settings.limit_touches;
-    let touched = context.touch(count, context.settings.seed.wrapping_add(0x11_1117))?;
+    let all = context.settings.limit_touches;
+    let touched = context.touch(all, context.settings.seed.wrapping_add(0x11_1117))?;
     let part = |range: std::ops::Range<usize>| {
         Dataset::new(touched.iter().map(|(object, _)| object.select(range.clone())).collect())
     };
-    let (train, held) = (count * 85 / 100, count * 90 / 100);
-    Ok(Large { train: part(0..train), held: part(train..held), test: part(held..count) })
+    let [train, held] = PARTS;
+    let (train, held) = (all * train / 100, all * (train + held) / 100);
+    Ok(Large { train: part(0..train), held: part(train..held), test: part(held..all) })
 }
 
 /// The first half of each object's touches.
@@ -87,7 +93,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
     let settings = context.settings;
     let large_ensemble = train::Settings {
         rounds: settings.limit_rounds,
-        depth: 7,
+        depth: DEPTH,
         eta: 0.1,
         min_child_weight: 100.0,
         ..context.ours()
@@ -150,18 +156,20 @@ impl Limit {
 /// The figure and the table.
 pub(super) fn section(context: &Context, limit: &Limit) -> Result<Section> {
     let mut section = Section::new("limit", "The limit");
+    let [trained, held] = PARTS;
     section.text(format!(
         "This section estimates the best accuracy that any classifier could reach. {} full touches of each object were \
-         captured separately. On 85 % of them a large ensemble was trained ({} multi-output trees of depth 7), and the \
-         density of each object's touches over the two features of the curvature descriptor was estimated (a grid of \
-         256 × 256 ranks, smoothed by a Gaussian kernel {:.1} cells wide, mirrored at the borders, the width chosen on \
-         5 % held out). The limit is the better of the two (or our own model, if it is better than both), here: {}, on \
-         groups from the remaining 10 %. Doubling the capture changed the estimate by {} points at ten touches.",
-        limit.captured,
+         captured separately. On {trained} % of them a large ensemble was trained ({} multi-output trees of depth {DEPTH}), \
+         and the density of each object's touches over the two features of the curvature descriptor was estimated (a grid of \
+         {CELLS} × {CELLS} ranks, smoothed by a Gaussian kernel {} cells wide, mirrored at the borders, the width chosen on \
+         {held} % held out). The limit is the better of the two (or our own model, if it is better than both), here: {}, on \
+         groups from the remaining {} %. Doubling the capture changed the estimate by {} points after ten touches.",
+        count(limit.captured),
         context.settings.limit_rounds,
-        limit.width,
+        decimal(limit.width, 1),
         limit.candidates[limit.best].name,
-        crate::page::axis::number(limit.doubling() * 100.0, 2)
+        100 - trained - held,
+        decimal(limit.doubling() * 100.0, 2)
     ));
     section.text(
         "The limit holds for the paper's descriptor too: the row of fingers is rolled at random, so a touch and its mirror \
@@ -192,7 +200,7 @@ fn figure(context: &Context, limit: &Limit) -> Result<Figure> {
     Ok(Figure {
         id: "limit-curves".into(),
         title: "Accuracy against touches, and the best possible".into(),
-        caption: format!("{} groups per object, the same for all.", limit.groups),
+        caption: format!("{} groups per object, the same for all.", count(limit.groups)),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
@@ -220,7 +228,7 @@ fn table(context: &Context, limit: &Limit) -> Table {
         caption: format!(
             "Accuracies on the same {} groups per object; gaps are paired over groups. One standard error of an accuracy \
              is at most {} points.",
-            limit.groups,
+            count(limit.groups),
             crate::page::axis::number(50.0 / ((limit.groups * context.objects.len()) as f64).sqrt(), 1)
         ),
         command: context.settings.command.clone(),

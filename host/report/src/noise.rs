@@ -15,6 +15,7 @@ use palpate::evaluate::{Candidate, Margins, add_noise};
 use palpate::probe::noise::{self, Noise};
 use palpate::touches::folds::Split;
 use palpate::touches::{Dataset, ObjectTouches};
+use palpate::wording::{count, counted};
 use plotters::style::RGBColor;
 use serde::{Deserialize, Serialize};
 
@@ -156,13 +157,12 @@ pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
     let mut section = Section::new("noise", "Noise on contact times");
     section.text(format!(
         "Gaussian noise was added to each contact time independently, then the earliest time subtracted, so that the \
-         first contact is 0 again. {} and {} were trained on clean touches, as in the paper; the third was trained on \
-         touches with {}. {} test touches per object and fold, {} folds.",
-        "The paper's method",
-        "ours",
+         first contact is 0 again. The paper's method and ours were trained on clean touches, as in the paper; the third was \
+         trained on touches with {}. {} test touches per object and fold, {}, {} per object and fold.",
         context.settings.noise,
-        context.settings.touches / context.settings.folds,
-        folds.len()
+        count(context.settings.touches / context.settings.folds),
+        counted(folds.len(), "fold", "folds"),
+        counted(context.settings.many_groups, "group", "groups")
     ));
     section.figure(signal(context)?);
     section.figure(overall(context, folds)?);
@@ -223,8 +223,9 @@ fn signal(context: &Context) -> Result<Figure> {
     Ok(Figure {
         id: "signal-to-noise".into(),
         title: "Signal-to-noise ratio of each object (figure 10)".into(),
-        caption: "The signal of a touch is the sum of its three contact times; the ratio is of mean squares, over all \
-                  captured touches."
+        caption: "The signal of a touch is the sum of its three contact times, its noise the sum of three independent ones of \
+                  this deviation, before the earliest time is subtracted; the ratio is of mean squares, over all captured \
+                  touches. The paper does not say if noise is taken before or after the subtraction."
             .into(),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
@@ -241,14 +242,38 @@ fn over_levels(context: &Context, folds: &[Fold], method: usize, of: impl Fn(&[f
     context.settings.deviations().into_iter().enumerate().map(mean).collect()
 }
 
-/// A smoothed curve at the same places: cubic, over eleven levels. It stays within the 95 % interval of what was measured
-/// in `trials` groups, so that it never denies a steep fall that was measured.
+/// The levels to either side that a smoothed value rests on, where there are enough.
+const HALF: usize = 5;
+/// Degrees of the polynomials that smooth, and their names.
+const DEGREES: [&str; 4] = ["constant", "linear", "quadratic", "cubic"];
+
+/// Levels to either side, and the polynomial's degree, for a curve over so many levels.
+fn smoothing(levels: usize) -> (usize, usize) {
+    let half = HALF.min((levels.max(1) - 1) / 2);
+    (half, half.min(DEGREES.len() - 1))
+}
+
+/// Smoothing of a curve over so many levels, in words.
+fn smoothed_by(levels: usize) -> String {
+    let (half, degree) = smoothing(levels);
+    match DEGREES.get(degree) {
+        Some(name) if half > 0 => format!(
+            "Points are measured; lines are smoothed by a {name} Savitzky–Golay filter over {} levels, within the 95 % \
+             interval (Wilson) of each point.",
+            2 * half + 1
+        ),
+        _ => "Points are measured; lines join them.".to_owned(),
+    }
+}
+
+/// A smoothed curve at the same places. It stays within the 95 % interval of what was measured in `trials` groups, so that
+/// it never denies a steep fall that was measured.
 fn smoothed(points: &[(f64, f64)], trials: usize) -> Vec<(f64, f64)> {
     let values: Vec<f64> = points.iter().map(|point| point.1).collect();
-    let half = 5.min((points.len().max(1) - 1) / 2);
+    let (half, degree) = smoothing(points.len());
     points
         .iter()
-        .zip(savitzky_golay(&values, half, 3.min(half)))
+        .zip(savitzky_golay(&values, half, degree))
         .map(|(&(x, share), y)| {
             let (low, high) = wilson(share * trials as f64, trials as f64);
             (x, y.clamp(low, high))
@@ -282,10 +307,7 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
     Ok(Figure {
         id: "noise".into(),
         title: "Accuracy after ten touches against noise, over all objects (figure 12)".into(),
-        caption:
-            "Points are measured; lines are smoothed by a cubic Savitzky–Golay filter over eleven levels, within the \
-                  95 % interval (Wilson) of each point."
-                .into(),
+        caption: smoothed_by(context.settings.deviations().len()),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
@@ -339,7 +361,7 @@ fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
     }
     Ok(Figure {
         id: "noise-confusion".into(),
-        title: "Confusion matrix after ten touches with noise of 5 ms (figure 13)".into(),
+        title: format!("Confusion matrix after ten touches with noise of {} ms (figure 13)", NOISE / 1e3),
         caption: "Percentage of an object's groups (row) that were recognized as another (column).".into(),
         command: context.settings.command.clone(),
         panels,
@@ -362,6 +384,18 @@ mod tests {
             assert!((measured.1 - smooth.1).abs() < 0.006, "{measured:?} {smooth:?}");
         }
         assert!((smoothed(&measured, 4)[0].1 - 0.93).abs() > 0.05, "the filter itself smooths more than that");
+    }
+
+    #[test]
+    fn the_caption_of_a_smoothed_line_states_the_filter_of_so_many_levels() {
+        for (levels, said) in
+            [(41, "a cubic Savitzky–Golay filter over 11"), (6, "a quadratic Savitzky–Golay filter over 5")]
+        {
+            assert!(smoothed_by(levels).contains(said), "{}", smoothed_by(levels));
+        }
+        assert_eq!(smoothed_by(2), "Points are measured; lines join them.");
+        let line: Vec<(f64, f64)> = [0.2, 0.9].into_iter().enumerate().map(|(k, share)| (k as f64, share)).collect();
+        assert_eq!(smoothed(&line, 1_000), line);
     }
 
     #[test]

@@ -12,15 +12,23 @@ use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::mesh::facts::Facts;
 use palpate::mesh::{Instance, Object};
+use palpate::probe::approach::Probe;
+use palpate::touches::Origin;
+use palpate::wording::{decimal, percent};
 use palpate_shared::Touch;
+use palpate_shared::format::Length;
+
+/// The curvature up to which densities are drawn at most, in milliseconds.
+const FARTHEST: f64 = 400.0;
 
 /// The figure of the objects, that of their curvature, and a table of what capturing took.
 pub(super) fn section(context: &Context) -> Result<Section> {
     let captured = context.captured()?;
     let mut section = Section::new("objects", "The objects and their curvature");
+    section.text("The objects (the paper's figure 5).");
     let touches = context.settings.touches;
     let pictures = context.objects.iter().zip(&captured.approaches).map(|(object, &approaches)| {
-        let line = format!("{:.1} % of approaches are full touches", 100.0 * touches as f64 / approaches.max(1) as f64);
+        let line = format!("{} of approaches are full touches", percent(touches as f64 / approaches.max(1) as f64, 1));
         Picture { name: object.name.clone(), png: render::thumbnail(object.mesh(), 240), line }
     });
     section.blocks.push(Block::Pictures(pictures.collect()));
@@ -52,14 +60,42 @@ pub(super) fn section(context: &Context) -> Result<Section> {
         id: "objects-table".into(),
         title: "What was captured".into(),
         caption: format!(
-            "An approach is a full touch when all three fingers touch. Each object's longest side is 10 units; fingers \
-                  of radius 0.15 are 1.5 apart and move at 10 units per second. This capture took {:.1} s.",
-            captured.seconds
+            "An approach is a full touch when all fingers touch. {} This capture took {} s.",
+            touched_by(&context.settings.capture),
+            decimal(captured.seconds, 1)
         ),
         command: context.settings.command.clone(),
         data,
     });
     Ok(section)
+}
+
+/// The size of the objects and the probe that touches them, in sentences.
+pub(super) fn touched_by(capture: &Origin) -> String {
+    let size = match capture.unit {
+        Length::Tenth => format!("Each object's longest side is {} units", capture.length),
+        Length::Millimeter => "The objects have their true sizes".to_owned(),
+    };
+    format!("{size}; {}.", described(&capture.probe, capture.unit))
+}
+
+/// A probe in words.
+pub(super) fn described(probe: &Probe, unit: Length) -> String {
+    let Probe { radius, spacing, speed, tilt, stroke, travel } = *probe;
+    let length = |length: f64| match unit {
+        Length::Tenth if length == 1.0 => "1 unit".to_owned(),
+        Length::Tenth => format!("{length} units"),
+        Length::Millimeter => format!("{length} mm"),
+    };
+    let way = [("a stroke", stroke), ("a travel", travel)];
+    let way = way.into_iter().filter_map(|(name, own)| Some(format!(", with {name} of {}", length(own?))));
+    format!(
+        "fingers of radius {} are {} apart and move at {} per second, tilted by up to {tilt}°{}",
+        length(radius),
+        length(spacing),
+        length(speed),
+        way.collect::<String>()
+    )
 }
 
 /// The names of the objects with a mesh that should be repaired before it is touched.
@@ -89,7 +125,7 @@ fn densities(context: &Context) -> Result<Figure> {
         captured.data.objects.iter().map(|object| object.touches().iter().filter_map(curvature).collect()).collect();
     // The middle nine tenths of every object fit.
     let ends = values.iter().flat_map(|values| [quantile(values, 0.05).abs(), quantile(values, 0.95).abs()]);
-    let reach = ends.fold(1.0, f64::max).min(400.0);
+    let reach = ends.fold(1.0, f64::max).min(FARTHEST);
     let mut data = Records::new(["object", "curvature (ms)", "density (1/ms)"]);
     let mut panels = Vec::new();
     for (object, values) in captured.data.objects.iter().zip(&values) {
@@ -109,20 +145,68 @@ fn densities(context: &Context) -> Result<Figure> {
     }
     Ok(Figure {
         id: "curvature".into(),
-        title: "Curvature of each object under the probe: densities of the descriptor (figures 5 and 6)".into(),
-        caption: "κ = t₁ − 2·t₂ + t₃, the contact times of the three fingers; Gaussian kernel density with Silverman's \
-                  bandwidth, each scaled to its own peak. The vertical line marks zero, a flat surface; to its right the \
-                  surface is bent toward the probe, to its left away from it."
-            .into(),
+        title: "Curvature of each object under the probe: densities of the descriptor (figure 6)".into(),
+        caption: format!(
+            "κ = t₁ − 2·t₂ + t₃, the contact times of the three fingers; Gaussian kernel density with Silverman's \
+             bandwidth, each scaled to its own peak. The vertical line marks zero, a flat surface. Positive: convex (the \
+             middle finger touches early); negative: concave. The paper's caption has these two the other way around, and \
+             its formula, (t₁ − t₂) − (t₂ − t₃), has them as here.{}",
+            beyond(captured.data.names().iter().map(String::as_str).zip(&values), reach)
+        ),
         command: context.settings.command.clone(),
         panels,
         data,
     })
 }
 
+/// The share of touches beyond the ends of the axes, of the object that has most of them there; nothing where that is
+/// hardly any.
+fn beyond<'a>(values: impl Iterator<Item = (&'a str, &'a Vec<f64>)>, reach: f64) -> String {
+    let share = |(name, values): (&'a str, &Vec<f64>)| {
+        let outside = values.iter().filter(|value| value.abs() > reach).count();
+        (name, outside as f64 / values.len().max(1) as f64)
+    };
+    match values.map(share).max_by(|a, b| a.1.total_cmp(&b.1)) {
+        Some((name, most)) if most >= 0.005 => format!(
+            " The axes end at ±{} ms, beyond which lie up to {} of an object's touches ({name}).",
+            decimal(reach, 0),
+            percent(most, 0)
+        ),
+        _ => String::new(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_caption_of_a_capture_states_the_probe_and_the_sizes_of_the_settings() {
+        let published = touched_by(&Origin::default());
+        assert!(
+            published.contains("longest side is 10 units") && published.contains("radius 0.15 units"),
+            "{published}"
+        );
+        let probe = Probe { radius: 2.0, spacing: 20.0, speed: 130.0, tilt: 5.0, stroke: Some(7.0), travel: None };
+        let own = touched_by(&Origin { unit: Length::Millimeter, probe, ..Origin::default() });
+        assert_eq!(
+            own,
+            "The objects have their true sizes; fingers of radius 2 mm are 20 mm apart and move at 130 mm per second, \
+             tilted by up to 5°, with a stroke of 7 mm."
+        );
+    }
+
+    #[test]
+    fn touches_beyond_the_axes_of_curvature_are_stated_where_there_are_any() {
+        let (inside, outside) = (vec![0.0; 4], vec![-500.0, 0.0, 0.0, 500.0]);
+        let of = |reach: f64| beyond([("cup", &inside), ("watch", &outside)].into_iter(), reach);
+        assert!(
+            of(400.0).contains("±400 ms") && of(400.0).contains("50 %") && of(400.0).contains("(watch)"),
+            "{}",
+            of(400.0)
+        );
+        assert_eq!(of(600.0), "");
+    }
 
     #[test]
     fn curvature_is_in_milliseconds_and_needs_all_three_times() {

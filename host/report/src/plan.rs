@@ -15,6 +15,7 @@ use palpate::evaluate::{
 };
 use palpate::probe::noise::Noise;
 use palpate::touches::{Dataset, Origin};
+use palpate::wording::{self, list};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 use serde::{Deserialize, Serialize};
@@ -171,7 +172,7 @@ pub(super) fn section(context: &Context, plans: &Plans) -> Result<Section> {
          next approach is the one that best distinguishes the likeliest object from the others. The model was trained \
          on {} approaches to each object, misses included, and knows the probe's pose; the plan was made from as many \
          others, and both are tested on a third set. Aims are random in every case.",
-        plans.count
+        wording::count(plans.count)
     ));
     section.figure(figure(context, plans)?);
     section.table(policies(context, plans));
@@ -228,7 +229,8 @@ fn figure(context: &Context, plans: &Plans) -> Result<Figure> {
 
 fn policies(context: &Context, plans: &Plans) -> Table {
     let percent = short_number(100.0 * ERRORS);
-    let columns = ["policy".into(), format!("approaches to {percent} % errors"), "times fewer".into(), "bytes".into()];
+    let columns =
+        ["policy".into(), format!("approaches to {percent} % errors"), "random over this".into(), "bytes".into()];
     let mut data = Records::new(columns);
     let random = plans.policies.first().and_then(|policy| policy.at_errors(|stopped| stopped.approaches));
     for policy in &plans.policies {
@@ -245,11 +247,22 @@ fn policies(context: &Context, plans: &Plans) -> Table {
         id: "plan-policies".into(),
         title: "Approaches at random and planned".into(),
         caption: format!(
-            "At thresholds where {percent} % of the sequences are measured to be wrong or undecided. A policy with too \
-             few approaches in each pose is left out."
+            "At thresholds where {percent} % of the sequences are measured to be wrong or undecided.{}",
+            left_out(plans)
         ),
         command: context.settings.command.clone(),
         data,
+    }
+}
+
+/// The plans for which there were too few approaches in a pose; nothing if there were enough for all.
+fn left_out(plans: &Plans) -> String {
+    let is_there = |rolls: &u8| plans.policies.iter().any(|policy| policy.rolls == Some(*rolls));
+    let missing: Vec<String> =
+        ROLLS.into_iter().filter(|rolls| !is_there(rolls)).map(|rolls| rolls.to_string()).collect();
+    match missing.is_empty() {
+        true => String::new(),
+        false => format!(" Left out, for too few approaches in a pose: plans of {} rolls.", list(&missing)),
     }
 }
 

@@ -14,6 +14,7 @@ use palpate::compile;
 use palpate::error::{CalibrateProblem, Result};
 use palpate::probe::scene::Scene;
 use palpate::touches::Origin;
+use palpate::wording;
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
 use serde::{Deserialize, Serialize};
@@ -221,15 +222,31 @@ pub(super) fn section(context: &Context, promises: &Promises) -> Result<Section>
     section.text(format!(
         "A promised error rate is the largest share of wrong names among those given; a sequence that reaches \
          {MAX_TOUCHES} touches without a name is undecided, neither right nor wrong. Thresholds were found by \
-         Learn-then-Test on {found} sequences of touches captured for that, so that each promise is kept with a \
-         probability of 95 %, and measured on {tested} other sequences. Stopping when the posterior exceeds 1 − rate \
-         makes fewer errors than allowed, and takes more touches. The limit is a density estimate from the large \
-         capture, with its own thresholds."
+         Learn-then-Test on {} sequences of touches captured for that, so that each promise is kept with a \
+         probability of {}, and measured on {} other sequences. {} The limit is a density estimate from the large \
+         capture, with its own thresholds.",
+        wording::count(found),
+        wording::rate(CONFIDENCE),
+        wording::count(tested),
+        uncalibrated(&promises.rates)
     ));
     section.figure(figure(context, promises)?);
     section.table(table(context, promises));
     section.table(objects(context, promises));
     Ok(section)
+}
+
+/// Stopping at the posterior, compared with the rates and with promises.
+fn uncalibrated(rates: &[Promised]) -> String {
+    let kept = rates.iter().filter(|of| of.uncalibrated.error <= of.rate).count();
+    let promised = || rates.iter().filter_map(|of| Some((of.uncalibrated.touches, of.average?.touches)));
+    let longer = promised().filter(|(uncalibrated, promised)| uncalibrated > promised).count();
+    format!(
+        "Stopping when the posterior exceeds 1 − rate, without a calibration, stayed at or below {kept} of {} rates, and took \
+         more touches than a promise at {longer} of the {} rates that could be promised.",
+        rates.len(),
+        promised().count()
+    )
 }
 
 fn figure(context: &Context, promises: &Promises) -> Result<Figure> {
@@ -335,12 +352,38 @@ fn objects(context: &Context, promises: &Promises) -> Table {
     }
     Table {
         id: "promises-objects".into(),
-        title: "A promise of 1 % for each object".into(),
+        title: format!("A promise of {} for each object", wording::rate(SHOWN)),
         caption:
             "Mistaken: share of wrong names among those given to the object. Named wrongly: share of wrong ones when \
                   its name is given. Dashes: too few sequences for the promise."
                 .into(),
         command: context.settings.command.clone(),
         data,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stopping_at_the_posterior_does_is_counted_and_not_supposed() {
+        let stopped =
+            |error: f64, touches: f64| Stopped { margin: 0.0, touches, error, low: 0.0, high: 1.0, undecided: 0.0 };
+        let promised = |rate: f64, uncalibrated: Stopped, average: Option<Stopped>| Promised {
+            rate,
+            uncalibrated,
+            average,
+            limit: None,
+            name: None,
+            object: None,
+        };
+        let rates = [
+            promised(0.1, stopped(0.04, 20.0), Some(stopped(0.09, 12.0))),
+            promised(0.01, stopped(0.02, 30.0), Some(stopped(0.01, 44.0))),
+            promised(0.001, stopped(0.01, 40.0), None),
+        ];
+        let said = uncalibrated(&rates);
+        assert!(said.contains("at or below 1 of 3 rates") && said.contains("at 1 of the 2 rates"), "{said}");
     }
 }

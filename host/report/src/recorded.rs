@@ -11,7 +11,11 @@ use palpate::compare::{self, Comparison, Cost, ObjectComparison, Share};
 use palpate::error::{EvaluateProblem, Result};
 use palpate::progress;
 use palpate::touches::{Dataset, Origin, checksum, files};
+use palpate::wording::{decimal, percent};
 use std::path::Path;
+
+/// Differences of shares of contact patterns above which these are named.
+const DIFFERENT: f64 = 0.02;
 
 /// Compares the recorded touches, if there are any, with as many approaches as other sections make, by the probe of the
 /// report with what a real one adds.
@@ -72,7 +76,7 @@ pub(super) fn section(context: &Context, compared: Option<&Comparison>) -> Resul
 }
 
 fn with_interval(share: &Share) -> String {
-    format!("{:.1} % ({:.1} to {:.1} %)", 100.0 * share.value, 100.0 * share.low, 100.0 * share.high)
+    format!("{} ({} to {})", percent(share.value, 1), decimal(100.0 * share.low, 1), percent(share.high, 1))
 }
 
 fn told_figure(context: &Context, compared: &Comparison) -> Result<Figure> {
@@ -183,8 +187,8 @@ fn words(context: &Context, compared: &Comparison) -> Table {
         let patterns = own
             .patterns
             .iter()
-            .filter(|(_, [one, other])| (one - other).abs() > 0.02)
-            .map(|(name, [one, other])| format!("{name}: {:.0} % instead of {:.0} %", 100.0 * one, 100.0 * other));
+            .filter(|(_, [one, other])| (one - other).abs() > DIFFERENT)
+            .map(|(name, [one, other])| format!("{name}: {} instead of {}", percent(*one, 0), percent(*other, 0)));
         let patterns: Vec<String> = patterns.collect();
         data.push([
             own.name.as_str().into(),
@@ -198,10 +202,11 @@ fn words(context: &Context, compared: &Comparison) -> Table {
     Table {
         id: "recorded-words".into(),
         title: "Recorded and simulated touches, object by object".into(),
-        caption:
-            "Features by themselves, and contact patterns that differ by more than 2 points. A classifier sees them \
-                  together."
-                .into(),
+        caption: format!(
+            "Features by themselves, and contact patterns that differ by more than {} points. A classifier sees them \
+             together.",
+            100.0 * DIFFERENT
+        ),
         command: context.settings.command.clone(),
         data,
     }

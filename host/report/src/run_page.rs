@@ -6,6 +6,7 @@ use crate::page::color;
 use crate::page::document::{Block, Figure, Page, Picture, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
+use palpate::wording::count;
 
 /// Results of a run, as its page shows them.
 #[derive(Clone, Debug)]
@@ -33,6 +34,8 @@ pub struct RunMethod {
     pub name: String,
     /// `(touches, accuracy, standard error)`, by rising number of touches, each a share of one.
     pub curve: Vec<(usize, f64, f64)>,
+    /// Bytes of its compiled model.
+    pub bytes: usize,
     /// For each object its `(touches, accuracy)`.
     pub per_object: Vec<(String, Vec<(usize, f64)>)>,
 }
@@ -66,13 +69,24 @@ pub fn run_page(results: &RunResults) -> Result<Page> {
     sections.push(section);
     Ok(Page {
         title: "Recognizing objects by touch".into(),
-        summary: "A probe with three fingers touched each object; trees learned the evidence that a touch gives for \
-                  each object; a compiled model of a few kilobytes added it up, touch by touch."
-            .into(),
+        summary: format!(
+            "A probe with three fingers touched each object; trees learned the evidence that a touch gives for each object; \
+             {} added it up, touch by touch.",
+            models("a compiled model", "compiled models", results.methods.iter().map(|method| method.bytes))
+        ),
         sections,
         facts: results.facts.clone(),
         files: false,
     })
+}
+
+/// Models, and how many bytes they have.
+pub(super) fn models(one: &str, several: &str, bytes: impl Iterator<Item = usize> + Clone) -> String {
+    let (least, most) = (bytes.clone().min().unwrap_or(0), bytes.clone().max().unwrap_or(0));
+    match bytes.count() {
+        0 | 1 => format!("{one} of {} bytes", count(most)),
+        _ => format!("{several} of {} to {} bytes", count(least), count(most)),
+    }
 }
 
 /// The `index`-th method's color and point shape: the paper's first, ours second.
@@ -163,6 +177,7 @@ mod tests {
         let method = |name: &str, accuracy: f64| RunMethod {
             name: name.into(),
             curve: vec![(5, accuracy, 0.01), (30, 1.0, 0.0)],
+            bytes: if name == "paper" { 259_556 } else { 44_284 },
             per_object: vec![
                 ("fork".into(), vec![(5, accuracy), (30, 1.0)]),
                 ("bowl".into(), vec![(5, 0.5), (30, 1.0)]),
@@ -195,6 +210,7 @@ mod tests {
             "palpate run builtin --seed 1",
             "href=\"play.html\"",
             "5.6 % of approaches",
+            "compiled models of 44,284 to 259,556 bytes added it up",
         ] {
             assert!(html.contains(part), "{part}");
         }

@@ -11,6 +11,7 @@ use crate::page::table::{Cell, Records, Table};
 use palpate::compile;
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins, SequentialSettings};
+use palpate::wording;
 use serde::{Deserialize, Serialize};
 
 /// Thresholds: the recognizer stops when the posterior exceeds 1 minus one of these.
@@ -28,6 +29,8 @@ pub(super) const METHODS: [&str; 2] = ["paper", "ours"];
 pub(super) struct Sequences {
     /// Sequences per object.
     pub(super) count: usize,
+    /// Touches after which a sequence gave up.
+    most: usize,
     /// For each of [`METHODS`], for each threshold.
     pub(super) methods: Vec<Vec<Stopped>>,
     /// For each of [`METHODS`]: the touches used by each sequence of each object at [`DRAWN`].
@@ -67,10 +70,11 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Sequences> {
     let bytes = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes];
     let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
     let count = if settings.quick { 300 } else { 1_000 };
-    let mut result = Sequences { count, methods: Vec::new(), used: Vec::new() };
+    let mut result = Sequences { count, most: MOST, methods: Vec::new(), used: Vec::new() };
     for candidate in [Candidate::Compiled(&paper), Candidate::Compiled(&ours)] {
         let margins = Margins::new(candidate, &large.test)?;
         let most = MOST.min(margins.fewest_touches());
+        result.most = most;
         let curve = margins.curve(most, count, settings.seed.wrapping_add(1))?;
         let mut stopped = Vec::new();
         for rate in RATES {
@@ -106,9 +110,10 @@ pub(super) fn section(context: &Context, sequences: &Sequences) -> Result<Sectio
     let mut section = Section::new("sequential", "Stopping when sure");
     section.text(format!(
         "The recognizer stops as soon as the posterior of an object exceeds 1 − threshold. {} sequences of each \
-         object's touches, from the large capture that no model was trained on; a sequence of {MOST} touches without a \
+         object's touches, from the large capture that no model was trained on; a sequence of {} touches without a \
          verdict counts as an error. It is compared with the fixed number of touches that makes no more errors.",
-        sequences.count
+        wording::count(sequences.count),
+        wording::count(sequences.most)
     ));
     section.figure(trade(context, sequences)?);
     section.table(table(context, sequences));
@@ -163,7 +168,7 @@ fn trade(context: &Context, sequences: &Sequences) -> Result<Figure> {
     }
     Ok(Figure {
         id: "sequential-trade".into(),
-        title: "Errors against touches, for thresholds from 0.3 to 0.001".into(),
+        title: format!("Errors against touches, for thresholds from {} to {}", RATES[0], RATES[RATES.len() - 1]),
         caption:
             "Both axes are logarithmic. Solid: stopping when sure; dashed: a fixed number. Bars are 95 % intervals \
                   (Wilson)."
@@ -204,13 +209,34 @@ fn table(context: &Context, sequences: &Sequences) -> Table {
     Table {
         id: "sequential".into(),
         title: "Thresholds".into(),
-        caption: "Error rates are below the threshold, because evidence overshoots it on the last touch; they include \
-             undecided sequences. ± is one standard error; a dash (–) means that no fixed number up to the longest \
-             group makes as few errors."
-            .into(),
+        caption: format!(
+            "Errors include undecided sequences. {} ± is one standard error; a dash (–) means that no fixed number up to the \
+             longest group makes as few errors.",
+            above_thresholds(&sequences.methods)
+        ),
         command: context.settings.command.clone(),
         data,
     }
+}
+
+/// Thresholds at which each method errs more often than they say, as a sentence for each.
+fn above_thresholds(methods: &[Vec<Stopped>]) -> String {
+    let of = |(name, stopped): (&str, &Vec<Stopped>)| {
+        let above: Vec<&Stopped> = stopped.iter().filter(|of| of.error > of.rate).collect();
+        let times = |of: &&&Stopped| of.error / of.rate;
+        match above.iter().max_by(|a, b| times(a).total_cmp(&times(b))) {
+            None => format!("Of {name} they are at most the threshold at all {} of these.", stopped.len()),
+            Some(worst) => format!(
+                "Of {name} they are above the threshold at {} of {}, at {} by a factor of {}.",
+                above.len(),
+                stopped.len(),
+                worst.rate,
+                number(times(&worst), 1)
+            ),
+        }
+    };
+    let names = METHODS.map(|name| if name == METHODS[0] { "the paper's method" } else { name });
+    names.into_iter().zip(methods).map(of).collect::<Vec<_>>().join(" ")
 }
 
 fn distributions(context: &Context, sequences: &Sequences) -> Result<Figure> {
@@ -272,6 +298,28 @@ fn binned(values: &[usize], width: usize, bins: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn errors_are_compared_with_the_thresholds_and_not_supposed_to_be_below() {
+        let stopped = |rate: f64, error: f64| Stopped {
+            rate,
+            touches: 1.0,
+            touches_error: 0.0,
+            error,
+            undecided: 0.0,
+            error_error: 0.0,
+            fixed: None,
+        };
+        let said = above_thresholds(&[
+            vec![stopped(0.1, 0.09), stopped(0.01, 0.043), stopped(0.001, 0.002)],
+            vec![stopped(0.1, 0.02), stopped(0.01, 0.01), stopped(0.001, 0.0)],
+        ]);
+        assert_eq!(
+            said,
+            "Of the paper's method they are above the threshold at 2 of 3, at 0.01 by a factor of 4.3. Of ours they are at most the \
+             threshold at all 3 of these."
+        );
+    }
 
     #[test]
     fn bins_hold_shares_and_start_at_one_touch() {

@@ -15,7 +15,7 @@ pub struct Settings {
     pub command: String,
     /// The seed of everything random.
     pub seed: u64,
-    /// Fewer folds, levels and touches; the same figures.
+    /// Fewer folds, levels, touches and trees; the same figures.
     pub quick: bool,
     /// Origin of the touches: the probe, and the unit of its lengths. The settings beside it state the number of
     /// touches and the seed. Growth and generalization use the

@@ -1,7 +1,7 @@
 //! The simulator's speed against its error, for several ways to decide a contact.
 
 use super::context::Context;
-use crate::page::axis::Axis;
+use crate::page::axis::{Axis, short_number};
 use crate::page::chart::{Chart, Mark, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
@@ -18,6 +18,13 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::hint::black_box;
 use std::time::Instant;
+
+/// One cast in so many grazes a triangle.
+const GRAZING: usize = 6;
+/// Logarithms of the distances, in units, at which they pass it.
+const CLEARANCES: std::ops::Range<f64> = -7.0..-2.0;
+/// The logarithm of the time, in seconds, at which an error of 0 is drawn: it has none of its own.
+const NO_ERROR: i32 = -17;
 
 /// Results of one way of deciding contacts, all objects together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,7 +49,7 @@ struct Cast {
     direction: DVec3,
 }
 
-/// Casts fingers at the objects, every sixth so that it grazes.
+/// Casts fingers at the objects, some so that they graze.
 pub(super) fn measure(context: &Context) -> Result<Vec<Engine>> {
     let count = if context.settings.quick { 90 } else { 600 };
     let probe = context.settings.capture.probe;
@@ -121,8 +128,8 @@ fn every_triangle(triangles: &[Triangle], cast: &Cast, radius: f64) -> Option<f6
     first.is_finite().then_some(first + skipped)
 }
 
-/// Fingers as the probe moves them; every sixth passes a triangle's middle at a distance of the radius, give or take
-/// 1e-7 to 1e-2 units.
+/// Fingers as the probe moves them; one in [`GRAZING`] passes a triangle's middle at a distance of the radius, give or take
+/// a clearance.
 fn casts(scene: &Scene, name: &str, count: usize, seed: u64, probe: &Probe) -> Vec<Cast> {
     let triangles: Vec<Triangle> = scene.triangles().collect();
     let mut random = random::generator(seed, Purpose::Casts, name, 0);
@@ -130,13 +137,13 @@ fn casts(scene: &Scene, name: &str, count: usize, seed: u64, probe: &Probe) -> V
         .map(|index| {
             let approach = Approach::draw(&mut random, scene.bounds(), probe.tilt);
             let direction = approach.direction;
-            if index % 6 != 0 {
+            if index % GRAZING != 0 {
                 return Cast { origin: approach.fingers(probe.spacing)[index % 3], direction };
             }
             let [a, b, c] = triangles[random.random_range(0..triangles.len())];
             let normal = (b - a).cross(c - a).normalize_or(DVec3::Z);
             let along = normal.cross(direction).normalize_or(DVec3::X);
-            let clearance = 10f64.powf(random.random_range(-7.0..-2.0)) * if random.random() { 1.0 } else { -1.0 };
+            let clearance = 10f64.powf(random.random_range(CLEARANCES)) * if random.random() { 1.0 } else { -1.0 };
             let beside = (a + b + c) / 3.0 + normal * (probe.radius + clearance);
             Cast { origin: beside - along * (approach.start.length() + 1.0), direction: along }
         })
@@ -145,17 +152,23 @@ fn casts(scene: &Scene, name: &str, count: usize, seed: u64, probe: &Probe) -> V
 
 /// Adds the figure and the table to the section on speed against error.
 pub(super) fn add(context: &Context, engines: &[Engine], section: &mut Section) -> Result<()> {
-    section.text(
+    section.text(format!(
         "The same for the simulator: fingers cast at the objects, one thread, compared with a decision in f64 over every triangle. \
-         A sixth of the casts graze a triangle at a clearance of 1e−7 to 1e−2 units.",
-    );
+         One cast in {GRAZING} grazes a triangle at a clearance of {} to {} units.",
+        short_number(10f64.powf(CLEARANCES.start)),
+        short_number(10f64.powf(CLEARANCES.end))
+    ));
     let rates = || engines.iter().map(|engine| engine.rate);
     let x = Axis::logarithmic(rates().fold(f64::INFINITY, f64::min) * 0.5, rates().fold(0.0, f64::max) * 8.0);
-    // An error of 0 has no logarithm.
-    let shown = |error: f64| error.max(1e-17);
+    let shown = |error: f64| error.max(10f64.powi(NO_ERROR));
     let top = engines.iter().map(|engine| shown(engine.largest_error)).fold(1e-6, f64::max);
-    let mut chart = Chart::new("casts per second", x, "largest time error (s)", Axis::logarithmic(3e-18, top * 10.0))
-        .sized(660, 330);
+    let mut chart = Chart::new(
+        "casts per second",
+        x,
+        "largest time error (s)",
+        Axis::logarithmic(0.3 * 10f64.powi(NO_ERROR), top * 10.0),
+    )
+    .sized(660, 330);
     let mut data = Records::new([
         "decided in",
         "casts per second",
@@ -186,7 +199,10 @@ pub(super) fn add(context: &Context, engines: &[Engine], section: &mut Section) 
     section.figure(Figure {
         id: "simulator-figure".into(),
         title: "Casts per second against time error".into(),
-        caption: "Farther right is faster, farther down more exact; errors of 0 are drawn at 1e−17.".into(),
+        caption: format!(
+            "Farther right is faster, farther down more exact; errors of 0 are drawn at {}.",
+            short_number(10f64.powi(NO_ERROR))
+        ),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data: data.clone(),

@@ -17,6 +17,7 @@ use palpate::error::Result;
 use palpate::mesh::{Object, source};
 use palpate::output::{refuse_foreign, write_json};
 use palpate::progress::{self, Progress};
+use palpate::wording::count;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::json;
@@ -247,7 +248,8 @@ fn sections(context: &Context, measured: &Measured, summary: &published::Summary
             damaged.join(", ")
         ));
     }
-    first.table(published::table(context, summary));
+    first.table(published::table(context, summary, &measured.noisy)?);
+    first.table(published::large(context, summary, &measured.limit, &measured.sequences));
     let mut costs = cost::section(context, &measured.members)?;
     simulator::add(context, &measured.engines, &mut costs)?;
     let mut sections = vec![
@@ -292,9 +294,9 @@ fn facts(settings: &Settings, stages: &[(String, f64)], seconds: f64) -> Vec<(St
         ("command".to_string(), settings.command.clone()),
         ("version".to_string(), env!("CARGO_PKG_VERSION").to_string()),
         ("seed".to_string(), settings.seed.to_string()),
-        ("touches of each object".to_string(), settings.touches.to_string()),
+        ("touches of each object".to_string(), count(settings.touches)),
         ("folds".to_string(), format!("{} of {}", settings.folds_used, settings.folds)),
-        ("large capture, touches of each object".to_string(), settings.limit_touches.to_string()),
+        ("large capture, touches of each object".to_string(), count(settings.limit_touches)),
         ("threads".to_string(), rayon::current_num_threads().to_string()),
         ("this run".to_string(), format!("{seconds:.0} s")),
     ];
@@ -309,6 +311,8 @@ mod tests {
     use palpate::mesh::Mesh;
     use palpate::mesh::obj;
     use palpate::output::write_whole;
+    use palpate::probe::approach::Probe;
+    use palpate::touches::Origin;
     use std::collections::BTreeSet;
     use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -433,7 +437,9 @@ mod tests {
             }
         }
         let place = tempfile::tempdir().unwrap();
-        let settings = Settings { growth: false, ..tiny(meshes(&place.path().join("meshes"))) };
+        let probe = Probe { radius: 0.1, spacing: 1.25, speed: 20.0, tilt: 5.0, ..Probe::default() };
+        let capture = Origin { probe, ..Origin::default() };
+        let settings = Settings { growth: false, capture, ..tiny(meshes(&place.path().join("meshes"))) };
         let directory = place.path().join("report");
         let cancel = CancelAt("noise", AtomicBool::new(false), Mutex::default());
         let error = report(&settings, &directory, Existing::default(), &cancel).unwrap_err();
@@ -453,6 +459,23 @@ mod tests {
         assert!(!resumed.stages.iter().any(|(name, _)| name == "growth" || name == "generalization"));
         let html = std::fs::read_to_string(directory.join("index.html")).unwrap();
         assert!(!html.contains("<figure id=\"generalization\">") && html.contains("leaves them out unless"));
+
+        // Captions state this probe and these settings, and not the published or the usual ones.
+        for said in [
+            "fingers of radius 0.1 units are 1.25 units apart and move at 20 units per second, tilted by up to 5°",
+            "Here it is 9 trees (300 as published: 100 boosting rounds instead of 3)",
+            "by a linear Savitzky–Golay filter over 3 levels",
+            "Of 10 folds, 2 were trained",
+            "1,000 full touches of each object were captured",
+            "20 groups per object and fold",
+        ] {
+            assert!(html.contains(said), "{said}");
+        }
+        for other in
+            ["0.15", "1.5 apart", "10 units per second", "1000 trees", "eleven", "kilobytes", "a fork", "80 rounds"]
+        {
+            assert!(!html.contains(other), "{other}");
+        }
     }
 
     #[test]

@@ -13,6 +13,7 @@ use palpate::evaluate::{DETECTED_BY, Outcome};
 use palpate::mesh::builtin;
 use palpate::strangers::{LeftOut, Sets, Settings, captured, leave_one_out};
 use palpate::touches::{Dataset, ObjectTouches, Origin};
+use palpate::wording::{self, percent};
 use palpate_shared::format::Held;
 use serde::{Deserialize, Serialize};
 
@@ -80,13 +81,24 @@ pub(super) fn measure(context: &Context) -> Result<Measured> {
     match column(None).and_then(|without| Ok([without, column(Some(&background))?])) {
         Ok(columns) => Ok(Measured::Columns(columns)),
         Err(error) if is_too_few(&error) => Ok(Measured::Not(format!(
-            "the misfit test could not be calibrated so that at most 2 % of known objects are taken for unknown, from {} \
+            "the misfit test could not be calibrated so that at most {} of known objects are taken for unknown, from {} \
              touches of each object: {}",
-            counts[1],
+            alarms(),
+            wording::count(counts[1]),
             error.problem::<EvaluateProblem>().map(ToString::to_string).unwrap_or_default()
         ))),
         Err(error) => Err(error),
     }
+}
+
+/// The share of known objects that may be taken for unknown.
+fn alarms() -> String {
+    wording::rate(Settings::default().alarms)
+}
+
+/// The settings of each training.
+fn training() -> train::Settings {
+    train::Settings { rounds: 40, depth: 5, ..train::Settings::compact() }
 }
 
 fn is_too_few(error: &Error) -> bool {
@@ -105,7 +117,7 @@ fn background(context: &Context, origin: &Origin) -> Result<Dataset> {
 }
 
 fn column(context: &Context, sets: Sets<'_>, background: Option<&Dataset>, shapes: &[ObjectTouches]) -> Result<Column> {
-    let training = train::Settings { rounds: 40, depth: 5, ..train::Settings::compact() };
+    let training = training();
     let held = WAYS.map(|(_, held)| held);
     let settings = Settings { seed: context.settings.seed, ..Settings::default() };
     let found = leave_one_out(sets, background, shapes, &training, &settings, &held, context.progress)?;
@@ -145,19 +157,21 @@ pub(super) fn section(context: &Context, measured: &Measured) -> Result<Section>
         }
     };
     let [_, with] = columns;
-    let at = |way: &Way, touches: usize| number(100.0 * way.detected.get(touches - 1).copied().unwrap_or(0.0), 0);
+    let at = |way: &Way, touches: usize| percent(way.detected.get(touches - 1).copied().unwrap_or(f64::NAN), 0);
+    let [_, middle, last] = DETECTED_BY;
     let [likely, certain] = [&with.ways[1], &with.ways[2]];
     section.text(format!(
         "Each object is left out of the training in turn, and then touched; a misfit test may declare it unknown. The \
-         test is calibrated to a false alarm rate of at most 2 %: the share of known objects taken for unknown. With \
-         names held back until a stranger would have been detected (certain), {} % of strangers are detected by 60 \
-         touches and {} % by 120, and {} % get a name; a known object takes {} touches. Without holding back (likely), \
-         {} % get a name, and a known object takes {} touches.",
-        at(certain, 60),
-        at(certain, 120),
-        number(100.0 * certain.wrong_name, 0),
+         test is calibrated to a false alarm rate of at most {}: the share of known objects taken for unknown. With \
+         names held back until a stranger would have been detected (certain), {} of strangers are detected by {middle} \
+         touches and {} by {last}, and {} get a name; a known object takes {} touches. Without holding back (likely), {} get \
+         a name, and a known object takes {} touches.",
+        alarms(),
+        at(certain, middle),
+        at(certain, last),
+        percent(certain.wrong_name, 0),
         number(certain.touches, 0),
-        number(100.0 * likely.wrong_name, 0),
+        percent(likely.wrong_name, 0),
         number(likely.touches, 0),
     ));
     section.figure(figure(context, columns)?);
@@ -191,8 +205,10 @@ fn figure(context: &Context, columns: &[Column; 2]) -> Result<Figure> {
     Ok(Figure {
         id: "strangers-detected".into(),
         title: "Detection rate of strangers, against touches".into(),
-        caption: "The mean over the objects that were left out, at a false alarm rate of at most 2 % on known objects."
-            .into(),
+        caption: format!(
+            "The mean over the objects that were left out, at a false alarm rate of at most {} on known objects.",
+            alarms()
+        ),
         command: context.settings.command.clone(),
         panels: vec![chart.svg()?],
         data,
@@ -220,9 +236,13 @@ fn ways_table(context: &Context, columns: &[Column; 2]) -> Table {
     Table {
         id: "strangers-ways".into(),
         title: "Cost of detecting strangers".into(),
-        caption: "Off: no test; a background, where there is one, still competes with every name. 40 trees of depth 5 \
-                  on curvature of full touches."
-            .into(),
+        caption: format!(
+            "Off: no test; a background, where there is one, still competes with every name. {} trees of depth {} on {} of \
+             full touches.",
+            training().rounds,
+            training().depth,
+            training().descriptor.name()
+        ),
         command: context.settings.command.clone(),
         data,
     }
@@ -239,10 +259,35 @@ fn objects_table(context: &Context, with: &Column) -> Table {
     Table {
         id: "strangers-objects".into(),
         title: "Detection rate of each stranger".into(),
-        caption: "With a background, names being held back (certain). Objects that feel alike are rarely detected: by \
-                  curvature alone a fork feels like a spoon, and a hammer like a paper clip."
-            .into(),
+        caption: format!(
+            "With a background, names being held back (certain). {}",
+            extremes(with.ways.last().map_or(&[], |way| &way.objects))
+        ),
         command: context.settings.command.clone(),
         data,
+    }
+}
+
+/// The strangers that are detected least and most in the end.
+fn extremes(objects: &[(String, Vec<f64>, f64)]) -> String {
+    let last = || objects.iter().filter_map(|(name, detected, _)| Some((name, *detected.last()?)));
+    let by = DETECTED_BY.last().copied().unwrap_or(0);
+    let of = |(name, share): (&String, f64)| format!("{name} ({})", percent(share, 1));
+    let least = last().min_by(|a, b| a.1.total_cmp(&b.1)).map_or_else(String::new, of);
+    let most = last().max_by(|a, b| a.1.total_cmp(&b.1)).map_or_else(String::new, of);
+    format!("Detected least by {by} touches: {least}; most: {most}.")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_caption_names_the_strangers_of_this_run() {
+        let of = |name: &str, detected: f64| (name.to_owned(), vec![0.0, 0.0, detected], 0.5);
+        assert_eq!(
+            extremes(&[of("cup", 0.031), of("jug", 0.98), of("pan", 0.4)]),
+            "Detected least by 120 touches: cup (3.1 %); most: jug (98.0 %)."
+        );
     }
 }

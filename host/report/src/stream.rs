@@ -1,13 +1,14 @@
 //! The page of verdicts on sequences of rows: rows to a verdict against the error rate, confusion, and how evidence grows.
 
 use crate::page::axis::{Axis, number};
-use crate::page::chart::{Chart, Shape};
+use crate::page::chart::{Chart, Mark, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Page, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::evaluate::Finding;
 use palpate::stream::{Evaluated, Grown, Point};
+use palpate::wording::{compared, count, percent, rate};
 
 /// The most classes whose posteriors are drawn.
 const MOST_CLASSES: usize = 8;
@@ -31,9 +32,9 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Page> {
     Ok(Page {
         title: "Verdicts on streams of rows".into(),
         summary: format!(
-            "{} sequences{groups}: {} % of the names given are wrong, after {} rows on average.",
-            evaluated.sequences,
-            number(100.0 * evaluated.error, 2),
+            "{} sequences{groups}: {} of the names given are wrong, after {} rows on average.",
+            count(evaluated.sequences),
+            percent(evaluated.error, 2),
             number(evaluated.mean_rows, 1),
         ),
         sections,
@@ -43,12 +44,11 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Page> {
 }
 
 fn promise(evaluated: &Evaluated) -> String {
-    let percent = |share: f64| number(100.0 * share, 2);
     let ends = format!(
-        "Of all sequences {} % end with a wrong name, {} % without a verdict, and {} % as unknown.",
-        percent(evaluated.wrong),
-        percent(evaluated.undecided),
-        percent(evaluated.unknown)
+        "Of all sequences {} end with a wrong name, {} without a verdict, and {} as unknown.",
+        percent(evaluated.wrong, 2),
+        percent(evaluated.undecided, 2),
+        percent(evaluated.unknown, 2)
     );
     let Some(promise) = &evaluated.promise else {
         return format!("{ends} The model was not calibrated for these thresholds, and promises nothing.");
@@ -61,24 +61,26 @@ fn promise(evaluated: &Evaluated) -> String {
         Finding::Untested => "No name was given.",
     };
     format!(
-        "The model promises at most {} % of wrong names; found here: {} %{of}. {kept} {ends}",
-        percent(promise.promised),
-        percent(promise.found)
+        "The model promises at most {} of wrong names; found here: {}{of}. {kept} {ends}",
+        rate(promise.promised),
+        percent(promise.found, 2)
     )
 }
 
 fn fewer(evaluated: &Evaluated) -> String {
-    let of = |rows: Option<f64>| match rows {
-        Some(rows) => {
-            format!("{} ({} % fewer)", number(rows, 1), number(100.0 * (1.0 - evaluated.mean_rows / rows), 0))
-        }
-        None => "more than these sequences have".into(),
-    };
     format!(
-        "To be wrong as rarely, a fixed number of rows has to be {}, and a majority vote has to be over {}.",
-        of(evaluated.comparison.fixed_rows),
-        of(evaluated.comparison.vote_rows)
+        "{} {}",
+        instead("A fixed number of rows", evaluated.mean_rows, evaluated.comparison.fixed_rows),
+        instead("A majority vote of rows", evaluated.mean_rows, evaluated.comparison.vote_rows)
     )
+}
+
+/// The rows that another way needs for the same error rate, and what stopping early saves.
+fn instead(way: &str, mean: f64, rows: Option<f64>) -> String {
+    let Some(rows) = rows else {
+        return format!("{way} does not reach the same error rate, not even with all rows of these sequences.");
+    };
+    format!("{way} needs {} for the same error rate; stopping early needs {}.", number(rows, 1), compared(mean, rows))
 }
 
 /// An error rate of nothing has no place on a logarithmic axis: half an error.
@@ -114,14 +116,17 @@ fn curves(evaluated: &Evaluated, command: &str) -> Result<Figure> {
             ]);
         }
     }
-    let own = [(evaluated.mean_rows, shown(evaluated, evaluated.error))];
-    chart.series("this model", color::series(3), Shape::Disc, &own);
+    // Last, over the lines, and named where it is.
+    let own = (evaluated.mean_rows, shown(evaluated, evaluated.error));
+    chart.marks.push(Mark::Dots { points: vec![own], color: color::INK, shape: Shape::Square });
+    chart.marks.push(Mark::Note { at: own, text: "this model".into(), color: color::INK });
     Ok(Figure {
         id: "rows-to-a-verdict".into(),
         title: "Wrong names against rows".into(),
         caption: "Early stopping at thresholds from strict to loose, the same for all names; the class with the most evidence after \
                   a fixed number of rows, and the class that most of as many rows are recognized as, each row taken alone. A \
-                  sequence with fewer rows uses all that it has. No error at all is drawn as half of one."
+                  sequence with fewer rows uses all that it has. Zero errors are drawn as half an error (the axis is logarithmic). \
+             The square is this model, with its own thresholds."
             .into(),
         command: command.into(),
         panels: vec![chart.svg()?],
@@ -169,14 +174,31 @@ fn posteriors(evaluated: &Evaluated, grown: &Grown, command: &str) -> Result<Fig
         Some((row, None)) => format!("After row {row} it is called unknown."),
         None => "It ends without a verdict.".into(),
     };
+    let longer = grown
+        .longer
+        .map_or_else(String::new, |share| format!(" Of the sequences with a name, {} take longer.", percent(share, 0)));
     Ok(Figure {
         id: "one-sequence".into(),
         title: format!("The evidence of one sequence of {} as it grows", name(grown.class)),
-        caption: format!(
-            "{ended} Later rows are shown as if there had been no verdict. Of the sequences with a name, a quarter take longer."
-        ),
+        caption: format!("{ended} Later rows are shown as if there had been no verdict.{longer}"),
         command: command.into(),
         panels: vec![chart.svg()?],
         data,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_way_needs_more_or_fewer_rows_as_was_measured() {
+        assert_eq!(
+            instead("A fixed number of rows", 3.54, Some(6.0)),
+            "A fixed number of rows needs 6.0 for the same error rate; stopping early needs 41 % fewer."
+        );
+        assert!(instead("A vote", 6.6, Some(6.0)).ends_with("stopping early needs 10 % more."));
+        assert!(instead("A vote", 6.0, Some(6.0)).ends_with("stopping early needs as many."));
+        assert!(instead("A vote", 6.0, None).contains("does not reach"));
+    }
 }

@@ -12,6 +12,7 @@ use palpate::error::{CalibrateProblem, Result};
 use palpate::evaluate::{Candidate, Margins, SequentialSettings};
 use palpate::mesh::placements;
 use palpate::touches::{Dataset, Origin, Surroundings};
+use palpate::wording::{self, rate};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 use serde::{Deserialize, Serialize};
@@ -189,10 +190,11 @@ pub(super) fn section(context: &Context, measured: &Measured) -> Section {
     };
     section.text(format!(
         "An object on a table lies in one of a few placements, turned by an unknown angle, and approaches come from above, \
-         within {cone} degrees of straight down. A robot knows which way is down. The models were trained on {count} \
+         within {cone} degrees of straight down. A robot knows which way is down. The models were trained on {} \
          approaches to each object, calibrated on as many others, and tested on a third set; approaches that touch nothing \
          are evidence too. A sequence of approaches is of one placement, drawn by its weight. Directions and angles about \
-         the vertical are random."
+         the vertical are random.",
+        wording::count(*count)
     ));
     section.table(models(context, rows));
     section.table(placements_of(context, objects));
@@ -226,10 +228,10 @@ fn models(context: &Context, rows: &[Row]) -> Table {
         id: "table-models".into(),
         title: "Approaches to a name on a table".into(),
         caption: format!(
-            "At thresholds that promise at most {} % wrong names; at most {MOST} approaches, with which sequences without a \
+            "At thresholds that promise at most {} wrong names; at most {MOST} approaches, with which sequences without a \
              name are counted. Not promised: no threshold keeps the rate, or names were too few to know; then at the threshold \
              of the posterior. Placement named: the share of right names that are given with the right placement.",
-            100.0 * RATE
+            rate(RATE)
         ),
         command: context.settings.command.clone(),
         data,

@@ -1,12 +1,13 @@
 //! The page of objects that were learned from recorded touches: their accuracy, and the benefit of more approaches.
 
-use crate::page::axis::{Axis, number};
+use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Page, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
-use palpate::teach::{LEAST, Needed, Taught, TaughtObject};
+use palpate::teach::{self, LEAST, Needed, Taught, TaughtObject};
+use palpate::wording::{count, percent, rate};
 
 /// The page. `command` is what remakes it.
 ///
@@ -58,16 +59,17 @@ fn objects(taught: &Taught, command: &str) -> Table {
             Cell::Percent(object.taken_for_it, 1),
         ]);
     }
-    let others = taught.others.map_or_else(String::new, |others| {
-        format!(" Of the other objects {} % are recognized.", number(100.0 * others, 1))
-    });
+    let others = taught
+        .others
+        .map_or_else(String::new, |others| format!(" Of the other objects {} are recognized.", percent(others, 1)));
     Table {
         id: "taught".into(),
         title: "Objects and how they were smoothed".into(),
         caption: format!(
             "Shares of groups of {} approaches; false recognitions of an object are summed over all other objects. \
-             Jitter is in multiples of 30 % and 10 ms on times, 8° on the pose.{others}",
-            taught.approaches
+             Jitter is in multiples of {}.{others}",
+            taught.approaches,
+            teach::jitter(1.0)
         ),
         command: command.into(),
         data,
@@ -125,11 +127,11 @@ pub fn more_approaches(object: &TaughtObject) -> String {
         return format!("Recording more approaches to {} would hardly help.", object.name);
     }
     format!(
-        "With {} approaches to {} the error would be about {} % instead of {} %.",
-        2 * object.approaches,
+        "With {} approaches to {} the error would be about {} instead of {}.",
+        count(2 * object.approaches),
         object.name,
-        number(100.0 * then, 1),
-        number(100.0 * now, 1)
+        percent(then, 1),
+        percent(now, 1)
     )
 }
 
@@ -138,11 +140,13 @@ pub fn promise(taught: &Taught) -> String {
     let Needed { sequences, of_each, approaches } = taught.promise;
     let recorded = taught.objects.iter().map(|object| object.approaches).min().unwrap_or(0);
     let what = format!(
-        "To promise 1 % wrong names takes {sequences} sequences that end with a name, none of them a wrong one, {of_each} of \
-         each object: about {approaches} approaches that the object was not taught with, or more"
+        "To promise {} wrong names takes {sequences} sequences that end with a name, none of them a wrong one, {of_each} of \
+         each object: about {} approaches that the object was not taught with, or more",
+        rate(teach::RATE),
+        count(approaches)
     );
     if recorded < approaches + LEAST {
-        format!("No promise can be made yet. {what}, and {recorded} were recorded in all.")
+        format!("No promise can be made yet. {what}, and {} were recorded in all.", count(recorded))
     } else {
         format!("{what}. Teach with the others only, and keep these for palpate calibrate.")
     }

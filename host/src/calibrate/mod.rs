@@ -48,6 +48,7 @@ mod sequence;
 mod temperature;
 #[cfg(all(test, feature = "train"))]
 mod tests;
+mod unlike;
 mod walk;
 
 pub(crate) use begin::Begin;
@@ -65,6 +66,8 @@ pub use palpate_shared::format::Per;
 pub use recorded::calibrate_recorded;
 pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
 pub use temperature::temperature;
+pub use unlike::unlike_training;
+
 /// The cases that the promised rate refers to, in words.
 pub fn of_what(per: Per) -> &'static str {
     match per {

@@ -53,10 +53,21 @@ impl Margins<'_> {
     /// # Errors
     /// As [`Margins::curve`], and `at` if `touches` is 0.
     pub fn confusion(&self, touches: usize, groups: usize, seed: u64) -> Result<Vec<Vec<usize>>> {
+        self.confusion_of_first(touches, touches, groups, seed)
+    }
+
+    /// Confusion matrix after the first `touches` touches of groups of `most`: of the groups that [`Margins::curve`] of
+    /// `most` follows, so that the share on its diagonal is the curve's accuracy.
+    ///
+    /// # Errors
+    /// As [`Margins::confusion`].
+    pub fn confusion_of_first(&self, touches: usize, most: usize, groups: usize, seed: u64) -> Result<Vec<Vec<usize>>> {
         self.check(touches, groups)?;
+        let most = most.max(touches);
+        self.check(most, groups)?;
         let row = |position| {
             let mut row = vec![0; self.objects().len()];
-            self.ends(position, touches, groups, seed, |evidence| self.best(position, evidence))
+            self.ends(position, (touches, most), groups, seed, |evidence| self.best(position, evidence))
                 .into_iter()
                 .for_each(|object| row[object] += 1);
             row
@@ -77,7 +88,7 @@ impl Margins<'_> {
         };
         let confidences = |position: usize| {
             let right = self.tested[position].object;
-            self.ends(position, touches, groups, seed, move |evidence| {
+            self.ends(position, (touches, touches), groups, seed, move |evidence| {
                 let (best, rivals) = self.leading(position, evidence, unit);
                 Confidence { posterior: 1.0 / (1.0 + rivals), correct: best == right }
             })
@@ -112,18 +123,18 @@ impl Margins<'_> {
         }
     }
 
-    /// Applies `end` to the evidence at the end of each group.
+    /// Applies `end` to the evidence after the first touches of each group of so many.
     fn ends<T: Send>(
         &self,
         position: usize,
-        touches: usize,
+        (touches, most): (usize, usize),
         groups: usize,
         seed: u64,
         end: impl Fn(&[f64]) -> T + Sync,
     ) -> Vec<T> {
         let group = |group| {
             let mut evidence = self.prior();
-            self.draw(position, group, touches, seed).into_iter().for_each(|touch| {
+            self.draw(position, group, most, seed).into_iter().take(touches).for_each(|touch| {
                 self.tested[position].add(touch, &mut evidence);
             });
             end(&evidence)

@@ -73,6 +73,18 @@ fn more_touches_make_fewer_errors_and_confusion_agrees_with_the_curve() {
 }
 
 #[test]
+fn confusion_after_the_first_touches_of_longer_groups_is_of_the_groups_of_the_curve() {
+    full_and_compiled(|margins| {
+        let curve = margins.curve(60, 300, 1).unwrap();
+        let confusion = margins.confusion_of_first(10, 60, 300, 1).unwrap();
+        for (object, row) in confusion.iter().enumerate() {
+            assert!((row[object] as f64 / 300.0 - curve.object_accuracy(object, 10).value).abs() < 1e-12, "{row:?}");
+        }
+        assert_eq!(margins.confusion_of_first(10, 0, 300, 1).unwrap(), margins.confusion(10, 300, 1).unwrap());
+    });
+}
+
+#[test]
 fn touches_to_an_error_rate_is_where_the_curve_passes_for_good() {
     full_and_compiled(|margins| {
         let curve = margins.curve(100, 300, 1).unwrap();

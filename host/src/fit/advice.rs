@@ -1,8 +1,9 @@
 //! Advice on what recordings cannot determine, and what to record next.
 
+use super::layer::MOST_ANGLE;
 use super::outcome::{Fit, Warning};
 use super::timer::Timer;
-use super::words::{Estimate, between, offset_between};
+use super::words::{Estimate, NOT_TOLD, between, offset_between};
 
 /// Width of an interval above which there is a warning: of the speed, of offsets in milliseconds, of the noise as a
 /// share of it, of shares of missed contacts.
@@ -20,7 +21,7 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
     };
     let said = |estimate: &Estimate, scale, digits, unit: &str| {
         let between = between(estimate, scale, digits);
-        if between == "not told" { between } else { format!("{between}{unit}") }
+        if between == NOT_TOLD { between } else { format!("{between}{unit}") }
     };
     let all = fit.recorded.max(1) as f64;
     // An interval shrinks with the root of the number of touches.
@@ -72,6 +73,13 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
                 }
             }
         }
+    }
+    if let Some(grazing) = fit.grazing.filter(|grazing| grazing.angle.low.is_none() && grazing.angle.high.is_none()) {
+        let record = format!(
+            "Record {}. If the fingers are rigid, take the line grazing out of the probe file.",
+            more(grazing.angle.width(), MOST_ANGLE)
+        );
+        warn("the angle beyond which fingers bend", NOT_TOLD.into(), record);
     }
     if timer == Timer::Unknown {
         let record = "Record more touches with two or three contacts.".into();

@@ -114,8 +114,11 @@ const WIDER: f64 = 1.5;
 /// Distance to either side over which curvatures are measured.
 const CURVATURE: f64 = 0.5;
 
+/// The largest angle of the search, in degrees. An interval that ends there, or at 0, has no end that the recordings tell.
+pub(super) const MOST_ANGLE: f64 = 80.0;
+
 fn real_of([angle, bend]: Numbers) -> Noise {
-    let grazing = Grazing { angle: 10.0 * angle.clamp(0.0, 8.0), bend: 1e3 * bend.clamp(-4.0, 8.0).exp2() };
+    let grazing = Grazing { angle: (10.0 * angle).clamp(0.0, MOST_ANGLE), bend: 1e3 * bend.clamp(-4.0, 8.0).exp2() };
     Noise { grazing, ..Noise::default() }
 }
 

@@ -61,7 +61,7 @@ mod words;
 pub use error::FitProblem;
 pub use outcome::{Fit, GrazingEstimate, Warning};
 pub use suspects::Suspect;
-pub use words::{Estimate, between, offset, offset_between};
+pub use words::{Estimate, NOT_TOLD, between, offset, offset_between};
 
 use crate::capture;
 use crate::error::{Error, Result};

@@ -1,10 +1,10 @@
 //! Results of a fit, and the probe file that states it.
 
 use super::candidate::{Candidate, Kept};
-use super::layer::Layer;
+use super::layer::{Layer, MOST_ANGLE};
 use super::search::{Best, Ends};
 use super::suspects::Suspect;
-use super::words::{Estimate, between, offset, offset_between};
+use super::words::{Estimate, NOT_TOLD, between, offset, offset_between};
 use super::{Evidence, Settings, Timer};
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::noise::{Grazing, Noise};
@@ -118,7 +118,10 @@ pub(super) fn outcome(
         missed: (!only_full).then_some(missed),
         stroke,
         grazing: bends.then_some(GrazingEstimate {
-            angle: layered(&|real| real.grazing.angle),
+            angle: {
+                let Estimate { value, low, high } = layered(&|real| real.grazing.angle);
+                Estimate { value, low: low.filter(|low| *low > 0.0), high: high.filter(|high| *high < MOST_ANGLE) }
+            },
             bend: layered(&|real| real.grazing.bend / 1e3),
         }),
         timer: resolution,
@@ -167,7 +170,7 @@ impl Fit {
         );
         // Writing to a string cannot fail.
         for warning in &self.warnings {
-            _ = writeln!(text, "# Not told well: {warning}");
+            _ = writeln!(text, "# Poorly determined: {warning}");
         }
         for suspect in &self.suspects {
             _ = writeln!(text, "# LOOKS WRONG: {suspect}");
@@ -208,10 +211,10 @@ impl Fit {
         if let Some(GrazingEstimate { angle, bend }) = &self.grazing {
             _ = writeln!(
                 text,
-                "grazing = {{ angle = \"{:.2}deg\", bend = {:.5} }}  # {} degrees, {}",
+                "grazing = {{ angle = \"{:.2}deg\", bend = {:.5} }}  # {}, {}",
                 angle.value,
                 bend.value * length,
-                between(angle, 1.0, 0),
+                degrees(angle),
                 between(bend, length, 4)
             );
         }
@@ -222,6 +225,27 @@ impl Fit {
     }
 }
 
+/// An interval of an angle in words: "10 to 30 degrees".
+fn degrees(angle: &Estimate) -> String {
+    match between(angle, 1.0, 0) {
+        none if none == NOT_TOLD => format!("an angle that is {none}"),
+        told => format!("{told} degrees"),
+    }
+}
+
 fn with_interval(late: &Estimate) -> String {
     format!("{} ({})", offset(late.value, 2), offset_between(late, 2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_angle_of_which_the_recordings_tell_no_end_is_not_said_to_be_known() {
+        let said = |low, high| degrees(&Estimate { value: 42.0, low, high });
+        assert_eq!(said(None, None), "an angle that is not told");
+        assert_eq!(said(Some(30.0), Some(50.0)), "30 to 50 degrees");
+        assert_eq!(said(Some(30.0), None), "at least 30 degrees");
+    }
 }

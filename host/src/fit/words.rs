@@ -26,6 +26,9 @@ impl Estimate {
     }
 }
 
+/// Words for an interval without an end.
+pub const NOT_TOLD: &str = "not told";
+
 /// An interval in words: "1.0 to 1.2", "at most 3".
 pub fn between(estimate: &Estimate, scale: f64, digits: usize) -> String {
     let number = |value: f64| {
@@ -41,7 +44,7 @@ pub fn between(estimate: &Estimate, scale: f64, digits: usize) -> String {
         (Some(low), Some(high)) => format!("{} to {}", number(low), number(high)),
         (Some(low), None) => format!("at least {}", number(low)),
         (None, Some(high)) => format!("at most {}", number(high)),
-        (None, None) => "not told".into(),
+        (None, None) => NOT_TOLD.into(),
     }
 }
 
@@ -61,7 +64,7 @@ pub fn offset_between(late: &Estimate, digits: usize) -> String {
         (Some(low), Some(high)) => format!("{} to {}", offset(low, digits), offset(high, digits)),
         (Some(low), None) => format!("{} or later", offset(low, digits)),
         (None, Some(high)) => format!("{} or earlier", offset(high, digits)),
-        (None, None) => "not told".into(),
+        (None, None) => NOT_TOLD.into(),
     }
 }
 

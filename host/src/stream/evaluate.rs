@@ -128,6 +128,8 @@ pub struct Grown {
     pub posteriors: Vec<Vec<f64>>,
     /// The row after which there was a verdict, and the name if one was given.
     pub ended: Option<(u32, Option<usize>)>,
+    /// The share of the sequences with a name that took more rows; none if no name was given.
+    pub longer: Option<f64>,
 }
 
 /// Streams of two sequences of different classes, one after the other, the second of which comes in the middle of the first's
@@ -391,7 +393,7 @@ impl Run<'_> {
         Comparison { early, fixed: shown(fixed), vote: shown(vote), fixed_rows, vote_rows }
     }
 
-    /// The sequence of about the median length, with a verdict if there is one.
+    /// A sequence with a name, if there is one: that at three quarters of these in the order of their rows.
     fn grown(&self, sequences: &[RowSequence], ends: &[End], stopping: Stopping) -> Option<Grown> {
         let mut order: Vec<usize> = (0..ends.len()).filter(|&at| ends[at].name.is_some()).collect();
         order.sort_by_key(|&at| (ends[at].rows, at));
@@ -406,7 +408,8 @@ impl Run<'_> {
         }
         let end = &ends[at];
         let ended = (end.name.is_some() || end.unknown).then_some((end.rows, end.name));
-        Some(Grown { class: sequence.class, posteriors, ended })
+        let longer = order.iter().filter(|&&other| ends[other].rows > end.rows).count() as f64 / order.len() as f64;
+        Some(Grown { class: sequence.class, posteriors, ended, longer: Some(longer).filter(|share| share.is_finite()) })
     }
 
     /// Streams in which the class changes, without and with forgetting. Streams are of a sequence, cut where half of the

@@ -62,7 +62,7 @@ pub(super) struct Material {
 }
 
 /// Noise that stands for what few touches have not shown: 30 % and 10 ms on times, 8° on the pose, times `factor`.
-pub(super) fn jitter(factor: f64) -> Noise {
+pub fn jitter(factor: f64) -> Noise {
     Noise {
         deviation: (10_000.0 * factor).into(),
         speed_error: (0.3 * factor).min(0.9),

@@ -30,7 +30,8 @@ pub use adjust::{Adjusted, AdjustedObject, Fitness, adjust};
 pub use alone::alone;
 pub use curve::{Curve, Point};
 pub use error::TeachProblem;
-pub use promise::Needed;
+pub use held_out::jitter;
+pub use promise::{Needed, RATE};
 
 use crate::ensemble::train::{BASE_MARGIN, round_leaves};
 use crate::ensemble::{Ensemble, Node, TouchOrigin, train};

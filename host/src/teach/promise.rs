@@ -8,8 +8,9 @@ use crate::random::{self, Purpose};
 use rand::seq::SliceRandom;
 use serde::Serialize;
 
-/// The error rate that is promised, and the probability with which it is kept: `palpate calibrate`'s own.
-const RATE: f64 = 0.01;
+/// The error rate that is promised: `palpate calibrate`'s own.
+pub const RATE: f64 = 0.01;
+/// The probability with which it is kept.
 const CONFIDENCE: f64 = 0.95;
 /// Limits to which sequences of a calibration are followed, in nats beyond the posterior's threshold, and in touches.
 const STRICTEST: f64 = calibrate::STRICTEST[0];

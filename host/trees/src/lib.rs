@@ -13,6 +13,7 @@
 //! | [`prove`] | a model means what its ensemble means, for every row: proofs and certificates | [`prove::prove`](fn@prove::prove) |
 //! | [`train`] | grows boosted trees on rows of classes | [`train::train`] |
 //! | [`output`], [`progress`] | files that appear whole or not at all; progress of long calls | |
+//! | [`wording`] | numbers as people read them | [`wording::decimal`] |
 //!
 //! The crate `palpate` builds on this one and adds meshes, probes and touches. The crates [`onboard`] and [`shared`] run on
 //! the chip.
@@ -26,6 +27,7 @@ pub mod prove;
 pub mod rows;
 pub mod train;
 pub mod verify;
+pub mod wording;
 
 pub use error::{Error, Result};
 pub use palpate_onboard as onboard;

@@ -1,5 +1,5 @@
 use super::Global;
-use super::numbers::{count, error_rate, share};
+use super::numbers::{self, error_rate, share};
 use super::plan::{self, Wanted};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
@@ -16,6 +16,7 @@ use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::strangers::{self, Found};
 use palpate::touches::Dataset;
+use palpate::wording::{self, count, decimal, rate};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -54,7 +55,7 @@ pub(crate) struct Arguments {
     #[arg(long, default_value = "0.95", value_name = "SHARE", value_parser = share)]
     confidence: f64,
     /// Sequences of touches to draw; of all objects together, at most
-    #[arg(long, default_value = "100000", value_name = "N", value_parser = count)]
+    #[arg(long, default_value = "100000", value_name = "N", value_parser = numbers::count)]
     sequences: u64,
     /// Give up after this many touches [default: the model's own limit]
     #[arg(long, value_name = "N")]
@@ -144,6 +145,11 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         active: arguments.active,
         seed: global.seed(),
     };
+    // Recorded touches hold the noise of their probe.
+    let unlike = calibrate::unlike_training(&compiled.model(), &dataset.real().and(&settings.noise));
+    if let Some(unlike) = unlike.filter(|_| !dataset.is_recorded()) {
+        super::remark(&format!("palpate: note: {unlike}"));
+    }
     let wrong = |error: palpate::Error| {
         let is_of_recorded = matches!(error.problem(), Some(CalibrateProblem::NotSupported { .. }))
             || matches!(error.problem(), Some(EvaluateProblem::TooFewRecorded { .. }));
@@ -230,20 +236,20 @@ struct Both<'c> {
 }
 
 fn written(path: &std::path::Path, calibrated: &Calibrated) -> String {
-    format!("{}: {} bytes", path.display(), calibrated.model.len())
+    format!("{}: {} bytes", path.display(), count(calibrated.model.len()))
 }
 
 fn text(calibrated: &Calibrated) -> String {
-    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+    let percent = |share: f64| wording::percent(share, 2);
     let mut text = thresholds::promised(calibrated.promised, calibrated.promise.per, "", calibrated.confidence);
     // Writing to a string cannot fail.
     _ = writeln!(
         text,
-        "{} sequences: of the names given {} wrong, {} without a name; {:.1} {} each.",
-        calibrated.sequences,
+        "{} sequences: of the names given {} wrong, {} without a name; {} {} each.",
+        count(calibrated.sequences),
         percent(calibrated.error),
         percent(calibrated.undecided),
-        calibrated.mean_approaches.unwrap_or(calibrated.mean_touches),
+        decimal(calibrated.mean_approaches.unwrap_or(calibrated.mean_touches), 1),
         calibrated.counted,
     );
     text += &thresholds::text(&calibrated.margins, &calibrated.errors, calibrated.uncalibrated_margin);

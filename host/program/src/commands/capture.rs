@@ -1,4 +1,4 @@
-use super::numbers::count;
+use super::numbers;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::scene::{SceneArguments, described};
@@ -10,6 +10,7 @@ use palpate::mesh::facts::Facts;
 use palpate::output;
 use palpate::probe::approach::Aim;
 use palpate::touches::{Format, Listing, Origin, Shard};
+use palpate::wording::{count, decimal};
 use palpate::{Error, Result};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -37,10 +38,10 @@ pub(crate) struct Arguments {
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Touches of each object; with all three fingers [default: 21000]
-    #[arg(long, value_name = "N", value_parser = count, conflicts_with = "approaches")]
+    #[arg(long, value_name = "N", value_parser = numbers::count, conflicts_with = "approaches")]
     touches: Option<u64>,
     /// Approaches to each object; all of them kept, also those that miss, instead of full touches
-    #[arg(long, value_name = "N", value_parser = count)]
+    #[arg(long, value_name = "N", value_parser = numbers::count)]
     approaches: Option<u64>,
     /// The longest side of each object's bounding box, in units [default: 10]
     #[arg(long, value_name = "UNITS", conflicts_with = "true_size")]
@@ -200,8 +201,9 @@ fn kept(summary: &Summary) -> String {
     let mut text = format!("{:width$}  {:>12}  {:>8}  {:>14}\n", "object", "approaches", "touching", "approaches/s");
     let mut row = |name: &str, approaches: u64, [now, touching]: [u64; 2], seconds: f64| {
         let share = 100.0 * touching as f64 / now.max(1) as f64;
+        let (approaches, rate) = (count(approaches), decimal(now as f64 / seconds, 0));
         // Writing to a string cannot fail.
-        _ = writeln!(text, "{name:width$}  {approaches:>12}  {share:>7.1}%  {:>14.0}", now as f64 / seconds);
+        _ = writeln!(text, "{name:width$}  {approaches:>12}  {share:>7.1}%  {rate:>14}");
     };
     for object in &summary.objects {
         row(&object.name, object.approaches, [object.approaches_now, object.touching], object.seconds);
@@ -224,9 +226,9 @@ fn table(summary: &Summary) -> String {
     );
     let mut row = |name: &str, touches: u64, approaches: u64, now: u64, seconds: f64| {
         let share = 100.0 * touches as f64 / approaches.max(1) as f64;
-        let rate = now as f64 / seconds;
+        let (touches, approaches, rate) = (count(touches), count(approaches), decimal(now as f64 / seconds, 0));
         // Writing to a string cannot fail.
-        _ = writeln!(text, "{name:width$}  {touches:>10}  {approaches:>12}  {share:>6.1}%  {rate:>14.0}");
+        _ = writeln!(text, "{name:width$}  {touches:>10}  {approaches:>12}  {share:>6.1}%  {rate:>14}");
     };
     for object in &summary.objects {
         row(&object.name, object.touches, object.approaches, object.approaches_now, object.seconds);

@@ -32,7 +32,7 @@ pub(super) fn features(model: &Model<'_>) -> String {
     let needed: String =
         sections.iter().filter(|section| section.1).map(|section| format!(", {}", section.0)).collect();
     format!(
-        "A chip that reads no other models needs these features of palpate-onboard: {}, {}-leaves{needed}\n",
+        "To read only this model, build palpate-onboard with: {}, {}-leaves{needed}\n",
         model.layout().name(),
         model.leaf_type().name(),
     )

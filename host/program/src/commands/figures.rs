@@ -1,9 +1,10 @@
 //! The figures of an evaluation as JSON and as text.
 
-use super::percent;
 use palpate::evaluate::{
     ActiveFacts, Approaches, Confusion, Evaluated, Evaluation, Finding, PromiseCheck, Rule, Strangers, Switched,
 };
+use palpate::wording::{self, count, counted, rate};
+use palpate_shared::DIRECTIONS;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -21,9 +22,9 @@ pub(super) fn text(evaluated: &Evaluated) -> String {
         // Writing to a string cannot fail.
         _ = writeln!(
             text,
-            "Each approach is in the pose that the plan proposed, of {poses} (26 directions, {rolls} roll{} each; {left_out} \
-             never touch, {without_approaches} have no approach here).",
-            if *rolls == 1 { "" } else { "s" }
+            "Each approach is in the pose that the plan proposed, of {poses} ({DIRECTIONS} directions, {} each; {left_out} never \
+             touch, {without_approaches} have no approach here).",
+            counted(usize::from(*rolls), "roll", "rolls")
         );
     }
     if evaluated.robots > 1 {
@@ -57,8 +58,8 @@ pub(super) fn text(evaluated: &Evaluated) -> String {
 /// At what recognizers stop.
 fn stops(error_rate: f64, promised: Option<f64>) -> String {
     match promised {
-        Some(rate) => format!("at a promised error rate of {rate}"),
-        None => format!("at an error rate of {error_rate}"),
+        Some(promised) => format!("at a promised error rate of {}", rate(promised)),
+        None => format!("at an error rate of {}", rate(error_rate)),
     }
 }
 
@@ -77,8 +78,8 @@ fn above_text(evaluation: &Evaluation) -> String {
     match (above.is_empty(), promised) {
         (true, _) => String::new(),
         (false, promised) => format!(
-            "More than {} % are wrong of the names given to: {}.{}\n",
-            percent(error_rate),
+            "More than {} are wrong of the names given to: {}.{}\n",
+            rate(error_rate),
             above.iter().map(share).collect::<Vec<_>>().join(", "),
             match promised {
                 Some(_) =>
@@ -97,15 +98,15 @@ fn promise_text(check: &PromiseCheck) -> String {
         _ => " of the names given".to_owned(),
     };
     let mut text = format!(
-        "\nPromised: at most {} % wrong ({}, {} % sure, from {} sequences). Measured: {:.2} %{of} ± {:.2}: {}.\n",
-        percent(check.promised),
+        "\nPromised: at most {} wrong ({}, {} sure, from {} sequences). Measured: {:.2} %{of} ± {:.2}: {}.\n",
+        rate(check.promised),
         match check.per {
             "name" => "each name, when it is given",
             "object" => "each object",
             _ => "on average",
         },
-        percent(check.confidence),
-        check.sequences,
+        rate(check.confidence),
+        count(check.sequences),
         100.0 * check.error,
         100.0 * check.standard_error,
         match check.finding {
@@ -196,8 +197,8 @@ fn table(evaluation: &Evaluation) -> String {
         100.0 * sequential.error_standard_error,
         100.0 * sequential.undecided,
         sequential.max_touches,
-        evaluation.groups,
-        evaluation.touches,
+        count(evaluation.groups),
+        count(evaluation.touches),
     );
     text
 }
@@ -285,16 +286,17 @@ fn switch_table(switch: &Switched) -> String {
 
 /// Answers to strangers, in percent: one row per object.
 fn strangers_table(strangers: &Strangers) -> String {
-    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let percent = |share: f64| wording::percent(share, 1);
     if !strangers.has_test {
         let named = strangers.wrong_name_per_object.iter().map(|(name, share)| format!("{name} {}", percent(*share)));
         return format!(
             "\nObjects that the model does not know: {} got a name, {} no verdict. The model has no test of whether touches \
              fit an object that it knows, so it never says that one is unknown: palpate calibrate --strangers certain adds \
-             one. Got a name: {}.\n",
+             one. Got a name: {}.\n{}",
             percent(strangers.wrong_name),
             percent(strangers.undecided),
-            named.collect::<Vec<_>>().join(", ")
+            named.collect::<Vec<_>>().join(", "),
+            used_up(strangers)
         );
     }
     let names = strangers.detected_per_object.keys().map(|name| name.chars().count());
@@ -318,7 +320,22 @@ fn strangers_table(strangers: &Strangers) -> String {
         "\nObjects that the model does not know: the share detected after each number of touches, and the share that got a name; \
          {undecided} got no verdict.\nOf the objects that it knows, {alarms} were taken for unknown."
     );
-    text
+    text + &used_up(strangers)
+}
+
+/// Meaning of a dash in the shares of strangers; nothing where there is none.
+fn used_up(strangers: &Strangers) -> String {
+    let Strangers { used_up, fewest_touches, max_touches, .. } = strangers;
+    let shares = || strangers.detected_per_object.values().flat_map(BTreeMap::values);
+    if shares().chain(strangers.wrong_name_per_object.values()).all(|share| share.is_finite()) {
+        return String::new();
+    }
+    format!(
+        "A dash (–): not known, since touches ran out before a verdict in more than one sequence of a hundred (in {} of all). The \
+         model may take {max_touches} touches, and a sequence is drawn from {fewest_touches} at least: capture more approaches to \
+         each of these objects, or to each of their instances.\n",
+        wording::percent(*used_up, 1)
+    )
 }
 
 /// Shares in percent: one row per touched object, one column per object that it was taken for.

@@ -5,7 +5,7 @@ use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::{Global, remark};
 use palpate::error::{FitProblem, ProbeProblem};
-use palpate::fit::{Fit, GrazingEstimate, Settings, between, fit, offset, offset_between};
+use palpate::fit::{Fit, GrazingEstimate, NOT_TOLD, Settings, between, fit, offset, offset_between};
 use palpate::output;
 use palpate::touches::{Origin, read_touches};
 use palpate::{Error, Result};
@@ -120,7 +120,8 @@ fn table(found: &Fit) -> String {
     }
     if let Some(grazing) = &found.grazing {
         let GrazingEstimate { angle, bend } = grazing;
-        line("fingers bend beyond", format!("{:.0}°", angle.value), between(angle, 1.0, 0) + "°");
+        let told = between(angle, 1.0, 0);
+        line("fingers bend beyond", format!("{:.0}°", angle.value), if told == NOT_TOLD { told } else { told + "°" });
         line("aside by", format!("{:.2} ms", bend.value), between(bend, 1.0, 2) + " ms");
     }
     _ = match found.timer {
@@ -132,7 +133,7 @@ fn table(found: &Fit) -> String {
     }
     text += "\nOffsets are relative to the first finger's: only differences of times are recorded.\n";
     for warning in &found.warnings {
-        _ = writeln!(text, "Not told well: {warning}");
+        _ = writeln!(text, "Poorly determined: {warning}");
     }
     text
 }

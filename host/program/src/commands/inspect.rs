@@ -7,6 +7,8 @@ use palpate::chip::inspect::{
 };
 use palpate::compile::{CompiledModel, Core, Memory};
 use palpate::output;
+use palpate::wording::{count, counted, rate, scientific};
+use palpate_shared::DIRECTIONS;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -86,9 +88,9 @@ fn text(inspected: &Inspected<'_>) -> String {
     training_lines(&mut lines, inspected);
     let each = if inspected.predicts.is_some() { "row" } else { "touch" };
     lines.line("instructions", format!("{} (per {each}, estimated)", instructions(inspected.instructions)));
-    lines.line("bytes", inspected.bytes);
+    lines.line("bytes", count(inspected.bytes));
     for (part, bytes) in &inspected.bytes_by_part {
-        lines.line("", format!("{bytes:>9} {}", part.replace('_', " ")));
+        lines.line("", format!("{:>9} {}", count(*bytes), part.replace('_', " ")));
     }
     lines.line("checksum", &inspected.checksum);
     lines.line("ensemble", &inspected.ensemble);
@@ -128,12 +130,16 @@ fn what_it_is(lines: &mut Lines, inspected: &Inspected<'_>) {
     lines.line("layout", format!("{}, {} leaves{shared}", inspected.layout, inspected.leaf));
     lines.line(
         "margins",
-        format!("units of {:.3e} nats, within {:.2e} nats of the ensemble's", inspected.unit, inspected.margin_error),
+        format!(
+            "units of {:.3e} nats, within {} nats of the ensemble's",
+            inspected.unit,
+            scientific(inspected.margin_error.into())
+        ),
     );
     let things = if inspected.predicts.is_some() { "rows" } else { "touches" };
     let Defaults { error_rate, max_touches } = inspected.stopping;
     match inspected.promise {
-        None => lines.line("stopping", format!("error rate {error_rate}, at most {max_touches} {things}")),
+        None => lines.line("stopping", format!("error rate {}, at most {max_touches} {things}", rate(error_rate))),
         Some(_) => lines.line("stopping", format!("at most {max_touches} {things}")),
     }
 }
@@ -243,7 +249,8 @@ fn training_lines(lines: &mut Lines, inspected: &Inspected<'_>) {
         }
     }
     if let Some(PlanOf { rolls, poses, left_out }) = &inspected.plan {
-        let text = format!("{poses} poses: 26 directions, {rolls} of the row's rolls each; {left_out} never touch");
+        let rolls = counted(usize::from(*rolls), "roll", "rolls");
+        let text = format!("{poses} poses: {DIRECTIONS} directions, {rolls} of the row each; {left_out} never touch");
         lines.line("plan", text);
     }
 }

@@ -103,7 +103,7 @@ commands! {
     Completions => completions,
 }
 
-/// Recognize objects by touch: virtual touches, boosted trees, a model of a few kilobytes for a microcontroller.
+/// Recognize objects by touch: virtual touches, boosted trees, a compiled model for a microcontroller.
 #[derive(Parser)]
 #[command(
     name = "palpate",
@@ -128,7 +128,7 @@ pub(crate) struct Global {
     /// Print the result as JSON
     #[arg(long, global = true)]
     json: bool,
-    /// Threads, which change no result [default: all]
+    /// Number of threads; results do not depend on it [default: all]
     #[arg(long, global = true, value_name = "N", value_parser = threads)]
     threads: Option<usize>,
     /// Seed of all that is random [default: 1]
@@ -212,7 +212,7 @@ fn overview(cli: &clap::Command) -> String {
         + "
 Global options:
   --json         Print the result as JSON
-  --threads <N>  Threads, which change no result
+  --threads <N>  Number of threads; results do not depend on it
   --seed <N>     Seed of all that is random
   --quiet        Print neither progress nor remarks
   --force        Write all the same, over what is there
@@ -289,7 +289,7 @@ pub fn main() -> ExitCode {
             eprintln!("palpate: {text}");
             std::process::exit(2);
         }
-        without_trailing(error).exit()
+        without_trailing(without_help(&words).unwrap_or(error)).exit()
     });
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     match cli.global.apply().and_then(|()| cli.command.run(&cli.global)) {
@@ -305,6 +305,14 @@ pub fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// The error about a command that `palpate help` was asked for: the parser suggests similar names of commands that are to be
+/// run alone.
+fn without_help(words: &[String]) -> Option<clap::Error> {
+    let (first, named) = words.split_first()?;
+    let error = cli().try_get_matches_from(std::iter::once("palpate").chain(named.iter().map(String::as_str))).err()?;
+    (first == "help" && error.kind() == clap::error::ErrorKind::InvalidSubcommand).then_some(error)
 }
 
 /// The error without the advice to give an option that does not exist as a value: no file or object begins with a dash.

@@ -7,6 +7,7 @@ use palpate::compile::CompiledModel;
 use palpate::ensemble::Ensemble;
 use palpate::evaluate::parity;
 use palpate::output;
+use palpate::wording::{count, scientific};
 use std::path::Path;
 
 /// Compares a compiled model with its ensemble, touch by touch and in a number of sequences.
@@ -23,14 +24,14 @@ pub(super) fn run(
         return output::print_json(&parity);
     }
     output::print(&format!(
-        "{} touches: margins differ by at most {:.2e} nats (the model states {:.2e}); another best object after {}\n\
-         {} sequences: another verdict in {}, the same after another number of touches in {}\n",
-        parity.touches,
-        parity.max_margin_error,
-        parity.stated_bound,
-        parity.best_differs,
-        parity.sequences,
-        parity.verdict_differs,
-        parity.touches_differ
+        "{} touches: margins differ by at most {} nats (the model states {}); another best object after {}\n\
+         {} sequences: {} with another verdict; {} with the same verdict at another touch\n",
+        count(parity.touches),
+        scientific(parity.max_margin_error),
+        scientific(parity.stated_bound),
+        count(parity.best_differs),
+        count(parity.sequences),
+        count(parity.verdict_differs),
+        count(parity.touches_differ)
     ))
 }

@@ -9,7 +9,9 @@ use palpate::evaluate::{self, Planned};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
+use palpate::wording::{count, counted, decimal};
 use palpate::{Error, Result};
+use palpate_shared::DIRECTIONS;
 use std::path::{Path, PathBuf};
 
 #[derive(serde::Serialize)]
@@ -58,13 +60,15 @@ pub(super) fn run(wanted: &Wanted<'_>, global: &Global) -> Result<()> {
     let Written { bytes, planned: Planned { plan_bytes, poses, rolls, left_out, fewest, hardest, .. } } = &written;
     let [first, second] = &hardest.objects;
     let text = format!(
-        "{}: {bytes} bytes, of which {plan_bytes} are a plan of {poses} poses: 26 directions, {rolls} roll{} each; \
-         {left_out} never touch\n\
-         Hardest to tell apart: {first} and {second}, by {:.3} of 1 in the best pose. Means are of {fewest} approaches or \
-         more.\n",
+        "{}: {} bytes; {} of them are a plan of {poses} poses: {DIRECTIONS} directions, {} each; {left_out} never touch\n\
+         Hardest to distinguish: {first} and {second}, separated by {} in the best pose (1 = fully). Means are of {} approaches \
+         or more.\n",
         path.display(),
-        if *rolls == 1 { "" } else { "s" },
-        hardest.separation,
+        count(*bytes),
+        count(*plan_bytes),
+        counted(usize::from(*rolls), "roll", "rolls"),
+        decimal(hardest.separation, 3),
+        count(*fewest),
     );
     output::print_about(path, &text)
 }

@@ -11,7 +11,9 @@ use palpate::evaluate::verify::Verified;
 use palpate::output;
 use palpate::prove::{Certificate, Moves, Proof, check, check_code, moves, prove, prove_code};
 use palpate::rows::Rows;
+use palpate::wording::{decimal, scientific};
 use palpate_onboard::ModelError;
+use std::fmt::Write as _;
 use std::path::Path;
 
 /// A model and its ensemble, and the files of a proof of it.
@@ -143,8 +145,10 @@ fn proof_text(proof: &Proof, what: &str) -> String {
     };
     let mut text = format!(
         "{what}: on every possible row {compared}, up to rounding ({boxes} boxes of rows).\n\
-         A leaf differs by at most {largest_difference:.2e}, a margin by at most {margin_error:.2e}; the model states \
-         {stated:.2e}.\n"
+         A leaf differs by at most {}, a margin by at most {}; the model states {}.\n",
+        scientific(*largest_difference),
+        scientific(*margin_error),
+        scientific(*stated)
     );
     if margin_error > stated {
         text += "That bound is proved: it is the sum of the trees' largest differences, which no single row need reach. The smaller \
@@ -158,11 +162,18 @@ fn proof_text(proof: &Proof, what: &str) -> String {
     }
     text += "Bounds of each margin, and how near to them a search for rows came:\n";
     for ((name, least, most), (from, to)) in ranges.iter().zip(&proof.found) {
-        let near = |bound: f64, found: f64| match (bound - found).abs() <= 1e-9 * bound.abs().max(1.0) {
+        let near = |bound: f64, found: f64, extreme: &str| match (bound - found).abs() <= 1e-9 * bound.abs().max(1.0) {
             true => "attained".to_owned(),
-            false => format!("not known to be attained; {found:.4} is"),
+            false => format!("{extreme} row found: {}", decimal(found, 4)),
         };
-        text += &format!("  {name}: {least:.4} ({}) to {most:.4} ({})\n", near(*least, *from), near(*most, *to));
+        _ = writeln!(
+            text,
+            "  {name}: at least {} ({}), at most {} ({})",
+            decimal(*least, 4),
+            near(*least, *from, "lowest"),
+            decimal(*most, 4),
+            near(*most, *to, "highest")
+        );
     }
     if proof.splits > 0 {
         text += &format!("A row passes at most {} splits.\n", proof.splits);

@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     /// Where to write; a directory for the page, its figures and tables
     #[arg(short, long, default_value = "report", value_name = "PATH")]
     output: PathBuf,
-    /// Fewer folds, levels and touches; the same figures
+    /// Fewer folds, levels, touches and trees; the same figures
     #[arg(long)]
     quick: bool,
     /// Measure growth and generalization too, which use built-in objects; the default for `builtin` alone

@@ -7,6 +7,7 @@ use palpate::Result;
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
+use palpate::wording::count;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -55,9 +56,11 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if !json {
         // At once: the capture takes a while.
         output::print(&format!(
-            "Touching {} objects {touches} times each with all three fingers, approaching each {approaches} times more, \
-             then training, compiling and testing three methods. Results in {}\n",
+            "Touching {} objects {} times each with all three fingers, approaching each {} times more, then training, \
+             compiling and testing three methods. Results in {}\n",
             objects.len(),
+            count(touches),
+            count(approaches),
             out.display()
         ))?;
     }

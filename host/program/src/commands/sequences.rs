@@ -12,6 +12,7 @@ use palpate::output;
 use palpate::rows::{SequenceColumns, Sequences};
 use palpate::strangers;
 use palpate::stream::{self, Calibrated, Evaluated, Gain, Strangers};
+use palpate::wording;
 use palpate_onboard::Model;
 use palpate_shared::format::Held;
 use std::fmt::Write as _;
@@ -118,15 +119,11 @@ fn calibrated_text(path: &Path, calibrated: &Calibrated) -> String {
         percent(*error),
         percent(*undecided),
     );
+    _ = writeln!(text, "Learned evidence table: {}", gain(calibrated.row_evidence, "used", "not used"));
     _ = writeln!(
         text,
-        "Evidence of a row: {}",
-        gain(calibrated.row_evidence, "a table from margins to evidence", "the margins")
-    );
-    _ = writeln!(
-        text,
-        "Weight of rows: {}{}",
-        gain(calibrated.weights, "less the more there are", "each as much as the first"),
+        "Learned weights, smaller for later rows: {}{}",
+        gain(calibrated.weights, "used", "not used"),
         calibrated.weights_by_doubling.as_ref().map_or_else(String::new, |weights| weights_text(weights)),
     );
     text += &super::thresholds::text(&calibrated.margins, &calibrated.errors, calibrated.uncalibrated_margin);
@@ -143,15 +140,11 @@ fn calibrated_text(path: &Path, calibrated: &Calibrated) -> String {
 
 fn gain(gain: Option<Gain>, with: &str, without: &str) -> String {
     let Some(Gain { kept, rows_without, rows_with }) = gain else {
-        return format!("{without}; too few sequences to learn more from");
+        return format!("{without}; too few sequences to learn from");
     };
     let rows = |rows: Option<f64>| rows.map_or_else(|| "no threshold".into(), |rows| format!("{rows:.1} rows"));
     let what = if kept { with } else { without };
-    format!(
-        "{what} ({} with, {} without, on sequences that the promise does not rest on)",
-        rows(rows_with),
-        rows(rows_without)
-    )
+    format!("{what} ({} with them, {} without, on held-back sequences)", rows(rows_with), rows(rows_without))
 }
 
 fn weights_text(weights: &[f64]) -> String {
@@ -235,7 +228,7 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
         );
     }
     let fixed = |rows: Option<f64>, what: &str| match rows {
-        Some(rows) => format!("{rows:.1} rows ({:.0} % fewer)", 100.0 * (1.0 - mean_rows / rows)),
+        Some(rows) => format!("{} rows ({})", wording::decimal(rows, 1), wording::compared(*mean_rows, rows)),
         None => format!("no number of rows ({what})"),
     };
     let comparison = &evaluated.comparison;

@@ -62,7 +62,10 @@ pub(crate) fn text(found: &Found) -> String {
     text += &found.recorded.as_ref().map_or_else(String::new, on_recordings);
     let width = found.left_out.keys().map(|name| name.chars().count()).max().unwrap_or(0).max("left out".len());
     // Writing to a string cannot fail.
-    _ = writeln!(text, "{:width$} {:>8} {:>8} {:>8}", "left out", "30", "60", "120");
+    _ = write!(text, "{:width$}", "left out");
+    let numbers = found.left_out.values().next().into_iter().flat_map(std::collections::BTreeMap::keys);
+    numbers.for_each(|at| _ = write!(text, " {at:>8}"));
+    text.push('\n');
     for (name, shares) in &found.left_out {
         _ = write!(text, "{name:width$}");
         shares.values().for_each(|share| _ = write!(text, " {:>8}", percent(*share)));

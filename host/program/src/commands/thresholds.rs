@@ -22,7 +22,7 @@ pub(super) fn text(margins: &BTreeMap<String, f64>, errors: &BTreeMap<String, f6
     if errors.is_empty() {
         let margin = margins.values().next().copied().unwrap_or(f64::NAN);
         return format!(
-            "Names are given {margin:.2} nats ahead of all others; uncalibrated it would be {uncalibrated:.2}.\n"
+            "An object is named once it leads by {margin:.2} nats (before calibration: {uncalibrated:.2}).\n"
         );
     }
     let width = margins.keys().map(|name| name.chars().count()).max().unwrap_or(0);
@@ -32,7 +32,7 @@ pub(super) fn text(margins: &BTreeMap<String, f64>, errors: &BTreeMap<String, f6
         // Writing to a string cannot fail.
         _ = writeln!(text, "{name:width$} {error:>8} {margin:>8.2}");
     }
-    text + &format!("Uncalibrated, names are given at {uncalibrated:.2} nats.\n")
+    text + &format!("An object is named once it leads by its nats (before calibration: {uncalibrated:.2}).\n")
 }
 
 /// A warning of objects that a rate of other names hides; `hidden` if one has few names.

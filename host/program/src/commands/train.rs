@@ -12,6 +12,7 @@ use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::teach::{self, Adjusted, Taught};
 use palpate::touches::{Dataset, ObjectTouches};
+use palpate::wording::{count, decimal, percent};
 use palpate::{Error, Result};
 use palpate_onboard::Refused;
 use palpate_shared::format::Counted;
@@ -22,6 +23,8 @@ use std::time::Instant;
 /// Train an ensemble on captured touches, and save it as XGBoost JSON.
 #[derive(clap::Args)]
 #[command(after_help = "\
+The ensemble is XGBoost's JSON. Its features are in microseconds, where data sets have seconds, and cosines in units of 1/32767.
+
 Presets: compact is small and accurate (leaves hold a value per object; curvature), paper the published method (one tree per object and round; contact times). Keys of --trees: rounds, depth, eta, min_child_weight, bins, leaves, leaf_bits, different_leaves, threshold_cost, trainer; docs/reference/options.md explains them, --teach and --evidence.
 
 Examples:
@@ -165,13 +168,13 @@ impl<'m> Trained<'m> {
 /// Summary of the training, as text.
 fn text(output: &Path, trained: &Trained<'_>, made: &Made) -> String {
     let text = format!(
-        "{}: {} trees, {} splits on {} of {} of {} {} of {} objects ({}), trained in {:.1} s\n",
+        "{}: {} trees, {} splits on {} of {} of {} {} of {} objects ({}), trained in {} s\n",
         output.display(),
-        trained.trees,
-        trained.splits,
+        count(trained.trees),
+        count(trained.splits),
         trained.descriptor,
-        trained.used,
-        trained.touches,
+        count(trained.used),
+        count(trained.touches),
         if made.dataset.holds_approaches() { "approaches" } else { "touches" },
         made.dataset.objects.len(),
         match made.ensemble.trained_touches().counted {
@@ -179,9 +182,11 @@ fn text(output: &Path, trained: &Trained<'_>, made: &Made) -> String {
             Counted::Contacts => "those with a contact",
             Counted::All => "all of them",
         },
-        trained.seconds
+        decimal(trained.seconds, 1)
     );
-    text + &cost(trained, made.is_clean)
+    // A remark, not a result.
+    let cost = if super::is_quiet() { String::new() } else { cost(trained, made.is_clean) };
+    text + &cost
         + &trained.adjusted.map_or_else(String::new, super::teach::adjusted)
         + &trained.taught.map_or_else(String::new, super::teach::text)
 }
@@ -269,13 +274,20 @@ fn teaching(settings: &Settings) -> teach::Settings {
 fn cost(trained: &Trained<'_>, is_clean: bool) -> String {
     let ms = SWITCH / 1e3;
     match trained.cost_of_noise {
-        Some(CostOfNoise { touches, clean, noisy }) => format!(
-            "{ms} ms of noise on contact times would cost about {:.0} points: {:.0} instead of {:.0} % correct after {touches} \
-             touches. --real noise={ms}ms trains for it.\n",
-            100.0 * (clean - noisy),
-            100.0 * noisy,
-            100.0 * clean,
-        ),
+        Some(CostOfNoise { touches, clean, noisy }) => {
+            let points = (100.0 * (clean - noisy)).round();
+            let cost = match () {
+                () if points >= 2.0 => format!("about {} points", decimal(points, 0)),
+                () if points >= 1.0 => "about one point".to_owned(),
+                () => "less than a point".to_owned(),
+            };
+            format!(
+                "{ms} ms of noise on contact times would cost {cost}: {} correct after {touches} touches instead of {}. --real \
+                 noise={ms}ms trains for it.\n",
+                percent(noisy, 0),
+                percent(clean, 0),
+            )
+        }
         None if is_clean => format!(
             "What {ms} ms of noise on contact times would cost was not measured: an object has fewer than {} touches.\n",
             evaluate::LEAST_FOR_COST

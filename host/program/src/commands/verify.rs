@@ -9,6 +9,7 @@ use palpate::error::{Error, Place, RowsProblem};
 use palpate::evaluate::verify::{Library, Verified, verify};
 use palpate::output;
 use palpate::rows::{read_margins, read_values};
+use palpate::wording::{count, scientific};
 use std::path::PathBuf;
 
 /// Compare a compiled model with what it was exported from.
@@ -117,14 +118,21 @@ impl Arguments {
 fn text(verified: &Verified) -> String {
     let Verified { rows, generated_rows, max_margin_error, stated_bound, class_differs, .. } = verified;
     let mut text = format!(
-        "{rows} rows and {generated_rows} made at thresholds: margins differ by at most {max_margin_error:.2e} (the \
-         model states {stated_bound:.2e}); another class for {class_differs}\n"
+        "{} rows and {} made at thresholds: margins differ by at most {} (the model states {}); another class for {}\n",
+        count(*rows),
+        count(*generated_rows),
+        scientific(*max_margin_error),
+        scientific(*stated_bound),
+        count(*class_differs)
     );
     if let (Some(error), Some(classes)) = (verified.library_max_margin_error, verified.library_class_differs) {
         let unexplained = verified.library_class_unexplained.unwrap_or_default();
         text += &format!(
-            "The library's own margins differ by at most {error:.2e}; another class for {classes} rows, of which the \
-             rounding that the model states does not explain {unexplained}\n"
+            "The library's own margins differ by at most {}; another class for {} rows; the rounding that the model states does \
+             not explain {} of these\n",
+            scientific(error),
+            count(classes),
+            count(unexplained)
         );
     }
     if let (Some(rows), Some(unexplained)) = (verified.library_values_differ, verified.library_values_unexplained) {
@@ -141,7 +149,9 @@ fn text(verified: &Verified) -> String {
     }
     if let Some((change, classes)) = verified.scaling {
         text += &format!(
-            "Measuring in whole numbers changes the rows' margins by at most {change:.2e}, and the class of {classes}\n"
+            "Measuring in whole numbers changes the rows' margins by at most {}, and the class of {}\n",
+            scientific(change),
+            count(classes)
         );
     }
     text

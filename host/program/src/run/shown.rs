@@ -2,8 +2,9 @@
 
 use super::{AT_APPROACHES, Method, PICTURE, PLAY, Recognition, Summary, TABLE_AT, Trial};
 use palpate::capture;
-use palpate::evaluate::Approaches;
+use palpate::evaluate::{Approaches, Finding, PromiseCheck};
 use palpate::mesh::Object;
+use palpate::wording::{count, decimal, percent, rate};
 use palpate_report::page::document::Picture;
 use palpate_report::page::render;
 use palpate_report::page::table::{Cell, Records};
@@ -18,7 +19,7 @@ pub(super) fn pictures(objects: &[Object], captured: &capture::Summary) -> Vec<P
         name: object.name.clone(),
         png: render::thumbnail(object.mesh(), PICTURE),
         line: captured_as(&object.name).map_or_else(String::new, |c| {
-            format!("{:.1} % of approaches are full touches", 100.0 * c.touches as f64 / c.approaches.max(1) as f64)
+            format!("{} of approaches are full touches", percent(c.touches as f64 / c.approaches.max(1) as f64, 1))
         }),
     };
     objects.iter().map(picture).collect()
@@ -39,6 +40,7 @@ pub(super) fn shown(name: &str, Trial { curve, method, fewest, .. }: &Trial) -> 
                 (n, accuracy.value, accuracy.standard_error)
             })
             .collect(),
+        bytes: method.model_bytes,
         per_object: objects
             .map(|(position, name)| {
                 (name.clone(), touches.iter().map(|&n| (n, curve.object_accuracy(position, n).value)).collect())
@@ -53,12 +55,12 @@ pub(super) fn table(summary: &Summary) -> Records {
     let mut table = Records::new(["measure", "paper, full touches", "ours, full touches", "ours, every contact"]);
     let both = |cell: &dyn Fn(&Method) -> Cell| [&summary.paper, &summary.full, &summary.ours].map(cell);
     let mut row = |name: String, [paper, full, ours]: [Cell; 3]| table.push([Cell::Text(name), paper, full, ours]);
-    let rate = 100.0 * summary.ours.evaluation.sequential.error_rate;
+    let wanted = rate(summary.ours.evaluation.sequential.error_rate);
     let approaches = |cell: &dyn Fn(&Approaches) -> Cell| {
         both(&|method| method.evaluation.approaches.as_ref().map_or(Cell::Missing, cell))
     };
     row(
-        format!("approaches to a {rate} % error rate, stopping when sure"),
+        format!("approaches to a {wanted} error rate, stopping when sure"),
         approaches(&|of| Cell::Spread(of.sequential.mean_approaches, of.sequential.mean_approaches_standard_error, 1)),
     );
     let promised = |rate: Option<f64>| rate.map_or(Cell::Missing, |rate| Cell::Percent(rate, 2));
@@ -84,7 +86,7 @@ pub(super) fn table(summary: &Summary) -> Records {
         row(format!("accuracy after {at} touches"), both(&cell));
     }
     row(
-        format!("touches to a {rate} % error rate, stopping when sure"),
+        format!("touches to a {wanted} error rate, stopping when sure"),
         both(&|m| {
             let sequential = &m.evaluation.sequential;
             Cell::Spread(sequential.mean_touches, sequential.mean_touches_standard_error, 1)
@@ -94,10 +96,16 @@ pub(super) fn table(summary: &Summary) -> Records {
     row("  wrong verdicts".into(), both(&|m| Cell::Percent(m.evaluation.sequential.error, 2)));
     row("  undecided when touches ran out".into(), both(&|m| Cell::Percent(m.evaluation.sequential.undecided, 2)));
     row(
-        format!("touches to a {rate} % error rate, a fixed number"),
+        format!("touches to a {wanted} error rate, a fixed number"),
         both(&|m| {
             m.fixed_touches.map_or_else(
-                || if m.followed_to == 0 { Cell::Missing } else { Cell::Text(format!("over {}", m.followed_to)) },
+                || {
+                    if m.followed_to == 0 {
+                        Cell::Missing
+                    } else {
+                        Cell::Text(format!("over {}", count(m.followed_to)))
+                    }
+                },
                 Cell::count,
             )
         }),
@@ -124,7 +132,7 @@ pub(super) fn note(summary: &Summary) -> String {
         true => "No noise was added to touches.".to_owned(),
         false => format!("Ours was trained, and all are tested, with {noise}; the paper's method is trained without."),
     };
-    [noise, calibration(summary), missing(summary)]
+    [noise, calibration(summary), above(summary), missing(summary)]
         .into_iter()
         .filter(|part| !part.is_empty())
         .collect::<Vec<_>>()
@@ -136,10 +144,10 @@ fn calibration(summary: &Summary) -> String {
     let ours = &summary.ours;
     let promise = match (&ours.calibration, &ours.uncalibrated) {
         (Some(calibrated), _) => format!(
-            "The model keeps its promise with a probability of {} %; its thresholds were found on {} sequences of {} \
-             captured for that.",
-            100.0 * calibrated.confidence,
-            calibrated.sequences,
+            "The model keeps its promise with a probability of {}; its thresholds were found on {} sequences of {} captured \
+             for that.",
+            rate(calibrated.confidence),
+            count(calibrated.sequences),
             calibrated.counted
         ),
         (None, why) => format!("The model promises nothing: {}.", why.as_deref().unwrap_or("it was not calibrated")),
@@ -147,6 +155,35 @@ fn calibration(summary: &Summary) -> String {
     let others = [("paper", &summary.paper), ("full touches", &summary.full)];
     let why = |(name, method): (&str, &Method)| method.uncalibrated.as_ref().map(|why| format!(" {name}: {why}."));
     promise + &others.into_iter().filter_map(why).collect::<String>()
+}
+
+/// Promises whose rate was measured to be exceeded, and if chance may be the reason.
+fn above(summary: &Summary) -> String {
+    let methods =
+        [("the paper's method", &summary.paper), ("ours on full touches", &summary.full), ("ours", &summary.ours)];
+    let of = |(name, method): (&str, &Method)| {
+        let own =
+            method.evaluation.promise.as_ref().filter(|_| method.promise_of_approaches != method.evaluation.promise);
+        let checks = [(own, "touches"), (method.promise_of_approaches.as_ref(), "approaches")];
+        let said = checks.into_iter().filter_map(|(check, of)| exceeded(name, check?, of));
+        said.collect::<Vec<_>>()
+    };
+    methods.into_iter().flat_map(of).collect::<Vec<_>>().join(" ")
+}
+
+/// A promise whose rate was exceeded, as a sentence.
+fn exceeded(name: &str, check: &PromiseCheck, of: &str) -> Option<String> {
+    let why = match check.finding {
+        Finding::Kept | Finding::Untested => return None,
+        Finding::Unclear => "which may be chance",
+        Finding::Broken => "by more than chance explains",
+    };
+    Some(format!(
+        "In sequences of {of}, {} (± {}) of the names that {name} gave are wrong: above the promised {}, {why}.",
+        percent(check.error, 2),
+        decimal(100.0 * check.standard_error, 2),
+        rate(check.promised)
+    ))
 }
 
 /// Meaning of a missing accuracy, if one is missing.
@@ -168,9 +205,9 @@ pub(super) fn facts(summary: &Summary) -> Vec<(String, String)> {
         ("command", summary.command.clone()),
         ("version", summary.tool_version.into()),
         ("seed", summary.seed.to_string()),
-        ("touches trained on", touches.train.to_string()),
-        ("touches tested on", touches.test.to_string()),
-        ("seconds in all", format!("{:.1}", summary.seconds)),
+        ("touches trained on", count(touches.train)),
+        ("touches tested on", count(touches.test)),
+        ("seconds in all", decimal(summary.seconds, 1)),
         ("seconds of each stage", stages.join("; ")),
     ]
     .map(|(name, value)| (name.to_string(), value))
@@ -185,11 +222,13 @@ pub fn text(summary: &Summary, out: &Path) -> String {
     _ = writeln!(
         text,
         "Touched {} objects {} times with all three fingers, in {} approaches, and approached them {} times more, keeping \
-         every approach. Tested on a tenth of each that training never saw.\n",
+         every approach. Tested on {} and {} of these, which training never saw.\n",
         capture.objects.len(),
-        capture.touches(),
-        capture.approaches(),
-        summary.approach_capture.approaches(),
+        count(capture.touches()),
+        count(capture.approaches()),
+        count(summary.approach_capture.approaches()),
+        count(summary.touches.test),
+        count(summary.approaches.test),
     );
     let width = summary.recognized.iter().map(|r| r.touched.chars().count()).max().unwrap_or(0);
     for recognition in &summary.recognized {
@@ -237,10 +276,41 @@ pub fn text(summary: &Summary, out: &Path) -> String {
     }
     _ = writeln!(
         text,
-        "\n± is a standard error. {:.1} s in all. The page: {}; to touch the objects yourself: {}",
-        summary.seconds,
+        "\n± is a standard error. {} s in all. The page: {}; to touch the objects yourself: {}",
+        decimal(summary.seconds, 1),
         out.join("report.html").display(),
         out.join(PLAY).display()
     );
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_promise_that_is_exceeded_is_remarked_on_and_a_kept_one_is_not() {
+        let check = |finding: Finding, error: f64| PromiseCheck {
+            promised: 0.01,
+            per: "average",
+            confidence: 0.95,
+            sequences: 10_000,
+            error,
+            standard_error: 0.0011,
+            of: None,
+            exceeded_by: error - 0.01,
+            finding,
+            void: Vec::new(),
+            recorded: None,
+            by_theory: None,
+        };
+        assert_eq!(exceeded("ours", &check(Finding::Kept, 0.009), "touches"), None);
+        assert_eq!(
+            exceeded("ours on full touches", &check(Finding::Unclear, 0.0116), "approaches").unwrap(),
+            "In sequences of approaches, 1.16 % (± 0.11) of the names that ours on full touches gave are wrong: above the \
+             promised 1 %, which may be chance."
+        );
+        let broken = exceeded("ours", &check(Finding::Broken, 0.03), "touches").unwrap();
+        assert!(broken.ends_with("by more than chance explains."), "{broken}");
+    }
 }

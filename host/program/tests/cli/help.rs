@@ -110,6 +110,19 @@ fn completions_know_every_command_in_every_shell() {
 }
 
 #[test]
+fn fish_does_not_complete_what_help_does_not_list() {
+    let script = stdout(run(["completions", "fish"]));
+    assert!(script.contains("-a \"check\"") && !script.contains("-a \"cast\""), "{script}");
+}
+
+#[test]
+fn help_of_a_misspelled_command_suggests_the_right_one() {
+    let error = stderr(run(["help", "captre"]), 2);
+    assert!(error.contains("captre") && error.contains("'capture'"), "{error}");
+    assert!(stdout(run(["help", "capture"])).contains("--approaches"));
+}
+
+#[test]
 fn help_lists_commands_in_groups_of_what_one_wants_to_do() {
     for arguments in [&["help"][..], &["--help"]] {
         let text = help(arguments, 80);
@@ -146,7 +159,8 @@ fn quiet_prints_no_remark_and_still_results_and_errors() {
         std::fs::write(directory.path().join("data").join(name), &lines).unwrap();
     }
     let here = |arguments: &[&str]| command(arguments).current_dir(&directory).output().unwrap();
-    stdout(here(&["--quiet", "train", "data", "-o", "e.json", "--trees", "rounds=2"]));
+    let trained = stdout(here(&["--quiet", "train", "data", "-o", "e.json", "--trees", "rounds=2"]));
+    assert_eq!(trained.lines().count(), 1, "{trained}");
     stdout(here(&["export", "e.json", "-o", "m.palpate"]));
     let error = stderr(here(&["--quiet", "evaluate", "m.palpate", "nowhere"]), 1);
     assert!(error.contains("nowhere"), "{error}");

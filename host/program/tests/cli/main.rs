@@ -1,5 +1,6 @@
 //! The program as its user sees it: one module per group of commands.
 
+mod captions;
 mod capture;
 mod cast;
 mod chip;

@@ -139,3 +139,54 @@ fn a_background_that_was_captured_otherwise_is_refused() {
     assert!(message.contains("called background"), "{message}");
     assert!(!at.join("e.json").exists());
 }
+
+#[test]
+fn shares_of_strangers_are_dashes_where_touches_run_out_before_a_verdict() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    touches(&at.join("data"), &KNOWN, 1_000, 1);
+    touches(&at.join("unseen"), &KNOWN, 1_000, 3);
+    touches(&at.join("few"), &[("kettle", 550_000)], 4, 3);
+    touches(&at.join("many"), &[("kettle", 550_000)], 1_000, 3);
+    succeeds(at, &["train", "data", "-o", "e.json", "--trees", "rounds=5"]);
+    succeeds(at, &["export", "e.json", "-o", "m.palpate"]);
+    let evaluated = |others: &str, more: &[&str]| {
+        let wanted =
+            ["evaluate", "m.palpate", "unseen", "--sequences", "200", "--error-rate", "0.01%", "--unknown", others];
+        succeeds(at, &[&wanted, more].concat())
+    };
+    let text = evaluated("few", &[]);
+    assert!(text.contains("kettle –") && text.contains("A dash (–): not known"), "{text}");
+    assert!(text.contains("drawn from 4 at least"), "{text}");
+    let figures: Value = serde_json::from_str(&evaluated("few", &["--json"])).unwrap();
+    let strangers = &figures["strangers"];
+    assert!(strangers["wrong_name"].is_null() && strangers["detected"]["30"].is_null(), "{strangers}");
+    assert_eq!(strangers["fewest_touches"], 4);
+    assert!(strangers["used_up"].as_f64().unwrap() > 0.01, "{strangers}");
+    let text = evaluated("many", &[]);
+    assert!(!text.contains("A dash") && text.contains("Got a name: kettle "), "{text}");
+}
+
+#[test]
+fn a_promise_for_other_noise_than_that_of_the_training_is_noted() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    touches(&at.join("data"), &KNOWN, 1_000, 1);
+    touches(&at.join("fresh"), &KNOWN, 30_000, 2);
+    succeeds(at, &["train", "data", "-o", "e.json", "--trees", "rounds=5", "--real", "noise=0..5ms,timer=1ms"]);
+    succeeds(at, &["export", "e.json", "-o", "m.palpate"]);
+    let calibrated = |more: &[&str]| {
+        let output = palpate(
+            at,
+            &[&["calibrate", "m.palpate", "fresh", "-o", "c.palpate", "--error-rate", "10%"], more].concat(),
+        );
+        let said = String::from_utf8(output.stderr.clone()).unwrap();
+        stdout(output);
+        said
+    };
+    let note = calibrated(&[]);
+    assert!(note.contains("trained on touches with noise of 0 to 5 ms, a timer of 1 ms"), "{note}");
+    assert!(note.contains("for touches with no noise") && note.contains("--real noise=0..5ms,timer=1ms"), "{note}");
+    assert!(!calibrated(&["--real", "noise=0..5ms,timer=1ms"]).contains("note:"));
+    assert!(calibrated(&["--quiet"]).is_empty());
+}

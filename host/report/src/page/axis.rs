@@ -1,5 +1,6 @@
 //! An axis: where its values are drawn, and which of them get a tick.
 
+pub(crate) use palpate::wording::decimal as number;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
 
@@ -158,17 +159,7 @@ fn decimals_of(step: f64) -> usize {
         .unwrap_or(9) as usize
 }
 
-/// `value` with `decimals` decimals and a true minus sign.
-pub(crate) fn number(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_string(),
-        Some(digits) => format!("\u{2212}{digits}"),
-        None => text,
-    }
-}
-
-/// `value` as short as a tick should be: 0.01, 5, 200, 10 k, 2 M, 1e−9.
+/// `value` as short as a tick should be: 0.01, 5, 1,000, 10 k, 2 M, 1e−9.
 pub(crate) fn short_number(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude == 0.0 {
@@ -213,7 +204,7 @@ mod tests {
     #[test]
     fn logarithmic_ticks_are_1_2_5_or_powers_alone() {
         assert_eq!(texts(&Axis::logarithmic(10.0, 120.0)), ["10", "20", "50", "100"]);
-        assert_eq!(texts(&Axis::logarithmic(1e3, 1e6)), ["1000", "10 k", "100 k", "1 M"]);
+        assert_eq!(texts(&Axis::logarithmic(1e3, 1e6)), ["1,000", "10 k", "100 k", "1 M"]);
     }
 
     #[test]
@@ -236,7 +227,7 @@ mod tests {
     #[test]
     fn short_numbers_are_short() {
         for (value, text) in
-            [(0.0, "0"), (0.05, "0.05"), (1000.0, "1000"), (16384.0, "16.4 k"), (2e6, "2 M"), (1e-9, "1e\u{2212}9")]
+            [(0.0, "0"), (0.05, "0.05"), (1000.0, "1,000"), (16384.0, "16.4 k"), (2e6, "2 M"), (1e-9, "1e\u{2212}9")]
         {
             assert_eq!(short_number(value), text);
         }

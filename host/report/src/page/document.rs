@@ -174,6 +174,7 @@ impl Page {
                 dl { @for (name, value) in &self.facts { div { dt { (name) } dd { (value) } } } }
             }
             (html::script(include_str!("page.js")))
+            (html::script(html::HINT))
         };
         html::file(&self.title, &[STYLE], &body)
     }

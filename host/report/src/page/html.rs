@@ -41,6 +41,9 @@ fn whole(title: &str, styles: &[&str], scripts: &str, body: &Markup) -> String {
     .into_string()
 }
 
+/// Makes tables that are wider than their place say so: for elements of the class `scroll`, and the style of `more`.
+pub(crate) const HINT: &str = include_str!("hint.js");
+
 /// A script, inside the file.
 pub(crate) fn script(text: &str) -> Markup {
     html! { script { (PreEscaped(text)) } }

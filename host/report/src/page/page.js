@@ -20,19 +20,3 @@ for (const table of document.querySelectorAll("table")) {
     });
   });
 }
-// A table that is wider than its place says that there is more of it to the right.
-const hint = (scroll) => {
-  const isWider = scroll.scrollWidth > scroll.clientWidth + 1;
-  const said = scroll.previousElementSibling?.classList.contains("more");
-  if (isWider && !said) {
-    const more = document.createElement("p");
-    more.className = "more";
-    more.textContent = "Scroll sideways for more columns \u2192";
-    scroll.before(more);
-  } else if (!isWider && said) {
-    scroll.previousElementSibling.remove();
-  }
-};
-const hints = () => document.querySelectorAll(".scroll").forEach(hint);
-addEventListener("resize", hints);
-hints();

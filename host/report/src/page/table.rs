@@ -43,16 +43,16 @@ impl Cell {
     pub fn shown(&self) -> String {
         match *self {
             Self::Text(ref text) => text.clone(),
-            Self::Number(value, decimals) => grouped(&finite(value, decimals)),
+            Self::Number(value, decimals) => number(value, decimals),
             // One measurement has no spread.
-            Self::Spread(value, 0.0, decimals) => finite(value, decimals),
+            Self::Spread(value, 0.0, decimals) => number(value, decimals),
             Self::PercentSpread(value, 0.0, decimals) => Self::Percent(value, decimals).shown(),
             Self::Spread(value, spread, decimals) => {
-                format!("{} ± {}", finite(value, decimals), finite(spread, decimals))
+                format!("{} ± {}", number(value, decimals), number(spread, decimals))
             }
-            Self::Percent(value, decimals) => format!("{}\u{a0}%", finite(value * 100.0, decimals)),
+            Self::Percent(value, decimals) => format!("{}\u{a0}%", number(value * 100.0, decimals)),
             Self::PercentSpread(value, spread, decimals) => {
-                format!("{} ± {}\u{a0}%", finite(value * 100.0, decimals), finite(spread * 100.0, decimals))
+                format!("{} ± {}\u{a0}%", number(value * 100.0, decimals), number(spread * 100.0, decimals))
             }
             Self::Missing => "–".to_string(),
         }
@@ -79,31 +79,6 @@ impl Cell {
             Self::Missing => vec![String::new()],
         }
     }
-}
-
-fn finite(value: f64, decimals: usize) -> String {
-    if value.is_finite() { number(value, decimals) } else { "–".to_string() }
-}
-
-/// Groups of three digits separated by thin spaces, from 10,000 up.
-fn grouped(text: &str) -> String {
-    let whole = text.find('.').unwrap_or(text.len());
-    let digits = text[..whole].chars().filter(char::is_ascii_digit).count();
-    if digits < 5 {
-        return text.to_string();
-    }
-    let mut out = String::new();
-    let mut left = digits;
-    for c in text[..whole].chars() {
-        out.push(c);
-        if c.is_ascii_digit() {
-            left -= 1;
-            if left > 0 && left.is_multiple_of(3) {
-                out.push('\u{202f}');
-            }
-        }
-    }
-    out + &text[whole..]
 }
 
 /// Rows under named columns: the numbers behind a figure, or a table's.
@@ -188,8 +163,8 @@ mod tests {
 
     #[test]
     fn numbers_are_shown_for_people() {
-        assert_eq!(Cell::Number(1234567.0, 0).shown(), "1\u{202f}234\u{202f}567");
-        assert_eq!(Cell::Number(-1234.5, 1).shown(), "\u{2212}1234.5");
+        assert_eq!(Cell::Number(1234567.0, 0).shown(), "1,234,567");
+        assert_eq!(Cell::Number(-1234.5, 1).shown(), "\u{2212}1,234.5");
         assert_eq!(Cell::PercentSpread(0.907, 0.025, 1).shown(), "90.7 ± 2.5\u{a0}%");
         assert_eq!(Cell::Number(f64::NAN, 1).shown(), "–");
     }

@@ -15,6 +15,7 @@ pub use trace::trace;
 use crate::page::PageProblem;
 use crate::page::html;
 use crate::page::scene;
+use crate::run_page::models;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
@@ -26,6 +27,7 @@ use palpate::play::compress;
 use palpate::probe::approach::Aim;
 use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
+use palpate::wording::{count, decimal, list};
 use palpate_onboard::Model;
 use palpate_shared::format::{Counted, Length};
 use std::path::PathBuf;
@@ -134,6 +136,7 @@ pub fn page(objects: &[Object], contenders: &[Contender], settings: &Settings) -
         (html::script(include_str!("game.js")))
         (html::script(include_str!("picture.js")))
         (html::script(include_str!("page.js")))
+        (html::script(html::HINT))
     };
     Ok(html::file_with_wasm("Touch it yourself – Palpate", &[scene::STYLE, include_str!("page.css")], &body))
 }
@@ -176,9 +179,8 @@ fn body(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
         header {
             h1 { "Touch it yourself" }
             p.lead {
-                "Three fingers in a row approach an object; each reports when it makes contact. From these times alone \
-                 a model of a few kilobytes distinguishes " (surfaces.len()) " objects. The simulator and the recognizer in this \
-                 page are the program's own, compiled to WebAssembly."
+                "Three fingers in a row approach an object; each reports when it makes contact. " (distinguishing(contenders, surfaces.len()))
+                " The simulator and the recognizer in this page are the program's own, compiled to WebAssembly."
             }
             p id="failure" role="alert" {}
             noscript { p { "This page needs JavaScript, which this browser does not run." } }
@@ -193,7 +195,8 @@ fn body(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
                     }
                     button type="button" id="secret" { "Guess what I am touching" }
                 }
-                (scene::figure("Click the surface to touch it there. Drag to turn, scroll or pinch to zoom."))
+                (scene::figure("Click the surface to touch it there. Drag to turn, scroll or pinch to zoom; or use the arrow \
+                                keys, + and \u{2212}."))
                 div.row {
                     button.main type="button" id="touch" { "Touch at random" }
                     button type="button" id="until" { "Touch until sure" }
@@ -252,6 +255,30 @@ fn body(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
     }
 }
 
+/// The evidence that models distinguish so many objects by, and their sizes.
+fn distinguishing(contenders: &[Contender], objects: usize) -> String {
+    let bytes = contenders.iter().map(|contender| contender.model.bytes().len());
+    let needs_pose = |contender: &&Contender| contender.model.model().trained_touches().needs_pose;
+    let posed =
+        contenders.iter().filter(needs_pose).map(|own| format!("\u{201c}{}\u{201d}", own.name)).collect::<Vec<_>>();
+    let from = match posed.is_empty() {
+        true => "From these times alone".to_owned(),
+        false if posed.len() == contenders.len() => "From these times and the probe's pose".to_owned(),
+        false => format!("From these times, and in the case of {} the probe's pose,", list(&posed)),
+    };
+    let verb = if contenders.len() == 1 { "distinguishes" } else { "distinguish" };
+    format!("{from} {} {verb} {objects} objects.", models("a model", "models", bytes))
+}
+
+/// The aim of random approaches.
+fn aimed_at(aim: Aim) -> &'static str {
+    match aim {
+        Aim::Box => "the bounding box",
+        Aim::Middle => "a box of half the sides of the bounding box, about its center",
+        Aim::Mass => "a box of a quarter of the sides of the bounding box, about the surface's center of mass",
+    }
+}
+
 /// All models on the same touches, and what is added to these.
 fn compare(contenders: &[Contender], settings: &Settings) -> Markup {
     let ms = |micros: f64| micros / 1e3;
@@ -280,20 +307,20 @@ fn compare(contenders: &[Contender], settings: &Settings) -> Markup {
                                 td.number {
                                     @match contender.expected {
                                         Some(expected) => {
-                                            (format!("{:.1} ± {:.1}", expected.approaches, expected.standard_error))
+                                            (format!("{} ± {}", decimal(expected.approaches, 1), decimal(expected.standard_error, 1)))
                                         }
                                         None => "–",
                                     }
                                 }
                                 td.number { "–" }
-                                td.number { (contender.model.bytes().len()) }
+                                td.number { (count(contender.model.bytes().len())) }
                             }
                         }
                     }
                 }
             }
             div.row {
-                button type="button" id="series" { "Play 100 rounds" }
+                button type="button" id="series" { "Play rounds" }
                 p id="rounds" role="status" {}
             }
             fieldset {
@@ -320,18 +347,26 @@ fn notes(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) ->
     let simplified: Vec<String> = surfaces
         .iter()
         .filter(|surface| surface.triangles < surface.of)
-        .map(|surface| format!("{} ({} of {} triangles)", surface.name, surface.triangles, surface.of))
+        .map(|surface| format!("{} ({} of {} triangles)", surface.name, count(surface.triangles), count(surface.of)))
         .collect();
     let instances: Vec<&str> =
         surfaces.iter().filter(|surface| surface.instances > 1).map(|surface| surface.name.as_str()).collect();
     let timer = settings.noise.timer;
+    let has_plan = |contender: &&Contender| contender.model.model().plan().is_some();
+    let planners: Vec<String> =
+        contenders.iter().filter(has_plan).map(|contender| format!("\u{201c}{}\u{201d}", contender.name)).collect();
     html! {
         section.notes {
             h2 { "What is what" }
             p {
-                "A random approach is one of a capture: from any direction, at any point of the bounding box. A click \
-                 is an approach that you aimed, which the models were not trained for: their confidence may be too \
-                 high or too low. An approach costs a robot the same whether or not it is evidence."
+                "A random approach is drawn as " code { "palpate capture" } " draws it: from any direction, at any point of "
+                (aimed_at(settings.origin.aim)) ". A click is an approach that you aimed, which the models were not trained for: \
+                 their confidence may be too high or too low. "
+                @if !planners.is_empty() {
+                    "A planned approach is where the plan of " (list(&planners)) " says; all models take it as evidence, and those \
+                     without a plan were trained for random ones. "
+                }
+                "An approach costs a robot the same whether or not it is evidence."
             }
             p {
                 "The picture and the simulator use the same surface: the mesh with its corners rounded to a 65,536th \

@@ -102,7 +102,7 @@
       return words.join(" and ");
     };
     element("proposal").textContent = proposal
-      ? `${data.models[planner].name}: from ${from(proposal.direction)}, pose ${proposal.pose}; it separates what is in play by ${proposal.score.toFixed(2)} of 1.`
+      ? `Plan of \u201c${data.models[planner].name}\u201d: approach from ${from(proposal.direction)} (pose ${proposal.pose}). It separates the remaining objects by ${proposal.score.toFixed(2)} (1 = fully).`
       : "";
   };
   const MOST_ROWS = 200;
@@ -112,7 +112,8 @@
     return fingers.length ? `; finger ${fingers.join(" and ")} beyond the ${reason}` : "";
   }).join("");
   const list = ({ times, pattern, unreached }) => {
-    const row = rowOf([approaches, ...times.map(milliseconds), pattern + because(unreached)], 0);
+    // A pattern stays on one line, so that rows are as high as each other.
+    const row = rowOf([approaches, ...times.map(milliseconds), pattern.replaceAll(" ", "\u00a0") + because(unreached)], 0);
     [0, 1, 2, 3].forEach((column) => row.cells[column].classList.add("number"));
     const body = element("touches").tBodies[0];
     body.prepend(row);
@@ -258,8 +259,8 @@
     outputs[0].textContent = text(noise.deviation.largest);
     noise.bent.forEach((early, finger) => { outputs[finger + 1].textContent = offset(early); });
     const same = noise.deviation.largest === data.noise.deviation.largest && noise.bent.every((early, finger) => early === data.noise.bent[finger]);
-    element("condition").textContent = same ? "As the expected numbers were measured."
-      : "Not as the expected numbers were measured.";
+    element("condition").textContent = same ? "These are the settings under which the \u201cexpected\u201d column was measured."
+      : "The \u201cexpected\u201d column was measured under other settings.";
   };
   ["noise", "bent1", "bent2", "bent3"].forEach((id, index) => element(id).addEventListener("input", ({ target }) => {
     if (index === 0) noise.deviation.largest = 1000 * target.value;
@@ -273,6 +274,7 @@
     }
   }));
 
+  pause();
   // The model that uses most touches and no pose first: the one to use.
   model = Number(element("model")?.value ?? 0);
   showModel();

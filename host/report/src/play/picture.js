@@ -11,7 +11,9 @@ function openPicture(data, touch) {
 
   // The probe: three balls, moved along their lines.
   const ball = new THREE.SphereGeometry(radius, 24, 16);
-  const fingers = hues.map((hue) => new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ color: hue, roughness: 0.45 })));
+  const material = (hue) => new THREE.MeshStandardMaterial({ color: hue, roughness: 0.45, transparent: true });
+  const fingers = hues.map((hue) => new THREE.Mesh(ball, material(hue)));
+  const missed = color("missed");
   const probe = new THREE.Group();
   probe.add(...fingers);
   probe.visible = false;
@@ -99,6 +101,11 @@ function openPicture(data, touch) {
   let motion = null;
   const arrive = ({ ends, contacts }) => {
     ends.forEach(([, end], finger) => fingers[finger].position.copy(end));
+    // A finger that missed is gray and pale, so that it is not taken for a contact.
+    fingers.forEach((finger, index) => {
+      finger.material.color.copy(contacts[index] ? hues[index] : missed);
+      finger.material.opacity = contacts[index] ? 1 : 0.4;
+    });
     ends.forEach(([, end], finger) => contacts[finger] && mark(end, finger));
     motion = null;
   };
@@ -118,6 +125,10 @@ function openPicture(data, touch) {
     if (motion) arrive(motion);
     const ends = paths(approached);
     motion = { ends, contacts: approached.distances.map((distance) => distance !== null), began: performance.now() };
+    fingers.forEach((finger, index) => {
+      finger.material.color.copy(hues[index]);
+      finger.material.opacity = 1;
+    });
     probe.visible = true;
     stretch(ways, ends);
     if (atOnce || still.matches) {

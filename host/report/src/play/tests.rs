@@ -66,6 +66,25 @@ fn a_page_holds_everything_itself_and_names_cannot_break_out_of_it() {
 }
 
 #[test]
+fn a_page_says_how_large_its_models_are_what_they_need_and_where_random_approaches_aim() {
+    let objects = [object("disc", 8, 0.1), object("globe", 8, 1.0)];
+    let one = [contender(["disc", "globe"])];
+    let bytes = count(one[0].model.bytes().len());
+    let page_of = |contenders: &[Contender], aim| {
+        let origin = Origin { aim, ..Origin::default() };
+        page(&objects, contenders, &Settings { origin, ..settings() }).unwrap()
+    };
+    let alone = page_of(&one, Aim::Box);
+    let said = format!("From these times alone a model of {bytes} bytes distinguishes 2 objects.");
+    assert!(alone.contains(&said) && alone.contains("at any point of the bounding box."), "{said}");
+    assert!(!alone.contains("kilobytes") && !alone.contains("A planned approach"));
+    let two = [one[0].clone(), one[0].clone()];
+    let both = page_of(&two, Aim::Mass);
+    assert!(both.contains(&format!("models of {bytes} to {bytes} bytes distinguish 2 objects.")));
+    assert!(both.contains("about the surface's center of mass"));
+}
+
+#[test]
 fn a_page_of_ten_large_objects_stays_below_three_megabytes_and_says_what_it_simplified() {
     // Rough surfaces, as scans are: smooth ones are packed too well to be simplified.
     let rough = |i: u32| {
@@ -82,7 +101,7 @@ fn a_page_of_ten_large_objects_stays_below_three_megabytes_and_says_what_it_simp
     assert!(surfaces.iter().all(|surface| surface.triangles > 5_000));
     let page = page(&objects, &[contender(["object0", "object1"])], &settings()).unwrap();
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
-    let stated = format!("({} of {} triangles)", surfaces[9].triangles, surfaces[9].of);
+    let stated = format!("({} of {} triangles)", count(surfaces[9].triangles), count(surfaces[9].of));
     assert!(page.contains(&stated), "{stated}");
 }
 

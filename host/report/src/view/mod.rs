@@ -18,6 +18,7 @@ use palpate::mesh::{Mesh, Object};
 use palpate::probe::approach::{Approach, CLEARANCE, FINGERS, Probe};
 use palpate::probe::scene::{Scene, Table};
 use palpate::random::{self, Purpose};
+use palpate::wording::{count, decimal, percent};
 
 /// Settings of a page.
 #[derive(Clone, Copy, Debug)]
@@ -164,7 +165,7 @@ impl Lying {
 }
 
 fn captioned(placement: &Placement) -> String {
-    format!("{} {:.1} %", placement.name, 100.0 * placement.weight)
+    format!("{} {}", placement.name, percent(placement.weight, 1))
 }
 
 /// One approach, for the page's script.
@@ -252,26 +253,27 @@ fn html(
 ) -> String {
     let side = facts.high - facts.low;
     let unit = f64::from(side.max_element()) / settings.length;
-    let share = 100.0 * drawn.full as f64 / drawn.tried.max(1) as f64;
+    let share = drawn.full as f64 / drawn.tried.max(1) as f64;
     let body = html! {
         main {
-            (scene::figure("Drag to turn, scroll or pinch to zoom, drag with two fingers or the right mouse button to move. \
-                            Click a contact or a row to see one approach alone; Escape shows all."))
+            (scene::figure("Drag to turn, scroll or pinch to zoom, drag with two fingers or the right mouse button to move; or \
+                            use the arrow keys, + and \u{2212}. Click a contact or a row to see one approach alone; Escape \
+                            shows all."))
             aside {
                 h1 { (object.name) }
                 dl {
                     div { dt { "Triangles" } dd {
-                        (grouped(facts.triangles))
+                        (count(facts.triangles))
                         @if shown_triangles < facts.triangles {
-                            " (simplified to " (grouped(shown_triangles)) " here; the touches are those of the whole mesh)"
+                            " (simplified to " (count(shown_triangles)) " here; the touches are those of the whole mesh)"
                         }
                     } }
                     div { dt { "Closed" } dd.warning[!facts.is_closed()] { (facts.closed()) } }
                     div { dt { "Right side out" } dd.warning[!facts.is_right_side_out()] { (facts.side()) } }
                     @if !object.points.is_empty() { div { dt { "Points" } dd {
-                        (grouped(object.points.len())) ", of which the surface was made"
+                        (count(object.points.len())) ", of which the surface was made"
                     } } }
-                    @if facts.parts.len() > 1 { div { dt { "Parts" } dd { (grouped(facts.parts.len())) } } }
+                    @if facts.parts.len() > 1 { div { dt { "Parts" } dd { (count(facts.parts.len())) } } }
                     div { dt { "Size in the file" } dd {
                         (three_digits(side.x.into())) " × " (three_digits(side.y.into())) " × " (three_digits(side.z.into()))
                     } }
@@ -279,7 +281,7 @@ fn html(
                     div { dt { "Finger radius" } dd {
                         (settings.probe.radius) " units, " (three_digits(settings.probe.radius * unit)) " in the file"
                     } }
-                    div { dt { "Full touches" } dd { (format!("{share:.1} % of {} approaches", grouped(drawn.tried as usize))) } }
+                    div { dt { "Full touches" } dd { (format!("{} of {} approaches", percent(share, 1), count(drawn.tried))) } }
                 }
                 @for complaint in facts.complaints(object.millimeters) { p.warning { (complaint) } }
                 p { (object.name) ": " (verdict(facts, settings.length, &settings.probe)) "." }
@@ -342,7 +344,7 @@ fn seconds(time: Option<f64>) -> String {
 
 fn curvature(times: [Option<f64>; FINGERS]) -> String {
     match times {
-        [Some(first), Some(middle), Some(last)] => format!("{:.1}", (first - 2.0 * middle + last) * 1e3),
+        [Some(first), Some(middle), Some(last)] => decimal((first - 2.0 * middle + last) * 1e3, 1),
         _ => "–".into(),
     }
 }
@@ -354,13 +356,6 @@ fn three_digits(value: f64) -> String {
     }
     let digits = (2.0 - value.abs().log10().floor()).max(0.0) as usize;
     format!("{value:.digits$}")
-}
-
-/// A count with its thousands separated by commas.
-fn grouped(count: usize) -> String {
-    let digits = count.to_string();
-    let groups: Vec<&[u8]> = digits.as_bytes().rchunks(3).rev().collect();
-    groups.iter().map(|group| String::from_utf8_lossy(group)).collect::<Vec<_>>().join(",")
 }
 
 #[cfg(test)]

@@ -35,6 +35,7 @@ pub fn page(model: Option<&CompiledModel>, command: &str) -> Result<String> {
         (html::script(include_str!("link.js")))
         (html::script(include_str!("port.js")))
         (html::script(include_str!("page.js")))
+        (html::script(html::HINT))
     };
     let styles = [include_str!("../play/page.css"), include_str!("page.css")];
     Ok(html::file_with_wasm("A chip at the cable – Palpate", &styles, &body))

@@ -1,6 +1,7 @@
 //! The figures of a run over objects with several very different meshes agree with fresh touches.
 
 use crate::run::*;
+use palpate::evaluate::SequentialSettings;
 use palpate::mesh::{Instance, Mesh};
 
 /// A share, and its standard error.

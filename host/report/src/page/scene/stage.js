@@ -1,5 +1,5 @@
 "use strict";
-// Sets three.js up in the page's stage, with the camera turned by the pointer. Returns what a page draws with; nothing
+// Sets three.js up in the page's stage, with the camera turned by the pointer or the keyboard. Returns what a page draws with; nothing
 // where WebGL is missing, which a message then says.
 function openStage() {
   const stage = document.getElementById("stage");
@@ -14,7 +14,8 @@ function openStage() {
   }
   renderer.setPixelRatio(devicePixelRatio);
   stage.prepend(renderer.domElement);
-  renderer.domElement.setAttribute("role", "img");
+  renderer.domElement.setAttribute("role", "application");
+  renderer.domElement.tabIndex = 0;
   renderer.domElement.setAttribute("aria-label", document.querySelector("#scene figcaption").textContent);
   const ground = color("ground");
   const scene = new THREE.Scene();
@@ -66,6 +67,37 @@ function openStage() {
     });
   };
   controls.addEventListener("change", draw);
+  // A printer gets a picture, since it may ask for the drawing when it is gone.
+  const picture = Object.assign(new Image(), { alt: "" });
+  stage.prepend(picture);
+  addEventListener("beforeprint", () => {
+    render();
+    picture.src = renderer.domElement.toDataURL();
+  });
+
+  // Arrow keys turn by a 24th of a full turn, + and − zoom.
+  const STEP = Math.PI / 12, ZOOM = 1.15;
+  const turned = (across, up) => {
+    const offset = camera.position.clone().sub(controls.target);
+    offset.applyAxisAngle(camera.up, across * STEP);
+    const side = new THREE.Vector3().crossVectors(camera.up, offset).normalize();
+    const angle = offset.angleTo(camera.up);
+    // Never over a pole, where up and down change places.
+    const to = Math.min(Math.max(angle - up * STEP, 0.02), Math.PI - 0.02);
+    return offset.applyAxisAngle(side, to - angle);
+  };
+  const zoomed = (factor) => camera.position.clone().sub(controls.target).multiplyScalar(factor);
+  const KEYS = {
+    ArrowLeft: () => turned(-1, 0), ArrowRight: () => turned(1, 0), ArrowUp: () => turned(0, 1), ArrowDown: () => turned(0, -1),
+    "+": () => zoomed(1 / ZOOM), "=": () => zoomed(1 / ZOOM), "-": () => zoomed(ZOOM),
+  };
+  renderer.domElement.addEventListener("keydown", (event) => {
+    const offset = event.ctrlKey || event.metaKey || event.altKey ? null : KEYS[event.key]?.();
+    if (!offset) return;
+    event.preventDefault();
+    camera.position.copy(controls.target).add(offset);
+    controls.update();
+  });
 
   const ray = new THREE.Raycaster();
   // The ray under the pointer.

@@ -192,11 +192,17 @@ impl Facts {
         let count = self.stray.len();
         let floats = if count == 1 { "piece floats" } else { "pieces float" };
         let places = places(self.stray.iter().map(Piece::place), count);
-        (count > 0).then(|| {
-            format!(
-                "The mesh has stray parts: {count} {floats} apart from the rest ({places}), and make its box larger."
-            )
-        })
+        // A piece that reaches the end of the box made it as large as it is.
+        let reaches = |piece: &&Piece| piece.low.cmple(self.low).any() || piece.high.cmpge(self.high).any();
+        let larger = match self.stray.iter().filter(reaches).count() {
+            0 => String::new(),
+            1 if count == 1 => ", and makes its box larger".to_owned(),
+            all if all == count => ", and make its box larger".to_owned(),
+            1 => "; 1 makes its box larger".to_owned(),
+            some => format!("; {some} make its box larger"),
+        };
+        (count > 0)
+            .then(|| format!("The mesh has stray parts: {count} {floats} apart from the rest ({places}){larger}."))
     }
 
     fn size(&self, millimeters: Option<f64>) -> Option<String> {

@@ -144,6 +144,15 @@ fn a_speck_beside_an_object_is_a_stray_part_and_what_touches_it_is_not() {
     assert!(
         said[0].starts_with("The mesh has stray parts: 1 piece floats apart from the rest (224 triangles around (")
     );
+    assert!(said[0].ends_with(", and makes its box larger."), "{said:?}");
+    let inside = Facts::of(&globes(&[([0.0; 3], 1.0, false), ([0.0; 3], 0.05, false)])).complaints(None);
+    assert!(inside.iter().any(|said| said.contains("1 piece floats apart") && !said.contains("larger")), "{inside:?}");
+    let two = Facts::of(&globes(&[([0.0; 3], 1.0, false), ([0.0; 3], 0.05, false), ([3.0, 0.0, 0.0], 0.05, false)]));
+    let two = two.complaints(None);
+    assert!(
+        two.iter().any(|said| said.contains("2 pieces float") && said.contains("; 1 makes its box larger.")),
+        "{two:?}"
+    );
     assert!(Facts::of(&pot(false, true)).stray.is_empty());
     assert!(Facts::of(&cube().stretched([1.0, 100.0, 0.001])).stray.is_empty());
 }
