@@ -92,6 +92,12 @@ pub enum CalibrateProblem {
         /// Objects that the model knows and the data set does not have.
         objects: Vec<String>,
     },
+    /// Recordings lack objects of the model, or placements of them.
+    #[error("nothing is recorded of {}", objects.join(", "))]
+    MissingRecordings {
+        /// Outputs that the model has and no recording is of.
+        objects: Vec<String>,
+    },
     /// The touches are those that the model was trained on.
     #[error("the model was trained on these touches of {}: a promise calibrated on them would not hold for others", objects.join(", "))]
     TrainedOn {
@@ -158,6 +164,11 @@ impl Problem for CalibrateProblem {
                  (`palpate probe fit`), or adjust the model to other recordings (`palpate train --teach`)."
             }
             Self::Missing { .. } => "Capture them too, with another seed than the training's.",
+            Self::MissingRecordings { objects } if objects.iter().any(|object| object.contains('/')) => {
+                "Record it too: `palpate data record --object OBJECT/PLACEMENT`, or --object OBJECT where the robot does not know \
+                 how it lies."
+            }
+            Self::MissingRecordings { .. } => "Record it too: a promise is for all objects of the model.",
             Self::TrainedOn { .. } => "Calibrate on others: capture them with another seed (--seed), or record more.",
             Self::OneObject => "Give a model of two or more objects.",
         }
@@ -202,7 +213,7 @@ fn in_touches(supplied: Option<Supplied>, found: u64, needed: u64) -> String {
 }
 
 /// An estimate, rounded up to two digits.
-pub(super) fn two_digits(number: f64) -> u64 {
+pub(crate) fn two_digits(number: f64) -> u64 {
     let digit = 10.0_f64.powf((number.max(1.0).log10().floor() - 1.0).max(0.0));
     ((number / digit).ceil() * digit) as u64
 }

@@ -56,9 +56,9 @@ pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
-pub use error::EvaluateProblem;
-pub use margins::Margins;
-pub(crate) use margins::OfTouches;
+pub use error::{EnoughRecorded, EvaluateProblem};
+pub use margins::{Margins, delivered};
+pub(crate) use margins::{OfTouches, leading, objects_of};
 #[cfg(feature = "train")]
 pub(crate) use margins::best;
 pub use measure::{Confusion, Evaluated, Expecting, Wanted, measure, own_weights};

@@ -96,9 +96,14 @@ impl Margins<'_> {
             let what = |approaches| if approaches { "every approach" } else { "full touches only" };
             void.push(format!("promised for {}, tested on {}", what(promise.approaches), what(self.hold_approaches())));
         }
-        let known = self.candidate.known_count();
-        if self.tested.len() < known {
-            void.push(format!("promised for all {known} objects of the model, tested on {}", self.tested.len()));
+        let (known, tested) = (self.candidate.known_count(), self.tested_outputs());
+        if tested < known {
+            let what = if self.numbers().is_some() { "placements" } else { "objects" };
+            void.push(format!("promised for all {known} {what} of the model, tested on {tested}"));
+        }
+        let is_unstated = (0..self.tested.len()).any(|position| self.is_of_any_placement(position));
+        if promise.per == Per::Object && is_unstated {
+            void.push("promised in each placement, tested on touches that state none".into());
         }
         if promise.active != active {
             let how = |active| if active { "as the plan proposes" } else { "at random" };
@@ -167,11 +172,16 @@ impl Margins<'_> {
         let mut of = Wrong::default();
         for (position, outcomes) in outcomes.iter().enumerate() {
             let weight = self.frequency(position);
-            let names = outcomes.iter().filter_map(|outcome| outcome.recognized);
-            for name in names.filter(|&name| counts(position, name)) {
-                of.given += weight;
-                of.spread += weight * weight;
-                of.wrong += if name == self.tested[position].object { 0.0 } else { weight };
+            let is_any = self.is_of_any_placement(position);
+            for outcome in outcomes {
+                let Some(name) = outcome.recognized else { continue };
+                // Of touches that may be of any placement, the one that was named counts.
+                let named = outcome.output.filter(|_| is_any).unwrap_or(name);
+                if counts(position, named) {
+                    of.given += weight;
+                    of.spread += weight * weight;
+                    of.wrong += if name == self.tested[position].object { 0.0 } else { weight };
+                }
             }
         }
         of

@@ -7,6 +7,7 @@ use super::suspects::Suspect;
 use super::words::{Estimate, between, offset, offset_between};
 use super::{Evidence, Settings, Timer};
 use crate::probe::approach::{FINGERS, Probe};
+use crate::probe::hand;
 use crate::probe::noise::{Grazing, Noise};
 use palpate_shared::format::Length;
 use serde::Serialize;
@@ -102,8 +103,12 @@ pub(super) fn outcome(
     let missed =
         [0, 1, 2].map(|finger: usize| estimate(4 + finger, false, &|candidate: &Candidate| candidate.missed[finger]));
     let stroke = evidence.stroke.estimated;
-    let written = |stroke: Estimate| (1e4 * stroke.value).round() / 1e4;
-    let probe = Probe { stroke: stroke.map(written).or(settings.origin.probe.stroke), ..settings.origin.probe };
+    let written = |length: f64| (1e4 * length).round() / 1e4;
+    let probe = Probe {
+        stroke: stroke.map(|stroke| written(stroke.value)).or(settings.origin.probe.stroke),
+        stroke_tolerance: stroke.map(|stroke| written(tolerance(&stroke))).or(settings.origin.probe.stroke_tolerance),
+        ..settings.origin.probe
+    };
     let layered = |of: &dyn Fn(&Noise) -> f64| {
         let [low, high] = [0, 1].map(|end: usize| layer.ends.as_ref().map(|ends| of(&ends[end])));
         Estimate { value: of(&layer.real), low, high }
@@ -131,6 +136,12 @@ pub(super) fn outcome(
     }
 }
 
+/// Length by which contacts may be later than an estimated stroke: up to the end of its interval, and beyond it by the ripple of
+/// the speed, which is allowed for where a stroke is stated too.
+fn tolerance(stroke: &Estimate) -> f64 {
+    stroke.high.unwrap_or(stroke.value) * (1.0 + hand::TOLERANCE) - stroke.value
+}
+
 impl Fit {
     /// Noise that the real probe adds to touches: the likeliest values.
     pub fn real(&self) -> Noise {
@@ -151,7 +162,7 @@ impl Fit {
 
     /// The probe as the text of a `probe.toml`, with the intervals as comments.
     pub fn toml(&self) -> String {
-        let Probe { radius, spacing, speed, tilt, stroke, travel } = self.probe;
+        let Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance } = self.probe;
         let unit = match self.unit {
             Length::Tenth => "# A unit is a tenth of the object's longest side.\nunit = \"unit\"\n",
             Length::Millimeter => "unit = \"mm\"\n",
@@ -178,6 +189,10 @@ impl Fit {
                 format!("  # {}: no recorded contact is later", between(&stroke, 1.0, 3))
             });
             _ = writeln!(text, "stroke = {stroke:?}{estimated}");
+            if let Some(tolerance) = stroke_tolerance {
+                let latest = stroke + tolerance;
+                _ = writeln!(text, "stroke_tolerance = {tolerance:?}  # contacts up to {latest:.3} are late, and of this hand");
+            }
         }
         if let Some(travel) = travel {
             _ = writeln!(text, "travel = {travel:?}");
