@@ -205,6 +205,9 @@ pub fn compare(
     if any(recorded, |touch| !touch.is_full()) && !any(simulated, |touch| !touch.is_full()) {
         return refuse("the recorded touches are of approaches, the simulated ones full touches only".into());
     }
+    if !recorded.placement_shares().is_empty() && simulated.placement_shares().is_empty() {
+        return refuse("the recordings state placements on a table, and the simulated objects float".into());
+    }
     let empties = any(recorded, Touch::is_empty);
     let partial = any(recorded, |touch| !touch.is_full());
     let alike = |touch: &Touch| touch.is_full() || partial && (empties || !touch.is_empty());

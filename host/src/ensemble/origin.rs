@@ -284,6 +284,10 @@ impl StatedProbe {
         if is_simulated {
             return Ok(());
         }
+        if probe.is_some_and(|probe| probe.cone == 0) && !dataset.placement_shares().is_empty() {
+            let [first, second] = names.map(str::to_owned);
+            return Err(ProbeProblem::Differs { first, second, differences: "scene floating and table".into() });
+        }
         let stroke = probe.and_then(|probe| probe.stroke);
         let [window, allowed] = match probe.and_then(|probe| stroke_of(&probe)) {
             Some(times) => times.map(Some),

@@ -9,6 +9,7 @@ use super::{Evidence, Settings, Timer};
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::hand;
 use crate::probe::noise::{Grazing, Noise};
+use crate::touches::Surroundings;
 use palpate_shared::format::Length;
 use serde::Serialize;
 use std::fmt::{self, Write as _};
@@ -67,8 +68,11 @@ pub struct Fit {
     pub contacts: [usize; 2],
     /// Presses on a flat plate.
     pub presses: usize,
-    /// Names of the recorded objects.
+    /// Names of the recorded objects, or placements.
     pub objects: Vec<String>,
+    /// Surroundings of the objects.
+    #[serde(skip_serializing_if = "Surroundings::is_floating")]
+    pub scene: Surroundings,
     /// Warnings about what the recordings cannot determine, and what to record next.
     pub warnings: Vec<Warning>,
     /// Recordings that look wrong.
@@ -131,6 +135,7 @@ pub(super) fn outcome(
         contacts: super::counts(evidence),
         presses: evidence.plate.as_ref().map_or(0, |plate| plate.count),
         objects: evidence.recordings.iter().map(|own| own.name.to_owned()).collect(),
+        scene: settings.origin.scene,
         warnings: Vec::new(),
         suspects,
     }
@@ -171,10 +176,11 @@ impl Fit {
         let presses =
             if self.presses > 0 { format!(" and {} presses on a plate", self.presses) } else { String::new() };
         let mut text = format!(
-            "# Found by `palpate probe fit` from {} approaches to {}{presses}.\n\
+            "# Found by `palpate probe fit` from {} approaches to {}{}{presses}.\n\
              # Behind each value its 95 % interval, which supposes that probe and objects are as they are simulated.\n",
             self.recorded,
             self.objects.join(", "),
+            if self.scene.is_floating() { "" } else { " on a table" },
         );
         // Writing to a string cannot fail.
         for warning in &self.warnings {

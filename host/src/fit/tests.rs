@@ -103,7 +103,8 @@ fn settings() -> Settings {
 /// Touches of rigid fingers, made once for all fits to them.
 fn simulated(settings: &Settings) -> Simulated {
     let scenes = scenes(&objects(), settings, &()).unwrap();
-    Simulated::new(&objects(), scenes, Layer::default(), settings, &()).unwrap()
+    let touched = touched::touched(&objects(), scenes, &Dataset::default());
+    Simulated::new(touched, Layer::default(), settings, &()).unwrap()
 }
 
 static SIMULATED: LazyLock<Simulated> = LazyLock::new(|| simulated(&settings()));
