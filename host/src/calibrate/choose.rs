@@ -87,7 +87,7 @@ pub(super) fn chosen(
             CalibrateProblem::TooFew { object: of(position), rate, found, needed: needed(rate, confidence), supplied }
         }
         Stop::TooMany { position, tally: Tally { wrong, all } } => {
-            CalibrateProblem::NotKept { object: of(position), rate, wrong, given: all }
+            CalibrateProblem::NotKept { object: of(position), rate, wrong, given: all, remedy: None }
         }
     })?;
     Ok(summary(kept.threshold, kept.tallies, &tested, count))

@@ -1,6 +1,7 @@
 //! Problems with calibrating.
 
-use super::walk::Tally;
+use super::recorded::{GROWN, GROWTH, LIKELY};
+use super::walk::{Tally, allowed, binomial_tail};
 use crate::error::Problem;
 
 /// Problems with calibrating.
@@ -32,6 +33,8 @@ pub enum CalibrateProblem {
         wrong: u64,
         /// Names given.
         given: u64,
+        /// Change that would keep it, where that is known.
+        remedy: Option<Box<Remedy>>,
     },
     /// There are too few sequences of rows, or groups of them, for a promise, even without any error.
     #[error("{found} {}{} are too few to promise {} %: at least {needed} are needed, none of them wrong; {}", what(*groups, object.is_some()), of_object(object), percent(*rate), could(*possible))]
@@ -118,6 +121,76 @@ pub struct Supplied {
     pub fewest: u64,
 }
 
+/// Changes that would keep a rate that no threshold kept, by the names that were seen.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Remedy {
+    /// Touches, or approaches, of each object with which it is likely to be kept if as large a share of the names is wrong; none
+    /// if that share is above the rate, or more are not the matter.
+    pub touches: Option<u64>,
+    /// Sequences with which it is likely, where the touches were not used up.
+    pub sequences: Option<u64>,
+    /// True if the touches are approaches.
+    pub approaches: bool,
+    /// The lowest rate that the names support.
+    pub supported: Option<f64>,
+    /// The noise that the model was trained for, and that of the touches, where these differ.
+    pub noise: Option<[String; 2]>,
+}
+
+impl Remedy {
+    /// Of this tally of names, of sequences that used up what was `supplied`, or of `sequences` that did not.
+    pub(super) fn new(
+        tally: Tally,
+        (rate, confidence): (f64, f64),
+        supplied: Option<Supplied>,
+        sequences: usize,
+        noise: Option<[String; 2]>,
+    ) -> Self {
+        // No rate is 0 because none was wrong.
+        let error = (tally.wrong as f64 + 0.5) / (tally.all as f64 + 1.0);
+        let is_likely = |times: &f64| {
+            let all = (tally.all as f64 * times).floor() as u64;
+            let wrong = allowed(all, rate, confidence);
+            wrong.is_some_and(|wrong| binomial_tail(Tally { wrong, all }, error) >= LIKELY)
+        };
+        let times = (1..GROWN).map(|step| GROWTH.powi(step)).find(is_likely).filter(|_| error < rate);
+        let times_of = |number: f64| times.map(|times| two_digits(number * times));
+        let supports = |rate: &f64| binomial_tail(tally, *rate) <= 1.0 - confidence;
+        Self {
+            touches: supplied.and_then(|supplied| times_of(supplied.fewest as f64)),
+            sequences: if supplied.is_none() { times_of(sequences as f64) } else { None },
+            approaches: supplied.is_none_or(|supplied| supplied.approaches),
+            // In steps that a reader tells apart.
+            supported: (1..500).map(|step| f64::from(step) / 1e3).filter(|higher| *higher > rate).find(supports),
+            noise,
+        }
+    }
+
+    /// The advice, as sentences.
+    fn sentences(&self) -> String {
+        let what = if self.approaches { "approaches" } else { "touches" };
+        let higher = match self.supported {
+            Some(supported) => format!("promise a higher error rate: these support {} %", percent(supported)),
+            None => "promise a higher error rate".into(),
+        };
+        match (self.touches, self.sequences, &self.noise) {
+            (Some(touches), ..) => {
+                format!("About {touches} {what} of each object would do, if as many of the names are wrong. Or {higher}.")
+            }
+            (_, Some(sequences), _) => {
+                format!("About {sequences} sequences would do (--sequences), if as many of the names are wrong. Or {higher}.")
+            }
+            (.., Some([trained, here])) => {
+                format!("Train the model for the noise of these {what}: it was trained for {trained}, and they have {here}. Or {higher}.")
+            }
+            _ => format!(
+                "The model was trained for the noise of these {what}, and more of them would not do: {higher}, or train a model that \
+                 mistakes fewer."
+            ),
+        }
+    }
+}
+
 /// Rates that recordings support, and recordings that a rate takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Forecast {
@@ -154,7 +227,8 @@ impl Problem for CalibrateProblem {
             Self::MissingSequences { .. } => "Add sequences of them.",
             Self::TooFew { supplied: None, .. } => "Allow more sequences, or promise a higher error rate.",
             Self::TooFew { supplied: Some(_), .. } => "Record or capture more touches, or promise a higher error rate.",
-            Self::NotKept { .. } => {
+            Self::NotKept { remedy: Some(remedy), .. } => return remedy.sentences(),
+            Self::NotKept { remedy: None, .. } => {
                 "Train the model for the noise of these touches, or promise a higher error rate; more touches of the \
                  calibration may also help."
             }

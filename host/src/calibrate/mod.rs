@@ -52,7 +52,7 @@ mod walk;
 pub use choose::{Chosen, Terms, choose, choose_independent};
 pub use draw::{Moment, Supply, Until, follow, follow_plan};
 pub(crate) use error::two_digits;
-pub use error::{CalibrateProblem, Enough, Forecast, Supplied};
+pub use error::{CalibrateProblem, Enough, Forecast, Remedy, Supplied};
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
 pub use groups::{Grouped, choose_groups};
 pub(crate) use model::worse;

@@ -1,6 +1,7 @@
 //! A model's thresholds, its promise and its temperature.
 
 use super::choose::{Chosen, Terms, chosen};
+use super::error::Remedy;
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
 use super::sequence::{Odds, Sequence, margin_of, odds_of};
 use super::temperature::temperature;
@@ -314,7 +315,17 @@ pub(super) fn calibrate_drawn(
     let sequences = draw(&mut supplies, settings.sequences, strictest)?;
     let supplied = (sequences.len() < wanted(settings.sequences).iter().sum())
         .then(|| Supplied { approaches: dataset.holds_approaches(), fewest });
-    let chosen = chosen(&sequences, names, strictest, &terms, supplied)?;
+    let chosen = chosen(&sequences, names, strictest, &terms, supplied).map_err(|problem| match problem {
+        CalibrateProblem::NotKept { object, rate, wrong, given, .. } => {
+            let there = dataset.real().and(&settings.noise);
+            let trained = model.noise().unwrap_or_default();
+            let noise = (trained != there.trained()).then(|| [Noise::of_training(&trained), there].map(|noise| noise.to_string()));
+            let tally = Tally { wrong, all: given };
+            let remedy = Remedy::new(tally, (rate, settings.confidence), supplied, sequences.len(), noise);
+            CalibrateProblem::NotKept { object, rate, wrong, given, remedy: Some(Box::new(remedy)) }
+        }
+        other => other,
+    })?;
     finished(model, dataset, settings, *max_touches, names, &chosen, temperature()?)
 }
 

@@ -32,7 +32,7 @@ use crate::touches::{Dataset, Source};
 use palpate_onboard::{Model, Stopping};
 
 /// The probability with which a forecast number of approaches is enough, if the simulation is right.
-const LIKELY: f64 = 0.8;
+pub(super) const LIKELY: f64 = 0.8;
 /// Of first thresholds that pass with nearly the same probability, to this share, the strictest is taken.
 const AS_LIKELY: f64 = 0.95;
 /// A probability below which recordings that make too few names are not tested at all.
@@ -41,8 +41,8 @@ const HOPELESS: f64 = 0.01;
 const RATES: [f64; 17] =
     [0.001, 0.002, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.4];
 /// The factor between numbers of approaches that a forecast tries, and how many it tries.
-const GROWTH: f64 = 1.05;
-const GROWN: i32 = 160;
+pub(super) const GROWTH: f64 = 1.05;
+pub(super) const GROWN: i32 = 160;
 
 /// Sets a model's thresholds, as [`calibrate`](fn@super::calibrate) does, for touches like the `recorded` ones: thresholds are
 /// found on `simulated` sequences, to which the noise of `settings` is added, and tested on the recorded ones, which have

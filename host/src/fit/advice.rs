@@ -4,12 +4,14 @@ use super::outcome::{Fit, Warning};
 use super::timer::Timer;
 use super::words::{Estimate, between, offset_between};
 
-/// Width of an interval above which there is a warning: of the speed, of offsets in milliseconds, of the noise as a
-/// share of it, of shares of missed contacts.
+/// Width of an interval above which there is a warning: of the speed, of offsets in milliseconds, of shares of missed contacts.
 const SPEED: f64 = 0.08;
 const OFFSET: f64 = 5.0;
-const NOISE: f64 = 0.8;
 const MISSED: f64 = 0.08;
+/// Amount in milliseconds by which the noise may be above its likeliest value without a warning: a model that is trained for that
+/// much too little loses half a point after 60 approaches, and one that is trained for too much loses a tenth
+/// (`docs/measurements/fit.md`).
+const NOISE: f64 = 2.5;
 /// No recording is asked to be longer than this many times what is there.
 const MOST: f64 = 30.0;
 
@@ -55,8 +57,18 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
     if coarse {
         let record = "It is below the timer's resolution; a finer timer would show it.".into();
         warn("the noise", said(&fit.noise, 1.0, 2, " ms"), record);
-    } else if is_wide(&fit.noise, NOISE * fit.noise.value.max(0.5)) {
-        let record = format!("Record {}.", more(fit.noise.width(), NOISE * fit.noise.value.max(0.5)));
+    } else if fit.noise.high.is_none_or(|high| high > fit.noise.value + NOISE) {
+        let above = fit.noise.high.map(|high| high - fit.noise.value);
+        let train = fit.noise.high.map_or_else(String::new, |high| {
+            format!(
+                "Train for the upper end (noise = \"{high:.2}ms\" in the file): too much noise in training costs hardly any accuracy, \
+                 too little does. Or record "
+            )
+        });
+        let record = match train.is_empty() {
+            true => format!("Record {}.", more(above, NOISE)),
+            false => format!("{train}{}.", more(above, NOISE)),
+        };
         warn("the noise", said(&fit.noise, 1.0, 2, " ms"), record);
     }
     match &fit.missed {

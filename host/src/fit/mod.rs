@@ -217,7 +217,8 @@ fn fit_to(
     };
     progress.begin("fitting", None);
     evidence.of.par_iter().for_each(|&object| evidence.objects[object].prepare());
-    let timer = timer::timer(recorded.touches().chain(plate.into_iter().flatten()));
+    let all = || recorded.touches().chain(plate.into_iter().flatten());
+    let timer = timer::timer(all());
     let (best, ends) = searched(&evidence, layer.candidate, progress)?;
     // The intervals of the search suppose the layer as it was found.
     let center = best.candidate.numbers();
@@ -226,6 +227,7 @@ fn fit_to(
     progress.begin("checking the recordings", None);
     let suspects = suspects::suspects(&evidence, &best, progress)?;
     let mut fit = outcome::outcome(&evidence, &best, &ends, layer, timer, suspects, settings);
+    fit.readings = timer::readings(all(), timer).map(|micros| micros / 1e3);
     fit.warnings = advice::warnings(&fit, timer);
     Ok(fit)
 }

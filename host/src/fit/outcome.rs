@@ -62,6 +62,10 @@ pub struct Fit {
     pub grazing: Option<GrazingEstimate>,
     /// The timer's resolution; none if it is finer than 0.02 ms, or there are too few times to tell.
     pub timer: Option<f64>,
+    /// Time between readings of the contacts in milliseconds, where contact times cluster about its multiples; none if they do not,
+    /// or if it is the timer's resolution.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub readings: Option<f64>,
     /// Recorded touches and approaches.
     pub recorded: usize,
     /// Those of them with three contacts, and with two.
@@ -131,6 +135,7 @@ pub(super) fn outcome(
             bend: layered(&|real| real.grazing.bend / 1e3),
         }),
         timer: resolution,
+        readings: None,
         recorded: evidence.recordings.iter().map(|own| own.touches.len()).sum(),
         contacts: super::counts(evidence),
         presses: evidence.plate.as_ref().map_or(0, |plate| plate.count),

@@ -146,6 +146,15 @@ fn table(found: &Fit) -> String {
     if found.stroke.is_some() {
         text += "\nThe stroke was not stated: no recorded contact is later, where many would be.";
     }
+    let coarse = found.readings.or(found.timer.filter(|timer| *timer >= 5.0));
+    if let Some(interval) = coarse {
+        // Writing to a string cannot fail.
+        _ = write!(
+            text,
+            "\nContact times cluster about multiples of {interval} ms, as if contacts were read that seldom. The probe states that as \
+             noise, and as its timer; read them more often if you can."
+        );
+    }
     text += "\nOffsets are relative to the first finger's: only differences of times are recorded.\n";
     for warning in &found.warnings {
         _ = writeln!(text, "Not told well: {warning}");
