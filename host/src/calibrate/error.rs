@@ -1,5 +1,6 @@
 //! Problems with calibrating.
 
+use super::choose::Terms;
 use super::recorded::{GROWN, GROWTH, LIKELY};
 use super::walk::{Tally, allowed, binomial_tail};
 use crate::error::Problem;
@@ -141,7 +142,7 @@ impl Remedy {
     /// Of this tally of names, of sequences that used up what was `supplied`, or of `sequences` that did not.
     pub(super) fn new(
         tally: Tally,
-        (rate, confidence): (f64, f64),
+        &Terms { rate, confidence, .. }: &Terms,
         supplied: Option<Supplied>,
         sequences: usize,
         noise: Option<[String; 2]>,
@@ -318,4 +319,45 @@ fn not_supported(object: &Option<String>, rate: f64, tally: Tally, needed: u64, 
 
 fn of_object(object: &Option<String>) -> String {
     object.as_ref().map_or_else(String::new, |object| format!(" for {object}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn remedy(wrong: u64, all: u64, noise: Option<[String; 2]>) -> Remedy {
+        let supplied = Some(Supplied { approaches: true, fewest: 60_000 });
+        Remedy::new(Tally { wrong, all }, &TERMS, supplied, 0, noise)
+    }
+
+    const TERMS: Terms = Terms { rate: 0.01, confidence: 0.95, per: super::super::Per::Average };
+
+    #[test]
+    fn the_advice_of_a_rate_that_is_not_kept_is_computed_from_the_names_that_were_seen() {
+        // 6 of 785 are a share below 1 %, and too many to show it: as large a share of more names does.
+        let few = remedy(6, 785, None);
+        let enough = few.touches.unwrap();
+        let times = enough as f64 / 60_000.0;
+        let tally = Tally { wrong: (6.0 * times).round() as u64, all: (785.0 * times).round() as u64 };
+        assert!(binomial_tail(tally, 0.01) <= 0.05, "{tally:?}");
+        assert!((2.0..12.0).contains(&times), "{enough}");
+        let said = few.sentences();
+        assert!(said.starts_with(&format!("About {enough} approaches of each object would do")), "{said}");
+        assert!(said.contains("these support 1.6 %") && !said.contains("noise"), "{said}");
+        assert!(binomial_tail(Tally { wrong: 6, all: 785 }, 0.016) <= 0.05);
+        // The fewer are wrong, the fewer do.
+        assert!(remedy(4, 785, None).touches.unwrap() < enough);
+    }
+
+    #[test]
+    fn a_model_that_was_trained_for_the_noise_of_the_touches_is_not_to_be_trained_for_it() {
+        let same = remedy(14, 785, None);
+        assert_eq!(same.touches, None, "a share above the rate stays above it");
+        let said = same.sentences();
+        assert!(said.starts_with("The model was trained for the noise of these approaches") && said.contains("2.8 %"), "{said}");
+        let other = remedy(14, 785, Some(["no noise".into(), "noise of 5 ms".into()])).sentences();
+        assert!(other.starts_with("Train the model for the noise") && other.contains("trained for no noise, and they have noise of 5 ms"), "{other}");
+        let sequences = Remedy::new(Tally { wrong: 6, all: 785 }, &TERMS, None, 1_000, None);
+        assert!(sequences.sentences().contains("sequences would do (--sequences)"), "{sequences:?}");
+    }
 }

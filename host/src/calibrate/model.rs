@@ -315,16 +315,14 @@ pub(super) fn calibrate_drawn(
     let sequences = draw(&mut supplies, settings.sequences, strictest)?;
     let supplied = (sequences.len() < wanted(settings.sequences).iter().sum())
         .then(|| Supplied { approaches: dataset.holds_approaches(), fewest });
-    let chosen = chosen(&sequences, names, strictest, &terms, supplied).map_err(|problem| match problem {
-        CalibrateProblem::NotKept { object, rate, wrong, given, .. } => {
-            let there = dataset.real().and(&settings.noise);
-            let trained = model.noise().unwrap_or_default();
-            let noise = (trained != there.trained()).then(|| [Noise::of_training(&trained), there].map(|noise| noise.to_string()));
-            let tally = Tally { wrong, all: given };
-            let remedy = Remedy::new(tally, (rate, settings.confidence), supplied, sequences.len(), noise);
-            CalibrateProblem::NotKept { object, rate, wrong, given, remedy: Some(Box::new(remedy)) }
+    let chosen = chosen(&sequences, names, strictest, &terms, supplied).map_err(|mut problem| {
+        if let CalibrateProblem::NotKept { wrong, given, remedy, .. } = &mut problem {
+            let both = [model.noise().unwrap_or_default(), dataset.real().and(&settings.noise).trained()];
+            let noise = (both[0] != both[1]).then(|| both.map(|noise| Noise::of_training(&noise).to_string()));
+            let tally = Tally { wrong: *wrong, all: *given };
+            *remedy = Some(Box::new(Remedy::new(tally, &terms, supplied, sequences.len(), noise)));
         }
-        other => other,
+        problem
     })?;
     finished(model, dataset, settings, *max_touches, names, &chosen, temperature()?)
 }

@@ -21,13 +21,13 @@ use crate::ensemble::{feature_row, train};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::evaluate::{Estimate, Finding};
 use crate::in_order::in_order;
-use crate::probe::Probe;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, ObjectTouches, folds};
 use palpate_shared::format::Counted;
 use palpate_shared::{ContactPattern, Descriptor, Touch};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Settings of a comparison of data sets.
@@ -173,11 +173,11 @@ impl Comparison {
         let pair = self.cost.as_ref().and_then(|cost| cost.confused.first());
         match pair.filter(|_| by_pairs >= MOSTLY * loss) {
             Some(Confused { touched, named, .. }) => format!(
-                "The simulated probe is a fitted one, and most of the loss is {touched} as {named}: check the mesh of {touched} and its \
-                 size, or adjust the model to recordings (`palpate train --teach`)."
+                "The simulated probe has a real one's deviations already, and most of the loss is {touched} as {named}: check the mesh \
+                 of {touched} and its size, or adjust the model to recordings (`palpate train --teach`)."
             ),
-            None => "The simulated probe is a fitted one: check the meshes and their sizes and whether the robot aims as the \
-                     simulation does, or adjust the model to recordings (`palpate train --teach`)."
+            None => "The simulated probe has a real one's deviations already: check the meshes and their sizes and whether the robot \
+                     aims as the simulation does, or adjust the model to recordings (`palpate train --teach`)."
                 .into(),
         }
     }
@@ -212,9 +212,9 @@ pub fn compare(
     let partial = any(recorded, |touch| !touch.is_full());
     let alike = |touch: &Touch| touch.is_full() || partial && (empties || !touch.is_empty());
     let simulated = simulated.each(|own| own.filtered(alike));
-    // By placement, where both sides state it; and without contacts behind the stroke that was simulated.
+    // By placement, where both sides state it; and without contacts that are late for the stroke that was simulated.
     let recorded = recorded.clone().matching(&simulated.by_placement().names());
-    let recorded = recorded.within(simulated.probe().and_then(Probe::window)).into_owned();
+    let recorded = simulated.probe().map_or(Cow::Borrowed(&recorded), |probe| recorded.delivered_by(probe)).into_owned();
     let pairs: Vec<(&ObjectTouches, ObjectTouches)> =
         recorded.objects.iter().filter_map(|own| Some((own, counterpart(&own.name, &simulated)?))).collect();
     if pairs.is_empty() {

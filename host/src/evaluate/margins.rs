@@ -273,7 +273,7 @@ impl<'m> Margins<'m> {
     }
 
     /// Frequency of touches of a tested object, compared with others: that of its placements together.
-    pub(super) fn frequency(&self, position: usize) -> f64 {
+    pub(crate) fn frequency(&self, position: usize) -> f64 {
         let of = |&output: &usize| match (&self.weights, self.candidate) {
             (Some(weights), _) => weights.get(output).copied().unwrap_or(0).into(),
             (None, Candidate::Compiled(model)) => (f64::from(model.prior(output)) * f64::from(model.unit())).exp(),

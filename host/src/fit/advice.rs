@@ -12,6 +12,8 @@ const MISSED: f64 = 0.08;
 /// much too little loses half a point after 60 approaches, and one that is trained for too much loses a tenth
 /// (`docs/measurements/fit.md`).
 const NOISE: f64 = 2.5;
+/// The most noise in milliseconds of which it is measured that training for it costs little.
+const MUCH_NOISE: f64 = 5.0;
 /// No recording is asked to be longer than this many times what is there.
 const MOST: f64 = 30.0;
 
@@ -59,15 +61,13 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
         warn("the noise", said(&fit.noise, 1.0, 2, " ms"), record);
     } else if fit.noise.high.is_none_or(|high| high > fit.noise.value + NOISE) {
         let above = fit.noise.high.map(|high| high - fit.noise.value);
-        let train = fit.noise.high.map_or_else(String::new, |high| {
-            format!(
+        let record = match fit.noise.high.filter(|high| *high <= MUCH_NOISE) {
+            None => format!("Record {}.", more(above, NOISE)),
+            Some(high) => format!(
                 "Train for the upper end (noise = \"{high:.2}ms\" in the file): too much noise in training costs hardly any accuracy, \
-                 too little does. Or record "
-            )
-        });
-        let record = match train.is_empty() {
-            true => format!("Record {}.", more(above, NOISE)),
-            false => format!("{train}{}.", more(above, NOISE)),
+                 too little does. Or record {}.",
+                more(above, NOISE)
+            ),
         };
         warn("the noise", said(&fit.noise, 1.0, 2, " ms"), record);
     }

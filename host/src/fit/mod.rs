@@ -81,7 +81,6 @@ use palpate_shared::Touch;
 use rayon::prelude::*;
 use recording::Recording;
 use search::Best;
-use std::borrow::Cow;
 use stroke::Stroke;
 use timer::Timer;
 use touched::Touched;
@@ -152,12 +151,7 @@ pub fn fit(
     let scenes = scenes(objects, settings, progress)?;
     let recorded = &recorded.clone().matching(&touched::placements(objects, &scenes));
     // Contacts that are a little later than a stated stroke are missing, as in every model of this probe.
-    let delivered = match settings.origin.probe.latest() {
-        Some(latest) if recorded.touches().all(|touch| f64::from(touch.spread()) <= latest) => {
-            recorded.within(settings.origin.probe.window())
-        }
-        _ => Cow::Borrowed(recorded),
-    };
+    let delivered = recorded.delivered_by(&settings.origin.probe);
     let recorded = delivered.as_ref();
     let touched = touched::touched(objects, scenes, recorded);
     let of = useful(recorded, &touched, plate)?;
@@ -205,6 +199,7 @@ fn fit_to(
     let objects: Vec<Densities> = touches.iter().map(densities).collect();
     let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
         in_poses: posed::in_poses(&own.name, own.touches(), &touched[object], &layer.real, settings),
+        is_mixed: touched[object].is_mixed(),
         ..Recording::without_poses(&own.name, own.touches(), kept)
     });
     let recordings: Vec<Recording<'_>> = recordings.collect();

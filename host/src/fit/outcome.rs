@@ -74,6 +74,9 @@ pub struct Fit {
     pub presses: usize,
     /// Names of the recorded objects, or placements.
     pub objects: Vec<String>,
+    /// Those of them that state no placement on a table, and were not checked for other objects.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unchecked: Vec<String>,
     /// Surroundings of the objects.
     #[serde(skip_serializing_if = "Surroundings::is_floating")]
     pub scene: Surroundings,
@@ -140,6 +143,7 @@ pub(super) fn outcome(
         contacts: super::counts(evidence),
         presses: evidence.plate.as_ref().map_or(0, |plate| plate.count),
         objects: evidence.recordings.iter().map(|own| own.name.to_owned()).collect(),
+        unchecked: evidence.recordings.iter().filter(|own| own.is_mixed).map(|own| own.name.to_owned()).collect(),
         scene: settings.origin.scene,
         warnings: Vec::new(),
         suspects,

@@ -55,6 +55,7 @@ impl Bench {
                 &self.settings,
             ),
             kept,
+            is_mixed: false,
         });
         let recordings: Vec<Recording<'_>> = recordings.collect();
         let evidence = Evidence {

@@ -13,9 +13,7 @@
 //! A looser threshold gives a name no later, in every single sequence, so there are no more false alarms than were tested.
 
 use super::{Calibrated, Settings, calibrate, calibrate_recorded, tested_means, without};
-use crate::calibrate::{
-    self, Remedy, STRICTEST, Tally, add_noise, allowed, binomial_tail, calibrate_from, odds_of, two_digits,
-};
+use crate::calibrate::{self, STRICTEST, add_noise, calibrate_from, odds_of, two_digits};
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};
 use crate::mesh::BACKGROUND;
@@ -23,17 +21,14 @@ use crate::progress::Progress;
 use crate::touches::folds::split;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Stopping};
-use palpate_shared::format::{Promise, Tag};
+use palpate_shared::format::Tag;
 
 /// The share of touches that the promise is tested on, and of the others the share that thresholds begin with.
 const PROMISED: f64 = 0.5;
 const BEGUN: f64 = 0.25;
 /// Amount by which sequences are followed beyond the first thresholds, in nats: room for the loosest that keeps the
-/// promise, as far as fewer touches say where it is; and the number of such steps that are tried.
+/// promise, as far as fewer touches say where it is.
 const STRICTER: f64 = 0.5;
-const MOST_STRICTER: u32 = 6;
-/// The probability with which the names of the promise should pass at the first threshold.
-const PASSES: f64 = 0.9;
 /// The confidence of the first thresholds, which promise nothing: that of an estimate.
 const EVEN: f64 = 0.5;
 
@@ -81,29 +76,17 @@ pub fn calibrate_with_promise(
         None => calibrate(&begun, &learned, &shapes, settings)?,
     };
     let promised = calibrate_from(&compile::open(&tested.bytes)?, halves.test, promise, Some(strictest), progress);
-    let promised = promised.map_err(|error| match error.problem::<CalibrateProblem>() {
-        // As many of all touches, of which a part makes the names of the promise.
-        Some(CalibrateProblem::NotKept { object, rate, wrong, given, remedy: Some(remedy) }) => {
-            let touches = remedy.touches.map(|touches| two_digits(touches as f64 / PROMISED));
-            let remedy = Some(Box::new(Remedy { touches, ..(**remedy).clone() }));
-            CalibrateProblem::NotKept { object: object.clone(), rate: *rate, wrong: *wrong, given: *given, remedy }.into()
+    let promised = promised.map_err(|error| {
+        let Some(mut problem) = error.problem::<CalibrateProblem>().cloned() else { return error };
+        if let CalibrateProblem::NotKept { remedy: Some(remedy), .. } = &mut problem {
+            // As many of all touches, of which a part makes the names of the promise.
+            remedy.touches = remedy.touches.map(|touches| two_digits(touches as f64 / PROMISED));
         }
-        _ => error,
+        problem.into()
     })?;
     let [mean_touches, mean_touches_without] = tested_means(&compile::open(&promised.model)?, &learned, settings)?;
     let tested = Calibrated { bytes: promised.model.clone(), mean_touches, mean_touches_without, ..tested };
     Ok((promised, tested))
-}
-
-/// Amount by which thresholds begin stricter than where a few names kept the rate, in nats: so that as many names as the promise is
-/// tested on would pass there. The fewer these are, the lower an error rate they can show; odds fall by e with each nat.
-fn stricter(begun: &Promise, promise: &calibrate::Settings) -> f64 {
-    let error = (f64::from(begun.wrong) + 0.5) / (f64::from(begun.given) + 1.0);
-    let all = (f64::from(begun.given) * PROMISED / ((1.0 - PROMISED) * BEGUN)).round() as u64;
-    let Some(wrong) = allowed(all, promise.rate, promise.confidence) else { return STRICTER };
-    let passes = |nats: &f64| binomial_tail(Tally { wrong, all }, error * (-nats).exp()) >= PASSES;
-    let nats = (0..=MOST_STRICTER).map(|step| STRICTER * f64::from(step)).find(passes);
-    nats.unwrap_or(STRICTER * f64::from(MOST_STRICTER)).max(STRICTER)
 }
 
 /// The margin in nats that thresholds begin with.
@@ -115,10 +98,7 @@ fn strictest(
 ) -> Result<f64> {
     let settings = calibrate::Settings { confidence: EVEN, ..promise.clone() };
     match calibrate::calibrate(untested, part, &settings, progress) {
-        Ok(calibrated) => {
-            let found = calibrated.margins.values().copied().fold(0.0, f64::max);
-            Ok(found + stricter(&calibrated.promise, promise))
-        }
+        Ok(calibrated) => Ok(calibrated.margins.values().copied().fold(0.0, f64::max) + STRICTER),
         Err(error) => match error.problem() {
             Some(CalibrateProblem::TooFew { .. } | CalibrateProblem::NotKept { .. }) => {
                 Ok(((1.0 - promise.rate) / promise.rate).ln() + STRICTEST[0])

@@ -73,6 +73,12 @@ impl Dataset {
         }
     }
 
+    /// The same by the stroke of a probe, if a hand with this stroke explains all contacts; otherwise as they are.
+    pub fn delivered_by(&self, probe: &Probe) -> Cow<'_, Self> {
+        let is_explained = |latest: f64| self.touches().all(|touch| f64::from(touch.spread()) <= latest);
+        self.within(probe.window().filter(|_| probe.latest().is_some_and(is_explained)))
+    }
+
     /// The weight of each placement among those of its object, by the name of its output; empty where objects have none.
     pub fn placement_shares(&self) -> BTreeMap<String, f64> {
         let of = |object: &ObjectTouches| {

@@ -146,6 +146,14 @@ fn table(found: &Fit) -> String {
     if found.stroke.is_some() {
         text += "\nThe stroke was not stated: no recorded contact is later, where many would be.";
     }
+    if !found.unchecked.is_empty() {
+        // Writing to a string cannot fail.
+        _ = write!(
+            text,
+            "\nNot checked for other objects, since their recordings state no placement: {}.",
+            found.unchecked.join(", ")
+        );
+    }
     let coarse = found.readings.or(found.timer.filter(|timer| *timer >= 5.0));
     if let Some(interval) = coarse {
         // Writing to a string cannot fail.

@@ -59,6 +59,7 @@ fn a_recording_is_a_data_set_whose_listing_says_when_from_where_and_by_what() {
     assert!(dataset.is_recorded() && dataset.holds_approaches());
     let expected = Recorded {
         object: "spoon".into(),
+        placement: None,
         touches: 3,
         began: "2026-10-02T12:00:00Z".into(),
         source: "/dev/ttyACM0".into(),
