@@ -263,7 +263,7 @@ struct Simulated {
 impl Simulated {
     fn new(touched: Vec<Touched>, layer: Layer, settings: &Settings, progress: &dyn Progress) -> Result<Self> {
         // What the hand does not reach is left out later, when a candidate says how fast it is.
-        let probe = Probe { stroke: None, ..settings.origin.probe };
+        let probe = Probe { stroke: None, stroke_tolerance: None, ..settings.origin.probe };
         let (touches, seed) = (settings.approaches, settings.seed);
         let origin = Origin { approaches: true, touches, seed, real: layer.real, probe, ..settings.origin.clone() };
         progress.begin("touching", Some(touched.len() as u64));

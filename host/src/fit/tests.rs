@@ -489,8 +489,7 @@ fn a_probe_is_fitted_to_objects_that_stand_on_a_table() {
     for (is_stated, has_poses) in [(true, false), (false, false), (true, true)] {
         let (recorded, settings) = tabled(900, 11, &BENT, is_stated, has_poses);
         let found = fit(&recorded, &objects(), Some(&plate(60, &BENT)), &settings, &()).unwrap();
-        near(&found, &BENT, [0.05, 1.5, 0.6]);
-        assert!(found.speed_factor.holds(1.0 / BENT.longer), "{:?}", found.speed_factor);
+        near(&found, &BENT, [0.04, 1.5, 0.6]);
         assert!(found.objects.iter().all(|name| name.contains('/') == is_stated), "{:?}", found.objects);
         assert!(found.toml().contains(" on a table and 60 presses on a plate.\n"), "{}", found.toml());
     }

@@ -302,7 +302,7 @@ fn a_promise_for_a_table_is_tested_on_recordings_with_and_without_placements() {
         let named: u64 = calibrated.objects.values().map(|of| of.named).sum();
         assert_eq!(named, u64::from(calibrated.promise.given), "each name is of one object");
         let per = |per| {
-            let settings = calibrate::Settings { per, rate: 0.2, ..settings.clone() };
+            let settings = calibrate::Settings { per, rate: 0.4, ..settings.clone() };
             calibrate_recorded(&model, simulated.clone(), &recorded, &settings, &())
         };
         assert!(per(Per::Name).unwrap_err().to_string().contains("several outputs"));

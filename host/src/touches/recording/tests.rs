@@ -213,7 +213,7 @@ fn a_directory_with_simulated_or_unlisted_touches_or_another_recorder_is_refused
     Listing::new(&Origin::default(), ["cup".into()]).write(directory.path()).unwrap();
     let simulated = TouchesProblem::HoldsSimulated { objects: "cup".into(), touches: 0 };
     assert_eq!(problem(&open(directory.path(), "fork").err().unwrap()), &simulated);
-    for name in ["", "../fork", "a/b"] {
+    for name in ["", "../fork", "a/b/c", "a/..", "/b"] {
         assert!(matches!(problem(&open(directory.path(), name).err().unwrap()), TouchesProblem::BadName { .. }));
     }
 }
