@@ -115,6 +115,7 @@ pub const TRAINED: Trained = Trained {
         stroke: None,
         travel: None,
         cone: 0,
+        stroke_tolerance: None,
     }),
     touches: Some(TrainedTouches {
         patterns: Patterns::CONTACTS,

@@ -56,8 +56,9 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Probe {
         let number = |name: &str| object.getattr(name)?.extract::<f64>();
         let (radius, spacing) = (number("radius")?, number("spacing")?);
         let length = |name: &str| object.getattr(name)?.extract::<Option<f64>>();
-        let (stroke, travel) = (length("stroke")?, length("travel")?);
-        Ok(Self(Measures { radius, spacing, speed: number("speed")?, tilt: number("tilt")?, stroke, travel }))
+        let (stroke, travel, stroke_tolerance) = (length("stroke")?, length("travel")?, length("stroke_tolerance")?);
+        let (speed, tilt) = (number("speed")?, number("tilt")?);
+        Ok(Self(Measures { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance }))
     }
 }
 
@@ -70,7 +71,7 @@ impl<'py> IntoPyObject<'py> for Probe {
 
     fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let Measures { radius, spacing, speed, tilt, stroke, travel } = self.0;
-        class(py, "Probe", &CLASS)?.call1((radius, spacing, speed, tilt, stroke, travel))
+        let Measures { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance } = self.0;
+        class(py, "Probe", &CLASS)?.call1((radius, spacing, speed, tilt, stroke, travel, stroke_tolerance))
     }
 }

@@ -116,6 +116,8 @@ impl Recognizer {
             let problem = EvaluateProblem::TimeTooLong { seconds, longest: self.longest, speed };
             return Err(Error::from(problem).into());
         }
+        // A little later than the stroke is missing, as on the chip.
+        let touch = palpate::evaluate::delivered(self.cell.borrow_dependent().model(), &touch);
         let pushed = self.cell.with_dependent_mut(|_, recognizer| recognizer.push(&touch));
         self.say(py, pushed)
     }

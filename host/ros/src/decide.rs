@@ -125,6 +125,8 @@ impl Decider {
             self.object.clone_from(&message.object);
             self.begin();
         }
+        // A little later than the stroke is missing, as on the chip.
+        let felt = palpate::evaluate::delivered(self.recognizer().model(), &felt);
         match self.opened.with_dependent_mut(|_, recognizer| recognizer.push(&felt)) {
             Ok(_) => self.step(),
             Err(refused) => self.refused(refused.to_string()),

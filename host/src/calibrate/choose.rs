@@ -124,7 +124,7 @@ pub(super) fn chosen(
             CalibrateProblem::TooFew { object: of(position), rate, found, needed, supplied }
         }
         Stop::TooMany { position, tally: Tally { wrong, all }, needed } => {
-            CalibrateProblem::NotKept { object: of(position), rate, wrong, given: all, needed }
+            CalibrateProblem::NotKept { object: of(position), rate, wrong, given: all, needed, remedy: None }
         }
         Stop::Looser => CalibrateProblem::Looser { rate },
     })

@@ -1,6 +1,8 @@
 //! Problems with calibrating.
 
-use super::walk::Tally;
+use super::choose::Terms;
+use super::recorded::{GROWN, GROWTH, LIKELY};
+use super::walk::{Tally, allowed, binomial_tail};
 use crate::error::Problem;
 
 /// Problems with calibrating.
@@ -34,6 +36,8 @@ pub enum CalibrateProblem {
         given: u64,
         /// The names with which as many wrong ones would do.
         needed: Option<u64>,
+        /// Change that would keep it, where that is known.
+        remedy: Option<Box<Remedy>>,
     },
     /// With a test of strangers no threshold as strict as without it was tested.
     #[error("with the test of strangers no threshold keeps {} % that is as strict as without it", percent(*rate))]
@@ -126,6 +130,12 @@ pub enum CalibrateProblem {
         /// Objects that the model knows and the data set does not have.
         objects: Vec<String>,
     },
+    /// Recordings lack objects of the model, or placements of them.
+    #[error("nothing is recorded of {}", objects.join(", "))]
+    MissingRecordings {
+        /// Outputs that the model has and no recording is of.
+        objects: Vec<String>,
+    },
     /// The touches are those that the model was trained on.
     #[error("the model was trained on these touches of {}: a promise calibrated on them would not hold for others", objects.join(", "))]
     TrainedOn {
@@ -144,6 +154,76 @@ pub struct Supplied {
     pub approaches: bool,
     /// Number of these that it holds of the object with the fewest.
     pub fewest: u64,
+}
+
+/// Changes that would keep a rate that no threshold kept, by the names that were seen.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Remedy {
+    /// Touches, or approaches, of each object with which it is likely to be kept if as large a share of the names is wrong; none
+    /// if that share is above the rate, or more are not the matter.
+    pub touches: Option<u64>,
+    /// Sequences with which it is likely, where the touches were not used up.
+    pub sequences: Option<u64>,
+    /// True if the touches are approaches.
+    pub approaches: bool,
+    /// The lowest rate that the names support.
+    pub supported: Option<f64>,
+    /// The noise that the model was trained for, and that of the touches, where these differ.
+    pub noise: Option<[String; 2]>,
+}
+
+impl Remedy {
+    /// Of this tally of names, of sequences that used up what was `supplied`, or of `sequences` that did not.
+    pub(super) fn new(
+        tally: Tally,
+        &Terms { rate, confidence, .. }: &Terms,
+        supplied: Option<Supplied>,
+        sequences: usize,
+        noise: Option<[String; 2]>,
+    ) -> Self {
+        // No rate is 0 because none was wrong.
+        let error = (tally.wrong as f64 + 0.5) / (tally.all as f64 + 1.0);
+        let is_likely = |times: &f64| {
+            let all = (tally.all as f64 * times).floor() as u64;
+            let wrong = allowed(all, rate, confidence);
+            wrong.is_some_and(|wrong| binomial_tail(Tally { wrong, all }, error) >= LIKELY)
+        };
+        let times = (1..GROWN).map(|step| GROWTH.powi(step)).find(is_likely).filter(|_| error < rate);
+        let times_of = |number: f64| times.map(|times| two_digits(number * times));
+        let supports = |rate: &f64| binomial_tail(tally, *rate) <= 1.0 - confidence;
+        Self {
+            touches: supplied.and_then(|supplied| times_of(supplied.fewest as f64)),
+            sequences: if supplied.is_none() { times_of(sequences as f64) } else { None },
+            approaches: supplied.is_none_or(|supplied| supplied.approaches),
+            // In steps that a reader tells apart.
+            supported: (1..500).map(|step| f64::from(step) / 1e3).filter(|higher| *higher > rate).find(supports),
+            noise,
+        }
+    }
+
+    /// The advice, as sentences.
+    fn sentences(&self) -> String {
+        let what = if self.approaches { "approaches" } else { "touches" };
+        let higher = match self.supported {
+            Some(supported) => format!("promise a higher error rate: these support {} %", percent(supported)),
+            None => "promise a higher error rate".into(),
+        };
+        match (self.touches, self.sequences, &self.noise) {
+            (Some(touches), ..) => {
+                format!("About {touches} {what} of each object would do, if as many of the names are wrong. Or {higher}.")
+            }
+            (_, Some(sequences), _) => {
+                format!("About {sequences} sequences would do (--sequences), if as many of the names are wrong. Or {higher}.")
+            }
+            (.., Some([trained, here])) => {
+                format!("Train the model for the noise of these {what}: it was trained for {trained}, and they have {here}. Or {higher}.")
+            }
+            _ => format!(
+                "The model was trained for the noise of these {what}, and more of them would not do: {higher}, or train a model that \
+                 mistakes fewer."
+            ),
+        }
+    }
 }
 
 /// Rates that recordings support, and recordings that a rate takes.
@@ -191,7 +271,8 @@ impl Problem for CalibrateProblem {
             Self::MissingSequences { .. } => "Add sequences of them.",
             Self::TooFew { supplied: None, .. } => "Allow more sequences, or promise a higher error rate.",
             Self::TooFew { supplied: Some(_), .. } => "Record or capture more touches, or promise a higher error rate.",
-            Self::NotKept { .. } => {
+            Self::NotKept { remedy: Some(remedy), .. } => return remedy.sentences(),
+            Self::NotKept { remedy: None, .. } => {
                 "Train the model for the noise of these touches, or promise a higher error rate; more touches of the \
                  calibration may also help."
             }
@@ -201,6 +282,11 @@ impl Problem for CalibrateProblem {
                  (`palpate probe fit`), or adjust the model to other recordings (`palpate train --teach`)."
             }
             Self::Missing { .. } => "Capture them too, with another seed than the training's.",
+            Self::MissingRecordings { objects } if objects.iter().any(|object| object.contains('/')) => {
+                "Record it too: `palpate data record --object OBJECT/PLACEMENT`, or --object OBJECT where the robot does not know \
+                 how it lies."
+            }
+            Self::MissingRecordings { .. } => "Record it too: a promise is for all objects of the model.",
             Self::TrainedOn { .. } => "Calibrate on others: capture them with another seed (--seed), or record more.",
             Self::OneObject => "Give a model of two or more objects.",
         }
@@ -269,7 +355,7 @@ fn in_touches(supplied: Option<Supplied>, found: u64, needed: u64) -> String {
 }
 
 /// An estimate, rounded up to two digits.
-pub(super) fn two_digits(number: f64) -> u64 {
+pub(crate) fn two_digits(number: f64) -> u64 {
     let digit = 10.0_f64.powf((number.max(1.0).log10().floor() - 1.0).max(0.0));
     ((number / digit).ceil() * digit) as u64
 }
@@ -300,4 +386,45 @@ fn not_supported(object: &Option<String>, rate: f64, tally: Tally, needed: u64, 
 
 fn of_object(object: &Option<String>) -> String {
     object.as_ref().map_or_else(String::new, |object| format!(" for {object}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn remedy(wrong: u64, all: u64, noise: Option<[String; 2]>) -> Remedy {
+        let supplied = Some(Supplied { approaches: true, fewest: 60_000 });
+        Remedy::new(Tally { wrong, all }, &TERMS, supplied, 0, noise)
+    }
+
+    const TERMS: Terms = Terms { rate: 0.01, confidence: 0.95, per: super::super::Per::Average };
+
+    #[test]
+    fn the_advice_of_a_rate_that_is_not_kept_is_computed_from_the_names_that_were_seen() {
+        // 6 of 785 are a share below 1 %, and too many to show it: as large a share of more names does.
+        let few = remedy(6, 785, None);
+        let enough = few.touches.unwrap();
+        let times = enough as f64 / 60_000.0;
+        let tally = Tally { wrong: (6.0 * times).round() as u64, all: (785.0 * times).round() as u64 };
+        assert!(binomial_tail(tally, 0.01) <= 0.05, "{tally:?}");
+        assert!((12.0..40.0).contains(&times), "{enough}");
+        let said = few.sentences();
+        assert!(said.starts_with(&format!("About {enough} approaches of each object would do")), "{said}");
+        assert!(said.contains("these support 1.6 %") && !said.contains("noise"), "{said}");
+        assert!(binomial_tail(Tally { wrong: 6, all: 785 }, 0.016) <= 0.05);
+        // The fewer are wrong, the fewer do.
+        assert!(remedy(4, 785, None).touches.unwrap() < enough);
+    }
+
+    #[test]
+    fn a_model_that_was_trained_for_the_noise_of_the_touches_is_not_to_be_trained_for_it() {
+        let same = remedy(14, 785, None);
+        assert_eq!(same.touches, None, "a share above the rate stays above it");
+        let said = same.sentences();
+        assert!(said.starts_with("The model was trained for the noise of these approaches") && said.contains("2.8 %"), "{said}");
+        let other = remedy(14, 785, Some(["no noise".into(), "noise of 5 ms".into()])).sentences();
+        assert!(other.starts_with("Train the model for the noise") && other.contains("trained for no noise, and they have noise of 5 ms"), "{other}");
+        let sequences = Remedy::new(Tally { wrong: 6, all: 785 }, &TERMS, None, 1_000, None);
+        assert!(sequences.sentences().contains("sequences would do (--sequences)"), "{sequences:?}");
+    }
 }

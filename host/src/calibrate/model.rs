@@ -2,6 +2,7 @@
 
 use super::begin::{Begin, Seen};
 use super::choose::{Chosen, Terms, Way, chosen, share_tested, spread};
+use super::error::Remedy;
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
 use super::sequence::{Odds, Sequence, margin_of, odds_of};
 use super::temperature::temperature;
@@ -16,7 +17,8 @@ use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Refused, Stopping};
 use palpate_shared::format::{OddsByObject, Promise, SECTION_HEADER_LENGTH, Tag, Temperature};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// One touch in this many serves the pilot alone, which says how strict to begin; its sequences are at most one in this many.
 const PILOT: usize = 30;
@@ -202,6 +204,9 @@ pub(crate) fn calibrate_from(
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
     let material = material(model, &dataset, settings)?;
+    if let Cow::Owned(delivered) = Candidate::Compiled(model).delivered(&dataset) {
+        dataset = delivered;
+    }
     add_noise(model, &mut dataset, &settings.noise, material.max_touches, noise_seed(settings));
     let touched = dataset.objects.iter().zip(&material.known);
     let drawn = Drawn {
@@ -225,12 +230,12 @@ pub(crate) fn begin(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<f64> {
-    let Material { names, known, max_touches } = material(model, &part, settings)?;
+    let Material { names, known, outputs, max_touches } = material(model, &part, settings)?;
     add_noise(model, &mut part, &settings.noise, max_touches, noise_seed(settings));
     let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
     let naive = ((1.0 - settings.rate) / settings.rate).ln();
     let most = ((settings.sequences as f64 / times) as usize).max(1);
-    let wanted = wanted(model, &known, settings.per, most);
+    let wanted = wanted(model, &outputs, settings.per, most);
     let followed = |beyond: f64| {
         let touched = part.objects.iter().zip(&known);
         let mut supplies: Vec<Supply<'_>> =
@@ -250,11 +255,11 @@ pub(crate) fn begin(
 }
 
 /// The sequences of each object of so many in all: as often as the model's priors say.
-fn wanted(model: &Model<'_>, known: &[usize], per: Per, count: usize) -> Vec<usize> {
+fn wanted(model: &Model<'_>, outputs: &[Vec<usize>], per: Per, count: usize) -> Vec<usize> {
     // Each placement has a promise of its own, however rare it is.
     let shares = match model.outputs() {
-        Some(_) if per == Per::Object => vec![1.0 / known.len() as f64; known.len()],
-        _ => shares(model, known),
+        Some(_) if per == Per::Object => vec![1.0 / outputs.len() as f64; outputs.len()],
+        _ => shares(model, outputs),
     };
     shares.iter().map(|share| (share * count as f64).round().max(1.0) as usize).collect()
 }
@@ -265,20 +270,48 @@ pub(super) struct Material {
     names: Vec<String>,
     /// The data set's objects' indices in the model.
     pub(super) known: Vec<usize>,
+    /// Their outputs: several of one whose touches state no placement.
+    outputs: Vec<Vec<usize>>,
     max_touches: u32,
 }
 
 /// Refuses settings, models and data sets of which there is no calibration.
 pub(super) fn material(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Material> {
     check(settings)?;
-    if model.outputs().is_some() && settings.per == Per::Name {
-        return Err(Error::setting("per", "name", "average or object with a model whose objects have several outputs"));
-    }
+    refuse_names_of_placements(model, settings)?;
     let own = Stopping::from_model(model).max_touches();
     let max_touches = settings.max_touches.unwrap_or(own);
     compile::stopping(settings.rate, max_touches)?;
     let (names, known) = named(model, dataset)?;
-    Ok(Material { names, known, max_touches })
+    let outputs = outputs(model, dataset);
+    refuse_unstated(&outputs, dataset, settings)?;
+    Ok(Material { names, known, outputs, max_touches })
+}
+
+/// Refuses a rate of each name where names are placements: how often one is wrong depends on their shares.
+pub(super) fn refuse_names_of_placements(model: &Model<'_>, settings: &Settings) -> Result<()> {
+    match model.outputs().is_some() && settings.per == Per::Name {
+        true => {
+            Err(Error::setting("per", "name", "average or object with a model whose objects have several outputs"))
+        }
+        false => Ok(()),
+    }
+}
+
+/// Refuses a rate in each placement on touches of which some state none.
+pub(super) fn refuse_unstated(outputs: &[Vec<usize>], dataset: &Dataset, settings: &Settings) -> Result<()> {
+    let unstated = dataset.objects.iter().zip(outputs).find(|(_, outputs)| outputs.len() > 1);
+    match unstated {
+        Some((touched, _)) if settings.per == Per::Object => {
+            let name = &touched.name;
+            let allowed = format!(
+                "average, or recordings that state their placements (--object {name}/PLACEMENT): a rate of each is one in each \
+                 placement, and those of {name} state none"
+            );
+            Err(Error::setting("per", "object", allowed))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Seed of the noise of the touches: another than those of training and tests.
@@ -299,7 +332,7 @@ pub(super) struct Drawn<'d> {
 /// Calibrates on touches drawn from supplies; `temperature` finds the temperature.
 pub(super) fn calibrate_drawn(
     model: &Model<'_>,
-    Material { names, known, max_touches }: &Material,
+    Material { names, known, outputs, max_touches }: &Material,
     Drawn { dataset, fewest, mut supplies }: Drawn<'_>,
     settings: &Settings,
     start: Option<Start>,
@@ -309,7 +342,7 @@ pub(super) fn calibrate_drawn(
     progress.begin("calibrating", Some((settings.sequences + settings.sequences / PILOT) as u64));
     let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
     let naive = ((1.0 - settings.rate) / settings.rate).ln();
-    let wanted = |count: usize| wanted(model, known, settings.per, count);
+    let wanted = |count: usize| wanted(model, outputs, settings.per, count);
     let draw = |supplies: &mut [Supply<'_>], count: usize, margin: f64| {
         let until = Until { margin, max_touches: *max_touches };
         follow(model, supplies, &wanted(count), until, || |_: &Moment<'_>| true, progress)
@@ -338,25 +371,44 @@ pub(super) fn calibrate_drawn(
     let supplied = (sequences.len() < wanted(settings.sequences).iter().sum())
         .then(|| Supplied { approaches: dataset.holds_approaches(), fewest });
     let way = Way { starts: &starts, loosest: loosest.as_ref() };
-    let chosen = chosen(&sequences, names, &way, &terms, supplied)?;
+    let chosen = chosen(&sequences, names, &way, &terms, supplied).map_err(|mut problem| {
+        if let CalibrateProblem::NotKept { wrong, given, remedy, .. } = &mut problem {
+            let both = [model.noise().unwrap_or_default(), dataset.real().and(&settings.noise).trained()];
+            let noise = (both[0] != both[1]).then(|| both.map(|noise| Noise::of_training(&noise).to_string()));
+            let tally = Tally { wrong: *wrong, all: *given };
+            *remedy = Some(Box::new(Remedy::new(tally, &terms, supplied, sequences.len(), noise)));
+        }
+        problem
+    })?;
     finished(model, dataset, settings, *max_touches, names, &chosen, temperature()?)
 }
 
-/// The names that a model gives, and the objects of a data set, which has all of them, by their indices in the model.
+/// The names that a model gives, and the objects of a data set, which has all of them, by their indices in the model: of an
+/// object that may be of several outputs the first.
 pub(super) fn named(model: &Model<'_>, dataset: &Dataset) -> Result<(Vec<String>, Vec<usize>)> {
-    let (_, known) = Candidate::Compiled(model).of(dataset)?;
+    let candidate = Candidate::Compiled(model);
+    let (_, known) = candidate.of(dataset)?;
     let mut names = compile::names(model);
     // A background is not touched, and never named.
     names.truncate(model.known_count());
     if names.len() < 2 {
         return Err(CalibrateProblem::OneObject.into());
     }
+    let there: BTreeSet<usize> =
+        dataset.objects.iter().flat_map(|touched| candidate.outputs_of(&touched.name)).collect();
     let missing: Vec<String> =
-        (0..names.len()).filter(|object| !known.contains(object)).map(|object| names[object].clone()).collect();
-    match missing.is_empty() {
-        true => Ok((names, known)),
-        false => Err(CalibrateProblem::Missing { objects: missing }.into()),
+        (0..names.len()).filter(|output| !there.contains(output)).map(|output| names[output].clone()).collect();
+    match (missing.is_empty(), dataset.is_recorded()) {
+        (true, _) => Ok((names, known)),
+        (false, false) => Err(CalibrateProblem::Missing { objects: missing }.into()),
+        (false, true) => Err(CalibrateProblem::MissingRecordings { objects: missing }.into()),
     }
+}
+
+/// The outputs of each of these objects, which are in the order of [`named`].
+pub(super) fn outputs(model: &Model<'_>, dataset: &Dataset) -> Vec<Vec<usize>> {
+    let candidate = Candidate::Compiled(model);
+    dataset.objects.iter().map(|touched| candidate.outputs_of(&touched.name)).collect()
 }
 
 pub(super) fn check(settings: &Settings) -> Result<()> {
@@ -391,10 +443,10 @@ pub(crate) fn add_noise(model: &Model<'_>, dataset: &mut Dataset, noise: &Noise,
     }
 }
 
-/// Share of the touches that each object of the data set gets, by its prior.
-pub(super) fn shares(model: &Model<'_>, known: &[usize]) -> Vec<f64> {
-    let weights: Vec<f64> =
-        known.iter().map(|&object| (f64::from(model.prior(object)) * f64::from(model.unit())).exp()).collect();
+/// Share of the touches that each object of a data set gets, by the priors of its outputs.
+pub(super) fn shares(model: &Model<'_>, outputs: &[Vec<usize>]) -> Vec<f64> {
+    let prior = |&output: &usize| (f64::from(model.prior(output)) * f64::from(model.unit())).exp();
+    let weights: Vec<f64> = outputs.iter().map(|own| own.iter().map(prior).sum()).collect();
     let sum: f64 = weights.iter().sum();
     weights.into_iter().map(|weight| weight / sum).collect()
 }
@@ -473,6 +525,21 @@ pub(super) fn finished(
         let of = OfObject { given: touched.all, wrong: touched.wrong, named: named.all, named_wrongly: named.wrong };
         (name.clone(), of)
     };
+    let mut objects: BTreeMap<String, OfObject> =
+        names.iter().zip(chosen.touched.iter().zip(&chosen.named)).map(of_object).collect();
+    // Touches that state no placement are of the object as a whole.
+    for (touched, outputs) in dataset.objects.iter().zip(self::outputs(model, dataset)) {
+        if outputs.len() > 1 {
+            let own = outputs.iter().filter_map(|&output| objects.remove(names.get(output)?));
+            let sum = own.fold(OfObject::default(), |a, b| OfObject {
+                given: a.given + b.given,
+                wrong: a.wrong + b.wrong,
+                named: a.named + b.named,
+                named_wrongly: a.named_wrongly + b.named_wrongly,
+            });
+            objects.insert(touched.name.clone(), sum);
+        }
+    }
     Ok(Calibrated {
         model: restate(model, &restated)?,
         promise,
@@ -489,7 +556,7 @@ pub(super) fn finished(
         uncalibrated_margin: ((1.0 - settings.rate) / settings.rate).ln(),
         margins: names.iter().enumerate().map(margin).collect(),
         errors,
-        objects: names.iter().zip(chosen.touched.iter().zip(&chosen.named)).map(of_object).collect(),
+        objects,
         temperature: stated.value(),
         recorded: None,
     })

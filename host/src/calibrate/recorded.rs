@@ -17,20 +17,22 @@ use super::choose::{By, Terms, steps, summary, tallies};
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
 use super::error::{Enough, Forecast, two_digits};
 use super::model::{
-    Calibrated, OfRecorded, STRICTEST, Settings, add_noise, check, finished, named, noise_seed, shares,
+    Calibrated, OfRecorded, STRICTEST, Settings, add_noise, check, finished, named, noise_seed, outputs,
+    refuse_names_of_placements, refuse_unstated, shares,
 };
 use super::sequence::{Odds, Sequence, margin_of};
 use super::temperature::temperature;
 use super::walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};
 use crate::compile;
 use crate::error::{CalibrateProblem, EvaluateProblem, Result};
+use crate::evaluate::{Candidate, OfTouches};
 use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, Source};
 use palpate_onboard::{Model, Stopping};
 
 /// The probability with which a forecast number of approaches is enough, if the simulation is right.
-const LIKELY: f64 = 0.8;
+pub(super) const LIKELY: f64 = 0.8;
 /// Of first thresholds that pass with nearly the same probability, to this share, the strictest is taken.
 const AS_LIKELY: f64 = 0.95;
 /// A probability below which recordings that make too few names are not tested at all.
@@ -39,8 +41,8 @@ const HOPELESS: f64 = 0.01;
 const RATES: [f64; 17] =
     [0.001, 0.002, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.4];
 /// The factor between numbers of approaches that a forecast tries, and how many it tries.
-const GROWTH: f64 = 1.05;
-const GROWN: i32 = 160;
+pub(super) const GROWTH: f64 = 1.05;
+pub(super) const GROWN: i32 = 160;
 
 /// Sets a model's thresholds, as [`calibrate`](fn@super::calibrate) does, for touches like the `recorded` ones: thresholds are
 /// found on `simulated` sequences, to which the noise of `settings` is added, and tested on the recorded ones, which have
@@ -56,10 +58,15 @@ pub fn calibrate_recorded(
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
     check(settings)?;
+    refuse_names_of_placements(model, settings)?;
     let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
     compile::stopping(settings.rate, max_touches)?;
     let (names, _) = named(model, &simulated)?;
     let (_, known) = named(model, recorded)?;
+    let of_recorded = outputs(model, recorded);
+    refuse_unstated(&of_recorded, recorded, settings)?;
+    let delivered = Candidate::Compiled(model).delivered(recorded);
+    let recorded = delivered.as_ref();
     add_noise(model, &mut simulated, &settings.noise, max_touches, noise_seed(settings));
     let strictest = ((1.0 - settings.rate) / settings.rate).ln() + STRICTEST[0];
     let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
@@ -67,7 +74,7 @@ pub fn calibrate_recorded(
     progress.begin("calibrating", Some(settings.sequences as u64));
     let sequences = cut.sequences(&simulated, settings.sequences, strictest, progress)?;
     let steps = steps(&sequences, names.len(), strictest, &terms);
-    let foreseen = Foreseen::new(&sequences, &steps, by, recorded, &known);
+    let foreseen = Foreseen::new(&sequences, &steps, by, recorded, &of_recorded);
     let of_step = |odds: &Odds| -> Result<(Vec<Sequence>, Vec<Tally>)> {
         progress::check(progress)?;
         let sequences = cut.sequences(recorded, recorded.len(), margin_of(odds.strictest()), &())?;
@@ -136,7 +143,7 @@ impl Cut<'_> {
             }
             follow_plan(&mut supplies, self.names, &plan)?;
         }
-        let shares = shares(self.model, &known);
+        let shares = shares(self.model, &outputs(self.model, dataset));
         let wanted: Vec<usize> = shares.iter().map(|share| (share * most as f64).round().max(1.0) as usize).collect();
         let until = Until { margin, max_touches: self.max_touches };
         follow(self.model, &mut supplies, &wanted, until, || |_: &Moment<'_>| true, progress)
@@ -148,7 +155,7 @@ struct Step {
     tallies: Vec<Tally>,
     /// Sequences that the recordings make, for each simulated one.
     scale: f64,
-    /// Approaches to each object of the model that all simulated sequences took.
+    /// Approaches to each recorded object that all simulated sequences took.
     used: Vec<u64>,
 }
 
@@ -173,26 +180,31 @@ impl Step {
 /// Every threshold on simulated sequences.
 struct Foreseen {
     steps: Vec<Step>,
+    /// The recorded objects' names.
+    names: Vec<String>,
     /// Approaches that were recorded to the object with the fewest.
     fewest: usize,
 }
 
 impl Foreseen {
-    fn new(sequences: &[Sequence], steps: &[Odds], by: By, recorded: &Dataset, known: &[usize]) -> Self {
+    /// Of recorded objects with these outputs.
+    fn new(sequences: &[Sequence], steps: &[Odds], by: By, recorded: &Dataset, outputs: &[Vec<usize>]) -> Self {
         let all: Vec<&Sequence> = sequences.iter().collect();
+        let object = |output: usize| outputs.iter().position(|own| own.contains(&output));
         let step = |odds: &Odds| {
-            let mut used = vec![0_u64; known.iter().max().map_or(0, |most| most + 1)];
+            let mut used = vec![0_u64; outputs.len()];
             for sequence in sequences {
                 let approaches = sequence.given(odds).map_or(sequence.approaches, |look| look.approaches);
-                used.get_mut(sequence.object).into_iter().for_each(|used| *used += u64::from(approaches));
+                let used = object(sequence.object).and_then(|object| used.get_mut(object));
+                used.into_iter().for_each(|used| *used += u64::from(approaches));
             }
-            let of = recorded.objects.iter().zip(known);
-            let scale = of.map(|(object, &known)| object.len() as f64 / used[known].max(1) as f64);
+            let of = recorded.objects.iter().zip(&used);
+            let scale = of.map(|(object, &used)| object.len() as f64 / used.max(1) as f64);
             let scale = scale.fold(f64::INFINITY, f64::min);
             Step { tallies: tallies(&all, odds, by), scale, used }
         };
         let fewest = recorded.objects.iter().map(crate::touches::ObjectTouches::len).min().unwrap_or(0);
-        Self { steps: steps.iter().map(step).collect(), fewest }
+        Self { steps: steps.iter().map(step).collect(), names: recorded.names(), fewest }
     }
 
     /// The probability that some threshold passes as the first one, and the strictest that passes about as likely.
@@ -218,11 +230,11 @@ impl Foreseen {
     }
 
     /// The approaches that so many times the sequences of the recordings take at a threshold.
-    fn enough(&self, times: f64, step: usize, names: &[String]) -> Enough {
+    fn enough(&self, times: f64, step: usize) -> Enough {
         let Some(Step { scale, used, .. }) = self.steps.get(step) else { return Enough::default() };
         let mut each: Vec<(u64, String)> = used
             .iter()
-            .zip(names)
+            .zip(&self.names)
             .map(|(&used, name)| (two_digits(used as f64 * scale * times), name.clone()))
             .collect();
         each.sort();
@@ -237,7 +249,7 @@ impl Foreseen {
         let is_likely = |times: f64, rate: f64| self.best(times, rate, confidence).0 >= LIKELY;
         let higher = || RATES.iter().copied().filter(|&higher| higher > rate);
         let enough = (0..GROWN).map(|step| GROWTH.powi(step)).find(|&times| is_likely(times, rate));
-        let enough = enough.map(|times| self.enough(times, self.best(times, rate, confidence).1, names));
+        let enough = enough.map(|times| self.enough(times, self.best(times, rate, confidence).1));
         let (position, tally, supported) = match stop {
             Stop::TooFew { position, found, .. } => {
                 let tally = Tally { wrong: 0, all: found };
@@ -268,11 +280,12 @@ pub(super) fn first_of(
     settings: &Settings,
 ) -> Result<usize> {
     let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
-    let (names, known) = named(model, recorded)?;
+    let (names, _) = named(model, recorded)?;
     let strictest = ((1.0 - settings.rate) / settings.rate).ln() + STRICTEST[0];
     let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
     let cut = Cut { model, names: &names, settings, max_touches };
     let sequences = cut.sequences(&simulated, settings.sequences, strictest, &())?;
     let steps = steps(&sequences, names.len(), strictest, &terms);
-    Ok(Foreseen::new(&sequences, &steps, By::of(settings.per, names.len()), recorded, &known).first(&terms))
+    let of_recorded = outputs(model, recorded);
+    Ok(Foreseen::new(&sequences, &steps, By::of(settings.per, names.len()), recorded, &of_recorded).first(&terms))
 }

@@ -2,6 +2,7 @@
 
 use super::demand::Demand;
 use crate::error::Result;
+use crate::evaluate::{Candidate, OfTouches};
 use crate::evaluate::together::margins_of_touches;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
@@ -15,12 +16,19 @@ const HALVINGS: usize = 24;
 
 /// Divisor of the margins with which the posteriors of single touches explain their objects best: the least mean
 /// negative log-likelihood, each object weighted equally. `known` are the indices of the data set's objects in the
-/// model. 1 if no touch is evidence.
+/// model; of one that has several outputs, and touches that state no placement, the posterior is that of all of them. 1 if no
+/// touch is evidence.
 pub fn temperature(model: &Model<'_>, dataset: &Dataset, known: &[usize]) -> f64 {
     let evidence = |touched: &ObjectTouches| -> Vec<Touch> {
         touched.touches().iter().filter(|touch| model.accepts(touch).is_ok()).take(MOST).copied().collect()
     };
-    temperature_of(model, &dataset.objects.iter().map(evidence).collect::<Vec<_>>(), known)
+    let candidate = Candidate::Compiled(model);
+    let outputs = |(touched, &known): (&ObjectTouches, &usize)| {
+        let outputs = candidate.outputs_of(&touched.name);
+        if outputs.len() > 1 { outputs } else { vec![known] }
+    };
+    let outputs: Vec<Vec<usize>> = dataset.objects.iter().zip(known).map(outputs).collect();
+    temperature_of(model, &dataset.objects.iter().map(evidence).collect::<Vec<_>>(), &outputs)
 }
 
 /// The same on touches that are captured for it.
@@ -37,30 +45,39 @@ pub(super) fn temperature_on_demand(model: &Model<'_>, demands: &[Demand<'_>], k
         evidence.truncate(MOST);
         Ok(evidence)
     };
-    Ok(temperature_of(model, &demands.iter().map(evidence).collect::<Result<Vec<_>>>()?, known))
+    let outputs: Vec<Vec<usize>> = known.iter().map(|&object| vec![object]).collect();
+    Ok(temperature_of(model, &demands.iter().map(evidence).collect::<Result<Vec<_>>>()?, &outputs))
 }
 
-/// The same on these touches of each object, which are all evidence.
-fn temperature_of(model: &Model<'_>, evidence: &[Vec<Touch>], known: &[usize]) -> f64 {
-    let rows = |(evidence, &object): (&Vec<Touch>, &usize)| {
+/// The same on these touches of each object, which are all evidence, and its outputs.
+fn temperature_of(model: &Model<'_>, evidence: &[Vec<Touch>], outputs: &[Vec<usize>]) -> f64 {
+    let rows = |(evidence, outputs): (&Vec<Touch>, &Vec<usize>)| {
         let row = |margins: &[i32]| {
-            let own = margins.get(object).copied().unwrap_or(0);
+            let own = outputs.first().and_then(|&output| margins.get(output)).copied().unwrap_or(0);
             // Ahead of the right object, in nats.
             margins.iter().map(|margin| f64::from(margin - own) * f64::from(model.unit())).collect::<Vec<_>>()
         };
         margins_of_touches(model, evidence).chunks_exact(model.object_count()).map(row).collect::<Vec<_>>()
     };
-    let rows: Vec<Vec<Vec<f64>>> = evidence.par_iter().zip(known).map(rows).collect();
+    let rows: Vec<Vec<Vec<f64>>> = evidence.par_iter().zip(outputs).map(rows).collect();
     if rows.iter().all(Vec::is_empty) {
         return 1.0;
     }
     // The likelihood is concave in one over the temperature; its slope is the right object's margin less the mean one.
     let slope = |sharpness: f64| -> f64 {
-        let of_object = |rows: &Vec<Vec<f64>>| {
-            let sum: f64 = rows.iter().map(|row| -mean_ahead(row, sharpness)).sum();
+        let of_object = |(rows, outputs): (&Vec<Vec<f64>>, &Vec<usize>)| {
+            // 0 for an object with one output.
+            let own = |row: &[f64]| match &outputs[..] {
+                [_] => 0.0,
+                outputs => {
+                    let own: Vec<f64> = outputs.iter().filter_map(|&output| row.get(output).copied()).collect();
+                    mean_ahead(&own, sharpness)
+                }
+            };
+            let sum: f64 = rows.iter().map(|row| own(row) - mean_ahead(row, sharpness)).sum();
             sum / rows.len().max(1) as f64
         };
-        rows.par_iter().map(of_object).collect::<Vec<_>>().iter().sum()
+        rows.par_iter().zip(outputs).map(of_object).collect::<Vec<_>>().iter().sum()
     };
     let (mut low, mut high) = (-16_f64.ln(), 16_f64.ln());
     for _ in 0..HALVINGS {

@@ -1,12 +1,12 @@
 //! The accuracy that a model trained on simulated touches loses on recorded ones.
 
 use super::promise::{Promised, promised};
-use super::{Settings, Share};
-use crate::ensemble::train;
+use super::{Settings, Share, counterparts};
+use crate::ensemble::{object_of, train};
 use crate::error::Result;
-use crate::evaluate::{Candidate, Estimate, Margins, SequentialSettings};
+use crate::evaluate::{Candidate, Estimate, Margins, SequentialSettings, objects_of};
 use crate::progress::Progress;
-use crate::touches::{Dataset, folds};
+use crate::touches::{Dataset, ObjectTouches, folds};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -100,8 +100,10 @@ pub(super) fn cost(
     let split = folds::split(simulated, 0.25, settings.seed)?;
     let recipe = train::Settings { descriptor: settings.descriptor, ..train::Settings::compact() };
     let model = train::train(&split.train, &recipe, progress)?;
-    let names = recorded.names();
-    let tested = split.test.only(|name| names.iter().any(|own| own == name));
+    let test = split.test.matching(&model.objects);
+    let entries: Vec<Entry> =
+        recorded.names().iter().map(|name| Entry::new(name, counterparts(name, simulated))).collect();
+    let tested = test.only(|name| entries.iter().any(|entry| entry.share_of(name) > 0.0));
     progress.begin("measuring", None);
     let candidate = || Candidate::Full(&model);
     let margins = [Margins::new(candidate(), &tested)?, Margins::new(candidate(), recorded)?];
@@ -110,8 +112,18 @@ pub(super) fn cost(
         let sequences =
             SequentialSettings { error_rate: None, max_touches: None, sequences: settings.groups, seed: settings.seed };
         let measured = margins.approaches(&at, &sequences)?;
-        let both = measured.accuracy.iter().zip(measured.accuracy_standard_error.values());
-        Ok(both.map(|((at, value), error)| (*at, Estimate { value: *value, standard_error: *error })).collect())
+        let of = |at: &usize| {
+            let of_entry = |entry: &Entry| {
+                let of = |(name, of): (&String, &BTreeMap<usize, f64>)| {
+                    let hits = of.get(at).map_or(0.0, |share| (share * settings.groups as f64).round());
+                    (Estimate::share(hits as usize, settings.groups), entry.share_of(name))
+                };
+                let own = measured.per_object.iter().map(of).filter(|(_, share)| *share > 0.0);
+                Estimate::weighted(own.collect::<Vec<_>>().into_iter())
+            };
+            (*at, Estimate::mean_of(entries.iter().map(of_entry).collect::<Vec<_>>().into_iter()))
+        };
+        Ok(at.iter().map(of).collect())
     };
     let all: Vec<usize> = (1..=*AT.last().unwrap_or(&1)).collect();
     let [own, other] = margins.each_ref().map(|margins| accuracy(margins, &all));
@@ -122,41 +134,88 @@ pub(super) fn cost(
     let after = COST_AT.min(own.len()).min(other.len()).max(1);
     let wanted = own.get(&after).map_or(1.0, |estimate| estimate.value);
     Ok(Some(Cost {
-        known: model.known_count(),
+        known: simulated.objects.len(),
         simulated: shown(&own),
         recorded: shown(&other),
         after,
         needed: needed(&other, wanted),
-        confused: confused(&margins, [&tested, recorded], settings)?,
-        promise: promised(&model, [&split.test, recorded], settings.seed, progress)?,
+        confused: confused(&margins, [&tested, recorded], &entries, settings)?,
+        promise: promised(&model, [&test, recorded], &entries, settings.seed, progress)?,
     }))
+}
+
+/// A recorded object, and the outputs of the model that its touches may be of: one or, where they state no placement, several,
+/// each with its share.
+pub(super) struct Entry {
+    pub(super) name: String,
+    pub(super) outputs: Vec<(String, f64)>,
+}
+
+impl Entry {
+    fn new(name: &str, outputs: Vec<(String, f64)>) -> Self {
+        Self { name: name.to_owned(), outputs }
+    }
+
+    /// The share of tested touches of this name, recorded or simulated, in the object's.
+    fn share_of(&self, name: &str) -> f64 {
+        let own = self.outputs.iter().find(|(output, _)| output == name).map(|(_, share)| *share);
+        own.unwrap_or(f64::from(u8::from(self.name == name)))
+    }
+
+    /// The object that it is, whatever its placement.
+    fn object(&self, has_placements: bool) -> &str {
+        if has_placements && self.outputs.len() == 1 { object_of(&self.name) } else { &self.name }
+    }
 }
 
 /// The confusions that are more frequent on the second data set's touches than on the first's: by [`MORE`], and by two
 /// standard errors of the difference of two shares.
-fn confused(margins: &[Margins<'_>; 2], datasets: [&Dataset; 2], settings: &Settings) -> Result<Vec<Confused>> {
+fn confused(
+    margins: &[Margins<'_>; 2],
+    datasets: [&Dataset; 2],
+    entries: &[Entry],
+    settings: &Settings,
+) -> Result<Vec<Confused>> {
     let fewest = margins.iter().map(Margins::fewest_touches).min().unwrap_or(0);
     let touches = fewest.min(*AT.last().unwrap_or(&1));
     if touches == 0 {
         return Ok(Vec::new());
     }
-    let [own, other] = margins.each_ref().map(|margins| margins.confusion(touches, settings.groups, settings.seed));
+    let has_placements = margins[1].has_placements();
+    let columns = margins[1].objects();
+    let names = objects_of(columns, has_placements);
+    // Of each object, how often it was named, as a share of an entry's groups.
+    let shares = |margins: &Margins<'_>| -> Result<Vec<BTreeMap<String, f64>>> {
+        let counts = margins.confusion(touches, settings.groups, settings.seed)?;
+        let of_entry = |entry: &Entry| {
+            let mut shares: BTreeMap<String, f64> = names.iter().map(|name| (name.clone(), 0.0)).collect();
+            for (name, counts) in margins.tested_names().iter().zip(&counts) {
+                let share = entry.share_of(name) / settings.groups.max(1) as f64;
+                for (column, &count) in columns.iter().zip(counts) {
+                    let object = if has_placements { object_of(column) } else { column };
+                    shares.entry(object.to_owned()).and_modify(|sum| *sum += share * count as f64);
+                }
+            }
+            shares
+        };
+        Ok(entries.iter().map(of_entry).collect())
+    };
+    let [own, other] = margins.each_ref().map(shares);
     let (own, other) = (own?, other?);
-    let names = margins[1].objects();
     let mut confused = Vec::new();
-    // Both are of the same objects, in the order of their names.
-    for (position, ((touched, own), other)) in margins[1].tested_names().iter().zip(&own).zip(&other).enumerate() {
+    for ((entry, own), other) in entries.iter().zip(&own).zip(&other) {
         // As many groups as share no touch.
         let groups = datasets.map(|dataset| {
-            let all = dataset.objects.get(position).map_or(0, |object| object.len());
+            let of_entry = dataset.objects.iter().filter(|object| entry.share_of(&object.name) > 0.0);
+            let all: usize = of_entry.map(ObjectTouches::len).sum();
             (all / touches).clamp(1, settings.groups.max(1)) as f64
         });
-        for ((named, &own), &other) in names.iter().zip(own).zip(other) {
-            let [simulated, recorded] = [own, other].map(|count| count as f64 / settings.groups.max(1) as f64);
+        for named in &names {
+            let [simulated, recorded] = [own, other].map(|shares| shares.get(named).copied().unwrap_or(0.0));
             let shared = (simulated * groups[0] + recorded * groups[1]) / (groups[0] + groups[1]);
             let error = (shared * (1.0 - shared) * (1.0 / groups[0] + 1.0 / groups[1])).sqrt();
-            if named != touched && recorded - simulated >= MORE.max(2.0 * error) {
-                let (touched, named) = (touched.clone(), named.clone());
+            if named != entry.object(has_placements) && recorded - simulated >= MORE.max(2.0 * error) {
+                let (touched, named) = (entry.name.clone(), named.clone());
                 confused.push(Confused { touched, named, touches, simulated, recorded });
             }
         }

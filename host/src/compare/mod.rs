@@ -27,6 +27,7 @@ use palpate_shared::format::Counted;
 use palpate_shared::{ContactPattern, Descriptor, Touch};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Settings of a comparison of data sets.
@@ -77,6 +78,8 @@ impl Share {
 const NEARLY: f64 = 0.02;
 /// Approaches after which the loss of accuracy decides.
 const ENOUGH: usize = 60;
+/// The part of a loss that pairs of objects make for it to be theirs.
+const MOSTLY: f64 = 0.5;
 /// Loss of accuracy from which on something is wrong with the simulation.
 const STRONGLY: f64 = 0.1;
 
@@ -92,6 +95,13 @@ pub struct Comparison {
     pub objects: Vec<ObjectComparison>,
     /// Cost of the difference; none for fewer than two objects.
     pub cost: Option<Cost>,
+    /// True if the simulated touches have the deviations of a real probe, as a fit finds them.
+    #[serde(default)]
+    pub is_fitted: bool,
+    /// Recorded objects whose placement is not stated, and which were simulated in several: compared with all of them, by their
+    /// weights.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unstated: Vec<String>,
 }
 
 /// Comparison of recorded and simulated touches of an object.
@@ -135,10 +145,7 @@ impl Comparison {
                 )
             }
             Some((at, loss)) if loss < STRONGLY => {
-                format!(
-                    "They differ: {}{broken}. Fit the probe to recorded touches, or record more of them.",
-                    lost(at, loss)
-                )
+                format!("They differ: {}{broken}. {}", lost(at, loss), self.advice(loss))
             }
             Some((at, loss)) => {
                 format!(
@@ -147,9 +154,31 @@ impl Comparison {
                 )
             }
             None if self.told_apart.value < 0.65 => {
-                "They differ: fit the probe to recorded touches. Two objects or more show what it costs.".into()
+                let fit = if self.is_fitted { "" } else { ": fit the probe to recorded touches" };
+                format!("They differ{fit}. Two objects or more show what it costs.")
             }
             None => "They differ strongly: the simulated probe, a mesh or its size is wrong.".into(),
+        }
+    }
+
+    /// Advice where this accuracy is lost: a probe that was fitted is not fitted again for a pair of objects.
+    fn advice(&self, loss: f64) -> String {
+        if !self.is_fitted {
+            return "Fit the probe to recorded touches, or record more of them.".into();
+        }
+        // Each object weighs the same in the accuracy.
+        let objects = self.objects.len().max(1) as f64;
+        let confused = self.cost.iter().flat_map(|cost| &cost.confused);
+        let by_pairs: f64 = confused.map(|pair| (pair.recorded - pair.simulated) / objects).sum();
+        let pair = self.cost.as_ref().and_then(|cost| cost.confused.first());
+        match pair.filter(|_| by_pairs >= MOSTLY * loss) {
+            Some(Confused { touched, named, .. }) => format!(
+                "The simulated probe has a real one's deviations already, and most of the loss is {touched} as {named}: check the mesh \
+                 of {touched} and its size, or adjust the model to recordings (`palpate train --teach`)."
+            ),
+            None => "The simulated probe has a real one's deviations already: check the meshes and their sizes and whether the robot \
+                     aims as the simulation does, or adjust the model to recordings (`palpate train --teach`)."
+                .into(),
         }
     }
 }
@@ -176,13 +205,18 @@ pub fn compare(
     if any(recorded, |touch| !touch.is_full()) && !any(simulated, |touch| !touch.is_full()) {
         return refuse("the recorded touches are of approaches, the simulated ones full touches only".into());
     }
+    if !recorded.placement_shares().is_empty() && simulated.placement_shares().is_empty() {
+        return refuse("the recordings state placements on a table, and the simulated objects float".into());
+    }
     let empties = any(recorded, Touch::is_empty);
     let partial = any(recorded, |touch| !touch.is_full());
     let alike = |touch: &Touch| touch.is_full() || partial && (empties || !touch.is_empty());
     let simulated = simulated.each(|own| own.filtered(alike));
-    let find = |name: &str| simulated.objects.iter().find(|own| own.name == name);
-    let pairs: Vec<(&ObjectTouches, &ObjectTouches)> =
-        recorded.objects.iter().filter_map(|own| Some((own, find(&own.name)?))).collect();
+    // By placement, where both sides state it; and without contacts that are late for the stroke that was simulated.
+    let recorded = recorded.clone().matching(&simulated.by_placement().names());
+    let recorded = simulated.probe().map_or(Cow::Borrowed(&recorded), |probe| recorded.delivered_by(probe)).into_owned();
+    let pairs: Vec<(&ObjectTouches, ObjectTouches)> =
+        recorded.objects.iter().filter_map(|own| Some((own, counterpart(&own.name, &simulated)?))).collect();
     if pairs.is_empty() {
         return refuse("no object is in both".into());
     }
@@ -198,20 +232,46 @@ pub fn compare(
         _ => settings.descriptor.for_contacts().unwrap_or(settings.descriptor),
     };
     progress.begin("telling apart", Some(pairs.len() as u64));
-    let one = |(own, other): &(&ObjectTouches, &ObjectTouches)| {
+    let one = |(own, other): &(&ObjectTouches, ObjectTouches)| {
         let compared = object(own, other, descriptor, counted, settings)?;
         progress::advance(progress, 1)?;
         Ok(compared)
     };
     let compared: Vec<(ObjectComparison, Estimate)> = in_order(pairs.par_iter().map(one))?;
     let told_apart = Share::of(Estimate::mean_of(compared.iter().map(|(_, told)| *told)));
-    let recorded = recorded.only(|name| find(name).is_some());
+    let recorded = recorded.only(|name| !counterparts(name, &simulated).is_empty());
+    let is_unstated = |name: &String| counterparts(name, &simulated).len() > 1;
     Ok(Comparison {
         descriptor: descriptor.name().into(),
         told_apart,
         objects: compared.into_iter().map(|(object, _)| object).collect(),
         cost: cost::cost(&recorded, &simulated, settings, progress)?,
+        is_fitted: !simulated.real().is_none(),
+        unstated: recorded.names().into_iter().filter(is_unstated).collect(),
     })
+}
+
+/// The outputs of a model of the simulated touches that recorded ones of this name may be of, each with its share: one or, of an
+/// object that lies on a table in a placement that is not stated, all of its.
+fn counterparts(name: &str, simulated: &Dataset) -> Vec<(String, f64)> {
+    let of = |object: &ObjectTouches| {
+        let Some(weights) = object.placement_weights() else {
+            return (object.name == name).then(|| vec![(object.name.clone(), 1.0)]);
+        };
+        let named = |(placement, weight): (String, f64)| (format!("{}/{placement}", object.name), weight);
+        let all: Vec<(String, f64)> = weights.into_iter().map(named).collect();
+        match all.iter().find(|(output, _)| output == name) {
+            Some((output, _)) => Some(vec![(output.clone(), 1.0)]),
+            None => (object.name == name).then_some(all),
+        }
+    };
+    simulated.objects.iter().find_map(of).unwrap_or_default()
+}
+
+/// The simulated touches that recorded ones of this name are compared with.
+fn counterpart(name: &str, simulated: &Dataset) -> Option<ObjectTouches> {
+    let whole = simulated.objects.iter().find(|own| own.name == name).map(ObjectTouches::as_often_as_placed);
+    whole.or_else(|| simulated.by_placement().objects.into_iter().find(|own| own.name == name))
 }
 
 fn object(
@@ -222,7 +282,9 @@ fn object(
     settings: &Settings,
 ) -> Result<(ObjectComparison, Estimate)> {
     let most = (MOST * recorded.len()).max(1_000).min(simulated.len());
-    let simulated = &first(simulated, most);
+    // Of placements as many as their shares say.
+    let is_placed = simulated.placement_weights().is_some_and(|weights| weights.len() > 1);
+    let simulated = &if is_placed { simulated.thinned(most) } else { first(simulated, most) };
     let told = told_apart([recorded, simulated], counted, settings)?;
     let both = [recorded.touches(), simulated.touches()];
     let share = |pattern: ContactPattern| {
@@ -351,6 +413,56 @@ mod tests {
         assert!(cost.needed.is_none_or(|needed| needed > 1.2 * cost.after as f64), "{cost:?}");
     }
 
+    fn blank() -> Comparison {
+        Comparison {
+            descriptor: "times".into(),
+            told_apart: Share { value: 0.53, low: 0.52, high: 0.54 },
+            objects: Vec::new(),
+            cost: None,
+            is_fitted: false,
+            unstated: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_fitted_probe_is_not_to_be_fitted_again_where_a_pair_of_objects_is_the_matter() {
+        let share = |value: f64| Share { value, low: value - 0.01, high: value + 0.01 };
+        let object = |name: &str| ObjectComparison {
+            name: name.into(),
+            touches: [260, 1_300],
+            told_apart: share(0.53),
+            patterns: BTreeMap::new(),
+            features: Vec::new(),
+        };
+        let said = |is_fitted: bool, recorded: f64| {
+            let confused = vec![Confused {
+                touched: "scissors".into(),
+                named: "hammer".into(),
+                touches: 60,
+                simulated: 0.08,
+                recorded,
+            }];
+            let cost = Cost {
+                known: 9,
+                simulated: BTreeMap::from([(60, share(0.881))]),
+                recorded: BTreeMap::from([(60, share(0.842))]),
+                after: 20,
+                needed: None,
+                confused,
+                promise: None,
+            };
+            let objects = ["a", "b", "c", "d", "e", "f", "g", "hammer", "scissors"].map(object).into();
+            Comparison { cost: Some(cost), objects, is_fitted, ..blank() }.verdict()
+        };
+        let lost = "They differ: accuracy after 60 approaches is 3.9 points lower on recorded touches.";
+        assert_eq!(said(false, 0.6), format!("{lost} Fit the probe to recorded touches, or record more of them."));
+        let fitted = said(true, 0.6);
+        assert!(fitted.starts_with(lost) && fitted.contains("most of the loss is scissors as hammer"), "{fitted}");
+        // A ninth of 5 points is no explanation of 3.9.
+        let elsewhere = said(true, 0.13);
+        assert!(elsewhere.contains("check the meshes and their sizes") && !elsewhere.contains("Fit"), "{elsewhere}");
+    }
+
     #[test]
     fn the_verdict_is_of_the_accuracy_lost_and_nearly_correct_takes_sixty_approaches_and_two_points() {
         let share = |value: f64| Share { value, low: value - 0.01, high: value + 0.01 };
@@ -370,7 +482,7 @@ mod tests {
                     finding: Finding::Broken,
                 }),
             });
-            Comparison { descriptor: "times".into(), told_apart: share(told), objects: Vec::new(), cost }.verdict()
+            Comparison { told_apart: share(told), cost, ..blank() }.verdict()
         };
         let verdict = |told, lost| of(told, lost, false);
         assert!(verdict(0.5, Some((60, 0.5))).starts_with("No difference"));

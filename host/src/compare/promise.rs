@@ -1,12 +1,13 @@
 //! A promise that is made on simulated touches, and kept or broken on recorded ones.
 
+use super::cost::Entry;
 use crate::calibrate::{self, Odds, Sequence, Supply, Tally, Until, binomial_tail, calibrate, follow, odds_of};
 use crate::compile::{self, compile};
 use crate::ensemble::Ensemble;
 use crate::error::{CalibrateProblem, Result};
 use crate::evaluate::Finding;
 use crate::progress::Progress;
-use crate::touches::Dataset;
+use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Stopping;
 use serde::{Deserialize, Serialize};
 
@@ -65,6 +66,7 @@ impl Promised {
 pub(super) fn promised(
     model: &Ensemble,
     [simulated, recorded]: [&Dataset; 2],
+    entries: &[Entry],
     seed: u64,
     progress: &dyn Progress,
 ) -> Result<Option<Promised>> {
@@ -87,17 +89,23 @@ pub(super) fn promised(
     let Some((rate, margin)) = made else { return Ok(None) };
     let names = compile::names(&model);
     let until = Until { margin, max_touches: Stopping::from_model(&model).max_touches() };
-    let tested = recorded.names();
     let follow = |dataset: &Dataset, seed: u64| -> Result<Vec<Sequence>> {
         let touched = |name: &String| dataset.objects.iter().find(|touched| touched.name == *name);
-        let of = |name: &String| Some((names.iter().position(|own| own == name)?, touched(name)?));
-        let objects: Vec<_> = tested.iter().filter_map(of).collect();
+        let output = |name: &String| names.iter().position(|own| own == name);
+        // The object itself, as any of its outputs, or its placements.
+        let of = |entry: &Entry| -> Vec<(usize, &ObjectTouches, f64)> {
+            let whole = touched(&entry.name).and_then(|own| Some((output(&entry.outputs.first()?.0)?, own, 1.0)));
+            let placed = |(name, share): &(String, f64)| Some((output(name)?, touched(name)?, *share));
+            whole.map_or_else(|| entry.outputs.iter().filter_map(placed).collect(), |whole| vec![whole])
+        };
+        let objects: Vec<Vec<_>> = entries.iter().map(of).collect();
+        let all = || objects.iter().flatten();
         let mut supplies: Vec<Supply<'_>> =
-            objects.iter().map(|&(object, touched)| Supply::new(object, touched, seed)).collect();
-        let wanted: Vec<usize> = objects.iter().map(|(_, touched)| touched.len()).collect();
+            all().map(|&(output, touched, _)| Supply::new(output, touched, seed)).collect();
         // Each object has equally many, as many as the one with the fewest.
-        let fewest = wanted.iter().copied().min().unwrap_or(0);
-        let wanted = vec![fewest; wanted.len()];
+        let lengths = objects.iter().map(|of| of.iter().map(|(_, touched, _)| touched.len()).sum::<usize>());
+        let fewest = lengths.min().unwrap_or(0) as f64;
+        let wanted: Vec<usize> = all().map(|(.., share)| (share * fewest).round().max(1.0) as usize).collect();
         follow(&model, &mut supplies, &wanted, until, || |_: &calibrate::Moment<'_>| true, &())
     };
     let own = tally(&follow(simulated, seed)?, margin);

@@ -9,6 +9,7 @@ mod origin;
 #[cfg(feature = "train")]
 pub mod train;
 
+pub(crate) use origin::{object_of, stroke_of};
 pub use origin::{StatedProbe, TouchOrigin, compiled_trained_on};
 pub use palpate_trees::ensemble::*;
 

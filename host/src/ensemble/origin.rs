@@ -164,7 +164,7 @@ impl TouchOrigin {
 }
 
 /// The object that an output belongs to, by its name: what stands before the last slash.
-fn object_of(output: &str) -> &str {
+pub(crate) fn object_of(output: &str) -> &str {
     output.rsplit_once('/').map_or(output, |(object, _)| object)
 }
 
@@ -205,12 +205,13 @@ impl StatedProbe {
             Length::Millimeter => 1.0,
         };
         let scaled = |number: f64| (number * scale) as f32;
-        let Probe { radius, spacing, speed, stroke, travel, .. } = self.probe;
+        let Probe { radius, spacing, speed, stroke, travel, stroke_tolerance, .. } = self.probe;
         let [radius, spacing, speed] = [radius, spacing, speed].map(scaled);
-        let [stroke, travel] = [stroke, travel].map(|length| length.map(scaled));
+        let [stroke, travel, stroke_tolerance] =
+            [stroke, travel, stroke_tolerance].map(|length| length.map(scaled));
         // At least a hundredth of a degree, since 0 is a floating object; a conversion saturates.
         let cone = self.scene.cone().map_or(0, |cone| ((100.0 * cone).round() as u16).max(1));
-        TrainedProbe { radius, spacing, speed, length: self.unit, stroke, travel, cone }
+        TrainedProbe { radius, spacing, speed, length: self.unit, stroke, travel, cone, stroke_tolerance }
     }
 
     /// Compares what two sides state, such as a data set and a model; `names` says who they are.
@@ -256,7 +257,7 @@ impl StatedProbe {
 impl StatedProbe {
     /// Compares a probe, such as a model's, with that of a data set, as [`compare`](Self::compare) does. Recorded touches may
     /// not state their stroke; it is then compared with their latest contacts: none may be later than the stroke of `probe`, by
-    /// more than a fiftieth of it; and where they end at once, long before `longest`, the largest time between contacts that
+    /// more than the tolerance that it states, or a fiftieth of it; and where they end at once, long before `longest`, the largest time between contacts that
     /// the model was trained on, another stroke ended them. `longest` of `u32::MAX`: not known.
     ///
     /// Cost: a pass over touches that no capture made.
@@ -283,10 +284,17 @@ impl StatedProbe {
         if is_simulated {
             return Ok(());
         }
-        let stroke = probe.and_then(|probe| Some((probe.stroke?, probe.speed)));
-        let window = stroke.map(|(stroke, speed)| f64::from(stroke) / f64::from(speed) * 1e6);
+        if probe.is_some_and(|probe| probe.cone == 0) && !dataset.placement_shares().is_empty() {
+            let [first, second] = names.map(str::to_owned);
+            return Err(ProbeProblem::Differs { first, second, differences: "scene floating and table".into() });
+        }
+        let stroke = probe.and_then(|probe| probe.stroke);
+        let [window, allowed] = match probe.and_then(|probe| stroke_of(&probe)) {
+            Some(times) => times.map(Some),
+            None => [None; 2],
+        };
         let Some(latest) = Latest::of(dataset) else { return Ok(()) };
-        let is_later = window.is_some_and(|window| latest.micros > window * (1.0 + hand::TOLERANCE));
+        let is_later = allowed.is_some_and(|allowed| latest.micros > allowed);
         let is_ended = |window: f64| latest.ends_at_once() && latest.micros < ENDED * window;
         // Without a stroke the longest time of the training is that of the objects' shapes.
         let longest = Some(f64::from(longest)).filter(|_| longest < u32::MAX);
@@ -299,12 +307,23 @@ impl StatedProbe {
         }
         let [first, second] = names.map(str::to_owned);
         let seconds = |micros: f64| format!("{:.3} s", micros / 1e6);
-        let stroke = match stroke.zip(window) {
-            Some(((stroke, _), window)) => format!("a stroke of {stroke} ({})", seconds(window)),
+        let stroke = match stroke.zip(window).zip(allowed) {
+            Some(((stroke, window), allowed)) if is_later => {
+                format!("a stroke of {stroke} ({}), which explains contacts up to {}", seconds(window), seconds(allowed))
+            }
+            Some(((stroke, window), _)) => format!("a stroke of {stroke} ({})", seconds(window)),
             None => "no stroke".into(),
         };
         Err(ProbeProblem::OtherStroke { first, second, stroke, latest: seconds(latest.micros), is_later })
     }
+}
+
+/// The time that the stroke of a probe takes, and the latest recorded contact that it explains, in microseconds; none without a
+/// stroke.
+pub(crate) fn stroke_of(probe: &TrainedProbe) -> Option<[f64; 2]> {
+    let time = |length: f32| f64::from(length) / f64::from(probe.speed) * 1e6;
+    let window = time(probe.stroke?);
+    Some([window, window + probe.stroke_tolerance.map_or(hand::TOLERANCE * window, time)])
 }
 
 /// The scene of a cone in hundredths of a degree, in words.

@@ -48,7 +48,8 @@ impl Margins<'_> {
     }
 
     /// Confusion matrix after `touches` touches: number of groups of each tested object (rows) recognized as each known
-    /// one (columns).
+    /// one (columns). Where an object has several outputs, a right one is that of the placement that was touched, if the touches
+    /// state it.
     ///
     /// # Errors
     /// As [`Margins::curve`], and `at` if `touches` is 0.
@@ -67,7 +68,10 @@ impl Margins<'_> {
         self.check(most, groups)?;
         let row = |position| {
             let mut row = vec![0; self.objects().len()];
-            self.ends(position, (touches, most), groups, seed, |evidence| self.best(position, evidence))
+            self.ends(position, (touches, most), groups, seed, |evidence| match self.is_of_any_placement(position) {
+                true => self.output(evidence),
+                false => self.best(position, evidence),
+            })
                 .into_iter()
                 .for_each(|object| row[object] += 1);
             row

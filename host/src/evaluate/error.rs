@@ -1,5 +1,7 @@
 //! Problems with evaluating.
 
+use crate::calibrate::two_digits;
+use crate::ensemble::object_of;
 use crate::error::Problem;
 use palpate_shared::Descriptor;
 
@@ -34,18 +36,47 @@ pub enum EvaluateProblem {
         found: usize,
     },
     /// There are too few sequences to promise a share of false alarms, or too many false alarms at every threshold.
-    #[error("{}", too_few_for_alarms(*object_sequences, *needed))]
+    #[error("{}", too_few_for_alarms(object, *object_sequences, *needed))]
     TooFewForAlarms {
-        /// Sequences of the object with the fewest.
+        /// The object with the fewest sequences.
+        object: String,
+        /// Its sequences.
         object_sequences: usize,
         /// Number of sequences of each object that it takes.
         needed: u64,
     },
-    /// Recordings make no sequences, or too many of them end as unknown at every threshold.
-    #[error("{}", too_few_recorded(*object_sequences))]
+    /// Recordings of an object make no sequence.
+    #[error(
+        "the {approaches} recorded approaches to {object} make no sequence that ends with a name: half of them are tested, {tested} \
+         touches that are evidence{}",
+        enough.map_or_else(String::new, |enough| format!(", and a simulated sequence takes {:.0}", enough.touches))
+    )]
     TooFewRecorded {
-        /// Sequences of the object with the fewest.
-        object_sequences: usize,
+        /// The object.
+        object: String,
+        /// Approaches that were recorded.
+        approaches: usize,
+        /// Touches of them that sequences are made of.
+        tested: usize,
+        /// Recordings that would do, where simulated sequences say.
+        enough: Option<EnoughRecorded>,
+    },
+    /// Too many recorded sequences end as unknown at every threshold.
+    #[error(
+        "of {of_each} recorded sequences of each object {} end as unknown at the strictest threshold, where a false alarm rate of \
+         {} % allows {allowed}",
+        unknown.iter().map(|(object, count)| format!("{count} of {object}")).collect::<Vec<_>>().join(", "),
+        percent(*share)
+    )]
+    RecordedUnknown {
+        /// Sequences of each object.
+        of_each: usize,
+        /// Objects of which some end as unknown, and how many.
+        unknown: Vec<(String, usize)>,
+        /// The share of false alarms that so many sequences support.
+        share: f64,
+        /// Sequences of all objects together that may end as unknown.
+        allowed: u64,
     },
     /// The model works on other rows than touches.
     #[error("the model works on rows of features, not on touches")]
@@ -143,19 +174,29 @@ pub enum EvaluateProblem {
     },
 }
 
-/// Message about too few sequences: too few in all, or too few that do not end as unknown.
-fn too_few_recorded(object_sequences: usize) -> String {
-    match object_sequences {
-        0 => "the recordings make no sequence of an object that ends with a name".into(),
-        some => format!("of {some} recorded sequences of each object too many end as unknown at every threshold"),
-    }
+/// Recordings that are likely to be enough for a false alarm rate, by simulated sequences.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EnoughRecorded {
+    /// Touches that are evidence of a simulated sequence, on average.
+    pub touches: f64,
+    /// Approaches to the object that make one sequence.
+    pub one: f64,
+    /// The share of false alarms that one sequence of each object supports.
+    pub share_of_one: f64,
+    /// Approaches to the object that the promised share takes.
+    pub promised: f64,
+    /// The promised share.
+    pub share: f64,
 }
 
-fn too_few_for_alarms(object_sequences: usize, needed: u64) -> String {
+/// A share in percent, without digits that say nothing.
+fn percent(share: f64) -> f64 {
+    (share * 1e4).round() / 1e2
+}
+
+fn too_few_for_alarms(object: &str, object_sequences: usize, needed: u64) -> String {
     if (object_sequences as u64) < needed {
-        format!(
-            "the touches make only {object_sequences} sequences of an object, and the promise takes at least {needed}"
-        )
+        format!("the touches make only {object_sequences} sequences of {object}, and the promise takes at least {needed}")
     } else {
         format!(
             "of {object_sequences} sequences of each object too many end as unknown at every threshold, so the promise takes \
@@ -167,11 +208,34 @@ fn too_few_for_alarms(object_sequences: usize, needed: u64) -> String {
 impl Problem for EvaluateProblem {
     fn fix(&self) -> String {
         match self {
+            Self::UnknownObject { object, known } if known.iter().any(|known| is_placement_of(known, object)) => {
+                "Train it on this placement too (capture with --placements), take it out of the data, or record the object without \
+                 its placement (--object OBJECT), to test it however it lies."
+            }
             Self::UnknownObject { .. } => "Train it on this object too, or take the object out of the data.",
             Self::KnownObject { .. } => "Take it out of the strangers, or train a model without it.",
             Self::MissingObject { .. } => "Capture touches of every object that the model knows.",
+            Self::TooFewForAlarms { object, object_sequences, needed }
+                if *object_sequences > 0 && (*object_sequences as u64) < *needed =>
+            {
+                let times = *needed as f64 / *object_sequences as f64;
+                return format!("Capture about {:.1} times as many touches of {object}.", (10.0 * times).ceil() / 10.0);
+            }
             Self::TooFewForMisfit { .. } | Self::TooFewForAlarms { .. } => "Capture more touches of every object.",
-            Self::TooFewRecorded { .. } => "Record more, or calibrate on simulated touches alone.",
+            Self::TooFewRecorded { object, enough: Some(enough), .. } => {
+                return format!(
+                    "Record about {} approaches to {object}: one sequence of each object supports a false alarm rate of {} %, and {} % \
+                     takes about {} approaches to it. Or calibrate on simulated touches alone.",
+                    two_digits(enough.one),
+                    percent(enough.share_of_one),
+                    percent(enough.share),
+                    two_digits(enough.promised)
+                );
+            }
+            Self::TooFewRecorded { .. } => "Record more approaches to it, or calibrate on simulated touches alone.",
+            Self::RecordedUnknown { .. } => {
+                "Fit the probe to the recordings (`palpate probe fit`) and check the meshes, or calibrate on simulated touches alone."
+            }
             Self::RawFeatures => {
                 "Give it rows of features: `palpate help recognize` and `palpate help evaluate` say how."
             }
@@ -202,14 +266,25 @@ impl Problem for EvaluateProblem {
     }
 }
 
+/// True if the first of two different outputs is another placement of the same object.
+fn is_placement_of(one: &str, other: &str) -> bool {
+    one != object_of(one) && object_of(one) == object_of(other)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn enough_sequences_with_too_many_alarms_are_not_said_to_be_too_few() {
-        let said = |object_sequences| EvaluateProblem::TooFewForAlarms { object_sequences, needed: 30 }.to_string();
-        assert!(said(29).contains("only 29 sequences of an object") && said(29).ends_with("at least 30"));
+        let of = |object_sequences| {
+            let object = "bowl".to_owned();
+            EvaluateProblem::TooFewForAlarms { object, object_sequences, needed: 30 }
+        };
+        let said = |object_sequences| of(object_sequences).to_string();
+        assert!(said(20).contains("only 20 sequences of bowl") && said(20).ends_with("at least 30"));
+        assert_eq!(of(20).fix(), "Capture about 1.5 times as many touches of bowl.");
+        assert_eq!(of(0).fix(), "Capture more touches of every object.");
         assert!(said(37).starts_with("of 37 sequences of each object too many end as unknown"), "{}", said(37));
     }
 }

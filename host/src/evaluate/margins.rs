@@ -2,7 +2,7 @@
 
 use super::Candidate;
 use super::together::margins_of_touches;
-use crate::ensemble::{StatedProbe, TouchOrigin, feature_row};
+use crate::ensemble::{StatedProbe, TouchOrigin, feature_row, object_of, stroke_of};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::probe::hand;
 use crate::random::{self, Purpose};
@@ -40,8 +40,10 @@ const STRANGER: usize = usize::MAX;
 
 /// The margins of one object's test touches.
 pub(super) struct Tested<'m> {
-    /// The object's index in the model, or [`STRANGER`].
+    /// The object's index in the model, or [`STRANGER`]; of several outputs that it may be of, the first.
     pub(super) object: usize,
+    /// The outputs that it may be of: several where nothing says which of its placements was touched.
+    pub(super) outputs: Vec<usize>,
     /// Number of touches that are evidence to the model.
     pub(super) touches: usize,
     /// For each touch of the data set its position among those that are evidence, if it is.
@@ -78,8 +80,36 @@ pub(crate) trait OfTouches {
     fn takes(&self, dataset: &Dataset) -> Result<Descriptor>;
     /// The number of each output's object, where several belong to one.
     fn numbers(&self) -> Option<Vec<u8>>;
-    /// The same, and for each object of a data set its index in the model.
+    /// The outputs of the object with this name: its own or, where it has one for each placement, all of them. None if the model
+    /// does not know it.
+    fn outputs_of(&self, name: &str) -> Vec<usize>;
+    /// The descriptor as [`takes`](Self::takes), and for each object of a data set its index in the model; of an object that
+    /// has several outputs, and touches that state no placement, the first.
     fn of(&self, dataset: &Dataset) -> Result<(Descriptor, Vec<usize>)>;
+    /// The data set as an effector would report it: of a model for a probe with a stroke, contacts that are later are missing.
+    fn delivered<'d>(&self, dataset: &'d Dataset) -> Cow<'d, Dataset>;
+}
+
+/// A recorded touch as an effector would report it to a model: of one for a probe with a stroke, a contact that is later, by no more
+/// than a hand with this stroke explains, is missing. Other touches are as they were, and a model refuses those that are later.
+pub fn delivered(model: &Model<'_>, touch: &Touch) -> Touch {
+    let allowed = model.probe().and_then(|probe| stroke_of(&probe)).map(|[_, latest]| latest);
+    match allowed {
+        Some(latest) if f64::from(touch.spread()) <= latest => {
+            hand::within(touch, Some(model.trained_touches().largest_spread))
+        }
+        _ => *touch,
+    }
+}
+
+/// The objects that a model with these outputs knows, in the order of the outputs.
+pub(crate) fn objects_of(outputs: &[String], has_placements: bool) -> Vec<String> {
+    let mut names: Vec<String> = match has_placements {
+        true => outputs.iter().map(|output| object_of(output).to_owned()).collect(),
+        false => outputs.to_vec(),
+    };
+    names.dedup();
+    names
 }
 
 impl OfTouches for Candidate<'_> {
@@ -111,15 +141,40 @@ impl OfTouches for Candidate<'_> {
         Ok(descriptor)
     }
 
-    fn of(&self, dataset: &Dataset) -> Result<(Descriptor, Vec<usize>)> {
-        let descriptor = self.takes(dataset)?;
+    fn outputs_of(&self, name: &str) -> Vec<usize> {
         let mut known = self.objects();
         known.truncate(self.known_count());
+        if let Some(own) = known.iter().position(|known| known == name) {
+            return vec![own];
+        }
+        let has_placements = self.numbers().is_some();
+        (0..known.len()).filter(|&output| has_placements && object_of(&known[output]) == name).collect()
+    }
+
+    fn of(&self, dataset: &Dataset) -> Result<(Descriptor, Vec<usize>)> {
+        let descriptor = self.takes(dataset)?;
         let index = |touched: &ObjectTouches| {
-            let unknown = || EvaluateProblem::UnknownObject { object: touched.name.clone(), known: known.clone() };
-            known.iter().position(|name| *name == touched.name).ok_or_else(|| unknown().into())
+            let unknown = || {
+                let mut known = self.objects();
+                known.truncate(self.known_count());
+                // Of an object that is known in other placements, these.
+                let object = object_of(&touched.name);
+                let is_placed = object != touched.name && !self.outputs_of(object).is_empty();
+                let known = match is_placed {
+                    true => self.outputs_of(object).into_iter().map(|output| known[output].clone()).collect(),
+                    false => objects_of(&known, self.numbers().is_some()),
+                };
+                EvaluateProblem::UnknownObject { object: touched.name.clone(), known }
+            };
+            self.outputs_of(&touched.name).first().copied().ok_or_else(|| unknown().into())
         };
         Ok((descriptor, dataset.objects.iter().map(index).collect::<Result<_>>()?))
+    }
+
+    fn delivered<'d>(&self, dataset: &'d Dataset) -> Cow<'d, Dataset> {
+        let window = self.trained_touches().largest_spread;
+        let has_stroke = self.probe().is_ok_and(|probe| probe.is_some_and(|probe| probe.stroke.is_some()));
+        dataset.within(has_stroke.then_some(window))
     }
 }
 
@@ -127,7 +182,7 @@ impl<'m> Margins<'m> {
     /// Computes the margins of all touches that are evidence to the model, on all threads; the others cost an approach
     /// and change nothing. Every group and sequence that is drawn from them is of one source's touches, such as an
     /// instance's, by one robot. Every object of the data set must be known to the model; the
-    /// model may know more.
+    /// model may know more. Touches of an object with an output for each placement may be of any of them, if they state none.
     ///
     /// # Errors
     /// [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if model and data set state different probes;
@@ -136,8 +191,9 @@ impl<'m> Margins<'m> {
     /// [`EvaluateProblem`] if the model does not know an object, works on rows of features instead of touches, or needs a
     /// pose that no touch has.
     pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
-        let (descriptor, known) = candidate.of(dataset)?;
-        Ok(Self::with(candidate, descriptor, &known, dataset))
+        let (descriptor, _) = candidate.of(dataset)?;
+        let outputs = dataset.objects.iter().map(|touched| candidate.outputs_of(&touched.name)).collect();
+        Ok(Self::with(candidate, descriptor, outputs, dataset))
     }
 
     /// The same for objects that the model does not know: no verdict on them is right.
@@ -146,35 +202,28 @@ impl<'m> Margins<'m> {
     /// As [`new`](Self::new), and [`EvaluateProblem::KnownObject`] if the model knows one.
     pub fn of_strangers(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
         let descriptor = candidate.takes(dataset)?;
-        let names = candidate.objects();
-        let known = &names[..candidate.known_count()];
-        if let Some(object) = dataset.objects.iter().map(|object| &object.name).find(|name| known.contains(name)) {
+        let is_known = |name: &&String| !candidate.outputs_of(name).is_empty();
+        if let Some(object) = dataset.objects.iter().map(|object| &object.name).find(is_known) {
             return Err(EvaluateProblem::KnownObject { object: object.clone() }.into());
         }
-        Ok(Self::with(candidate, descriptor, &vec![STRANGER; dataset.objects.len()], dataset))
+        Ok(Self::with(candidate, descriptor, vec![Vec::new(); dataset.objects.len()], dataset))
     }
 
-    fn with(candidate: Candidate<'m>, descriptor: Descriptor, indices: &[usize], dataset: &Dataset) -> Self {
+    /// The outputs of each object; none of a stranger.
+    fn with(candidate: Candidate<'m>, descriptor: Descriptor, outputs: Vec<Vec<usize>>, dataset: &Dataset) -> Self {
         let objects = candidate.objects();
         let trained = candidate.trained_touches();
-        // What is a little later than the stroke the effector takes for missing.
-        let is_late = |touch: &Touch| touch.spread() > trained.largest_spread;
-        let has_stroke = || candidate.probe().is_ok_and(|probe| probe.is_some_and(|probe| probe.stroke.is_some()));
-        let within = match dataset.touches().any(is_late) && has_stroke() {
-            true => {
-                Cow::Owned(dataset.each(|own| own.changed(|touch| hand::within(touch, Some(trained.largest_spread)))))
-            }
-            false => Cow::Borrowed(dataset),
-        };
-        let dataset = within.as_ref();
-        let tested = dataset.objects.iter().zip(indices).map(|(touched, &object)| {
+        let delivered = candidate.delivered(dataset);
+        let dataset = delivered.as_ref();
+        let tested = dataset.objects.iter().zip(outputs).map(|(touched, outputs)| {
             let is_evidence = |touch: &&Touch| Refused::check(&trained, touch).is_ok();
             let evidence: Vec<&Touch> = touched.touches().iter().filter(is_evidence).collect();
             let mut position = 0..;
             let approach = |touch| if is_evidence(&touch) { position.next() } else { None };
             let approaches: Vec<Option<u32>> = touched.touches().iter().map(approach).collect();
             Tested {
-                object,
+                object: outputs.first().copied().unwrap_or(STRANGER),
+                outputs,
                 touches: evidence.len(),
                 pools: pools(touched, &approaches),
                 approaches,
@@ -208,7 +257,8 @@ impl<'m> Margins<'m> {
     /// a tested object is above 0.
     pub fn expecting(mut self, weights: Vec<u32>) -> Result<Self> {
         let objects = self.objects.len();
-        let is_there = |tested: &Tested<'_>| weights.get(tested.object).is_some_and(|&weight| weight > 0);
+        let has_weight = |output: &usize| weights.get(*output).is_some_and(|&weight| weight > 0);
+        let is_there = |tested: &Tested<'_>| tested.outputs.iter().any(has_weight);
         if weights.len() != objects || !self.tested.iter().any(is_there) {
             let allowed = format!("{objects} weights, one for each object, of which one of the data set is above 0");
             return Err(Error::setting("prior", format!("{weights:?}"), allowed));
@@ -222,14 +272,29 @@ impl<'m> Margins<'m> {
         Ok(self)
     }
 
-    /// Frequency of touches of a tested object, compared with others.
-    pub(super) fn frequency(&self, position: usize) -> f64 {
-        let object = self.tested[position].object;
-        match (&self.weights, self.candidate) {
-            (Some(weights), _) => weights.get(object).copied().unwrap_or(0).into(),
-            (None, Candidate::Compiled(model)) => (f64::from(model.prior(object)) * f64::from(model.unit())).exp(),
-            (None, Candidate::Full(_)) => self.full_shares().get(object).copied().unwrap_or(1.0),
+    /// Frequency of touches of a tested object, compared with others: that of its placements together.
+    pub(crate) fn frequency(&self, position: usize) -> f64 {
+        let of = |&output: &usize| match (&self.weights, self.candidate) {
+            (Some(weights), _) => weights.get(output).copied().unwrap_or(0).into(),
+            (None, Candidate::Compiled(model)) => (f64::from(model.prior(output)) * f64::from(model.unit())).exp(),
+            (None, Candidate::Full(_)) => self.full_shares().get(output).copied().unwrap_or(1.0),
+        };
+        match &self.tested[position].outputs[..] {
+            [] => of(&STRANGER),
+            outputs => outputs.iter().map(of).sum(),
         }
+    }
+
+    /// True if a tested object has several outputs, and nothing says which of them its touches are of.
+    pub(super) fn is_of_any_placement(&self, position: usize) -> bool {
+        self.tested[position].outputs.len() > 1
+    }
+
+    /// Number of outputs that were tested.
+    pub(super) fn tested_outputs(&self) -> usize {
+        let outputs: std::collections::BTreeSet<usize> =
+            self.tested.iter().flat_map(|tested| tested.outputs.iter().copied()).collect();
+        outputs.len()
     }
 
     /// Shares of an ensemble's outputs of their objects; empty where each is an object.
@@ -266,6 +331,11 @@ impl<'m> Margins<'m> {
         if is_same { touched } else { output }
     }
 
+    /// True if outputs are placements of objects.
+    pub fn has_placements(&self) -> bool {
+        self.numbers.is_some()
+    }
+
     /// The number of each output's object, where several belong to one.
     pub(super) fn numbers(&self) -> Option<&[u8]> {
         self.numbers.as_deref()
@@ -278,6 +348,11 @@ impl<'m> Margins<'m> {
             None => best(&evidence[..self.known]),
             Some(_) => self.leading(position, evidence, self.unit()).0,
         }
+    }
+
+    /// The output with the most evidence of the object that leads.
+    pub(super) fn output(&self, evidence: &[f64]) -> usize {
+        leading(evidence, self.known, self.numbers.as_deref(), self.unit()).0
     }
 
     /// The objects of the data set, in its order.
@@ -470,7 +545,7 @@ pub(crate) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
 
 /// The output with the most evidence of the object that leads, and the sum of the other objects' weights, its own being 1. The
 /// first `known` outputs can be named; `numbers` are those of their objects, where several belong to one.
-pub(super) fn leading(evidence: &[f64], known: usize, numbers: Option<&[u8]>, unit: f64) -> (usize, f64) {
+pub(crate) fn leading(evidence: &[f64], known: usize, numbers: Option<&[u8]>, unit: f64) -> (usize, f64) {
     let Some(numbers) = numbers else {
         let best = best(&evidence[..known]);
         return (best, rivals(evidence, best, unit));

@@ -56,9 +56,9 @@ pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
-pub use error::EvaluateProblem;
-pub use margins::Margins;
-pub(crate) use margins::OfTouches;
+pub use error::{EnoughRecorded, EvaluateProblem};
+pub use margins::{Margins, delivered};
+pub(crate) use margins::{OfTouches, leading, objects_of};
 #[cfg(feature = "train")]
 pub(crate) use margins::best;
 pub use measure::{Confusion, Evaluated, Expecting, Wanted, measure, own_weights};
@@ -67,7 +67,7 @@ pub use palpate_trees::verify::{
     self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict, together,
 };
 pub use plan::{Active, ActiveFacts, ByPose, Hardest, LEAST_IN_POSE, Planned, Stock, evaluate_active, plan};
-pub use promise::{Finding, PromiseCheck, by_theory};
+pub use promise::{AlarmCheck, Finding, PromiseCheck, by_theory};
 pub use sequential::significant;
 pub use sequential::{Outcome, Sequential, SequentialSettings};
 pub use strangers::{DETECTED_BY, Strangers, strangers};
@@ -157,6 +157,9 @@ pub struct Evaluation {
     /// Check of the model's promise: counted in approaches where the data set holds those.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promise: Option<PromiseCheck>,
+    /// Check of the share of false alarms that the model's misfit test promises, on sequences that stop by its own thresholds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub false_alarms: Option<AlarmCheck>,
     /// Share of each contact pattern among the touches of the data set, each object weighted equally.
     pub patterns: BTreeMap<&'static str, f64>,
 }
@@ -181,6 +184,7 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
         None => margins.check_promise(outcomes, sequential.max_touches, &settings.noise, false),
         Some(_) => None,
     };
+    let false_alarms = if settings.error_rate.is_none() { margins.check_alarms(outcomes) } else { None };
     let accuracy = |touches: &usize| (*touches, curve.accuracy(*touches));
     let per_object = |(position, name): (usize, &String)| {
         let accuracy = |&touches: &usize| (touches, curve.object_accuracy(position, touches).value);
@@ -196,6 +200,7 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
         sequential,
         approaches,
         promise,
+        false_alarms,
         patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
     })
 }

@@ -1,7 +1,8 @@
 //! A compiled model compared with its ensemble: margins touch by touch, verdicts sequence by sequence.
 
+use super::Candidate;
 use super::full::FullRecognizer;
-use super::margins::{best, row};
+use super::margins::{OfTouches, best, row};
 use super::together::margins_of_touches;
 use crate::ensemble::Ensemble;
 use crate::error::{EvaluateProblem, Result};
@@ -52,6 +53,8 @@ pub fn parity(
     if dataset.objects.is_empty() || dataset.objects.iter().any(ObjectTouches::is_empty) {
         return Err(EvaluateProblem::NoTouches.into());
     }
+    let delivered = Candidate::Compiled(model).delivered(dataset);
+    let dataset = delivered.as_ref();
     let touches: Vec<&Touch> = dataset.touches().collect();
     check(ensemble, model)?;
     let full = FullMargins::new(ensemble, &touches, progress)?;

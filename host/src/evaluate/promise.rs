@@ -62,7 +62,54 @@ pub struct PromiseCheck {
     pub by_theory: Option<f64>,
 }
 
+/// Check of a model's promised share of false alarms on test touches: of known objects' sequences, those that end as unknown.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AlarmCheck {
+    /// The promised share.
+    pub promised: f64,
+    /// The probability that it is kept.
+    pub confidence: f64,
+    /// Sequences of the calibration.
+    pub sequences: u32,
+    /// Share of the sequences that ended as unknown, each object weighted equally.
+    pub found: f64,
+    /// Standard error of [`AlarmCheck::found`].
+    pub standard_error: f64,
+    /// Result of a test of significance of that share.
+    pub finding: Finding,
+    /// The share of each object, where it is above the promised one by more than chance; the promise is of all together.
+    pub above: BTreeMap<String, f64>,
+}
+
 impl Margins<'_> {
+    /// Compares the share of false alarms that the model's misfit test promises with sequences that stopped by its own
+    /// thresholds. `None` if it has no test.
+    pub(super) fn check_alarms(&self, outcomes: &[Vec<Outcome>]) -> Option<AlarmCheck> {
+        let Candidate::Compiled(model) = self.candidate else { return None };
+        let terms = model.strangers()?.test?.terms;
+        let promised = f64::from(terms.alarms) / 1e6;
+        let of = |outcomes: &Vec<Outcome>| {
+            let given = outcomes.len() as f64;
+            let wrong = outcomes.iter().filter(|outcome| outcome.unknown).count() as f64;
+            Wrong { given, wrong, spread: given }
+        };
+        let each: Vec<Wrong> = outcomes.iter().map(of).collect();
+        let sum = |of: fn(&Wrong) -> f64| each.iter().map(of).sum();
+        let all = Wrong { given: sum(|of| of.given), wrong: sum(|of| of.wrong), spread: sum(|of| of.spread) };
+        let is_above = |of: &Wrong| of.finding_of(promised, each.len()) == Finding::Broken;
+        let named = self.tested_names().iter().zip(&each).filter(|(_, of)| is_above(of));
+        let Estimate { value, standard_error } = all.estimate();
+        Some(AlarmCheck {
+            promised,
+            confidence: f64::from(terms.confidence) / 1e6,
+            sequences: terms.sequences,
+            found: value,
+            standard_error,
+            finding: all.finding_of(promised, 1),
+            above: named.map(|(name, of)| (name.clone(), of.share())).collect(),
+        })
+    }
+
     /// Compares what the model promises with sequences that stopped by its own thresholds. `None` if it promises nothing.
     pub(super) fn check_promise(
         &self,
@@ -96,9 +143,14 @@ impl Margins<'_> {
             let what = |approaches| if approaches { "every approach" } else { "full touches only" };
             void.push(format!("promised for {}, tested on {}", what(promise.approaches), what(self.hold_approaches())));
         }
-        let known = self.candidate.known_count();
-        if self.tested.len() < known {
-            void.push(format!("promised for all {known} objects of the model, tested on {}", self.tested.len()));
+        let (known, tested) = (self.candidate.known_count(), self.tested_outputs());
+        if tested < known {
+            let what = if self.numbers().is_some() { "placements" } else { "objects" };
+            void.push(format!("promised for all {known} {what} of the model, tested on {tested}"));
+        }
+        let is_unstated = (0..self.tested.len()).any(|position| self.is_of_any_placement(position));
+        if promise.per == Per::Object && is_unstated {
+            void.push("promised in each placement, tested on touches that state none".into());
         }
         if promise.active != active {
             let how = |active| if active { "as the plan proposes" } else { "at random" };
@@ -167,11 +219,16 @@ impl Margins<'_> {
         let mut of = Wrong::default();
         for (position, outcomes) in outcomes.iter().enumerate() {
             let weight = self.frequency(position);
-            let names = outcomes.iter().filter_map(|outcome| outcome.recognized);
-            for name in names.filter(|&name| counts(position, name)) {
-                of.given += weight;
-                of.spread += weight * weight;
-                of.wrong += if name == self.tested[position].object { 0.0 } else { weight };
+            let is_any = self.is_of_any_placement(position);
+            for outcome in outcomes {
+                let Some(name) = outcome.recognized else { continue };
+                // Of touches that may be of any placement, the one that was named counts.
+                let named = outcome.output.filter(|_| is_any).unwrap_or(name);
+                if counts(position, named) {
+                    of.given += weight;
+                    of.spread += weight * weight;
+                    of.wrong += if name == self.tested[position].object { 0.0 } else { weight };
+                }
             }
         }
         of

@@ -63,7 +63,8 @@ pub struct Sequential {
     pub error_of_given_per_object: BTreeMap<String, f64>,
     /// Objects of whose names more are wrong than [`Sequential::error_rate`], by more than chance.
     pub above: Vec<String>,
-    /// Share of right names with which the placement that was touched was named; none where outputs are objects.
+    /// Share of right names with which the placement that was touched was named; none where outputs are objects, and of touches
+    /// that state no placement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub placement: Option<f64>,
     /// Share of wrong names among those given of each name; without names that were never given.
@@ -138,11 +139,13 @@ impl Margins<'_> {
         }
     }
 
-    /// Share of right names with the right placement, each tested placement weighted by its frequency.
+    /// Share of right names with the right placement, each tested placement weighted by its frequency; of touches that state
+    /// theirs.
     fn placement_named(&self, outcomes: &[Vec<Outcome>]) -> Option<f64> {
         self.numbers()?;
         let (mut right, mut placed) = (0.0, 0.0);
-        for (position, outcomes) in outcomes.iter().enumerate() {
+        let stated = |(position, _): &(usize, &Vec<Outcome>)| !self.is_of_any_placement(*position);
+        for (position, outcomes) in outcomes.iter().enumerate().filter(stated) {
             let (touched, weight) = (self.tested[position].object, self.frequency(position));
             let named = outcomes.iter().filter(|outcome| outcome.recognized == Some(touched));
             for outcome in named {

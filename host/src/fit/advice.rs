@@ -5,12 +5,16 @@ use super::outcome::{Fit, Warning};
 use super::timer::Timer;
 use super::words::{Estimate, NOT_TOLD, between, offset_between};
 
-/// Width of an interval above which there is a warning: of the speed, of offsets in milliseconds, of the noise as a
-/// share of it, of shares of missed contacts.
+/// Width of an interval above which there is a warning: of the speed, of offsets in milliseconds, of shares of missed contacts.
 const SPEED: f64 = 0.08;
 const OFFSET: f64 = 5.0;
-const NOISE: f64 = 0.8;
 const MISSED: f64 = 0.08;
+/// Amount in milliseconds by which the noise may be above its likeliest value without a warning: a model that is trained for that
+/// much too little loses half a point after 60 approaches, and one that is trained for too much loses a tenth
+/// (`docs/measurements/fit.md`).
+const NOISE: f64 = 2.5;
+/// The most noise in milliseconds of which it is measured that training for it costs little.
+const MUCH_NOISE: f64 = 5.0;
 /// No recording is asked to be longer than this many times what is there.
 const MOST: f64 = 30.0;
 
@@ -56,8 +60,16 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
     if coarse {
         let record = "It is below the timer's resolution; a finer timer would show it.".into();
         warn("the noise", said(&fit.noise, 1.0, 2, " ms"), record);
-    } else if is_wide(&fit.noise, NOISE * fit.noise.value.max(0.5)) {
-        let record = format!("Record {}.", more(fit.noise.width(), NOISE * fit.noise.value.max(0.5)));
+    } else if fit.noise.high.is_none_or(|high| high > fit.noise.value + NOISE) {
+        let above = fit.noise.high.map(|high| high - fit.noise.value);
+        let record = match fit.noise.high.filter(|high| *high <= MUCH_NOISE) {
+            None => format!("Record {}.", more(above, NOISE)),
+            Some(high) => format!(
+                "Train for the upper end (noise = \"{high:.2}ms\" in the file): too much noise in training costs hardly any accuracy, \
+                 too little does. Or record {}.",
+                more(above, NOISE)
+            ),
+        };
         warn("the noise", said(&fit.noise, 1.0, 2, " ms"), record);
     }
     match &fit.missed {

@@ -11,6 +11,7 @@ use super::recording::Recording;
 use super::search::{self, Best};
 use super::slopes;
 use super::stroke::Stroke;
+use super::touched::Touched;
 use super::{Evidence, Settings};
 use crate::capture::Sampler;
 use crate::error::Result;
@@ -42,6 +43,8 @@ pub(super) struct Samples<'a> {
 }
 
 struct Sample {
+    /// The number of the scene.
+    scene: usize,
     approach: Approach,
     contacts: [Option<Contact>; FINGERS],
     /// Exponential numbers of mean 1: by how much each finger bends.
@@ -49,38 +52,48 @@ struct Sample {
 }
 
 impl<'a> Samples<'a> {
-    fn new(name: &'a str, scenes: &'a [Scene], settings: &Settings) -> Self {
+    fn new(Touched { name, scenes, .. }: &'a Touched, shares: &[f64], settings: &Settings) -> Self {
         let origin = Origin { seed: settings.seed, ..settings.origin.clone() };
         let sampler = Sampler::of_instances(scenes, name, &origin);
         let probe = origin.probe;
+        let count = APPROACHES.min(settings.approaches);
+        // Of each scene as many of its approaches as its share says.
+        let of_each = count as f64 / scenes.len().max(1) as f64;
+        let is_kept = |index: &u64| {
+            let [turn, rank] = [index % scenes.len() as u64, index / scenes.len() as u64];
+            rank as f64 <= of_each * shares[turn as usize]
+        };
         let one = |index: u64| {
-            let scene = &scenes[index as usize % scenes.len()];
+            let place = index as usize % scenes.len();
+            let scene = &scenes[place];
             let mut random = random::generator(settings.seed, Purpose::Fit, name, index | 1 << 40);
             let approach = sampler.approach(scene, index);
             let contact = |finger| scene.contact(finger, approach.direction, probe.radius);
             Sample {
+                scene: place,
                 approach,
                 contacts: approach.fingers(probe.spacing).map(contact),
                 bends: std::array::from_fn(|_| Exp1.sample(&mut random)),
             }
         };
-        let approaches = (0..APPROACHES.min(settings.approaches)).into_par_iter().map(one).collect();
+        let approaches = (0..count).into_par_iter().filter(is_kept).map(one).collect();
         Self { name, probe, scenes, approaches }
     }
 
     /// The touches of fingers that bend like that.
     pub(super) fn touches(&self, real: &Noise) -> Vec<Touch> {
-        let one = |(index, sample): (usize, &Sample)| {
-            let scene = &self.scenes[index % self.scenes.len()];
+        let one = |sample: &Sample| {
+            let scene = &self.scenes[sample.scene];
             let fingers = sample.approach.fingers(self.probe.spacing);
             let distances = std::array::from_fn(|finger| {
                 let cast = [fingers[finger], sample.approach.direction];
                 let contact = sample.contacts[finger].as_ref()?;
                 real.grazing.distance(cast, contact, sample.bends[finger], scene, &self.probe)
             });
+            let distances = sample.approach.above_table(distances, scene, &self.probe);
             sample.approach.touch(distances, &self.probe)
         };
-        self.approaches.par_iter().enumerate().map(one).collect()
+        self.approaches.par_iter().map(one).collect()
     }
 }
 
@@ -218,9 +231,9 @@ impl Layers<'_> {
     }
 }
 
-/// Approaches to these objects, by their names, that no stroke ends.
-pub(super) fn samples<'a>(objects: &[(&'a str, &'a [Scene])], settings: &Settings) -> Vec<Samples<'a>> {
-    objects.iter().map(|(name, scenes)| Samples::new(name, scenes, settings)).collect()
+/// Approaches to these objects, or placements, that no stroke ends.
+pub(super) fn samples<'a>(touched: &[&'a Touched], settings: &Settings) -> Vec<Samples<'a>> {
+    touched.iter().map(|own| Samples::new(own, &own.shares(), settings)).collect()
 }
 
 /// Finds fingers that bend, if the recordings show them. `samples` are of the recordings' objects, in their order.

@@ -57,6 +57,7 @@ mod suspects;
 #[cfg(all(test, feature = "objects"))]
 mod tests;
 mod timer;
+mod touched;
 mod words;
 pub use error::FitProblem;
 pub use outcome::{Fit, GrazingEstimate, Warning};
@@ -82,6 +83,7 @@ use recording::Recording;
 use search::Best;
 use stroke::Stroke;
 use timer::Timer;
+use touched::Touched;
 
 /// Settings of a fit.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,7 +131,8 @@ impl Evidence<'_> {
 }
 
 /// Finds the probe that made recorded touches of `objects`, which are matched by their names, and presses on a flat plate
-/// if there are any, with a half turn of the probe after each.
+/// if there are any, with a half turn of the probe after each. Where the objects lie on a table, recordings that state their
+/// placement are compared with that one, others with all of the object's by their weights; the table is a plate too.
 ///
 /// The same recordings, objects and settings give the same fit on any number of threads. Cost: half a minute of a
 /// processor for ten meshes and 300 recorded approaches to four of them, twice that where touches have poses.
@@ -145,12 +148,16 @@ pub fn fit(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
-    let of = useful(recorded, objects, plate)?;
     let scenes = scenes(objects, settings, progress)?;
+    let recorded = &recorded.clone().matching(&touched::placements(objects, &scenes));
+    // Contacts that are a little later than a stated stroke are missing, as in every model of this probe.
+    let delivered = recorded.delivered_by(&settings.origin.probe);
+    let recorded = delivered.as_ref();
+    let touched = touched::touched(objects, scenes, recorded);
+    let of = useful(recorded, &touched, plate)?;
     progress.begin("fitting", None);
     let kept = kept(recorded);
-    let known: Vec<(&str, &[Scene])> =
-        of.iter().map(|&object| (objects[object].name.as_str(), &scenes[object][..])).collect();
+    let known: Vec<&Touched> = of.iter().map(|&place| &touched[place]).collect();
     let samples = layer::samples(&known, settings);
     let rigid: Vec<Vec<Touch>> = samples.iter().map(|samples| samples.touches(&Noise::default())).collect();
     let rigid: Vec<&[Touch]> = rigid.iter().map(Vec::as_slice).collect();
@@ -159,13 +166,13 @@ pub fn fit(
         recorded.objects.iter().map(|own| Recording::without_poses(&own.name, own.touches(), kept)).collect();
     let pressed = plate.map(|touches| Plate::new(touches.iter().map(Observed::of)));
     let layer = layer::layer(&recordings, samples, pressed.as_ref(), stroke, progress)?;
-    let simulated = Simulated::new(objects, scenes, layer, settings, progress)?;
+    let simulated = Simulated::new(touched, layer, settings, progress)?;
     fit_to(&simulated, stroke, recorded, plate, settings, progress)
 }
 
-/// For each recording its object, if there are enough touches.
-fn useful(recorded: &Dataset, objects: &[Object], plate: Option<&[Touch]>) -> Result<Vec<usize>> {
-    let place = |own: &ObjectTouches| place(&own.name, objects.iter().map(|object| object.name.as_str()));
+/// For each recording what it is of, if there are enough touches.
+fn useful(recorded: &Dataset, touched: &[Touched], plate: Option<&[Touch]>) -> Result<Vec<usize>> {
+    let place = |own: &ObjectTouches| place(&own.name, touched.iter().map(|touched| touched.name.as_str()));
     let of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
     let useful = |touch: &&Touch| Observed::of(touch).contacts() >= 2;
     let found = recorded.touches().chain(plate.into_iter().flatten()).filter(useful).count();
@@ -184,14 +191,15 @@ fn fit_to(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
-    let Simulated { touches, scenes, layer } = simulated;
+    let Simulated { touches, touched, layer } = simulated;
     let place = |own: &ObjectTouches| place(&own.name, touches.iter().map(|own| own.name.as_str()));
     let of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
     let kept = kept(recorded);
     let densities = |own: &ObjectTouches| Densities::new(&own.name, own.touches(), stroke.window);
     let objects: Vec<Densities> = touches.iter().map(densities).collect();
     let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
-        in_poses: posed::in_poses(&own.name, own.touches(), &scenes[object], &layer.real, settings),
+        in_poses: posed::in_poses(&own.name, own.touches(), &touched[object], &layer.real, settings),
+        is_mixed: touched[object].is_mixed(),
         ..Recording::without_poses(&own.name, own.touches(), kept)
     });
     let recordings: Vec<Recording<'_>> = recordings.collect();
@@ -204,7 +212,8 @@ fn fit_to(
     };
     progress.begin("fitting", None);
     evidence.of.par_iter().for_each(|&object| evidence.objects[object].prepare());
-    let timer = timer::timer(recorded.touches().chain(plate.into_iter().flatten()));
+    let all = || recorded.touches().chain(plate.into_iter().flatten());
+    let timer = timer::timer(all());
     let (best, ends) = searched(&evidence, layer.candidate, progress)?;
     // The intervals of the search suppose the layer as it was found.
     let center = best.candidate.numbers();
@@ -213,16 +222,15 @@ fn fit_to(
     progress.begin("checking the recordings", None);
     let suspects = suspects::suspects(&evidence, &best, progress)?;
     let mut fit = outcome::outcome(&evidence, &best, &ends, layer, timer, suspects, settings);
+    fit.readings = timer::readings(all(), timer).map(|micros| micros / 1e3);
     fit.warnings = advice::warnings(&fit, timer);
     Ok(fit)
 }
 
-/// The place of the object with this name.
+/// The place of what a recording of this name is of.
 fn place<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Result<usize> {
-    known
-        .clone()
-        .position(|own| own == name)
-        .ok_or_else(|| FitProblem::NotRecorded { name: name.into(), known: known.map(str::to_owned).collect() }.into())
+    let problem = || FitProblem::NotRecorded { name: name.into(), known: known.clone().map(str::to_owned).collect() };
+    touched::place(name, known.clone()).ok_or_else(|| problem().into())
 }
 
 /// The approaches that were recorded, as far as the touches say: every one if some touched nothing, only full touches
@@ -248,30 +256,25 @@ fn scenes(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> R
 /// Each object, touched by the probe as it should be whose hand goes on past it, but for fingers that bend.
 struct Simulated {
     touches: Vec<ObjectTouches>,
-    scenes: Vec<Vec<Scene>>,
+    touched: Vec<Touched>,
     layer: Layer,
 }
 
 impl Simulated {
-    fn new(
-        objects: &[Object],
-        scenes: Vec<Vec<Scene>>,
-        layer: Layer,
-        settings: &Settings,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
+    fn new(touched: Vec<Touched>, layer: Layer, settings: &Settings, progress: &dyn Progress) -> Result<Self> {
         // What the hand does not reach is left out later, when a candidate says how fast it is.
-        let probe = Probe { stroke: None, ..settings.origin.probe };
+        let probe = Probe { stroke: None, stroke_tolerance: None, ..settings.origin.probe };
         let (touches, seed) = (settings.approaches, settings.seed);
         let origin = Origin { approaches: true, touches, seed, real: layer.real, probe, ..settings.origin.clone() };
-        progress.begin("touching", Some(objects.len() as u64));
-        let one = |(object, scenes): (&Object, &Vec<_>)| {
-            let touches = capture::touches(scenes, &object.name, &origin, 0..settings.approaches)?;
+        progress.begin("touching", Some(touched.len() as u64));
+        let one = |own: &Touched| {
+            let touches = capture::touches(&own.scenes, &own.name, &origin, 0..settings.approaches)?;
             progress::advance(progress, 1)?;
-            Ok(touches)
+            let is_weighed = own.weights.iter().any(|weight| *weight != own.weights[0]);
+            Ok(if is_weighed { touches.as_often_as_placed() } else { touches })
         };
-        let touches = objects.iter().zip(&scenes).map(one).collect::<Result<_>>()?;
-        Ok(Self { touches, scenes, layer })
+        let touches = touched.iter().map(one).collect::<Result<_>>()?;
+        Ok(Self { touches, touched, layer })
     }
 }
 

@@ -7,7 +7,9 @@ use super::suspects::Suspect;
 use super::words::{Estimate, NOT_TOLD, between, offset, offset_between};
 use super::{Evidence, Settings, Timer};
 use crate::probe::approach::{FINGERS, Probe};
+use crate::probe::hand;
 use crate::probe::noise::{Grazing, Noise};
+use crate::touches::Surroundings;
 use palpate_shared::format::Length;
 use serde::Serialize;
 use std::fmt::{self, Write as _};
@@ -60,14 +62,24 @@ pub struct Fit {
     pub grazing: Option<GrazingEstimate>,
     /// The timer's resolution; none if it is finer than 0.02 ms, or there are too few times to tell.
     pub timer: Option<f64>,
+    /// Time between readings of the contacts in milliseconds, where contact times cluster about its multiples; none if they do not,
+    /// or if it is the timer's resolution.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub readings: Option<f64>,
     /// Recorded touches and approaches.
     pub recorded: usize,
     /// Those of them with three contacts, and with two.
     pub contacts: [usize; 2],
     /// Presses on a flat plate.
     pub presses: usize,
-    /// Names of the recorded objects.
+    /// Names of the recorded objects, or placements.
     pub objects: Vec<String>,
+    /// Those of them that state no placement on a table, and were not checked for other objects.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unchecked: Vec<String>,
+    /// Surroundings of the objects.
+    #[serde(skip_serializing_if = "Surroundings::is_floating")]
+    pub scene: Surroundings,
     /// Warnings about what the recordings cannot determine, and what to record next.
     pub warnings: Vec<Warning>,
     /// Recordings that look wrong.
@@ -102,8 +114,12 @@ pub(super) fn outcome(
     let missed =
         [0, 1, 2].map(|finger: usize| estimate(4 + finger, false, &|candidate: &Candidate| candidate.missed[finger]));
     let stroke = evidence.stroke.estimated;
-    let written = |stroke: Estimate| (1e4 * stroke.value).round() / 1e4;
-    let probe = Probe { stroke: stroke.map(written).or(settings.origin.probe.stroke), ..settings.origin.probe };
+    let written = |length: f64| (1e4 * length).round() / 1e4;
+    let probe = Probe {
+        stroke: stroke.map(|stroke| written(stroke.value)).or(settings.origin.probe.stroke),
+        stroke_tolerance: stroke.map(|stroke| written(tolerance(&stroke))).or(settings.origin.probe.stroke_tolerance),
+        ..settings.origin.probe
+    };
     let layered = |of: &dyn Fn(&Noise) -> f64| {
         let [low, high] = [0, 1].map(|end: usize| layer.ends.as_ref().map(|ends| of(&ends[end])));
         Estimate { value: of(&layer.real), low, high }
@@ -125,13 +141,22 @@ pub(super) fn outcome(
             bend: layered(&|real| real.grazing.bend / 1e3),
         }),
         timer: resolution,
+        readings: None,
         recorded: evidence.recordings.iter().map(|own| own.touches.len()).sum(),
         contacts: super::counts(evidence),
         presses: evidence.plate.as_ref().map_or(0, |plate| plate.count),
         objects: evidence.recordings.iter().map(|own| own.name.to_owned()).collect(),
+        unchecked: evidence.recordings.iter().filter(|own| own.is_mixed).map(|own| own.name.to_owned()).collect(),
+        scene: settings.origin.scene,
         warnings: Vec::new(),
         suspects,
     }
+}
+
+/// Length by which contacts may be later than an estimated stroke: up to the end of its interval, and beyond it by the ripple of
+/// the speed, which is allowed for where a stroke is stated too.
+fn tolerance(stroke: &Estimate) -> f64 {
+    stroke.high.unwrap_or(stroke.value) * (1.0 + hand::TOLERANCE) - stroke.value
 }
 
 impl Fit {
@@ -154,7 +179,7 @@ impl Fit {
 
     /// The probe as the text of a `probe.toml`, with the intervals as comments.
     pub fn toml(&self) -> String {
-        let Probe { radius, spacing, speed, tilt, stroke, travel } = self.probe;
+        let Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance } = self.probe;
         let unit = match self.unit {
             Length::Tenth => "# A unit is a tenth of the object's longest side.\nunit = \"unit\"\n",
             Length::Millimeter => "unit = \"mm\"\n",
@@ -163,10 +188,11 @@ impl Fit {
         let presses =
             if self.presses > 0 { format!(" and {} presses on a plate", self.presses) } else { String::new() };
         let mut text = format!(
-            "# Found by `palpate probe fit` from {} approaches to {}{presses}.\n\
+            "# Found by `palpate probe fit` from {} approaches to {}{}{presses}.\n\
              # Behind each value its 95 % interval, which supposes that probe and objects are as they are simulated.\n",
             self.recorded,
             self.objects.join(", "),
+            if self.scene.is_floating() { "" } else { " on a table" },
         );
         // Writing to a string cannot fail.
         for warning in &self.warnings {
@@ -181,6 +207,10 @@ impl Fit {
                 format!("  # {}: no recorded contact is later", between(&stroke, 1.0, 3))
             });
             _ = writeln!(text, "stroke = {stroke:?}{estimated}");
+            if let Some(tolerance) = stroke_tolerance {
+                let latest = stroke + tolerance;
+                _ = writeln!(text, "stroke_tolerance = {tolerance:?}  # contacts up to {latest:.3} are late, and of this hand");
+            }
         }
         if let Some(travel) = travel {
             _ = writeln!(text, "travel = {travel:?}");

@@ -8,11 +8,12 @@ use super::Settings;
 use super::candidate::{Candidate, Kept};
 use super::likelihood::{Explained, product};
 use super::observed::{FULL, Observed};
+use super::touched::Touched;
 use crate::probe::approach::Approach;
 use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::random::{self, Purpose};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use palpate_shared::{Pose, Q15_ONE, Touch};
 use rand::{Rng, RngExt};
 use rayon::prelude::*;
@@ -48,18 +49,19 @@ struct Simulated {
 pub(super) fn in_poses(
     name: &str,
     touches: &[Touch],
-    scenes: &[Scene],
+    touched: &Touched,
     layer: &Noise,
     settings: &Settings,
 ) -> Vec<Option<InPose>> {
-    if touches.iter().all(|touch| touch.pose().is_none()) || scenes.is_empty() {
+    if touches.iter().all(|touch| touch.pose().is_none()) || touched.scenes.is_empty() {
         return Vec::new();
     }
+    let order = order(&touched.shares());
     let one = |(index, touch): (usize, &Touch)| {
         let mut random = random::generator(settings.seed, Purpose::Fit, name, 1 + index as u64);
         let pose = touch.pose()?;
-        let approaches = (0..APPROACHES).map(|turn| {
-            let scene = &scenes[turn % scenes.len()];
+        let approaches = order.iter().map(|&scene| {
+            let scene = &touched.scenes[scene];
             let approach = aimed(&mut random, &pose, scene, settings);
             let probe = &settings.origin.probe;
             let distances = match layer.grazing.is_none() {
@@ -76,6 +78,19 @@ pub(super) fn in_poses(
         Some(InPose(approaches))
     };
     touches.par_iter().enumerate().map(one).collect()
+}
+
+/// The scene of each approach: each as often as its share says, in turn where all have the same.
+fn order(shares: &[f64]) -> Vec<usize> {
+    let mut due: Vec<f64> = shares.to_vec();
+    let mut next = || {
+        // The first of those that have waited the longest.
+        let scene = (0..due.len()).fold(0, |best, scene| if due[scene] > due[best] { scene } else { best });
+        due[scene] -= shares.iter().sum::<f64>();
+        due.iter_mut().zip(shares).for_each(|(due, share)| *due += share);
+        scene
+    };
+    (0..APPROACHES).map(|_| next()).collect()
 }
 
 /// Half the way to the third neighbor with the same contacts; 0 where there are not as many.
@@ -100,13 +115,18 @@ fn aimed(random: &mut impl Rng, pose: &Pose, scene: &Scene, settings: &Settings)
     let vector = |cosines: [i16; 3]| {
         DVec3::from_array(cosines.map(|cosine| f64::from(cosine) / f64::from(Q15_ONE))).normalize_or(DVec3::Z)
     };
+    // On a table the angle of the object about the vertical is unknown.
+    let turn = match scene.table() {
+        Some(_) => DMat3::from_rotation_z(random.random_range(0.0..std::f64::consts::TAU)),
+        None => DMat3::IDENTITY,
+    };
     let [low, high] = settings.origin.aim.target(scene);
     let shares = DVec3::new(random.random(), random.random(), random.random());
     let [bottom, top] = scene.bounds();
     let away = (top - bottom).length() + settings.origin.clearance([bottom, top]);
-    let direction = vector(pose.direction);
+    let [direction, alignment] = [pose.direction, pose.alignment].map(|cosines| turn * vector(cosines));
     // Farther away than the robot starts, which changes no difference of times.
-    Approach { start: low + (high - low) * shares - direction * away, direction, alignment: vector(pose.alignment) }
+    Approach { start: low + (high - low) * shares - direction * away, direction, alignment }
 }
 
 /// For each finger the probability that its contact is missing, though it touches: missed, or later than the stroke. What was

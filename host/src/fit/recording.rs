@@ -14,12 +14,14 @@ pub(super) struct Recording<'a> {
     /// Simulated approaches in the pose of each touch; empty if no touch has one.
     pub(super) in_poses: Vec<Option<InPose>>,
     pub(super) kept: Kept,
+    /// True if it may be of several placements: its touches are then not alike, but of one placement after the other.
+    pub(super) is_mixed: bool,
 }
 
 impl<'a> Recording<'a> {
     /// As if no pose had been recorded.
     pub(super) fn without_poses(name: &'a str, touches: &[Touch], kept: Kept) -> Self {
-        Self { name, touches: touches.iter().map(Observed::of).collect(), in_poses: Vec::new(), kept }
+        Self { name, touches: touches.iter().map(Observed::of).collect(), in_poses: Vec::new(), kept, is_mixed: false }
     }
 
     /// The logarithm of its likelihood, of the object and under the candidate that explain it; poses count where there are some.

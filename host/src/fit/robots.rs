@@ -27,7 +27,7 @@ fn read(directory: &Path, range: std::ops::Range<usize>, has_poses: bool) -> Dat
 /// Everything that does not differ from set to set.
 struct Bench {
     objects: Vec<Object>,
-    scenes: Vec<Vec<Scene>>,
+    touched: Vec<Touched>,
     densities: Vec<Densities>,
     settings: Settings,
 }
@@ -50,11 +50,12 @@ impl Bench {
             in_poses: posed::in_poses(
                 &own.name,
                 own.touches(),
-                &self.scenes[object],
+                &self.touched[object],
                 &Noise::default(),
                 &self.settings,
             ),
             kept,
+            is_mixed: false,
         });
         let recordings: Vec<Recording<'_>> = recordings.collect();
         let evidence = Evidence {
@@ -88,11 +89,12 @@ fn honest_recordings_of_compliant_robots_are_not_refused_and_a_plate_makes_no_fi
     let settings = Settings::default();
     let objects = source::objects(&[shared.join("objects").to_str().unwrap().into()]).unwrap();
     let scenes = scenes(&objects, &settings, &()).unwrap();
-    let Simulated { touches: simulated, scenes, .. } =
-        Simulated::new(&objects, scenes, Layer::default(), &settings, &()).unwrap();
+    let touched = touched::touched(&objects, scenes, &Dataset::default());
+    let Simulated { touches: simulated, touched, .. } =
+        Simulated::new(touched, Layer::default(), &settings, &()).unwrap();
     let densities = simulated.iter().map(|own| Densities::new(&own.name, own.touches(), None)).collect();
     drop(simulated);
-    let bench = Bench { objects, scenes, densities, settings };
+    let bench = Bench { objects, touched, densities, settings };
     for (robot, has_poses) in [("c", false), ("d", false), ("c", true), ("d", true)].into_iter().take(2 * sets.min(2)) {
         let directory = shared.join(format!("recorded/robot-{robot}"));
         let presses = read_touches(&directory.join("plate.txt")).unwrap();

@@ -1,13 +1,12 @@
 //! The stroke of the hand that made recorded touches: stated, or estimated from the recordings.
 //!
-//! Where the simulated objects would be touched later and no recorded contact is, the hand had stopped. The latest contact is
-//! then the likeliest end of the stroke; the true one is later by about the time between two contacts there.
+//! Where the simulated objects would be touched later and no recorded contact is, the hand had stopped, at or behind the latest
+//! contact: by about as far as it takes for one contact more, as often as the simulated ones come there.
 
 use super::words::Estimate;
 use super::{FitProblem, Kept};
 use crate::error::Result;
 use crate::probe::approach::Probe;
-use crate::probe::hand;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Touch;
 
@@ -15,8 +14,9 @@ use palpate_shared::Touch;
 const EXPECTED: f64 = 12.0;
 /// A contact counts as expected behind the latest one if it is later by this factor: speeds are off.
 const FAR: f64 = 1.2;
-/// The part of the stroke from whose contacts their density at its end is taken.
-const END: f64 = 0.8;
+/// Contacts that would be expected between the latest one and the end of the stroke: at its likeliest value, and at the upper end
+/// of its interval, which is exceeded by chance in e⁻³ of all cases.
+const BEHIND: [f64; 2] = [1.0, 3.0];
 
 /// The stroke of the recordings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,22 +48,25 @@ pub(super) fn stroke(
         stated: format!("{} ({:.3} s)", probe.stroke.unwrap_or_default(), stated.unwrap_or_default() / 1e6),
         found,
     };
-    if stated.is_some_and(|stated| latest > stated * (1.0 + hand::TOLERANCE)) {
+    if probe.latest().is_some_and(|allowed| latest > allowed) {
         let found = format!("a contact with {} is {:.3} s after the first", object.name, latest / 1e6);
         return Err(other(found));
     }
-    let is_later = |micros: f64| micros > FAR * latest && stated.is_none_or(|stated| micros < stated);
-    let expected = |(own, simulated): (&ObjectTouches, &&[Touch])| {
+    // Simulated contacts behind the latest recorded one, each with how often it would be expected among the recorded.
+    let behind = |(own, simulated): (&ObjectTouches, &&[Touch])| -> Vec<(f64, f64)> {
         let is_kept = |touch: &&Touch| match kept {
             Kept::All => true,
             Kept::Contacts => !touch.is_empty(),
             Kept::Full => touch.is_full(),
         };
-        let all = simulated.iter().filter(is_kept);
-        let later = all.clone().filter(|touch| is_later(spread(touch))).count();
-        own.len() as f64 * later as f64 / all.count().max(1) as f64
+        let share = own.len() as f64 / simulated.iter().filter(is_kept).count().max(1) as f64;
+        let later = simulated.iter().filter(is_kept).map(spread).filter(|micros| *micros > latest);
+        later.map(|micros| (micros, share)).collect()
     };
-    let expected: f64 = recorded.objects.iter().zip(simulated).map(expected).sum();
+    let mut behind: Vec<(f64, f64)> = recorded.objects.iter().zip(simulated).flat_map(behind).collect();
+    behind.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let is_far = |micros: f64| micros > FAR * latest && stated.is_none_or(|stated| micros < stated);
+    let expected: f64 = behind.iter().filter(|(micros, _)| is_far(*micros)).map(|(_, share)| share).sum();
     if expected < EXPECTED {
         return Ok(Stroke { window: stated.map(|stated| stated / 1e3), estimated: None });
     }
@@ -74,10 +77,15 @@ pub(super) fn stroke(
         );
         return Err(other(found));
     }
-    let near = recorded.touches().filter(|touch| spread(touch) > END * latest).count().max(1);
-    let gap = (1.0 - END) * latest / near as f64;
-    // Three gaps are exceeded by chance in e⁻³ of all cases.
-    let [value, high] = [latest + gap, latest + 3.0 * gap].map(length);
-    let estimate = Estimate { value, low: Some(length(latest)), high: Some(high) };
-    Ok(Stroke { window: Some((latest + gap) / 1e3), estimated: Some(estimate) })
+    // As many are expected in all: see above.
+    let at = |wanted: f64| {
+        let sums = behind.iter().scan(0.0, |sum, (micros, share)| {
+            *sum += share;
+            Some((*micros, *sum))
+        });
+        sums.filter(|(_, sum)| *sum <= wanted).last().map_or(latest, |(micros, _)| micros)
+    };
+    let [value, high] = BEHIND.map(at);
+    let estimate = Estimate { value: length(value), low: Some(length(latest)), high: Some(length(high)) };
+    Ok(Stroke { window: Some(value / 1e3), estimated: Some(estimate) })
 }

@@ -193,7 +193,8 @@ fn suspect(sound: &Sound<'_>, index: usize) -> Option<(Suspect, f64)> {
     let (evidence, best) = (sound.evidence, &sound.best);
     let recording = &evidence.recordings[index];
     let (touches, own, name) = (&recording.touches, evidence.of[index], recording.name.to_owned());
-    if touches.len() < LEAST {
+    // Touches of one placement after the other look like two objects, and like two probes.
+    if touches.len() < LEAST || recording.is_mixed {
         return None;
     }
     let only = sound.is_only();

@@ -4,7 +4,7 @@ use super::*;
 
 use crate::mesh::builtin;
 use crate::probe::noise::Grazing;
-use crate::touches::{ObjectTouches, Source};
+use crate::touches::{ObjectTouches, Recorded, Source, Surroundings};
 use palpate_shared::ContactTime;
 use std::sync::LazyLock;
 
@@ -103,7 +103,8 @@ fn settings() -> Settings {
 /// Touches of rigid fingers, made once for all fits to them.
 fn simulated(settings: &Settings) -> Simulated {
     let scenes = scenes(&objects(), settings, &()).unwrap();
-    Simulated::new(&objects(), scenes, Layer::default(), settings, &()).unwrap()
+    let touched = touched::touched(&objects(), scenes, &Dataset::default());
+    Simulated::new(touched, Layer::default(), settings, &()).unwrap()
 }
 
 static SIMULATED: LazyLock<Simulated> = LazyLock::new(|| simulated(&settings()));
@@ -453,4 +454,79 @@ fn full_touches_and_poses_of_a_short_stroke_are_fitted_as_well() {
     let found = fitted(&full, None);
     assert!((found.speed_factor.value * BENT.longer - 1.0).abs() < 0.06, "{:?}", found.speed_factor);
     assert!(found.stroke.unwrap().holds(2.5), "{:?}", found.stroke);
+}
+
+/// Approaches from above to objects on a table, in a recording of each placement that states it, or in one of each object that states
+/// none.
+fn tabled(count: usize, seed: u64, probe: &Crooked, is_stated: bool, has_poses: bool) -> (Dataset, Settings) {
+    let scene = Surroundings::Table { cone: 60.0 };
+    let settings = Settings { origin: Origin { scene, ..Origin::default() }, ..settings() };
+    let origin = Origin { approaches: true, pose: true, seed: 1_000 + seed, ..settings.origin.clone() };
+    let one = |object: &Object| {
+        let scenes = capture::scenes(&[object], &origin, &()).unwrap();
+        let touched = capture::touches(&scenes[0], &object.name, &origin, 0..count as u64).unwrap();
+        let touched = if is_stated { touched } else { touched.as_often_as_placed() };
+        let mut numbers = Numbers(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ object.name.len() as u64);
+        let mut recorded = |touch: &Touch| {
+            let times = touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e3));
+            let felt = record(times, probe, &mut numbers);
+            touch.pose().filter(|_| has_poses).map_or(felt, |pose| felt.with_pose(pose))
+        };
+        let by_source = touched.by_source();
+        let runs = by_source.iter().enumerate().map(|(source, touches)| {
+            let placement = touched.placement_of_source(source).filter(|_| is_stated).map(str::to_owned);
+            let recording = Recorded { object: object.name.clone(), placement, began: source.to_string(), ..Recorded::default() };
+            (Source::Recording(recording), touches.len() as u64)
+        });
+        let touches = by_source.iter().flatten().map(|&touch| recorded(&touched.touches()[touch])).collect();
+        ObjectTouches::in_runs(&object.name, touches, runs.collect())
+    };
+    (Dataset::new(objects().iter().map(one).collect()), settings)
+}
+
+#[test]
+fn a_probe_is_fitted_to_objects_that_stand_on_a_table() {
+    for (is_stated, has_poses) in [(true, false), (false, false), (true, true)] {
+        let (recorded, settings) = tabled(900, 11, &BENT, is_stated, has_poses);
+        let found = fit(&recorded, &objects(), Some(&plate(60, &BENT)), &settings, &()).unwrap();
+        near(&found, &BENT, [0.04, 1.5, 0.6]);
+        assert!(found.objects.iter().all(|name| name.contains('/') == is_stated), "{:?}", found.objects);
+        assert!(found.toml().contains(" on a table and 60 presses on a plate.\n"), "{}", found.toml());
+    }
+}
+
+#[test]
+fn a_recording_in_another_placement_than_it_states_looks_wrong_and_one_that_is_unknown_is_refused() {
+    let (mut recorded, settings) = tabled(900, 12, &BENT, true, false);
+    let bowl = recorded.objects.iter_mut().find(|own| own.name == "bowl").unwrap();
+    let by_source = bowl.by_source();
+    let [one, other] = [0, 1].map(|source| bowl.sources()[source].clone());
+    assert!(bowl.sources().len() == 2, "{:?}", bowl.sources());
+    // Each is called the other.
+    let touches = by_source.iter().flatten().map(|&touch| bowl.touches()[touch]).collect();
+    let lengths = by_source.iter().map(|touches| touches.len() as u64);
+    *bowl = ObjectTouches::in_runs("bowl", touches, [other, one].into_iter().zip(lengths).collect());
+    let found = fit(&recorded, &objects(), Some(&plate(60, &BENT)), &settings, &()).unwrap();
+    let said: Vec<String> = found.suspects.iter().map(ToString::to_string).collect();
+    assert!(said.iter().any(|said| said.starts_with("bowl/") && said.contains("look like touches of the bowl/")), "{said:?}");
+    let lying = Recorded { object: "bowl".into(), placement: Some("+q".into()), ..Recorded::default() };
+    let unknown = ObjectTouches::new("bowl", recorded.objects[0].touches().to_vec(), Source::Recording(lying));
+    let error = fit(&Dataset::new(vec![unknown]), &objects(), None, &settings, &()).unwrap_err();
+    assert!(error.to_string().contains("bowl/+q was recorded, and is none of the objects: bowl/"), "{error}");
+}
+
+#[test]
+fn the_file_of_an_estimated_stroke_states_how_far_contacts_may_be_behind_it() {
+    let found = fitted(&stopped(&recorded(&objects(), 400, 1, &BENT), 250), None);
+    let stroke = found.stroke.unwrap();
+    let file = crate::probe::file::ProbeFile::parse(&found.toml(), "probe.toml".as_ref()).unwrap();
+    let latest = file.probe.latest().unwrap() / 1e6 * file.probe.speed;
+    // The end of the interval, and the ripple of the speed beyond it.
+    let end = stroke.high.unwrap();
+    assert!((latest / end - 1.0 - crate::probe::hand::TOLERANCE).abs() < 1e-3, "{latest} {end}");
+    // A later recording of the same hand, whose clock runs 1.5 % slow, is fitted with the file as well, and its late contacts are none.
+    let later = stopped(&recorded(&objects(), 400, 7, &BENT), 253);
+    let origin = Origin { probe: file.probe, ..Origin::default() };
+    let again = fit(&later, &objects(), None, &Settings { origin, ..settings() }, &()).unwrap();
+    assert_eq!((again.stroke, again.probe), (None, file.probe));
 }

@@ -1,6 +1,7 @@
 //! Sequences of touches, and how badly they fit at each look.
 
 use super::{EARLY, FIRST, HALVED_AFTER, NAT, Supply};
+use crate::evaluate::leading;
 use crate::random::{self, Purpose};
 use palpate_onboard::{Model, Stopping};
 use rand::seq::SliceRandom;
@@ -67,6 +68,11 @@ impl Sequence {
         End { is_alarm: false, touches: self.0.len() as u64 }
     }
 
+    /// Number of its touches.
+    pub(super) fn touches(&self) -> usize {
+        self.0.len()
+    }
+
     /// The touches after which it ends without a test.
     pub(super) fn decided_after(&self) -> u32 {
         self.0.iter().position(|look| look.is_decided).map_or(self.0.len(), |at| at + 1) as u32
@@ -94,6 +100,9 @@ pub(super) fn early(touches: u32) -> f64 {
 pub(super) fn sequences(model: &Model<'_>, supplies: &[Supply], policy: &Policy, most: usize) -> Vec<Vec<Sequence>> {
     let objects = model.object_count();
     let of_each = most.div_ceil(supplies.len().max(1));
+    // Where several outputs belong to one object, it is the object that is named.
+    let numbers: Option<Vec<u8>> = model.outputs().map(|outputs| outputs.objects().collect());
+    let numbers = numbers.as_deref();
     let limit = match policy.until {
         Until::Touches(touches) => touches,
         Until::Named { .. } => Stopping::from_model(model).max_touches(),
@@ -103,7 +112,7 @@ pub(super) fn sequences(model: &Model<'_>, supplies: &[Supply], policy: &Policy,
         if supply.is_once {
             let once = supply.pools.iter().take(of_each).map(|rows| {
                 let mut looks = Vec::new();
-                one(model, &mut rows.chunks_exact(objects), policy, limit, &mut looks);
+                one(model, numbers, &mut rows.chunks_exact(objects), (policy, limit), &mut looks);
                 Sequence(looks)
             });
             return once.filter(|sequence| !sequence.0.is_empty()).collect();
@@ -112,7 +121,7 @@ pub(super) fn sequences(model: &Model<'_>, supplies: &[Supply], policy: &Policy,
         while all.len() < of_each && !pools.is_empty() {
             let next = all.len() % pools.len();
             let mut looks = Vec::new();
-            if !one(model, &mut pools[next], policy, limit, &mut looks) {
+            if !one(model, numbers, &mut pools[next], (policy, limit), &mut looks) {
                 break;
             }
             all.push(Sequence(looks));
@@ -125,9 +134,9 @@ pub(super) fn sequences(model: &Model<'_>, supplies: &[Supply], policy: &Policy,
 /// Follows one sequence; returns true if it ended before the touches did.
 fn one<'r>(
     model: &Model<'_>,
+    numbers: Option<&[u8]>,
     rows: &mut impl Iterator<Item = &'r [i32]>,
-    policy: &Policy,
-    limit: u32,
+    (policy, limit): (&Policy, u32),
     looks: &mut Vec<Look>,
 ) -> bool {
     let mut evidence: Vec<i64> = (0..model.object_count()).map(|object| model.prior(object).into()).collect();
@@ -136,7 +145,7 @@ fn one<'r>(
         evidence.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += i64::from(margin));
         let misfit = model.misfit(&evidence, touches).filter(|_| touches >= FIRST);
         let level = misfit.map_or(f64::NEG_INFINITY, |misfit| misfit as f64 / NAT - early(touches));
-        let look = Look { level, is_decided: is_decided(model, &evidence, touches) };
+        let look = Look { level, is_decided: is_decided(model, numbers, &evidence, touches) };
         looks.push(look);
         match policy.until {
             Until::Named { level } if touches >= policy.least && look.is_decided && look.level <= level => break,
@@ -147,7 +156,13 @@ fn one<'r>(
 }
 
 /// True if the leader's posterior passes the model's threshold.
-fn is_decided(model: &Model<'_>, evidence: &[i64], touches: u32) -> bool {
+fn is_decided(model: &Model<'_>, numbers: Option<&[u8]>, evidence: &[i64], touches: u32) -> bool {
+    if numbers.is_some() {
+        let unit = f64::from(model.unit()) * f64::from(model.weight_of(touches)) / 65_536.0;
+        let evidence: Vec<f64> = evidence.iter().map(|&sum| sum as f64).collect();
+        let (leader, rivals) = leading(&evidence, model.known_count(), numbers, unit);
+        return rivals <= Stopping::from_model(model).odds_of(leader, model) as f64 / 2.0_f64.powi(56);
+    }
     let known = 0..model.known_count();
     let leader = known.reduce(|best, other| if evidence[other] > evidence[best] { other } else { best }).unwrap_or(0);
     // A weight of 1 changes nothing.

@@ -49,6 +49,7 @@ use crate::evaluate::{Candidate, OfTouches};
 use crate::touches::{Dataset, ObjectTouches, Pool};
 use follow::{Policy, Sequence};
 use misfit::Moments;
+pub(crate) use recorded::OfRecorded;
 use palpate_onboard::{Model, Refused};
 use palpate_shared::Touch;
 use palpate_shared::format::{Held, MisfitTerms, Strangers, Tag};
@@ -193,7 +194,7 @@ fn calibrate_on(
 ) -> Result<Calibrated> {
     check(settings)?;
     let given = supplies(model, dataset, settings.seed)?;
-    let recorded = recorded.map(|recorded| supplies(model, recorded, settings.seed)).transpose()?;
+    let recorded = recorded.map(|recorded| recorded::supplies(model, recorded, settings.seed)).transpose()?;
     calibrate_supplies(model, given, recorded, &of_shapes(model, shapes), settings)
 }
 
@@ -201,7 +202,7 @@ fn calibrate_on(
 pub(crate) fn calibrate_supplies(
     model: &Model<'_>,
     given: Vec<Supply>,
-    recorded: Option<Vec<Supply>>,
+    recorded: Option<Vec<OfRecorded>>,
     shapes: &[Vec<f64>],
     settings: &Settings,
 ) -> Result<Calibrated> {
@@ -211,6 +212,7 @@ pub(crate) fn calibrate_supplies(
     let (learn, test) = learned_and_tested(given, objects);
     let known = model.known_count();
     let (recorded_learn, recorded_test) = recorded.map(|all| recorded::halves(all, objects)).unzip();
+    let recorded_learn = recorded_learn.map(|learn| recorded::by_output(learn, known, objects));
     let moments = Moments::new(&learn, recorded_learn.as_deref(), shapes, known, objects, unit);
     let misfits = misfit::misfits(&moments, None)
         .ok_or(EvaluateProblem::TooFewForMisfit { found: learn_count(&learn, objects) })?;
@@ -235,13 +237,24 @@ pub(crate) fn calibrate_supplies(
     let sequences = follow(&test, &policy);
     let all = counted(&sequences, is_short);
     let tried = Tried { loosest, strictest, least, gap: doubt(settings.held) };
+    let names = compile::names(model);
     let simulated = tried.threshold(&all, settings.alarms, settings.confidence).ok_or_else(|| {
         let objects = if is_short { 1 } else { known.max(1) };
         let needed = needed(settings.alarms, settings.confidence).div_ceil(objects as u64);
-        EvaluateProblem::TooFewForAlarms { object_sequences: all.len() / objects, needed }
+        let fewest = (0..sequences.len()).min_by_key(|&object| sequences[object].len());
+        EvaluateProblem::TooFewForAlarms {
+            object: fewest.and_then(|object| names.get(object).cloned()).unwrap_or_default(),
+            object_sequences: all.len() / objects,
+            needed,
+        }
     })?;
     let on_recordings = match &recorded_test {
-        Some(test) => Some(recorded::tested(&follow(test, &policy), &tried, simulated, settings)?),
+        Some(test) => {
+            let followed = |own: &OfRecorded| follow(std::slice::from_ref(&own.supply), &policy).pop();
+            let followed: Vec<Vec<Sequence>> =
+                test.par_iter().map(followed).map(Option::unwrap_or_default).collect();
+            Some(recorded::tested((test, &followed), &sequences, (&tried, simulated), settings)?)
+        }
         None => None,
     };
     let threshold = on_recordings.as_ref().map_or(simulated, |(threshold, _)| *threshold);
@@ -254,7 +267,6 @@ pub(crate) fn calibrate_supplies(
         ..terms(threshold, least)
     };
     let bytes = stated(model, &terms, &misfits)?;
-    let names = compile::names(model);
     let at = |path: &[f64], touches: u32| path.get(touches as usize - 1).or(path.last()).copied().unwrap_or(0.0);
     let mean = |touches: u64| touches as f64 / all.len().max(1) as f64;
     Ok(Calibrated {
@@ -344,24 +356,31 @@ fn learn_count(learn: &[Supply], objects: usize) -> usize {
 
 /// Touches of every known object, in the model's order: those that may follow each other in a random order.
 fn supplies(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Vec<Supply>> {
-    Candidate::Compiled(model).of(dataset)?;
+    let candidate = Candidate::Compiled(model);
+    candidate.of(dataset)?;
+    let dataset = candidate.delivered(dataset);
     let names = compile::names(model);
     let known = &names[..model.known_count()];
-    let supply = |name: &String| {
+    let of_name = |name: &String| {
         let missing = || EvaluateProblem::MissingObject { object: name.clone() };
         let touched = dataset.objects.iter().find(|object| object.name == *name).ok_or_else(missing)?;
-        let is_once = touched.has_robots();
-        let pool = |(turn, pool): (u64, Pool)| {
-            let own = pool.touches.iter().filter_map(|&touch| touched.touches().get(touch as usize));
-            let mut touches: Vec<&Touch> = evidence(model, own).collect();
-            if !is_once {
-                follow::shuffle(&mut touches, name, seed, turn);
-            }
-            margins_of_touches(model, &touches)
-        };
-        Ok(Supply { pools: (0..).zip(touched.pools()).map(pool).collect(), is_once, is_short: false })
+        Ok(supply(model, touched, seed))
     };
-    known.iter().map(supply).collect()
+    known.iter().map(of_name).collect()
+}
+
+/// The touches of an object that may follow each other in a random order.
+fn supply(model: &Model<'_>, touched: &ObjectTouches, seed: u64) -> Supply {
+    let is_once = touched.has_robots();
+    let pool = |(turn, pool): (u64, Pool)| {
+        let own = pool.touches.iter().filter_map(|&touch| touched.touches().get(touch as usize));
+        let mut touches: Vec<&Touch> = evidence(model, own).collect();
+        if !is_once {
+            follow::shuffle(&mut touches, &touched.name, seed, turn);
+        }
+        margins_of_touches(model, &touches)
+    };
+    Supply { pools: (0..).zip(touched.pools()).map(pool).collect(), is_once, is_short: false }
 }
 
 /// Those of the touches that the model takes as evidence.

@@ -18,7 +18,7 @@
 //! without the test too.
 
 use super::{Calibrated, Settings, calibrate, calibrate_recorded, tested_means, without};
-use crate::calibrate::{self, Start, add_noise, begin, calibrate_from, odds_of};
+use crate::calibrate::{self, Start, add_noise, begin, calibrate_from, odds_of, two_digits};
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};
 use crate::mesh::BACKGROUND;
@@ -79,7 +79,15 @@ pub fn calibrate_with_promise(
         None => calibrate(&begun, &learned, &shapes, settings)?,
     };
     let start = Start { margin: strictest, loosest: without.map(|without| without.odds) };
-    let promised = calibrate_from(&compile::open(&tested.bytes)?, halves.test, promise, Some(start), progress)?;
+    let promised = calibrate_from(&compile::open(&tested.bytes)?, halves.test, promise, Some(start), progress);
+    let promised = promised.map_err(|error| {
+        let Some(mut problem) = error.problem::<CalibrateProblem>().cloned() else { return error };
+        if let CalibrateProblem::NotKept { remedy: Some(remedy), .. } = &mut problem {
+            // As many of all touches, of which a part makes the names of the promise.
+            remedy.touches = remedy.touches.map(|touches| two_digits(touches as f64 / PROMISED));
+        }
+        problem.into()
+    })?;
     let [mean_touches, mean_touches_without] = tested_means(&compile::open(&promised.model)?, &learned, settings)?;
     let tested = Calibrated { bytes: promised.model.clone(), mean_touches, mean_touches_without, ..tested };
     Ok((promised, tested))

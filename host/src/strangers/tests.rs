@@ -161,7 +161,8 @@ fn what_cannot_be_calibrated_says_so() {
     let usual = Settings::default();
     assert!(message(&of(0..2, 1_000, 2), &usual).contains("no touches of object2"));
     assert!(message(&of(0..4, 1_000, 2), &usual).contains("object3"));
-    assert!(message(&of(0..KNOWN, 200, 2), &usual).contains("sequences of an object"));
+    let few = message(&of(0..KNOWN, 200, 2), &usual);
+    assert!(few.contains("sequences of object") && few.contains("times as many touches of object"), "{few}");
     assert!(message(&of(0..KNOWN, 1_000, 2), &Settings { alarms: 0.0, ..usual }).contains("alarms is 0"));
     let strangers = Margins::of_strangers(Candidate::Compiled(&model), &of(0..KNOWN, 100, 1));
     assert!(matches!(
@@ -294,5 +295,21 @@ fn few_recordings_state_the_share_of_false_alarms_that_they_support() {
     assert!((10..149).contains(&found.sequences) && found.alarms == 0, "{found:?}");
     assert!((found.supported - (1.0 - 0.05_f64.powf(1.0 / found.sequences as f64))).abs() < 2e-6, "{found:?}");
     let none = calibrate_recorded(&model, &of(0..KNOWN, 30_000, 2), &of_robot(4, 5), &shapes(), &settings);
-    assert!(none.unwrap_err().to_string().contains("no sequence of an object"), "none at all");
+    let none = none.unwrap_err();
+    let Some(EvaluateProblem::TooFewRecorded { object, approaches: 4, tested: 2, enough: Some(enough) }) = none.problem() else {
+        panic!("{none}")
+    };
+    let said = none.to_string();
+    assert!(said.starts_with(&format!("the 4 recorded approaches to {object} make no sequence that ends with a name")), "{said}");
+    // Three objects with a sequence each: 1 - .05^(1/3).
+    assert!(said.contains("supports a false alarm rate of 63.16 %, and 2 % takes about"), "{said}");
+    // As many approaches as it says make one.
+    let one = calibrate_recorded(
+        &model,
+        &of(0..KNOWN, 30_000, 2),
+        &of_robot(2 * enough.one.ceil() as usize, 5),
+        &shapes(),
+        &settings,
+    );
+    assert!(one.is_ok_and(|one| one.recorded.is_some_and(|found| found.supported <= 0.6317)));
 }

@@ -8,6 +8,7 @@ use super::{Settings, balance, by_source, check, known_touches, on_threads, with
 use crate::ensemble::train::round_leaves;
 use crate::ensemble::{Ensemble, Node, TouchOrigin};
 use crate::error::Result;
+use crate::evaluate::{Candidate, OfTouches};
 use crate::in_order::in_order;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, ObjectTouches};
@@ -100,6 +101,8 @@ pub fn adjust(
 ) -> Result<(Ensemble, Adjusted)> {
     let (known, recorded) = (&*super::by_output(ensemble, known), &*super::by_output(ensemble, recorded));
     let descriptor = check::adjustable(ensemble, known, recorded, settings)?;
+    let delivered = Candidate::Full(ensemble).delivered(recorded);
+    let recorded = delivered.as_ref();
     let noise = settings.noise.map_or_else(|| check::missing_noise(ensemble, known), Ok)?;
     on_threads(settings.threads, || {
         let simulated = known_touches(ensemble, known, &noise, settings.seed);

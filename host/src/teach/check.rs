@@ -3,6 +3,7 @@
 use super::{LEAST, Settings};
 use crate::ensemble::{Ensemble, Output, StatedProbe, TouchOrigin};
 use crate::error::{Error, Result, TeachProblem};
+use crate::evaluate::{Candidate, OfTouches};
 use crate::mesh::BACKGROUND;
 use crate::probe::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
@@ -18,7 +19,8 @@ pub(super) fn check(
 ) -> Result<Descriptor> {
     let descriptor = of_vectors(ensemble, settings)?;
     none_missing(ensemble, &[known])?;
-    if let Some(object) = recorded.objects.iter().find(|object| ensemble.objects.contains(&object.name)) {
+    let is_known = |object: &&ObjectTouches| !Candidate::Full(ensemble).outputs_of(&object.name).is_empty();
+    if let Some(object) = recorded.objects.iter().find(is_known) {
         return Err(TeachProblem::Known { object: object.name.clone() }.into());
     }
     names(ensemble, recorded)?;
@@ -39,6 +41,9 @@ pub(super) fn adjustable(
         return Err(TeachProblem::Nothing.into());
     }
     if let Some(object) = recorded.objects.iter().find(|object| !is_known(&object.name)) {
+        if !Candidate::Full(ensemble).outputs_of(&object.name).is_empty() {
+            return Err(TeachProblem::NoPlacement { object: object.name.clone() }.into());
+        }
         return Err(TeachProblem::NotKnown { object: object.name.clone() }.into());
     }
     none_missing(ensemble, &[known, recorded])?;

@@ -35,6 +35,12 @@ pub enum TeachProblem {
         /// The name.
         object: String,
     },
+    /// A model with an output for each placement is adjusted to recordings that state none.
+    #[error("the recordings of {object} state no placement, and the model has an output for each")]
+    NoPlacement {
+        /// The object.
+        object: String,
+    },
     /// Partial touches are evidence, but none were recorded.
     #[error(
         "only full touches were recorded, but the model takes {} as evidence: it would learn that the objects never \
@@ -85,6 +91,9 @@ impl Problem for TeachProblem {
             Self::Known { .. } => {
                 "Adjust the model to the recorded touches of objects that it knows, or rename the recording to teach it as \
                  another object."
+            }
+            Self::NoPlacement { .. } => {
+                "Record it in its placements (`palpate data record --object OBJECT/PLACEMENT`), or leave it out."
             }
             Self::NotKnown { .. } => "Teach it as a new object.",
             Self::FullTouches { .. } => {

@@ -36,7 +36,7 @@ pub use promise::{Needed, RATE};
 use crate::ensemble::train::{BASE_MARGIN, round_leaves};
 use crate::ensemble::{Ensemble, Node, TouchOrigin, train};
 use crate::error::Result;
-use crate::evaluate::ROBOTS;
+use crate::evaluate::{Candidate, OfTouches, ROBOTS};
 use crate::in_order::in_order;
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
@@ -162,6 +162,8 @@ pub fn teach(
     let shares = recorded.placement_shares();
     let recorded = &**placed;
     let descriptor = check::check(ensemble, known, recorded, settings)?;
+    let delivered = Candidate::Full(ensemble).delivered(recorded);
+    let recorded = delivered.as_ref();
     let noise = settings.noise.map_or_else(|| check::missing_noise(ensemble, known), Ok)?;
     on_threads(settings.threads, || {
         let known = known_touches(ensemble, known, &noise, settings.seed);

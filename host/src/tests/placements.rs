@@ -1,14 +1,17 @@
 //! Models with an output for each placement of objects on a table.
 
-use crate::calibrate::{self, Per, calibrate};
+use crate::calibrate::{self, Per, calibrate, calibrate_recorded};
 use crate::capture::{self, Settings};
+use crate::compare::{self, compare};
 use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::train::{self, Outputs, train};
 use crate::ensemble::{Ensemble, StatedProbe, TouchOrigin};
+use crate::error::{CalibrateProblem, EvaluateProblem, ProbeProblem, TeachProblem};
 use crate::evaluate::{Candidate, Margins, SequentialSettings, parity};
 use crate::mesh::{Mesh, Object};
+use crate::strangers;
 use crate::teach;
-use crate::touches::{Dataset, ObjectTouches, Origin, Source, Surroundings};
+use crate::touches::{Dataset, ObjectTouches, Origin, Recorded, Source, Surroundings};
 use crate::tune;
 use palpate_shared::Descriptor;
 
@@ -167,4 +170,213 @@ fn a_taught_object_has_one_output_unless_its_recordings_name_placements() {
         let shares = (ensemble.objects.len()..taught.objects.len()).map(|output| f64::from(outputs.share(output)));
         assert!((shares.sum::<f64>() / 65_536.0 - 1.0).abs() < 1e-4);
     }
+}
+
+/// The same touches as a robot's recordings: of each placement one that states it, or of each object one that states none, in
+/// which placements have their shares.
+fn recorded(dataset: &Dataset, is_stated: bool) -> Dataset {
+    let one = |own: &ObjectTouches| {
+        let began = |number: usize| format!("2026-11-22T{:02}:00:00Z", 10 + number);
+        let recording = |number: usize, placement: Option<String>| {
+            let (object, began) = (own.name.clone(), began(number));
+            Source::Recording(Recorded { object, began, placement, ..Recorded::default() })
+        };
+        if !is_stated {
+            return ObjectTouches::new(&own.name, own.as_often_as_placed().touches().to_vec(), recording(0, None));
+        }
+        let by_source = own.by_source();
+        let touches = by_source.iter().flatten().map(|&touch| own.touches()[touch]).collect();
+        let runs = by_source.iter().enumerate().map(|(source, touches)| {
+            let placement = own.placement_of_source(source).map(str::to_owned);
+            (recording(source, placement), touches.len() as u64)
+        });
+        ObjectTouches::in_runs(&own.name, touches, runs.collect())
+    };
+    let probe = dataset.probe().copied().unwrap_or_default();
+    let origin = Origin::recorded(probe, palpate_shared::format::Length::Tenth, true);
+    Dataset { origin: Some(origin), ..Dataset::new(dataset.objects.iter().map(one).collect()) }
+}
+
+#[test]
+fn recordings_of_an_object_are_of_all_of_its_placements_unless_they_state_one() {
+    let ensemble = trained(Outputs::Placements);
+    let compiled = compiled(&ensemble);
+    let model = compiled.model();
+    let tested = touched(3, 12_000);
+    let settings = SequentialSettings { error_rate: Some(0.01), max_touches: Some(200), sequences: 300, seed: 1 };
+    for is_stated in [true, false] {
+        let recorded = recorded(&tested, is_stated).matching(&compiled.names());
+        let expected = if is_stated { compiled.names() } else { vec!["brick".into(), "disc".into(), "rod".into()] };
+        assert_eq!(recorded.names(), expected);
+        for candidate in [Candidate::Full(&ensemble), Candidate::Compiled(&model)] {
+            let margins = Margins::new(candidate, &recorded).unwrap();
+            let found = margins.sequential(&settings).unwrap();
+            assert!(found.error < 0.05 && found.undecided < 0.5, "{found:?}");
+            // Which placement was touched is known of those that state it.
+            assert_eq!(found.placement.is_some(), is_stated);
+            let all: f64 = (0..expected.len()).map(|position| margins.frequency(position)).sum();
+            let known: f64 = match candidate {
+                Candidate::Full(_) => 3.0,
+                Candidate::Compiled(model) => (0..compiled.names().len())
+                    .map(|output| (f64::from(model.prior(output)) * f64::from(model.unit())).exp())
+                    .sum(),
+            };
+            assert!((all / known - 1.0).abs() < 1e-3, "{all} {known}");
+            // Named is what the model says, not what stands for the object.
+            let confusion = margins.confusion(20, 200, 1).unwrap();
+            let brick = confusion[0].iter().filter(|count| **count > 0).count();
+            assert!(is_stated || brick > 1, "{confusion:?}");
+        }
+    }
+    // Each object expected or not, whatever its placement.
+    let recorded = recorded(&tested, false);
+    let only = |weights: Vec<u32>| {
+        let margins = Margins::new(Candidate::Compiled(&model), &recorded).unwrap().expecting(weights).unwrap();
+        margins.tested_names().to_vec()
+    };
+    let of = |object: &str| compiled.names().iter().map(|name| u32::from(name.starts_with(object))).collect();
+    assert_eq!(only(of("disc")), ["disc"]);
+}
+
+#[test]
+fn a_placement_that_the_model_does_not_know_is_named_with_those_that_it_does() {
+    let compiled = compiled(&trained(Outputs::Placements));
+    let model = compiled.model();
+    let mut tested = recorded(&touched(3, 600), true);
+    let lying = tested.objects[0].sources()[0].clone();
+    let Source::Recording(lying) = lying else { panic!("{lying:?}") };
+    let other = Recorded { placement: Some("+q".into()), ..lying };
+    tested.objects[0] = ObjectTouches::new("brick", tested.objects[0].touches().to_vec(), Source::Recording(other));
+    let error = Margins::new(Candidate::Compiled(&model), &tested.matching(&compiled.names())).err().unwrap();
+    let text = error.to_string();
+    assert!(text.contains("does not know the object brick/+q, only brick/") && !text.contains("rod"), "{text}");
+    assert!(text.contains("--object OBJECT"), "{text}");
+    // Of an object that it does not know at all, the objects.
+    let mut unknown = recorded(&touched(3, 600), false);
+    unknown.objects[2] = unknown.objects[2].clone().renamed("vase");
+    let error = Margins::new(Candidate::Compiled(&model), &unknown).err().unwrap().to_string();
+    assert!(error.contains("the object vase, only brick, disc, rod."), "{error}");
+}
+
+#[test]
+fn an_object_that_is_known_in_any_placement_is_no_stranger() {
+    let compiled = compiled(&trained(Outputs::Placements));
+    let model = compiled.model();
+    let strangers = touched(3, 600).only(|name| name == "rod");
+    let refused = Margins::of_strangers(Candidate::Compiled(&model), &strangers).err().unwrap();
+    let known = EvaluateProblem::KnownObject { object: "rod".into() };
+    assert_eq!(refused.problem::<EvaluateProblem>(), Some(&known));
+}
+
+#[test]
+fn recordings_that_state_placements_are_refused_by_models_of_floating_objects() {
+    let dataset = in_scene(Surroundings::Floating, 1, 3_000);
+    let recipe = train::Settings {
+        descriptor: Descriptor::Gravity,
+        rounds: 4,
+        probe: StatedProbe::of(&dataset),
+        ..train::Settings::compact()
+    };
+    let ensemble = train(&dataset, &recipe, &()).unwrap();
+    let touched = touched(3, 600);
+    let error = Margins::new(Candidate::Full(&ensemble), &recorded(&touched, true)).err().unwrap();
+    assert!(matches!(error.problem(), Some(ProbeProblem::Differs { .. })), "{error}");
+    assert!(error.to_string().contains("scene floating and table"), "{error}");
+    assert!(Margins::new(Candidate::Full(&ensemble), &recorded(&touched, false)).is_ok(), "nothing says where they are from");
+    let compared = compare(&recorded(&touched, true), &dataset, &compare::Settings::default(), &());
+    assert!(compared.unwrap_err().to_string().contains("simulated objects float"));
+}
+
+#[test]
+fn a_promise_for_a_table_is_tested_on_recordings_with_and_without_placements() {
+    let compiled = compiled(&trained(Outputs::Placements));
+    let model = compiled.model();
+    let simulated = touched(2, 30_000).matching(&compiled.names());
+    let of_robot = touched(5, 6_000);
+    let settings = calibrate::Settings { rate: 0.1, sequences: 3_000, max_touches: Some(150), ..Default::default() };
+    for is_stated in [true, false] {
+        let recorded = recorded(&of_robot, is_stated).matching(&compiled.names());
+        let calibrated = calibrate_recorded(&model, simulated.clone(), &recorded, &settings, &()).unwrap();
+        assert!(calibrated.promise.given > 30, "{:?}", calibrated.promise);
+        assert_eq!(calibrated.objects.keys().cloned().collect::<Vec<_>>(), recorded.names());
+        let named: u64 = calibrated.objects.values().map(|of| of.named).sum();
+        assert_eq!(named, u64::from(calibrated.promise.given), "each name is of one object");
+        let per = |per| {
+            let settings = calibrate::Settings { per, rate: 0.4, ..settings.clone() };
+            calibrate_recorded(&model, simulated.clone(), &recorded, &settings, &())
+        };
+        assert!(per(Per::Name).unwrap_err().to_string().contains("several outputs"));
+        match per(Per::Object) {
+            Err(error) if !is_stated => assert!(error.to_string().contains("those of brick state none"), "{error}"),
+            result => assert!(is_stated && result.is_ok(), "{result:?}"),
+        }
+        // Too few: the advice is of what was recorded.
+        let few = recorded.each(|own| own.select(0..40));
+        let error = calibrate_recorded(&model, simulated.clone(), &few, &settings, &()).unwrap_err().to_string();
+        assert!(error.contains(if is_stated { "to brick/" } else { "to brick" }) || error.contains(" to disc"), "{error}");
+        assert!(is_stated || !error.contains("/+z"), "{error}");
+    }
+    let mut partly = recorded(&of_robot, true).matching(&compiled.names());
+    let left_out = partly.objects.remove(0).name;
+    let error = calibrate_recorded(&model, simulated, &partly, &settings, &()).unwrap_err();
+    let missing = CalibrateProblem::MissingRecordings { objects: vec![left_out] };
+    assert_eq!(error.problem::<CalibrateProblem>(), Some(&missing));
+    assert!(error.to_string().contains("--object OBJECT where the robot does not know"), "{error}");
+}
+
+#[test]
+fn a_test_for_strangers_is_calibrated_on_recordings_that_state_no_placement() {
+    let compiled = compiled(&trained(Outputs::Placements));
+    let model = compiled.model();
+    let simulated = touched(2, 30_000).matching(&compiled.names());
+    let settings = strangers::Settings::default();
+    for is_stated in [true, false] {
+        let recorded = recorded(&touched(5, 6_000), is_stated).matching(&compiled.names());
+        let found = strangers::calibrate_recorded(&model, &simulated, &recorded, &[], &settings).unwrap();
+        let on = found.recorded.unwrap();
+        assert!(on.sequences > 30 && on.supported >= 0.02, "{on:?}");
+        assert_eq!(on.before.objects.keys().cloned().collect::<Vec<_>>(), recorded.names());
+    }
+}
+
+#[test]
+fn recordings_are_compared_with_the_placements_that_they_may_be_of() {
+    let simulated = touched(1, 9_000);
+    let settings = compare::Settings { descriptor: Descriptor::Gravity, groups: 100, ..Default::default() };
+    for is_stated in [true, false] {
+        let recorded = recorded(&touched(4, 1_500), is_stated);
+        let compared = compare(&recorded, &simulated, &settings, &()).unwrap();
+        let names: Vec<String> = compared.objects.iter().map(|own| own.name.clone()).collect();
+        assert_eq!(names.iter().all(|name| name.contains('/')), is_stated, "{names:?}");
+        assert_eq!(compared.unstated.is_empty(), is_stated, "{:?}", compared.unstated);
+        // The same simulator made both.
+        assert!(compared.told_apart.value < 0.56, "{:?}", compared.told_apart);
+        let cost = compared.cost.unwrap();
+        assert_eq!(cost.known, 3);
+        let (at, loss) = cost.loss().unwrap();
+        assert!(at >= 20 && loss.abs() < 0.06, "{cost:?}");
+        assert!(cost.confused.iter().all(|pair| !pair.named.contains('/')), "{cost:?}");
+    }
+}
+
+#[test]
+fn a_model_of_placements_is_adjusted_only_to_recordings_that_state_theirs() {
+    let known = touched(1, 2_000);
+    let settings = train::Settings {
+        descriptor: Descriptor::Gravity,
+        rounds: 6,
+        multi_output: true,
+        ..train::Settings::compact()
+    };
+    let ensemble = train(&known, &settings, &()).unwrap();
+    let how = teach::Settings { groups: 40, ..teach::Settings::default() };
+    let bricks = |is_stated| recorded(&touched(5, 900), is_stated).only(|name| name == "brick");
+    let error = teach::adjust(&ensemble, &known, &bricks(false), &how, &()).unwrap_err();
+    let problem = TeachProblem::NoPlacement { object: "brick".into() };
+    assert_eq!(error.problem::<TeachProblem>(), Some(&problem), "{error}");
+    let (_, adjusted) = teach::adjust(&ensemble, &known, &bricks(true), &how, &()).unwrap();
+    assert!(adjusted.objects.iter().all(|object| object.name.starts_with("brick/")), "{adjusted:?}");
+    // Nor is it another object.
+    let error = teach::teach(&ensemble, &known, &bricks(false), &how, &()).unwrap_err();
+    assert!(matches!(error.problem(), Some(TeachProblem::Known { .. })), "{error}");
 }

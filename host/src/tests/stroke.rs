@@ -1,14 +1,18 @@
 //! A stroke from the probe through the model to touches that are recorded: what is the same passes, what differs is refused
 //! with both values.
 
+use crate::calibrate;
 use crate::capture::in_memory;
+use crate::compile::{self, CompiledModel};
 use crate::ensemble::train::{self, train};
 use crate::ensemble::{Ensemble, StatedProbe};
 use crate::error::ProbeProblem;
-use crate::evaluate::{Candidate, Margins};
+use crate::evaluate::{Candidate, Margins, delivered};
 use crate::mesh::{Mesh, Object};
 use crate::probe::{Probe, hand};
+use crate::strangers;
 use crate::touches::{Dataset, ObjectTouches, Origin, Recorded, Source};
+use palpate_shared::Touch;
 
 /// Two objects whose contacts come up to a second apart.
 fn captured(stroke: Option<f64>, seed: u64) -> Dataset {
@@ -72,7 +76,7 @@ fn touches_of_the_models_stroke_are_taken_and_of_another_refused_with_both_value
     for (model, dataset, parts) in [
         (&unlimited, lines(&short), ["the model has no stroke", "no contact is later than 0.2"]),
         (&unlimited, recorded(&short, None), ["the model has no stroke", "no contact is later than 0.2"]),
-        (&limited, lines(&long), ["a stroke of 2 (0.200 s)", "contacts come up to "]),
+        (&limited, lines(&long), ["a stroke of 2 (0.200 s), which explains contacts up to 0.204 s", "contacts come up to "]),
         (&limited, recorded(&long, None), ["a stroke of 2 (0.200 s)", "contacts come up to "]),
         (&limited, lines(&captured(Some(1.0), 2)), ["a stroke of 2 (0.200 s)", "no contact is later than 0.1"]),
     ] {
@@ -100,4 +104,52 @@ fn a_recorded_contact_a_little_after_the_stroke_is_missing_as_on_the_chip() {
 fn stretched(touch: &palpate_shared::Touch) -> palpate_shared::Touch {
     let slow = |micros: u32| palpate_shared::ContactTime::from_micros(micros + micros * 3 / 200);
     palpate_shared::Touch::new(touch.times().map(|time| time.micros().map_or(time, slow)))
+}
+
+/// A model of touches with a stroke of 2 that is known to an interval: contacts up to 2.3 are of the same hand.
+fn estimated() -> Ensemble {
+    let dataset = captured(Some(2.0), 1);
+    let probe = StatedProbe::of(&dataset).map(|stated| {
+        let probe = Probe { stroke_tolerance: Some(0.3), ..stated.probe };
+        StatedProbe { probe, ..stated }
+    });
+    let recipe = train::Settings { rounds: 3, probe, ..train::Settings::compact() };
+    train(&dataset, &recipe, &()).unwrap()
+}
+
+#[test]
+fn a_contact_later_than_an_estimated_stroke_by_less_than_it_is_known_to_is_late_and_no_reason_to_refuse() {
+    let ensemble = estimated();
+    let bytes = compile::compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
+    let compiled = CompiledModel::from_bytes(bytes).unwrap();
+    let model = compiled.model();
+    assert_eq!(model.probe().unwrap().stroke_tolerance, Some(0.3), "the model states it");
+    let of_hand = |stroke: f64| lines(&captured(Some(stroke), 2));
+    let (same, other) = (of_hand(2.25), of_hand(2.35));
+    assert!(same.touches().any(|touch| touch.spread() > 220_000));
+    for candidate in [Candidate::Full(&ensemble), Candidate::Compiled(&model)] {
+        assert!(Margins::new(candidate, &same).is_ok());
+        let refused = Margins::new(candidate, &other).err().unwrap().to_string();
+        assert!(refused.contains("a stroke of 2 (0.200 s), which explains contacts up to 0.230 s"), "{refused}");
+    }
+    // Whoever looks at them, late contacts are missing: margins, sequences, a test for strangers, and a line at a time.
+    let cut = same.each(|own| own.changed(|touch| hand::within(touch, Some(200_000))));
+    let accuracy = |dataset: &Dataset| {
+        let margins = Margins::new(Candidate::Compiled(&model), dataset).unwrap();
+        margins.confusion(5, 500, 1).unwrap()
+    };
+    assert_eq!(accuracy(&same), accuracy(&cut));
+    let settings = calibrate::Settings { rate: 0.3, sequences: 400, max_touches: Some(60), ..Default::default() };
+    let calibrated = |dataset: &Dataset| calibrate::calibrate(&model, dataset.clone(), &settings, &()).unwrap().model;
+    assert_eq!(calibrated(&same), calibrated(&cut));
+    let tested = |dataset: &Dataset| {
+        let settings = strangers::Settings { alarms: 0.2, sequences: 2_000, ..Default::default() };
+        strangers::calibrate(&model, dataset, &[], &settings).unwrap().bytes
+    };
+    assert_eq!(tested(&same), tested(&cut));
+    for (late, missing) in same.touches().zip(cut.touches()) {
+        assert_eq!(delivered(&model, late), *missing);
+    }
+    let beyond = Touch::from_micros([0, 1_000, 240_000]);
+    assert_eq!(delivered(&model, &beyond), beyond, "of another hand: refused as it is");
 }

@@ -6,8 +6,10 @@ use super::warning::Warning;
 use super::{Entry, Format, Listing, Log, ObjectTouches, Origin, Recorded, Source, is_log, recording};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
+use crate::probe::hand;
 use crate::probe::noise::Noise;
 use palpate_shared::Touch;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -50,18 +52,31 @@ impl Dataset {
         Self { objects, origin: self.origin.clone(), warnings: Vec::new() }
     }
 
-    /// The same for a model with outputs of these names, if they are placements of these objects; otherwise as it is.
+    /// The same for a model with outputs of these names: each object that has placements among them is divided into its own.
+    /// Others stay as they are, such as recordings that state no placement, which are of all outputs of their object.
     #[must_use]
     pub fn matching(self, outputs: &[String]) -> Self {
-        let is_placement = |object: &ObjectTouches| {
-            let names =
-                object.placement_weights().into_iter().flatten().map(|(name, _)| format!("{}/{name}", object.name));
-            !outputs.contains(&object.name) && names.into_iter().any(|name| outputs.contains(&name))
+        let is_placed = |object: &ObjectTouches| {
+            let is_of = |output: &String| output.rsplit_once('/').is_some_and(|(name, _)| name == object.name);
+            !outputs.contains(&object.name) && object.placement_weights().is_some() && outputs.iter().any(is_of)
         };
-        match self.objects.iter().any(is_placement) {
-            true => Self { warnings: self.warnings.clone(), ..self.by_placement() },
-            false => self,
+        let of = |object: ObjectTouches| if is_placed(&object) { object.by_placement() } else { vec![object] };
+        Self { objects: self.objects.into_iter().flat_map(of).collect(), ..self }
+    }
+
+    /// The same touches without the contacts that are later than `window` microseconds, such as by the stroke of the probe that a
+    /// model is for: what an effector takes for missing.
+    pub fn within(&self, window: Option<u32>) -> Cow<'_, Self> {
+        match self.touches().any(|touch| hand::late(touch, window).contains(&true)) {
+            true => Cow::Owned(self.each(|own| own.changed(|touch| hand::within(touch, window)))),
+            false => Cow::Borrowed(self),
         }
+    }
+
+    /// The same by the stroke of a probe, if a hand with this stroke explains all contacts; otherwise as they are.
+    pub fn delivered_by(&self, probe: &Probe) -> Cow<'_, Self> {
+        let is_explained = |latest: f64| self.touches().all(|touch| f64::from(touch.spread()) <= latest);
+        self.within(probe.window().filter(|_| probe.latest().is_some_and(is_explained)))
     }
 
     /// The weight of each placement among those of its object, by the name of its output; empty where objects have none.

@@ -400,7 +400,11 @@ impl Problem for TouchesProblem {
             Self::OneObject { .. } => "Capture at least two objects into the directory.",
             Self::TwoFiles { .. } => "Remove one of them.",
             Self::Incomplete => "Resume the capture.",
-            Self::BadListing { .. } | Self::BadName { .. } | Self::ListedTwice { .. } => {
+            Self::BadName { .. } => {
+                "Give a name that a file can have, for an object on a table OBJECT/PLACEMENT. If it stands in a dataset.json from \
+                 elsewhere, remove that file."
+            }
+            Self::BadListing { .. } | Self::ListedTwice { .. } => {
                 "Remove the file if the touches are from elsewhere, else capture them again."
             }
             Self::Unsaid { .. } => {

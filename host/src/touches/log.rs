@@ -151,14 +151,20 @@ impl Log {
         Ok(objects.into_iter().map(|(name, touches)| ObjectTouches::new(name, touches, source())).collect())
     }
 
-    /// The touches of one object: those that name it, or all if none names any; and how many others there are.
+    /// The touches of one object: those that name it, or all if none names any; and how many others there are. Of a placement,
+    /// called `object/placement`, those that name the object if none names the placement.
     ///
     /// # Errors
     /// [`TouchesProblem::NamelessTouch`] as [`by_object`](Self::by_object), and [`TouchesProblem::NotInLog`] if there is
     /// none.
     pub fn of_object(&self, object: &str) -> Result<(Vec<Touch>, usize)> {
         self.all_or_none_named()?;
-        let is_it = |logged: &&Logged| self.object(logged).is_none_or(|name| name == object);
+        let whole = object.split_once('/').map(|(whole, _)| whole);
+        let named = match whole {
+            Some(whole) if !self.objects.iter().any(|name| name == object) => whole,
+            _ => object,
+        };
+        let is_it = |logged: &&Logged| self.object(logged).is_none_or(|name| name == named);
         let touches: Vec<Touch> = self.touches.iter().filter(is_it).map(|logged| logged.touch).collect();
         if touches.is_empty() {
             let problem = TouchesProblem::NotInLog { object: object.into(), objects: self.objects.join(", ") };

@@ -29,6 +29,17 @@ pub enum Source {
     Log(PathBuf),
 }
 
+impl Source {
+    /// The placement on a table, where it is of one.
+    pub fn placement(&self) -> Option<&str> {
+        match self {
+            Self::Placement { placement, .. } => Some(placement),
+            Self::Recording(recorded) => recorded.placement.as_deref(),
+            Self::Object | Self::Instance(_) | Self::Log(_) => None,
+        }
+    }
+}
+
 impl From<String> for Source {
     /// An instance of this name.
     fn from(instance: String) -> Self {
@@ -265,32 +276,34 @@ impl ObjectTouches {
         self.source_of.get(touch).map_or(0, |source| *source as usize)
     }
 
-    /// The placement of a source among [`sources`](Self::sources), by name; none if it is of none.
+    /// The placement of a source among [`sources`](Self::sources), by name; none if it is of none, or a recording that states
+    /// none.
     pub fn placement_of_source(&self, source: usize) -> Option<&str> {
-        match self.sources.get(source)? {
-            Source::Placement { placement, .. } => Some(placement),
-            _ => None,
-        }
+        self.sources.get(source)?.placement()
     }
 
     /// The share that each source has of the object: of placements their weights, each instance counting the same; equal shares
-    /// of other sources. They sum to 1.
+    /// of the placements that recordings state, and of other sources. They sum to 1.
     pub fn source_weights(&self) -> Vec<f64> {
+        let like = |source: &Source| self.sources.iter().filter(|own| own.placement() == source.placement()).count();
         let weight = |source: &Source| match source {
             Source::Placement { millionths, .. } => f64::from(*millionths),
+            // How often it was recorded says nothing of how often it lies like that.
+            Source::Recording(Recorded { placement: Some(_), .. }) => 1e6 / like(source).max(1) as f64,
             _ => 1e6,
         };
-        let whole: f64 = self.sources.iter().map(weight).sum();
+        let weights: Vec<f64> = self.sources.iter().map(weight).collect();
+        let whole: f64 = weights.iter().sum();
         // Every placement has a weight, unless a file was changed by hand.
         if whole > 0.0 {
-            self.sources.iter().map(|source| weight(source) / whole).collect()
+            weights.into_iter().map(|weight| weight / whole).collect()
         } else {
             vec![1.0 / self.sources.len().max(1) as f64; self.sources.len()]
         }
     }
 
     /// The weights of the object's placements by name, over all of its instances; the greatest first, equal ones by name. They
-    /// sum to 1. None if the object was not touched in placements.
+    /// sum to 1. None if the object was not touched in placements, or a recording states none.
     pub fn placement_weights(&self) -> Option<Vec<(String, f64)>> {
         let mut sums = std::collections::BTreeMap::<&str, f64>::new();
         for (source, weight) in self.source_weights().into_iter().enumerate() {
@@ -311,8 +324,12 @@ impl ObjectTouches {
             let mut own = self.select((0..self.len()).filter(is_own));
             own.name = format!("{}/{placement}", self.name);
             for source in &mut own.sources {
-                if let Source::Placement { instance, .. } = source {
-                    *source = instance.take().map_or(Source::Object, Source::Instance);
+                match source {
+                    Source::Placement { instance, .. } => {
+                        *source = instance.take().map_or(Source::Object, Source::Instance);
+                    }
+                    Source::Recording(recorded) => recorded.placement = None,
+                    _ => {}
                 }
             }
             own
@@ -321,10 +338,11 @@ impl ObjectTouches {
     }
 
     /// The same touches, of which each placement has as many as its weight says, compared with the others: as an object that is
-    /// put down at random is touched. All of them without placements.
+    /// put down at random is touched. All of them without placements, and of recordings, whose shares are those of the robot.
     #[must_use]
     pub fn as_often_as_placed(&self) -> Self {
-        if self.placement_weights().is_none() {
+        let is_recorded = self.sources.iter().any(|source| matches!(source, Source::Recording(_)));
+        if is_recorded || self.placement_weights().is_none() {
             return self.clone();
         }
         let (by_source, weights) = (self.by_source(), self.source_weights());
@@ -495,6 +513,29 @@ mod tests {
         assert_eq!(reversed.sources(), object.sources());
         assert_eq!(object.select([0, 3]).sources(), [Source::Instance("cup 2".into())], "others have no touch");
         assert_eq!(object.select([]).pools(), [Pool { source: 0, touches: Vec::new() }]);
+    }
+
+    #[test]
+    fn placements_that_recordings_state_count_the_same_however_often_they_were_recorded() {
+        let recorded = |began: &str, placement: Option<&str>| {
+            let (object, began, placement) = ("cup".into(), began.into(), placement.map(str::to_owned));
+            Source::Recording(Recorded { object, began, placement, touches: 10, ..Recorded::default() })
+        };
+        let of = |last: Option<&str>| {
+            let runs = [("1", Some("+z")), ("2", Some("+z")), ("3", last)];
+            let runs = runs.map(|(began, placement)| (recorded(began, placement), 10));
+            ObjectTouches::in_runs("cup", touches(30), runs.into())
+        };
+        let stated = of(Some("-z"));
+        assert_eq!(stated.placement_weights(), Some(vec![("+z".into(), 0.5), ("-z".into(), 0.5)]));
+        assert_eq!(stated.as_often_as_placed(), stated);
+        let placed = stated.by_placement();
+        let found: Vec<_> = placed.iter().map(|own| (own.name.as_str(), own.len(), own.sources().len())).collect();
+        assert_eq!(found, [("cup/+z", 20, 2), ("cup/-z", 10, 1)]);
+        assert!(placed.iter().all(|own| own.by_placement() == [own.clone()]), "divided once");
+        // One that states none may be of any.
+        let unstated = of(None);
+        assert_eq!((unstated.placement_weights(), unstated.by_placement()), (None, vec![unstated.clone()]));
     }
 
     #[test]

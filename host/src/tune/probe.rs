@@ -153,7 +153,7 @@ impl Settings {
         for (&spacing, &radius) in corners {
             for tilt in [*self.tilt.start(), *self.tilt.end()] {
                 let stroke = self.stroke.as_ref().map(|stroke| *stroke.start());
-                let probe = Probe { radius, spacing, speed: self.speed, tilt, stroke, travel: None };
+                let probe = Probe { radius, spacing, speed: self.speed, tilt, stroke, ..Probe::default() };
                 probe.check(if self.unit == Length::Tenth { LENGTH } else { 1.0 })?;
             }
         }
@@ -175,9 +175,12 @@ pub fn median_length(objects: &[Object]) -> Option<f64> {
 /// The same probe where what was a unit is `unit`; lengths are rounded to hundredths.
 pub fn scaled_probe(probe: &Probe, unit: f64) -> Probe {
     let scaled = |length: f64| hundredths(length * unit);
-    let Probe { radius, spacing, speed, tilt, stroke, travel } = *probe;
+    let Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance } = *probe;
     let [radius, spacing, speed] = [radius, spacing, speed].map(scaled);
-    Probe { radius, spacing, speed, tilt, stroke: stroke.map(scaled), travel: travel.map(scaled) }
+    let [stroke, travel, stroke_tolerance] = [stroke, travel, stroke_tolerance].map(|length| length.map(scaled));
+    // A length of nothing is none.
+    let stroke_tolerance = stroke_tolerance.filter(|length| *length > 0.0);
+    Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance }
 }
 
 /// A probe that was tried, and what it achieved.
@@ -337,7 +340,7 @@ impl Search<'_> {
             for radius in steps(&settings.radius, 2) {
                 for tilt in steps(&settings.tilt, 2) {
                     let stroke = self.stroke();
-                    let probe = Probe { radius, spacing, speed: settings.speed, tilt, stroke, travel: None };
+                    let probe = Probe { radius, spacing, speed: settings.speed, tilt, stroke, ..Probe::default() };
                     plans.extend(settings.aims.iter().map(|&aim| (probe, aim)));
                 }
             }

@@ -51,8 +51,8 @@ impl Table {
         let [radius, spacing, speed, tilt, ..] = measures;
         let [.., stroke, travel] = measures.map(|length| (length > 0.0).then_some(length));
         let aim = *Aim::ALL.get(index(aim))?;
-        let origin =
-            Origin { unit, aim, probe: Probe { radius, spacing, speed, tilt, stroke, travel }, ..Origin::default() };
+        let probe = Probe { radius, spacing, speed, tilt, stroke, travel, ..Probe::default() };
+        let origin = Origin { unit, aim, probe, ..Origin::default() };
         *self = Self { game: Some(Game::new(&origin)), ..Self::default() };
         Some(0)
     }

@@ -557,6 +557,7 @@ fn the_timeout_of_a_model_with_a_stroke_is_the_strokes_time_and_what_comes_later
         stroke: Some(3.0),
         travel: None,
         cone: 0,
+        stroke_tolerance: None,
     };
     let bytes = model_of(&Trained { touches: Some(touches), probe: Some(probe), ..Trained::default() });
     let model = crate::Model::new(&bytes).unwrap();

@@ -82,7 +82,8 @@ pub const MUST_UNDERSTAND: u16 = 1 << 15;
 /// Bytes before a section's content: tag, two zeros, length.
 pub const SECTION_HEADER_LENGTH: usize = 8;
 
-/// The probe that a model was trained for: 16 bytes, or 24 where it states how far the hand goes.
+/// The probe that a model was trained for: 16 bytes, 24 where it states how far the hand goes, 28 where it also states how
+/// well the stroke is known.
 ///
 /// The header's `spacing` and `speed` are those of the simulated training; here they are as the user stated them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,6 +103,9 @@ pub struct TrainedProbe {
     /// Largest angle between approaches and straight down, in hundredths of a degree, where objects lie on a table; 0: they
     /// float, and approaches come from every direction.
     pub cone: u16,
+    /// Length by which a recorded contact may be later than the stroke and is still of this hand, in lengths; none: as
+    /// much as clocks and lengths are usually off.
+    pub stroke_tolerance: Option<f32>,
 }
 
 impl TrainedProbe {
@@ -114,23 +118,31 @@ impl TrainedProbe {
     /// Bytes of the section with them.
     pub const WITH_HAND: usize = 24;
 
+    /// Bytes of the section with them and the tolerance of the stroke: the most that it has.
+    pub const WITH_TOLERANCE: usize = 28;
+
     /// The section's content: of these bytes the first [`length`](Self::length).
-    pub fn to_bytes(self) -> [u8; Self::WITH_HAND] {
+    pub fn to_bytes(self) -> [u8; Self::WITH_TOLERANCE] {
         let [radius, spacing, speed] = [self.radius, self.spacing, self.speed].map(f32::to_le_bytes);
-        let [stroke, travel] = [self.stroke, self.travel].map(|length| length.unwrap_or_default().to_le_bytes());
+        let [stroke, travel, tolerance] = [self.stroke, self.travel, self.stroke_tolerance]
+            .map(|length| length.unwrap_or_default().to_le_bytes());
         let [low, high] = self.cone.to_le_bytes();
-        let numbers = [radius, spacing, speed, [self.length.code(), 0, low, high], stroke, travel];
-        let mut bytes = [0; Self::WITH_HAND];
+        let numbers = [radius, spacing, speed, [self.length.code(), 0, low, high], stroke, travel, tolerance];
+        let mut bytes = [0; Self::WITH_TOLERANCE];
         bytes.iter_mut().zip(numbers.into_iter().flatten()).for_each(|(to, from)| *to = from);
         bytes
     }
 
     /// Bytes of the section's content: without stroke and travel as many as in version 0.2.
     pub const fn length(&self) -> usize {
-        if self.stroke.is_none() && self.travel.is_none() { Self::LENGTH } else { Self::WITH_HAND }
+        match (self.stroke_tolerance, self.stroke, self.travel) {
+            (Some(_), ..) => Self::WITH_TOLERANCE,
+            (None, None, None) => Self::LENGTH,
+            _ => Self::WITH_HAND,
+        }
     }
 
-    /// Reads a section; `None` if a number is not positive and finite (stroke and travel may be 0, or not there), the unit of
+    /// Reads a section; `None` if a number is not positive and finite (stroke, travel and tolerance may be 0, or not there), the unit of
     /// length does not exist, or the cone is above 90 degrees. Bytes after those that are known are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let ([radius, spacing, speed, [length, _, low, high]], rest) =
@@ -143,6 +155,7 @@ impl TrainedProbe {
         };
         let stated = |bytes: &[u8; 4]| if *bytes == [0; 4] { Some(None) } else { number(bytes).map(Some) };
         let [stroke, travel] = rest.first_chunk::<2>().unwrap_or(&[[0; 4]; 2]);
+        let tolerance = rest.get(2).unwrap_or(&[0; 4]);
         Some(Self {
             radius: number(radius)?,
             spacing: number(spacing)?,
@@ -151,6 +164,7 @@ impl TrainedProbe {
             stroke: stated(stroke)?,
             travel: stated(travel)?,
             cone: (cone <= Self::LARGEST_CONE).then_some(cone)?,
+            stroke_tolerance: stated(tolerance)?,
         })
     }
 }
@@ -448,6 +462,7 @@ mod tests {
         stroke: None,
         travel: None,
         cone: 0,
+        stroke_tolerance: None,
     };
     const NOISE: TrainedNoise = TrainedNoise { least: 0, largest: 10_000, timer: 1_000, pose: 5_000 };
 
@@ -485,6 +500,16 @@ mod tests {
             assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), Some(probe));
             assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()[..23]), Some(PROBE), "as far as it is whole");
         }
+    }
+
+    #[test]
+    fn a_probe_states_how_well_its_stroke_is_known_behind_what_older_readers_know() {
+        let stated = TrainedProbe { stroke: Some(5.25), ..PROBE };
+        let probe = TrainedProbe { stroke_tolerance: Some(0.25), ..stated };
+        assert_eq!((stated.length(), probe.length()), (24, 28));
+        assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), Some(probe));
+        assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()[..24]), Some(stated), "as version 0.3 reads it");
+        assert_eq!(probe.to_bytes()[..24], stated.to_bytes()[..24]);
     }
 
     #[test]

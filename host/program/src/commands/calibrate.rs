@@ -151,8 +151,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         super::remark(&format!("palpate: note: {unlike}"));
     }
     let wrong = |error: palpate::Error| {
-        let is_of_recorded = matches!(error.problem(), Some(CalibrateProblem::NotSupported { .. }))
-            || matches!(error.problem(), Some(EvaluateProblem::TooFewRecorded { .. }));
+        use CalibrateProblem::{MissingRecordings, NotSupported};
+        use EvaluateProblem::{RecordedUnknown, TooFewRecorded};
+        let is_of_recorded = matches!(error.problem(), Some(NotSupported { .. } | MissingRecordings { .. }))
+            || matches!(error.problem(), Some(TooFewRecorded { .. } | RecordedUnknown { .. }));
         error.in_file(arguments.recorded.as_ref().filter(|_| is_of_recorded).unwrap_or(&arguments.directory))
     };
     let (calibrated, found) = match arguments.strangers.held() {

@@ -21,15 +21,22 @@ pub(crate) struct PriorArguments {
 }
 
 impl PriorArguments {
-    /// The probability of each object; `None` without the option.
-    pub(crate) fn of(&self, names: &[String]) -> Result<Option<Vec<f64>>> {
+    /// The probability of each output; `None` without the option. That of an object that has one for each of its placements is
+    /// divided as their `own` weights are.
+    pub(crate) fn of(&self, names: &[String], own: &[f64]) -> Result<Option<Vec<f64>>> {
         if self.prior.is_empty() {
             return Ok(None);
         }
         let mut priors = vec![None; names.len()];
         for (name, prior) in &self.prior {
-            if priors[position("prior", name, names)?].replace(*prior).is_some() {
-                return Err(Error::setting("prior", name, "each name once"));
+            let outputs = outputs("prior", name, names)?;
+            let weight = |output: usize| own.get(output).copied().unwrap_or(1.0);
+            let all: f64 = outputs.iter().map(|&output| weight(output)).sum();
+            for output in outputs {
+                let share = if all > 0.0 { weight(output) / all } else { 0.0 };
+                if priors[output].replace(prior * share).is_some() {
+                    return Err(Error::setting("prior", name, "each name once"));
+                }
             }
         }
         let stated: f64 = priors.iter().flatten().sum();
@@ -61,11 +68,11 @@ impl ExpectedArguments {
         if !self.is_given() {
             return Ok(None);
         }
-        let mut weights = self.prior.of(names)?.unwrap_or_else(|| own.to_vec());
+        let mut weights = self.prior.of(names, own)?.unwrap_or_else(|| own.to_vec());
         if !self.only.is_empty() {
             let mut allowed = vec![false; names.len()];
             for name in &self.only {
-                allowed[position("only", name, names)?] = true;
+                outputs("only", name, names)?.into_iter().for_each(|output| allowed[output] = true);
             }
             weights.iter_mut().zip(allowed).filter(|(_, allowed)| !allowed).for_each(|(weight, _)| *weight = 0.0);
         }
@@ -80,11 +87,17 @@ impl ExpectedArguments {
     }
 }
 
-fn position(option: &'static str, name: &str, names: &[String]) -> Result<usize> {
-    names
-        .iter()
-        .position(|known| known == name)
-        .ok_or_else(|| Error::setting(option, name, format!("objects that the model knows: {}", names.join(", "))))
+/// The output of this name, or those of the placements of the object of this name.
+fn outputs(option: &'static str, name: &str, names: &[String]) -> Result<Vec<usize>> {
+    if let Some(own) = names.iter().position(|known| known == name) {
+        return Ok(vec![own]);
+    }
+    let is_of = |output: &usize| names[*output].rsplit_once('/').is_some_and(|(object, _)| object == name);
+    let placements: Vec<usize> = (0..names.len()).filter(is_of).collect();
+    match placements.is_empty() {
+        true => Err(Error::setting(option, name, format!("objects that the model knows: {}", names.join(", ")))),
+        false => Ok(placements),
+    }
 }
 
 /// A name and its probability.
@@ -125,6 +138,20 @@ mod tests {
         assert_eq!(weights(&["--prior", "fork=2,bowl=4,spoon=1"]).unwrap(), Some(vec![all, all / 2, all / 4]));
         assert_eq!(weights(&["--prior", "fork=0.5", "--only", "bowl,spoon"]).unwrap(), Some(vec![all, 0, all]));
         assert_eq!(weights(&["--prior", "fork=1e-12"]).unwrap().unwrap()[1], 1);
+    }
+
+    #[test]
+    fn an_object_that_has_placements_is_all_of_them() {
+        let names = ["bowl/+z", "bowl/-z", "fork/+z"].map(String::from);
+        let weights = |words: &[&str]| {
+            let parsed = Program::try_parse_from([&["program"], words].concat()).unwrap();
+            parsed.expected.weights(&names, &[3.0, 1.0, 4.0]).unwrap().unwrap()
+        };
+        let all = 1_u32 << 31;
+        let third = (f64::from(all) / 3.0).round() as u32;
+        assert_eq!(weights(&["--only", "bowl"]), [all, third, 0]);
+        assert_eq!(weights(&["--only", "bowl/-z,fork"]), [0, all / 4, all]);
+        assert_eq!(weights(&["--prior", "bowl=0.4"]), [all / 2, all / 6 + 1, all]);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use palpate::compile::{
     self, Candidate, Compiled, CompiledModel, EarlyExit, EarlyExitFound, Goal, Instructions, Language, Layout, Leaf,
     Settings,
 };
-use palpate::ensemble::{Ensemble, Inputs, train};
+use palpate::ensemble::{Ensemble, Inputs, TouchOrigin, train};
 use palpate::error::Error;
 use palpate::output;
 use palpate::rows::scales::{self, Effect, Merged};
@@ -215,7 +215,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         error_rate: arguments.error_rate,
         max_touches: arguments.max_touches,
         scales,
-        priors: arguments.prior.of(&ensemble.objects)?,
+        priors: arguments.prior.of(&ensemble.objects, &shares_of(&ensemble)?)?,
         early_exit: early_exit(&arguments, &ensemble)?,
         ..Settings::default()
     };
@@ -329,7 +329,7 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
         ("early_exit", arguments.early_exit.is_some()),
         ("error_rate", arguments.error_rate != usual.error_rate),
         ("max_touches", arguments.max_touches != usual.max_touches),
-        ("prior", arguments.prior.of(&compiled.names())?.is_some()),
+        ("prior", arguments.prior.of(&compiled.names(), &[])?.is_some()),
     ] {
         if is_given {
             return refuse(name, "given");
@@ -565,6 +565,12 @@ fn link(name: &str) -> Result<Link, String> {
 }
 
 /// Classes from fewer trees, if they are asked for.
+/// The share that each output has of its object.
+fn shares_of(ensemble: &Ensemble) -> Result<Vec<f64>> {
+    let placements = TouchOrigin::of(&ensemble.origin)?.placements;
+    Ok(ensemble.objects.iter().map(|output| placements.get(output).copied().unwrap_or(1.0)).collect())
+}
+
 fn early_exit(arguments: &Arguments, ensemble: &Ensemble) -> Result<Option<EarlyExit>> {
     let Some(path) = &arguments.early_exit else { return Ok(None) };
     if path.as_os_str() == "yes" {

@@ -1,7 +1,7 @@
 //! The figures of an evaluation as JSON and as text.
 
 use palpate::evaluate::{
-    ActiveFacts, Approaches, Confusion, Evaluated, Evaluation, Finding, PromiseCheck, Rule, Strangers, Switched,
+    ActiveFacts, AlarmCheck, Approaches, Confusion, Evaluated, Evaluation, Finding, PromiseCheck, Rule, Strangers, Switched,
 };
 use palpate::wording::{self, count, counted, rate};
 use palpate_shared::DIRECTIONS;
@@ -18,6 +18,9 @@ pub(super) fn text(evaluated: &Evaluated) -> String {
         text += &promise_text(promise);
     }
     text += &above_text(&evaluated.evaluation);
+    if let Some(alarms) = &evaluated.evaluation.false_alarms {
+        text += &alarms_text(alarms);
+    }
     if let Some(ActiveFacts { rolls, poses, left_out, without_approaches }) = &evaluated.active {
         // Writing to a string cannot fail.
         _ = writeln!(
@@ -141,6 +144,31 @@ fn promise_text(check: &PromiseCheck) -> String {
         }
     }
     text
+}
+
+/// The promised share of false alarms beside the one that was found.
+fn alarms_text(check: &AlarmCheck) -> String {
+    let above = check.above.iter().map(|(name, share)| format!("{name} {:.1} %", 100.0 * share));
+    let above = above.collect::<Vec<_>>().join(", ");
+    format!(
+        "\nKnown objects taken for unknown. Promised: at most {} % ({} % sure, from {} sequences). Measured: {:.2} % ± {:.2}: {}.{}\n",
+        percent(check.promised),
+        percent(check.confidence),
+        check.sequences,
+        100.0 * check.found,
+        100.0 * check.standard_error,
+        match check.finding {
+            Finding::Kept => "the promise is kept".to_owned(),
+            Finding::Unclear => {
+                format!("{:.2} points above what is promised, which may be chance", 100.0 * (check.found - check.promised))
+            }
+            Finding::Broken => {
+                format!("the promise is broken by {:.2} points", 100.0 * (check.found - check.promised))
+            }
+            Finding::Untested => "there was no sequence, so nothing is known of the promise".to_owned(),
+        },
+        if above.is_empty() { String::new() } else { format!(" More than promised of: {above}.") }
+    )
 }
 
 /// Accuracies in percent: one row per object, one column per number of touches; then the sequential figures.

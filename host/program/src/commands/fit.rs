@@ -3,6 +3,7 @@
 use super::numbers::count;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
+use super::scene::SceneArguments;
 use super::{Global, remark};
 use palpate::error::{FitProblem, ProbeProblem};
 use palpate::fit::{Fit, GrazingEstimate, NOT_TOLD, Settings, between, fit, offset, offset_between};
@@ -19,11 +20,14 @@ RECORDED is a data set that your probe made, of objects whose meshes you have, m
 
 A few hundred approaches to three or four objects are enough. Presses on a flat plate, with half a turn of the probe after each, determine offsets better than any object, and nothing else: one line per press, in a file for --plate. Recordings that look wrong are named, and nothing is written.
 
+With --scene table the objects stood on a table and were approached from above; the table itself is a plate. Recordings that state their placement (`palpate data record --object bowl/+z`) determine more.
+
 Examples:
   palpate probe fit recorded meshes/ -o probe.toml
   palpate probe fit recorded meshes/ -o probe.toml --plate plate.txt
   palpate probe fit recorded meshes/ -o fitted.toml --probe probe.toml \\
-      --true-size mm")]
+      --true-size mm
+  palpate probe fit recorded meshes/ -o probe.toml --scene table --plate table.txt")]
 pub(super) struct FitArguments {
     /// The recorded touches: a directory with a file for each object
     #[arg(value_name = "RECORDED")]
@@ -42,6 +46,8 @@ pub(super) struct FitArguments {
     approaches: u64,
     #[command(flatten)]
     size: SizeArguments,
+    #[command(flatten)]
+    scene: SceneArguments,
 }
 
 pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
@@ -63,7 +69,13 @@ pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
         }
         (_, given) => origin.probe.stroke = given.or(there),
     }
-    let objects = arguments.size.objects(&arguments.sources, global.seed())?;
+    origin.scene = arguments.scene.scene(origin.scene)?;
+    if let (true, Some((output, _))) = (origin.scene.is_floating(), recorded.placement_shares().first_key_value()) {
+        let allowed = format!("table: the recordings state placements on one, such as {output}");
+        return Err(Error::setting("scene", "floating", allowed));
+    }
+    let mut objects = arguments.size.objects(&arguments.sources, global.seed())?;
+    arguments.scene.weigh(&mut objects)?;
     let plate = arguments.plate.as_deref().map(read_touches).transpose()?;
     let settings = Settings { origin, approaches: arguments.approaches, seed: global.seed() };
     let found = fit(&recorded, &objects, plate.as_deref(), &settings, &Bar::new())?;
@@ -93,9 +105,10 @@ fn table(found: &Fit) -> String {
     let [full, pairs] = found.contacts;
     let presses = if found.presses > 0 { format!(", {} presses on a plate", found.presses) } else { String::new() };
     let mut text = format!(
-        "{} approaches to {}: {full} with three contacts, {pairs} with two{presses}\n\n{:22}{:>14}  95 % interval\n",
+        "{} approaches to {}{}: {full} with three contacts, {pairs} with two{presses}\n\n{:22}{:>14}  95 % interval\n",
         found.recorded,
         found.objects.join(", "),
+        if found.scene.is_floating() { "" } else { " on a table" },
         "",
         "value"
     );
@@ -130,6 +143,23 @@ fn table(found: &Fit) -> String {
     };
     if found.stroke.is_some() {
         text += "\nThe stroke was not stated: no recorded contact is later, where many would be.";
+    }
+    if !found.unchecked.is_empty() {
+        // Writing to a string cannot fail.
+        _ = write!(
+            text,
+            "\nNot checked for other objects, since their recordings state no placement: {}.",
+            found.unchecked.join(", ")
+        );
+    }
+    let coarse = found.readings.or(found.timer.filter(|timer| *timer >= 5.0));
+    if let Some(interval) = coarse {
+        // Writing to a string cannot fail.
+        _ = write!(
+            text,
+            "\nContact times cluster about multiples of {interval} ms, as if contacts were read that seldom. The probe states that as \
+             noise, and as its timer; read them more often if you can."
+        );
     }
     text += "\nOffsets are relative to the first finger's: only differences of times are recorded.\n";
     for warning in &found.warnings {

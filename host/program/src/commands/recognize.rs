@@ -221,6 +221,8 @@ impl<'m> Stream<'m> {
     fn push(&mut self, touch: &Touch, object: Option<&str>, time: Option<u64>) -> Result<()> {
         self.touches += 1;
         self.is_any_partial |= !touch.is_full();
+        // A little later than the stroke is missing, as on the chip.
+        let touch = &palpate::evaluate::delivered(self.model, touch);
         let refused = self.recognizer.push(touch).err().map(|refused| refused.to_string());
         let line = self.line(refused);
         line.print(self.json)?;

@@ -27,6 +27,7 @@ mod scan;
 mod shards;
 mod strangers;
 mod support;
+mod table;
 mod teach;
 mod view;
 

@@ -54,6 +54,8 @@ class Probe:
     """How far the hand goes on after the first contact; a later contact is missing. None: past the object."""
     travel: float | None = None
     """How far the hand goes from its start before an approach is a miss. None: past the object."""
+    stroke_tolerance: float | None = None
+    """How much later than the stroke a recorded contact may be, and counts as missing. None: 2 % of the stroke."""
 
 
 @dataclass(frozen=True)

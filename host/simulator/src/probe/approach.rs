@@ -35,12 +35,24 @@ pub struct Probe {
     /// object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub travel: Option<f64>,
+    /// Length by which a recorded contact may be later than the stroke and is still of this hand, in units; see
+    /// [`Probe::latest`]. None: as much as clocks and lengths are usually off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stroke_tolerance: Option<f64>,
 }
 
 /// The published probe: radius 0.15, spacing 1.5, 10 units per second, ±10°, and a hand that goes on past the object.
 impl Default for Probe {
     fn default() -> Self {
-        Self { radius: 0.15, spacing: 1.5, speed: 10.0, tilt: 10.0, stroke: None, travel: None }
+        Self {
+            radius: 0.15,
+            spacing: 1.5,
+            speed: 10.0,
+            tilt: 10.0,
+            stroke: None,
+            travel: None,
+            stroke_tolerance: None,
+        }
     }
 }
 
@@ -66,6 +78,14 @@ impl Probe {
         for (name, value) in [("stroke", self.stroke), ("travel", self.travel)] {
             if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
                 return Err(Error::setting(name, value, "a length greater than 0, or leave it out"));
+            }
+        }
+        if let Some(tolerance) = self.stroke_tolerance {
+            if !(tolerance.is_finite() && tolerance > 0.0) {
+                return Err(Error::setting("stroke_tolerance", tolerance, "a length greater than 0, or leave it out"));
+            }
+            if self.stroke.is_none() {
+                return Err(Error::setting("stroke_tolerance", tolerance, "it with the stroke that it belongs to"));
             }
         }
         if self.window() == Some(0) {

@@ -82,7 +82,7 @@ impl Problem for ProbeProblem {
             Self::Differs { .. } => "Use both with the same probe: with another, times have another meaning.".into(),
             Self::OtherStroke { .. } => {
                 "Train for the stroke of the hand that made the touches: state it as stroke in probe.toml, or let `palpate probe \
-                 fit` estimate it."
+                 fit` estimate it, from these touches too."
                     .into()
             }
             Self::OnlyCaptured => "Capture with `palpate capture --probe FILE`, or leave grazing out of the file.".into(),

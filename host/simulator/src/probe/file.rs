@@ -7,6 +7,7 @@
 //! speed = 100.0     # per second
 //! tilt = 10.0       # degrees; the default
 //! stroke = 30.0     # how far the hand goes on after the first contact; later ones are missing. By default past the object
+//! stroke_tolerance = 1.0 # how much later recorded contacts may be and count as missing; by default 2 % of the stroke
 //! travel = 200.0    # how far it goes from its start before an approach is a miss; by default past the object
 //! timer = "1ms"     # the timer's resolution; by default none
 //!
@@ -56,6 +57,7 @@ struct Document {
     #[serde(default = "tilt")]
     tilt: f64,
     stroke: Option<f64>,
+    stroke_tolerance: Option<f64>,
     travel: Option<f64>,
     #[serde(default, deserialize_with = "duration")]
     timer: Option<f64>,
@@ -132,7 +134,7 @@ impl ProbeFile {
     }
 
     fn of(document: &Document) -> Self {
-        let Document { unit, radius, spacing, speed, tilt, stroke, travel, timer, ref real } = *document;
+        let Document { unit, radius, spacing, speed, tilt, stroke, stroke_tolerance, travel, timer, ref real } = *document;
         let real = Noise {
             deviation: real.noise.unwrap_or_default(),
             timer: real.timer.or(timer).unwrap_or_default(),
@@ -151,7 +153,7 @@ impl ProbeFile {
                 bend: bend / speed * 1e6,
             }),
         };
-        Self { probe: Probe { radius, spacing, speed, tilt, stroke, travel }, unit, real }
+        Self { probe: Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance }, unit, real }
     }
 }
 
@@ -254,9 +256,12 @@ mod tests {
         let file = parse(&format!("{MEASURES}stroke = 30\ntravel = 200.5\n")).unwrap();
         assert_eq!((file.probe.stroke, file.probe.travel), (Some(30.0), Some(200.5)));
         assert_eq!(file.probe.window(), Some(300_000));
+        let known = parse(&format!("{MEASURES}stroke = 30\nstroke_tolerance = 1.5\n")).unwrap();
+        assert_eq!((known.probe.window(), known.probe.latest()), (Some(300_000), Some(315_000.0)));
         let wrong = [
             ("stroke = 0", "stroke"),
             ("travel = -3", "travel"),
+            ("stroke_tolerance = 1", "stroke_tolerance is 1"),
             ("stroke = \"3\"", "4: not a usable probe file: invalid type: string \"3\""),
         ];
         for (text, named) in wrong {

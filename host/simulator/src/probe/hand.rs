@@ -5,12 +5,14 @@
 //! contact the hand goes on for its travel, and the approach is a miss.
 //!
 //! The stroke counts at the nominal speed, so that it is a time on the clock of every part that measures contacts: of an
-//! effector, which stops waiting for a finger, as well as of a recording, in which no contact is later.
+//! effector, which stops waiting for a finger, as well as of a recording, in which no contact is later. Speeds ripple, clocks
+//! and lengths are a little off, and a stroke that was estimated is known to its interval: a recorded contact that is later by
+//! no more than that is late, and missing like any other; one that is later still was made by a hand with another stroke.
 
 use super::approach::{FINGERS, Probe};
 use palpate_shared::{ContactTime, Touch};
 
-/// A recorded contact may be later than the stroke by this share of it: clocks and lengths are a little off.
+/// A recorded contact may be later than the stroke by this share of it: speeds ripple, clocks and lengths are a little off.
 pub const TOLERANCE: f64 = 0.02;
 
 /// Reason why a finger has no contact, though the object lies in its way.
@@ -28,6 +30,13 @@ impl Probe {
     pub fn window(&self) -> Option<u32> {
         let micros = |stroke: f64| (stroke / self.speed * 1e6).round().clamp(0.0, f64::from(u32::MAX - 1)) as u32;
         self.stroke.map(micros)
+    }
+
+    /// The latest recorded contact that a hand with this stroke can have made, as a time after the first one, in microseconds.
+    /// None without a stroke.
+    pub fn latest(&self) -> Option<f64> {
+        let tolerance = self.stroke_tolerance.map(|length| length / self.speed * 1e6);
+        self.window().map(f64::from).map(|window| window + tolerance.unwrap_or(TOLERANCE * window))
     }
 
     /// The distances of an approach without those behind the end of the travel: all, if the first contact is. The second
@@ -75,6 +84,14 @@ mod tests {
     }
 
     #[test]
+    fn a_hand_whose_stroke_is_known_to_an_interval_explains_contacts_up_to_its_end() {
+        let stated = Probe { stroke: Some(5.0), ..Probe::default() };
+        assert_eq!(stated.latest(), Some(510_000.0));
+        assert_eq!(Probe { stroke_tolerance: Some(0.4), ..stated }.latest(), Some(540_000.0));
+        assert_eq!(Probe::default().latest(), None);
+    }
+
+    #[test]
     fn an_approach_whose_first_contact_is_behind_the_travel_is_a_miss() {
         let probe = Probe { travel: Some(12.0), ..Probe::default() };
         let reached = [Some(12.0), None, Some(15.0)];
@@ -92,6 +109,12 @@ mod tests {
             let probe = Probe { stroke: Some(stroke), travel: Some(travel), ..Probe::default() };
             assert!(probe.check(10.0).is_err(), "{stroke} {travel}");
         }
-        assert!(Probe { stroke: Some(0.5), travel: Some(30.0), ..Probe::default() }.check(10.0).is_ok());
+        let good = Probe { stroke: Some(0.5), travel: Some(30.0), ..Probe::default() };
+        assert!(good.check(10.0).is_ok() && Probe { stroke_tolerance: Some(0.1), ..good }.check(10.0).is_ok());
+        for (stroke, tolerance) in [(Some(3.0), 0.0), (Some(3.0), f64::NAN), (Some(3.0), -1.0), (None, 0.1)] {
+            let probe = Probe { stroke, stroke_tolerance: Some(tolerance), ..Probe::default() };
+            let refused = probe.check(10.0).unwrap_err().to_string();
+            assert!(refused.contains("stroke_tolerance"), "{refused}");
+        }
     }
 }

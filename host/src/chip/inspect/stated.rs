@@ -106,6 +106,9 @@ pub struct Probe {
     pub stroke: Option<f32>,
     /// Way that it goes from its start before an approach is a miss; null: past the object.
     pub travel: Option<f32>,
+    /// Length by which a recorded contact may be later than the stroke; null: two hundredths of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stroke_tolerance: Option<f32>,
     /// Largest angle between approaches and straight down, in degrees, where objects lie on a table; null: they float.
     pub cone: Option<f64>,
     /// True if the model states its probe; otherwise the published one is assumed.
@@ -201,9 +204,10 @@ pub(super) fn features(model: &Model<'_>) -> Vec<Feature> {
 /// The probe that a model states, or the one that its header assumes.
 pub(super) fn probe(model: &Model<'_>) -> Probe {
     match model.probe() {
-        Some(TrainedProbe { radius, spacing, speed, length, stroke, travel, cone }) => {
+        Some(TrainedProbe { radius, spacing, speed, length, stroke, travel, cone, stroke_tolerance }) => {
+            let (radius, unit) = (Some(radius), length.name());
             let cone = (cone > 0).then(|| f64::from(cone) / 100.0);
-            Probe { radius: Some(radius), spacing, speed, unit: length.name(), stroke, travel, cone, stated: true }
+            Probe { radius, spacing, speed, unit, stroke, travel, stroke_tolerance, cone, stated: true }
         }
         None => {
             let header = model.header();
@@ -214,6 +218,7 @@ pub(super) fn probe(model: &Model<'_>) -> Probe {
                 unit: Length::Tenth.name(),
                 stroke: None,
                 travel: None,
+                stroke_tolerance: None,
                 cone: None,
                 stated: false,
             }

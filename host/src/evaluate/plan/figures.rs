@@ -47,6 +47,7 @@ pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settin
         None => margins.check_promise(&outcomes, most, &settings.noise, true),
         Some(_) => None,
     };
+    let false_alarms = if settings.error_rate.is_none() { margins.check_alarms(&outcomes) } else { None };
     let in_approaches = margins.summary(outcomes.clone(), stated(), most);
     let accuracies = margins.accuracies(at, &by_touches);
     Ok(Evaluation {
@@ -59,6 +60,7 @@ pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settin
         sequential: margins.of_outcomes(outcomes, stated(), most),
         approaches: Some(margins.in_approaches(used, margins.accuracies(at_approaches, &by_approaches), in_approaches)),
         promise,
+        false_alarms,
         patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
     })
 }

@@ -14,7 +14,6 @@ use super::listing::is_file_name;
 use super::{Entry, Format, Listing, Origin, Warning, text, write_touch};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
-use crate::probe::hand;
 use crc::{Digest, Table};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
@@ -31,6 +30,9 @@ const CHECKPOINT: Duration = Duration::from_millis(500);
 pub struct Recorded {
     /// The object's name.
     pub object: String,
+    /// The placement that it lay in on a table, where the recording states one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub placement: Option<String>,
     /// Number of touches that the recording added.
     pub touches: u64,
     /// When it began, in UTC: `2026-11-22T11:00:00Z`.
@@ -74,8 +76,8 @@ struct Open {
 }
 
 impl Recording {
-    /// Opens the directory, which is created if it is missing, for touches of `object`. Nothing is written before the
-    /// first touch.
+    /// Opens the directory, which is created if it is missing, for touches of `object`, or of one of its placements, called
+    /// `object/placement`. Nothing is written before the first touch.
     ///
     /// `origin` says how the touches are made ([`Origin::recorded`]); none: as those in the directory, or by the published
     /// probe. `source` is where they come from, and `began` the time.
@@ -91,8 +93,12 @@ impl Recording {
         source: &str,
         began: SystemTime,
     ) -> Result<Self> {
-        if !is_file_name(object) {
-            return Err(TouchesProblem::BadName { name: object.into() }.into());
+        let (object, placement) = match object.split_once('/') {
+            Some((object, placement)) => (object, Some(placement)),
+            None => (object, None),
+        };
+        if let Some(&name) = std::iter::once(&object).chain(&placement).find(|name| !is_file_name(name)) {
+            return Err(TouchesProblem::BadName { name: name.into() }.into());
         }
         std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, "make the directory", error))?;
         let wrong = |problem| Error::at(Place::file(directory), problem);
@@ -118,6 +124,7 @@ impl Recording {
         }
         let recorded = Recorded {
             object: object.into(),
+            placement: placement.map(str::to_owned),
             began: humantime::format_rfc3339_seconds(began).to_string(),
             source: source.into(),
             ..Recorded::default()
@@ -161,6 +168,11 @@ impl Recording {
     /// The object's name.
     pub fn object(&self) -> &str {
         &self.recorded.object
+    }
+
+    /// The placement of the touches that are added, where one is stated.
+    pub fn placement(&self) -> Option<&str> {
+        self.recorded.placement.as_deref()
     }
 
     /// Warnings about the touches that the object had before.
@@ -234,8 +246,8 @@ impl Recording {
             return Err(TouchesProblem::NoPose.into());
         }
         let probe = &self.listing.origin.probe;
-        let window = probe.window().map(|window| f64::from(window) * (1.0 + hand::TOLERANCE));
-        let is_late = |touch: &&Touch| window.is_some_and(|window| f64::from(touch.spread()) > window);
+        let latest = probe.latest();
+        let is_late = |touch: &&Touch| latest.is_some_and(|latest| f64::from(touch.spread()) > latest);
         if let Some((touch, stroke)) = touches.iter().find(is_late).zip(probe.stroke) {
             let seconds = |micros: u32| format!("{:.3} s", f64::from(micros) / 1e6);
             let stroke = format!("{stroke} ({})", seconds(probe.window().unwrap_or_default()));

@@ -59,6 +59,7 @@ fn a_recording_is_a_data_set_whose_listing_says_when_from_where_and_by_what() {
     assert!(dataset.is_recorded() && dataset.holds_approaches());
     let expected = Recorded {
         object: "spoon".into(),
+        placement: None,
         touches: 3,
         began: "2026-10-02T12:00:00Z".into(),
         source: "/dev/ttyACM0".into(),
@@ -212,7 +213,7 @@ fn a_directory_with_simulated_or_unlisted_touches_or_another_recorder_is_refused
     Listing::new(&Origin::default(), ["cup".into()]).write(directory.path()).unwrap();
     let simulated = TouchesProblem::HoldsSimulated { objects: "cup".into(), touches: 0 };
     assert_eq!(problem(&open(directory.path(), "fork").err().unwrap()), &simulated);
-    for name in ["", "../fork", "a/b"] {
+    for name in ["", "../fork", "a/b/c", "a/..", "/b"] {
         assert!(matches!(problem(&open(directory.path(), name).err().unwrap()), TouchesProblem::BadName { .. }));
     }
 }

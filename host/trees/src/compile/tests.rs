@@ -332,6 +332,7 @@ fn what_is_read_from_a_model_is_found_behind_its_optional_sections() {
         stroke: None,
         travel: None,
         cone: 0,
+        stroke_tolerance: None,
     };
     for &layout in Layout::OF_DATA {
         let compiled = |probe| {

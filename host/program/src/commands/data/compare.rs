@@ -36,6 +36,15 @@ fn percent(share: &Share) -> String {
 fn text(compared: &Comparison) -> String {
     let told = &compared.told_apart;
     let mut text = compared.verdict() + "\n";
+    if !compared.unstated.is_empty() {
+        // Writing to a string cannot fail.
+        _ = writeln!(
+            text,
+            "note: the recordings of {} state no placement, and were compared with all placements by their weights, which the robot's \
+             need not have. `palpate data record --object OBJECT/PLACEMENT` states it.",
+            compared.unstated.join(", ")
+        );
+    }
     if let Some(cost) = &compared.cost {
         text += &cost_text(cost);
     }

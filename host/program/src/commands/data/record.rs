@@ -14,12 +14,15 @@ use std::time::SystemTime;
 #[command(after_help = "\
 A line is a touch: three contact times in seconds on any clock, - for a finger that did not touch, and if you like the probe's direction and alignment (six numbers). Lines `- - -` for approaches that touched nothing are recorded too; a chip reports those if it is told when an approach is over (GP5 on a Pico). SOURCE may also be a robot's log (MCAP), of which the touches of NAME are taken, or a chip, whose touches are added as soon as it reports them, until Ctrl-C; if the cable is pulled, this waits for it.
 
+On a table the object may be called after its placement, as `palpate capture --scene table` names it; without it the touches may be of any.
+
 The directory gets NAME.txt and dataset.json. All lines are added, or none if one of them is wrong. Touches of an object that is there already are added to it.
 
 Examples:
   palpate data record monday.txt -o recorded --object bowl
   palpate data record monday.txt -o recorded --object bowl --probe probe.toml
   palpate data record monday.mcap -o recorded --object bowl
+  palpate data record monday.txt -o table --object bowl/+z --pose
   robot --print | palpate data record - -o recorded --object bowl --pose
   palpate data record /dev/ttyACM0 -o recorded --object bowl")]
 pub(crate) struct Arguments {
@@ -29,7 +32,7 @@ pub(crate) struct Arguments {
     /// Where to write; the data set's directory, such as recorded
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// The name of the object that was touched, such as bowl
+    /// The name of the object that was touched, such as bowl; or bowl/+z, if it lay on a table in that placement
     #[arg(long, value_name = "NAME")]
     object: String,
     #[command(flatten)]

@@ -103,9 +103,13 @@ fn say(json: bool, text: &str) -> Result<()> {
 pub(crate) fn summary(recording: &Recording, directory: &Path, contacts: [u64; 4]) -> String {
     let [none, one, two, three] = contacts;
     let (object, touches, all) = (recording.object(), recording.touches(), recording.all_touches());
+    let (lying, of) = match recording.placement() {
+        Some(placement) => (format!("/{placement}"), format!("of {object}")),
+        None => (String::new(), "of it".into()),
+    };
     let missed = if none > 0 { format!(", {none} none") } else { String::new() };
     format!(
-        "recorded {touches} touches of {object} into {}, which holds {all} of it now\ncontacts: {three} have three, {two} \
+        "recorded {touches} touches of {object}{lying} into {}, which holds {all} {of} now\ncontacts: {three} have three, {two} \
          two, {one} one{missed}\n",
         directory.display()
     )

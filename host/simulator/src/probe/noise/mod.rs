@@ -206,6 +206,17 @@ impl Noise {
         }
     }
 
+    /// The noise that a compiled model states that it was trained for.
+    pub fn of_training(trained: &TrainedNoise) -> Self {
+        let TrainedNoise { least, largest, timer, pose } = *trained;
+        Self {
+            deviation: Deviation { least: least.into(), largest: largest.into() },
+            timer: timer.into(),
+            pose: f64::from(pose) / 1e3,
+            ..Self::default()
+        }
+    }
+
     /// Statement of a compiled model's promise about it.
     pub fn promised(&self) -> PromisedNoise {
         let whole = |number: f64| number.round().clamp(0.0, f64::from(u32::MAX)) as u32;
