@@ -636,10 +636,12 @@ fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
     let names = [0, 0, 0x80, 0x3f, 1, b'a', 0, 0, 0x80, 0x3f, 2, b'b', b'c'];
     let table = [0, 0, 0, 0, 4, 3, 0, 4, 0, 1, 1, 2, 9];
     let exits = EarlyExit { groups: 1, bound: 1 << 20 }.to_bytes();
-    let prediction = Prediction { link: Link::Identity, last_of_ties: true, scale: 0.5, targets: false }.to_bytes();
+    let mut prediction = Vec::new();
+    let averaged = Prediction { link: Link::Identity, last_of_ties: true, scale: 0.5, targets: false, average: 5 };
+    averaged.write(&mut |part| prediction.extend_from_slice(part));
     let sections = [
         (Tag::FeatureNames.code(), names.to_vec(), 0),
-        (must(Tag::Prediction), prediction.to_vec(), 8),
+        (must(Tag::Prediction), prediction.clone(), prediction.len()),
         (must(Tag::Sentinel), Sentinel { low: -1, high: 1 }.to_bytes().to_vec(), 8),
         (must(Tag::RowEvidence), table.to_vec(), table.len()),
         (Tag::EarlyExit.code(), exits.to_vec(), 0),

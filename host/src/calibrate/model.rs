@@ -332,7 +332,7 @@ pub(super) struct Drawn<'d> {
 /// Calibrates on touches drawn from supplies; `temperature` finds the temperature.
 pub(super) fn calibrate_drawn(
     model: &Model<'_>,
-    Material { names, known, outputs, max_touches }: &Material,
+    Material { names, outputs, max_touches, .. }: &Material,
     Drawn { dataset, fewest, mut supplies }: Drawn<'_>,
     settings: &Settings,
     start: Option<Start>,

@@ -511,7 +511,8 @@ fn as_many_touches_as_a_refusal_says_keep_the_rate_that_was_refused() {
     let compiled = model();
     let settings = Settings { rate: 0.05, max_touches: Some(60), ..Settings::default() };
     let calibrated = |count: usize, seed: u64, strictest: f64| {
-        calibrate_from(&compiled.model(), fresh(count, seed), &settings, Some(strictest), &())
+        let start = Start { margin: strictest, loosest: None };
+        calibrate_from(&compiled.model(), fresh(count, seed), &settings, Some(start), &())
     };
     // From loose to strict, the first that is refused though fewer names are wrong than promised.
     let refused = (0..60).find_map(|step| {
@@ -528,6 +529,7 @@ fn as_many_touches_as_a_refusal_says_keep_the_rate_that_was_refused() {
     assert!(kept >= 3, "{kept} of 5 with {enough}");
     // Touches with another noise are named.
     let noisy = Settings { noise: Noise::gaussian(40_000.0), ..settings.clone() };
-    let error = calibrate_from(&compiled.model(), fresh(6_000, 2), &noisy, Some(0.5), &()).unwrap_err().to_string();
+    let start = Start { margin: 0.5, loosest: None };
+    let error = calibrate_from(&compiled.model(), fresh(6_000, 2), &noisy, Some(start), &()).unwrap_err().to_string();
     assert!(error.contains("it was trained for no noise, and they have noise of 40 ms"), "{error}");
 }

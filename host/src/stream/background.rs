@@ -63,7 +63,7 @@ pub(super) fn test<'s>(
 fn problem(error: Error, parts: &Parts<'_>, settings: &strangers::Settings) -> Error {
     let strangers::Settings { alarms, confidence, .. } = *settings;
     match error.problem() {
-        Some(&EvaluateProblem::TooFewForAlarms { object_sequences, needed }) if object_sequences as u64 >= needed => {
+        Some(&EvaluateProblem::TooFewForAlarms { object_sequences, needed, .. }) if object_sequences as u64 >= needed => {
             CalibrateProblem::TooManyAlarms { found: object_sequences as u64, alarms }.into()
         }
         Some(EvaluateProblem::TooFewForAlarms { .. } | EvaluateProblem::TooFewForMisfit { .. }) => {
