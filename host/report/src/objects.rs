@@ -81,7 +81,7 @@ pub(super) fn touched_by(capture: &Origin) -> String {
 
 /// A probe in words.
 pub(super) fn described(probe: &Probe, unit: Length) -> String {
-    let Probe { radius, spacing, speed, tilt, stroke, travel } = *probe;
+    let Probe { radius, spacing, speed, tilt, stroke, travel, .. } = *probe;
     let length = |length: f64| match unit {
         Length::Tenth if length == 1.0 => "1 unit".to_owned(),
         Length::Tenth => format!("{length} units"),
@@ -187,7 +187,8 @@ mod tests {
             published.contains("longest side is 10 units") && published.contains("radius 0.15 units"),
             "{published}"
         );
-        let probe = Probe { radius: 2.0, spacing: 20.0, speed: 130.0, tilt: 5.0, stroke: Some(7.0), travel: None };
+        let probe =
+            Probe { radius: 2.0, spacing: 20.0, speed: 130.0, tilt: 5.0, stroke: Some(7.0), ..Probe::default() };
         let own = touched_by(&Origin { unit: Length::Millimeter, probe, ..Origin::default() });
         assert_eq!(
             own,

@@ -192,8 +192,8 @@ fn beta_binomial(most: u64, all: u64, a: f64, b: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use super::super::sequence::Look;
+    use super::*;
 
     #[test]
     fn a_flat_prior_makes_every_number_of_errors_as_probable() {
@@ -252,7 +252,8 @@ mod tests {
 
     #[test]
     fn several_starts_are_for_where_names_are_many() {
-        let all: Vec<(f64, bool)> = (0..100).map(|number| (f64::from(number % 20) * 0.5 + 0.6, number % 20 > 2)).collect();
+        let all: Vec<(f64, bool)> =
+            (0..100).map(|number| (f64::from(number % 20) * 0.5 + 0.6, number % 20 > 2)).collect();
         for (tested, starts) in [(60, 1..=1), (400, 2..=7), (4_000, 5..=7)] {
             let found = begin(&all, tested, 0.05);
             assert!(starts.contains(&found.starts.len()), "{tested}: {found:?}");

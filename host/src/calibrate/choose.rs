@@ -187,7 +187,11 @@ impl Steps {
             }
             Per::Name => {
                 let ungated: Vec<Sequence> = learn.iter().map(|sequence| sequence.ungated()).collect();
-                around(&learned(&ungated.iter().collect::<Vec<_>>(), objects, strictest, terms.rate), strictest, way.starts.len())
+                around(
+                    &learned(&ungated.iter().collect::<Vec<_>>(), objects, strictest, terms.rate),
+                    strictest,
+                    way.starts.len(),
+                )
             }
         };
         if let Some(loosest) = way.loosest {

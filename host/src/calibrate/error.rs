@@ -210,13 +210,19 @@ impl Remedy {
         };
         match (self.touches, self.sequences, &self.noise) {
             (Some(touches), ..) => {
-                format!("About {touches} {what} of each object would do, if as many of the names are wrong. Or {higher}.")
+                format!(
+                    "About {touches} {what} of each object would do, if as many of the names are wrong. Or {higher}."
+                )
             }
             (_, Some(sequences), _) => {
-                format!("About {sequences} sequences would do (--sequences), if as many of the names are wrong. Or {higher}.")
+                format!(
+                    "About {sequences} sequences would do (--sequences), if as many of the names are wrong. Or {higher}."
+                )
             }
             (.., Some([trained, here])) => {
-                format!("Train the model for the noise of these {what}: it was trained for {trained}, and they have {here}. Or {higher}.")
+                format!(
+                    "Train the model for the noise of these {what}: it was trained for {trained}, and they have {here}. Or {higher}."
+                )
             }
             _ => format!(
                 "The model was trained for the noise of these {what}, and more of them would not do: {higher}, or train a model that \
@@ -309,7 +315,9 @@ fn how_many(found: u64, groups: bool, names_in: Option<u64>) -> String {
 fn could(possible: Option<f64>, held: Option<[u64; 2]>) -> String {
     match (held, possible) {
         (Some([first, longest]), _) => {
-            format!("the test of strangers lets names be given from row {first} on, and the longest sequence has {longest}")
+            format!(
+                "the test of strangers lets names be given from row {first} on, and the longest sequence has {longest}"
+            )
         }
         (None, None) => "as many could promise nothing".into(),
         (None, Some(rate)) => format!("as many could promise {} %", percent(rate)),
@@ -325,7 +333,9 @@ fn is_too_few(Tally { wrong, all }: Tally, rate: f64) -> bool {
 fn seen(object: &Option<String>, rate: f64, tally: Tally, needed: Option<u64>, units: &str) -> String {
     let (Tally { wrong, all }, of, rate_text) = (tally, of_object(object), percent(rate));
     if !is_too_few(tally, rate) {
-        return format!("no threshold that was tested keeps {rate_text} %: at the best {wrong} of {all} names given{of}{units} are wrong");
+        return format!(
+            "no threshold that was tested keeps {rate_text} %: at the best {wrong} of {all} names given{of}{units} are wrong"
+        );
     }
     let needed = needed.map_or_else(String::new, |needed| {
         format!(": with {wrong} wrong it takes {needed}, and fewer the fewer are wrong")
@@ -421,9 +431,16 @@ mod tests {
         let same = remedy(14, 785, None);
         assert_eq!(same.touches, None, "a share above the rate stays above it");
         let said = same.sentences();
-        assert!(said.starts_with("The model was trained for the noise of these approaches") && said.contains("2.8 %"), "{said}");
+        assert!(
+            said.starts_with("The model was trained for the noise of these approaches") && said.contains("2.8 %"),
+            "{said}"
+        );
         let other = remedy(14, 785, Some(["no noise".into(), "noise of 5 ms".into()])).sentences();
-        assert!(other.starts_with("Train the model for the noise") && other.contains("trained for no noise, and they have noise of 5 ms"), "{other}");
+        assert!(
+            other.starts_with("Train the model for the noise")
+                && other.contains("trained for no noise, and they have noise of 5 ms"),
+            "{other}"
+        );
         let sequences = Remedy::new(Tally { wrong: 6, all: 785 }, &TERMS, None, 1_000, None);
         assert!(sequences.sentences().contains("sequences would do (--sequences)"), "{sequences:?}");
     }

@@ -215,7 +215,13 @@ mod tests {
             sequences.iter().map(|(sequence, group)| Grouped { sequence, group: *group }).collect();
         // As if a fifth as many others had been learned from.
         let learned = &grouped[..grouped.len() / 5 / of * of];
-        choose_groups(learned, &grouped, 2, &Way { starts: &[8.0], loosest: None }, &Terms { rate, confidence: 0.95, per: Per::Average })
+        choose_groups(
+            learned,
+            &grouped,
+            2,
+            &Way { starts: &[8.0], loosest: None },
+            &Terms { rate, confidence: 0.95, per: Per::Average },
+        )
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use super::begin::{Begin, Seen};
 use super::choose::{Chosen, Terms, Way, chosen, share_tested, spread};
-use super::error::Remedy;
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
+use super::error::Remedy;
 use super::sequence::{Odds, Sequence, margin_of, odds_of};
 use super::temperature::temperature;
 use super::{Per, Tally, binomial_tail};
@@ -291,9 +291,7 @@ pub(super) fn material(model: &Model<'_>, dataset: &Dataset, settings: &Settings
 /// Refuses a rate of each name where names are placements: how often one is wrong depends on their shares.
 pub(super) fn refuse_names_of_placements(model: &Model<'_>, settings: &Settings) -> Result<()> {
     match model.outputs().is_some() && settings.per == Per::Name {
-        true => {
-            Err(Error::setting("per", "name", "average or object with a model whose objects have several outputs"))
-        }
+        true => Err(Error::setting("per", "name", "average or object with a model whose objects have several outputs")),
         false => Ok(()),
     }
 }

@@ -2,8 +2,8 @@
 
 use super::demand::Demand;
 use crate::error::Result;
-use crate::evaluate::{Candidate, OfTouches};
 use crate::evaluate::together::margins_of_touches;
+use crate::evaluate::{Candidate, OfTouches};
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
 use palpate_shared::Touch;

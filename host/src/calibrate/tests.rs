@@ -518,7 +518,9 @@ fn as_many_touches_as_a_refusal_says_keep_the_rate_that_was_refused() {
     let refused = (0..60).find_map(|step| {
         let strictest = 0.5 + 0.05 * f64::from(step);
         match calibrated(2_000, 2, strictest).err()?.problem()? {
-            CalibrateProblem::NotKept { remedy: Some(remedy), .. } => Some((strictest, remedy.touches?, remedy.noise.clone())),
+            CalibrateProblem::NotKept { remedy: Some(remedy), .. } => {
+                Some((strictest, remedy.touches?, remedy.noise.clone()))
+            }
             _ => None,
         }
     });

@@ -315,7 +315,10 @@ mod tests {
         let kept = walk((0..).zip(steps), &[0], 0.01, 0.95).unwrap();
         assert_eq!((kept.threshold, kept.tallies), (1, vec![Tally { wrong: 3, all: 1_000 }]));
         let stop = walk((0..).zip(tallies(&[5, 0, 0], 1_000)), &[0], 0.01, 0.95);
-        assert_eq!(stop, Err(Stop::TooMany { position: 0, tally: Tally { wrong: 5, all: 1_000 }, needed: Some(1_049) }));
+        assert_eq!(
+            stop,
+            Err(Stop::TooMany { position: 0, tally: Tally { wrong: 5, all: 1_000 }, needed: Some(1_049) })
+        );
         let few = |found| Err(Stop::TooFew { position: 0, found, needed: 299 });
         assert_eq!(walk((0..).zip(tallies(&[0], 298)), &[0], 0.01, 0.95), few(298));
         assert_eq!(walk(Vec::<(i32, _)>::new(), &[0], 0.01, 0.95), few(0));
@@ -346,7 +349,11 @@ mod tests {
         };
         assert_eq!(walked(&[4, 3, 3, 4], &[0, 1]), Ok(2));
         assert_eq!(walked(&[3, 4, 4, 5], &[0, 1]), Ok(2), "shares of both");
-        assert_eq!(walked(&[3, 4, 3, 4], &[0, 2]), Ok(2), "the first walk ends at 4, which its own share does not allow");
+        assert_eq!(
+            walked(&[3, 4, 3, 4], &[0, 2]),
+            Ok(2),
+            "the first walk ends at 4, which its own share does not allow"
+        );
         assert_eq!(walked(&[0, 0, 9, 3, 3, 4, 0], &[0, 3]), Ok(4), "the loosest of both walks");
         // A failure leaves nothing of the shares before it.
         assert_eq!(walked(&[9, 9, 3, 4], &[0, 1, 2]), Ok(2));
@@ -361,7 +368,8 @@ mod tests {
     fn several_starts_take_as_many_names_as_the_share_of_one_does() {
         for (starts, least) in [(1, 299), (2, 368), (7, 492)] {
             let positions: Vec<usize> = (0..starts).collect();
-            let walked = |all| walk((0..).zip(tallies(&vec![0; 9], all)), &positions, 0.01, 0.95).map(|kept| kept.threshold);
+            let walked =
+                |all| walk((0..).zip(tallies(&vec![0; 9], all)), &positions, 0.01, 0.95).map(|kept| kept.threshold);
             assert_eq!(walked(least), Ok(8), "{starts}");
             let few = Stop::TooFew { position: 0, found: least - 1, needed: least };
             assert_eq!(walked(least - 1), Err(few), "{starts}");
@@ -372,7 +380,10 @@ mod tests {
     fn as_many_cases_are_enough_as_the_errors_among_them_take() {
         for (wrong, rate, least) in [(0, 0.01, 299), (0, 0.05, 59), (1, 0.05, 93), (2, 0.05, 124), (4, 0.01, 913)] {
             assert_eq!(enough(wrong, rate, 0.95), least);
-            assert_eq!((allowed(least, rate, 0.95), allowed(least - 1, rate, 0.95)), (Some(wrong), wrong.checked_sub(1)));
+            assert_eq!(
+                (allowed(least, rate, 0.95), allowed(least - 1, rate, 0.95)),
+                (Some(wrong), wrong.checked_sub(1))
+            );
         }
     }
 

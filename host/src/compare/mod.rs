@@ -214,7 +214,8 @@ pub fn compare(
     let simulated = simulated.each(|own| own.filtered(alike));
     // By placement, where both sides state it; and without contacts that are late for the stroke that was simulated.
     let recorded = recorded.clone().matching(&simulated.by_placement().names());
-    let recorded = simulated.probe().map_or(Cow::Borrowed(&recorded), |probe| recorded.delivered_by(probe)).into_owned();
+    let recorded =
+        simulated.probe().map_or(Cow::Borrowed(&recorded), |probe| recorded.delivered_by(probe)).into_owned();
     let pairs: Vec<(&ObjectTouches, ObjectTouches)> =
         recorded.objects.iter().filter_map(|own| Some((own, counterpart(&own.name, &simulated)?))).collect();
     if pairs.is_empty() {

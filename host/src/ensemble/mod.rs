@@ -9,8 +9,8 @@ mod origin;
 #[cfg(feature = "train")]
 pub mod train;
 
-pub(crate) use origin::{object_of, stroke_of};
 pub use origin::{StatedProbe, TouchOrigin, compiled_trained_on};
+pub(crate) use origin::{object_of, stroke_of};
 pub use palpate_trees::ensemble::*;
 
 use crate::error::Result;

@@ -207,8 +207,7 @@ impl StatedProbe {
         let scaled = |number: f64| (number * scale) as f32;
         let Probe { radius, spacing, speed, stroke, travel, stroke_tolerance, .. } = self.probe;
         let [radius, spacing, speed] = [radius, spacing, speed].map(scaled);
-        let [stroke, travel, stroke_tolerance] =
-            [stroke, travel, stroke_tolerance].map(|length| length.map(scaled));
+        let [stroke, travel, stroke_tolerance] = [stroke, travel, stroke_tolerance].map(|length| length.map(scaled));
         // At least a hundredth of a degree, since 0 is a floating object; a conversion saturates.
         let cone = self.scene.cone().map_or(0, |cone| ((100.0 * cone).round() as u16).max(1));
         TrainedProbe { radius, spacing, speed, length: self.unit, stroke, travel, cone, stroke_tolerance }
@@ -309,7 +308,11 @@ impl StatedProbe {
         let seconds = |micros: f64| format!("{:.3} s", micros / 1e6);
         let stroke = match stroke.zip(window).zip(allowed) {
             Some(((stroke, window), allowed)) if is_later => {
-                format!("a stroke of {stroke} ({}), which explains contacts up to {}", seconds(window), seconds(allowed))
+                format!(
+                    "a stroke of {stroke} ({}), which explains contacts up to {}",
+                    seconds(window),
+                    seconds(allowed)
+                )
             }
             Some(((stroke, window), _)) => format!("a stroke of {stroke} ({})", seconds(window)),
             None => "no stroke".into(),

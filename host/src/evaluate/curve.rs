@@ -72,8 +72,8 @@ impl Margins<'_> {
                 true => self.output(evidence),
                 false => self.best(position, evidence),
             })
-                .into_iter()
-                .for_each(|object| row[object] += 1);
+            .into_iter()
+            .for_each(|object| row[object] += 1);
             row
         };
         Ok((0..self.tested.len()).map(row).collect())

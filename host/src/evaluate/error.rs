@@ -196,7 +196,9 @@ fn percent(share: f64) -> f64 {
 
 fn too_few_for_alarms(object: &str, object_sequences: usize, needed: u64) -> String {
     if (object_sequences as u64) < needed {
-        format!("the touches make only {object_sequences} sequences of {object}, and the promise takes at least {needed}")
+        format!(
+            "the touches make only {object_sequences} sequences of {object}, and the promise takes at least {needed}"
+        )
     } else {
         format!(
             "of {object_sequences} sequences of each object too many end as unknown at every threshold, so the promise takes \

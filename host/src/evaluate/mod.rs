@@ -57,10 +57,10 @@ pub use approaches::{ApproachSequential, Approaches};
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
 pub use error::{EnoughRecorded, EvaluateProblem};
-pub use margins::{Margins, delivered};
-pub(crate) use margins::{OfTouches, leading, objects_of};
 #[cfg(feature = "train")]
 pub(crate) use margins::best;
+pub use margins::{Margins, delivered};
+pub(crate) use margins::{OfTouches, leading, objects_of};
 pub use measure::{Confusion, Evaluated, Expecting, Wanted, measure, own_weights};
 pub use noisy::{ROBOTS, add_noise};
 pub use palpate_trees::verify::{

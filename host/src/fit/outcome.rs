@@ -209,7 +209,10 @@ impl Fit {
             _ = writeln!(text, "stroke = {stroke:?}{estimated}");
             if let Some(tolerance) = stroke_tolerance {
                 let latest = stroke + tolerance;
-                _ = writeln!(text, "stroke_tolerance = {tolerance:?}  # contacts up to {latest:.3} are late, and of this hand");
+                _ = writeln!(
+                    text,
+                    "stroke_tolerance = {tolerance:?}  # contacts up to {latest:.3} are late, and of this hand"
+                );
             }
         }
         if let Some(travel) = travel {

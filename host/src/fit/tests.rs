@@ -475,7 +475,8 @@ fn tabled(count: usize, seed: u64, probe: &Crooked, is_stated: bool, has_poses: 
         let by_source = touched.by_source();
         let runs = by_source.iter().enumerate().map(|(source, touches)| {
             let placement = touched.placement_of_source(source).filter(|_| is_stated).map(str::to_owned);
-            let recording = Recorded { object: object.name.clone(), placement, began: source.to_string(), ..Recorded::default() };
+            let recording =
+                Recorded { object: object.name.clone(), placement, began: source.to_string(), ..Recorded::default() };
             (Source::Recording(recording), touches.len() as u64)
         });
         let touches = by_source.iter().flatten().map(|&touch| recorded(&touched.touches()[touch])).collect();
@@ -508,7 +509,10 @@ fn a_recording_in_another_placement_than_it_states_looks_wrong_and_one_that_is_u
     *bowl = ObjectTouches::in_runs("bowl", touches, [other, one].into_iter().zip(lengths).collect());
     let found = fit(&recorded, &objects(), Some(&plate(60, &BENT)), &settings, &()).unwrap();
     let said: Vec<String> = found.suspects.iter().map(ToString::to_string).collect();
-    assert!(said.iter().any(|said| said.starts_with("bowl/") && said.contains("look like touches of the bowl/")), "{said:?}");
+    assert!(
+        said.iter().any(|said| said.starts_with("bowl/") && said.contains("look like touches of the bowl/")),
+        "{said:?}"
+    );
     let lying = Recorded { object: "bowl".into(), placement: Some("+q".into()), ..Recorded::default() };
     let unknown = ObjectTouches::new("bowl", recorded.objects[0].touches().to_vec(), Source::Recording(lying));
     let error = fit(&Dataset::new(vec![unknown]), &objects(), None, &settings, &()).unwrap_err();

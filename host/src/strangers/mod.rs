@@ -49,11 +49,11 @@ use crate::evaluate::{Candidate, OfTouches};
 use crate::touches::{Dataset, ObjectTouches, Pool};
 use follow::{Policy, Sequence};
 use misfit::Moments;
-pub(crate) use recorded::OfRecorded;
 use palpate_onboard::{Model, Refused};
 use palpate_shared::Touch;
 use palpate_shared::format::{Held, MisfitTerms, Strangers, Tag};
 use rayon::prelude::*;
+pub(crate) use recorded::OfRecorded;
 use std::collections::BTreeMap;
 
 /// Touches from which on a test is made.
@@ -251,8 +251,7 @@ pub(crate) fn calibrate_supplies(
     let on_recordings = match &recorded_test {
         Some(test) => {
             let followed = |own: &OfRecorded| follow(std::slice::from_ref(&own.supply), &policy).pop();
-            let followed: Vec<Vec<Sequence>> =
-                test.par_iter().map(followed).map(Option::unwrap_or_default).collect();
+            let followed: Vec<Vec<Sequence>> = test.par_iter().map(followed).map(Option::unwrap_or_default).collect();
             Some(recorded::tested((test, &followed), &sequences, (&tried, simulated), settings)?)
         }
         None => None,

@@ -103,7 +103,10 @@ pub(super) fn by_output(supplies: Vec<OfRecorded>, known: usize, objects: usize)
                 rows.chunks_exact(objects).filter_map(|row| row.get(output)).map(|&margin| i64::from(margin)).sum()
             };
             let likeliest = outputs.iter().copied().max_by_key(sum);
-            likeliest.and_then(|output| by_output.get_mut(output)).into_iter().for_each(|of| of.pools.push(rows.clone()));
+            likeliest
+                .and_then(|output| by_output.get_mut(output))
+                .into_iter()
+                .for_each(|of| of.pools.push(rows.clone()));
         }
     }
     by_output

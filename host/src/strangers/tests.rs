@@ -296,11 +296,16 @@ fn few_recordings_state_the_share_of_false_alarms_that_they_support() {
     assert!((found.supported - (1.0 - 0.05_f64.powf(1.0 / found.sequences as f64))).abs() < 2e-6, "{found:?}");
     let none = calibrate_recorded(&model, &of(0..KNOWN, 30_000, 2), &of_robot(4, 5), &shapes(), &settings);
     let none = none.unwrap_err();
-    let Some(EvaluateProblem::TooFewRecorded { object, approaches: 4, tested: 2, enough: Some(enough) }) = none.problem() else {
+    let Some(EvaluateProblem::TooFewRecorded { object, approaches: 4, tested: 2, enough: Some(enough) }) =
+        none.problem()
+    else {
         panic!("{none}")
     };
     let said = none.to_string();
-    assert!(said.starts_with(&format!("the 4 recorded approaches to {object} make no sequence that ends with a name")), "{said}");
+    assert!(
+        said.starts_with(&format!("the 4 recorded approaches to {object} make no sequence that ends with a name")),
+        "{said}"
+    );
     // Three objects with a sequence each: 1 - .05^(1/3).
     assert!(said.contains("supports a false alarm rate of 63.16 %, and 2 % takes about"), "{said}");
     // As many approaches as it says make one.

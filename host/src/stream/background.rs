@@ -63,14 +63,17 @@ pub(super) fn test<'s>(
 fn problem(error: Error, parts: &Parts<'_>, settings: &strangers::Settings) -> Error {
     let strangers::Settings { alarms, confidence, .. } = *settings;
     match error.problem() {
-        Some(&EvaluateProblem::TooFewForAlarms { object_sequences, needed, .. }) if object_sequences as u64 >= needed => {
+        Some(&EvaluateProblem::TooFewForAlarms { object_sequences, needed, .. })
+            if object_sequences as u64 >= needed =>
+        {
             CalibrateProblem::TooManyAlarms { found: object_sequences as u64, alarms }.into()
         }
         Some(EvaluateProblem::TooFewForAlarms { .. } | EvaluateProblem::TooFewForMisfit { .. }) => {
             // Three quarters of the part that is for the test are tested on.
             let needed = needed(alarms, confidence) as f64 / (0.75 * TESTED * parts.share_tested());
             let needed = needed.ceil() as u64;
-            CalibrateProblem::TooFewForTest { found: parts.units as u64, needed, alarms, groups: parts.has_groups }.into()
+            CalibrateProblem::TooFewForTest { found: parts.units as u64, needed, alarms, groups: parts.has_groups }
+                .into()
         }
         _ => error,
     }

@@ -6,8 +6,8 @@ use super::settings::Settings;
 use super::shape::{self, Fitted, Gain, STRICTEST};
 use super::{Rows, check, follow};
 use crate::calibrate::{
-    Begin, Chosen, Grouped, Odds, OfObject, Per, Sequence, Stop, Tally, Terms, Until, Way, Worse, choose_groups, choose_independent,
-    margin_of, share_tested, worse,
+    Begin, Chosen, Grouped, Odds, OfObject, Per, Sequence, Stop, Tally, Terms, Until, Way, Worse, choose_groups,
+    choose_independent, margin_of, share_tested, worse,
 };
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};

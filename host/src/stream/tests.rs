@@ -398,7 +398,8 @@ fn a_test_for_strangers_names_no_more_rows_between_the_classes_than_no_test() {
         let settings = Settings { rate: 0.1, per, ..Settings::default() };
         let without = calibrate(&model, &made, &settings, &()).unwrap();
         let named = |calibrated: &[u8]| {
-            let found = evaluate_ends(&compile::open(calibrated).unwrap(), &Rows::new(&model, &idle).unwrap(), &idle.sequences);
+            let found =
+                evaluate_ends(&compile::open(calibrated).unwrap(), &Rows::new(&model, &idle).unwrap(), &idle.sequences);
             (500.0 * (1.0 - found.undecided - found.unknown)).round() as u32
         };
         for background in [None, Some(5.0)] {
@@ -421,8 +422,15 @@ fn names_that_a_test_never_lets_be_given_are_no_lack_of_sequences() {
     let strangers = Some(Strangers::new(certain, &model, None).unwrap());
     let settings = Settings { rate: 0.05, strangers, ..Settings::default() };
     let refused = calibrate(&model, &short, &settings, &()).unwrap_err().to_string();
-    assert!(refused.starts_with("0 names given in ") && refused.contains(" sequences are too few to promise 5 %"), "{refused}");
-    assert!(refused.contains("from row ") && refused.contains("and the longest sequence has 12. Give sequences of more rows"), "{refused}");
+    assert!(
+        refused.starts_with("0 names given in ") && refused.contains(" sequences are too few to promise 5 %"),
+        "{refused}"
+    );
+    assert!(
+        refused.contains("from row ")
+            && refused.contains("and the longest sequence has 12. Give sequences of more rows"),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -430,7 +438,8 @@ fn sequences_that_are_too_few_for_a_test_of_strangers_are_counted_as_sequences()
     let model = compile::open(&MODEL).unwrap();
     let settings = Settings { rate: 0.1, strangers: Some(strangers(None)), ..Settings::default() };
     let refused = calibrate(&model, &sequences(Kind::Independent, 400, 40, 3), &settings, &()).unwrap_err().to_string();
-    let expected = "400 sequences are too few for a test of strangers with at most 2 % false alarms: at least 619 are needed";
+    let expected =
+        "400 sequences are too few for a test of strangers with at most 2 % false alarms: at least 619 are needed";
     assert!(refused.starts_with(expected), "{refused}");
     // As many as are needed are enough, even if one class is rare.
     let mut enough = sequences(Kind::Independent, 960, 40, 3);
@@ -457,8 +466,9 @@ fn a_refusal_states_the_names_that_were_seen_and_how_many_it_takes() {
         .collect();
     println!("{refusals:#?}");
     let stated = |refusal: &&String| {
-        refusal.contains(" 1 wrong, are too few to know whether 5 % is kept: with 1 wrong it takes 93, and fewer the fewer")
-            && refusal.contains(" names given in 75 sequences,")
+        refusal.contains(
+            " 1 wrong, are too few to know whether 5 % is kept: with 1 wrong it takes 93, and fewer the fewer",
+        ) && refusal.contains(" names given in 75 sequences,")
             && refusal.ends_with("Record more sequences, or promise a higher error rate.")
     };
     assert!(refusals.iter().filter(stated).count() >= 3);
@@ -515,7 +525,9 @@ fn the_guides_least_numbers_are_those_of_the_test() {
 fn forgetting_helps_if_it_makes_fewer_names_wrong_than_chance_explains() {
     let point = |error: f64| Point { rows: 10.0, error, named: 1.0 };
     let switched = |changed: [f64; 2]| Switched { nats: 3.0, unchanged: [point(0.05); 2], changed: changed.map(point) };
-    for (changed, expected) in [([0.4147, 0.4150], false), ([0.4147, 0.40], false), ([0.4147, 0.2], true), ([0.1, 0.3], false)] {
+    for (changed, expected) in
+        [([0.4147, 0.4150], false), ([0.4147, 0.40], false), ([0.4147, 0.2], true), ([0.1, 0.3], false)]
+    {
         assert_eq!(switched(changed).helps(2_000), expected, "{changed:?}");
     }
 }

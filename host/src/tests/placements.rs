@@ -282,7 +282,10 @@ fn recordings_that_state_placements_are_refused_by_models_of_floating_objects() 
     let error = Margins::new(Candidate::Full(&ensemble), &recorded(&touched, true)).err().unwrap();
     assert!(matches!(error.problem(), Some(ProbeProblem::Differs { .. })), "{error}");
     assert!(error.to_string().contains("scene floating and table"), "{error}");
-    assert!(Margins::new(Candidate::Full(&ensemble), &recorded(&touched, false)).is_ok(), "nothing says where they are from");
+    assert!(
+        Margins::new(Candidate::Full(&ensemble), &recorded(&touched, false)).is_ok(),
+        "nothing says where they are from"
+    );
     let compared = compare(&recorded(&touched, true), &dataset, &compare::Settings::default(), &());
     assert!(compared.unwrap_err().to_string().contains("simulated objects float"));
 }
@@ -313,7 +316,10 @@ fn a_promise_for_a_table_is_tested_on_recordings_with_and_without_placements() {
         // Too few: the advice is of what was recorded.
         let few = recorded.each(|own| own.select(0..40));
         let error = calibrate_recorded(&model, simulated.clone(), &few, &settings, &()).unwrap_err().to_string();
-        assert!(error.contains(if is_stated { "to brick/" } else { "to brick" }) || error.contains(" to disc"), "{error}");
+        assert!(
+            error.contains(if is_stated { "to brick/" } else { "to brick" }) || error.contains(" to disc"),
+            "{error}"
+        );
         assert!(is_stated || !error.contains("/+z"), "{error}");
     }
     let mut partly = recorded(&of_robot, true).matching(&compiled.names());

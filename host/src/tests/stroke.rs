@@ -76,7 +76,11 @@ fn touches_of_the_models_stroke_are_taken_and_of_another_refused_with_both_value
     for (model, dataset, parts) in [
         (&unlimited, lines(&short), ["the model has no stroke", "no contact is later than 0.2"]),
         (&unlimited, recorded(&short, None), ["the model has no stroke", "no contact is later than 0.2"]),
-        (&limited, lines(&long), ["a stroke of 2 (0.200 s), which explains contacts up to 0.204 s", "contacts come up to "]),
+        (
+            &limited,
+            lines(&long),
+            ["a stroke of 2 (0.200 s), which explains contacts up to 0.204 s", "contacts come up to "],
+        ),
         (&limited, recorded(&long, None), ["a stroke of 2 (0.200 s)", "contacts come up to "]),
         (&limited, lines(&captured(Some(1.0), 2)), ["a stroke of 2 (0.200 s)", "no contact is later than 0.1"]),
     ] {

@@ -124,8 +124,8 @@ impl TrainedProbe {
     /// The section's content: of these bytes the first [`length`](Self::length).
     pub fn to_bytes(self) -> [u8; Self::WITH_TOLERANCE] {
         let [radius, spacing, speed] = [self.radius, self.spacing, self.speed].map(f32::to_le_bytes);
-        let [stroke, travel, tolerance] = [self.stroke, self.travel, self.stroke_tolerance]
-            .map(|length| length.unwrap_or_default().to_le_bytes());
+        let [stroke, travel, tolerance] =
+            [self.stroke, self.travel, self.stroke_tolerance].map(|length| length.unwrap_or_default().to_le_bytes());
         let [low, high] = self.cone.to_le_bytes();
         let numbers = [radius, spacing, speed, [self.length.code(), 0, low, high], stroke, travel, tolerance];
         let mut bytes = [0; Self::WITH_TOLERANCE];

@@ -16,7 +16,7 @@ use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::strangers::{self, Found};
 use palpate::touches::Dataset;
-use palpate::wording::{self, count, decimal, rate};
+use palpate::wording::{self, count, decimal};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

@@ -1,7 +1,8 @@
 //! The figures of an evaluation as JSON and as text.
 
 use palpate::evaluate::{
-    ActiveFacts, AlarmCheck, Approaches, Confusion, Evaluated, Evaluation, Finding, PromiseCheck, Rule, Strangers, Switched,
+    ActiveFacts, AlarmCheck, Approaches, Confusion, Evaluated, Evaluation, Finding, PromiseCheck, Rule, Strangers,
+    Switched,
 };
 use palpate::wording::{self, count, counted, rate};
 use palpate_shared::DIRECTIONS;
@@ -151,16 +152,19 @@ fn alarms_text(check: &AlarmCheck) -> String {
     let above = check.above.iter().map(|(name, share)| format!("{name} {:.1} %", 100.0 * share));
     let above = above.collect::<Vec<_>>().join(", ");
     format!(
-        "\nKnown objects taken for unknown. Promised: at most {} % ({} % sure, from {} sequences). Measured: {:.2} % ± {:.2}: {}.{}\n",
-        percent(check.promised),
-        percent(check.confidence),
-        check.sequences,
+        "\nKnown objects taken for unknown. Promised: at most {} ({} sure, from {} sequences). Measured: {:.2} % ± {:.2}: {}.{}\n",
+        rate(check.promised),
+        rate(check.confidence),
+        count(check.sequences),
         100.0 * check.found,
         100.0 * check.standard_error,
         match check.finding {
             Finding::Kept => "the promise is kept".to_owned(),
             Finding::Unclear => {
-                format!("{:.2} points above what is promised, which may be chance", 100.0 * (check.found - check.promised))
+                format!(
+                    "{:.2} points above what is promised, which may be chance",
+                    100.0 * (check.found - check.promised)
+                )
             }
             Finding::Broken => {
                 format!("the promise is broken by {:.2} points", 100.0 * (check.found - check.promised))

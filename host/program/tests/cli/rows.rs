@@ -636,7 +636,8 @@ fn sequences_of_rows_are_calibrated_evaluated_and_recognized_verdict_after_verdi
     assert!(text.contains("promised: at most 10 % wrong") && text.contains("no name"), "{text}");
     let streamed = run(["recognize", &sure, &unseen, "--features", "--add-up"]);
     let note = String::from_utf8_lossy(&streamed.stderr).into_owned();
-    let about = "nothing says where a sequence ends (--sequence-column), so the promise of 10 % is for the first verdict alone";
+    let about =
+        "nothing says where a sequence ends (--sequence-column), so the promise of 10 % is for the first verdict alone";
     assert_eq!(note.matches(about).count(), 1, "{note}");
     let said = stdout(streamed);
     assert!(said.lines().filter(|line| line.contains("recognized")).count() > 100, "{said}");
@@ -708,17 +709,35 @@ fn a_promise_for_groups_says_when_none_are_given_and_copies_are_noted() {
         stdout(run([&["calibrate", &model, &fresh, "-o", &sure, "--error-rate", "20%"][..], &columns, more].concat()))
     };
     let text = calibrate(&groups);
-    assert!(text.starts_with("Promised: at most 20 % of all names given, on average, wrong in new groups, with a confidence of 95 %"), "{text}");
-    assert!(text.contains("of all calibrations, those included that promise nothing, at most 5 % promise what does not hold"), "{text}");
+    assert!(
+        text.starts_with(
+            "Promised: at most 20 % of all names given, on average, wrong in new groups, with a confidence of 95 %"
+        ),
+        "{text}"
+    );
+    assert!(
+        text.contains(
+            "of all calibrations, those included that promise nothing, at most 5 % promise what does not hold"
+        ),
+        "{text}"
+    );
     let evaluate = |more: &[&str]| stdout(run([&["evaluate", &sure, &fresh][..], &columns, more].concat()));
     assert!(evaluate(&groups).contains(" were, each group weighing the same: "), "{}", evaluate(&groups));
     let alone = evaluate(&[]);
-    assert!(alone.contains(" were, each sequence as a group of its own, as none are given (--group-column): "), "{alone}");
+    assert!(
+        alone.contains(" were, each sequence as a group of its own, as none are given (--group-column): "),
+        "{alone}"
+    );
     // There are as many different rows as the fixture has, so that sequences repeat.
-    let copied = format!("{made}{}\n", lines.lines().take(600).map(|line| format!("c{line}")).collect::<Vec<_>>().join("\n"));
+    let copied =
+        format!("{made}{}\n", lines.lines().take(600).map(|line| format!("c{line}")).collect::<Vec<_>>().join("\n"));
     std::fs::write(&fresh, copied).unwrap();
     let text = calibrate(&[]);
-    assert!(text.contains("\nnote: ") && text.contains(" of 400 sequences are copies, value by value, of others under another id"), "{text}");
+    assert!(
+        text.contains("\nnote: ")
+            && text.contains(" of 400 sequences are copies, value by value, of others under another id"),
+        "{text}"
+    );
 }
 
 #[test]

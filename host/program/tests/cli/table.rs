@@ -69,7 +69,8 @@ fn recordings_on_a_table_are_taken_by_every_command_with_their_placements_or_wit
         let found = evaluated["per_object"].as_object().unwrap();
         assert_eq!(found.len(), names, "{evaluated}");
         assert!(evaluated["accuracy"]["20"].as_f64().unwrap() > 0.8, "{evaluated}");
-        let checked = json(palpate(at, &format!("data check {recorded} data --descriptor gravity --sequences 100 --json")));
+        let checked =
+            json(palpate(at, &format!("data check {recorded} data --descriptor gravity --sequences 100 --json")));
         assert_eq!(checked["objects"].as_array().unwrap().len(), names, "{checked}");
         stdout(palpate(at, &format!("data check {recorded}")));
         let calibrate = format!(
@@ -96,7 +97,10 @@ fn a_probe_over_a_table_is_fitted_from_objects_that_stand_on_it() {
         stdout(palpate(at, &format!("data record {file} -o recorded --object {named} --pose")));
     }
     let error = stderr(palpate(at, "probe fit recorded bowl mouse -o probe.toml"), 2);
-    assert!(error.contains("scene is floating. Use table: the recordings state placements on one, such as bowl/"), "{error}");
+    assert!(
+        error.contains("scene is floating. Use table: the recordings state placements on one, such as bowl/"),
+        "{error}"
+    );
     let error = stderr(palpate(at, "probe fit recorded bowl mouse -o probe.toml --cone 45"), 2);
     assert!(error.contains("--scene table"), "{error}");
     let said = stdout(palpate(at, "probe fit recorded bowl mouse -o probe.toml --scene table --approaches 8000"));
@@ -114,7 +118,10 @@ fn names_of_placements_that_cannot_be_are_refused_by_name() {
     for object in ["bowl/", "/+z", "bowl/+z/2", "bowl/..", "a\\b/+z"] {
         let words = ["data", "record", "lines.txt", "-o", "out", "--object", object];
         let error = stderr(crate::command(words).current_dir(at).output().unwrap(), 1);
-        assert!(error.contains("no file can be named after") && error.contains("OBJECT/PLACEMENT"), "{object}: {error}");
+        assert!(
+            error.contains("no file can be named after") && error.contains("OBJECT/PLACEMENT"),
+            "{object}: {error}"
+        );
     }
     assert!(!at.join("out/dataset.json").exists());
 }

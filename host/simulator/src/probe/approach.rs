@@ -44,15 +44,7 @@ pub struct Probe {
 /// The published probe: radius 0.15, spacing 1.5, 10 units per second, ±10°, and a hand that goes on past the object.
 impl Default for Probe {
     fn default() -> Self {
-        Self {
-            radius: 0.15,
-            spacing: 1.5,
-            speed: 10.0,
-            tilt: 10.0,
-            stroke: None,
-            travel: None,
-            stroke_tolerance: None,
-        }
+        Self { radius: 0.15, spacing: 1.5, speed: 10.0, tilt: 10.0, stroke: None, travel: None, stroke_tolerance: None }
     }
 }
 

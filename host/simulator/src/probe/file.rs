@@ -134,7 +134,8 @@ impl ProbeFile {
     }
 
     fn of(document: &Document) -> Self {
-        let Document { unit, radius, spacing, speed, tilt, stroke, stroke_tolerance, travel, timer, ref real } = *document;
+        let Document { unit, radius, spacing, speed, tilt, stroke, stroke_tolerance, travel, timer, ref real } =
+            *document;
         let real = Noise {
             deviation: real.noise.unwrap_or_default(),
             timer: real.timer.or(timer).unwrap_or_default(),
