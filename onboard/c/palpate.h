@@ -685,7 +685,8 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
             if (trees > limit >> bits >> shift) {
                 return palpate_wrong_(model, PALPATE_MARGIN_RANGE, model->bytes + 8);
             }
-            range += trees << (bits + shift);
+            /* By 32 bits or more only where there is no tree. */
+            range += trees << ((bits + shift) & 31);
             range = range > limit ? limit + 1 : range;
         }
         if (one == 0) {

@@ -2,7 +2,7 @@
 
 use crate::abuse::places;
 use crate::scripts::sealed;
-use palpate_shared::format::{HEADER_LENGTH, MUST_UNDERSTAND, VERSION};
+use palpate_shared::format::{HEADER_LENGTH, Layout, MUST_UNDERSTAND, VERSION};
 use rand::RngExt;
 use rand::rngs::SmallRng;
 
@@ -288,7 +288,8 @@ fn damage_anywhere(bytes: &mut Vec<u8>, rng: &mut SmallRng) {
 
 /// Every section of the models cut to every length from 0 to its own and grown by up to four bytes, as it is and with small numbers at
 /// its start; before other sections, and the last one before margins that are all 0: what is read behind it then is in order. Then
-/// every byte of headers, axes, groups and what sections start with, at every limit, in sections that are long enough for any count, too.
+/// every byte of headers, axes, groups and what sections start with, at every limit, in sections that are long enough for any count, too;
+/// and groups of no trees with every shift.
 pub fn sweep(models: &[Parts], rng: &mut SmallRng) -> Vec<(Vec<u8>, String)> {
     let mut all = Vec::new();
     for (number, model) in models.iter().enumerate() {
@@ -306,6 +307,12 @@ pub fn sweep(models: &[Parts], rng: &mut SmallRng) -> Vec<(Vec<u8>, String)> {
                 bytes[at] = value;
                 all.push((parts.bytes(), format!("model {number}; byte {at} of place {place} is {value}")));
             }
+        }
+        for shift in 0..=32 {
+            let mut parts = model.clone();
+            let depth = u8::from(parts.header[6] == Layout::Complete.code());
+            parts.parts[4].splice(..0, [depth, shift, 0, 0, 0, 0, 0, 0]);
+            all.push((parts.bytes(), format!("model {number}; no trees with a shift of {shift}")));
         }
         for section in 0..model.sections.len() {
             let (tag, ref content) = model.sections[section];

@@ -1,9 +1,9 @@
 //! `onboard/c/palpate.h` gives the bits that the crate gives: on this machine, under sanitizers, and on emulated chips.
 
-use palpate::compile::{Language, Restated, emit, restate};
+use palpate::compile::{Language, Layout, Leaf, Restated, emit, restate};
 use palpate_onboard::{Model, Verdict};
 use palpate_shared::format::{Tag, Temperature};
-use palpate_tests::abuse::{cuts, forgetful, snapshot};
+use palpate_tests::abuse::{self, cuts, forgetful, snapshot};
 use palpate_tests::mutants::{Parts, mutant, sweep};
 use palpate_tests::replay::{MARGINS_LEFT_OPEN, NAMES_LEFT_OPEN, Script, is_specified};
 use palpate_tests::scripts::{all_models, models, play, script};
@@ -145,7 +145,10 @@ fn set(name: &str) -> Option<u64> {
 /// Damaged models, and what was done to each: all of it follows from the seed and the batch's number. The first batch is a sweep.
 fn batch(models: &[Parts], seed: u64, number: u64) -> Vec<(Vec<u8>, String)> {
     if number == 0 {
-        let models: Vec<Parts> = cuts().into_iter().map(|(_, base, _)| Parts::of(&base)).collect();
+        let of_i8 = cuts().into_iter().map(|(_, base, _)| base);
+        let of_i16 =
+            [Layout::Compact, Layout::Complete, Layout::Wide].map(|layout| abuse::model(layout, Leaf::I16, false));
+        let models: Vec<Parts> = of_i8.chain(of_i16).map(|base| Parts::of(&base)).collect();
         return sweep(&models, &mut SmallRng::seed_from_u64(seed));
     }
     let mut rng = SmallRng::seed_from_u64(seed.wrapping_mul(1 << 32).wrapping_add(number));
