@@ -105,10 +105,19 @@
 #define PALPATE_U32_ PALPATE_APART_
 #endif
 
+/* f32 values are added as f32. 16 and 32 say that only narrower types are evaluated in a wider one; -1 that nothing is known. */
 #if PALPATE_LEAVES & PALPATE_F32
 #include <float.h>
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD > 0
-#error "f32 leaves are added in f32: compile without excess precision (-mfpmath=sse), or without PALPATE_F32"
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16 && FLT_EVAL_METHOD != 32
+#if defined(__i386__) || defined(_M_IX86)
+#error "f32 leaves are added in f32, but this compiler may add in more: compile with -msse2 -mfpmath=sse, or export with --leaf i16 and leave PALPATE_F32 out of PALPATE_LEAVES"
+#elif defined(__FAST_MATH__)
+#error "f32 leaves are added in f32, but this compiler may add in more: compile without -ffast-math, or export with --leaf i16 and leave PALPATE_F32 out of PALPATE_LEAVES"
+#elif defined(__GNUC__)
+#error "f32 leaves are added in f32, but this compiler may add in more: compile with -std=gnu99 or -fexcess-precision=fast where that helps, or export with --leaf i16 and leave PALPATE_F32 out of PALPATE_LEAVES"
+#else
+#error "f32 leaves are added in f32, but this compiler may add in more: export with --leaf i16 and leave PALPATE_F32 out of PALPATE_LEAVES"
+#endif
 #endif
 #endif
 
@@ -116,6 +125,8 @@
 #define PALPATE_MISSING UINT32_MAX
 /* A feature that is missing. */
 #define PALPATE_MISSING_FEATURE INT32_MIN
+/* A class that is none, where there was no room for margins. */
+#define PALPATE_NO_CLASS UINT16_MAX
 /* The most features of a touch. */
 #define PALPATE_TOUCH_FEATURES 10
 /* 1 as a posterior. */
@@ -135,7 +146,7 @@ typedef enum {
     PALPATE_NOT_UNDERSTOOD,  /* a section that must be understood, and is not */
     PALPATE_MARGIN_RANGE,    /* margins could overflow */
     PALPATE_NOT_BUILT_IN,    /* not in PALPATE_LAYOUTS (place 6) or PALPATE_LEAVES (place 7) */
-    PALPATE_TOO_MANY_OBJECTS, /* more than PALPATE_MAX_OBJECTS (place 14) */
+    PALPATE_TOO_MANY_OBJECTS, /* more than a recognizer (palpate_start, place 14) or a call has room for; none for palpate_open */
     PALPATE_NEEDS_CODE       /* its trees are a function, which palpate_open_code takes */
 } palpate_error;
 
@@ -250,6 +261,24 @@ enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPAT
 #define PALPATE_IS_I16_(model) PALPATE_IS_LEAF_(model, PALPATE_I16, 1)
 #define PALPATE_IS_F32_(model) PALPATE_IS_LEAF_(model, PALPATE_F32, 2)
 
+/* ---- Lengths ---- */
+
+/* Bytes between two places. */
+static inline uint32_t palpate_between_(const uint8_t *start, const uint8_t *end)
+{
+    /* As a size first: where pointers have 16 bits, a difference above 32,767 is negative. */
+    const size_t length = PALPATE_AS_(size_t, end - start);
+    return PALPATE_AS_(uint32_t, length);
+}
+
+/* True if `rest` bytes hold `head` bytes, and after them `count` pieces of `size` bytes. Every length that a model states is
+ * compared with what is left here, and nowhere else is one subtracted. Numbers whose product may not fit 32 bits are more than any
+ * model has: 2^18 pieces, or 2^14 bytes. */
+PALPATE_NEAR_ int palpate_holds_(uint32_t rest, uint32_t head, uint32_t count, uint32_t size)
+{
+    return head <= rest && (count >> 18 | size >> 14) == 0 && count * size <= rest - head;
+}
+
 /* ---- Bytes ---- */
 
 static inline uint32_t palpate_u16_(const uint8_t *p)
@@ -261,6 +290,12 @@ PALPATE_U32_ uint32_t palpate_u32_(const uint8_t *p)
 {
     return PALPATE_AS_(uint32_t, PALPATE_BYTE(p)) | PALPATE_AS_(uint32_t, PALPATE_BYTE(p + 1)) << 8 |
            PALPATE_AS_(uint32_t, PALPATE_BYTE(p + 2)) << 16 | PALPATE_AS_(uint32_t, PALPATE_BYTE(p + 3)) << 24;
+}
+
+PALPATE_NEAR_ int32_t palpate_i32_(const uint8_t *p)
+{
+    const uint32_t number = palpate_u32_(p);
+    return PALPATE_AS_(int32_t, number);
 }
 
 /* The CRC-32 so far with one more byte; it begins with all ones, and ends inverted. */
@@ -282,7 +317,7 @@ static inline int32_t palpate_signed_(const uint8_t *p, uint_fast8_t width)
         return PALPATE_AS_(int16_t, PALPATE_AS_(uint16_t, palpate_u16_(p)));
     }
     if (width == 4) {
-        return PALPATE_AS_(int32_t, palpate_u32_(p));
+        return palpate_i32_(p);
     }
     p += width;
     number = 0u - PALPATE_AS_(uint32_t, PALPATE_BYTE(p - 1) >> 7);
@@ -308,32 +343,34 @@ static inline size_t palpate_leaf_size_(const palpate_model *model)
 
 static inline palpate_error palpate_wrong_(palpate_model *model, palpate_error error, const uint8_t *place)
 {
-    model->wrong = PALPATE_AS_(uint32_t, place - model->bytes);
+    model->wrong = palpate_between_(model->bytes, place);
     return error;
 }
 
-/* Bytes between two places. */
-static inline uint32_t palpate_between_(const uint8_t *start, const uint8_t *end)
+/* Zeros after the content of an optional section. */
+static inline uint32_t palpate_zeros_(uint32_t length)
 {
-    return PALPATE_AS_(uint32_t, end - start);
+    return (0u - length) & 3;
 }
 
-/* The next optional section of those that end at `end`: its tag as it stands there, 0x10000 if it is not whole. Its content
- * starts 8 bytes after `p`, and has `length` bytes; `p` becomes where the next one starts. */
-static inline uint32_t palpate_section_(const uint8_t **p, const uint8_t *end, uint32_t *length)
+/* True if an optional section starts at `head`, and is whole before `end`. */
+static inline int palpate_is_section_(const uint8_t *head, const uint8_t *end)
+{
+    uint32_t length;
+    if (!palpate_holds_(palpate_between_(head, end), 8, 0, 0)) {
+        return 0;
+    }
+    length = palpate_u32_(head + 4);
+    return palpate_holds_(palpate_between_(head + 8, end), length, palpate_zeros_(length), 1);
+}
+
+/* The optional section at `p`, which is whole: its tag as it stands there. Its content starts 8 bytes after `p`, and has `length`
+ * bytes; `p` becomes where the next one starts. */
+static inline uint32_t palpate_section_(const uint8_t **p, uint32_t *length)
 {
     const uint8_t *head = *p;
-    uint32_t rest = palpate_between_(head, end), size;
-    if (rest < 8) {
-        return 0x10000u;
-    }
-    rest -= 8;
-    size = palpate_u32_(head + 4);
-    if (size > rest || ((0u - size) & 3) > rest - size) {
-        return 0x10000u;
-    }
-    *length = size;
-    *p = head + 8 + size + ((0u - size) & 3);
+    *length = palpate_u32_(head + 4);
+    *p = head + 8 + *length + palpate_zeros_(*length);
     return palpate_u16_(head);
 }
 
@@ -363,7 +400,8 @@ static inline int palpate_check_strangers_(palpate_model *model, const uint8_t *
     const uint8_t *record = content + 44;
     uint32_t rivals, size, first;
     uint_fast16_t object;
-    if (length < 4 || PALPATE_BYTE(content) > 1 || PALPATE_BYTE(content + 1) > 1 || model->objects == PALPATE_BYTE(content)) {
+    if (!palpate_holds_(length, 4, 0, 0) || PALPATE_BYTE(content) > 1 || PALPATE_BYTE(content + 1) > 1 ||
+        model->objects == PALPATE_BYTE(content)) {
         return 0;
     }
     model->strangers_ = content;
@@ -371,16 +409,15 @@ static inline int palpate_check_strangers_(palpate_model *model, const uint8_t *
     if (PALPATE_BYTE(content + 1) == 0) {
         return 1;
     }
-    if (length < 44) {
+    if (!palpate_holds_(length, 44, 0, 0)) {
         return 0;
     }
     rivals = PALPATE_BYTE(content + 5);
     size = palpate_record_(rivals);
     first = palpate_u32_(content + 8);
     if (PALPATE_BYTE(content + 4) - 1u > 1 || rivals - 1 > 15 || first == 0 || palpate_u32_(content + 12) < first ||
-        PALPATE_AS_(int32_t, palpate_u32_(content + 24)) > PALPATE_AS_(int32_t, palpate_u32_(content + 16)) ||
-        palpate_u32_(content + 20) >> 31 != 0 ||
-        size * model->known > length - 44) {
+        palpate_i32_(content + 24) > palpate_i32_(content + 16) || palpate_u32_(content + 20) >> 31 != 0 ||
+        !palpate_holds_(length, 44, model->known, size)) {
         return 0;
     }
     for (object = 0; object < model->known; object++) {
@@ -401,7 +438,7 @@ static inline int palpate_check_row_(palpate_model *model, const uint8_t *conten
 {
     uint32_t start, i;
     uint8_t dropped, between, scale, last;
-    if (length < 8) {
+    if (!palpate_holds_(length, 8, 0, 0)) {
         return 0;
     }
     start = palpate_u32_(content);
@@ -410,8 +447,8 @@ static inline int palpate_check_row_(palpate_model *model, const uint8_t *conten
     between = PALPATE_BYTE(content + 5);
     scale = PALPATE_BYTE(content + 6);
     last = PALPATE_BYTE(content + 7);
-    if (last == 0 || last > 128 || length - 9 < last || start > 0x40000000u || between > 15 || dropped + between > 26 ||
-        between + scale > 22 || model->descriptor != 255) {
+    if (last == 0 || last > 128 || !palpate_holds_(length, 9, last, 1) || start > 0x40000000u || between > 15 ||
+        dropped + between > 26 || between + scale > 22 || model->descriptor != 255) {
         return 0;
     }
     for (i = 8; i < 8u + last; i++) {
@@ -420,7 +457,7 @@ static inline int palpate_check_row_(palpate_model *model, const uint8_t *conten
         }
     }
     model->row_ = content;
-    model->row_start_ = PALPATE_AS_(int32_t, palpate_u32_(content));
+    model->row_start_ = palpate_i32_(content);
     model->row_most_ = (PALPATE_AS_(uint32_t, last) << between) - 1;
     return 1;
 }
@@ -430,7 +467,7 @@ static inline int palpate_check_row_(palpate_model *model, const uint8_t *conten
 static inline int palpate_check_outputs_(const palpate_model *model, const uint8_t *content, uint32_t length)
 {
     uint_fast16_t most = 0, count = 0, before = 0, i;
-    if (length < 4 + 4 * PALPATE_AS_(uint32_t, model->objects)) {
+    if (!palpate_holds_(length, 4, model->objects, 4)) {
         return 0;
     }
     for (i = 0; i < model->objects; i++) {
@@ -453,12 +490,13 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
     uint32_t last = 0;
     while (p != end) {
         const uint8_t *content = p + 8;
-        uint32_t length = 0, least = 0, tag, pairs;
+        /* What the content has at least: so many bytes, and so many pieces. */
+        uint32_t length, tag, least = 0, pieces = 0, piece = 0;
         palpate_wrong_(model, PALPATE_OK, p);
-        tag = palpate_section_(&p, end, &length);
-        if (tag > 0xffff) {
+        if (!palpate_is_section_(p, end)) {
             return PALPATE_SECTION;
         }
+        tag = palpate_section_(&p, &length);
         if ((tag & 0x7fff) <= last) {
             return PALPATE_FIELD;
         }
@@ -469,24 +507,26 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
             least = 16;
             break;
         case 2:
-            if (length < 8 || !palpate_trained_(model, content)) {
+            if (!palpate_holds_(length, 8, 0, 0) || !palpate_trained_(model, content)) {
                 return PALPATE_FIELD;
             }
             break;
         case 5:
             model->odds_ = content;
-            least = 4 * PALPATE_AS_(uint32_t, model->objects);
+            pieces = model->objects;
+            piece = 4;
             break;
         case 7: /* plan: pairs of objects, 26 directions with 1, 2 or 4 rolls */
-            pairs = PALPATE_AS_(uint32_t, model->objects) * (model->objects - 1u) / 2;
-            if (length < 4 || pairs == 0 || PALPATE_BYTE(content) != 0) {
+            least = 4;
+            pieces = PALPATE_AS_(uint32_t, model->objects) * (model->objects - 1u) / 2;
+            if (!palpate_holds_(length, least, 0, 0) || pieces == 0 || PALPATE_BYTE(content) != 0) {
                 return PALPATE_FIELD;
             }
-            least = PALPATE_BYTE(content + 1);
-            if (least != 1 && least != 2 && least != 4) {
+            piece = PALPATE_BYTE(content + 1);
+            if (piece != 1 && piece != 2 && piece != 4) {
                 return PALPATE_FIELD;
             }
-            least = 4 + pairs * 26 * least;
+            piece *= 26;
             break;
         default:
             if (PALPATE_STRANGERS && last == 6) {
@@ -495,27 +535,31 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 }
             } else if (PALPATE_SHARED && (PALPATE_LAYOUTS & 11) != 0 && last == 12) {
                 /* Tables of margins have no leaves to share. */
-                if (length < 4 || PALPATE_BYTE(content) - 1u > 1 || PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model)) {
+                if (!palpate_holds_(length, 4, 0, 0) || PALPATE_BYTE(content) - 1u > 1 || PALPATE_IS_GRID_(model) ||
+                    PALPATE_IS_PATTERNS_(model)) {
                     return PALPATE_FIELD;
                 }
                 model->table_ = content + 4;
             } else if (last == 13) {
                 /* The prediction: a link, a rule for ties, a scale that is positive and finite. */
-                if (length < 8 || PALPATE_BYTE(content) > 4 || PALPATE_BYTE(content + 1) > 1 ||
+                if (!palpate_holds_(length, 8, 0, 0) || PALPATE_BYTE(content) > 4 || PALPATE_BYTE(content + 1) > 1 ||
                     palpate_u32_(content + 4) - 1 >= 0x7f7fffffu) {
                     return PALPATE_FIELD;
                 }
             } else if (PALPATE_SENTINEL && last == 14) {
-                if (length < 8 || PALPATE_AS_(int32_t, palpate_u32_(content)) > PALPATE_AS_(int32_t, palpate_u32_(content + 4))) {
+                if (!palpate_holds_(length, 8, 0, 0) || palpate_i32_(content) > palpate_i32_(content + 4)) {
                     return PALPATE_FIELD;
                 }
                 model->sentinel_ = content;
             } else if (PALPATE_ROW_EVIDENCE && last == 4) {
                 /* Weights by the number of touches or rows. */
-                if (length < 2 || PALPATE_BYTE(content) - 1u > 63 || length - 2 < 2u * PALPATE_BYTE(content)) {
+                least = 2;
+                if (!palpate_holds_(length, least, 0, 0) || PALPATE_BYTE(content) - 1u > 63) {
                     return PALPATE_FIELD;
                 }
                 model->weights_ = content;
+                pieces = PALPATE_BYTE(content);
+                piece = 2;
             } else if (PALPATE_ROW_EVIDENCE && last == 16) {
                 if (!palpate_check_row_(model, content, length)) {
                     return PALPATE_FIELD;
@@ -536,7 +580,7 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 return PALPATE_NOT_UNDERSTOOD;
             }
         }
-        if (length < least) {
+        if (!palpate_holds_(length, least, pieces, piece)) {
             return PALPATE_FIELD;
         }
     }
@@ -550,17 +594,16 @@ static inline palpate_error palpate_check_axes_(palpate_model *model)
     const uint8_t *cuts = model->cuts_;
     uint_fast16_t columns = 0;
     for (; axis != model->cuts_; axis += 4) {
-        uint8_t kind = PALPATE_BYTE(axis + 1), width = PALPATE_BYTE(axis + 2);
-        uint32_t size = PALPATE_AS_(uint32_t, width) * PALPATE_BYTE(axis + 3);
+        uint8_t kind = PALPATE_BYTE(axis + 1), width = PALPATE_BYTE(axis + 2), count = PALPATE_BYTE(axis + 3);
         int32_t last = INT32_MIN;
         columns += 1u + (kind == 3);
         if (kind - 1u > 2 || width - 1u > 3 || PALPATE_BYTE(axis) >= model->features || columns > 256) {
             return palpate_wrong_(model, PALPATE_FIELD, axis);
         }
-        if (size > palpate_between_(cuts, end)) {
+        if (!palpate_holds_(palpate_between_(cuts, end), 0, count, width)) {
             return palpate_wrong_(model, PALPATE_SECTION, cuts);
         }
-        for (; size != 0; size -= width) {
+        for (; count != 0; count--) {
             const int32_t next = palpate_signed_(cuts, width);
             if (next < last) {
                 return palpate_wrong_(model, PALPATE_FIELD, axis);
@@ -609,14 +652,15 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
     uint_fast16_t object;
     uint_fast8_t shift = 24;
     if (PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model)) {
-        uint32_t size = palpate_cells_(model) * model->objects * PALPATE_AS_(uint32_t, palpate_leaf_size_(model));
-        if (size == 0) {
+        const uint32_t cells = palpate_cells_(model);
+        const uint32_t size = model->objects * PALPATE_AS_(uint32_t, palpate_leaf_size_(model));
+        if (cells == 0) {
             return palpate_wrong_(model, PALPATE_SECTION, model->part_[PALPATE_AXES_]);
         }
-        if (size > palpate_between_(leaves, end)) {
+        if (!palpate_holds_(palpate_between_(leaves, end), 0, cells, size)) {
             return palpate_wrong_(model, PALPATE_SECTION, leaves);
         }
-        leaves += size;
+        leaves += cells * size;
         if (group != splits) {
             return palpate_wrong_(model, PALPATE_SECTION, group);
         }
@@ -638,7 +682,8 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
             if (trees > limit >> bits >> shift) {
                 return palpate_wrong_(model, PALPATE_MARGIN_RANGE, model->bytes + 8);
             }
-            range += trees << (bits + shift);
+            /* By 32 bits or more only where there is no tree. */
+            range += trees << ((bits + shift) & 31);
             range = range > limit ? limit + 1 : range;
         }
         if (one == 0) {
@@ -647,41 +692,32 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
         length = leaf;
         if (PALPATE_IS_SHARED_(model)) {
             leaf = PALPATE_BYTE(model->table_ - 4);
-            table = palpate_u32_(model->table_ - 8) - 4;
+            table = palpate_u32_(model->table_ - 8);
         }
-        if (PALPATE_IS_COMPLETE_(model)) {
-            if (depth - 1u > 7) {
-                return palpate_wrong_(model, PALPATE_FIELD, group);
+        if (PALPATE_IS_COMPLETE_(model) ? depth - 1u > 7 : depth != 0) {
+            return palpate_wrong_(model, PALPATE_FIELD, group);
+        }
+        for (; trees != 0 && fits; trees--) {
+            const uint32_t rest = palpate_between_(splits, model->part_[PALPATE_LEAVES_]);
+            /* A complete tree has two bytes for each leaf, others a head and their splits. */
+            uint32_t head = 0, node = 2, nodes = PALPATE_AS_(uint32_t, 1) << depth, own = nodes;
+            if (!PALPATE_IS_COMPLETE_(model)) {
+                head = 2;
+                node = PALPATE_IS_WIDE_(model) ? 6 : 3;
+                nodes = palpate_holds_(rest, head, 0, 0) ? palpate_u16_(splits) : 0;
+                own = nodes + 1;
             }
-            fits = trees <= palpate_between_(splits, model->part_[PALPATE_LEAVES_]) >> 1 >> depth &&
-                   PALPATE_AS_(uint64_t, trees << depth) * leaf <= palpate_between_(leaves, end);
+            fits = palpate_holds_(rest, head, nodes, node) && palpate_holds_(palpate_between_(leaves, end), 0, own, leaf);
             if (fits) {
-                splits += PALPATE_AS_(size_t, trees << depth) * 2;
-                leaves += PALPATE_AS_(size_t, (trees << depth) * leaf);
-            }
-        } else {
-            const uint32_t node = PALPATE_IS_WIDE_(model) ? 6 : 3;
-            if (depth != 0) {
-                return palpate_wrong_(model, PALPATE_FIELD, group);
-            }
-            for (; trees != 0 && fits; trees--) {
-                uint32_t rest = palpate_between_(splits, model->part_[PALPATE_LEAVES_]), count = 0;
-                fits = rest >= 2;
-                if (fits) {
-                    count = palpate_u16_(splits);
-                    fits = count * node <= rest - 2 && (count + 1) * leaf <= palpate_between_(leaves, end);
-                }
-                if (fits) {
-                    splits += PALPATE_AS_(size_t, count * node + 2);
-                    leaves += PALPATE_AS_(size_t, (count + 1) * leaf);
-                }
+                splits += PALPATE_AS_(size_t, head + nodes * node);
+                leaves += PALPATE_AS_(size_t, own * leaf);
             }
         }
         if (!fits) {
             return palpate_wrong_(model, PALPATE_SECTION, model->part_[PALPATE_SPLITS_]);
         }
         for (; PALPATE_IS_SHARED_(model) && number != leaves; number += leaf) {
-            if ((palpate_number_(model, number) + 1) * length > table) {
+            if (!palpate_holds_(table, 4, palpate_number_(model, number) + 1, length)) {
                 return palpate_wrong_(model, PALPATE_FIELD, number);
             }
         }
@@ -749,7 +785,7 @@ static inline uint8_t palpate_wrong_header_(palpate_model *model)
 static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *bytes, size_t length)
 {
     uint32_t lengths[7], rest, i;
-    const uint8_t *p;
+    const uint8_t *p, *end;
     palpate_error error;
     model->bytes = bytes;
     for (i = 0; i < 4 && i < length; i++) {
@@ -769,7 +805,8 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
         return palpate_wrong_(model, PALPATE_LENGTH, bytes + (length < rest ? length : PALPATE_AS_(size_t, rest)));
     }
     rest = 0xffffffffu;
-    for (p = bytes; p != bytes + (length - 4); p++) {
+    end = bytes + length;
+    for (p = bytes; p != end - 4; p++) {
         rest = palpate_crc_(rest, PALPATE_BYTE(p));
     }
     if (~rest != palpate_u32_(p)) {
@@ -792,17 +829,15 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
     lengths[PALPATE_SPLITS_] = palpate_u32_(bytes + 84);
     lengths[PALPATE_LEAVES_] = palpate_u32_(bytes + 88);
     p = bytes + 96;
-    rest = PALPATE_AS_(uint32_t, length) - 96;
     for (i = 0; i < 7; i++) {
         model->part_[i] = p;
-        if (lengths[i] > rest) {
+        if (!palpate_holds_(palpate_between_(p, end), lengths[i], 0, 0)) {
             return palpate_wrong_(model, PALPATE_SECTION, p);
         }
         p += lengths[i];
-        rest -= lengths[i];
     }
     model->part_[PALPATE_END_] = p;
-    if (rest != 4) {
+    if (palpate_between_(p, end) != 4) {
         return palpate_wrong_(model, PALPATE_SECTION, p);
     }
     model->cuts_ = model->part_[PALPATE_AXES_] + 4 * PALPATE_AS_(size_t, palpate_u16_(bytes + 16));
@@ -888,11 +923,11 @@ PALPATE_API size_t palpate_object_name(const palpate_model *model, uint16_t obje
     for (skipped = 0; text != end; skipped++) {
         length = PALPATE_BYTE(text);
         text++;
-        if (length > PALPATE_AS_(size_t, end - text)) {
+        if (!palpate_holds_(palpate_between_(text, end), 0, PALPATE_AS_(uint32_t, length), 1)) {
             length = 0;
             break;
         }
-        if (skipped == object + 1u) {
+        if (skipped == PALPATE_AS_(uint32_t, object) + 1) {
             break;
         }
         text += length;
@@ -1061,8 +1096,8 @@ PALPATE_APART_ uint8_t palpate_rank_(const uint8_t *cuts, uint_fast8_t width, ui
 static inline int32_t palpate_value_(const palpate_model *model, const int32_t *features, uint16_t count, uint8_t feature)
 {
     const int32_t value = feature < count ? features[feature] : PALPATE_MISSING_FEATURE;
-    if (PALPATE_SENTINEL && model->sentinel_ != NULL && value >= PALPATE_AS_(int32_t, palpate_u32_(model->sentinel_)) &&
-        value <= PALPATE_AS_(int32_t, palpate_u32_(model->sentinel_ + 4))) {
+    if (PALPATE_SENTINEL && model->sentinel_ != NULL && value >= palpate_i32_(model->sentinel_) &&
+        value <= palpate_i32_(model->sentinel_ + 4)) {
         return PALPATE_MISSING_FEATURE;
     }
     return value;
@@ -1387,15 +1422,27 @@ static inline int32_t palpate_q16_(uint32_t bits)
     return bits >> 31 != 0 ? -PALPATE_AS_(int32_t, magnitude) : PALPATE_AS_(int32_t, magnitude);
 }
 
-/* The margins of a row of `count` features, in units: one for each object, within 2^30. Features are whole numbers, or keys
- * if the model's `real` is 1; PALPATE_MISSING_FEATURE, and what is beyond the end of a short row, is missing. */
-PALPATE_API void palpate_margins_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *margins)
+/* Margins where there is room for all. */
+static inline void palpate_margins_of_(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *margins)
 {
     uint_fast16_t i;
     palpate_sum_(model, features, count, PALPATE_AT_(uint32_t *, margins));
     for (i = 0; PALPATE_IS_F32_(model) && i < model->objects; i++) {
         margins[i] = palpate_q16_(PALPATE_AS_(uint32_t, margins[i]));
     }
+}
+
+/* The margins of a row of `count` features, in units: one for each object, within 2^30, in `margins`, which has room for `room` of
+ * them. Features are whole numbers, or keys if the model's `real` is 1; PALPATE_MISSING_FEATURE, and what is beyond the end of a
+ * short row, is missing. PALPATE_TOO_MANY_OBJECTS, and nothing written, if there are more objects than room. */
+PALPATE_API palpate_error palpate_margins_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *margins,
+                                             size_t room)
+{
+    if (model->objects > room) {
+        return PALPATE_TOO_MANY_OBJECTS;
+    }
+    palpate_margins_of_(model, features, count, margins);
+    return PALPATE_OK;
 }
 
 /* The features of a touch in `features`, which has room for PALPATE_TOUCH_FEATURES; returns how many there are: 0 of a
@@ -1412,15 +1459,16 @@ PALPATE_API uint16_t palpate_features(const palpate_model *model, const palpate_
 }
 
 /* The margins of a touch, whether it counts or not; see palpate_margins_of. */
-PALPATE_API void palpate_margins(const palpate_model *model, const palpate_touch *touch, int32_t *margins)
+PALPATE_API palpate_error palpate_margins(const palpate_model *model, const palpate_touch *touch, int32_t *margins, size_t room)
 {
     int32_t features[PALPATE_TOUCH_FEATURES];
-    palpate_margins_of(model, features, palpate_features(model, touch, features), margins);
+    return palpate_margins_of(model, features, palpate_features(model, touch, features), margins, room);
 }
 
 #if PALPATE_LEAVES & PALPATE_F32
-/* The sums of a row of features as the trainer's own f32 values; 0, and nothing written, unless the model has f32 leaves. */
-PALPATE_API int palpate_f32_margins_of(const palpate_model *model, const int32_t *features, uint16_t count, float *margins)
+/* The sums of a row of features as the trainer's own f32 values, in `margins`, which has room for `room` of them. 0, and nothing
+ * written, unless the model has f32 leaves, and no more objects than room and PALPATE_MAX_OBJECTS. */
+PALPATE_API int palpate_f32_margins_of(const palpate_model *model, const int32_t *features, uint16_t count, float *margins, size_t room)
 {
     union {
         uint32_t bits;
@@ -1428,7 +1476,7 @@ PALPATE_API int palpate_f32_margins_of(const palpate_model *model, const int32_t
     } both;
     uint32_t sums[PALPATE_MAX_OBJECTS];
     uint_fast16_t i;
-    if (!PALPATE_IS_F32_(model) || model->objects > PALPATE_MAX_OBJECTS) {
+    if (!PALPATE_IS_F32_(model) || model->objects > PALPATE_MAX_OBJECTS || model->objects > room) {
         return 0;
     }
     palpate_sum_(model, features, count, sums);
@@ -1529,7 +1577,7 @@ static inline uint_fast16_t palpate_leader_(const palpate_recognizer *recognizer
 /* The prior of an object, in units. */
 static inline int32_t palpate_prior_(const palpate_model *model, uint_fast16_t object)
 {
-    return PALPATE_AS_(int32_t, palpate_u32_(model->part_[PALPATE_MARGINS_] + 4 * (PALPATE_AS_(size_t, model->objects) + object)));
+    return palpate_i32_(model->part_[PALPATE_MARGINS_] + 4 * (PALPATE_AS_(size_t, model->objects) + object));
 }
 
 /* A sum that stays within 64 bits. */
@@ -1652,7 +1700,7 @@ static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint
     squares /= touches;
     squares = squares > INT64_MAX ? INT64_MAX : squares;
     slope = palpate_add_(PALPATE_AS_(int64_t, squares), palpate_down_(slope, PALPATE_BYTE(record + 2)));
-    return palpate_subtract_(slope, PALPATE_AS_(int64_t, PALPATE_AS_(int32_t, palpate_u32_(record + 4))) * touches);
+    return palpate_subtract_(slope, PALPATE_AS_(int64_t, palpate_i32_(record + 4)) * touches);
 }
 
 /* Whether the leader may be named by the model's misfit test: PALPATE_RECOGNIZED, PALPATE_UNDECIDED or PALPATE_UNKNOWN. */
@@ -1674,10 +1722,10 @@ static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recog
         left = palpate_exp2(PALPATE_AS_(uint64_t, touches) * palpate_u32_(test + 28)) >> 24;
         misfit = PALPATE_AS_(int64_t, palpate_u32_(test + 20) * left >> 32);
         misfit = palpate_subtract_(palpate_misfit_(recognizer, leader), misfit);
-        if (misfit > PALPATE_AS_(int32_t, palpate_u32_(test + 16))) {
+        if (misfit > palpate_i32_(test + 16)) {
             return PALPATE_UNKNOWN;
         }
-        if (touches < palpate_u32_(test + 12) || misfit > PALPATE_AS_(int32_t, palpate_u32_(test + 24))) {
+        if (touches < palpate_u32_(test + 12) || misfit > palpate_i32_(test + 24)) {
             return PALPATE_UNDECIDED;
         }
     }
@@ -1740,8 +1788,8 @@ static inline uint32_t palpate_sharpness_(const palpate_model *model)
     uint32_t sharpness = 65536;
     while (p != end) {
         const uint8_t *content = p + 8;
-        uint32_t length = 0;
-        if ((palpate_section_(&p, end, &length) & 0x7fff) == 11 && length >= 4) {
+        uint32_t length;
+        if ((palpate_section_(&p, &length) & 0x7fff) == 11 && palpate_holds_(length, 4, 0, 0)) {
             const uint32_t stated = palpate_u32_(content);
             sharpness = stated >= 4096 && stated <= 1048576u ? stated : sharpness;
         }
@@ -1932,20 +1980,21 @@ static inline void palpate_push_evidence_(palpate_recognizer *recognizer, const 
     recognizer->object = PALPATE_AS_(uint8_t, best);
 }
 
-/* Takes in a touch or row by its margins. */
-PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int32_t *margins)
+/* Takes in a touch or row by its first `count` margins; missing ones add nothing. */
+PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int32_t *margins, size_t count)
 {
-    if (PALPATE_ROW_EVIDENCE && recognizer->model->row_ != NULL) {
-        int32_t evidence[PALPATE_MAX_OBJECTS];
-        uint_fast16_t i;
-        for (i = 0; i < recognizer->model->objects; i++) {
-            evidence[i] = margins[i];
-        }
-        palpate_evidence_of_(recognizer->model, evidence);
-        palpate_push_evidence_(recognizer, evidence);
-    } else {
-        palpate_push_evidence_(recognizer, margins);
+    int32_t evidence[PALPATE_MAX_OBJECTS];
+    uint_fast16_t i;
+    for (i = 0; i < recognizer->model->objects; i++) {
+        evidence[i] = i < count ? margins[i] : 0;
     }
+    if (PALPATE_ROW_EVIDENCE && recognizer->model->row_ != NULL) {
+        palpate_evidence_of_(recognizer->model, evidence);
+        for (i = 0; i < recognizer->model->objects; i++) {
+            evidence[i] = i < count ? evidence[i] : 0;
+        }
+    }
+    palpate_push_evidence_(recognizer, evidence);
 }
 
 /* Takes in a touch; after a decision nothing changes until the reset. Cost: the ensemble's margins, a few instructions for
@@ -1959,7 +2008,7 @@ PALPATE_API palpate_answer palpate_push(palpate_recognizer *recognizer, const pa
     answer = palpate_accepts_(recognizer->model, touch, times);
     if (answer == PALPATE_COUNTED && recognizer->verdict == PALPATE_UNDECIDED) {
         palpate_features_(recognizer->model, touch, times, features);
-        palpate_margins_of(recognizer->model, features, recognizer->model->features, margins);
+        palpate_margins_of_(recognizer->model, features, recognizer->model->features, margins);
         palpate_push_evidence_(recognizer, margins);
     }
     return answer;
@@ -1972,7 +2021,7 @@ PALPATE_API palpate_answer palpate_push_features(palpate_recognizer *recognizer,
     if (recognizer->model->descriptor != 255) {
         return PALPATE_NEEDS_TOUCHES;
     }
-    palpate_margins_of(recognizer->model, features, count, margins);
+    palpate_margins_of_(recognizer->model, features, count, margins);
     if (PALPATE_ROW_EVIDENCE && recognizer->model->row_ != NULL) {
         palpate_evidence_of_(recognizer->model, margins);
     }
@@ -2014,8 +2063,8 @@ static inline const uint8_t *palpate_prediction_(const palpate_model *model)
     const uint8_t *p = model->part_[PALPATE_OPTIONAL_], *end = model->part_[PALPATE_MARGINS_];
     while (p != end) {
         const uint8_t *content = p + 8;
-        uint32_t length = 0;
-        if ((palpate_section_(&p, end, &length) & 0x7fff) == 13) {
+        uint32_t length;
+        if ((palpate_section_(&p, &length) & 0x7fff) == 13) {
             return content;
         }
     }
@@ -2041,23 +2090,32 @@ static inline uint16_t palpate_best_of_(const palpate_model *model, const int32_
 }
 
 /* The class that palpate_predict_class gives, ties and all, from no more trees than it takes, if `palpate export --early-exit`
- * wrote the model. `room` is for `model->objects` numbers, which are no margins afterwards. */
-PALPATE_API uint16_t palpate_class_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *room)
+ * wrote the model. `numbers` has room for `room` of them, and holds no margins afterwards. PALPATE_NO_CLASS, and nothing written,
+ * if there are more objects than room. */
+PALPATE_API uint16_t palpate_class_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *numbers, size_t room)
 {
-    const uint_fast16_t leader = palpate_sum_until_(model, features, count, PALPATE_AT_(uint32_t *, room), 1);
-    return leader != PALPATE_NONE_ ? PALPATE_AS_(uint16_t, leader) : palpate_best_of_(model, room);
+    uint_fast16_t leader;
+    if (model->objects > room) {
+        return PALPATE_NO_CLASS;
+    }
+    leader = palpate_sum_until_(model, features, count, PALPATE_AT_(uint32_t *, numbers), 1);
+    return leader != PALPATE_NONE_ ? PALPATE_AS_(uint16_t, leader) : palpate_best_of_(model, numbers);
 }
 #endif
 
 /* The class of a row of `count` features (see palpate_margins_of): that with the largest margin, and of several the first,
  * or the last where the model says so. With f32 leaves their sums are compared as they are. `margins` has room for
- * `model->objects` of them, and then holds the row's. */
-PALPATE_API uint16_t palpate_predict_class(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *margins)
+ * `room` of them, and then holds the row's. PALPATE_NO_CLASS, and nothing written, if there are more objects than room. */
+PALPATE_API uint16_t palpate_predict_class(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *margins,
+                                           size_t room)
 {
     const uint8_t *prediction = palpate_prediction_(model);
     const int last_of_ties = prediction != NULL && PALPATE_BYTE(prediction + 1) != 0;
     int32_t most = INT32_MIN;
     uint_fast16_t best = 0, i;
+    if (model->objects > room) {
+        return PALPATE_NO_CLASS;
+    }
     palpate_sum_(model, features, count, PALPATE_AT_(uint32_t *, margins));
     for (i = 0; i < model->objects; i++) {
         int32_t sum = margins[i];
@@ -2111,8 +2169,8 @@ static inline float palpate_exp_(float x)
     uint64_t power;
     int whole, half;
     both.value = x;
-    if (x != x) {
-        return x;
+    if ((both.bits & 0x7fffffff) > 0x7f800000) {
+        return x; /* NaN */
     }
     if (x > 89.0f) {
         return palpate_float_(0x7f800000u);
@@ -2226,7 +2284,7 @@ PALPATE_API size_t palpate_snapshot(const palpate_recognizer *recognizer, uint8_
     uint_fast16_t i;
     length = palpate_put_(buffer, 0, room, palpate_u32_(model->part_[PALPATE_END_]));
     length = palpate_put_(buffer, length, room, recognizer->touches);
-    if (room - length < 2 || room < length) {
+    if (length + 2 > room) {
         return 0;
     }
     buffer[length++] = PALPATE_AS_(uint8_t, recognizer->verdict | (recognizer->forgotten != 0 ? 4 : 0));
@@ -2238,7 +2296,7 @@ PALPATE_API size_t palpate_snapshot(const palpate_recognizer *recognizer, uint8_
         const uint64_t evidence = PALPATE_AS_(uint64_t, recognizer->evidence[i]);
         length = palpate_put_(buffer, length, room, evidence << 1 ^ (0u - (evidence >> 63)));
     }
-    if (length > room || room - length < 4) {
+    if (length + 4 > room) {
         return 0;
     }
     for (at = 0; at < length; at++) {
@@ -2276,7 +2334,7 @@ PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, con
     }
     checksum = PALPATE_AS_(uint32_t, palpate_take_(snapshot, &at, length, 5, 15));
     touches = PALPATE_AS_(uint32_t, palpate_take_(snapshot, &at, length, 5, 15));
-    if (at > length || length - at < 2) {
+    if (at + 2 > length) {
         return PALPATE_DAMAGED;
     }
     verdict = snapshot[at++];

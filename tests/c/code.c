@@ -51,7 +51,7 @@ static unsigned differences(const struct code_test *test)
             differs |= margins[i] != expected[i];
             margins[i] = 0;
         }
-        palpate_margins_of(&model, test->keys + row * test->features, (uint16_t)test->features, margins);
+        differs |= palpate_margins_of(&model, test->keys + row * test->features, (uint16_t)test->features, margins, 256) != PALPATE_OK;
         for (i = 0; i < test->objects; i++) {
             differs |= margins[i] != expected[i];
         }

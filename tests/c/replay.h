@@ -5,6 +5,7 @@
  *   M u32 length, bytes      opens a model and starts a recognizer: "open ERROR PLACE"
  *   T 3 u32, u8, 6 i16       pushes a touch: times, whether it has a pose, direction and alignment
  *   R u16 count, i32 each    pushes a row of features
+ *   E u16 count, i32 each    pushes margins
  *   P                        the posterior of every object
  *   N                        the name of every object
  *   S                        a snapshot
@@ -34,6 +35,8 @@ static uint8_t *replay_room(int which, size_t length);
 static palpate_model replay_model;
 static palpate_recognizer replay_recognizer;
 static int32_t replay_features[256], replay_margins[PALPATE_MAX_OBJECTS];
+/* Room for margins. */
+#define REPLAY_ROOM (sizeof replay_margins / sizeof replay_margins[0])
 
 static uint32_t replay_number(int bytes)
 {
@@ -103,11 +106,46 @@ static void replay_float(float value)
     replay_i64(value != value ? -1 : (int64_t)both.bits);
 }
 
+/* Evidence and verdict now. */
+static void replay_evidence(void)
+{
+    uint16_t i;
+    replay_text("evidence");
+    for (i = 0; i < replay_model.objects; i++) {
+        replay_i64(replay_recognizer.evidence[i]);
+    }
+    replay_text("\nverdict");
+    replay_i64(replay_recognizer.verdict);
+    replay_i64(replay_recognizer.verdict == PALPATE_RECOGNIZED ? replay_recognizer.object : 0);
+    replay_i64((int64_t)replay_recognizer.touches);
+    replay_put('\n');
+}
+
+static void replay_name(uint16_t object)
+{
+    char name[256];
+    const size_t length = palpate_object_name(&replay_model, object, name, sizeof name);
+    replay_text("name");
+    replay_hex((const uint8_t *)name, length);
+    replay_i64((int64_t)length);
+    replay_put('\n');
+}
+
+/* Numbers of a command, into the features; returns how many there are. */
+static uint16_t replay_row(void)
+{
+    const uint16_t count = (uint16_t)replay_number(2);
+    uint16_t i;
+    for (i = 0; i < count; i++) {
+        replay_features[i & 255] = (int32_t)replay_number(4);
+    }
+    return count;
+}
+
 /* What came of a touch or row with these features. */
 static void replay_known(palpate_answer answer, uint16_t count)
 {
     const uint16_t objects = replay_model.objects;
-    uint16_t i;
     if (answer != PALPATE_COUNTED) {
         replay_text("refused");
         replay_i64((int64_t)answer);
@@ -115,7 +153,7 @@ static void replay_known(palpate_answer answer, uint16_t count)
         return;
     }
     replay_numbers("features", replay_features, count);
-    palpate_margins_of(&replay_model, replay_features, count, replay_margins);
+    (void)palpate_margins_of(&replay_model, replay_features, count, replay_margins, REPLAY_ROOM);
     replay_numbers("margins", replay_margins, objects);
 #if PALPATE_LEAVES & PALPATE_F32
     {
@@ -123,7 +161,8 @@ static void replay_known(palpate_answer answer, uint16_t count)
             float sums[PALPATE_MAX_OBJECTS];
             uint32_t bits[PALPATE_MAX_OBJECTS];
         } both;
-        if (palpate_f32_margins_of(&replay_model, replay_features, count, both.sums)) {
+        uint16_t i;
+        if (palpate_f32_margins_of(&replay_model, replay_features, count, both.sums, PALPATE_MAX_OBJECTS)) {
             replay_text("sums");
             for (i = 0; i < objects; i++) {
                 /* Which of the NaNs it is, is up to the machine. */
@@ -136,7 +175,7 @@ static void replay_known(palpate_answer answer, uint16_t count)
     {
         /* A model of several outputs has no value. */
         const int has_value = objects == 1;
-        const uint16_t class_number = palpate_predict_class(&replay_model, replay_features, count, replay_margins);
+        const uint16_t class_number = palpate_predict_class(&replay_model, replay_features, count, replay_margins, REPLAY_ROOM);
         replay_text("predicted");
         replay_i64((int64_t)class_number);
         replay_float(has_value ? palpate_predict_raw(&replay_model, replay_features, count) : 0);
@@ -144,18 +183,10 @@ static void replay_known(palpate_answer answer, uint16_t count)
         replay_put('\n');
         replay_numbers("margins", replay_margins, objects);
         replay_text("class");
-        replay_i64((int64_t)palpate_class_of(&replay_model, replay_features, count, replay_margins));
+        replay_i64((int64_t)palpate_class_of(&replay_model, replay_features, count, replay_margins, REPLAY_ROOM));
         replay_put('\n');
     }
-    replay_text("evidence");
-    for (i = 0; i < objects; i++) {
-        replay_i64(replay_recognizer.evidence[i]);
-    }
-    replay_text("\nverdict");
-    replay_i64(replay_recognizer.verdict);
-    replay_i64(replay_recognizer.verdict == PALPATE_RECOGNIZED ? replay_recognizer.object : 0);
-    replay_i64((int64_t)replay_recognizer.touches);
-    replay_put('\n');
+    replay_evidence();
 }
 
 static void replay_touch(int is_open)
@@ -179,7 +210,7 @@ static void replay_touch(int is_open)
         count = palpate_features(&replay_model, &touch, replay_features);
         if (answer == PALPATE_COUNTED) {
             /* The same without a recognizer. */
-            palpate_margins(&replay_model, &touch, replay_margins);
+            (void)palpate_margins(&replay_model, &touch, replay_margins, REPLAY_ROOM);
             replay_numbers("touch", replay_margins, replay_model.objects);
         }
         replay_known(answer, count);
@@ -223,12 +254,16 @@ static int replay(void)
             replay_touch(is_open);
             break;
         case 'R':
-            count = (uint16_t)replay_number(2);
-            for (i = 0; i < count; i++) {
-                replay_features[i & 255] = (int32_t)replay_number(4);
-            }
+            count = replay_row();
             if (is_open) {
                 replay_known(palpate_push_features(&replay_recognizer, replay_features, count), count);
+            }
+            break;
+        case 'E':
+            count = replay_row();
+            if (is_open) {
+                palpate_push_margins(&replay_recognizer, replay_features, count);
+                replay_evidence();
             }
             break;
         case 'P':
@@ -258,11 +293,10 @@ static int replay(void)
             break;
         case 'N':
             for (i = 0; is_open && i <= replay_model.objects; i++) {
-                char name[256];
-                replay_text("name ");
-                palpate_object_name(&replay_model, i, name, sizeof name);
-                replay_text(name);
-                replay_put('\n');
+                replay_name(i);
+            }
+            if (is_open) {
+                replay_name(UINT16_MAX);
             }
             break;
         case 'S':

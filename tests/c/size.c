@@ -62,7 +62,7 @@ int32_t key(float value)
 void margins(const palpate_touch *touch, int32_t *sums);
 void margins(const palpate_touch *touch, int32_t *sums)
 {
-    palpate_margins(&model, touch, sums);
+    (void)palpate_margins(&model, touch, sums, PALPATE_MAX_OBJECTS);
 }
 
 void reset(void);
@@ -75,7 +75,7 @@ void reset(void)
 int sums(const int32_t *features, float *margins);
 int sums(const int32_t *features, float *margins)
 {
-    return palpate_f32_margins_of(&model, features, model.features, margins);
+    return palpate_f32_margins_of(&model, features, model.features, margins, PALPATE_MAX_OBJECTS);
 }
 #endif
 #endif

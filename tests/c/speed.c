@@ -70,7 +70,7 @@ static int bare_main(void)
             palpate_features(&model, &touch, features);
         }
         began = ticks();
-        palpate_margins_of(&model, features, model.features, margins);
+        (void)palpate_margins_of(&model, features, model.features, margins, PALPATE_MAX_OBJECTS);
         sums += (ticks() - began) & 0xffffff;
         palpate_reset(&recognizer);
         began = ticks();

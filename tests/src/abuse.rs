@@ -1,14 +1,17 @@
 //! Every way to abuse a model file: bytes that a reader must refuse, and why. `shared/FORMAT.md` lists them by name.
 
 use crate::random::{self, Shape};
+use crate::replay::groups_and_splits;
 use crate::sections::{trained, with_sections};
+use crate::vectors::{Cut, Run};
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
-    Counted, HEADER_LENGTH, Header, Length, Link, MUST_UNDERSTAND, Prediction, RAW_FEATURES, Sentinel, Tag, Trained,
-    TrainedNoise, TrainedProbe, TrainedTouches, checksum, write_section,
+    Axis, Counted, EarlyExit, Group, HEADER_LENGTH, Header, Held, Length, Link, MUST_UNDERSTAND, MisfitTerms,
+    ObjectMisfit, Outputs, Plan, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, TrainedNoise,
+    TrainedProbe, TrainedTouches, checksum, write_section,
 };
-use palpate_shared::{Descriptor, Patterns};
+use palpate_shared::{Descriptor, Patterns, Poses};
 
 /// Bytes that must be refused.
 #[derive(Clone, Debug)]
@@ -496,4 +499,181 @@ fn shared_leaves(put: Put<'_>) {
 fn splits_of(model: &[u8]) -> usize {
     let [.., splits, _, _] = places(model);
     splits
+}
+
+/// Models, by name, and how each part and each optional section of them is cut.
+///
+/// # Panics
+/// Never.
+pub fn cuts() -> Vec<(String, Vec<u8>, Vec<Cut>)> {
+    let mut all = vec![touches_with_all_sections(), rows_with_all_sections()];
+    for layout in [Layout::Compact, Layout::Complete, Layout::Wide, Layout::Grid, Layout::Patterns] {
+        let base = model(layout, Leaf::I8, true);
+        let cuts = cuts_of_parts(&base);
+        all.push((format!("cut, {}", layout.name()), base, cuts));
+    }
+    all
+}
+
+/// A section's tag, its content, and what it has at least to be read: nothing, of what no verdict depends on.
+type Whole = (u16, Vec<u8>, usize);
+
+/// Puts sections in, and cuts each.
+fn with_cuts(model: &[u8], sections: &[Whole]) -> (Vec<u8>, Vec<Cut>) {
+    let all: Vec<u8> = sections.iter().flat_map(|(tag, content, _)| section(*tag, content)).collect();
+    let base = with_sections(model, &all);
+    let [mut at, ..] = places(&base);
+    let cut = |(_, content, least): &Whole| {
+        let place = at + 8;
+        let refused = (0..*least).map(|length| (length..=length, "field".into(), at));
+        let cut = Cut { field: at + 4, place, length: content.len(), refused: runs(refused) };
+        at = place + content.len().next_multiple_of(4);
+        cut
+    };
+    let cuts = sections.iter().map(cut).collect();
+    (base, cuts)
+}
+
+/// Neighboring lengths with the same error at the same place as one.
+fn runs(lengths: impl Iterator<Item = Run>) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for (own, kind, place) in lengths {
+        match runs.last_mut() {
+            Some((lengths, last, at)) if *last == kind && *at == place && lengths.end() + 1 == *own.start() => {
+                *lengths = *lengths.start()..=*own.end();
+            }
+            _ => runs.push((own, kind, place)),
+        }
+    }
+    runs
+}
+
+fn touches_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
+    let plain = shared(Layout::Compact, false);
+    let objects = usize::from(plain[14]) + 1;
+    let own = Model::new(&plain).expect("a model");
+    let table = own.optional_sections().find(|section| section.tag == Tag::SharedLeaves.code()).expect("its leaves");
+    let table = table.content.to_vec();
+    let must = |tag: Tag| tag.code() | MUST_UNDERSTAND;
+    let mut strangers = Strangers::header(true, true).to_vec();
+    let terms = MisfitTerms {
+        held: Held::Likely,
+        rivals: 1,
+        first: 1,
+        least: 2,
+        threshold: 1 << 18,
+        early: 1 << 16,
+        doubt: 1 << 16,
+        halving: 1 << 28,
+        alarms: 10_000,
+        sequences: 1_000,
+        confidence: 950_000,
+    };
+    strangers.extend(terms.to_bytes());
+    for object in 1..objects as u8 {
+        let numbers = [100, -100, 50].into_iter();
+        ObjectMisfit::write([1, 8, 8], 500, &[object], numbers, &mut |part| strangers.extend_from_slice(part));
+    }
+    let poses = Poses::with_rolls(1).expect("a roll");
+    let mut plan = Plan::header(poses).to_vec();
+    plan.extend((0..Plan::pairs(objects) * usize::from(poses.count())).map(|number| number as u8));
+    let weights = [[3, 0], [0xff, 0xff], [0, 0xc0], [0, 0xa0]].concat();
+    let odds = [1_u32 << 31, 1 << 29, 1 << 28].map(u32::to_le_bytes).concat();
+    let stated = [
+        TRAINED.probe.expect("stated").to_bytes().to_vec(),
+        TRAINED.touches.expect("stated").to_bytes().to_vec(),
+        TRAINED.noise.expect("stated").to_bytes().to_vec(),
+    ];
+    let [probe, touches, noise] = stated;
+    let whole = |tag: u16, content: Vec<u8>| {
+        let least = content.len();
+        (tag, content, least)
+    };
+    let sections = [
+        (Tag::Probe.code(), probe, 16),
+        whole(must(Tag::Touches), touches),
+        whole(Tag::Noise.code(), noise),
+        whole(must(Tag::Weights), weights),
+        whole(must(Tag::ThresholdsByObject), odds),
+        whole(must(Tag::Strangers), strangers),
+        whole(Tag::Plan.code(), plan),
+        (Tag::PatternShares.code(), vec![1; 12], 0),
+        (Tag::Promise.code(), vec![0; 48], 0),
+        (Tag::Temperature.code(), vec![0, 0, 2, 0], 0),
+        (must(Tag::SharedLeaves), table.clone(), 4),
+        (Tag::Capture.code(), vec![7; 18], 0),
+    ];
+    let (base, mut cuts) = with_cuts(&plain, &sections);
+    // Beyond its head, a table that is cut lacks the values of a leaf, whose number is at fault.
+    let [.., leaves, end] = places(&base);
+    let cut = cuts.get_mut(10).expect("the table");
+    for length in 4..table.len() {
+        let is_there = |number: u8| (usize::from(number) + 1) * objects <= length - 4;
+        if let Some(first) = base[leaves..end].iter().position(|&number| !is_there(number)) {
+            let shorter = table.len().next_multiple_of(4) - length.next_multiple_of(4);
+            cut.refused.push((length..=length, "field".into(), leaves + first - shorter));
+        }
+    }
+    ("cut, touches with all sections".into(), base, cuts)
+}
+
+fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
+    let plain = changed_to_rows(&model(Layout::Complete, Leaf::I8, true));
+    let objects = usize::from(plain[14]) + 1;
+    let must = |tag: Tag| tag.code() | MUST_UNDERSTAND;
+    let mut outputs = Vec::new();
+    Outputs::write((0..objects as u8).map(|output| (output / 2, 0.5)), &mut |part| outputs.extend_from_slice(part));
+    let names = [0, 0, 0x80, 0x3f, 1, b'a', 0, 0, 0x80, 0x3f, 2, b'b', b'c'];
+    let table = [0, 0, 0, 0, 4, 3, 0, 4, 0, 1, 1, 2, 9];
+    let exits = EarlyExit { groups: 1, bound: 1 << 20 }.to_bytes();
+    let prediction = Prediction { link: Link::Identity, last_of_ties: true, scale: 0.5, targets: false }.to_bytes();
+    let sections = [
+        (Tag::FeatureNames.code(), names.to_vec(), 0),
+        (must(Tag::Prediction), prediction.to_vec(), 8),
+        (must(Tag::Sentinel), Sentinel { low: -1, high: 1 }.to_bytes().to_vec(), 8),
+        (must(Tag::RowEvidence), table.to_vec(), table.len()),
+        (Tag::EarlyExit.code(), exits.to_vec(), 0),
+        (must(Tag::Outputs), outputs.clone(), outputs.len()),
+    ];
+    let (base, cuts) = with_cuts(&plain, &sections);
+    ("cut, rows with all sections".into(), base, cuts)
+}
+
+/// The parts of a model that has no optional sections.
+fn cuts_of_parts(base: &[u8]) -> Vec<Cut> {
+    let model = Model::new(base).expect("a model");
+    let [text, _, axes, cuts, groups, splits, leaves, end] = places(base);
+    let error = |length: usize, place: usize| (length..=length, "section".to_owned(), place);
+    let cut =
+        |field, place, length, refused: Vec<Run>| Cut { field, place, length, refused: runs(refused.into_iter()) };
+    // Where the thresholds of each axis end.
+    let mut ends = vec![0];
+    for axis in base[axes..cuts].as_chunks().0 {
+        ends.push(ends[ends.len() - 1] + Axis::from_bytes(*axis).expect("an axis").cuts_length());
+    }
+    // Thresholds that belong to no axis.
+    let axes_count = (cuts - axes) / Axis::LENGTH;
+    let of_axes = (0..axes_count).map(|left| error(left, axes + Axis::LENGTH * left + ends[left])).collect();
+    let of_cuts = (0..groups - cuts).filter_map(|left| match ends.iter().skip(1).position(|&end| end > left) {
+        Some(axis) => Some(error(left, cuts + ends[axis])),
+        // Of wide trees they have four bytes.
+        None => (left % 4 != 0).then(|| error(left, cuts)),
+    });
+    let is_table = matches!(model.layout(), Layout::Grid | Layout::Patterns);
+    // Splits, or leaves of none, that belong to no group.
+    let own: Vec<usize> = groups_and_splits(&model).iter().map(|(_, splits)| splits.len()).collect();
+    let groups_count = own.len();
+    let of_groups = (0..groups_count).map(|left| {
+        let first = splits - Group::LENGTH * (groups_count - left);
+        error(left, first + own.iter().take(left).sum::<usize>())
+    });
+    let trees = |length: usize| (0..length).map(|left| error(left, if is_table { leaves } else { splits })).collect();
+    vec![
+        cut(68, HEADER_LENGTH, text - HEADER_LENGTH, Vec::new()),
+        cut(16, axes, axes_count, of_axes),
+        cut(80, cuts, groups - cuts, of_cuts.collect()),
+        cut(18, groups, groups_count, of_groups.collect()),
+        cut(84, splits, leaves - splits, trees(leaves - splits)),
+        cut(88, leaves, end - leaves, trees(end - leaves)),
+    ]
 }

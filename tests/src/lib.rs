@@ -5,6 +5,7 @@ pub mod desk;
 pub mod flash;
 #[path = "../../onboard/firmware/src/identity.rs"]
 pub mod identity;
+pub mod mutants;
 pub mod pins;
 pub mod plain;
 pub mod random;

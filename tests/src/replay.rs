@@ -1,8 +1,9 @@
 //! Commands for the C header's test program (`tests/c/replay.h`), and what it has to say to each: what the crate gives.
 
+use crate::abuse::places;
 use palpate_onboard::{Model, ModelError, Recognizer, Refused, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
 use palpate_shared::Touch;
-use palpate_shared::format::{HEADER_LENGTH, Layout};
+use palpate_shared::format::{Group, HEADER_LENGTH, Layout};
 use std::fmt::Write;
 
 /// Commands, and the lines that have to come out.
@@ -21,7 +22,7 @@ impl<'m> Script<'m> {
         self.block(b'M', bytes);
         let opened = Model::new(bytes);
         let (code, place) = opened.as_ref().map_or_else(|error| (code(error), error.offset()), |_| (0, 0));
-        self.say(&format!("open {code} {place:x}"));
+        self.say(&format!("open {code:x} {place:x}"));
         let start =
             |model: &Model<'m>| Recognizer::new(model, Stopping::from_model(model)).expect("at most 256 objects");
         self.recognizer = opened.ok().as_ref().map(start);
@@ -71,6 +72,15 @@ impl<'m> Script<'m> {
         }
     }
 
+    /// Pushes margins.
+    pub fn margins(&mut self, margins: &[i32]) {
+        self.commands.push(b'E');
+        self.commands.extend((margins.len() as u16).to_le_bytes());
+        self.commands.extend(margins.iter().flat_map(|margin| margin.to_le_bytes()));
+        self.known().push_margins(margins);
+        self.evidence();
+    }
+
     /// Forgets all touches.
     pub fn reset(&mut self) {
         self.commands.push(b'X');
@@ -98,8 +108,10 @@ impl<'m> Script<'m> {
     pub fn names(&mut self) {
         self.commands.push(b'N');
         let model = *self.recognizer().model();
-        for object in 0..=model.object_count() {
-            self.say(&format!("name {}", model.object_name(object)));
+        // Where `int` has 16 bits, the number after the last of these is 0.
+        for object in (0..=model.object_count()).chain([65_535]) {
+            let name: String = model.object_name(object).bytes().map(|byte| format!("{byte:02x}")).collect();
+            self.say(&format!("name {name} {:x}", name.len() / 2));
         }
     }
 
@@ -144,6 +156,10 @@ impl<'m> Script<'m> {
         self.numbers("margins", &margins);
         let class = model.class_of(features, &mut margins).expect("as much room as classes");
         self.numbers("class", &[class as i64]);
+        self.evidence();
+    }
+
+    fn evidence(&mut self) {
         let evidence = self.recognizer().evidence().to_vec();
         self.numbers("evidence", &evidence);
         let (verdict, object) = match self.recognizer().verdict() {
@@ -204,40 +220,83 @@ const fn refusal(refused: Refused) -> u8 {
     }
 }
 
-/// True if `FORMAT.md` defines where the walk through an opened model leads. Slot 0 of a complete tree is not checked,
-/// nor that the sizes of subtrees agree: what comes of wrong ones is up to the implementation, as long as it ends.
+/// Sentence of `FORMAT.md`, and the models that it leaves something open for.
+pub type LeftOpen = (&'static str, fn(&Model<'_>) -> bool);
+
+/// Models whose margins `FORMAT.md` leaves open. Two implementations may differ in these, in what follows from them, and in
+/// [names](NAMES_LEFT_OPEN); in nothing else.
+pub const MARGINS_LEFT_OPEN: [LeftOpen; 2] = [
+    ("a column or threshold of slot 0 other than stated gives wrong steps", has_another_slot_0),
+    ("subtrees of compact and wide trees whose sizes contradict each other must end the", has_contradictions),
+];
+
+/// Models whose names of objects it leaves open.
+pub const NAMES_LEFT_OPEN: LeftOpen =
+    ("a reader that does not check UTF-8 may give the bytes of such a name", has_a_name_that_is_no_utf8);
+
+/// True if `FORMAT.md` says what margins a model has.
 pub fn is_specified(model: &Model<'_>) -> bool {
-    let (bytes, header) = (model.bytes(), model.header());
-    let groups = HEADER_LENGTH
-        + header.text_length() as usize
-        + header.optional_length() as usize
-        + 8 * model.object_count()
-        + 4 * usize::from(header.axes())
-        + header.cuts_length() as usize;
-    let mut splits = groups + 8 * usize::from(header.groups());
-    let number = |at: usize| usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
-    bytes[groups..splits].chunks(8).all(|group| {
-        let trees = u32::from_le_bytes([group[4], group[5], group[6], group[7]]) as usize;
-        match model.layout() {
-            Layout::Complete => {
-                let slots = 1 << group[0];
-                let roots = (0..trees).all(|tree| bytes[splits + tree * slots] == 1);
-                splits += 2 * trees * slots;
-                roots
+    !MARGINS_LEFT_OPEN.iter().any(|(_, is_of)| is_of(model))
+}
+
+/// The groups of a model, and the splits of each.
+///
+/// # Panics
+/// If it is no model that was opened.
+pub fn groups_and_splits<'m>(model: &Model<'m>) -> Vec<(Group, &'m [u8])> {
+    let bytes = model.bytes();
+    let [_, _, _, _, groups, mut splits, _, _] = places(bytes);
+    let groups = bytes[groups..splits].as_chunks().0;
+    let group = |group: &[u8; Group::LENGTH]| {
+        let group = Group::from_bytes(*group).expect("a group");
+        let start = splits;
+        if model.layout() == Layout::Complete {
+            splits += 2 * ((group.trees as usize) << group.depth);
+        } else {
+            for _ in 0..group.trees {
+                splits += 2 + size_of_split(model) * number(&bytes[splits..]);
             }
-            _ => (0..trees).all(|_| {
-                let (start, count) = (splits + 2, number(splits));
-                let is_wide = model.layout() == Layout::Wide;
-                let size = if is_wide { 6 } else { 3 };
-                splits = start + size * count;
-                let left = |split: usize| {
-                    let at = start + size * (split + 1);
-                    if is_wide { number(at - 2) } else { bytes[at - 1].into() }
-                };
-                agrees(&left, 0, count)
-            }),
         }
-    })
+        (group, &bytes[start..splits])
+    };
+    groups.iter().map(group).collect()
+}
+
+fn size_of_split(model: &Model<'_>) -> usize {
+    if model.layout() == Layout::Wide { 6 } else { 3 }
+}
+
+fn number(bytes: &[u8]) -> usize {
+    usize::from(u16::from_le_bytes([bytes[0], bytes[1]]))
+}
+
+fn has_another_slot_0(model: &Model<'_>) -> bool {
+    model.layout() == Layout::Complete
+        && groups_and_splits(model).iter().any(|(group, splits)| {
+            let (columns, thresholds) = splits.split_at(splits.len() / 2);
+            let first = |part: &[u8], expected| part.iter().step_by(1 << group.depth).any(|&byte| byte != expected);
+            first(columns, 1) || first(thresholds, 0)
+        })
+}
+
+fn has_contradictions(model: &Model<'_>) -> bool {
+    let size = size_of_split(model);
+    let contradicts = |mut splits: &[u8]| {
+        while !splits.is_empty() {
+            let count = number(splits);
+            let (tree, rest) = splits[2..].split_at(size * count);
+            let left = |split: usize| {
+                let own = &tree[size * split..][..size];
+                if size == 6 { number(&own[4..]) } else { own[2].into() }
+            };
+            if !agrees(&left, 0, count) {
+                return true;
+            }
+            splits = rest;
+        }
+        false
+    };
+    model.layout() != Layout::Complete && groups_and_splits(model).iter().any(|(_, splits)| contradicts(splits))
 }
 
 /// True if subtrees stay within those that they are part of.
@@ -250,4 +309,17 @@ fn agrees(left: &impl Fn(usize) -> usize, mut start: usize, end: usize) -> bool 
         start = right;
     }
     true
+}
+
+fn has_a_name_that_is_no_utf8(model: &Model<'_>) -> bool {
+    let [end, ..] = places(model.bytes());
+    let mut text = &model.bytes()[HEADER_LENGTH..end];
+    while let Some((&length, rest)) = text.split_first() {
+        let Some((name, rest)) = rest.split_at_checked(length.into()) else { return false };
+        if std::str::from_utf8(name).is_err() {
+            return true;
+        }
+        text = rest;
+    }
+    false
 }

@@ -211,6 +211,11 @@ pub fn play(script: &mut Script<'_>, count: usize, rng: &mut SmallRng) {
         if rng.random_bool(0.3 / objects as f64) {
             script.posteriors();
         }
+        if rng.random_bool(0.1 / objects as f64) {
+            let margins: Vec<i32> =
+                (0..rng.random_range(0..=objects)).map(|_| rng.random_range(-(1 << 30)..=1 << 30)).collect();
+            script.margins(&margins);
+        }
         if index == 2 || rng.random_bool(0.1 / objects as f64) {
             let mut snapshot = script.snapshot();
             if rng.random_bool(0.5) {

@@ -3,10 +3,10 @@
 
 use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict, exp2_negative};
 use palpate_shared::Touch;
-use palpate_shared::format::{Temperature, checksum, f32_key};
+use palpate_shared::format::{HEADER_LENGTH, MUST_UNDERSTAND, Temperature, checksum, f32_key};
 use palpate_tests::abuse;
 use palpate_tests::plain::{self, Approach, Decision, Plain};
-use palpate_tests::vectors::{bytes, hex, numbers, read_numbers, read_touch, refusal};
+use palpate_tests::vectors::{Cut, bytes, hex, numbers, read_numbers, read_touch, refusal};
 use std::collections::BTreeSet;
 
 const VECTORS: &str = include_str!("../../shared/vectors/vectors.txt");
@@ -63,6 +63,19 @@ impl<'m> Both<'m> {
                 self.plain.evidence = self.recognizer.evidence().to_vec();
             }
         }
+    }
+
+    /// Cuts a part of the model at every length, and returns how many there are.
+    fn cut(&self, words: &str) -> usize {
+        let cut = Cut::read(words);
+        for length in 0..cut.length {
+            let bytes = cut.model(self.model.bytes(), length);
+            let found =
+                Model::new(&bytes).map(|_| ()).map_err(|error| (abuse::kind(&error).to_owned(), error.offset()));
+            let expected = cut.expected(length).map_or(Ok(()), |(kind, place)| Err((kind.to_owned(), place)));
+            assert_eq!(found, expected, "cut {words}: length {length}");
+        }
+        cut.length
     }
 
     fn check(&self, word: &str, words: &str) {
@@ -184,7 +197,7 @@ fn lines() -> impl Iterator<Item = (usize, &'static str, &'static str)> {
 #[test]
 fn the_recognizer_and_a_plain_reading_of_the_specification_agree_with_the_vectors() {
     let mut both: Option<Both<'_>> = None;
-    let mut counts = [0; 3];
+    let mut counts = [0; 4];
     for (number, word, words) in lines() {
         let place = std::panic::AssertUnwindSafe(|| {
             if word == "vectors" {
@@ -200,6 +213,7 @@ fn the_recognizer_and_a_plain_reading_of_the_specification_agree_with_the_vector
             }
             let both = both.as_mut().expect("a model comes first");
             match word {
+                "cut" => counts[3] += both.cut(words),
                 "touch" => {
                     counts[1] += 1;
                     both.touch(words);
@@ -224,8 +238,8 @@ fn the_recognizer_and_a_plain_reading_of_the_specification_agree_with_the_vector
             std::panic::resume_unwind(panic);
         }
     }
-    println!("{} models, {} touches, {} results", counts[0], counts[1], counts[2]);
-    assert!(counts[0] > 60 && counts[1] > 500 && counts[2] > 2_000, "{counts:?}");
+    println!("{} models, {} touches, {} results, {} lengths of parts", counts[0], counts[1], counts[2], counts[3]);
+    assert!(counts[0] > 60 && counts[1] > 500 && counts[2] > 2_000 && counts[3] > 900, "{counts:?}");
 }
 
 #[test]
@@ -244,7 +258,37 @@ fn the_vectors_have_every_layout_leaf_descriptor_and_verdict() {
     let verdicts: BTreeSet<&str> = of("verdict").iter().map(|words| words.split(' ').next().unwrap()).collect();
     assert_eq!(verdicts, BTreeSet::from(["gave-up", "recognized", "undecided"]));
     assert_eq!(of("refused"), BTreeSet::from(["features", "pattern", "pose", "spread"]));
-    assert!(VECTORS.len() < 520_000, "{} bytes", VECTORS.len());
+    assert!(VECTORS.len() < 530_000, "{} bytes", VECTORS.len());
+}
+
+#[test]
+fn the_vectors_cut_every_optional_section_and_every_part_of_every_layout() {
+    let (mut tags, mut fields, mut base) = (BTreeSet::new(), BTreeSet::new(), Vec::new());
+    for (_, word, words) in lines() {
+        match word {
+            "model" => base = bytes(words.split(' ').next().unwrap()),
+            "cut" => {
+                let cut = Cut::read(words);
+                if cut.field < HEADER_LENGTH {
+                    fields.insert((base[6], cut.field));
+                } else {
+                    let tag = u16::from_le_bytes([base[cut.field - 4], base[cut.field - 3]]);
+                    tags.insert(tag & !MUST_UNDERSTAND);
+                }
+            }
+            _ => {}
+        }
+    }
+    assert_eq!(tags, (1..=18).collect());
+    let of = |layout: u8, fields: &[usize]| fields.iter().map(|&field| (layout, field)).collect::<Vec<_>>();
+    let expected = [
+        of(0, &[16, 18, 68, 80, 84, 88]),
+        of(1, &[16, 18, 68, 80, 84, 88]),
+        of(2, &[16, 68, 80, 88]),
+        of(3, &[18, 68, 80, 84, 88]),
+        of(4, &[16, 68, 80, 88]),
+    ];
+    assert_eq!(fields, expected.concat().into_iter().collect());
 }
 
 #[test]

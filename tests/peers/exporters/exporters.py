@@ -253,7 +253,7 @@ def export(palpate, ensemble, directory, leaf, goal, early):
 def ours_c(ensemble, directory, palpate, leaf, goal, early=False):
     exported = export(palpate, ensemble, directory, leaf, goal, early)
     features = ensemble.rows.shape[1]
-    answer = f"""    palpate_margins_of(&model, features, {features}, margins);
+    answer = f"""    palpate_margins_of(&model, features, {features}, margins, {ensemble.outputs});
     for (i = 1; i < {ensemble.outputs}; i++) {{
         if (margins[i] > margins[best]) {{
             best = i;
@@ -262,7 +262,7 @@ def ours_c(ensemble, directory, palpate, leaf, goal, early=False):
     return best;
 """
     if early:
-        answer = f"    (void)best;\n    return palpate_class_of(&model, features, {features}, margins);\n"
+        answer = f"    (void)best;\n    return palpate_class_of(&model, features, {features}, margins, {ensemble.outputs});\n"
     # Rows of f32, or whole numbers.
     key = "palpate_f32_key(row[i])" if "features" in exported else "row[i] == row[i] ? (int32_t)row[i] : INT32_MIN"
     wrapper = f"""#include "model.h"

@@ -28,6 +28,7 @@ fn main() {
     early_exits(&mut text);
     together(&mut text);
     refused(&mut text);
+    cut(&mut text);
     assert!(text.lines().all(|line| line.len() < 16_384), "a line is too long");
     print!("{text}");
 }
@@ -472,5 +473,16 @@ fn shared_leaves(text: &mut String) {
 fn refused(text: &mut String) {
     for abuse::Abuse { name, kind, offset, bytes } in abuse::cases() {
         *text += &format!("refuse {} {kind} {offset} {name}\n", hex(&bytes));
+    }
+}
+
+/// Parts and sections at every length.
+fn cut(text: &mut String) {
+    for (name, base, cuts) in abuse::cuts() {
+        Model::new(&base).expect("a model");
+        *text += &format!("model {} {name}\n", hex(&base));
+        for cut in cuts.iter().filter(|cut| cut.length > 0) {
+            *text += &format!("cut {}\n", cut.words());
+        }
     }
 }
