@@ -69,7 +69,7 @@ pub enum RowsProblem {
     Ragged {
         /// Its cells.
         found: u64,
-        /// Those of the header, or of the first row of a file without one.
+        /// Cells of the header, or of the first row of a file without one.
         wanted: u64,
     },
     /// There is nothing between two line ends.
