@@ -240,8 +240,10 @@ pub enum RowsProblem {
     },
 }
 
-/// The first names of many.
+/// The first names of many, `?` for what is no text.
 fn some(names: &[String]) -> String {
+    let plain = |name: &String| name.chars().map(|own| if own.is_control() { '?' } else { own }).collect::<String>();
+    let names: Vec<String> = names.iter().map(plain).collect();
     Columns::first(names.iter().map(String::as_str), 12)
 }
 
