@@ -49,7 +49,7 @@ pub(crate) struct Arguments {
     /// The library's own raw scores of the rows
     #[arg(long, value_name = "CSV", requires = "data")]
     library_margins: Option<PathBuf>,
-    /// What the library predicts of the rows: classes or values
+    /// The library's own predictions of the rows: classes or values
     #[arg(long, value_name = "CSV", requires = "data")]
     library_values: Option<PathBuf>,
     #[command(flatten)]

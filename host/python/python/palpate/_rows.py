@@ -34,7 +34,8 @@ def rows_of(owner: _Named, rows: Any) -> npt.NDArray[np.float64]:
 
 def row_of(owner: _Named, row: Any) -> npt.NDArray[np.float64]:
     """The same of one row with names, such as a series of pandas."""
-    return rows_of(owner, row.to_frame().T)[0]
+    first: npt.NDArray[np.float64] = rows_of(owner, row.to_frame().T)[0]
+    return first
 
 
 def names_of(rows: Any) -> list[str] | None:

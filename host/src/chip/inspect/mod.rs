@@ -32,7 +32,7 @@ pub struct Inspected<'a> {
     /// Of a model over rows: each feature's name, and how many units make up 1 (null where f32 values are compared).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feature_names: Option<Vec<Feature>>,
-    /// Of a model over some of the columns of the library's rows: their numbers.
+    /// Numbers of the columns of the library's rows, for a model over some of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<SomeColumns>,
     /// The objects' names.

@@ -69,7 +69,7 @@ pub enum RowsProblem {
     Ragged {
         /// Its cells.
         found: u64,
-        /// Those of the header, or of the first row of a file without one.
+        /// Cells of the header, or of the first row of a file without one.
         wanted: u64,
     },
     /// There is nothing between two line ends.
@@ -246,8 +246,10 @@ pub enum RowsProblem {
     },
 }
 
-/// The first names of many.
+/// The first names of many, `?` for what is no text.
 fn some(names: &[String]) -> String {
+    let plain = |name: &String| name.chars().map(|own| if own.is_control() { '?' } else { own }).collect::<String>();
+    let names: Vec<String> = names.iter().map(plain).collect();
     Columns::first(names.iter().map(String::as_str), 12)
 }
 

@@ -199,7 +199,7 @@ mod tests {
             ("a,b\n1,2\n\n3,4\n", ":3: the line is empty"),
             ("a,b,a\n1,2,3\n", ":1: two columns are named \"a\""),
             ("a,b\n", "no rows"),
-            ("", ":1: no column is named a, b"),
+            ("", "no rows"),
             ("a,b\n1,x\n", ":2: \"x\" in the column b is not a number"),
             ("a,b\n1\n", ":2: it has 1 cell, where the header has 2"),
         ] {

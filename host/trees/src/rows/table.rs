@@ -40,8 +40,12 @@ impl Table {
         builder.trim(csv::Trim::All).has_headers(self.has_header).from_reader(self.bytes.as_slice())
     }
 
-    /// The problem in the header, or another one that explains it: cells that something else than commas separates.
+    /// The problem in the header, or another one that explains it: an empty file, or cells that something else than commas
+    /// separates.
     pub(super) fn in_header(&self, problem: RowsProblem) -> Error {
+        if self.header.iter().all(String::is_empty) {
+            return Error::at(Place::file(&self.path), RowsProblem::Empty);
+        }
         let separator = match self.header.as_slice() {
             [only] => [';', '\t'].into_iter().find(|separator| only.contains(*separator)),
             _ => None,

@@ -55,7 +55,7 @@ pub struct Verified {
     /// model states explains; `None` without its predictions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub library_values_differ: Option<usize>,
-    /// Those of them that this rounding does not explain.
+    /// Rows of these that this rounding does not explain.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub library_values_unexplained: Option<usize>,
     /// The first row with another class than by the library's margins or its predictions.

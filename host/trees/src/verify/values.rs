@@ -13,7 +13,7 @@ pub(super) struct OfPredictions {
     pub(super) error: Option<f64>,
     /// Rows with another class, or with a value farther away than rounding explains.
     pub(super) differ: usize,
-    /// Those of them that the rounding that the model states does not explain.
+    /// Rows of these that the rounding that the model states does not explain.
     pub(super) unexplained: usize,
     pub(super) first_class: Option<ClassDiffers>,
     pub(super) first_value: Option<ValueDiffers>,
@@ -73,7 +73,7 @@ fn classes(
     Ok(())
 }
 
-/// How far a value may be from the library's beside the rounding of margins: links are within 5e-7 of the value.
+/// Distance of a value from the library's that is no fault, beside the rounding of margins: links are within 5e-7 of the value.
 const LINK_ERROR: f64 = 2e-6;
 
 fn values(

@@ -168,8 +168,14 @@ fn assembly_that_begins_again_without_end_is_refused_in_little_time_and_memory()
         for (number, line) in text.lines().enumerate().filter(|line| line.1.starts_with("\tb.n .L")).take(3) {
             let lines = text.lines().enumerate().map(|own| if own.0 == number { &again[..] } else { own.1 });
             let changed = lines.collect::<Vec<_>>().join("\n");
-            assert!(meaning(&bytes, &changed).is_none(), "{} {chip:?}: {line}", case.name);
-            refused += 1;
+            match meaning(&bytes, &changed) {
+                None => refused += 1,
+                // A branch that no row takes.
+                Some((changed, mut rows)) => {
+                    let (own, _) = meaning(&bytes, &text).unwrap();
+                    assert!(is_same(&own, &changed, &mut rows), "{} {chip:?}: {line}", case.name);
+                }
+            }
         }
     }
     assert!(refused > 30, "{refused}");
