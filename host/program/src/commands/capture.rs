@@ -85,7 +85,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     arguments.scene.weigh(&mut objects)?;
     for object in &objects {
         for instance in object.instances() {
-            let complaints = Facts::of(&instance.mesh).complaints(object.millimeters);
+            let complaints = object.complaints(&Facts::of(&instance.mesh));
             if !complaints.is_empty() {
                 let name = if instance.name == object.name { String::new() } else { format!(", {}", instance.name) };
                 remark(&format!("{}{name}: {}", object.name, complaints.join(" ")));

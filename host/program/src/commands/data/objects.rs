@@ -1,7 +1,7 @@
 //! `palpate data objects`.
 
 use crate::commands::Global;
-use crate::commands::probe::tell;
+use crate::commands::probe::{reading, tell};
 use palpate::mesh::builtin;
 use palpate::mesh::obj;
 use palpate::mesh::source::{self, Source};
@@ -83,7 +83,7 @@ fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
         }
     }
     let objects = match arguments.varied {
-        None => sources.into_iter().map(Source::read).collect::<Result<_>>()?,
+        None => reading(|| sources.into_iter().map(Source::read).collect::<Result<_>>())?,
         Some(seed) if names.len() == sources.len() => builtin::make(&names, Some(seed))?,
         Some(_) => {
             let instead = "it with built-in objects: only they can be varied";
