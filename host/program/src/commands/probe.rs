@@ -1,5 +1,6 @@
 //! Options for the probe and the sizes of objects.
 
+use super::progress::Bar;
 use super::remark;
 use palpate::capture;
 use palpate::ensemble::StatedProbe;
@@ -10,6 +11,7 @@ use palpate::mesh::{BACKGROUND, Object, builtin};
 use palpate::probe::Probe;
 use palpate::probe::file::ProbeFile;
 use palpate::probe::noise::Noise;
+use palpate::progress::Progress;
 use palpate::touches::{Dataset, Origin};
 use palpate::{Error, Result};
 use palpate_shared::format::Length;
@@ -130,10 +132,10 @@ pub(crate) struct UnitArguments {
 impl UnitArguments {
     /// The objects of the sources, with their true sizes as far as they are known.
     pub(crate) fn objects(&self, sources: &[String], seed: u64) -> Result<Vec<Object>> {
-        let mut objects = match self.instances {
-            None => self.load(sources)?,
-            Some(count) => self.of_instances(sources, count, seed)?,
-        };
+        let mut objects = reading(|| match self.instances {
+            None => self.load(sources),
+            Some(count) => self.of_instances(sources, count, seed),
+        })?;
         tell(&objects);
         self.add_units(&mut objects)?;
         Ok(objects)
@@ -186,7 +188,7 @@ impl UnitArguments {
 
     /// One object, with its true size as far as it is known.
     pub(crate) fn object(&self, source: &str) -> Result<Object> {
-        let mut object = [source::object(source)?];
+        let mut object = [reading(|| source::object(source))?];
         tell(&object);
         self.add_units(&mut object)?;
         let [object] = object;
@@ -319,6 +321,13 @@ pub(crate) fn refuse_unstated(size: &SizeArguments) -> Result<()> {
         true => Err(Error::setting("probe", "not given", IN_MILLIMETERS)),
         false => Ok(()),
     }
+}
+
+/// Reads objects, and shows meanwhile that it goes on: surfaces of large scans take seconds.
+pub(super) fn reading<T>(read: impl FnOnce() -> T) -> T {
+    let bar = Bar::new();
+    bar.begin("reading objects", None);
+    read()
 }
 
 /// Tells on stderr how objects were found and read, where that may surprise.

@@ -113,8 +113,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     )?;
     output::write_bytes(output, page.as_bytes())?;
     let facts = Facts::of(object.mesh());
-    let complaints = facts.complaints(object.millimeters);
-    let verdict = view::verdict(&facts, length, &probe);
+    let complaints = object.complaints(&facts);
+    let verdict = view::verdict(&object, &facts, length, &probe);
     if global.json {
         return output::print_json_about(output, &Shown { page: output, object: &object.name, complaints, verdict });
     }

@@ -54,10 +54,11 @@ impl Default for Settings {
     }
 }
 
-/// Says in words if a mesh can be touched as it is, if its longest side has this length and the probe these fingers.
-pub fn verdict(facts: &Facts, length: f64, probe: &Probe) -> String {
+/// Says in words if a mesh of an object can be touched as it is, if its longest side has this length and the probe these
+/// fingers.
+pub fn verdict(object: &Object, facts: &Facts, length: f64, probe: &Probe) -> String {
     let unit = f64::from((facts.high - facts.low).max_element()) / length;
-    facts.verdict(2.0 * probe.radius * unit)
+    object.verdict(facts, 2.0 * probe.radius * unit)
 }
 
 /// Largest number of approaches drawn to find the touches.
@@ -283,8 +284,8 @@ fn html(
                     } }
                     div { dt { "Full touches" } dd { (format!("{} of {} approaches", percent(share, 1), count(drawn.tried))) } }
                 }
-                @for complaint in facts.complaints(object.millimeters) { p.warning { (complaint) } }
-                p { (object.name) ": " (verdict(facts, settings.length, &settings.probe)) "." }
+                @for complaint in object.complaints(facts) { p.warning { (complaint) } }
+                p { (object.name) ": " (verdict(object, facts, settings.length, &settings.probe)) "." }
                 @if !object.points.is_empty() {
                     ul.note { @for note in &object.notes { li { (note) } } }
                 }

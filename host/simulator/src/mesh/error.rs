@@ -155,9 +155,35 @@ pub enum MeshProblem {
     /// A file holds points, and this program was built without what makes surfaces of them.
     #[error("the file holds points and no triangles, and this program was built without scans")]
     NeedsScans,
-    /// Points say nothing about which side of them is outside.
-    #[error("the points have neither normals nor viewpoints, so it is unknown which side of the surface is outside")]
+    /// Points say nothing about which side of them is outside, or contradict each other, and do not enclose anything.
+    #[error(
+        "it is unknown which side of the surface is outside: the points have neither viewpoints nor normals that agree with each \
+         other, and their neighbors do not tell"
+    )]
     NoSide,
+    /// Depth images contradict each other, which a usual mistake explains.
+    #[error(
+        "the depth images contradict each other: {now:.0} % of their points are where another image sees them, and {then:.0} % \
+         would be if {cause}"
+    )]
+    Cameras {
+        /// Percentage of points that another image sees.
+        now: f64,
+        /// The same if the mistake is undone.
+        then: f64,
+        /// The mistake.
+        cause: String,
+        /// What undoes it.
+        remedy: String,
+    },
+    /// Masks of depth images do not match the images, or each other.
+    #[error("{what}")]
+    Masks {
+        /// Description of what does not match.
+        what: String,
+        /// Remedy, as a sentence without its full stop.
+        instead: String,
+    },
     /// All points of a scan are at one place.
     #[error("no surface fits the points: all of them are at one place")]
     OnePlace,
@@ -228,6 +254,7 @@ impl Problem for MeshProblem {
             | Self::NotAnIndex { .. }
             | Self::IndexBeforeFirst { .. }
             | Self::IndexAfterLast { .. } => "Correct the line, or export the mesh again.".into(),
+            Self::Damaged { format: "scan" | "PCD" | "XYZ", .. } => "Correct the file, or write it again.".into(),
             Self::NoSuchVertex { .. } | Self::Damaged { .. } => {
                 "Export the mesh again, or convert it to another of OBJ, STL, PLY, GLB and COLLADA.".into()
             }
@@ -244,6 +271,8 @@ impl Problem for MeshProblem {
             Self::NoSide => {
                 "Add normals (nx ny nz, in PCD normal_x normal_y normal_z) or the place of the sensor (vp_x vp_y vp_z for each point, in PCD also VIEWPOINT).".into()
             }
+            Self::Cameras { remedy, .. } => format!("Correct scene_camera.json: {remedy}."),
+            Self::Masks { instead, .. } => format!("{instead}."),
             Self::OnePlace | Self::PointCount { .. } => "Scan the object more closely, or thin the points out.".into(),
             Self::NoSuchPlacement { .. } | Self::NoPlacement { .. } => {
                 "Give the weights of placements that it has; those that are not named are left out.".into()

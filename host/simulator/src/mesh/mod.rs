@@ -61,11 +61,16 @@ mod unread;
 mod weld;
 mod words;
 
+use facts::Facts;
+
 pub use error::MeshProblem;
 pub use triangles::Mesh;
 
 /// The name of the object of many different shapes, and of a model's background column.
 pub const BACKGROUND: &str = "background";
+
+/// Largest share of a surface that may be a guess.
+const MOST_GUESSED: f64 = 0.2;
 
 /// An object to recognize: one class of a model. It has a name and one or more meshes, its instances: the cups that are
 /// all to be recognized as a cup.
@@ -140,6 +145,30 @@ impl Object {
     pub fn instances(&self) -> impl ExactSizeIterator<Item = &Instance> + Clone {
         let count = 1 + self.others.len();
         (0..count).map(|index| if index == 0 { &self.first } else { &self.others[index - 1] })
+    }
+
+    /// Warnings before touching it: those about a mesh of it, as sentences, and one if more than a fifth of its surface is a
+    /// guess.
+    pub fn complaints(&self, facts: &Facts) -> Vec<String> {
+        let guess = self.guess().map(|guess| format!("A scan misses much: {guess}."));
+        facts.complaints(self.millimeters).into_iter().chain(guess).collect()
+    }
+
+    /// Says if a mesh of it can be touched as it is by fingers of a diameter (in the units of its file), in words: as
+    /// [`Facts::verdict`], or "scan again" if more than a fifth of its surface is a guess.
+    pub fn verdict(&self, facts: &Facts, diameter: f64) -> String {
+        let verdict = facts.verdict(diameter);
+        match (self.guess(), verdict.strip_prefix("repair first: ")) {
+            (None, _) => verdict,
+            (Some(guess), None) => format!("scan again: {guess}"),
+            (Some(guess), Some(reasons)) => format!("scan again: {guess}; {reasons}"),
+        }
+    }
+
+    fn guess(&self) -> Option<String> {
+        let share = 100.0 * self.guessed;
+        (self.guessed > MOST_GUESSED)
+            .then(|| format!("{share:.1} % of the surface is a guess, since no point was measured there"))
     }
 
     /// The longest side of an instance's bounding box in millimeters, where its units are known.

@@ -1,6 +1,7 @@
 //! `palpate data cast`: for those who compare the simulator with another engine.
 
 use crate::commands::Global;
+use crate::commands::probe::reading;
 use glam::DVec3;
 use palpate::Error;
 use palpate::Result;
@@ -48,7 +49,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
             return Err(Error::setting(name, value, "a number greater than 0"));
         }
     }
-    let Contents { mesh, moved, notes, .. } = file::read(&arguments.mesh)?;
+    let Contents { mesh, moved, notes, .. } = reading(|| file::read(&arguments.mesh))?;
     notes.iter().for_each(|note| crate::commands::remark(&format!("palpate: {note}")));
     let scene = if arguments.as_is { Scene::as_is(&mesh) } else { Scene::new(&mesh, arguments.length) }?;
     let mut lines = cast::read(&arguments.casts)?;

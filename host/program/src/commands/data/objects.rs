@@ -1,6 +1,6 @@
 //! `palpate data objects`.
 
-use crate::commands::probe::tell;
+use crate::commands::probe::{reading, tell};
 use crate::commands::{Global, remark};
 use palpate::mesh::builtin;
 use palpate::mesh::obj;
@@ -88,7 +88,7 @@ fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
     let objects = match arguments.varied {
         None => {
             let search = Search { skips_bad: arguments.skip_bad, ..Search::default() };
-            let loaded = source::load(&arguments.sources, search)?;
+            let loaded = reading(|| source::load(&arguments.sources, search))?;
             loaded.notes.iter().for_each(|note| remark(&format!("palpate: {note}")));
             loaded.objects
         }

@@ -8,7 +8,7 @@ use super::{Mesh, collada, gltf, obj, ply, stl, unread};
 use crate::error::{Error, MeshProblem, Place, Result};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The kinds of mesh files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -111,7 +111,7 @@ const MOST_OF_A_PIPE: u64 = 1 << 30;
 /// what is not read, and with the file when there is no face or each is a single point.
 pub fn read(path: &Path) -> Result<Contents> {
     let io = |source| Error::io(path, "read the mesh", source);
-    let file = File::open(path).map_err(io)?;
+    let file = File::open(opened(path)).map_err(io)?;
     let metadata = file.metadata().map_err(io)?;
     if metadata.is_file() {
         return parse_buffered(BufReader::with_capacity(1 << 18, file), metadata.len(), path, path.parent());
@@ -122,6 +122,17 @@ pub fn read(path: &Path) -> Result<Contents> {
         return Err(Error::at(Place::file(path), MeshProblem::TooLarge { limit: MOST_OF_A_PIPE }));
     }
     parse_buffered(bytes.as_slice(), bytes.len() as u64, path, path.parent())
+}
+
+/// The file that is opened for a path: of an object of a scene, its list of images.
+fn opened(path: &Path) -> PathBuf {
+    chosen(path).map_or_else(|| path.to_owned(), |(list, _)| list)
+}
+
+/// The list of a scene's depth images, and which of its objects is chosen: `scene_camera.json@3`.
+pub(super) fn chosen(path: &Path) -> Option<(PathBuf, u32)> {
+    let (name, number) = path.file_name()?.to_str()?.rsplit_once('@')?;
+    (name == DEPTH_LIST).then(|| Some((path.with_file_name(name), number.parse().ok()?)))?
 }
 
 /// Reads the bytes of a mesh file of any kind; errors name `path`, and its extension serves where the bytes do not say
@@ -154,7 +165,7 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
     }
     let mut notes = Vec::new();
     let format = match path.file_name() {
-        Some(name) if name == DEPTH_LIST => Format::Depth,
+        Some(name) if name == DEPTH_LIST || chosen(path).is_some() => Format::Depth,
         _ => Format::of(head, length, path.extension().and_then(|extension| extension.to_str())),
     };
     let (parsed, millimeters) = match format {

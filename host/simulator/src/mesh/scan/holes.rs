@@ -86,7 +86,7 @@ impl Holes {
             stand.is_on(&places(rim), &places(within))
         };
         let underside = holes.iter().rev().take(2).find(|hole| is_underside(hole)).copied();
-        let all: f64 = holes.iter().map(|(area, _)| area).sum();
+        let all = holes.iter().fold(0.0, |all, (area, _)| all + area);
         let share = |area: f64| format!("{:.1} % of the surface", 100.0 * area / whole);
         let mut note = match holes.as_slice() {
             [] => format!("no hole is closed that is wider than {}", short(2.0 * reach)),
@@ -104,7 +104,7 @@ impl Holes {
             (Some(_), 1) => note += ", the underside",
             (Some((area, _)), _) => note += &format!(", {:.1} % the underside", 100.0 * area / whole),
         }
-        Self { note, guessed: (all - underside.map_or(0.0, |(area, _)| area)) / whole }
+        Self { note, guessed: (all - underside.map_or(0.0, |(area, _)| area)).max(0.0) / whole }
     }
 }
 

@@ -16,8 +16,10 @@ mod near;
 pub(super) mod pcd;
 mod side;
 mod smooth;
+mod table;
 #[cfg(test)]
 mod tests;
+mod views;
 pub(super) mod xyz;
 
 use super::Mesh;
@@ -143,6 +145,9 @@ pub(super) fn surface(mut points: Points, path: &Path) -> Result<Scanned> {
     places.retain(|_| kept.next() == Some(&true));
     let mut kept = is_near.iter();
     points.measured.retain(|_| kept.next() == Some(&true));
+    if places.iter().all(|place| Some(place) == places.first()) {
+        return Err(at(MeshProblem::OnePlace));
+    }
     let side::Sides { outward, notes: said } = side::sides(&points, &places, DVec3::from(moved)).map_err(at)?;
     let smoothed = smooth::smoothed(Cloud { places, outward }).ok_or_else(|| at(MeshProblem::OnePlace))?;
     let (count, outliers) = (shown.len(), shown.len() - smoothed.places.len());

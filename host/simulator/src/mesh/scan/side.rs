@@ -7,7 +7,7 @@
 //! that of the sensor, or that of the volume. Winding numbers judge the result (Jacobson, Kavan and Sorkine-Hornung, *Robust
 //! Inside-Outside Segmentation using Generalized Winding Numbers*, 2013).
 
-use super::near::{Near, Neighbor};
+use super::near::{Near, Neighbor, farthest};
 use super::smooth;
 use super::{Point, Points, Sensors};
 use crate::error::MeshProblem;
@@ -29,7 +29,7 @@ const PARALLEL: f64 = 0.8;
 const SAMPLES: usize = 300;
 
 /// Least mean winding number of a surface that encloses something; a half if all of it is right side out.
-const WINDING: f64 = 0.12;
+const WINDING: f64 = 0.15;
 
 /// Largest length of the sum of all normals, in the area, of a surface that closes.
 const CLOSED: f64 = 0.25;
@@ -84,12 +84,14 @@ pub(super) fn sides(points: &Points, places: &[DVec3], offset: DVec3) -> Result<
     // A default says nothing against normals.
     let sensor = seen_at.as_deref().filter(|_| own.is_none() || !is_default);
     let by_neighbors = graph.by_neighbors(sensor, own_at.as_deref(), is_default);
+    let is_known = by_neighbors.is_signed && !by_neighbors.judged.is_split && by_neighbors.judged.is_sure();
     let is_good = |outward: &[DVec3]| {
         let judged = graph.judged(outward);
         by_neighbors.is_alike(outward)
-            || (!judged.is_split && judged.is_sure() && judged.winding >= 0.9 * by_neighbors.judged.winding)
+            || (!judged.is_split
+                && judged.is_sure()
+                && (!is_known || judged.winding >= 0.9 * by_neighbors.judged.winding))
     };
-    let is_known = by_neighbors.is_signed && !by_neighbors.judged.is_split && by_neighbors.judged.is_sure();
     match (own, viewed) {
         (Some(own), Some(viewed)) if !is_default && viewed_at.as_deref().is_some_and(is_good) => {
             let turned = differ(&own, &viewed);
@@ -210,13 +212,20 @@ impl Graph {
         let near = Near::new(places);
         let count = smooth::neighbors_of_planes(&near, places);
         let step = places.len().div_ceil(NODES);
-        let plane = |index: usize, near: &[Neighbor]| (index, smooth::plane_at(index, near, places));
+        let plane = |index: usize, near: &[Neighbor]| {
+            let farthest = farthest(near).max(f64::MIN_POSITIVE);
+            let (middle, spread) = smooth::spread(near, farthest, places);
+            let (_, normal) = smooth::least_axis(spread);
+            let area = std::f64::consts::PI * farthest / near.len() as f64;
+            let trace = spread.x_axis.x + spread.y_axis.y + spread.z_axis.z;
+            // Neighbors spread along the surface, and less along its normal than in the mean of all directions.
+            let stands = given[index].map(|given| given.dot(spread * given) < 0.25 * trace);
+            (index, (places[index] + normal * (middle - places[index]).dot(normal), normal, area, stands))
+        };
         let mut planes = near.some(|index| index % step == 0, count, 1, |_, _| true, plane);
         planes.sort_unstable_by_key(|(index, _)| *index);
-        let standing =
-            planes.iter().filter_map(|(index, (_, normal, _))| Some(given[*index]?.dot(*normal).abs() > 0.5));
-        let standing: Vec<bool> = standing.collect();
-        // Half of random directions stand on a surface by chance.
+        let standing: Vec<bool> = planes.iter().filter_map(|(_, (.., stands))| *stands).collect();
+        // Of random directions a third stands on a plane by chance, and half on a wire.
         if 10 * standing.iter().filter(|stands| **stands).count() < 6 * standing.len() {
             given.fill(None);
             notes.push("the normals do not stand on the surface, and are not used".into());
@@ -231,8 +240,8 @@ impl Graph {
             nodes,
             places,
             feet,
-            normals: planes.iter().map(|(index, (_, plane, _))| normal(*index, *plane)).collect(),
-            areas: planes.iter().map(|(_, (.., area))| *area * step as f64).collect(),
+            normals: planes.iter().map(|(index, (_, plane, ..))| normal(*index, *plane)).collect(),
+            areas: planes.iter().map(|(_, (_, _, area, _))| *area * step as f64).collect(),
         }
     }
 
@@ -352,7 +361,7 @@ impl Graph {
                 opposite += 1.0;
                 let between = self.places[one] - self.places[two];
                 let height = between.dot(outward[one] - outward[two]) / (2.0 * between.length());
-                apart += f64::from(i8::from(height > 0.1) - i8::from(height < -0.1));
+                apart += f64::from(i8::from(height > 0.01) - i8::from(height < -0.01));
             }
         }
         let share = opposite / parallel.max(1) as f64;
@@ -401,15 +410,15 @@ impl Graph {
         if low.z <= 0.0 {
             return 1.0;
         }
-        // Some ten nodes in a cell.
-        let cell = (10.0 * size.x * size.y / seen.len() as f64).sqrt().max(f64::MIN_POSITIVE);
+        // Some four nodes in a cell.
+        let cell = (4.0 * size.x * size.y / seen.len() as f64).sqrt().max(f64::MIN_POSITIVE);
         let number = |at: &DVec3| [at.x - low.x, at.y - low.y].map(|distance| (distance / cell) as u64);
         let mut nearest: BTreeMap<[u64; 2], f64> = BTreeMap::new();
         for at in &seen {
             let depth = nearest.entry(number(at)).or_insert(at.z);
             *depth = depth.min(at.z);
         }
-        let hidden = seen.iter().filter(|at| at.z > nearest.get(&number(at)).copied().unwrap_or(at.z) + 0.15 * size.z);
+        let hidden = seen.iter().filter(|at| at.z > nearest.get(&number(at)).copied().unwrap_or(at.z) + 0.3 * size.z);
         hidden.count() as f64 / seen.len() as f64
     }
 

@@ -145,19 +145,16 @@ pub(super) fn neighbors_of_planes(near: &Near, places: &[DVec3]) -> usize {
     }
 }
 
-/// The foot of a point on the plane through its neighbors, the plane's normal, which may point to either side, and the area
-/// that the point stands for.
-pub(super) fn plane_at(index: usize, near: &[Neighbor], places: &[DVec3]) -> (DVec3, DVec3, f64) {
-    let farthest = farthest(near).max(f64::MIN_POSITIVE);
-    let (middle, _, normal) = plane(near, farthest, places);
-    let place = places[index];
-    let area = std::f64::consts::PI * farthest / near.len() as f64;
-    (place + normal * (middle - place).dot(normal), normal, area)
-}
-
 /// The plane that fits points best, with those that are farther counting less: a point on it, the variance of the others'
 /// distances, and its normal, which may point to either side.
 pub(super) fn plane(near: &[Neighbor], farthest: f64, places: &[DVec3]) -> (DVec3, f64, DVec3) {
+    let (middle, spread) = spread(near, farthest, places);
+    let (variance, normal) = least_axis(spread);
+    (middle, variance, normal)
+}
+
+/// The mean of points and the covariance of their coordinates, with those that are farther counting less.
+pub(super) fn spread(near: &[Neighbor], farthest: f64, places: &[DVec3]) -> (DVec3, DMat3) {
     let weighted = || near.iter().map(|&(squared, other)| (1.0 - squared / farthest + 1e-3, places[other as usize]));
     let total: f64 = weighted().map(|(weight, _)| weight).sum();
     let middle = weighted().map(|(weight, place)| place * weight).sum::<DVec3>() / total;
@@ -166,12 +163,11 @@ pub(super) fn plane(near: &[Neighbor], farthest: f64, places: &[DVec3]) -> (DVec
         let away = place - middle;
         spread += DMat3::from_cols(away * away.x, away * away.y, away * away.z) * (weight / total);
     }
-    let (variance, normal) = least_axis(spread);
-    (middle, variance, normal)
+    (middle, spread)
 }
 
 /// The least eigenvalue of a symmetric matrix and its axis (Smith, *Eigenvalues of a symmetric 3 × 3 matrix*, 1961).
-fn least_axis(matrix: DMat3) -> (f64, DVec3) {
+pub(super) fn least_axis(matrix: DMat3) -> (f64, DVec3) {
     let mean = (matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z) / 3.0;
     let rest = matrix - DMat3::from_diagonal(DVec3::splat(mean));
     let size =

@@ -69,6 +69,8 @@ fn a_hole_is_closed_and_its_area_is_said() {
     let contents = read(xyz(&sphere(0.2, |direction| direction.z > -0.84)).as_bytes(), "sphere.xyz");
     assert_sound(&contents.mesh);
     let note = contents.notes.iter().find(|note| note.contains("hole")).unwrap();
+    // The hole is below, where the ball may have stood.
+    let note = note.strip_suffix(", the underside").unwrap();
     let share: f64 = note.split(' ').rev().nth(4).unwrap().parse().unwrap();
     assert!(note.contains("one hole is closed") && (3.0..9.0).contains(&share), "{note}");
 }
@@ -110,8 +112,13 @@ fn hard_clouds_give_a_closed_surface_that_can_be_touched_or_an_error() {
     for (name, cloud) in clouds {
         match file::parse(xyz(&cloud).as_bytes(), Path::new("hard.xyz")) {
             Err(error) => {
-                assert_eq!(name, "one point many times");
-                assert!(error.to_string().contains("hard.xyz: no surface fits the points"), "{error}");
+                let said = match name {
+                    "one point many times" => "no surface fits the points",
+                    // Nothing is between their sides, or they have none.
+                    "a plane with both sides" | "a line" | "normals at random" => "it is unknown which side",
+                    _ => panic!("{name}: {error}"),
+                };
+                assert!(error.to_string().starts_with(&format!("hard.xyz: {said}")), "{error}");
             }
             Ok(contents) => {
                 let facts = Facts::of(&contents.mesh);
@@ -125,23 +132,253 @@ fn hard_clouds_give_a_closed_surface_that_can_be_touched_or_an_error() {
 #[test]
 fn the_same_points_give_the_same_bytes_on_any_number_of_threads() {
     let text = xyz(&sphere(1.0, |_| true));
-    let on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| read(text.as_bytes(), "sphere.xyz"))
-    };
-    let one = on(1);
-    for threads in [2, 5] {
-        let other = on(threads);
-        assert_eq!((one.mesh.checksum(), &one.notes), (other.mesh.checksum(), &other.notes));
+    let unsigned = plain(&sphere(1.0, |_| true));
+    for text in [text, unsigned] {
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| read(text.as_bytes(), "sphere.xyz"))
+        };
+        let one = on(1);
+        for threads in [2, 5] {
+            let other = on(threads);
+            assert_eq!((one.mesh.checksum(), &one.notes), (other.mesh.checksum(), &other.notes));
+        }
     }
 }
 
 #[test]
-fn a_cloud_without_views_or_normals_is_refused() {
-    let text: String = sphere(0.0, |_| true).iter().map(|(p, _)| format!("{} {} {}\n", p.x, p.y, p.z)).collect();
-    let error = refusal(text.as_bytes(), "sphere.xyz");
-    assert!(error.starts_with("sphere.xyz: the points have neither normals nor viewpoints"), "{error}");
+fn neighbors_are_the_nearest_points_that_are_kept() {
+    let places: Vec<DVec3> = sphere(3.0, |_| true).into_iter().map(|(place, _)| place).collect();
+    let is_kept = |one: usize, two: usize| places[one].dot(places[two]) > 0.0 && two % 3 > 0;
+    let found = super::near::Near::new(&places).each(40, 4, is_kept, |_, near| {
+        let mut numbers: Vec<u32> = near.iter().map(|(_, number)| *number).collect();
+        numbers.sort_unstable();
+        numbers
+    });
+    for (one, found) in found.iter().enumerate().step_by(97) {
+        let mut all: Vec<u32> = (0..places.len() as u32).collect();
+        all.sort_by(|a, b| {
+            let [a, b] = [a, b].map(|&other| places[other as usize].distance_squared(places[one]));
+            a.total_cmp(&b)
+        });
+        let mut nearest: Vec<u32> =
+            all.into_iter().take(160).filter(|&two| is_kept(one, two as usize)).take(40).collect();
+        nearest.sort_unstable();
+        assert_eq!(*found, nearest);
+    }
+}
+
+/// A PCD of points, with normals or without, as seen from a place.
+fn pcd(points: &[(DVec3, DVec3)], has_normals: bool, viewpoint: &str) -> String {
+    let (count, names) = (points.len(), if has_normals { " normal_x normal_y normal_z" } else { "" });
+    let columns = if has_normals { 6 } else { 3 };
+    let header = format!(
+        "VERSION 0.7\nFIELDS x y z{names}\nSIZE{}\nTYPE{}\nWIDTH {count}\nHEIGHT 1\nVIEWPOINT {viewpoint}\nDATA ascii\n",
+        " 4".repeat(columns),
+        " F".repeat(columns)
+    );
+    let line = |(p, n): &(DVec3, DVec3)| match has_normals {
+        true => format!("{} {} {} {} {} {}\n", p.x, p.y, p.z, n.x, n.y, n.z),
+        false => format!("{} {} {}\n", p.x, p.y, p.z),
+    };
+    header + &points.iter().map(line).collect::<String>()
+}
+
+const DEFAULT: &str = "0 0 0 1 0 0 0";
+
+fn moved(points: Vec<(DVec3, DVec3)>, by: DVec3) -> Vec<(DVec3, DVec3)> {
+    points.into_iter().map(|(place, normal)| (place + by, normal)).collect()
+}
+
+/// Points whose normals are turned where `is_turned` says so.
+fn turned(points: &[(DVec3, DVec3)], is_turned: impl Fn(usize) -> bool) -> Vec<(DVec3, DVec3)> {
+    let turn =
+        |(index, &(place, normal)): (usize, &(DVec3, DVec3))| (place, if is_turned(index) { -normal } else { normal });
+    points.iter().enumerate().map(turn).collect()
+}
+
+/// Asserts that a surface is the sphere about a place, and gives its notes.
+fn assert_sphere(contents: &file::Contents, middle: DVec3) -> String {
+    assert_sound(&contents.mesh);
+    let middle = middle - DVec3::from(contents.moved);
+    let centered = |vertex: &[f32; 3]| (Vec3::from(*vertex).as_dvec3() - middle).as_vec3().to_array();
+    let vertices = contents.mesh.vertices.iter().map(centered).collect();
+    let [largest, mean] = errors(&Mesh { vertices, triangles: Vec::new() });
+    assert!(largest < 3.0 && mean < 0.8, "{largest} {mean} {:?}", contents.notes);
+    contents.notes.join("\n")
+}
+
+#[test]
+fn normals_of_a_pcd_win_over_a_default_viewpoint() {
+    let middle = DVec3::new(450.0, 100.0, 200.0);
+    let points = moved(sphere(0.2, |_| true), middle);
+    let said = assert_sphere(&read(pcd(&points, true, DEFAULT).as_bytes(), "ball.pcd"), middle);
+    assert!(!said.contains("normals"), "{said}");
+    // Each point's place of the sensor, which nobody set either.
+    let names =
+        ["x", "y", "z", "nx", "ny", "nz", "vp_x", "vp_y", "vp_z"].map(|name| format!("property float {name}\n"));
+    let header = format!("ply\nformat ascii 1.0\nelement vertex {}\n{}end_header\n", points.len(), names.concat());
+    let rows: String =
+        points.iter().map(|(p, n)| format!("{} {} {} {} {} {} 0 0 0\n", p.x, p.y, p.z, n.x, n.y, n.z)).collect();
+    assert_sphere(&read((header + &rows).as_bytes(), "ball.ply"), middle);
+}
+
+#[test]
+fn a_viewpoint_that_cannot_have_seen_all_points_is_not_used() {
+    let middle = DVec3::new(450.0, 100.0, 200.0);
+    let points = moved(sphere(0.2, |_| true), middle);
+    for viewpoint in [DEFAULT, "900 0 0 1 0 0 0"] {
+        let said = assert_sphere(&read(pcd(&points, false, viewpoint).as_bytes(), "ball.pcd"), middle);
+        assert!(said.contains("not all points can be seen from the viewpoint"), "{said}");
+    }
+    let said = assert_sphere(&read(pcd(&points, true, "900 0 0 1 0 0 0").as_bytes(), "ball.pcd"), middle);
+    assert!(said.contains("normals disagree with the viewpoint at") && said.contains("they decide"), "{said}");
+}
+
+#[test]
+fn a_default_viewpoint_that_fits_the_points_is_used() {
+    // As a camera sees it in its own frame.
+    let seen = moved(sphere(0.2, |direction| direction.z < -0.2), 400.0 * DVec3::Z);
+    let contents = read(pcd(&seen, false, DEFAULT).as_bytes(), "ball.pcd");
+    assert!(Facts::of(&contents.mesh).is_right_side_out());
+    assert!(!contents.notes.concat().contains("outside"), "{:?}", contents.notes);
+    // What is closed is not, from inside.
+    let front = contents.mesh.vertices.iter().map(|vertex| vertex[2]).fold(f32::INFINITY, f32::min);
+    assert!((front - 350.0).abs() < 2.0, "{front}");
+}
+
+#[test]
+fn normals_that_disagree_with_a_stated_viewpoint_are_turned_and_counted() {
+    let seen = turned(&sphere(0.2, |direction| direction.z > 0.2), |index| index % 4 == 0);
+    let contents = read(pcd(&seen, true, "0 0 400 1 0 0 0").as_bytes(), "cap.pcd");
+    assert!(Facts::of(&contents.mesh).is_right_side_out());
+    let said = contents.notes.concat();
+    assert!(said.contains("normals disagree with the viewpoint: 25.0 % turned"), "{said}");
+}
+
+#[test]
+fn normals_without_a_common_side_are_turned_to_that_of_their_neighbors() {
+    for noise in [0.0, 0.5] {
+        let ball = sphere(noise, |_| true);
+        let some = turned(&ball, |index| index * 7 % 10 < 3);
+        let said = assert_sphere(&read(xyz(&some).as_bytes(), "ball.xyz"), DVec3::ZERO);
+        assert!(said.contains("normals have no common side: 30.0 % turned"), "{said}");
+        // As programs that estimate normals leave them.
+        let upward: Vec<_> = ball.iter().map(|&(p, n)| (p, if n.z < 0.0 { -n } else { n })).collect();
+        let said = assert_sphere(&read(xyz(&upward).as_bytes(), "ball.xyz"), DVec3::ZERO);
+        assert!(said.contains("normals have no common side: "), "{said}");
+        let said = assert_sphere(&read(xyz(&turned(&ball, |_| true)).as_bytes(), "ball.xyz"), DVec3::ZERO);
+        assert!(said.contains("all normals point inward: they are turned"), "{said}");
+        let said = assert_sphere(&read(xyz(&ball).as_bytes(), "ball.xyz"), DVec3::ZERO);
+        assert!(!said.contains("normals"), "{said}");
+    }
+}
+
+#[test]
+fn normals_of_a_thin_sheet_stay_on_their_sides() {
+    // Closer to each other than points are on either side.
+    let sheet: Vec<_> = sphere(0.0, |_| true)
+        .iter()
+        .map(|&(p, n)| (DVec3::new(p.x, p.y, 0.02 * p.z), n.z.signum() * DVec3::Z))
+        .collect();
+    let contents = read(xyz(&sheet).as_bytes(), "sheet.xyz");
+    assert!(!contents.notes.concat().contains("normals"), "{:?}", contents.notes);
+}
+
+#[test]
+fn normals_that_do_not_stand_on_the_surface_are_not_used() {
+    let wrong: Vec<_> = sphere(0.2, |_| true).into_iter().map(|(p, _)| (p, DVec3::new(1.0, -1.0, 1.0))).collect();
+    let said = assert_sphere(&read(xyz(&wrong).as_bytes(), "ball.xyz"), DVec3::ZERO);
+    assert!(said.contains("do not stand on the surface, and are not used"), "{said}");
+}
+
+fn plain(points: &[(DVec3, DVec3)]) -> String {
+    points.iter().map(|(p, _)| format!("{} {} {}\n", p.x, p.y, p.z)).collect()
+}
+
+#[test]
+fn a_cloud_without_views_or_normals_is_turned_by_its_neighbors_if_it_is_closed_and_refused_if_not() {
+    let said = assert_sphere(&read(plain(&sphere(0.2, |_| true)).as_bytes(), "ball.xyz"), DVec3::ZERO);
+    assert!(said.contains("without normals and viewpoints, the points' neighbors say which side is outside"), "{said}");
+    let error = refusal(plain(&sphere(0.2, |direction| direction.z > 0.0)).as_bytes(), "cap.xyz");
+    assert!(error.starts_with("cap.xyz: it is unknown which side of the surface is outside"), "{error}");
     assert!(error.contains("normal_x") && error.contains("VIEWPOINT"), "{error}");
+}
+
+#[test]
+fn colors_are_no_normals() {
+    let ball = sphere(0.2, |_| true);
+    let color = |n: &DVec3| (0.5 * (*n + DVec3::ONE) * 255.0).round();
+    let bytes: String = ball.iter().map(|(p, n)| format!("{} {} {} {}\n", p.x, p.y, p.z, text(color(n)))).collect();
+    let shares: String =
+        ball.iter().map(|(p, n)| format!("{} {} {} {}\n", p.x, p.y, p.z, text(color(n) / 255.0))).collect();
+    let one_color: String = ball.iter().map(|(p, _)| format!("{} {} {} 0 0 1\n", p.x, p.y, p.z)).collect();
+    for content in [bytes, shares, one_color] {
+        let said = assert_sphere(&read(content.as_bytes(), "ball.xyz"), DVec3::ZERO);
+        assert!(said.contains("not used"), "{said}");
+    }
+}
+
+fn text(vector: DVec3) -> String {
+    format!("{} {} {}", vector.x, vector.y, vector.z)
+}
+
+#[test]
+fn columns_of_xyz_are_those_that_a_header_names_or_that_normals_fill() {
+    let ball = sphere(0.2, |_| true);
+    let parsed = |content: &str| super::xyz::parse(content.as_bytes(), Path::new("ball.xyz"));
+    let values = |content: &str| -> Vec<_> {
+        let points = parsed(content).unwrap_or_else(|error| panic!("{error}")).measured;
+        points.into_iter().map(|point| (point.place, point.normal)).collect()
+    };
+    let expected = values(&xyz(&ball));
+    assert!(expected.iter().zip(&ball).all(|(found, (_, normal))| found.1 == Some(normal.to_array())));
+    let rows = |row: &dyn Fn(usize, DVec3, DVec3) -> String| -> String {
+        ball.iter().enumerate().map(|(index, &(p, n))| row(index, p, n) + "\n").collect()
+    };
+    let usual = rows(&|_, p, n| format!("{} {}", text(p), text(n)));
+    for content in [
+        format!("x y z nx ny nz\n{usual}"),
+        format!("//X Y Z Nx Ny Nz\n4000\n{usual}"),
+        format!("\"X\",\"Y\",\"Z\",\"Normal_X\",\"Normal_Y\",\"Normal_Z\"\n{usual}"),
+        format!("4000\n{usual}"),
+        rows(&|index, p, n| format!("{} {} {}", text(p), text(n), index % 7)),
+        rows(&|index, p, n| format!("{} {} {}", text(p), index % 7, text(n))),
+        rows(&|index, p, n| format!("{} {} {} 255 {}", text(p), text(n), index % 256, index % 100)),
+        rows(&|index, p, n| format!("{} {} 255 {} {}", text(p), index % 256, index % 100, text(n))),
+        format!(
+            "id nz ny nx z y x\n{}",
+            rows(&|index, p, n| format!("{index} {} {} {} {} {} {}", n.z, n.y, n.x, p.z, p.y, p.x))
+        ),
+    ] {
+        assert!(values(&content) == expected, "{}", &content[..80]);
+    }
+    let said = |content: String| parsed(&content).unwrap_or_default().notes.concat();
+    assert!(
+        said(rows(&|index, p, _| format!("{} {index}", text(p))))
+            .contains("column 4 is neither coordinates nor normals")
+    );
+    let error = |content: String| parsed(&content).err().map_or_else(String::new, |error| error.to_string());
+    for (content, what) in [
+        (format!("4001\n{usual}"), "ball.xyz:4001: the XYZ file is damaged: it states 4001 points and has 4000"),
+        (rows(&|index, p, _| format!("{index} {}", text(p))), "its first column counts the points"),
+        (
+            rows(&|_, p, n| text(p).replace('.', ",") + " " + &text(n)),
+            "ball.xyz:1: the XYZ file is damaged: commas stand in its numbers",
+        ),
+        (
+            rows(&|_, p, n| format!("{} {}", text(p), text(700.5 * (n + DVec3::ONE)))),
+            "columns 4 to 6 are neither normals nor colors",
+        ),
+        (
+            rows(&|_, p, n| format!("{} {} -3.5", text(p), text(3.0 * n))),
+            "which of its 7 columns are normals is unclear",
+        ),
+        (rows(&|_, p, n| format!("{} {} {}", text(p), text(n), text(n))), "several of its 9 columns may be normals"),
+    ] {
+        let error = error(content);
+        assert!(error.contains(what), "{error}");
+    }
 }
 
 #[test]
@@ -150,8 +387,8 @@ fn a_bad_line_of_xyz_is_named() {
         let error = refusal(format!("# x y z\n1 2 3 0 0 1\n{bad}").as_bytes(), "cup.xyz");
         assert!(error.starts_with("cup.xyz:3: ") && error.contains(what), "{error}");
     }
-    let error = refusal(b"1 2 3 4\n", "cup.xyz");
-    assert!(error.starts_with("cup.xyz:1: ") && error.contains("4 numbers"), "{error}");
+    let error = refusal(b"1 2\n", "cup.xyz");
+    assert!(error.starts_with("cup.xyz:1: ") && error.contains("2 numbers"), "{error}");
     let error = refusal(b"1 2 3 0 0 1\n", "cup.xyz");
     assert!(error.contains("1 point with coordinates, where a surface needs 100"), "{error}");
 }
@@ -227,11 +464,11 @@ fn a_pcd_is_seen_from_its_viewpoint_and_points_that_were_not_measured_are_counte
     let from = |place: &str| header.clone() + &format!("VIEWPOINT {place} 1 0 0 0\nDATA ascii\n") + &lines;
     let contents = read(from("0 0 400").as_bytes(), "cap.pcd");
     assert!(Facts::of(&contents.mesh).is_right_side_out());
-    assert!(contents.notes[0].contains("1 points without coordinates"), "{:?}", contents.notes);
+    assert!(contents.notes[0].contains("1 point without coordinates is left out"), "{:?}", contents.notes);
     assert!(contents.notes.iter().any(|note| note.contains("one hole is closed")), "{:?}", contents.notes);
     // A viewpoint among the points is one that nobody set.
     let error = refusal(from("0 0 45").as_bytes(), "cap.pcd");
-    assert!(error.contains("neither normals nor viewpoints"), "{error}");
+    assert!(error.contains("it is unknown which side of the surface is outside"), "{error}");
 }
 
 #[test]
@@ -277,33 +514,256 @@ fn a_ply_without_faces_gives_one_surface_as_text_and_binary() {
     assert_eq!(read(&binary, "sphere.ply").mesh.checksum(), text.mesh.checksum());
 }
 
-/// Depth images of a sphere of 50 mm at the origin, from six sides, in a directory.
-fn depth_images(place: &Path) {
-    const WIDTH: usize = 120;
+/// Writes an image in gray, of 16 bits or of 8.
+fn write_gray(path: &Path, pixels: &[u16], is_depth: bool) {
+    let file = std::fs::File::create(path).unwrap();
+    let mut encoder = png::Encoder::new(file, WIDTH as u32, (pixels.len() / WIDTH) as u32);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(if is_depth { png::BitDepth::Sixteen } else { png::BitDepth::Eight });
+    let bytes: Vec<u8> = match is_depth {
+        true => pixels.iter().flat_map(|pixel| pixel.to_be_bytes()).collect(),
+        false => pixels.iter().map(|&pixel| pixel as u8).collect(),
+    };
+    encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+}
+
+const WIDTH: usize = 120;
+
+/// Distance along a ray of what it meets: from a place, in a direction of any length.
+type Scene<'a> = &'a dyn Fn(DVec3, DVec3) -> Option<f64>;
+
+/// A camera's pose: the rows of its rotation and its translation.
+type CameraPose = ([DVec3; 3], DVec3);
+
+fn ball(middle: DVec3, radius: f64) -> impl Fn(DVec3, DVec3) -> Option<f64> {
+    move |from, along| {
+        let (a, b, c) =
+            (along.dot(along), along.dot(from - middle), (from - middle).length_squared() - radius * radius);
+        let root = b * b - a * c;
+        (root >= 0.0).then(|| (-b - root.sqrt()) / a)
+    }
+}
+
+/// The top of a table at a height, 500 mm long.
+fn table_top(height: f64) -> impl Fn(DVec3, DVec3) -> Option<f64> {
+    move |from, along| {
+        let distance = (height - from.z) / along.z;
+        let place = from + distance * along;
+        (distance > 0.0 && place.x.abs().max(place.y.abs()) < 250.0).then_some(distance)
+    }
+}
+
+/// The nearest of what two scenes have.
+fn both(one: Scene, other: Scene) -> impl Fn(DVec3, DVec3) -> Option<f64> {
+    move |from, along| [one(from, along), other(from, along)].into_iter().flatten().min_by(f64::total_cmp)
+}
+
+/// Depth images from these sides of the origin, 400 mm away, with the poses that `stated` makes of the right ones.
+fn images(place: &Path, eyes: &[DVec3], scene: Scene, stated: impl Fn(CameraPose) -> CameraPose) {
     std::fs::create_dir_all(place.join("depth")).unwrap();
     let mut cameras = Vec::new();
-    for (number, axis) in [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z].into_iter().enumerate() {
+    for (number, eye) in eyes.iter().enumerate() {
         // The camera looks along its z axis.
-        let (right, down) = (-axis).any_orthonormal_pair();
-        let rotation = [right, down, -axis].map(|row| row.to_array()).concat();
+        let eye = 400.0 * eye.normalize();
+        let ahead = -eye.normalize();
+        let (right, down) = ahead.any_orthonormal_pair();
         let pixel = |index: usize| {
-            let [x, y] = [index % WIDTH, index / WIDTH].map(|at| (at as f64 - 60.0) / 400.0);
-            // |t · (x, y, 1) − (0, 0, 400)| = 50
-            let (a, b, c) = (x * x + y * y + 1.0, 400.0, 400.0 * 400.0 - 50.0 * 50.0);
-            let root = b * b - a * c;
-            if root < 0.0 { 0 } else { (((b - root.sqrt()) / a) * 10.0).round() as u16 }
+            let [x, y] = [index % WIDTH, index / WIDTH].map(|at| (at as f64 - 60.0) / 300.0);
+            scene(eye, ahead + x * right + y * down).map_or(0, |depth| (depth * 10.0).round() as u16)
         };
-        let bytes: Vec<u8> = (0..WIDTH * WIDTH).flat_map(|index| pixel(index).to_be_bytes()).collect();
-        let file = std::fs::File::create(place.join(format!("depth/{number:06}.png"))).unwrap();
-        let mut encoder = png::Encoder::new(file, WIDTH as u32, WIDTH as u32);
-        encoder.set_color(png::ColorType::Grayscale);
-        encoder.set_depth(png::BitDepth::Sixteen);
-        encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+        let pixels: Vec<u16> = (0..WIDTH * WIDTH).map(pixel).collect();
+        write_gray(&place.join(format!("depth/{number:06}.png")), &pixels, true);
+        let (rows, t) = stated(([right, down, ahead], 400.0 * DVec3::Z));
+        let rotation = rows.map(|row| row.to_array()).concat();
         cameras.push(format!(
-            "\"{number}\": {{\"cam_K\": [400, 0, 60, 0, 400, 60, 0, 0, 1], \"depth_scale\": 0.1, \"cam_R_w2c\": {rotation:?}, \"cam_t_w2c\": [0, 0, 400]}}"
+            "\"{number}\": {{\"cam_K\": [300, 0, 60, 0, 300, 60, 0, 0, 1], \"depth_scale\": 0.1, \"cam_R_w2c\": {rotation:?}, \"cam_t_w2c\": {:?}}}",
+            t.to_array()
         ));
     }
     std::fs::write(place.join(file::DEPTH_LIST), format!("{{{}}}", cameras.join(",\n"))).unwrap();
+}
+
+const SIX: [DVec3; 6] = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
+
+/// Depth images of a sphere of 50 mm at the origin, from six sides, in a directory.
+fn depth_images(place: &Path) {
+    images(place, &SIX, &ball(DVec3::ZERO, 50.0), |pose| pose);
+}
+
+/// Sides around and above.
+fn above(count: usize) -> Vec<DVec3> {
+    let side = |index: usize| {
+        let (angle, height) = (std::f64::consts::TAU * index as f64 / count as f64, [0.4, 1.2][index % 2]);
+        DVec3::new(libm::cos(angle), libm::sin(angle), height)
+    };
+    (0..count).map(side).collect()
+}
+
+fn scan(place: &Path) -> Result<file::Contents, String> {
+    file::read(&place.join(file::DEPTH_LIST)).map_err(|error| error.to_string())
+}
+
+fn refused(place: &Path) -> String {
+    scan(place).err().unwrap_or_default()
+}
+
+#[test]
+fn a_table_under_an_object_is_left_out_and_its_underside_is_no_guess() {
+    let directory = tempfile::tempdir().unwrap();
+    let (place, middle) = (directory.path(), DVec3::new(0.0, 0.0, 20.0));
+    // Most of a ball: its lower part is in the table.
+    images(place, &above(8), &both(&ball(middle, 50.0), &table_top(0.0)), |pose| pose);
+    let contents = scan(place).unwrap();
+    let said = contents.notes.concat();
+    assert!(said.contains("a plane that extends beyond all else is taken for a table"), "{said}");
+    assert!(said.contains("the underside") && contents.guessed < 0.1, "{said} {}", contents.guessed);
+    let [low, high] = contents.mesh.bounds();
+    assert!((high - low).max_element() < 106.0 && (high.z - 70.0).abs() < 2.0 && low.z > -10.0, "{low} {high}");
+    // Without the table the same is known: it was seen from all around and above.
+    images(
+        place,
+        &above(8),
+        &|from, along| ball(middle, 50.0)(from, along).filter(|t| (from + t * along).z > 0.0),
+        |pose| pose,
+    );
+    let contents = scan(place).unwrap();
+    let said = contents.notes.concat();
+    assert!(!said.contains("table") && said.contains("the underside") && contents.guessed < 0.1, "{said}");
+}
+
+#[test]
+fn the_top_of_a_box_is_no_table() {
+    let directory = tempfile::tempdir().unwrap();
+    let block = |from: DVec3, along: DVec3| {
+        let [near, far] = [-50.0, 50.0].map(|side| (DVec3::splat(side) - from) / along);
+        let (enter, leave) = (near.min(far).max_element(), near.max(far).min_element());
+        (enter < leave).then_some(enter)
+    };
+    images(directory.path(), &above(8), &block, |pose| pose);
+    let said = scan(directory.path()).unwrap().notes.concat();
+    assert!(!said.contains("table"), "{said}");
+}
+
+#[test]
+fn one_view_of_a_ball_leaves_a_guess() {
+    let directory = tempfile::tempdir().unwrap();
+    images(directory.path(), &[DVec3::new(0.2, 0.1, 1.0)], &ball(DVec3::ZERO, 50.0), |pose| pose);
+    let contents = scan(directory.path()).unwrap();
+    assert!(contents.guessed > 0.2, "{} {:?}", contents.guessed, contents.notes);
+    let mut object = crate::mesh::Object::new("ball", contents.mesh);
+    let facts = Facts::of(object.mesh());
+    assert_eq!(object.verdict(&facts, 5.0), "usable");
+    object.guessed = contents.guessed;
+    assert!(object.verdict(&facts, 5.0).starts_with("scan again: "), "{}", object.verdict(&facts, 5.0));
+    assert!(object.complaints(&facts).concat().contains("% of the surface is a guess"));
+}
+
+#[test]
+fn usual_mistakes_of_cameras_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let place = directory.path();
+    let [one, two] = [(DVec3::new(20.0, 0.0, 10.0), 40.0), (DVec3::new(-30.0, 10.0, -10.0), 25.0)]
+        .map(|(middle, radius)| ball(middle, radius));
+    let scene = both(&one, &two);
+    let columns = |rows: [DVec3; 3]| glam::DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
+    let rows = |matrix: glam::DMat3| [0, 1, 2].map(|row| matrix.row(row));
+    let eyes = [&above(6)[..], &[DVec3::NEG_Z]].concat();
+    images(place, &eyes, &scene, |pose| pose);
+    assert!(scan(place).is_ok());
+    let stated: [(&dyn Fn(CameraPose) -> CameraPose, &str, &str); 4] = [
+        (&|(rows, t)| (rows, t / 1000.0), "cam_t_w2c is in meters", "multiply cam_t_w2c by 1000"),
+        (&|([x, y, z], t)| ([x, -y, -z], -t), "those of OpenGL", "negate the second and the third row"),
+        (
+            &|(pose, t)| (rows(columns(pose).transpose()), -(columns(pose).transpose() * t)),
+            "the poses are those of the cameras in the world",
+            "-R times the translation",
+        ),
+        (&|(pose, t)| (rows(columns(pose).transpose()), t), "column by column", "row by row"),
+    ];
+    for (stated, cause, remedy) in stated {
+        images(place, &eyes, &scene, stated);
+        let error = refused(place);
+        assert!(error.contains(cause) && error.contains(remedy), "{error}");
+        assert!(error.contains("scene_camera.json: the depth images contradict each other: "), "{error}");
+    }
+    images(place, &eyes, &scene, |pose| pose);
+    let list = place.join(file::DEPTH_LIST);
+    let good = std::fs::read_to_string(&list).unwrap();
+    std::fs::write(&list, good.replace("\"depth_scale\": 0.1, ", "")).unwrap();
+    let error = refused(place);
+    assert!(error.contains("if depth_scale is 0.100 and not 1.00"), "{error}");
+    std::fs::write(&list, good.replace("\"depth_scale\": 0.1", "\"depth_scale\": 0.0001")).unwrap();
+    let error = refused(place);
+    assert!(error.contains("if depth_scale is 0.100 and not"), "{error}");
+}
+
+#[test]
+fn masks_that_do_not_match_are_refused_and_any_object_can_be_chosen() {
+    let directory = tempfile::tempdir().unwrap();
+    let place = directory.path().join("scene");
+    let balls = [(DVec3::new(40.0, 0.0, 0.0), 30.0), (DVec3::new(-40.0, 0.0, 0.0), 20.0)];
+    let [one, two] = balls.map(|(middle, radius)| ball(middle, radius));
+    images(&place, &SIX, &both(&one, &two), |pose| pose);
+    let masks = place.join("mask_visib");
+    std::fs::create_dir(&masks).unwrap();
+    let mask = |image: usize, object: usize| masks.join(format!("{image:06}_{object:06}.png"));
+    for (image, axis) in SIX.iter().enumerate() {
+        let (right, down) = (-*axis).any_orthonormal_pair();
+        for (object, scene) in [&one as Scene, &two].into_iter().enumerate() {
+            let other: Scene = [&two as Scene, &one][object];
+            let is_seen = |index: usize| {
+                let [x, y] = [index % WIDTH, index / WIDTH].map(|at| (at as f64 - 60.0) / 300.0);
+                let (from, along) = (400.0 * *axis, x * right + y * down - *axis);
+                let own = scene(from, along);
+                u16::from(own.is_some_and(|own| other(from, along).is_none_or(|other| own < other))) * 255
+            };
+            write_gray(&mask(image, object), &(0..WIDTH * WIDTH).map(is_seen).collect::<Vec<_>>(), false);
+        }
+    }
+    let source = place.to_str().unwrap().to_owned();
+    let object = |source: &str| crate::mesh::source::object(source);
+    let size = |source: &str| {
+        let object = object(source).unwrap();
+        let [low, high] = object.mesh().bounds();
+        (object.name, ((high - low).max_element() / 10.0).round() * 10.0, object.notes.concat())
+    };
+    let (name, length, notes) = size(&source);
+    assert_eq!((name.as_str(), length), ("scene", 60.0));
+    assert!(
+        notes.contains("there are masks of 2 objects: 0 is taken") && notes.contains("scene_camera.json@1 is another"),
+        "{notes}"
+    );
+    let (name, length, _) = size(&format!("{source}@000001"));
+    assert_eq!((name.as_str(), length), ("scene@1", 40.0));
+    assert_eq!(size(&format!("{source}/scene_camera.json@1")).1, 40.0);
+    let error = |source: &str| object(source).unwrap_err().to_string();
+    let said = error(&format!("{source}@2"));
+    assert!(said.contains("masks of the objects 0, 1, and none of object 2"), "{said}");
+    let ids = |second: u32| {
+        (0..6)
+            .map(|image| {
+                format!("\"{image}\": [{{\"obj_id\": 5}}, {{\"obj_id\": {}}}]", if image == 3 { second } else { 7 })
+            })
+            .collect::<Vec<_>>()
+            .join(",")
+    };
+    std::fs::write(place.join("scene_gt.json"), format!("{{{}}}", ids(8))).unwrap();
+    let said = error(&format!("{source}@1"));
+    assert!(said.contains("the masks of number 1 are of object 7 in image 0, and of 8 in 3"), "{said}");
+    std::fs::write(place.join("scene_gt.json"), format!("{{{}}}", ids(7))).unwrap();
+    assert_eq!(size(&format!("{source}@1")).1, 40.0);
+    std::fs::remove_file(mask(3, 0)).unwrap();
+    let said = error(&source);
+    assert!(said.contains("000003_000000.png: the mask is missing, and other images have one"), "{said}");
+    (0..6).filter(|image| *image != 3).for_each(|image| std::fs::remove_file(mask(image, 0)).unwrap());
+    let said = error(&source);
+    assert!(
+        said.contains("masks of the objects 1, and none of object 0") && said.contains("scene_camera.json@1"),
+        "{said}"
+    );
+    std::fs::remove_dir_all(&masks).unwrap();
+    let said = error(&format!("{source}@1"));
+    assert!(said.contains("object 1 is chosen, and no image has a mask"), "{said}");
 }
 
 #[test]
@@ -331,11 +791,12 @@ fn what_is_wrong_with_depth_images_is_named() {
         std::fs::write(&list, text).unwrap();
         file::read(&list).unwrap_err().to_string()
     };
-    assert!(
-        error(&good.replace("\"cam_t_w2c\"", "\"t\""))
-            .contains("scene_camera.json:1: the scan file is damaged: missing field")
-    );
-    assert!(error(&good.replace("\"cam_K\": [400", "\"cam_K\": [0")).contains("cam_K or depth_scale of image 0"));
+    let said = error(&good.replace("\"cam_t_w2c\"", "\"t\""));
+    assert!(said.contains("image 0, whose camera has no pose (cam_R_w2c and cam_t_w2c), is not read"), "{said}");
+    assert!(said.contains("cam_R_m2c and cam_t_m2c in scene_gt.json"), "{said}");
+    let said = error(&good.replace("\"cam_K\"", "\"K\""));
+    assert!(said.contains("scene_camera.json:1: the scan file is damaged: missing field"), "{said}");
+    assert!(error(&good.replace("\"cam_K\": [300", "\"cam_K\": [0")).contains("cam_K or depth_scale of image 0"));
     assert!(
         error(&good.replace("\"cam_R_w2c\": [", "\"cam_R_w2c\": [5, 0, 0, 0, 1, 0, 0, 0, 1], \"old\": ["))
             .contains("not a rotation")

@@ -1,7 +1,7 @@
 //! Layouts of the folders of mesh data sets.
 
 use super::search::{Found, lossy, rank};
-use crate::mesh::file::DEPTH_LIST;
+use crate::mesh::file::{self, DEPTH_LIST};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +26,9 @@ pub(super) fn shapenet(path: &Path) -> Option<(String, String)> {
 pub(super) fn folder(path: &Path) -> Option<String> {
     let inner = path.parent()?;
     let is_scanned = path.file_stem()? == "model" && inner.file_name()? == "meshes";
+    if let Some((_, number)) = file::chosen(path) {
+        return Some(format!("{}@{number}", lossy(Some(inner.file_name()?))));
+    }
     match ycb(path) {
         None if path.file_name()? == DEPTH_LIST => Some(lossy(Some(inner.file_name()?))),
         Some((folder, _)) => Some(lossy(folder.file_name())),

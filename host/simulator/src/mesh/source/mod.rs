@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 /// - a mesh file of any of the kinds that [`mod@file`] reads, or a directory, which is searched for files with one of the
 ///   extensions of [`file::EXTENSIONS`], subdirectories included; where a folder holds a name with several extensions, the
 ///   first of them is taken, and the object's notes say so;
+/// - a scene of depth images with the number of the object that is chosen: `scene@3`;
 /// - the name of a built-in object, if there is no file of that name.
 ///
 /// An object is named after its file, except in the layouts of
@@ -298,6 +299,8 @@ fn found(sources: &[String], search: Search) -> Result<(Vec<Source>, Option<Stri
             && !Path::new(source).exists()
         {
             insert(&mut found, name.into(), Source::BuiltIn(name))?;
+        } else if let Some(path) = search::chosen(source) {
+            paths.push(Found { path, passed: Vec::new() });
         } else {
             let path = Path::new(source);
             let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {

@@ -38,6 +38,16 @@ pub(super) fn rank(path: &Path) -> Option<usize> {
     EXTENSIONS.iter().position(|known| extension.eq_ignore_ascii_case(known))
 }
 
+/// The object of a scene of depth images that a source chooses: `scene@3`, or `scene/scene_camera.json@3`.
+pub(super) fn chosen(source: &str) -> Option<PathBuf> {
+    let (scene, number) = source.rsplit_once('@')?;
+    let number: u32 = number.parse().ok()?;
+    let scene = Path::new(scene);
+    let list = if scene.is_dir() { scene.join(DEPTH_LIST) } else { scene.to_owned() };
+    let is_list = list.file_name().is_some_and(|name| name == DEPTH_LIST) && list.is_file();
+    (is_list && !Path::new(source).exists()).then(|| list.with_file_name(format!("{DEPTH_LIST}@{number}")))
+}
+
 /// A search of directories.
 #[derive(Default)]
 pub(super) struct Finder {
