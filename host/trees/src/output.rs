@@ -113,7 +113,7 @@ const BEGINNINGS: [&[u8]; 10] = [
     // The listing of a data set, the summary of a run or of a report, a journal.
     b"{\n  \"palpate\": \"",
     b"{\n  \"made_from\": {",
-    b"{\"is\":\"model\"",
+    b"{\"is\":\"",
 ];
 
 /// Beginnings of files of which other programs write the same, and what only those of Palpate have soon after.

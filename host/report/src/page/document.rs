@@ -355,6 +355,32 @@ mod tests {
     }
 
     #[test]
+    fn tables_that_the_page_links_are_replaced_with_it_and_foreign_ones_keep_it_from_being_written() {
+        let directory = tempfile::tempdir().unwrap();
+        let (path, csv) = (directory.path().join("index.html"), directory.path().join("t.csv"));
+        let page = |columns: [&str; 2]| {
+            let mut section = Section::new("one", "One");
+            let data = Records::new(columns);
+            section.table(Table { id: "t".into(), title: "T".into(), caption: "".into(), command: "".into(), data });
+            Page { title: "A".into(), summary: String::new(), sections: vec![section], facts: Vec::new(), files: true }
+        };
+        std::fs::write(&csv, "mine,yours\n").unwrap();
+        let error = page(["name", "value"]).write(&path).unwrap_err();
+        assert!(error.to_string().contains("t.csv: a file is there already that Palpate did not write"), "{error}");
+        assert_eq!((path.exists(), std::fs::read_to_string(&csv).unwrap()), (false, "mine,yours\n".into()));
+        std::fs::remove_file(&csv).unwrap();
+        for columns in [["name", "value"], ["name", "other"]] {
+            assert_eq!(page(columns).write(&path).unwrap().len(), 2);
+            assert_eq!(std::fs::read_to_string(&csv).unwrap(), columns.join(",") + "\n");
+        }
+        // Left by a report that was interrupted before its page was written.
+        std::fs::remove_file(&path).unwrap();
+        page(["name", "other"]).write(&path).unwrap();
+        std::fs::write(&path, "<html>mine</html>").unwrap();
+        assert!(page(["name", "other"]).write(&path).unwrap_err().to_string().contains("index.html: a file is there"));
+    }
+
+    #[test]
     fn panels_are_tiled_into_one_drawing() {
         let text = "<svg width=\"500\" height=\"100\"></svg>\n".into();
         let panel = Svg { text, width: 500, height: 100, narrow: None };

@@ -14,7 +14,7 @@ pub(super) struct Cutter {
 /// The most corners of a polygon that is cut corner by corner, which takes time with the square of their number.
 const MOST_CORNERS: usize = 4096;
 
-/// Twice the area of a triangle that is flat but for rounding, in a polygon whose coordinates are at most 1.
+/// Twice the area up to which a triangle is flat within rounding, in a polygon whose coordinates are at most 1.
 const FLAT: f64 = 1e-12;
 
 impl Cutter {

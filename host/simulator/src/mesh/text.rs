@@ -46,7 +46,7 @@ impl Written {
 #[cfg(test)]
 mod tests {
     use crate::mesh::Mesh;
-    use crate::mesh::file::parse;
+    use crate::mesh::file::{Format, parse};
     use crate::mesh::tests::samples::{self, corners};
     use std::path::Path;
 
@@ -67,6 +67,7 @@ mod tests {
                 let bytes: Vec<u8> = units.iter().flat_map(|&unit| swap(unit)).collect();
                 let read = parse(&bytes, Path::new(name)).unwrap_or_else(|error| panic!("{error}"));
                 assert!(corners(&read.mesh) == corners(&globe), "{name}");
+                assert_eq!(Format::of(&bytes, bytes.len() as u64, None), read.format, "{name}");
             }
         }
     }

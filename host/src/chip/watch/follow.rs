@@ -149,7 +149,7 @@ mod tests {
     fn a_journal_through_a_link_leaves_the_link() {
         let directory = tempfile::tempdir().unwrap();
         let (target, link) = (directory.path().join("target"), directory.path().join("link"));
-        std::fs::write(&target, "old\n").unwrap();
+        Journal::create(&target).unwrap().write(&object("old")).unwrap();
         std::os::unix::fs::symlink(&target, &link).unwrap();
         Journal::create(&link).unwrap().write(&object("first")).unwrap();
         assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());

@@ -42,6 +42,14 @@ impl Format {
     /// The kind of file that starts with `head` (a few hundred bytes or more, or all of it) and has `length` bytes. Its
     /// content decides; `extension` only where the content says nothing, so that errors speak of what the user meant.
     pub fn of(head: &[u8], length: u64, extension: Option<&str>) -> Self {
+        match Written::of(head, length) {
+            Some(written) => Self::of_usual(&written.usual(head.to_vec()), length, extension),
+            None => Self::of_usual(head, length, extension),
+        }
+    }
+
+    /// The same of text as it is usually written.
+    fn of_usual(head: &[u8], length: u64, extension: Option<&str>) -> Self {
         if stl::is_binary(head, length) {
             return Self::Stl;
         }
@@ -166,7 +174,7 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
     let mut notes = Vec::new();
     let format = match path.file_name() {
         Some(name) if name == DEPTH_LIST || chosen(path).is_some() => Format::Depth,
-        _ => Format::of(head, length, path.extension().and_then(|extension| extension.to_str())),
+        _ => Format::of_usual(head, length, path.extension().and_then(|extension| extension.to_str())),
     };
     let (parsed, millimeters) = match format {
         Format::Obj => (Parsed::Mesh(obj::parse_moved(reader, path)?), None),

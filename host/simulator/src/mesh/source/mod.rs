@@ -42,7 +42,7 @@ pub fn objects(sources: &[String]) -> Result<Vec<Object>> {
 /// How directories are searched and meshes are read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Search {
-    /// True to take a directory inside a directory as one object, of which each mesh in it is an instance.
+    /// True to take a directory inside a directory as one object, with each mesh in it as an instance.
     pub instances: bool,
     /// True to take files that may state their unit before others of the same name.
     pub prefers_units: bool,
