@@ -249,9 +249,10 @@ impl Recording {
         let latest = probe.latest();
         let is_late = |touch: &&Touch| latest.is_some_and(|latest| f64::from(touch.spread()) > latest);
         if let Some((touch, stroke)) = touches.iter().find(is_late).zip(probe.stroke) {
-            let seconds = |micros: u32| format!("{:.3} s", f64::from(micros) / 1e6);
-            let stroke = format!("{stroke} ({})", seconds(probe.window().unwrap_or_default()));
-            return Err(TouchesProblem::LaterThanStroke { stroke, latest: seconds(touch.spread()) }.into());
+            let seconds = |micros: f64| format!("{:.3} s", micros / 1e6);
+            let [window, latest] = [probe.window().map(f64::from), latest].map(|micros| seconds(micros.unwrap_or_default()));
+            let stroke = format!("{stroke} ({window}), which explains contacts up to {latest}");
+            return Err(TouchesProblem::LaterThanStroke { stroke, latest: seconds(touch.spread().into()) }.into());
         }
         let lines = lines(touches);
         if self.recorded.touches == 0 {
