@@ -46,7 +46,7 @@ pub enum CalibrateProblem {
         rate: f64,
     },
     /// There are too few sequences of rows, or groups of them, for a promise, even without any error.
-    #[error("{}{} are too few to promise {} %: at least {needed} are needed, none of them wrong; {}", how_many(*found, *groups, *names_in), of_object(object), percent(*rate), could(*possible, *held))]
+    #[error("{} are too few to promise {} %: at least {needed} are needed, none of them wrong; {}", how_many(*found, object, *groups, *names_in), percent(*rate), could(*possible, *held))]
     TooFewSequences {
         /// The class whose names are too few, if the promise is for each.
         object: Option<String>,
@@ -304,10 +304,11 @@ fn what(groups: bool) -> &'static str {
     if groups { "groups of sequences" } else { "sequences" }
 }
 
-fn how_many(found: u64, groups: bool, names_in: Option<u64>) -> String {
+fn how_many(found: u64, object: &Option<String>, groups: bool, names_in: Option<u64>) -> String {
+    let of = of_object(object);
     match names_in {
-        Some(all) if groups => format!("names given in as many as {found} of {all} groups of sequences"),
-        Some(all) => format!("{found} names given in {all} sequences"),
+        Some(all) if groups => format!("names given{of} in as many as {found} of {all} groups of sequences"),
+        Some(all) => format!("{found} names given{of} in {all} sequences"),
         None => format!("{found} {}", what(groups)),
     }
 }

@@ -1,7 +1,7 @@
 //! The sequences of a calibration, divided into those that are learned from and those that are tested on.
 
 use super::settings::Settings;
-use crate::calibrate::{Per, Stop, Tally, needed};
+use crate::calibrate::{Per, Stop, Tally, needed, share_tested};
 use crate::error::{CalibrateProblem, Result};
 use crate::random::{self, Purpose};
 use palpate_trees::rows::RowSequence;
@@ -110,7 +110,9 @@ impl<'s> Parts<'s> {
     /// The problem that a walk ended with; `least` is the row before which no name is given.
     pub(super) fn problem(&self, stop: Stop, names: &[String], settings: &Settings, least: u32) -> CalibrateProblem {
         let of = |position: usize| (settings.per != Per::Average).then(|| names.get(position).cloned()).flatten();
-        let units = self.units_tested() as u64;
+        // Thresholds by name are learned on some of them.
+        let share = if self.has_groups { 1.0 } else { share_tested(settings.per) };
+        let units = (share * self.units_tested() as f64).round() as u64;
         match stop {
             Stop::TooFew { position, found, needed } => {
                 let count = usize::try_from(found).unwrap_or(usize::MAX);
