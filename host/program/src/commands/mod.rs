@@ -128,7 +128,7 @@ pub(crate) struct Global {
     /// Print the result as JSON
     #[arg(long, global = true)]
     json: bool,
-    /// Number of threads; results do not depend on it [default: all]
+    /// Threads [default: all]; results do not depend on them
     #[arg(long, global = true, value_name = "N", value_parser = threads)]
     threads: Option<usize>,
     /// Seed of all that is random [default: 1]
@@ -212,7 +212,7 @@ fn overview(cli: &clap::Command) -> String {
         + "
 Global options:
   --json         Print the result as JSON
-  --threads <N>  Number of threads; results do not depend on it
+  --threads <N>  Threads; results do not depend on them
   --seed <N>     Seed of all that is random
   --quiet        Print neither progress nor remarks
   --force        Write all the same, over what is there

@@ -121,7 +121,7 @@ pub(crate) struct UnitArguments {
     /// Objects keep their size, in mm: the unit of meshes that state none (mm, cm, m, in, NAME=cm), or stated
     #[arg(long, value_name = "UNIT,…", value_parser = mesh_unit, value_delimiter = ',')]
     true_size: Vec<MeshUnit>,
-    /// Treat each subdirectory as one object with several meshes, or make N variants of each built-in object
+    /// Treat each subdirectory as one object, or make N variants of each built-in one
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "0", value_parser = instances)]
     instances: Option<usize>,
     /// Leave out bad meshes; also untouchable ones

@@ -71,7 +71,7 @@ fn an_ensemble_and_its_compiled_model_evaluate_side_by_side() {
     let noisy: Value = serde_json::from_str(&succeeds(at, &noisy)).unwrap();
     assert!(noisy["accuracy"]["20"].as_f64() < figures[1]["accuracy"]["20"].as_f64());
     let table = succeeds(at, &["evaluate", "model.palpate", "data"]);
-    assert!(table.contains("bowl") && table.contains("Stopping at an error rate of 0.01"), "{table}");
+    assert!(table.contains("bowl") && table.contains("Stopping at an error rate of 1 %"), "{table}");
 }
 
 #[test]
@@ -403,7 +403,7 @@ fn tune_names_the_file_it_wrote_and_the_features_that_the_chip_needs() {
     let inspected = json(at, &["inspect", "tuned.palpate", "--json"]);
     assert!(inspected["instructions"]["m0_plus"].as_u64() <= Some(2000), "{inspected}");
     let [layout, leaf] = ["layout", "leaf"].map(|key| inspected[key].as_str().unwrap());
-    assert!(written.contains(&format!("features of palpate-onboard: {layout}, {leaf}-leaves")), "{written}");
+    assert!(written.contains(&format!("build palpate-onboard with: {layout}, {leaf}-leaves")), "{written}");
     assert!(succeeds(at, &tune).contains("The model was not written"));
 }
 
