@@ -122,7 +122,7 @@ impl TrainedProbe {
         bytes
     }
 
-    /// Bytes of the section's content: without stroke and travel as many as in version 0.2.
+    /// Bytes of the section's content; fewer without stroke and travel.
     pub const fn length(&self) -> usize {
         if self.stroke.is_none() && self.travel.is_none() { Self::LENGTH } else { Self::WITH_HAND }
     }

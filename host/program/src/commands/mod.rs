@@ -23,7 +23,6 @@ mod prove;
 mod real;
 mod recognize;
 mod recognize_rows;
-mod renamed;
 mod report;
 mod rows;
 mod run;
@@ -269,14 +268,7 @@ fn unwrapped(text: &str) -> String {
 
 /// Runs the command that the arguments name, prints its error if it has one, and returns the exit code.
 pub fn main() -> ExitCode {
-    let matches = cli().try_get_matches().unwrap_or_else(|error| {
-        let words: Vec<String> = std::env::args().skip(1).collect();
-        if let Some(text) = renamed::said(&words, &error) {
-            eprintln!("palpate: {text}");
-            std::process::exit(2);
-        }
-        without_trailing(error).exit()
-    });
+    let matches = cli().try_get_matches().unwrap_or_else(|error| without_trailing(error).exit());
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let hint = cli.command.hint();
     match cli.global.apply().and_then(|()| cli.command.run(&cli.global)) {
