@@ -247,7 +247,7 @@ impl Descriptor {
     }
 
     /// The features of [`Descriptor::Curvature`] of a full touch that is over within four seconds, as nearly all are; `None`
-    /// for others, of which [`Descriptor::features`] has them.
+    /// for others; [`Descriptor::features`] has those.
     ///
     /// Cost: less than that of [`Descriptor::features`], since nothing can be missing or reach a limit.
     #[inline]

@@ -34,7 +34,7 @@ impl ContactTime {
 /// One in Q15: a direction cosine of 1 is stored as 32767.
 pub const Q15_ONE: i16 = i16::MAX;
 
-/// Where the probe came from, in the object's frame: direction cosines in Q15 (-32767 to 32767).
+/// Direction and alignment of the probe, in the object's frame: direction cosines in Q15 (-32767 to 32767).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pose {

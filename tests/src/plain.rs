@@ -275,7 +275,7 @@ impl<'a> Plain<'a> {
         self.sums_until(features, &mut |_, _| false)
     }
 
-    /// The same until `is_known` of the number of groups so far and their sums.
+    /// Sums until `is_known` of the number of groups so far and their sums.
     fn sums_until(&self, features: &[i32], is_known: &mut dyn FnMut(usize, &[i32]) -> bool) -> Vec<i32> {
         let is_missing = |value: i32| self.sentinel.is_some_and(|(low, high)| low <= value && value <= high);
         let feature =

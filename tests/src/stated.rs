@@ -1,6 +1,6 @@
 //! Numbers in READMEs, held against measurements.
 //!
-//! `PALPATE_RESTATE=1` writes what was measured in the place of what is stated, so that a README follows the code.
+//! `PALPATE_RESTATE=1` replaces stated figures by measured ones, so that a README follows the code.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -98,7 +98,7 @@ fn with_commas(number: u64) -> String {
     text
 }
 
-/// Where a comment states a number of instructions, or of bytes of code, flash, stack or RAM: the words.
+/// Words of a comment that state a number of instructions, or of bytes of code, flash, stack or RAM.
 pub fn measured_in(comment: &str) -> Vec<String> {
     const NUMBERS: [&str; 14] = [
         "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "fifteen", "dozen",

@@ -65,9 +65,9 @@ fn dataset(count: usize) -> Dataset {
 
 /// On a good line nothing has to be sent again, however busy the machine that emulates the chip.
 const PATIENT: HostSettings = HostSettings { retry: 5_000_000, attempts: 10 };
-/// Where something is lost now and then.
+/// Settings for a line that loses something now and then.
 const BRISK: HostSettings = HostSettings { retry: 500_000, attempts: 50 };
-/// Where much is lost.
+/// Settings for a line that loses much.
 const HASTY: HostSettings = HostSettings { retry: 50_000, attempts: 200 };
 
 /// Streams touches to an emulated chip that gets `model` first, and holds it against the host.

@@ -135,7 +135,7 @@ proptest! {
                 let mut changed = bytes.clone();
                 tried += 1;
                 for _ in 0..random.random_range(1..30) {
-                    // Thresholds, splits and leaves: what is not checked when a model is opened.
+                    // Thresholds, splits and leaves, which are not checked when a model is opened.
                     changed[random.random_range(body - sections..body)] = random.random();
                 }
                 let sum = checksum(&changed[..body]);

@@ -106,7 +106,7 @@ struct Sizes {
 }
 
 impl Sizes {
-    /// Of a 32-bit little-endian ELF file: what is loaded counts as flash, what is written as RAM.
+    /// Reads a 32-bit little-endian ELF file: loaded bytes count as flash, written ones as RAM.
     fn read(elf: &[u8]) -> Self {
         let half = |at: usize| usize::from(u16::from_le_bytes([elf[at], elf[at + 1]]));
         let word = |at: usize| u32::from_le_bytes(elf[at..at + 4].try_into().expect("four bytes"));

@@ -71,7 +71,7 @@ for categories in [5, 20, 100]:
                 print(f"| {kind} | {categories} | {splits} | {answer} |")
                 continue
             cost = next(one for one in answer["candidates"] if one["layout"] == answer["layout"])
-            # As compact trees: three bytes for a split, two for a leaf, and two for the number of a set.
+            # Compact trees: three bytes for a split, two for a leaf, and two for the number of a set.
             fewer = answer["splits"] - splits
             sets = answer["bytes"] - 5 * fewer + 4 * words + 2 * words
             print(f"| {kind} | {categories} | {splits} | {answer['splits']} | {answer['bytes']} | {sets} | {cost['instructions']['m4f']} |")

@@ -126,6 +126,6 @@ def figures(half, threshold):
 
 numbers = np.maximum(1, np.round(SEQUENCES * prior / prior.sum()).astype(int))
 halves = [[[followed(placement) for _ in range(n)] for placement, n in enumerate(numbers)] for _ in range(2)]
-# The loosest threshold, from there on, of which fewer than .8 % are wrong: 1 % with a margin for chance.
+# Loosest threshold from there on with fewer than .8 % wrong: 1 % with a margin for chance.
 threshold = next(1 - 10.0**-nines for nines in np.arange(0.5, 12, 0.05) if figures(0, 1 - 10.0**-nines)[0] <= 0.008)
 print(f"threshold {threshold:.4f}; {figures(1, threshold)[1]}")

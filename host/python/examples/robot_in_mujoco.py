@@ -75,7 +75,7 @@ def draw(rng, half):
     row /= np.linalg.norm(row)
     tilt = math.radians(rng.uniform(-TILT, TILT))
     alignment = row * math.cos(tilt) + motion * math.sin(tilt)
-    # Where the paths of the fingers are inside the box, grown by a finger.
+    # Parts of the fingers' paths inside the box, grown by a finger.
     grown = half + RADIUS + 1e-4
     begin, end = math.inf, -math.inf
     for place in (-SPACING, 0, SPACING):

@@ -316,7 +316,7 @@ impl DataSet {
         self.write(py, directory, Format::Parquet)
     }
 
-    /// The same as text, one line per touch.
+    /// Writes the touches as text, one line per touch.
     fn to_text(&self, py: Python<'_>, directory: PathBuf) -> Result<(), Failure> {
         self.write(py, directory, Format::Text)
     }

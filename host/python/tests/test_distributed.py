@@ -101,7 +101,7 @@ def test_the_result_is_that_of_one_machine(
     summary = palpate.distributed.capture(client, OBJECTS, 700, out, touches_per_shard=200, **options)
     assert files(out) == files(tmp_path / "one")
     assert (summary.objects, summary.done, summary.kept, summary.refused) == (2, 8, 0, [])
-    # Once more: nothing is done again, but for a part that was damaged.
+    # Once more: only a part that was damaged is done again.
     (out / "parts" / "bowl" / "2-of-4.txt").write_bytes(b"0 0 0\n")
     again = palpate.distributed.capture(client, OBJECTS, 700, out, touches_per_shard=200, **options)
     assert (again.done, again.kept) == (1, 7) and files(out) == files(tmp_path / "one")

@@ -59,7 +59,7 @@ def test_margins_are_the_ensembles_within_the_stated_bound(
     compiled = model.margins(unseen)
     assert full.dtype == np.float32 and compiled.dtype == np.float64 and full.shape == compiled.shape
     assert np.abs(full - compiled).max() <= model.margin_error
-    # Of the same times as an array, in Fortran order, row by row.
+    # The same times as an array, in Fortran order, row by row.
     np.testing.assert_array_equal(model.margins(unseen.times), compiled)
     rows = [model.margins(unseen.times[row : row + 1])[0] for row in range(300)]
     np.testing.assert_array_equal(rows, compiled[:300])

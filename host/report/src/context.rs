@@ -25,7 +25,7 @@ pub(super) struct Context<'a> {
     pub(super) objects: &'a [Object],
     pub(super) cache: &'a Cache,
     pub(super) progress: &'a dyn Progress,
-    /// Those of each object's instances.
+    /// Scenes of each object's instances.
     scenes: Vec<Vec<Scene>>,
     captured: OnceCell<Captured>,
     first: OnceCell<Split>,

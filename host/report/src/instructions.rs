@@ -53,7 +53,7 @@ impl Instructions {
         Self { m4f, m0_plus: count(m0_plus, estimate.m0_plus.unwrap_or_else(by_ratio)) }
     }
 
-    /// Where the numbers come from, as sentences.
+    /// Source of the numbers, as sentences.
     pub(super) fn explanation(self) -> String {
         let measured = "counted while emulated chips ran the compiled models";
         let chip = if self.m4f.measured { Chip::M0Plus } else { Chip::M4F };
@@ -76,7 +76,7 @@ impl Instructions {
 }
 
 impl Count {
-    /// Where the number comes from, for a column's title.
+    /// Source of the number, for a column's title.
     pub(super) fn source(self) -> &'static str {
         if self.measured { "measured" } else { "estimated" }
     }

@@ -12,7 +12,7 @@ const SUMMARY: &str = "summary.json";
 const MADE_FROM: &str = "made_from";
 
 /// Refuses a directory with results that this run would replace though it did not make them. The same run again may
-/// replace its own: `summary.json` then states the same `made_from`. Where there is no summary but the file or directory
+/// replace its own: `summary.json` then states the same `made_from`. If there is no summary, only the file or directory
 /// `trace`, an earlier run was interrupted, and its files may be replaced too; any other of `files` is somebody's.
 ///
 /// # Errors

@@ -237,7 +237,7 @@ impl Line {
         Ok(step)
     }
 
-    /// The same of a touch of the chip's own fingers. Once it has decided it has begun another object, and can be asked no
+    /// The step for a touch of the chip's own fingers. Once the chip has decided, it has begun another object, and can be asked no
     /// more about this one.
     fn step_of_event(&mut self, connection: &mut Connection, names: &[String], said: &VerdictMessage) -> Result<Step> {
         if said.decision == Decision::Undecided { self.step(connection, names, said) } else { Ok(spoken(names, said)) }

@@ -45,7 +45,7 @@ enum Happened {
     Signal(Signal),
 }
 
-/// Where verdicts come from.
+/// Source of verdicts.
 enum Recognizing {
     Here(Decider),
     Chip {
@@ -390,7 +390,7 @@ impl Running<'_> {
         }
     }
 
-    /// The verdict so far, as far as it is known here.
+    /// The verdict so far, if it is known here.
     fn verdict(&self) -> Verdict {
         match &self.recognizing {
             Recognizing::Here(decider) => decider.step().verdict,

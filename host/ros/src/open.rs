@@ -56,7 +56,7 @@ pub(crate) struct Inputs {
 /// Messages of the node.
 pub(crate) struct Outputs {
     pub(crate) verdicts: Publisher<Verdict>,
-    /// The same in a line, for nodes that do not know the package of the messages.
+    /// Publisher of the verdict as one line of text, for nodes that do not know the package of the messages.
     pub(crate) texts: Publisher<Text>,
     pub(crate) evidence: Publisher<Evidence>,
     pub(crate) approaches: Publisher<Approach>,
@@ -116,7 +116,7 @@ fn change(
             thresholds(Thresholds { max_touches, ..Thresholds::default() })?;
             Ok(Some(Change::MaxTouches(max_touches)))
         }
-        _ => Err(format!("{name} is no parameter of this type")),
+        _ => Err(format!("{name} is not a parameter of this type")),
     }
 }
 

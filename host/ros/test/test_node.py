@@ -28,7 +28,7 @@ def draw(count, seed):
 
 
 def exchange(touches, verdicts, drawn):
-    """Verdicts on touches, of which not more are under way than a publisher keeps."""
+    """Verdicts on touches, at most as many under way at a time as a publisher keeps."""
     taken = []
     for number, touch in enumerate(drawn):
         touches.write(touch)
@@ -159,7 +159,7 @@ def test_a_late_subscriber_gets_the_last_verdict():
 @pytest.mark.parametrize("port", [10, 11], ids=["discovery", "data"])
 def test_a_node_of_whose_ports_another_process_has_one_is_heard_and_hears(port):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        # Of number 0, as the specification of RTPS has it.
+        # The port of participant 0, by the RTPS specification.
         taken.bind(("0.0.0.0", 7400 + 250 * int(os.environ["ROS_DOMAIN_ID"]) + port))
         with Node(MODEL) as node:
             peer = Peer(node)
@@ -237,7 +237,7 @@ def test_a_best_effort_publisher_is_heard_if_the_node_says_so():
         verdicts = peer.latched("verdict", Verdict)
         for reliable in (False, True):
             touches = peer.writer("touch", Touch, qos=qos(reliable))
-            # What is lost is not sent again.
+            # Lost samples are not sent again.
             until(lambda: touches.write(Touch(LEVEL)) or verdicts.take(), "no verdict")
 
 
@@ -311,7 +311,7 @@ def test_a_client_that_never_hears_responses_does_not_keep_the_node_from_others(
         def other_is_answered():
             other.ask(NumberedResetRequest(RequestHeader(2, 1)))
             time.sleep(0.1)
-            # Those to the deaf are heard, too, and the node keeps the last ten only.
+            # Responses to the deaf are heard, too, and the node keeps the last ten only.
             return any(answer.header.client == 2 for answer in other.responses.take(1000))
 
         # The node waits for a second, not for a hundred.

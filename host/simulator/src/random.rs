@@ -47,7 +47,7 @@ pub enum Purpose {
 
 impl Purpose {
     /// Byte that the purpose adds to the name: a control character, which no object's name begins with. Nothing for
-    /// folds, which version 0.1.0 drew without a purpose: a data set is still divided as it was.
+    /// folds.
     fn mark(self) -> Option<u8> {
         match self {
             Self::Folds => None,

@@ -10,7 +10,7 @@ use palpate_shared::format::TrainedTouches;
 /// As many touches as a robot's sequence often needs; each robot makes only one.
 const AT_ONCE_OF_A_ROBOT: usize = 128;
 
-/// Where a supply's touches come from.
+/// Source of a supply's touches.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Feed<'d> {
     /// They are there.

@@ -29,7 +29,7 @@ pub struct Moment<'s> {
     pub approaches: u32,
 }
 
-/// Where sequences end.
+/// End of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Until {
     /// Once the leader has this much more evidence than all others together, in nats.
@@ -281,7 +281,7 @@ pub fn follow<G: FnMut(&Moment<'_>) -> bool>(
     let share = |(found, wanted): (&Vec<Sequence>, &usize)| (*wanted > 0).then(|| found.len() as f64 / *wanted as f64);
     let share = found.iter().zip(wanted).filter_map(share).fold(1.0, f64::min);
     for (found, &wanted) in found.iter_mut().zip(wanted) {
-        // Rounded up where it is a whole number but for the last bits.
+        // Rounded up if it is a whole number except for the last bits.
         found.truncate((wanted as f64 * share + 1e-6) as usize);
     }
     Ok(found.into_iter().flatten().collect())

@@ -120,7 +120,7 @@ fn recordings_that_are_too_few_say_which_rate_they_support_and_that_rate_can_be_
     assert!((0.015..0.4).contains(&supported) && (400..6_000).contains(&most), "{text}");
     assert!(enough.least.0 < most && enough.all < OBJECTS as u64 * most, "{text}");
     of(300, supported).unwrap();
-    // Each object as many as it takes.
+    // As many of each object as it takes.
     let counts = [&enough.least, &enough.most].map(|(count, name)| (name.clone(), *count as usize));
     let rest = enough.all as usize - counts.iter().map(|(_, count)| count).sum::<usize>();
     let as_much = |object: &ObjectTouches| counts.iter().find(|of| of.0 == object.name).map_or(rest, |of| of.1);

@@ -38,7 +38,7 @@ pub const TOUCHES: usize = 64;
 const PATIENCE: Duration = Duration::from_secs(120);
 
 impl Chip {
-    /// Where `cargo build --release` in `onboard/firmware` puts the image, seen from the project's folder.
+    /// Path of the image that `cargo build --release` in `onboard/firmware` makes, from the project's folder.
     pub fn image(self) -> PathBuf {
         let target = match self {
             Self::M4F => "thumbv7em-none-eabihf",

@@ -1,4 +1,4 @@
-//! Where a chip can be reached.
+//! Address of a chip.
 
 use super::{Emulator, Transport};
 use crate::error::{ChipProblem, Error, Place, Result};
@@ -8,7 +8,7 @@ use std::net::{Shutdown, TcpStream};
 use std::str::FromStr;
 use std::time::Duration;
 
-/// Where a chip can be reached.
+/// Address of a chip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Port {
     /// A serial port, by the operating system's name: `/dev/ttyACM0`, `COM3`.

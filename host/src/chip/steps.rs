@@ -15,7 +15,7 @@ pub enum Step {
     Touch(Touch),
 }
 
-/// Where touches come from.
+/// Source of touches.
 pub enum Steps {
     /// A data set: a sequence of touches of each object in turn, again and again.
     Sequences {
@@ -25,7 +25,7 @@ pub enum Steps {
         length: usize,
         /// Touches still to come.
         left: u64,
-        /// Of each object the touches that may follow each other.
+        /// For each object, the touches that may follow each other.
         pools: Vec<Vec<Pool>>,
         /// Indices of the sequence and of its touch.
         at: (usize, usize),

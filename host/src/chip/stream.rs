@@ -55,7 +55,7 @@ pub struct Summary {
     pub compared: u64,
     /// Proposed approaches that were compared with the host's recognizer.
     pub approaches: u64,
-    /// Of everything that was compared, with another verdict, posterior, evidence or approach.
+    /// Compared touches with another verdict, posterior, evidence or approach.
     pub differences: u64,
     /// The first of them.
     pub first_difference: Option<String>,

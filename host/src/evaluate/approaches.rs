@@ -16,13 +16,13 @@ use std::collections::BTreeMap;
 pub struct Approaches {
     /// Share of approaches that are evidence to the model.
     pub used: f64,
-    /// The same for each object.
+    /// Approaches used, for each object.
     pub used_per_object: BTreeMap<String, f64>,
     /// Accuracy after a number of approaches. A model that has no evidence yet has recognized nothing.
     pub accuracy: BTreeMap<usize, f64>,
     /// Standard error of [`Approaches::accuracy`].
     pub accuracy_standard_error: BTreeMap<usize, f64>,
-    /// The same for each object.
+    /// Accuracy for each object.
     pub per_object: BTreeMap<String, BTreeMap<usize, f64>>,
     /// Results of the recognizer that stops by itself.
     pub sequential: ApproachSequential,
@@ -36,7 +36,7 @@ pub struct ApproachSequential {
     pub error_rate: f64,
     /// The error rate that the model promises; none for thresholds that nothing was calibrated for.
     pub promised: Option<f64>,
-    /// Of what it is promised: "average", "name" or "object".
+    /// Cases that the promise covers: "average", "name" or "object".
     pub per: Option<&'static str>,
     /// Touches that are evidence, after which it gave up.
     pub max_touches: u32,
@@ -62,7 +62,7 @@ pub struct ApproachSequential {
     pub undecided_per_object: BTreeMap<String, f64>,
     /// Share of wrong names among those given; not a number if there are none.
     pub error_of_given: f64,
-    /// The same of those given to each object; without objects that never got a name.
+    /// Error rate of the names given to each object; objects that never got a name are left out.
     pub error_of_given_per_object: BTreeMap<String, f64>,
     /// Objects of whose names more are wrong than [`ApproachSequential::error_rate`], by more than chance.
     pub above: Vec<String>,

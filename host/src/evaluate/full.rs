@@ -19,7 +19,7 @@ pub(super) struct FullRecognizer {
 }
 
 impl FullRecognizer {
-    /// A recognizer that has touched nothing yet; `prior` is the evidence for each object, in nats, of which the first
+    /// A recognizer that has touched nothing yet; `prior` is the evidence for each object, in nats, and only the first
     /// `known` can be named; `numbers` are those of their objects, where several outputs belong to one. Objects have
     /// thresholds of their own if the model that it is compared with has them.
     pub(super) fn new(

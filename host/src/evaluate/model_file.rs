@@ -40,7 +40,7 @@ impl ModelFile {
         }
     }
 
-    /// The objects whose touches in `dataset` the model was trained on, as far as it states that.
+    /// The objects whose touches in `dataset` the model was trained on, if it states them.
     pub fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
         match self {
             Self::Full(ensemble) => {

@@ -20,7 +20,7 @@ pub(super) struct Candidate {
 pub(super) const NUMBERS: usize = 7;
 
 impl Candidate {
-    /// As numbers of about the same scale for a search.
+    /// The candidate as numbers of about the same scale, for a search.
     pub(super) fn numbers(&self) -> [f64; NUMBERS] {
         let [_, middle, third] = self.late;
         let [a, b, c] = self.missed.map(f64::sqrt);
@@ -47,7 +47,7 @@ const USUAL: [f64; 3] = [0.15, 8.0, 1.0];
 const USUAL_NOISE: f64 = 2.0;
 
 impl Candidate {
-    /// The logarithm of how usual it is, but for a constant.
+    /// Logarithm of how usual it is, up to a constant.
     pub(super) fn usual(&self) -> f64 {
         let [factor, offset, noise] = USUAL;
         // Whichever finger counts as straight.
@@ -63,7 +63,7 @@ impl Candidate {
 pub(super) enum Kept {
     /// Every approach.
     All,
-    /// Those with a contact.
+    /// Approaches with a contact.
     Contacts,
     /// Full touches.
     Full,

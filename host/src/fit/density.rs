@@ -6,7 +6,7 @@
 //!
 //! Each table is a kernel estimate from simulated touches: every touch adds a Gaussian of the noise's width, which grows
 //! with the distance from 0, where touches are rare and shapes smooth. Cells grow likewise, so that one table holds flat
-//! faces (κ = 0 but for the noise) and the farthest edges. Tables are made for steps of σ as they are needed, and read with
+//! faces (κ = 0 except for noise) and the farthest edges. Tables are made for steps of σ as they are needed, and read with
 //! interpolation; what a candidate probe does to times (factor, offsets) is undone before a table is read.
 
 use super::candidate::{Candidate, Kept, NOISE};
@@ -32,7 +32,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// Of these samples and their mirror images, whose second number has the other sign.
+    /// A density of these samples and their mirror images, whose second number has the other sign.
     fn new(samples: &[[f32; 2]], deviation: f64) -> Self {
         let deviations = [6.0_f64.sqrt() * deviation, 2.0_f64.sqrt() * deviation];
         let axes = [0, 1].map(|axis| {
@@ -99,12 +99,12 @@ pub(super) struct Densities {
     /// Contact times of some of the approaches, in milliseconds.
     some: Vec<[Option<f64>; 3]>,
     levels: [OnceLock<Level>; LEVELS],
-    /// The same as a stroke makes them, if the recordings have one.
+    /// Densities cut off by a stroke, if the recordings have one.
     pub(super) late: Option<Late>,
 }
 
 impl Densities {
-    /// Of simulated approaches, whether they touched or not, that no stroke ended; and the recordings' stroke as a time in
+    /// Densities of simulated approaches, with contact or without, that no stroke ended; and the recordings' stroke as a time in
     /// milliseconds.
     pub(super) fn new(name: &str, touches: &[Touch], window: Option<f64>) -> Self {
         let (mut full, mut neighbors, mut outer) = (Vec::new(), [Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
@@ -204,22 +204,22 @@ impl Smoothed<'_> {
         one + self.share * (other - one)
     }
 
-    /// Of κ and slope of a full touch, per square millisecond.
+    /// Density of κ and slope of a full touch, per square millisecond.
     pub(super) fn full(&self, curvature: f64, slope: f64) -> f64 {
         self.between(|level| level.full.at(curvature, slope))
     }
 
-    /// Of what the middle finger is later than an outer one, per millisecond, if only these two touch and if all do.
+    /// Density of how much later the middle finger is than an outer one, per millisecond, if only these two touch and if all do.
     pub(super) fn neighbors(&self, late: f64) -> [f64; 2] {
         [0, 1].map(|which: usize| self.between(|level| level.neighbors[which].at(late)))
     }
 
-    /// The same of the outer fingers.
+    /// Density of the difference between the outer fingers.
     pub(super) fn outer(&self, late: f64) -> [f64; 2] {
         [0, 1].map(|which: usize| self.between(|level| level.outer[which].at(late)))
     }
 
-    /// As [`Late::density`], 0 without a stroke.
+    /// [`Late::density`], 0 without a stroke.
     pub(super) fn late(&self, window: f64, which: usize, apart: f64) -> f64 {
         let Some(late) = self.late else { return 0.0 };
         let at = |level: usize| late.density(window, level, 2.0_f64.sqrt() * deviation_of(level), which, apart);

@@ -1,6 +1,6 @@
 //! Contacts that come later than the stroke: missing, and what that makes of the simulated touches.
 //!
-//! A late contact is censored. A touch with two recorded contacts may be one of three, of which the last came too late; how
+//! A late contact is censored. A touch with two recorded contacts may be one of three whose last contact came too late; how
 //! often that is, and how far the other two are then apart, is known from the simulated touches at any stroke. The stroke is a
 //! time on the recording's clock, so that a candidate's factor moves it: tables are made for a few strokes about the recorded
 //! one and read with interpolation. What is recorded lies within the stroke, where nothing changes. Noise, a hundredth of
@@ -26,7 +26,7 @@ pub(super) struct Late {
 struct Step {
     /// The share of each set of fingers, late ones left out, a set and its mirror image alike.
     shares: [f64; 8],
-    /// Of touches of three fingers of which one is late, the others' difference: of neighbors, and of the outer fingers.
+    /// Differences between the other two fingers, in touches of three fingers with one late: of neighbors, and of the outer fingers.
     samples: [Vec<f32>; 2],
     /// Share of each of these among all approaches; of neighbors, of either two.
     of_full: [f64; 2],
@@ -34,7 +34,7 @@ struct Step {
 }
 
 impl Late {
-    /// Of simulated approaches that no stroke ended, in milliseconds.
+    /// Tables of simulated approaches that no stroke ended, in milliseconds.
     pub(super) fn new(touches: &[Touch], window: f64) -> Self {
         Self { window, steps: STEPS.map(|step| Step::new(touches, window * step)) }
     }
@@ -44,7 +44,7 @@ impl Late {
         self.window
     }
 
-    /// Where a stroke of this many simulated milliseconds is among the tables: the lower one, and the share of the next.
+    /// Position of a stroke of this many simulated milliseconds among the tables: the lower one, and the share of the next.
     fn place(&self, window: f64) -> (usize, f64) {
         let step = (window / self.window).clamp(STEPS[0], STEPS[STEPS.len() - 1]);
         let lower = (STEPS.partition_point(|own| *own <= step).max(1) - 1).min(STEPS.len() - 2);

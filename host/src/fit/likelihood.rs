@@ -27,7 +27,7 @@ pub(super) struct Explained<'a> {
 /// The stroke that ended recorded approaches.
 #[derive(Clone, Copy)]
 struct Stroke {
-    /// As a time on the recording's clock, in milliseconds.
+    /// Stroke as a time on the recording's clock, in milliseconds.
     window: f64,
     /// The share of each set of fingers, late ones left out.
     shares: [f64; 8],
@@ -151,7 +151,7 @@ fn wide(x: f64) -> f64 {
     2.0 / (TAU * ODD_SPREAD * (1.0 + (x / ODD_SPREAD).powi(2)))
 }
 
-/// Presses on a flat plate: curvature is 0 but for the probe, and the slope is the plate's, with the other sign after each
+/// Presses on a flat plate: curvature is 0 except for the probe's own, and the slope is the plate's, with the other sign after each
 /// half turn. They tell how late fingers are, and nothing else: a press square to a plate repeats far better than a touch
 /// of an object, and misses nothing, so its noise and its missed contacts are its own.
 #[derive(Clone, Debug, Default)]
@@ -162,7 +162,7 @@ pub(super) struct Plate {
     pub(super) count: usize,
 }
 
-/// Repetitions of the estimate of a plate's noise, of which each is far closer than the one before.
+/// Repetitions of the estimate of a plate's noise; each is far closer than the one before.
 const REPETITIONS: usize = 12;
 
 impl Plate {

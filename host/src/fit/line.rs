@@ -36,7 +36,7 @@ impl Axis {
         2 * self.half + 1
     }
 
-    /// Where x is, in cells from the first.
+    /// Position of x, in cells from the first.
     pub(super) fn position(&self, x: f64) -> f64 {
         // The standard library's asinh takes three times as long, for digits near 0 that no cell needs.
         let x = self.scale * x;

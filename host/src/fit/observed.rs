@@ -24,7 +24,7 @@ impl Observed {
         Self::of_times(touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e3)))
     }
 
-    /// Of contact times on any common clock, in milliseconds.
+    /// Observation from contact times on any common clock, in milliseconds.
     pub(super) fn of_times(times: [Option<f64>; 3]) -> Self {
         let (fingers, first, second) = match times {
             [Some(a), Some(b), Some(c)] => (FULL, a - 2.0 * b + c, c - a),

@@ -19,7 +19,7 @@ pub(super) struct Recording<'a> {
 }
 
 impl<'a> Recording<'a> {
-    /// As if no pose had been recorded.
+    /// The recording without its poses.
     pub(super) fn without_poses(name: &'a str, touches: &[Touch], kept: Kept) -> Self {
         Self { name, touches: touches.iter().map(Observed::of).collect(), in_poses: Vec::new(), kept, is_mixed: false }
     }

@@ -116,7 +116,7 @@ pub(super) fn best(likelihood: Likelihood<'_>, more: Option<Candidate>) -> Best 
     Best { candidate: Candidate::of(&numbers), log_likelihood }
 }
 
-/// Where an interval ends.
+/// End of an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ends {
     /// The candidates at the lower and at the upper end; none where the likelihood does not say how far one may go.

@@ -26,7 +26,7 @@ use std::fmt;
 
 /// Number of nats by which another explanation of a recording must be better.
 const CERTAIN: f64 = 12.0;
-/// The same for another probe, which has seven numbers to suit the touches: by Wilks' theorem twice the gain of a probe
+/// The threshold for another probe, which has seven numbers to suit the touches: by Wilks' theorem twice the gain of a probe
 /// that is not another one is chi squared with seven degrees of freedom, and passes 44 with a probability of 2·10⁻⁷.
 const CERTAIN_PROBE: f64 = 22.0;
 /// The fewest touches that say anything about a part of a recording.

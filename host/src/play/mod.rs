@@ -84,7 +84,7 @@ pub struct Player<'m> {
 /// One approach, and what came of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Approached {
-    /// Where the probe came from.
+    /// The probe's approach.
     pub approach: Approach,
     /// Distance that each finger moved to its contact, in units; none for one that missed.
     pub distances: [Option<f64>; FINGERS],

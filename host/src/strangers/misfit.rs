@@ -18,10 +18,10 @@ const NEAR: f64 = 0.05;
 
 /// Means and covariances of the margins of one touch, in nats.
 pub(super) struct Moments {
-    /// Of each known object. Where it has several instances, or robots differ, their means are spread; the
+    /// Mean and covariance of each known object. If it has several instances, or robots differ, their means are spread; the
     /// covariance has this spread in the mean of [`AT`] touches, so that no instance is taken for a stranger.
     of: Vec<(DVector<f64>, DMatrix<f64>)>,
-    /// Of each of many other shapes, the mean.
+    /// Mean of each of many other shapes.
     shapes: Vec<DVector<f64>>,
     known: usize,
     objects: usize,
@@ -32,7 +32,7 @@ pub(super) struct Moments {
 pub(super) struct Misfit {
     /// Whose evidence against the object counts.
     pub(super) rivals: Vec<usize>,
-    /// Of this evidence per touch.
+    /// Mean evidence per touch.
     pub(super) mean: DVector<f64>,
     pub(super) slope: DVector<f64>,
     /// Lower triangular.
@@ -41,7 +41,7 @@ pub(super) struct Misfit {
 }
 
 impl Moments {
-    /// Of rows of margins in units, for each known object, and of recorded ones where there are some: recorded touches
+    /// A misfit from rows of margins in units, for each known object, and of recorded ones where there are some: recorded touches
     /// take the place of another instance. `shapes` are mean rows.
     pub(super) fn new(
         supplies: &[Supply],

@@ -56,7 +56,7 @@ pub struct Gain {
     /// The rows to a verdict without it, at the promised error rate on sequences that it was not fitted to; `None` if no
     /// threshold that a model can store keeps the rate.
     pub rows_without: Option<f64>,
-    /// The same with it.
+    /// Rows with it.
     pub rows_with: Option<f64>,
 }
 
@@ -292,7 +292,7 @@ fn fit_weights(rows: &Rows<'_>, sequences: &[&RowSequence], table: Option<&Table
 
 /// The weight with the greatest likelihood, up to 1.
 fn best_weight(cases: &[&[f64]]) -> f64 {
-    // The likelihood is concave in the weight; its slope is minus the mean of what is ahead of the right class.
+    // The likelihood is concave in the weight; its slope is minus the mean lead over the right class.
     let slope = |weight: f64| -> f64 {
         let ahead = |case: &&[f64]| {
             let most = case.iter().copied().fold(0.0, f64::max);
@@ -315,7 +315,7 @@ fn best_weight(cases: &[&[f64]]) -> f64 {
     (0.5 * (low + high)).exp()
 }
 
-/// Sequences under a shape, as far as it matters for comparing thresholds.
+/// Sequences under a shape, reduced to what a comparison of thresholds needs.
 fn looks(rows: &Rows<'_>, sequences: &[&RowSequence], shape: &Shape, max_rows: u32) -> Vec<Sequence> {
     let of = |sequence: &&RowSequence| {
         let mut followed = Sequence::new(sequence.class);

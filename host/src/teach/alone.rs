@@ -41,7 +41,7 @@ pub fn alone(
         let fitted = |jitter: f64, is_used: &dyn Fn(f64) -> bool| -> Result<Ensemble> {
             let object = |(object, places): (&ObjectTouches, &Vec<f64>)| {
                 let used = object.select((0..object.len()).filter(|&touch| is_used(places[touch])));
-                // Copies that are trained on, and of which no sequence is drawn.
+                // Copies to train on; no sequence is drawn from them.
                 let touches = repeated(&object.name, used.touches(), jitter, settings.seed);
                 ObjectTouches::new(&object.name, touches, Source::Object)
             };

@@ -57,7 +57,7 @@ static FRESH: LazyLock<Dataset> = LazyLock::new(|| touches(20_000, 77));
 struct Share(f64, f64);
 
 impl Share {
-    /// Of so many independent cases.
+    /// A share of this many independent cases.
     fn of(value: f64, cases: f64) -> Self {
         // One that is 0 or 1 is not known exactly.
         let spread = value.clamp(1.0 / (cases + 2.0), 1.0 - 1.0 / (cases + 2.0));
@@ -83,7 +83,7 @@ fn measured(candidate: Candidate<'_>, dataset: &Dataset) -> [Share; 3] {
     figures(&evaluate::evaluate(&margins, &settings).unwrap(), dataset)
 }
 
-/// The same as an evaluation on touches of `dataset` states it.
+/// The figures that an evaluation on touches of `dataset` states.
 fn figures(evaluation: &Evaluation, dataset: &Dataset) -> [Share; 3] {
     let (groups, all) = (evaluation.groups, dataset.len());
     let objects = dataset.objects.len();

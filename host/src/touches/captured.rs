@@ -20,7 +20,7 @@ pub struct Meshes {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stated", into = "Stated")]
 pub struct Captured {
-    /// Of the seed, and of all settings that change a touch but not what is kept of it.
+    /// Checksum of the seed, and of all settings that change a touch but not which touches are kept.
     settings: u64,
     /// The samples of each object.
     samples: Range<u64>,
@@ -57,7 +57,7 @@ impl Captured {
         other.objects.iter().filter(is_same).map(|(name, _)| name.as_str()).collect()
     }
 
-    /// Statement of a compiled model about it, but for the objects.
+    /// Statement of a compiled model about it, except the objects.
     pub(crate) fn stated(&self) -> (u16, Range<u32>) {
         let number = |sample: u64| u32::try_from(sample).unwrap_or(u32::MAX);
         (short(self.settings), number(self.samples.start)..number(self.samples.end))
@@ -148,7 +148,7 @@ mod tests {
         let trained = captured(0.5, origin(10, "1/1"));
         assert_eq!(trained.shared(&captured(0.5, origin(30, "1/1"))), ["disc", "globe"]);
         let kept = Origin { approaches: true, pose: true, ..origin(5, "1/1") };
-        assert_eq!(trained.shared(&captured(0.5, kept)), ["disc", "globe"], "approaches, of which some are full");
+        assert_eq!(trained.shared(&captured(0.5, kept)), ["disc", "globe"], "approaches, some of them full");
         assert_eq!(trained.shared(&captured(0.4, origin(10, "1/1"))), ["globe"], "another mesh of the other");
         // Of the whole, one half has these samples and the other one has not.
         assert_eq!(trained.shared(&captured(0.5, origin(20, "1/2"))), ["disc", "globe"]);

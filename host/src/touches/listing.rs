@@ -35,7 +35,7 @@ pub struct Entry {
     pub approaches: u64,
     /// The size of the object's file; of the text so far, while the object is being captured.
     pub bytes: u64,
-    /// The CRC-32 (ISO-HDLC, as in gzip and PNG) of the object's complete file. Version 0.1.0 wrote none.
+    /// The CRC-32 (ISO-HDLC, as in gzip and PNG) of the object's complete file. None while the object is being captured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crc32: Option<u32>,
     /// The names of its instances, if it has several: sample i is of instance i modulo their number, unless `counts` says
@@ -228,9 +228,9 @@ pub(super) fn is_file_name(name: &str) -> bool {
 mod tests {
     use super::*;
 
-    /// As version 0.1.0 wrote it.
-    const OLD: &str = r#"{
-  "palpate": "0.1.0",
+    /// A listing without checksums.
+    const PLAIN: &str = r#"{
+  "palpate": "0.3.0",
   "complete": true,
   "settings": {
     "touches": 2,
@@ -248,8 +248,8 @@ mod tests {
 }"#;
 
     #[test]
-    fn a_listing_of_version_0_1_0_can_be_read() {
-        let listing = Listing::parse(OLD.as_bytes(), Path::new("dataset.json")).unwrap();
+    fn a_listing_without_checksums_can_be_read() {
+        let listing = Listing::parse(PLAIN.as_bytes(), Path::new("dataset.json")).unwrap();
         assert_eq!(listing.origin.probe.spacing, 2.0);
         assert_eq!(listing.names(), ["fork"]);
         assert_eq!(listing.objects[0].crc32, None);
@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn a_listing_that_names_files_outside_its_directory_is_refused() {
         for name in ["", "..", ".", "../fork", "/etc/fork", "a/b", "a\\\\b", "fork/"] {
-            let text = OLD.replace("\"fork\"", &format!("\"{name}\""));
+            let text = PLAIN.replace("\"fork\"", &format!("\"{name}\""));
             let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err();
             assert!(matches!(error.problem::<TouchesProblem>(), Some(TouchesProblem::BadName { .. })), "{error}");
         }
@@ -277,14 +277,14 @@ mod tests {
     #[test]
     fn a_listing_that_names_an_object_twice_is_refused() {
         let entry = "{\"name\": \"fork\", \"touches\": 2, \"approaches\": 31, \"bytes\": 54}";
-        let text = OLD.replace(entry, &format!("{entry}, {entry}"));
+        let text = PLAIN.replace(entry, &format!("{entry}, {entry}"));
         let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err().to_string();
         assert!(error.contains("dataset.json: the object fork is listed twice"), "{error}");
     }
 
     #[test]
     fn what_is_no_listing_is_refused_with_its_line() {
-        for (text, line) in [("", 1), ("{", 1), ("[]", 1), (&OLD.replace("seed", "sed"), 6)] {
+        for (text, line) in [("", 1), ("{", 1), ("[]", 1), (&PLAIN.replace("seed", "sed"), 6)] {
             let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err().to_string();
             assert!(error.starts_with(&format!("dataset.json:{line}: not the listing of a data set")), "{error}");
         }

@@ -5,11 +5,11 @@ use palpate_shared::Touch;
 /// The channels of a log: topics, with the names of their schemas.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Channels {
-    /// Those with touches.
+    /// Topics with touches.
     pub touches: Vec<String>,
-    /// Those with verdicts.
+    /// Topics with verdicts.
     pub verdicts: Vec<String>,
-    /// Those that were skipped.
+    /// Skipped topics.
     pub others: Vec<String>,
 }
 
@@ -27,7 +27,7 @@ pub struct Message {
 /// Contents of a message of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Said {
-    /// A touch, and of which object, where that is known.
+    /// A touch, and its object if that is known.
     Touch(Touch, Option<String>),
     /// A verdict.
     Verdict(LoggedVerdict),

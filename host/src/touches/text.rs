@@ -56,7 +56,7 @@ pub fn read(path: &Path) -> Result<Vec<Touch>> {
     read_with_checksum(path).map(|(touches, _)| touches)
 }
 
-/// The same with the file's checksum.
+/// Reads the touches, and the file's checksum.
 pub(super) fn read_with_checksum(path: &Path) -> Result<(Vec<Touch>, u32)> {
     let mut text = BufReader::with_capacity(1 << 16, Checked::new(open(path)?));
     let touches = touches(&mut text, path).collect::<Result<Vec<_>>>()?;

@@ -108,7 +108,7 @@ pub struct Row {
     pub bytes: Option<usize>,
     /// Instructions per touch on a Cortex-M4F, estimated.
     pub instructions: Option<u64>,
-    /// The same on a Cortex-M0+.
+    /// Instructions on a Cortex-M0+.
     pub instructions_m0_plus: Option<u64>,
     /// Accuracy after 10 and 30 touches, as far as the held-out touches go.
     pub accuracy: BTreeMap<usize, f64>,
@@ -157,7 +157,7 @@ pub struct Tuned {
 /// on the last. Of objects on a table each placement is an output, as [`crate::ensemble::train::Outputs`] says.
 ///
 /// # Errors
-/// As [`crate::ensemble::train::train`], [`compile`](fn@crate::compile::compile) (but for layouts that an ensemble does not fit) and
+/// Errors of [`crate::ensemble::train::train`], [`compile`](fn@crate::compile::compile) (except for layouts that do not fit) and
 /// [`evaluate::evaluate`]; [`TuneProblem::NothingFits`] if no model is within the limits.
 pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Tuned> {
     let shares = dataset.placement_shares();

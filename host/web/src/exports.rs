@@ -27,7 +27,7 @@ export! {
         with(|table| table.room(length))
     }
 
-    /// Where numbers go out.
+    /// Buffer for numbers that go out.
     fn output() -> *const f64 {
         with(|table| table.output.as_ptr())
     }

@@ -18,7 +18,7 @@ const BAUD_DIVIDER: u32 = 217;
 pub enum Port {
     /// The link to the host.
     Link,
-    /// Where a host plays the pins.
+    /// Pins that a host plays.
     Pins,
 }
 

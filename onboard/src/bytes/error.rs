@@ -46,7 +46,7 @@ pub enum ModelError {
     MarginRange,
     /// This crate was built without the feature that reads such a model.
     NotBuiltIn {
-        /// The offset of what is missing: 6 for the layout, 7 for the type of leaf.
+        /// The offset of the missing part: 6 for the layout, 7 for the type of leaf.
         offset: usize,
     },
     /// The model's trees are code, which it has to be opened with.
@@ -65,7 +65,7 @@ pub(crate) enum Wrong {
 }
 
 impl Wrong {
-    /// As whoever opens a model sees it.
+    /// The error as a caller that opens a model sees it.
     pub(crate) fn in_model(self, model: &[u8]) -> ModelError {
         match self {
             Self::Field(offset) => ModelError::Field { offset },

@@ -15,12 +15,12 @@ pub struct Proposal {
     /// The number of its pose: see [`Poses`](palpate_shared::Poses).
     pub pose: u16,
     /// Degree to which the approach distinguishes the object with the most evidence from the others, in Q15: the mean
-    /// separation, each other object counting as much as it is still in play.
+    /// separation, each other object weighted by how likely it still is.
     pub score: i32,
 }
 
 impl<const N: usize> Recognizer<'_, N> {
-    /// Of the candidates, numbers of poses that the robot can reach, the one whose approach helps most: it tells the
+    /// The most helpful of the candidates, numbers of poses that the robot can reach: it tells the
     /// object with the most evidence best from the others, each weighted by its posterior. `0..plan.poses().count()` are
     /// all poses. `None` if the model has no [plan](Model::plan), or none of the candidates is a pose that may touch;
     /// of several that are as good, the first.

@@ -76,7 +76,7 @@ pub(crate) const SHARPNESS: u32 = 1 << 16;
 const MOST_BITS: u64 = 1 << 42;
 
 impl Unit {
-    /// The same of evidence with a weight in Q16 that is at most 1, rounded down: in products of 32 bits.
+    /// The unit of evidence with a weight in Q16 that is at most 1, rounded down: in products of 32 bits.
     pub(crate) const fn weighed(self, weight: u32) -> Self {
         if !cfg!(feature = "row-evidence") || weight >= Weights::ONE {
             return self;

@@ -37,7 +37,7 @@ pub struct Forgetting<const N: usize> {
 impl<const N: usize> Forgetting<N> {
     /// Forgets once recent touches speak by this many nats for another object; 5 costs little where nothing changes.
     ///
-    /// Cost: a few operations in f32. Cannot fail: what is not a number above 0 counts as 0, with which every touch for
+    /// Cost: a few operations in f32. Cannot fail: anything except a number above 0 counts as 0, with which every touch for
     /// another object is a restart.
     pub fn new(model: &Model<'_>, nats: f32) -> Self {
         let mut start = [0; N];
@@ -99,7 +99,7 @@ impl<const N: usize> Recognizer<'_, N> {
         Ok(self.add_forgetting(&margins, forgetting))
     }
 
-    /// The same of a row of features, as [`push_features`](Self::push_features).
+    /// Takes in a row of features like [`push_features`](Self::push_features), and forgets.
     ///
     /// # Errors
     /// As `push_features`.
@@ -116,7 +116,7 @@ impl<const N: usize> Recognizer<'_, N> {
         Ok(self.push_margins_forgetting(&margins, forgetting))
     }
 
-    /// The same with margins that were computed beforehand, as [`push_margins`](Self::push_margins).
+    /// Takes in margins that were computed beforehand like [`push_margins`](Self::push_margins), and forgets.
     pub fn push_margins_forgetting(&mut self, margins: &[i32; N], forgetting: &mut Forgetting<N>) -> Verdict {
         if self.model().row_evidence().is_none() {
             return self.add_forgetting(margins, forgetting);
@@ -126,7 +126,7 @@ impl<const N: usize> Recognizer<'_, N> {
         self.add_forgetting(&evidence, forgetting)
     }
 
-    /// The same with evidence: margins, or what the model's table makes of them.
+    /// Takes in evidence, and forgets: margins, or what the model's table makes of them.
     fn add_forgetting(&mut self, margins: &[i32; N], forgetting: &mut Forgetting<N>) -> Verdict {
         if self.verdict() != Verdict::Undecided {
             return self.verdict();

@@ -82,10 +82,10 @@ pub(crate) struct State<const N: usize> {
     /// Margins summed over touches, and the prior, in units of a margin; anything while nothing is [`Decided::Fresh`].
     evidence: [i64; N],
     stopping: Stopping,
-    /// Of the object that was recognized.
+    /// Rivals of the object that was recognized.
     rivals: Rivals,
     touches: u32,
-    /// Of these, the first ones that are no longer part of the evidence.
+    /// Number of the first touches that are no longer part of the evidence.
     forgotten: u32,
     decided: Decided,
 }
@@ -188,7 +188,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.touches
     }
 
-    /// Of the objects that can be named, the one with the most evidence; the first of several. Of an object with several
+    /// The object with the most evidence among those that can be named; the first of several. For an object with several
     /// [outputs](Model::outputs), whose weights add up, the output with the most evidence.
     ///
     /// Cost: a few instructions for each object; with several outputs an exponential for each.
@@ -266,7 +266,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// object of weight 0, or beyond the end of `weights`, cannot be recognized; a background keeps its prior. What the
     /// model promises was determined for its own priors, and its misfit test takes the weights' for evidence. The
     /// weights `&[3, 0, 1]` say that there are three of the first object for each of the third, and none of the second. An
-    /// object with several [outputs](Model::outputs) has one weight, of which each output has the share that the model
+    /// object with several [outputs](Model::outputs) has one weight, and each output has the share of it that the model
     /// states; or there is a weight for each output.
     ///
     /// Cost: two logarithms for each object, bit by bit.

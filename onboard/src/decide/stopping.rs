@@ -68,7 +68,7 @@ impl Stopping {
         own.unwrap_or(self.odds)
     }
 
-    /// The same for an object of `model`, which may have a threshold of its own.
+    /// The threshold of an object of `model`, which may have one of its own.
     ///
     /// Cost: a few instructions. Cannot fail.
     pub fn odds_of(&self, object: usize, model: &Model<'_>) -> u64 {

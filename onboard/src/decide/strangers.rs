@@ -18,7 +18,7 @@ pub enum Familiarity {
     Stranger,
 }
 
-/// Of the objects that can be named, the one with the most evidence.
+/// The object with the most evidence among those that can be named.
 pub(crate) fn leader(model: &Model<'_>, evidence: &[i64]) -> (usize, i64) {
     best(evidence.get(..model.known_count()).unwrap_or(evidence))
 }

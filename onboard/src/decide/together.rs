@@ -7,7 +7,7 @@ use palpate_shared::format::Outputs;
 /// The object that leads, and the weights of all, in units in which the output with the most evidence weighs 2^56.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leading {
-    /// Of its outputs, the one with the most evidence.
+    /// The object's output with the most evidence.
     pub(super) output: usize,
     /// The sum over its outputs.
     own: u64,

@@ -44,7 +44,7 @@ impl<A: InputPin, B: InputPin, C: InputPin, T: Clock> Probe<A, B, C, T> {
         }
     }
 
-    /// Where the probe is in a touch.
+    /// Phase of the touch.
     pub const fn state(&self) -> State {
         self.effector.state()
     }

@@ -47,7 +47,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The same with the timeout that a model needs, as `scale`'s probe takes it: the time that the stroke of the model's
+    /// Settings with the timeout that a model needs, as `scale`'s probe takes it: the time that the stroke of the model's
     /// probe takes, after which contacts were missing in training; of a model without a stroke a sixteenth more than the
     /// largest time between contacts that it was trained on. The timeout stays if the model states neither.
     ///
@@ -64,7 +64,7 @@ impl Settings {
         Self { timeout: spread.saturating_add(spread / 16).saturating_add(1), ..self }
     }
 
-    /// The same with every duration in range, and `settle` and `stuck` long enough to make sense.
+    /// Settings with every duration in range, and `settle` and `stuck` long enough to make sense.
     pub(super) fn in_range(self) -> Self {
         let [debounce, settle, timeout, release, rest, stuck] =
             [self.debounce, self.settle, self.timeout, self.release, self.rest, self.stuck].map(|d| d.min(LONGEST));

@@ -45,7 +45,7 @@ impl core::fmt::Debug for Batch {
     }
 }
 
-/// Where the leaves of a group are added, and trees that wait for it.
+/// Accumulator for one group, with its pending trees.
 struct Sums<'a> {
     /// Row by row.
     sums: &'a mut [i32],
@@ -60,7 +60,7 @@ struct Sums<'a> {
     words: &'a mut [Words; TREES],
     /// Trees that wait to be added.
     waiting: usize,
-    /// Those of them that are also still to be looked up: a bit each.
+    /// Pending trees that are also still to be looked up: a bit each.
     masked: u8,
 }
 
@@ -260,7 +260,7 @@ impl Sums<'_> {
         self.masked = 0;
     }
 
-    /// Where the leaves that are reached in the next tree go.
+    /// Room for the leaves that are reached in the next tree.
     fn next(&mut self) -> &mut Leaves {
         let [first, second, third, fourth] = &mut *self.reached;
         match self.waiting {

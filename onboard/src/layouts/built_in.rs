@@ -18,7 +18,7 @@ pub(crate) const fn layout(layout: Layout) -> bool {
 /// True if models with trees are read, and not only tables.
 pub(crate) const TREES: bool = layout(Layout::Compact) || layout(Layout::Complete) || layout(Layout::Wide);
 
-/// True if tables are read, of which a search for a rank is a large part: it is written out then.
+/// True if tables are read, where a search for a rank takes a large part of the time: it is written out then.
 pub(crate) const TABLES: bool = layout(Layout::Grid) || layout(Layout::Patterns);
 
 /// True if trees with leaves in a table are read.

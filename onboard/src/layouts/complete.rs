@@ -159,7 +159,7 @@ fn child(ranks: &Ranks, column: u8, threshold: u8, slot: usize) -> usize {
         return (slot << 1) + usize::from(at(ranks, usize::from(column)) > threshold);
     }
     let rank = isize::from(i16::from(at(ranks, usize::from(column))));
-    // All ones for right, and not a comparison, of which the compiler would make branches.
+    // All ones for right, instead of a comparison, which the compiler would turn into branches.
     let right = (isize::from(i16::from(threshold)) - rank) >> 8;
     (slot << 1).wrapping_sub(right.cast_unsigned())
 }

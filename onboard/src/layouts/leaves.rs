@@ -207,7 +207,7 @@ fn add_ten_i8(margins: &mut [i32; 10], reached: &Reached<'_>, from: usize) {
     add_lanes(margins, reached.reached.iter().map_while(|&leaf| reached.values(leaves, leaf)));
 }
 
-/// The same of leaves that have no more: their numbers are indices, which takes fewer instructions.
+/// Adds leaves that have no more values: their numbers are indices, which takes fewer instructions.
 #[inline(never)]
 fn add_whole_i8(margins: &mut [i32; 10], leaves: &[[u8; 10]], reached: &[u16]) {
     add_lanes(margins, reached.iter().map_while(|&leaf| leaves.get(usize::from(leaf))));

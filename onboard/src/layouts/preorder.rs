@@ -1,4 +1,4 @@
-//! Trees with their splits in preorder: no byte for what is not there.
+//! Trees with their splits in preorder: missing nodes take no byte.
 //!
 //! A tree is the number of its splits, then the splits, each with the number of splits in its left subtree; its leaves
 //! are in order, so going right skips as many leaves as splits, plus one.

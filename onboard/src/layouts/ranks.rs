@@ -137,7 +137,7 @@ fn number(cut: &[u8]) -> i32 {
     cut.iter().rfold(sign, |sum, byte| sum << 8 | i32::from(*byte))
 }
 
-/// The same in one place of the image, for what is rare.
+/// Reads a number in one place of the image, for rare cases.
 #[inline(never)]
 fn number_apart(cut: &[u8]) -> i32 {
     number(cut)
@@ -240,7 +240,7 @@ fn search_many<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32 + Copy
     Some(rank)
 }
 
-/// Of 2`HALF` + 1 thresholds, those among which or at an end of which a value's rank is.
+/// The half of 2`HALF` + 1 thresholds that a value's rank is in, or at an end of.
 #[inline(always)]
 fn half<T: Copy, const N: usize, const HALF: usize>(
     cuts: &[T; N],
@@ -251,7 +251,7 @@ fn half<T: Copy, const N: usize, const HALF: usize>(
     if number(*cuts.get(HALF)?) <= value { cuts.last_chunk() } else { cuts.first_chunk() }
 }
 
-/// The same for thresholds of any width that stand anywhere.
+/// Searches thresholds of any width and alignment.
 #[inline(never)]
 fn search_bytes(cuts: &[u8], width: usize, value: i32) -> u8 {
     let (mut rank, mut step) = (0_u8, 128_u8);

@@ -2,7 +2,7 @@
 
 use palpate_shared::format::{Axis, Header, Layout, LeafType};
 
-/// Where the sections of a model are. What a layout reads from them it has checked before.
+/// Sections of a model. A layout has checked what it reads from them.
 ///
 /// Short enough for a model to be copied in a few instructions; a call to copy it would bring in a routine that most programs
 /// have no other use for. So neighbors that are rarely used apart are one slice.
@@ -23,10 +23,10 @@ pub(crate) struct Sections<'a> {
     pub(crate) leaf: LeafType,
 }
 
-/// The same as offsets, without the bytes.
+/// Sections as offsets, without the bytes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Places {
-    /// Where each part starts, in the order of the fields of [`Sections`], and where the last one ends.
+    /// Start of each part, in the order of the fields of [`Sections`], and the end of the last one.
     starts: [usize; 6],
     length: usize,
     axis_count: u16,
@@ -44,7 +44,7 @@ impl<'a> Sections<'a> {
         Places { starts: [a, b, c, d, e, end], length: self.bytes.len(), axis_count, layout, leaf }
     }
 
-    /// The sections at these places of `bytes`, of which there have to be as many as there were.
+    /// The sections at these places of `bytes`, which must be as long as they were.
     pub(crate) fn at(bytes: &'a [u8], places: &Places) -> Option<Self> {
         if bytes.len() != places.length {
             return None;

@@ -69,7 +69,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Model<'_>, Wrong> {
     Ok(Model::of(sections, stated))
 }
 
-/// The header's descriptor, `None` for rows of features; the place of what is wrong in the header.
+/// The header's descriptor, `None` for rows of features; the offset of the fault in the header.
 fn descriptor(header: &Header<'_>) -> Result<Option<Descriptor>, usize> {
     if header.descriptor() == RAW_FEATURES {
         return Ok(None);

@@ -52,7 +52,7 @@ codes! {
 }
 
 impl Layout {
-    /// Those whose trees are in the model.
+    /// Layouts whose trees are in the model.
     pub const OF_DATA: &'static [Self] = &[Self::Compact, Self::Complete, Self::Grid, Self::Wide, Self::Patterns];
 }
 
@@ -120,14 +120,14 @@ codes! {
 }
 
 codes! {
-    /// Of what an error rate is promised. A name that is given and wrong is an error; no name, at the limit of touches, is
+    /// Names that a promised error rate covers. A name that is given and wrong is an error; no name, at the limit of touches, is
     /// neither right nor wrong.
     Per {
-        /// Of all names that are given, objects being touched equally often.
+        /// All names that are given, with objects touched equally often.
         Average = 0, "average";
-        /// Of each name, when it is given.
+        /// Each name, when it is given.
         Name = 1, "name";
-        /// Of the names that are given to each object.
+        /// The names that are given to each object.
         Object = 2, "object";
     }
 }

@@ -68,7 +68,7 @@ impl<'a> RowEvidence<'a> {
         is_valid.then_some(table)
     }
 
-    /// The same of a section that was read before; `None` if it is too short.
+    /// Reopens a section that was read before; `None` if it is too short.
     ///
     /// Cost: a few instructions. Cannot fail otherwise.
     pub fn opened(bytes: &'a [u8]) -> Option<Self> {

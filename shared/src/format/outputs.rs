@@ -46,7 +46,7 @@ impl<'a> Outputs<'a> {
         (most == u16::from(found.most).saturating_add(1)).then_some(found)
     }
 
-    /// The same of a section that was checked.
+    /// Reopens a section that was checked.
     ///
     /// Cost: a few instructions.
     pub fn opened(content: &'a [u8], outputs: usize) -> Option<Self> {

@@ -42,9 +42,9 @@ pub struct Promise {
     pub rate: f64,
     /// The probability that the rate is kept.
     pub confidence: f64,
-    /// Of what the rate is promised.
+    /// Names that the rate covers.
     pub per: Per,
-    /// True if sequences were of approaches, of which some are no evidence, or of touches only.
+    /// True if sequences were of approaches, including ones that are not evidence; false if of touches only.
     pub approaches: bool,
     /// True if each approach was in the pose that the model's plan proposed.
     pub active: bool,
@@ -78,7 +78,7 @@ pub struct PromisedNoise {
     pub missed: [u32; 3],
     /// Largest error of the speed of a touch, in parts of a billion.
     pub speed_error: u32,
-    /// The same for a robot, through all of its touches.
+    /// The largest deviation of the speed for a robot, through all of its touches.
     pub speed_bias: u32,
     /// The speed less the nominal one, in parts of a billion of it.
     pub speed: i32,
@@ -105,7 +105,7 @@ impl Promise {
     pub const LENGTH: usize = 48;
     /// Bytes of the section with all noise.
     pub const FULL_LENGTH: usize = 84;
-    /// Bytes of the section with all noise, of which every finger misses another share of its contacts.
+    /// Bytes of the section with all noise, in which every finger misses another share of its contacts.
     pub const FINGERS_LENGTH: usize = 92;
 
     /// Bytes of the section with this noise: one of the three lengths.

@@ -133,7 +133,7 @@ impl TrainedProbe {
         bytes
     }
 
-    /// Bytes of the section's content: without stroke and travel as many as in version 0.2.
+    /// Bytes of the section's content; fewer without stroke and travel.
     pub const fn length(&self) -> usize {
         match (self.stroke_tolerance, self.stroke, self.travel) {
             (Some(_), ..) => Self::WITH_TOLERANCE,

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! The 1000 one-output trees are the run's own (`paper.json`); the multi-output ensembles are trained on its touches
-//! with its settings, but for the number of trees and their depth.
+//! with its settings, except the number of trees and their depth.
 //!
 //! `OUT` then holds models, what the exporter's model of the evaluator says that they cost, touches (three times of four
 //! bytes), the same trees for other evaluators, and for `identity.palpate` what this machine makes of ten thousand touches.

@@ -23,7 +23,6 @@ mod prove;
 mod real;
 mod recognize;
 mod recognize_rows;
-mod renamed;
 mod report;
 mod rows;
 mod run;
@@ -285,10 +284,6 @@ fn unwrapped(text: &str) -> String {
 pub fn main() -> ExitCode {
     let matches = cli().try_get_matches().unwrap_or_else(|error| {
         let words: Vec<String> = std::env::args().skip(1).collect();
-        if let Some(text) = renamed::said(&words, &error) {
-            eprintln!("palpate: {text}");
-            std::process::exit(2);
-        }
         without_trailing(without_help(&words).unwrap_or(error)).exit()
     });
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());

@@ -16,7 +16,7 @@ pub(crate) struct RealArguments {
 
 #[derive(Clone, Debug)]
 struct Real {
-    /// As it was written, to repeat it.
+    /// Original text, to repeat it in messages.
     text: String,
     given: Given,
 }

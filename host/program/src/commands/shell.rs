@@ -1,6 +1,6 @@
 //! Commands as a shell reads them.
 
-/// The words as one line of a POSIX shell: what is not plain is quoted.
+/// The words as one line of a POSIX shell: words with special characters are quoted.
 pub(crate) fn command<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
     words.into_iter().map(quoted).collect::<Vec<_>>().join(" ")
 }

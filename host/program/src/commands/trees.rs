@@ -47,7 +47,7 @@ impl FromStr for Trees {
             let Some((key, wanted)) = KEYS.into_iter().find(|(known, _)| *known == key) else {
                 let keys: Vec<&str> = KEYS.iter().map(|(key, _)| *key).collect();
                 return Err(format!(
-                    "{part:?} is no setting of trees; use rounds=30,depth=6 and the like: {}",
+                    "{part:?} is not a setting of trees; use rounds=30,depth=6 and the like: {}",
                     keys.join(", ")
                 ));
             };
@@ -129,12 +129,12 @@ mod tests {
     #[test]
     fn what_is_no_setting_of_trees_is_refused_with_what_to_use() {
         for (text, expected) in [
-            ("", "\"\" is no setting of trees; use rounds=30,depth=6"),
+            ("", "\"\" is not a setting of trees; use rounds=30,depth=6"),
             ("rounds", "rounds is \"\"; use a number"),
             ("rounds=-1", "rounds is \"-1\"; use a number such as 30"),
             ("bins=64/", "bins is \"64/\"; use a number such as 256, or one for each feature such as 64/16"),
             ("leaves=two", "leaves is \"two\"; use each"),
-            ("gamma=1", "\"gamma=1\" is no setting of trees"),
+            ("gamma=1", "\"gamma=1\" is not a setting of trees"),
             ("depth=3,depth=4", "depth is given twice"),
             ("threshold_cost=1", "threshold_cost is given; use it with different_leaves"),
             ("trainer=lightgbm", "trainer is \"lightgbm\"; use palpate or xgboost"),

@@ -7,7 +7,7 @@ use std::path::Path;
 const QUICK: [&str; 11] =
     ["probe", "design", "bowl", "mouse", "--approaches", "200", "--sequences", "30", "--error-rate", "5%", "-o"];
 
-/// A search of one probe, but for what `more` says.
+/// A search of one probe, with the settings of `more`.
 fn search(more: &str) -> String {
     format!("radius=0.15,tilt=10,aim=box,{more}")
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const CROOKED: &str = "radius = 0.15\nspacing = 1.5\nspeed = 10.0\n[real]\nspeed_factor = 0.9\n\
                        offsets = [0.0, -0.04, 0.0]\nnoise = \"2ms\"\ntimer = \"1ms\"\nmissed = [\"0%\", \"4%\", \"0%\"]\n";
 
-/// The program's arguments, of which some are paths.
+/// The program's arguments, including paths.
 macro_rules! arguments {
     ($($argument:expr),* $(,)?) => { [$(std::ffi::OsStr::new($argument)),*] };
 }

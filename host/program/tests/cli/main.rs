@@ -9,6 +9,7 @@ mod data;
 mod design;
 mod fit;
 mod formats;
+mod goldens;
 mod help;
 #[cfg(feature = "mcap")]
 mod mcap;

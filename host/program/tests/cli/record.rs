@@ -14,7 +14,7 @@ use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Output, Stdio};
 
-/// As a robot prints them: seconds on a clock of its own, and an approach that missed.
+/// Lines as a robot prints them: seconds on a clock of its own, and an approach that missed.
 const LINES: &str = "0.000 0.155 -\n1.010,1.000,1.000\n- - -\n";
 
 fn recorded(directory: &Path) -> Value {

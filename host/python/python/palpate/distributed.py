@@ -324,7 +324,7 @@ def _capture(job: _Job) -> None:
         "crc32": zlib.crc32(content),
         "bytes": len(content),
         "palpate": listing["palpate"],
-        # As text, so that its numbers stay as they are.
+        # Text, so that its numbers stay as they are.
         "settings": json.dumps(listing["settings"]),
         "entry": json.dumps(entry, ensure_ascii=False),
     }

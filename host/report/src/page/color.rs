@@ -5,7 +5,7 @@
 
 use plotters::style::RGBColor;
 
-/// Text, axes, and what is no series.
+/// Color of text, axes, and everything else that is not a series.
 pub(crate) const INK: RGBColor = RGBColor(0, 0, 0);
 /// Grid lines and what should stay in the background.
 pub(crate) const GRID: RGBColor = RGBColor(221, 221, 221);

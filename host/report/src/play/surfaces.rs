@@ -25,7 +25,7 @@ pub struct Surface {
     pub packed: Vec<u8>,
     /// Its triangles.
     pub triangles: usize,
-    /// Those of the object's own mesh.
+    /// Triangles of the object's own mesh.
     pub of: usize,
     /// Number of meshes of the object; this is the first.
     pub instances: usize,

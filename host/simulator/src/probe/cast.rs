@@ -30,7 +30,7 @@ pub struct Cast {
     pub text: String,
     /// The set it belongs to.
     pub set: String,
-    /// Where the sphere's center starts.
+    /// Start of the sphere's center.
     pub origin: DVec3,
     /// Its direction.
     pub direction: DVec3,

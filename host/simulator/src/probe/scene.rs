@@ -121,12 +121,12 @@ impl Scene {
         self.surface.first_contact(origin, direction, radius)
     }
 
-    /// As [`first_contact`](Self::first_contact), and how the surface stands there. Cost: that of one cast, and little more.
+    /// The [first contact](Self::first_contact), and how the surface is oriented there. Cost: about that of one cast.
     pub fn contact(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<Contact> {
         self.surface.contact(origin, direction, radius)
     }
 
-    /// As [`first_contact`](Self::first_contact) of each of these origins, if all of them touch; none as soon as one does not.
+    /// The [first contacts](Self::first_contact) of these origins if all of them touch; none as soon as one does not.
     pub fn all_contacts<const N: usize>(&self, origins: [DVec3; N], direction: DVec3, radius: f64) -> Option<[f64; N]> {
         self.surface.all_contacts(origins, direction, radius)
     }

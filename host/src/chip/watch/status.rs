@@ -9,7 +9,7 @@ const KEPT: usize = 200;
 /// Status of a chip that is watched.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Status {
-    /// Where it comes from.
+    /// Its source.
     pub source: String,
     /// The objects' names.
     pub objects: Vec<String>,

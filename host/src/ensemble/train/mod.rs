@@ -71,7 +71,7 @@ pub struct Settings {
     /// before training, so that no feature has more thresholds than that. For models that are compiled to a table. One
     /// number for each feature of the descriptor, or of its form for full touches.
     pub feature_bins: Option<Vec<usize>>,
-    /// Rounds the leaves to whole multiples of a power of two, of which the largest leaf takes at most this many bits
+    /// Rounds the leaves to whole multiples of a power of two, so that the largest leaf takes at most this many bits
     /// with its sign; `None` leaves them as the trainer made them. See [`round_leaves`].
     pub leaf_bits: Option<u32>,
     /// Grows trees with few thresholds and few different leaves, for models of a few KB; `None` grows them for accuracy alone.
@@ -146,7 +146,7 @@ impl Settings {
         }
     }
 
-    /// The same for a descriptor and a number of outputs, on a chip with 64 KB: of descriptors with a pose 60 trees, or fewer where
+    /// The compact preset for a descriptor and a number of outputs, on a chip with 64 KB: with a pose 60 trees, or fewer where
     /// there are more than 13 outputs, with leaves of one byte. For ten objects twice the trees with half the bytes of a leaf
     /// take 52 KB instead of 46, and a fifth fewer approaches (`docs/measurements/tables/pose.sh`).
     pub fn compact_for(descriptor: Descriptor, outputs: usize) -> Self {

@@ -9,7 +9,7 @@ use ruzstd::decoding::StreamingDecoder;
 use std::borrow::Cow;
 use std::io::Read;
 
-/// Smallest window of a compressor's back references: as far as those of level 19 and below do.
+/// Smallest window of a compressor's back references that covers levels up to 19.
 const WINDOW: u64 = 16 << 20;
 
 /// The records of a chunk, with the checksum that it states, if it states one.
@@ -51,7 +51,7 @@ fn zstd(mut data: &[u8], size: u64) -> Result<Vec<u8>, String> {
     Ok(records)
 }
 
-/// The same for LZ4 frames.
+/// Decompresses LZ4 frames.
 fn lz4(data: &[u8], size: u64) -> Result<Vec<u8>, String> {
     let mut records = Vec::new();
     unpack(FrameDecoder::new(data), &mut records, size)?;

@@ -169,7 +169,7 @@ struct Costs {
     leaf: Leaf,
     /// Reading a leaf's number in a block of complete trees.
     number: usize,
-    /// The same in preorder, for a tree.
+    /// Instructions for a tree in preorder.
     shared_tree: usize,
     /// A tree in preorder; then each value of its leaf.
     preorder: (f64, usize, usize),

@@ -16,7 +16,7 @@ use palpate_shared::format::{Layout, Sentinel};
 /// Choice of models whose walks may end early.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EarlyExit {
-    /// Where that takes fewer instructions for these rows, which should not be those of the training: a model knows them too
+    /// Only if it takes fewer instructions for these rows, which should not be those of the training: a model knows them too
     /// well.
     IfItPays(Rows),
     /// After an eighth, a quarter and a half of the trees.
@@ -26,7 +26,7 @@ pub enum EarlyExit {
 /// Result of the choice.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct EarlyExitFound {
-    /// Trees of the model, of which some were merged.
+    /// Trees of the model, after merging.
     pub trees: usize,
     /// Numbers of trees after which the walk may end; none where that does not pay.
     pub ends: Vec<usize>,

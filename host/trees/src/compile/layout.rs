@@ -196,7 +196,7 @@ pub(super) fn with_early_exit(
     Some((parts, plan.found))
 }
 
-/// The same of code.
+/// Candidates of code.
 pub(super) fn code_with_early_exit(
     forest: &Forest<'_>,
     leaf: LeafType,

@@ -221,7 +221,7 @@ pub struct Compiled {
     pub candidates: Vec<Candidate>,
     /// The trees as code, and its form, if that was chosen: the bytes are a model without trees then.
     pub code: Option<(Program, Form)>,
-    /// Where walks for a class alone may end, if that was asked for.
+    /// Places where a walk for a class alone may end, if that was asked for.
     pub early_exit: Option<EarlyExitFound>,
 }
 

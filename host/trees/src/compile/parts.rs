@@ -13,7 +13,7 @@ pub(super) struct Parts {
     pub(super) leaves: Vec<u8>,
     /// The section with the leaves' values, where leaves are numbers.
     pub(super) shared: Option<Vec<u8>>,
-    /// Where walks for a class alone may end.
+    /// Places where a walk for a class alone may end.
     pub(super) exits: Vec<EarlyExit>,
     /// Starting values of the margins: in units, or f32 bits.
     pub(super) base: Vec<i32>,
@@ -43,7 +43,7 @@ impl Parts {
         bytes
     }
 
-    /// Bytes of the model, but for its text and what is the same in all layouts.
+    /// Bytes of the model, except its text and the parts that all layouts share.
     pub(super) fn bytes(&self) -> usize {
         let records = Axis::LENGTH * self.axes.len() + Group::LENGTH * self.groups.len() + 8 * self.base.len();
         HEADER_LENGTH + records + self.cuts.len() + self.nodes.len() + self.leaves.len() + self.section().len()

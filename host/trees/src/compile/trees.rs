@@ -35,7 +35,7 @@ impl<'a> Leaves<'a> {
     }
 }
 
-/// The sections of trees, but for their leaves.
+/// Sections of trees, except their leaves.
 pub(super) struct Sections {
     pub(super) axes: Vec<Axis>,
     pub(super) cuts: Vec<u8>,

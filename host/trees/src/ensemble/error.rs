@@ -29,7 +29,7 @@ pub enum EnsembleProblem {
     FeatureCount {
         /// Features.
         count: usize,
-        /// Those that some tree splits on.
+        /// Features that some tree splits on.
         used: usize,
         /// The most that there may be.
         most: usize,
@@ -327,7 +327,7 @@ pub enum TreeProblem {
     NoValues {
         /// The leaf.
         node: usize,
-        /// Where they should be.
+        /// Their expected column.
         column: &'static str,
         /// Number of values there should be.
         values: usize,

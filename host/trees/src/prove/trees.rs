@@ -298,7 +298,7 @@ struct Sums {
     most: f64,
     /// The base margin that the ensemble's is, with what is folded into it.
     base: f64,
-    /// The same in whole units, to which each part was rounded.
+    /// The sums in whole units, to which each part was rounded.
     units: [f64; 2],
 }
 

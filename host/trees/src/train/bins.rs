@@ -11,7 +11,7 @@ const NEAR: usize = 64;
 pub(super) struct Bins {
     /// For each column the upper ends of its bins, ascending.
     pub(super) ends: Vec<Vec<f32>>,
-    /// Where each column begins among the bins of all columns, and where the last ends. After a column's bins comes one for
+    /// Start of each column among the bins of all columns, and the end of the last. After a column's bins comes one for
     /// missing values.
     pub(super) starts: Vec<usize>,
     /// Columns × rows: the number of the bin in its column.
@@ -25,9 +25,9 @@ pub(super) struct Bins {
 #[derive(Clone, Copy)]
 pub(super) struct Side {
     pub(super) column: usize,
-    /// Those in this many bins of the column, the first.
+    /// Number of the column's first bins that go left.
     pub(super) limit: usize,
-    /// Those without a value go left too.
+    /// True if rows without a value go left too.
     pub(super) missing_left: bool,
 }
 

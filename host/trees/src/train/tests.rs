@@ -39,7 +39,7 @@ impl Case {
         Self { features, columns: kinds.len(), labels, weights: None, classes, parameters }
     }
 
-    /// The same, each class with a weight of its own.
+    /// The data with a weight for each class.
     fn weighted(self) -> Self {
         let weights = self.labels.iter().map(|&label| 0.3 + 0.7 * label as f32).collect();
         Self { weights: Some(weights), ..self }

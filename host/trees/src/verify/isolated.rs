@@ -8,7 +8,7 @@ use palpate_onboard::Model;
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, Layout, LeafType, checksum};
 use std::ops::Range;
 
-/// The first tree, in the ensemble's order, of which the model adds another leaf for this row than the ensemble does.
+/// The first tree, in the ensemble's order, whose leaf for this row differs between the model and the ensemble.
 /// `None` if there is none, or the model is a table and has no trees.
 pub(super) fn first_different_tree(
     model: &Model<'_>,
@@ -61,7 +61,7 @@ pub(super) fn first_different_tree(
     Some(different.fold(first, usize::min))
 }
 
-/// Where the leaves of a tree are, and their shift.
+/// Leaves of a tree, and their shift.
 struct Leaves {
     bytes: Range<usize>,
     shift: u8,

@@ -58,7 +58,7 @@ impl Together {
         debug_assert!(is_whole, "a row of margins for each touch");
     }
 
-    /// The same in nats.
+    /// Margins of touches in nats.
     pub fn touches_in_nats<T: Borrow<Touch>>(&mut self, model: &Model<'_>, touches: &[T], margins: &mut [f64]) {
         let mut units = std::mem::take(&mut self.units);
         units.resize(margins.len(), 0);

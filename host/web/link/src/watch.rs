@@ -46,7 +46,7 @@ pub(crate) enum Happening {
     Started,
     /// The chip has forgotten its touches, as it was told.
     Reset,
-    /// So many reports of the chip were lost on the way.
+    /// Number of the chip's reports that were lost on the way.
     Missed { count: u32 },
 }
 
@@ -135,7 +135,7 @@ pub(crate) struct Watch {
     /// Reads the same bytes: the end counts frames of another version and does not say which.
     versions: Decoder,
     session: u32,
-    /// The chip's boot number as far as it is known.
+    /// The chip's boot number, if it is known.
     boot: Option<u32>,
     known: Known,
     /// The question that is open, and since when.

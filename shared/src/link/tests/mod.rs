@@ -689,7 +689,7 @@ fn golden_frames_pin_the_format() {
     let touch = Touch::from_micros([300, 0, 70_000]).with_pose(Pose { direction: [1, 2, 3], alignment: [-1, 0, 256] });
     let detail = Detail { posterior: [8, 7, 6, 5, 4, 3, 2, 1], evidence: [4, 3, 2, 1] };
     let verdict = VerdictMessage { decision: Decision::Recognized(4), best: 4, touches: 17, detail: Some(detail) };
-    // Written out by hand but for the checksums: version, session, message, CRC-32, in COBS.
+    // Written out by hand, except the checksums: version, session, message, CRC-32, in COBS.
     let (mut without, down) = ([0; POSE_BYTES], Pose { direction: [0, 0, -32767], alignment: [32767, 0, 0] });
     (without[0], without[12]) = (255, 1);
     let frames: [(Message<'_>, &[u8]); 8] = [

@@ -199,7 +199,7 @@ fn start(text: &str, width: usize) -> String {
         .collect()
 }
 
-/// The same, filled up to `width` columns.
+/// The text, padded to `width` columns.
 fn pad(text: &str, width: usize) -> String {
     let mut text = start(text, width);
     text.extend(repeat_n(' ', width - text.width()));

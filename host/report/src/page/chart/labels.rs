@@ -1,4 +1,4 @@
-//! Where labels go.
+//! Placement of labels.
 
 /// Places as near as possible to the `wanted` ones, in the order of `ordered`, at least `distance` apart and within
 /// `low..high` if they fit: neighbors that collide are pooled and spread about their mean.

@@ -1,4 +1,4 @@
-//! Where everything of a chart goes: the plane, and every text, before anything is drawn. No two texts overlap, and none is
+//! Layout of a chart: the plane, and every text, before anything is drawn. No two texts overlap, and none is
 //! cut off by the chart's edge, whatever the data and the names: what would not fit goes elsewhere (names of lines into a
 //! legend below), or is shortened or left out (ticks and notes beside points; never a name).
 
@@ -58,7 +58,7 @@ pub(super) struct Text {
     /// All of it, if it is shortened.
     pub(super) whole: Option<String>,
     pub(super) x: f64,
-    /// Of the baseline.
+    /// Height of the baseline.
     pub(super) y: f64,
     pub(super) anchor: Anchor,
     /// True if it reads from below upwards.
@@ -115,7 +115,7 @@ fn widest<'t>(texts: impl IntoIterator<Item = &'t String>) -> f64 {
     texts.into_iter().map(|text| width(text, false)).fold(0.0, f64::max)
 }
 
-/// Where `value` is between two places.
+/// Position of `value` between two places.
 fn place(axis: &Axis, value: f64, from: f64, to: f64) -> f64 {
     from + axis.place(value) * (to - from)
 }
@@ -182,7 +182,7 @@ impl Chart {
         layout
     }
 
-    /// Where each label is in the legend: its left edge, its row, and its text; and how many rows there are.
+    /// Positions of the labels in the legend: left edge, row, and text of each; and the number of rows.
     fn legend_places(&self, chart: f64) -> (Vec<InLegend>, usize) {
         let (mut x, mut row) = (EDGE, 0);
         let mut places = Vec::new();

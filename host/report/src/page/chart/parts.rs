@@ -38,7 +38,7 @@ pub(crate) enum Mark {
     },
     /// Points.
     Dots {
-        /// Where.
+        /// Places on the plane.
         points: Vec<(f64, f64)>,
         /// Their color.
         color: RGBColor,
@@ -135,7 +135,7 @@ pub(crate) struct Label {
 }
 
 impl Label {
-    /// The label of a line through `points`, of which there is at least one.
+    /// The label of a line through `points`, which is not empty.
     fn of(text: &str, key: Key, points: &[(f64, f64)]) -> Self {
         let mean = points.iter().map(|point| point.1).sum::<f64>() / points.len().max(1) as f64;
         let last = points.iter().max_by(|a, b| a.0.total_cmp(&b.0));
@@ -186,13 +186,13 @@ impl Chart {
         }
     }
 
-    /// The same in another size.
+    /// The chart in another size.
     pub(crate) fn sized(mut self, width: u32, height: u32) -> Self {
         (self.width, self.height) = (width, height);
         self
     }
 
-    /// The same with a title.
+    /// The chart with a title.
     pub(crate) fn titled(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
         self

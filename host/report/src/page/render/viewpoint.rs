@@ -1,4 +1,4 @@
-//! Where a mesh is looked at from.
+//! Viewpoint from which a mesh is drawn.
 
 use glam::{Mat3, Vec3};
 use palpate::mesh::Mesh;

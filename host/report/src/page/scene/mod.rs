@@ -46,9 +46,9 @@ pub(crate) struct Scene {
 pub(crate) struct Line {
     /// Group of lines that are shown, pointed at and chosen as one.
     pub(crate) group: usize,
-    /// Where it starts.
+    /// Start of the line.
     pub(crate) start: [f64; 3],
-    /// Where it ends.
+    /// End of the line.
     pub(crate) end: [f64; 3],
     /// The style's custom property that holds its color.
     pub(crate) color: &'static str,
@@ -83,7 +83,7 @@ impl Scene {
     }
 }
 
-/// Where the scene is drawn, with a caption.
+/// Frame that the scene is drawn in, with a caption.
 pub(crate) fn figure(caption: &str) -> Markup {
     html! {
         figure id="scene" {

@@ -24,7 +24,7 @@ impl SimplifiedMesh {
         Self::with_at_most(mesh, length, MOST_TRIANGLES)
     }
 
-    /// The same with at most this many triangles: in a larger mesh, the vertices in each cell of a grid become one, on the
+    /// The mesh with at most this many triangles: in a larger mesh, the vertices in each cell of a grid become one, on the
     /// finest grid that is coarse enough.
     pub(crate) fn with_at_most(mesh: &Mesh, length: f64, most: usize) -> Self {
         let [low, high] = mesh.bounds();

@@ -42,7 +42,7 @@ fn is_closed(mesh: &Mesh) -> bool {
 
 fn contour(form: &Form, cells: f32) -> Mesh {
     let center = (form.bounds[0] + form.bounds[1]) / 2.0;
-    // The mesher works in a cube of 2^DEPTH cells a side, of which the bounds fill only a part. It merges cells as long
+    // The mesher works in a cube of 2^DEPTH cells a side, and the bounds fill only a part of it. It merges cells as long
     // as the surface stays within about a thousandth of that cube, so flat parts get large triangles.
     let side = (form.bounds[1] - form.bounds[0]).max_element();
     let reach = side / cells * f32::from(1_u16 << DEPTH) / 2.0;

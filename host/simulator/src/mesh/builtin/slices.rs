@@ -219,13 +219,13 @@ fn two(slots: &mut [Lanes], to: u8, [a, b]: [u8; 2], step: impl Fn(f32, f32) -> 
     slots[usize::from(to)] = std::array::from_fn(|lane| step(a[lane], b[lane]));
 }
 
-/// The smaller one, or what is no number.
+/// The smaller one; NaN if either is NaN.
 #[inline]
 fn least(a: f32, b: f32) -> f32 {
     if a < b || a.is_nan() { a } else { b }
 }
 
-/// The larger one, or what is no number.
+/// The larger one; NaN if either is NaN.
 #[inline]
 fn most(a: f32, b: f32) -> f32 {
     if a > b || a.is_nan() { a } else { b }

@@ -22,7 +22,7 @@ use std::path::Path;
 /// Reads the mesh of a COLLADA file, and how many millimeters its unit is, if it says; errors name `path`.
 ///
 /// # Errors
-/// Where the XML is none, a number is damaged, a reference leads nowhere or in a circle, it uses what is not read, or no
+/// If the XML is malformed, a number is damaged, a reference is dangling or circular, the file uses an unsupported feature, or no
 /// face is left.
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>)> {
     let text = text(bytes, path)?;

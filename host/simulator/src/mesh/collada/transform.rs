@@ -5,7 +5,7 @@ use super::{Wrong, damaged, unsupported, wrong};
 use glam::{DAffine3, DMat4, DVec3};
 use roxmltree::Node;
 
-/// Where a node places what is in it, within its parent.
+/// Transform of a node's content within its parent.
 pub(super) fn of(node: Node<'_, '_>) -> Result<DAffine3, Wrong> {
     let mut whole = DAffine3::IDENTITY;
     for child in node.children().filter(Node::is_element) {

@@ -21,17 +21,17 @@ pub struct Part {
     pub is_closed: bool,
     /// The volume that it encloses, negative if its triangles face inward; meaningless if it is open.
     pub volume: f64,
-    /// True if it is closed and its triangles face inward, although it is no cavity of another part.
+    /// True if it is closed and its triangles face inward, although it is not a cavity of another part.
     pub is_inside_out: bool,
 }
 
 impl Part {
-    /// Where it is, in words.
+    /// Location in words.
     pub(super) fn place(&self) -> String {
         Self::place_of(self.triangles, self.low, self.high)
     }
 
-    /// Where so many triangles in a box are, in words: "96 triangles around (1.20, 0, -3.00)".
+    /// Location of so many triangles in a box, in words: "96 triangles around (1.20, 0, -3.00)".
     pub(super) fn place_of(triangles: usize, low: Vec3, high: Vec3) -> String {
         let plural = if triangles == 1 { "" } else { "s" };
         let [x, y, z] = ((low.as_dvec3() + high.as_dvec3()) / 2.0).to_array().map(super::short);

@@ -26,7 +26,7 @@ pub struct Piece {
 }
 
 impl Piece {
-    /// Where it is, in words.
+    /// Location in words.
     pub(super) fn place(&self) -> String {
         Part::place_of(self.triangles, self.low, self.high)
     }

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 pub(super) struct Data<'a> {
     pub(super) document: &'a Document,
     pub(super) buffers: Vec<Option<Cow<'a, [u8]>>>,
-    /// The most elements of an accessor whose elements stand nowhere: zeros, of which a few are replaced.
+    /// The most elements of an accessor whose elements stand nowhere: zeros, a few of them replaced.
     pub(super) most_zeros: u64,
 }
 

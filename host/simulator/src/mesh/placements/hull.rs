@@ -102,7 +102,7 @@ impl Hull<'_> {
         facet.outside.iter().copied().max_by_key(|&point| (self.height(facet.corners, point), point))
     }
 
-    /// Replaces the facets that a point sees, of which `first` is one, by those from their outline to the point.
+    /// Replaces the facets that a point sees, including `first`, by those from their outline to the point.
     fn add(&mut self, first: usize, point: usize) {
         let (mut visible, mut outline) = (vec![first], Vec::new());
         self.facets[first].is_alive = false;

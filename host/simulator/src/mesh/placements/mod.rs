@@ -34,7 +34,7 @@ use glam::{DMat3, DVec3, I64Vec3, Vec3};
 /// Placements whose upward directions differ by at most this angle, in degrees, are one.
 pub const SAME: f64 = 10.0;
 
-/// Placements of less weight are left out, but for the second of an object that would have only one.
+/// Placements of less weight are left out, except the second of an object that would have only one.
 pub const LEAST: f64 = 0.03;
 
 /// The second placement of an object is left out if it has less weight than this, whatever others there are.
@@ -69,7 +69,7 @@ impl Placement {
 pub struct Placements {
     /// The placements that are kept, by descending weight; their weights sum to 1.
     pub placements: Vec<Placement>,
-    /// Those that are left out since they are rare, with the weights that they would have among all.
+    /// Placements left out because they are rare, with the weights that they would have among all.
     pub left_out: Vec<Placement>,
     /// Basis of the center of mass.
     pub center: Center,
@@ -244,7 +244,7 @@ fn settled(facets: &[hull::Facet], corners: &[[DVec3; 3]]) -> Vec<(DVec3, f64)> 
                 break end;
             }
             if let Some(place) = way.iter().position(|&passed| passed == facet) {
-                // Facets of one plane, but for rounding, may send it around: it ends on the lowest.
+                // Facets of one plane, up to rounding, may send it around: it ends on the lowest.
                 let height = |facet: usize| normals[facet].dot(corners[facet][0]);
                 let lowest = way[place..].iter().copied().min_by(|&a, &b| height(a).total_cmp(&height(b)));
                 break lowest.unwrap_or(facet);

@@ -28,7 +28,7 @@ impl Grazing {
         self.bend == 0.0
     }
 
-    /// As [`Approach::distances`], with fingers that bend aside. Cost: two casts for each finger that does.
+    /// Distances like [`Approach::distances`], with fingers that bend aside. Cost: two casts for each finger that does.
     pub fn distances(
         &self,
         approach: &Approach,

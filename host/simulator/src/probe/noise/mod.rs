@@ -345,8 +345,8 @@ impl Noise {
 
     /// The same with touch i made by robot `robot(i)`.
     pub fn add_by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
-        // Gaussian numbers have a stream of their own, three for each touch, so that the noise of one level is that of
-        // version 0.1.0, and no other setting changes it.
+        // Gaussian numbers have a stream of their own, three for each touch, so that no other setting changes the noise
+        // of one level.
         let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);
         let one = |(touch, index): (&Touch, u64)| {
             let normal: [f64; FINGERS] = std::array::from_fn(|_| StandardNormal.sample(&mut gaussian));

@@ -40,7 +40,7 @@ pub const PLANE: f64 = 1e-9;
 /// A triangle narrower than this share of its length has all its edges tested; one that is wider, only those that the
 /// center is outside of, or less than this share of the length inside of.
 pub const NARROW: f64 = 1e-6;
-/// Where the squared sine of an edge's angle with the motion is less than this, both its ends are tested as well.
+/// Squared sine of an edge's angle with the motion below which both its ends are tested as well.
 pub const STEEP: f64 = 1e-6;
 /// A squared distance of this many times the squared radius is a miss, whatever rounding does.
 pub const CLEAR: f64 = 1.0 + 1e-12;

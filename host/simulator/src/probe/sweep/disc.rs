@@ -30,7 +30,7 @@ pub(super) struct ContactBounds {
 /// Larger parts of a mesh are seldom flat, and would take time to measure again on every level of the tree.
 const MOST_TRIANGLES: usize = 512;
 
-/// Where the cosine between motion and normal is less than this, dividing by it would cost too many digits.
+/// Cosine between motion and normal below which dividing by it would cost too many digits.
 const LEAST_SLOPE: f32 = 0.2;
 
 impl Discs {

@@ -45,7 +45,7 @@ impl Surface {
         Self::with_bounds(triangles).0
     }
 
-    /// The same, and the triangles' bounding box: its lowest and highest corner, not rounded as [`bounds`](Self::bounds).
+    /// A surface, and the triangles' bounding box: its lowest and highest corner, not rounded as [`bounds`](Self::bounds).
     pub(super) fn with_bounds(mut triangles: Vec<Triangle>) -> (Self, [DVec3; 2]) {
         assert!(!triangles.is_empty(), "a surface needs a triangle");
         let (mut low, mut high, mut is_finite) = (DVec3::INFINITY, DVec3::NEG_INFINITY, true);
@@ -90,7 +90,7 @@ impl Surface {
         Some(distance * self.unit / start.length)
     }
 
-    /// As [`first_contact`](Self::first_contact), and how the surface stands there.
+    /// The [first contact](Self::first_contact), and how the surface is oriented there.
     pub fn contact(&self, origin: DVec3, direction: DVec3, radius: f64) -> Option<Contact> {
         let Start { motion, skipped, length } = self.start(origin, direction, radius)?;
         let (way, triangle) = Search::new(&self.tree, &motion).first_triangle(&self.tree, &self.triangles, &motion)?;
@@ -99,7 +99,7 @@ impl Surface {
         Some(Contact { distance: (skipped + way) * self.unit / length, normal: away.normalize_or(-motion.direction) })
     }
 
-    /// As [`first_contact`](Self::first_contact) of each of these origins, if all of them touch; none as soon as one does not,
+    /// The [first contacts](Self::first_contact) of these origins if all of them touch; none as soon as one does not,
     /// which takes a part of the time.
     pub fn all_contacts<const N: usize>(&self, origins: [DVec3; N], direction: DVec3, radius: f64) -> Option<[f64; N]> {
         let mut starts = [const { None }; N];
@@ -171,7 +171,7 @@ impl Surface {
 /// First contact of a sphere with a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// As [`Surface::first_contact`] gives it.
+    /// Distance from [`Surface::first_contact`].
     pub distance: f64,
     /// Unit vector from the point of contact to the sphere's center; against the direction where the sphere starts on the
     /// surface.

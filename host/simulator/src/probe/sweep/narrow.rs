@@ -13,7 +13,7 @@ pub type Triangle = [Vector; 3];
 /// A moving sphere.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
-    /// Where its center starts.
+    /// Start of its center.
     pub origin: Vector,
     /// Unit vector of its motion, or zero for a sphere that does not move.
     pub direction: Vector,

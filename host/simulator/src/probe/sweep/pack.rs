@@ -57,7 +57,7 @@ pub(super) struct Earliest {
 }
 
 impl Earliest {
-    /// Of the first `count` triangles.
+    /// A pack of the first `count` triangles.
     #[inline]
     fn new(halves: [Vec4; 2], count: u32) -> Self {
         let [low, high] = halves.map(|half| half.cmplt(Vec4::INFINITY).bitmask());
@@ -166,7 +166,7 @@ fn apart(corners: [[Vec4; 3]; 3], margin_squared: Vec4) -> BVec4A {
 /// A motion as the f32 tests need it.
 pub(super) struct Ray {
     pub(super) origin: Vec3,
-    /// The same, and one over the direction with tiny components in place of zeros, and its absolute value: axis by axis, for
+    /// The origin, one over the direction with tiny components instead of zeros, and its absolute value: axis by axis, for
     /// four boxes at once.
     pub(super) origins: [Vec4; 3],
     pub(super) inverse: [Vec4; 3],
@@ -201,7 +201,7 @@ impl Ray {
         }
     }
 
-    /// Of boxes, given by their center and half their sides: where the center is along one of the axes, and how far
+    /// Extent of boxes along an axis, from their centers and half their sides: position of the center, and how far
     /// the box reaches from there.
     #[inline]
     pub(super) fn extent(&self, center: &[Vec4; 3], [x, y, z]: &[Vec4; 3], axis: usize) -> [Vec4; 2] {

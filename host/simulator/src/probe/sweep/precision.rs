@@ -72,7 +72,7 @@ mod single {
     pub mod narrow;
 }
 
-/// As [`Surface::first_contact`], in another precision.
+/// [`Surface::first_contact`] in another precision.
 pub fn first_contact<P: Precision>(surface: &Surface, origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
     let start = surface.start(origin, direction, radius)?;
     let (tree, triangles, motion) = (&surface.tree, &surface.triangles, &start.motion);

@@ -57,7 +57,7 @@ pub(super) mod scale {
 /// The sphere's radius, as a multiple of the packs' size, from which on a mesh is not coarse.
 const MIDDLE_FROM: f32 = 0.6;
 
-/// The same from which on it is fine.
+/// Ratio from which on it is fine.
 const FINE_FROM: f32 = 2.0;
 
 /// A triangle, as the builder takes it.
@@ -194,7 +194,7 @@ pub(super) struct Search {
     stack: Vec<Candidate>,
     /// Distance of the first contact so far.
     first: f64,
-    /// The same for boxes and packs.
+    /// The limit for boxes and packs.
     limit: f32,
     /// The triangle that it touches, in the tree's order.
     touched: usize,
@@ -312,7 +312,7 @@ impl Node {
     }
 }
 
-/// Where the search begins: beyond any contact. A sphere that does not move touches at 0 or never.
+/// Start of the search: beyond any contact. A sphere that does not move touches at 0 or never.
 #[inline]
 pub(super) fn farthest(motion: &Motion) -> f64 {
     if motion.direction == DVec3::ZERO { f64::MIN_POSITIVE } else { f64::INFINITY }
@@ -324,7 +324,7 @@ pub(super) fn limit_after(first: f64, motion: &Motion, ray: &Ray) -> f32 {
     first as f32 + 2.0 * (ray.margin - motion.radius as f32)
 }
 
-/// As the fast preset of obvhs, without the collapse of its leaves.
+/// Builds the tree like the fast preset of obvhs, without the collapse of its leaves.
 fn build(bounds: &[Bounded]) -> Bvh2 {
     let indices = (0..bounds.len() as u32).collect();
     let mut builder = PlocBuilder::with_capacity(bounds.len());

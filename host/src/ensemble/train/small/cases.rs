@@ -66,7 +66,7 @@ impl Cases {
     }
 }
 
-/// The edges of bins that hold equally many values, but for the least value. Missing values are in none.
+/// Edges of bins that hold equally many values, except the bin of the least value. Missing values are in none.
 fn quantiles(features: &[f32], column: usize, columns: usize, bins: usize) -> Vec<f32> {
     let mut values: Vec<f32> =
         features.iter().skip(column).step_by(columns).copied().filter(|value| !value.is_nan()).collect();

@@ -14,7 +14,7 @@ use std::collections::HashMap;
 
 /// Rounds of fitting lists and exchanging them.
 const ROUNDS: usize = 12;
-/// The same after rounding.
+/// Length after rounding.
 const ROUNDED: usize = 4;
 /// Passes over all lists in a round.
 const SWEEPS: usize = 4;

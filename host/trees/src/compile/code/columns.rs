@@ -64,7 +64,7 @@ impl Columns {
         Self { columns, places }
     }
 
-    /// Where the column with this number in [`Axes`] is.
+    /// Position of the column with this number in [`Axes`].
     pub(super) fn place(&self, column: usize) -> usize {
         self.places[column]
     }

@@ -101,7 +101,7 @@ impl Program {
         })
     }
 
-    /// The same with its trees in this order, and with places where a walk for a class alone may end.
+    /// The program with its trees in this order, and with places where a walk for a class alone may end.
     pub(in super::super) fn with_exits(mut self, order: &[usize], exits: Vec<(usize, u32)>) -> Self {
         if !exits.is_empty() {
             self.trees = order.iter().map(|&tree| self.trees[tree].clone()).collect();

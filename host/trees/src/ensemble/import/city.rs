@@ -42,7 +42,7 @@ const K2: u64 = 0x9ae1_6a3b_2f90_404f;
 const K3: u64 = 0xc949_d7c7_509e_6557;
 const MIX: u64 = 0x9ddf_ea08_eb38_2d69;
 
-/// Of 1 to 8 bytes, as many as the numbers have.
+/// Hash of 1 to 8 bytes.
 fn hash(text: &[u8]) -> u32 {
     let length = text.len() as u64;
     let word = |bytes: &[u8]| bytes.iter().rev().fold(0_u64, |word, byte| word << 8 | u64::from(*byte));

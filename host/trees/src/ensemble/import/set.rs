@@ -9,7 +9,7 @@ const MAX_CATEGORIES: usize = 1 << 16;
 /// Values of a feature, in runs.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::ensemble) struct Set {
-    /// Where one run ends and the next begins, ascending: every other run is in the set.
+    /// Ends of runs, ascending: every other run is in the set.
     pub(super) ends: Vec<f64>,
     /// True if the first run is.
     pub(super) begins: bool,
@@ -44,7 +44,7 @@ impl Set {
         Ok(Self { ends, begins: false })
     }
 
-    /// The same, and all values below 0 and from `end` on, which is beyond all categories.
+    /// The set, with all values below 0 and from `end` on, which is beyond all categories.
     pub(in crate::ensemble) fn and_beyond(mut self, end: f64) -> Self {
         for end in [0.0, end] {
             match self.ends.binary_search_by(|own| own.total_cmp(&end)) {

@@ -14,7 +14,7 @@ use std::rc::Rc;
 
 /// Splits that a tree may have, for each one in the file.
 const MAX_GROWTH: usize = 64;
-/// The same for a small tree.
+/// The limit for a small tree.
 const ALWAYS: usize = 1 << 12;
 
 /// The tree with splits by thresholds alone, nodes from the root on; `name` names a feature.

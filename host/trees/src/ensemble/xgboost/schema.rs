@@ -1,4 +1,4 @@
-//! XGBoost's JSON model schema, as far as it is used.
+//! The parts of XGBoost's JSON model schema that are used.
 
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
@@ -35,7 +35,7 @@ pub(super) struct GradientBooster {
     /// Of dart up to 3.2, the booster that holds the trees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) gbtree: Option<Box<GradientBooster>>,
-    /// Of dart up to 3.3; later it is in the model.
+    /// Weights of dart up to 3.3; later versions have them in the model.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_floats")]
     pub(super) weight_drop: Option<Vec<f32>>,
 }
@@ -84,7 +84,7 @@ pub(super) struct SoftmaxParameters {
     pub(super) num_class: String,
 }
 
-/// Of binary models and regressions.
+/// Loss parameters of binary models and regressions.
 #[derive(Serialize)]
 pub(super) struct LossParameters {
     pub(super) scale_pos_weight: String,
@@ -131,7 +131,7 @@ pub(super) struct TreeParameters {
     pub(super) size_leaf_vector: String,
 }
 
-/// Numbers, of which those that JSON cannot write are null.
+/// Numbers; those that JSON cannot write are null.
 fn floats<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f32>, D::Error> {
     let numbers = Vec::<Option<f32>>::deserialize(deserializer)?;
     Ok(numbers.into_iter().map(|number| number.unwrap_or(f32::NAN)).collect())

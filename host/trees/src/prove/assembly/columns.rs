@@ -216,7 +216,7 @@ impl<'w> Walk<'w> {
         })
     }
 
-    /// The end of a way, which is the same for all but for the column's number.
+    /// The end of a way, the same for all columns except for the column's number.
     fn store(&mut self, mut state: State, at: usize, values: Values) -> Result<(), ProofProblem> {
         let instruction = &self.text.instructions[at];
         let error = || problem(instruction.line, format!("{} is not known here", instruction.text()));

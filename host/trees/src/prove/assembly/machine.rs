@@ -34,7 +34,7 @@ pub(super) enum Value {
     Sum(i32),
     /// A margin in memory, of this object.
     Margin(usize),
-    /// The same with a number, or the sum of trees, added.
+    /// A value with a number, or the sum of trees, added.
     Added(usize, i32, bool),
 }
 

@@ -4,11 +4,11 @@ use crate::shared;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_write};
 use palpate_onboard::station::MappedFlash;
 
-/// Where the program's part ends; memory.x says the same.
+/// End of the program's part; memory.x says the same.
 const START: u32 = 512 << 10;
 /// The part of the 2 MB that the program leaves.
 const LENGTH: usize = 1536 << 10;
-/// Where the chip's bus sees the flash.
+/// Address of the flash on the chip's bus.
 const MAPPED: usize = 0x1000_0000;
 /// Bytes that the flash writes at once; writing ones changes nothing, so a page may be written in parts.
 const PAGE: usize = 256;

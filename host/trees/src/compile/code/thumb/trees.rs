@@ -135,7 +135,7 @@ fn zero(tree: &CodeTree, chip: Chip) -> i32 {
     let cost = |zero: i32| -> f64 {
         leaves.iter().map(|&(value, chance)| chance * additions(value.wrapping_sub(zero), chip) as f64).sum()
     };
-    // Among those that are likely: a tree has thousands of leaves at most, of which few are.
+    // Among the likely ones: a tree has thousands of leaves at most, and few are likely.
     let mut candidates = leaves.clone();
     candidates.sort_by(|a, b| b.1.total_cmp(&a.1));
     candidates.truncate(16);

@@ -18,7 +18,7 @@ pub(super) struct Walk<'w> {
     pub(super) pins: &'w Pins,
     pub(super) put: &'w dyn Fn(&mut Assembler, &CodeNode, bool, Label) -> f64,
     pub(super) bytes: &'w dyn Fn(&CodeNode) -> usize,
-    /// Where leaves stand that others may branch to: with the position there.
+    /// Positions of leaves that others may branch to.
     pub(super) shared: Option<&'w Shared>,
 }
 
@@ -81,7 +81,7 @@ impl Pins {
 }
 
 impl Walk<'_> {
-    /// Where the same leaf stands already, within reach, and about what it takes there.
+    /// An equal leaf within reach, and about what a branch to it takes.
     fn standing(&self, out: &Assembler, node: &CodeNode) -> Option<(Label, f64)> {
         let CodeNode::Leaf(values) = node else { return None };
         let (position, label) = *self.shared?.borrow().get(values)?;

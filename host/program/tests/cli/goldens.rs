@@ -1,0 +1,204 @@
+//! Results that stay: what the program prints, and the files it writes, for settings that cover each kind of evidence, promise
+//! and layout. `PALPATE_GOLDENS=write` records them again, for a change that is meant to change them.
+
+use crate::{run, stdout};
+use palpate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Centers of the classes' rows.
+const CENTERS: [f64; 3] = [0.0, 1.2, 3.0];
+
+/// The recorded results.
+fn recorded(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/goldens").join(name)
+}
+
+/// The steps so far: the commands, their output, and checksums of what they wrote.
+struct Script {
+    directory: tempfile::TempDir,
+    text: String,
+}
+
+impl Script {
+    fn new() -> Self {
+        Self { directory: tempfile::tempdir().unwrap(), text: String::new() }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+
+    /// Runs a command in the directory; adds its output, and the checksum of the file that it wrote, if one is named.
+    fn step(&mut self, line: &str) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let output = crate::command(&words).current_dir(self.directory.path()).output().unwrap();
+        let output = stdout(output);
+        writeln!(self.text, "$ palpate {line}\n{}", output.trim_end()).unwrap();
+        let written = words.iter().position(|word| *word == "-o").map(|at| self.path(words[at + 1]));
+        if let Some(bytes) = written.filter(|path| path.is_file()).map(|path| std::fs::read(path).unwrap()) {
+            writeln!(self.text, "# {} bytes, {:016x}", bytes.len(), checksum(&bytes)).unwrap();
+        }
+    }
+
+    /// Compares the results with the recorded ones of this name.
+    #[track_caller]
+    fn compare(self, name: &str) {
+        let path = recorded(name);
+        if std::env::var_os("PALPATE_GOLDENS").is_some_and(|value| value == "write") {
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(&path, &self.text).unwrap();
+        }
+        let expected = std::fs::read_to_string(&path).unwrap_or_default();
+        for (number, (found, expected)) in self.text.lines().zip(expected.lines()).enumerate() {
+            assert_eq!(found, expected, "{name}, line {}", number + 1);
+        }
+        assert_eq!(self.text.lines().count(), expected.lines().count(), "{name}: lines");
+    }
+}
+
+/// FNV-1a, 64 bits.
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+#[test]
+fn calibration_and_evaluation_on_touches_stay() {
+    let mut script = Script::new();
+    for line in [
+        // Full touches.
+        "capture bowl camera mouse winebottle -o full --touches 1500 --json",
+        "train full -o full.json --trees rounds=12,depth=4 --json",
+        "export full.json -o full.palpate --json",
+        "capture bowl camera mouse winebottle -o fresh --touches 6000 --seed 2 --json",
+        "calibrate full.palpate fresh -o average.palpate --error-rate 5% --json",
+        "calibrate full.palpate fresh -o name.palpate --error-rate 20% --per name --json",
+        "calibrate full.palpate fresh -o object.palpate --error-rate 20% --per object",
+        "capture bowl camera mouse winebottle -o unseen --touches 1000 --seed 3 --json",
+        "evaluate average.palpate unseen --sequences 200 --json",
+        "evaluate name.palpate unseen --sequences 200 --confusion 5",
+        "evaluate full.json unseen --sequences 200 --json",
+        "evaluate average.palpate unseen --sequences 200 --switch 5 --prior bowl=0.5 --json",
+        "evaluate average.palpate unseen --sequences 200 --only bowl,mouse --real noise=2ms,missed=2% --json",
+        // Every approach, with a test for unknown objects.
+        "capture bowl camera mouse winebottle -o all --approaches 3000 --pose --json",
+        "train all -o all.json --evidence all --trees rounds=12,depth=4",
+        "export all.json -o all.palpate",
+        "capture bowl camera mouse winebottle -o fresh-all --approaches 12000 --pose --seed 2",
+        "calibrate all.palpate fresh-all -o all-5.palpate --error-rate 5% --real noise=1ms --json",
+        "calibrate all.palpate fresh-all -o likely.palpate --error-rate 10% --strangers likely --json",
+        "capture fork hammer -o unknown --approaches 800 --seed 4",
+        "capture bowl camera mouse winebottle -o unseen-all --approaches 1000 --pose --seed 3",
+        "evaluate all-5.palpate unseen-all --sequences 100 --json",
+        "evaluate likely.palpate unseen-all --sequences 100 --unknown unknown --json",
+        // Chosen approaches.
+        "train all -o oriented.json --descriptor oriented --evidence all --trees rounds=12,depth=4",
+        "export oriented.json -o oriented.palpate",
+        "calibrate oriented.palpate fresh-all -o planned.palpate --plan 1 --json",
+        "calibrate planned.palpate fresh-all -o active.palpate --active --error-rate 5% --json",
+        "evaluate active.palpate unseen-all --sequences 100 --active --json",
+        "verify oriented.palpate oriented.json unseen-all --sequences 100 --json",
+        // A table.
+        "capture bowl mouse -o table --approaches 3000 --scene table --pose",
+        "train table -o table.json --descriptor gravity --evidence all --trees rounds=12,depth=4",
+        "export table.json -o table.palpate",
+        "capture bowl mouse -o fresh-table --approaches 12000 --scene table --pose --seed 2",
+        "calibrate table.palpate fresh-table -o table-5.palpate --error-rate 5% --json",
+        "calibrate table.palpate fresh-table -o table-object.palpate --error-rate 20% --per object --json",
+        "evaluate table-5.palpate fresh-table --sequences 50 --json",
+    ] {
+        script.step(line);
+    }
+    script.compare("touches.txt");
+}
+
+/// Trees that are exact for rows that are normal about the classes' centers: steps of the log density.
+fn ensemble() -> Ensemble {
+    let cuts: Vec<f64> = (-20..=28).map(|step| f64::from(step) * 0.25).collect();
+    let leaf = |x: f64| Node::Leaf(CENTERS.iter().map(|center| (-0.5 * (x - center).powi(2)) as f32).collect());
+    let mut nodes = Vec::new();
+    for cut in &cuts {
+        let (threshold, here) = (*cut as f32, nodes.len());
+        nodes.push(Node::Split { feature: 0, threshold, missing_left: true, left: here + 1, right: here + 2 });
+        nodes.push(leaf(cut - 0.125));
+    }
+    nodes.push(leaf(cuts[cuts.len() - 1] + 0.125));
+    Ensemble {
+        inputs: Inputs::unnamed(1),
+        objects: ["a", "b", "c"].map(String::from).to_vec(),
+        base_margins: vec![0.0; CENTERS.len()],
+        trees: vec![Tree { nodes, output: Output::Each }],
+        origin: Origin::default(),
+    }
+}
+
+/// Sequences of twelve rows as CSV, three of each group, with an offset for each sequence.
+fn sequences(count: usize, mut state: u64) -> String {
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut text = String::from("f0,kind,id,person\n");
+    for id in 0..count {
+        let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+        let (class, offset) = (id % CENTERS.len(), 0.4 * normal());
+        for _ in 0..12 {
+            let x = CENTERS[class] + offset + normal();
+            writeln!(text, "{x:.4},{},{id},{}", ["a", "b", "c"][class], id / 3).unwrap();
+        }
+    }
+    text
+}
+
+#[test]
+fn calibration_and_evaluation_on_rows_stay() {
+    let mut script = Script::new();
+    ensemble().save(&script.path("rows.json")).unwrap();
+    std::fs::write(script.path("calibration.csv"), sequences(900, 1)).unwrap();
+    std::fs::write(script.path("unseen.csv"), sequences(300, 2)).unwrap();
+    let columns = "--label kind --sequence-column id";
+    script.step("export rows.json -o rows.palpate --json");
+    for line in [
+        format!("calibrate rows.palpate calibration.csv {columns} -o average.palpate --error-rate 10% --json"),
+        format!("calibrate rows.palpate calibration.csv {columns} -o name.palpate --error-rate 20% --per name --json"),
+        format!("calibrate rows.palpate calibration.csv {columns} -o object.palpate --error-rate 20% --per object"),
+        format!(
+            "calibrate rows.palpate calibration.csv {columns} --group-column person -o groups.palpate --error-rate 10% --json"
+        ),
+        format!("evaluate average.palpate unseen.csv {columns} --json"),
+        format!("evaluate name.palpate unseen.csv {columns} --switch"),
+        format!("evaluate groups.palpate unseen.csv {columns} --group-column person --json"),
+        "evaluate rows.palpate unseen.csv --label kind --json".to_owned(),
+    ] {
+        script.step(&line);
+    }
+    script.compare("rows.txt");
+}
+
+#[test]
+fn models_of_every_fixture_stay_in_every_layout() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/import");
+    let is_model = |path: &PathBuf| {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        [".json", ".ubj", ".txt", ".onnx"].iter().any(|end| name.ends_with(end))
+    };
+    let files = std::fs::read_dir(data).unwrap().map(|entry| entry.unwrap().path());
+    let mut files: Vec<PathBuf> = files.filter(is_model).collect();
+    files.sort();
+    let script = Script::new();
+    let output = script.path("model.palpate");
+    let mut text = String::new();
+    for file in &files {
+        write!(text, "{}", file.file_name().unwrap().to_str().unwrap()).unwrap();
+        for layout in ["balanced", "speed", "size", "m0+", "compact", "complete", "grid", "wide"] {
+            let arguments = ["export", file.to_str().unwrap(), "-o", output.to_str().unwrap(), "--layout", layout];
+            let exported = run(arguments);
+            match exported.status.code() {
+                Some(0) => write!(text, " {:08x}", checksum(&std::fs::read(&output).unwrap()) as u32).unwrap(),
+                code => write!(text, " {}", code.unwrap_or(-1)).unwrap(),
+            }
+        }
+        text.push('\n');
+    }
+    Script { text, ..script }.compare("models.txt");
+}
