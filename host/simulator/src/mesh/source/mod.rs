@@ -300,7 +300,7 @@ fn found(sources: &[String], search: Search) -> Result<(Vec<Source>, Option<Stri
         {
             insert(&mut found, name.into(), Source::BuiltIn(name))?;
         } else if let Some(path) = search::chosen(source) {
-            paths.push(Found { path, passed: Vec::new() });
+            finder.found.push(Found { path, passed: Vec::new() });
         } else {
             let path = Path::new(source);
             let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
