@@ -151,7 +151,7 @@ mod tests {
         let third = (f64::from(all) / 3.0).round() as u32;
         assert_eq!(weights(&["--only", "bowl"]), [all, third, 0]);
         assert_eq!(weights(&["--only", "bowl/-z,fork"]), [0, all / 4, all]);
-        assert_eq!(weights(&["--prior", "bowl=0.4"]), [all / 2, all / 6 + 1, all]);
+        assert_eq!(weights(&["--prior", "bowl=0.4"]), [all / 2, all / 6, all]);
     }
 
     #[test]

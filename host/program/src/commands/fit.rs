@@ -27,7 +27,7 @@ Examples:
   palpate probe fit recorded meshes/ -o probe.toml --plate plate.txt
   palpate probe fit recorded meshes/ -o fitted.toml --probe probe.toml \\
       --true-size mm
-  palpate probe fit recorded meshes/ -o probe.toml --scene table --plate table.txt")]
+  palpate probe fit recorded meshes/ -o probe.toml --scene table")]
 pub(super) struct FitArguments {
     /// The recorded touches: a directory with a file for each object
     #[arg(value_name = "RECORDED")]
@@ -157,8 +157,8 @@ fn table(found: &Fit) -> String {
         // Writing to a string cannot fail.
         _ = write!(
             text,
-            "\nContact times cluster about multiples of {interval} ms, as if contacts were read that seldom. The probe states that as \
-             noise, and as its timer; read them more often if you can."
+            "\nContact times cluster about multiples of {interval} ms, as if contacts were read only that often. The probe states \
+             that as noise, and as its timer; read them more frequently if you can."
         );
     }
     text += "\nOffsets are relative to the first finger's: only differences of times are recorded.\n";

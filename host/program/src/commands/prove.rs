@@ -152,8 +152,7 @@ fn proof_text(proof: &Proof, what: &str) -> String {
     );
     if margin_error > stated {
         text += "That bound is proved: it is the sum of the trees' largest differences, which no single row need reach. The smaller \
-                 one that the model states is not: `export` went through all cells between thresholds for it, and this proof did \
-                 not.\n";
+                 one that the model states is not proved here: `export` went through all cells between thresholds for it.\n";
     }
     if let Some([own, of_ensemble]) = proof.other_link {
         text += &format!(

@@ -31,7 +31,7 @@ Examples:
   probe | palpate recognize planned.palpate --active
   palpate recognize model.palpate monday.mcap --mcap verdicts.mcap
   palpate recognize model.palpate rows.csv --features --json
-  palpate recognize sure.palpate rows.csv --features --add-up --sequence-column id")]
+  palpate recognize a.palpate a.csv --features --add-up --sequence-column id")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,

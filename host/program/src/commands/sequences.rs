@@ -262,7 +262,7 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
         text += match (switched.helps(*sequences), forgetting.error > plain.error) {
             (true, _) => "",
             (false, true) => "Forgetting does not help: no fewer names are wrong where the class changes.\n",
-            (false, false) => "Forgetting does not help: as few wrong names less may be by chance.\n",
+            (false, false) => "Forgetting does not help: so small a decrease in wrong names may be chance.\n",
         };
     }
     let mut recognized = evaluated.names.clone();

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Phrases with numbers that no setting and no result changes.
 const NUMBERS: &[(&str, &str)] = &[
+    ("{} (from 0)", "columns count from it"),
     ("figure 5", "of the paper"),
     ("figure 6", "of the paper"),
     ("figure 8a", "of the paper"),
@@ -99,6 +100,14 @@ const NUMBERS: &[(&str, &str)] = &[
 
 /// Phrases that compare, of what was set, or of what the words before or after them say was computed.
 const RELATIONS: &[(&str, &str)] = &[
+    ("no fewer names are wrong where", "computed: Switched::helps"),
+    ("so small a decrease in wrong names", "computed: Switched::helps"),
+    ("for {} rows by more than the rounding", "computed: library_values_differ"),
+    ("More than promised of: {}", "computed: the objects above the rate"),
+    ("more frequently if you can", "advice"),
+    ("its trees' largest differences", "the definition of the bound"),
+    ("the trees' largest differences", "the definition of the bound"),
+    ("The smaller one that the model states", "computed: margin_error above stated"),
     ("at most {}", "a bound that was set, or measured"),
     ("at most the threshold at all", "computed: above_thresholds"),
     ("above the threshold at {}", "computed: above_thresholds"),

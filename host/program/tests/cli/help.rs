@@ -134,23 +134,6 @@ fn help_lists_commands_in_groups_of_what_one_wants_to_do() {
 }
 
 #[test]
-fn old_names_end_with_2_and_the_new_name() {
-    for (arguments, expected) in [
-        (&["objects", "-o", "meshes"][..], "palpate data objects"),
-        (&["help", "plan"], "plan"),
-        (&["parity", "e.json", "m.palpate", "data"], "palpate verify MODEL ENSEMBLE DIR"),
-        (&["data", "compare", "a", "b"], "palpate data check RECORDED SIMULATED"),
-        (&["run", "--noise", "5ms"], "--real noise="),
-        (&["train", "data", "-o", "e.json", "--touches", "all"], "--evidence"),
-        (&["capture", "bowl", "-o", "data", "--approaches", "--touches", "100"], "--approaches 60000"),
-        (&["--json", "evaluate", "m", "d", "--strangers", "others"], "--unknown DIR"),
-    ] {
-        let error = stderr(run(arguments), 2);
-        assert!(error.contains(expected), "{arguments:?}: {error}");
-    }
-}
-
-#[test]
 fn quiet_prints_no_remark_and_still_results_and_errors() {
     let directory = tempfile::tempdir().unwrap();
     let lines = (0..40).map(|i| format!("0 0.00{} 0.0{}\n", i % 7, 10 + i % 50)).collect::<String>();

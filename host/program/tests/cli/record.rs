@@ -98,7 +98,7 @@ fn what_is_no_touch_is_refused_with_its_line_and_nothing_is_written() {
     let error = stderr(record(LINES, &data, "bowl", &["--pose"]), 1);
     assert!(error.contains("no pose, but this data set is recorded with one. Give direction and alignment"), "{error}");
     let error = stderr(record(LINES, &data, "../bowl", &[]), 1);
-    assert!(error.contains("no file can be named after the object \"../bowl\""), "{error}");
+    assert!(error.contains("no file can be named after the object \"..\""), "{error}");
     let error = stderr(run(["data", "record", "no-such-file", "--object", "bowl", "-o", data.to_str().unwrap()]), 1);
     assert!(error.contains("no-such-file: cannot read the touches"), "{error}");
     assert_eq!(listing(&data), [".lock"]);
@@ -347,7 +347,6 @@ fn with_the_pose_wanted_touches_without_one_are_said_and_not_recorded() {
 fn bad_arguments_of_recordings_exit_with_2() {
     for (arguments, part) in [
         (&["data", "record", "emulator", "-o", "recorded"][..], "--object"),
-        (&["link", "emulator", "--record", "recorded"], "palpate data record PORT -o DIR --object NAME"),
         (&["data", "record", "x.txt", "--object", "bowl"], "--output"),
         (&["data"], "Usage: palpate data"),
     ] {

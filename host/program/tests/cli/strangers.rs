@@ -107,7 +107,10 @@ fn a_test_is_calibrated_on_recordings_and_those_without_a_sequence_are_named() {
     assert!(text.contains("The test rests on recorded touches"), "{text}");
     touches(&at.join("few"), &KNOWN, 4, 3);
     let message = stderr(palpate(at, &[&alone[..], &["--recorded", "few"]].concat()), 1);
-    assert!(message.contains("few: the recordings make no sequence of an object that ends with a name"), "{message}");
+    assert!(
+        message.contains("few: the 4 recorded approaches to bowl make no sequence that ends with a name"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -157,11 +160,14 @@ fn shares_of_strangers_are_dashes_where_touches_run_out_before_a_verdict() {
     };
     let text = evaluated("few", &[]);
     assert!(text.contains("kettle –") && text.contains("A dash (–): not known"), "{text}");
-    assert!(text.contains("drawn from 4 at least"), "{text}");
+    assert!(text.contains("drawn from 2 at least"), "{text}");
     let figures: Value = serde_json::from_str(&evaluated("few", &["--json"])).unwrap();
     let strangers = &figures["strangers"];
     assert!(strangers["wrong_name"].is_null() && strangers["detected"]["30"].is_null(), "{strangers}");
-    assert_eq!(strangers["fewest_touches"], 4);
+    assert_eq!(
+        strangers["fewest_touches"], 2,
+        "two of the four are later than any that the model was trained on: {strangers}"
+    );
     assert!(strangers["used_up"].as_f64().unwrap() > 0.01, "{strangers}");
     let text = evaluated("many", &[]);
     assert!(!text.contains("A dash") && text.contains("Got a name: kettle "), "{text}");

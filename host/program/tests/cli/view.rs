@@ -34,7 +34,7 @@ fn wrong_arguments_write_no_page() {
     for (wrong, expected) in [
         (["--misses", "-1"], "-1"),
         (["--real", "noise=5ms"], "--real is given. Use it with --play"),
-        (["--length", "9"], "--probe FILE with smaller or larger fingers"),
+        (["--length", "9"], "unexpected argument '--length'"),
         (["--touches", "many"], "many"),
     ] {
         let error = stderr(command(["view", "bowl", "-o"]).arg(&page).args(wrong).output().unwrap(), 2);
