@@ -12,3 +12,4 @@ pub use crate::touches::TouchesProblem;
 #[cfg(feature = "train")]
 pub use crate::tune::TuneProblem;
 pub use palpate_simulator::error::*;
+pub use palpate_trees::error::*;

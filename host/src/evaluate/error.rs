@@ -1,8 +1,8 @@
 //! Problems with evaluating.
 
-use crate::calibrate::two_digits;
 use crate::ensemble::object_of;
 use crate::error::Problem;
+use palpate_base::wording::two_digits;
 use palpate_shared::Descriptor;
 
 /// Problems with evaluating.

@@ -21,14 +21,12 @@
 pub mod compile;
 pub mod ensemble;
 pub mod error;
-pub mod output;
-pub mod progress;
 pub mod prove;
 pub mod rows;
 pub mod train;
 pub mod verify;
-pub mod wording;
 
 pub use error::{Error, Result};
+pub use palpate_base::{output, progress, wording};
 pub use palpate_onboard as onboard;
 pub use palpate_shared as shared;

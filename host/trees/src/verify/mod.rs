@@ -18,9 +18,9 @@ pub use score::{Classes, Regression, RowsEvaluation, evaluate_rows};
 
 use crate::ensemble::{Ensemble, Threshold};
 use crate::error::{Result, RowsProblem};
-use crate::progress::{self, Progress};
 use crate::rows::{Encoder, Rows, ValueDiffers, generate};
 use isolated::first_different_tree;
+use palpate_base::progress::{self, Progress};
 use palpate_onboard::Model;
 use predict::class_by;
 use rayon::prelude::*;

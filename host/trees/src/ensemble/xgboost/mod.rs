@@ -27,7 +27,7 @@ mod write;
 use super::Ensemble;
 use super::import::options::Options;
 use crate::error::{EnsembleProblem, Error, Place, Result};
-use crate::output;
+use palpate_base::output;
 use schema::Document;
 use std::borrow::Cow;
 use std::path::Path;
