@@ -39,6 +39,7 @@ mod axes;
 mod budget;
 mod cells;
 pub mod code;
+mod container;
 mod cost;
 mod early;
 mod emit;
@@ -61,6 +62,7 @@ mod trees;
 mod write;
 
 pub use budget::compile_within;
+pub use container::OwnedSection;
 pub use cost::{Core, Instructions, Memory};
 pub use early::{EarlyExit, EarlyExitFound};
 pub use emit::{Language, emit, emit_code};
