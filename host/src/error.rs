@@ -3,6 +3,8 @@
 pub use crate::calibrate::{CalibrateProblem, Supplied};
 pub use crate::capture::CaptureProblem;
 pub use crate::chip::ChipProblem;
+#[cfg(feature = "train")]
+pub use crate::ensemble::train::TrainProblem;
 pub use crate::evaluate::EvaluateProblem;
 #[cfg(feature = "train")]
 pub use crate::fit::FitProblem;

@@ -1,4 +1,4 @@
-//! Crates depend on each other in one direction, and so do rooms, the top-level modules of a crate.
+//! Crates depend on each other in one direction, and so do rooms, the top-level modules of a crate. Trees know no touch.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::read_to_string;
@@ -107,6 +107,20 @@ fn crates_are_built_on_those_below_them_alone() {
         let keys = lines.take_while(|line| !line.starts_with('[')).filter_map(|line| line.split(['.', ' ']).next());
         let own = keys.filter(|key| key.starts_with("palpate")).map(|key| key.trim_start_matches("palpate-"));
         assert_eq!(own.collect::<Vec<_>>(), expected, "{folder}");
+    }
+}
+
+#[test]
+fn trees_know_no_touch() {
+    // The format's limit of steps, and ordinary words.
+    let others = ["max_touches", "compos", "dispos", "expos", "oppos", "propos", "purpos", "suppos", "transpos"];
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    for file in sources(&root.join("host/trees/src")) {
+        for (number, line) in read_to_string(&file).unwrap().lines().enumerate() {
+            let words = others.iter().fold(line.to_lowercase(), |line, other| line.replace(other, ""));
+            let known = ["touch", "probe", "finger", "pose"].into_iter().find(|word| words.contains(word));
+            assert_eq!(known, None, "{}:{}: {line}", file.display(), number + 1);
+        }
     }
 }
 

@@ -15,7 +15,7 @@
 //! | [`output`], [`progress`] | files that appear whole or not at all; progress of long calls | |
 //! | [`wording`] | numbers as people read them | [`wording::decimal`] |
 //!
-//! The crate `palpate` builds on this one and adds meshes, probes and touches. The crates [`onboard`] and [`shared`] run on
+//! The crate `palpate` builds on this one. The crates [`onboard`] and [`shared`] run on
 //! the chip.
 
 pub mod compile;

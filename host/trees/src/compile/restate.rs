@@ -10,9 +10,9 @@ use palpate_shared::format::Tag;
 pub struct Restated {
     /// The threshold in the header: error rate / (1 − error rate) in Q56.
     pub odds: Option<u64>,
-    /// The limit of touches.
+    /// Steps after which recognizers give up.
     pub max_touches: Option<u32>,
-    /// The evidence for each object before any touch, in units.
+    /// The evidence for each object before the first step, in units.
     pub priors: Option<Vec<i32>>,
     /// Sections to write instead of those with their tags: whether they have to be understood, and their content. `None`
     /// removes a section.

@@ -9,7 +9,7 @@ use crate::error::{CompileProblem, Error, Result};
 use crate::rows::whole;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{
-    CHECKSUM_LENGTH, HeaderBuilder, Layout, Outputs, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, f32_key,
+    CHECKSUM_LENGTH, HeaderBuilder, Layout, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, f32_key,
 };
 
 /// The model's bytes; `hash` is that of the ensemble as it was read.
@@ -27,7 +27,7 @@ pub(super) fn write(
     let header = HeaderBuilder::default()
         .with_layout(layout.code())
         .with_leaf(settings.leaf.code())
-        .with_descriptor(forest.descriptor.map_or(RAW_FEATURES, palpate_shared::Descriptor::code))
+        .with_descriptor(forest.schema.map_or(RAW_FEATURES, |schema| schema.code))
         .with_key(forest.key.code())
         .with_last_object(byte(forest.objects() - 1)?)
         .with_last_feature(byte(forest.features - 1)?)
@@ -60,28 +60,10 @@ pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest
 
 /// Sections that are the same in all layouts.
 fn sections(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<Vec<OwnedSection>> {
-    let mut sections = Vec::new();
+    let mut sections = settings.stated.sections.clone();
     let mut put = |tag, must_understand, content| sections.push(OwnedSection::new(tag, must_understand, content));
     let origin = &ensemble.origin;
-    let stated = &settings.stated;
-    // Rows of features are no touches of any probe.
-    if forest.descriptor.is_some() {
-        if let Some(probe) = stated.probe {
-            put(Tag::Probe, false, probe.to_bytes()[..probe.length()].to_vec());
-        }
-        if let Some(trained) = origin.trained {
-            // Whoever does not know it would take as evidence what is none.
-            put(Tag::Touches, true, trained.touches.to_bytes().to_vec());
-        }
-        if let Some(noise) = stated.noise {
-            put(Tag::Noise, false, noise.to_bytes().to_vec());
-        }
-        if let Some(shares) = origin.trained.and_then(|trained| trained.pattern_shares()) {
-            put(Tag::PatternShares, false, shares.to_bytes().to_vec());
-        }
-        if let Some(content) = &stated.capture {
-            put(Tag::Capture, false, content.clone());
-        }
+    if forest.schema.is_some() {
         if origin.background {
             // Whoever does not know it would name the background.
             put(Tag::Strangers, true, Strangers::header(true, false).to_vec());
@@ -96,13 +78,8 @@ fn sections(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Re
         }
         put(Tag::FeatureNames, false, features);
     }
-    if let Some(outputs) = &stated.outputs {
-        let mut content = Vec::new();
-        Outputs::write(outputs.iter().copied(), &mut |part| content.extend_from_slice(part));
-        put(Tag::Outputs, true, content);
-    }
     let imported = origin.imported.as_ref();
-    if let Some(imported) = imported.filter(|_| forest.descriptor.is_none()) {
+    if let Some(imported) = imported.filter(|_| forest.schema.is_none()) {
         let prediction = imported.prediction;
         if prediction != Prediction::default() {
             let mut content = Vec::new();
@@ -125,7 +102,7 @@ fn sections(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Re
 
 /// The features that stand for a missing value in a model over rows.
 pub(super) fn sentinel(ensemble: &Ensemble, settings: &Settings) -> Option<Sentinel> {
-    let imported = ensemble.origin.imported.as_ref().filter(|_| ensemble.descriptor().is_none())?;
+    let imported = ensemble.origin.imported.as_ref().filter(|_| ensemble.schema().is_none())?;
     let [low, high] = imported.sentinel?;
     // The same for every feature, which was checked.
     let [low, high] = match settings.scales.as_ref().and_then(|scales| scales.first().copied()) {
@@ -186,7 +163,7 @@ fn unit_bits(unit: f32) -> (u32, u8) {
 pub(super) fn hash(ensemble: &Ensemble) -> u64 {
     const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
     let mut digest = CRC.digest();
-    digest.update(&[ensemble.descriptor().map_or(RAW_FEATURES, palpate_shared::Descriptor::code)]);
+    digest.update(&[ensemble.schema().map_or(RAW_FEATURES, |schema| schema.code)]);
     for name in &ensemble.objects {
         digest.update(name.as_bytes());
         digest.update(&[0]);

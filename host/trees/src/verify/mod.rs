@@ -151,8 +151,8 @@ pub fn verify(
     library: Library<'_>,
     progress: &dyn Progress,
 ) -> Result<Verified> {
-    if model.descriptor().is_some() || ensemble.descriptor().is_some() {
-        return Err(RowsProblem::Touches.into());
+    if model.descriptor().is_some() || ensemble.schema().is_some() {
+        return Err(RowsProblem::MakesFeatures.into());
     }
     let trees = usize::try_from(model.header().trees()).unwrap_or(usize::MAX);
     let own = [model.feature_count(), model.object_count(), trees];
