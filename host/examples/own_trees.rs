@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Any trainer of boosted trees will do, as long as its trees split on the features of a descriptor: here curvature
-//! (κ = t1 − 2·t2 + t3, and the slope |t3 − t1|, both in microseconds). XGBoost's JSON is read by `Ensemble::load`.
+//! (κ = t1 − 2·t2 + t3, and the slope |t3 − t1|, both in microseconds). XGBoost's JSON is read by `ensemble::load`.
 
 use palpate::compile::{self, compile};
 use palpate::ensemble::{Ensemble, Node, Origin, Output, OverTouches, Tree, feature_row, inputs};

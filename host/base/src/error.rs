@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// The result of everything fallible on the host's side.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Where something is wrong.
+/// Place of a fault.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Place {
@@ -114,7 +114,7 @@ pub enum Error {
     /// Something is wrong with what was given.
     #[error("{place}{problem}. {}", problem.fix())]
     At {
-        /// Where.
+        /// Its place.
         place: Place,
         /// The problem.
         problem: Box<dyn Problem>,

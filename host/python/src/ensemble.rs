@@ -194,7 +194,7 @@ impl Ensemble {
 
     fn __repr__(&self) -> String {
         let kind = match &self.ensemble.inputs {
-            Inputs::Made(schema) => schema.name.to_owned(),
+            Inputs::Computed(schema) => schema.name.to_owned(),
             Inputs::Rows(names) => format!("{} features", names.len()),
         };
         format!("Ensemble({} trees, {kind}, {} objects)", self.ensemble.trees.len(), self.ensemble.objects.len())

@@ -14,7 +14,8 @@ mod trained;
 pub use origin::{StatedProbe, TouchOrigin, compiled_trained_on};
 pub(crate) use origin::{object_of, stroke_of};
 pub use palpate_trees::ensemble::*;
-pub use schema::{OverTouches, SCHEMAS, feature_row, inputs, schema};
+pub(crate) use schema::SCHEMAS;
+pub use schema::{OverTouches, feature_row, inputs, schema};
 pub use trained::Trained;
 
 use crate::error::Result;
@@ -30,7 +31,7 @@ pub fn load(path: impl AsRef<Path>) -> Result<Ensemble> {
     load_with(path, &Options::default())
 }
 
-/// As [`load`], with what the file does not say.
+/// Reads an ensemble as [`load`] does, with facts that the file does not state.
 ///
 /// # Errors
 /// As [`Ensemble::load_with`], and as [`load`].
@@ -39,7 +40,7 @@ pub fn load_with(path: impl AsRef<Path>, options: &Options<'_>) -> Result<Ensemb
     checked(path, Ensemble::load_with(path, &Options { schemas: SCHEMAS, ..*options })?)
 }
 
-/// As [`load_with`], from a file's bytes; `path` is for errors only.
+/// Reads an ensemble from a file's bytes as [`load_with`] does; `path` is for errors only.
 ///
 /// # Errors
 /// As [`load_with`], except for reading the file.

@@ -1,4 +1,4 @@
-//! Where the touches that an ensemble was trained on came from.
+//! Origin of the touches that an ensemble was trained on.
 
 use super::{Origin, Trained};
 use crate::error::{EnsembleProblem, ProbeProblem, Result};
@@ -97,7 +97,7 @@ impl TouchOrigin {
         }
     }
 
-    /// The same as [`state`](Self::state), of an ensemble that states nothing else.
+    /// Origin of an ensemble that states this and nothing else.
     pub fn origin(&self) -> Origin {
         let mut origin = Origin::default();
         self.state(&mut origin);

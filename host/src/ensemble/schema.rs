@@ -5,7 +5,7 @@ use palpate_shared::format::TrainedTouches;
 use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
 
 /// Schemas of all descriptors, by which [`load`](super::load) knows features of touches.
-pub const SCHEMAS: &[Schema] = &[
+pub(crate) const SCHEMAS: &[Schema] = &[
     schema(Descriptor::Times),
     schema(Descriptor::Curvature),
     schema(Descriptor::Gravity),
@@ -35,7 +35,7 @@ pub const fn schema(descriptor: Descriptor) -> Schema {
 
 /// Inputs of an ensemble over a descriptor's features.
 pub const fn inputs(descriptor: Descriptor) -> Inputs {
-    Inputs::Made(schema(descriptor))
+    Inputs::Computed(schema(descriptor))
 }
 
 /// No contact, or one at 0 with any others.

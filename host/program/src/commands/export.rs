@@ -202,8 +202,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let (layout, forms) = arguments.code()?;
     let usual = match ensemble.inputs {
         // Where leaves were rounded to one byte, two hold nothing more.
-        Inputs::Made(_) if train::is_rounded(&ensemble, 8) => Settings { leaf: Leaf::I8, ..Settings::default() },
-        Inputs::Made(_) => compile::for_touches(ensemble.objects.len()),
+        Inputs::Computed(_) if train::is_rounded(&ensemble, 8) => Settings { leaf: Leaf::I8, ..Settings::default() },
+        Inputs::Computed(_) => compile::for_touches(ensemble.objects.len()),
         Inputs::Rows(_) => Settings::default(),
     };
     let settings = Settings {
@@ -240,7 +240,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         candidates: compiled.candidates,
         features: match &ensemble.inputs {
             Inputs::Rows(names) => Some(names.clone()),
-            Inputs::Made(_) => None,
+            Inputs::Computed(_) => None,
         },
         classes: ensemble.objects.clone(),
         predicts: Predicts::of(&ensemble),

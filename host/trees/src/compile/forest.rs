@@ -242,7 +242,7 @@ impl<'a> Thresholds<'a> {
     fn new(inputs: &Inputs, scales: Option<&'a [f32]>) -> Result<Self> {
         let features = inputs.count();
         match (inputs, scales) {
-            (Inputs::Made(_), None) => Ok(Self::Whole),
+            (Inputs::Computed(_), None) => Ok(Self::Whole),
             (Inputs::Rows(_), None) => Ok(Self::Real),
             (Inputs::Rows(_), Some(scales))
                 if scales.len() == features && scales.iter().all(|scale| scale.is_finite() && *scale > 0.0) =>
@@ -252,7 +252,7 @@ impl<'a> Thresholds<'a> {
             (_, Some(scales)) => {
                 let text = scales.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
                 let allowed = match inputs {
-                    Inputs::Made(schema) => format!("none: features of {} are whole numbers", schema.of),
+                    Inputs::Computed(schema) => format!("none: features of {} are whole numbers", schema.of),
                     Inputs::Rows(_) => format!("{features} positive numbers, one for each feature"),
                 };
                 Err(Error::setting("scales", text, allowed))

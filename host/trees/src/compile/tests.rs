@@ -1,5 +1,5 @@
 use super::*;
-use crate::ensemble::{Inputs, Node, Origin, Output, Tree, made};
+use crate::ensemble::{Inputs, Node, Origin, Output, Tree, computed};
 use crate::error::{Setting, TreeProblem};
 use palpate_onboard::ModelError;
 use palpate_shared::{Descriptor, MISSING_FEATURE};
@@ -15,7 +15,7 @@ fn leaf(values: &[f32]) -> Node {
 /// An ensemble of two objects over these trees, whose leaves have a value for each.
 fn ensemble(descriptor: Descriptor, trees: Vec<Vec<Node>>) -> Ensemble {
     Ensemble {
-        inputs: made(descriptor).into(),
+        inputs: computed(descriptor).into(),
         objects: vec!["bowl".into(), "fork".into()],
         base_margins: vec![0.0; 2],
         trees: trees.into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
@@ -240,7 +240,7 @@ fn settings_out_of_range_are_refused_by_name() {
     assert_eq!(setting(&Settings { max_touches: 0, ..Settings::default() }), "max_touches");
     assert_eq!(setting(&Settings { priors: Some(vec![1.0]), ..Settings::default() }), "priors");
     assert_eq!(setting(&Settings { priors: Some(vec![1.0, 0.0]), ..Settings::default() }), "priors");
-    // Features that a model makes are whole numbers already, and a row has a scale for each feature.
+    // Features that a model computes are whole numbers already, and a row has a scale for each feature.
     assert_eq!(setting(&Settings { scales: Some(vec![1.0, 1.0]), ..Settings::default() }), "scales");
 }
 

@@ -13,13 +13,13 @@ pub const MAX_FEATURES: usize = 256;
 impl Ensemble {
     /// Checks an ensemble that was put together by hand: 2 to 256 objects (over rows of 1 to 256 features also one) with
     /// names that a file can hold, a base margin for each, at least one tree; in each tree a root, children and features in range, no node reached twice, finite
-    /// leaves, thresholds that are numbers (finite ones where the model makes its features), and as many values in a leaf as the tree's [`Output`] says.
+    /// leaves, thresholds that are numbers (finite ones where the model computes its features), and as many values in a leaf as the tree's [`Output`] says.
     ///
     /// # Errors
     /// The first thing that is wrong.
     pub fn check(&self) -> Result<(), EnsembleProblem> {
         match &self.inputs {
-            Inputs::Made(_) => check_names(&self.objects)?,
+            Inputs::Computed(_) => check_names(&self.objects)?,
             Inputs::Rows(features) => {
                 if self.objects.len() != 1 {
                     check_names(&self.objects)?;
@@ -143,14 +143,14 @@ pub fn check_names(names: &[String]) -> Result<(), EnsembleProblem> {
 mod tests {
     use super::*;
     use crate::ensemble::import::Options;
-    use crate::ensemble::{Origin, made};
+    use crate::ensemble::{Origin, computed};
     use palpate_shared::Descriptor;
 
     fn ensemble() -> Ensemble {
         let split = Node::Split { feature: 0, threshold: 5.0, missing_left: true, left: 1, right: 2 };
         let nodes = vec![split, Node::Leaf(vec![1.0, 2.0]), Node::Leaf(vec![3.0, 4.0])];
         Ensemble {
-            inputs: made(Descriptor::Curvature).into(),
+            inputs: computed(Descriptor::Curvature).into(),
             objects: vec!["bowl".into(), "fork".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],
@@ -204,7 +204,7 @@ mod tests {
         );
         assert_eq!(refused(&|e| e.objects.truncate(1)), EnsembleProblem::ObjectCount { count: 1 });
         ensemble().save(&path).unwrap();
-        let schemas = [made(Descriptor::Curvature)];
+        let schemas = [computed(Descriptor::Curvature)];
         let options = Options { schemas: &schemas, ..Options::default() };
         assert_eq!(Ensemble::load_with(&path, &options).unwrap(), ensemble());
         let unknown = Ensemble::load(&path).unwrap_err();

@@ -57,7 +57,7 @@ pub enum EnsembleProblem {
     Objective {
         /// The objective found.
         found: String,
-        /// Name of what it is over, if the model makes its features itself.
+        /// Name of what it is over, if the model computes its features.
         of: Option<&'static str>,
     },
     /// The booster has no trees.

@@ -1,6 +1,6 @@
 //! Features of an ensemble.
 
-/// Features that a model makes itself, of what it measures: whole numbers, of whose meaning trees know nothing.
+/// Features that a model computes from measurements: whole numbers. Trees know nothing of their meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Schema {
     /// Code in a model's header.
@@ -9,7 +9,7 @@ pub struct Schema {
     pub name: &'static str,
     /// Names of the features, in order.
     pub features: &'static [&'static str],
-    /// Name of what is measured, in the plural, for messages.
+    /// Name of the measurements, in the plural, for messages.
     pub of: &'static str,
     /// Whole numbers that thresholds are rounded to, for messages.
     pub whole: &'static str,
@@ -37,8 +37,8 @@ pub enum Occurring {
 /// Features of an ensemble.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Inputs {
-    /// Whole numbers that the model makes itself.
-    Made(Schema),
+    /// Whole numbers that the model computes.
+    Computed(Schema),
     /// Rows of f32 values with these names, NaN where one is missing: an ensemble that was trained elsewhere.
     Rows(Vec<String>),
 }
@@ -54,10 +54,10 @@ impl Inputs {
         format!("f{index}")
     }
 
-    /// The schema of features that the model makes itself; none of rows.
+    /// The schema of features that the model computes; none of rows.
     pub fn schema(&self) -> Option<&Schema> {
         match self {
-            Self::Made(schema) => Some(schema),
+            Self::Computed(schema) => Some(schema),
             Self::Rows(_) => None,
         }
     }
@@ -65,7 +65,7 @@ impl Inputs {
     /// Number of features.
     pub fn count(&self) -> usize {
         match self {
-            Self::Made(schema) => schema.features.len(),
+            Self::Computed(schema) => schema.features.len(),
             Self::Rows(names) => names.len(),
         }
     }
@@ -73,7 +73,7 @@ impl Inputs {
     /// The features' names, in order.
     pub fn names(&self) -> Vec<&str> {
         match self {
-            Self::Made(schema) => schema.features.to_vec(),
+            Self::Computed(schema) => schema.features.to_vec(),
             Self::Rows(names) => names.iter().map(String::as_str).collect(),
         }
     }
@@ -81,7 +81,7 @@ impl Inputs {
     /// True if features have names.
     pub fn are_named(&self) -> bool {
         match self {
-            Self::Made(_) => true,
+            Self::Computed(_) => true,
             Self::Rows(names) => Self::has_names(names),
         }
     }
@@ -94,13 +94,13 @@ impl Inputs {
 
 impl From<Schema> for Inputs {
     fn from(schema: Schema) -> Self {
-        Self::Made(schema)
+        Self::Computed(schema)
     }
 }
 
 /// Schema of a descriptor's features, without planes.
 #[cfg(test)]
-pub(crate) fn made(descriptor: palpate_shared::Descriptor) -> Schema {
+pub(crate) fn computed(descriptor: palpate_shared::Descriptor) -> Schema {
     Schema {
         code: descriptor.code(),
         name: descriptor.name(),

@@ -17,7 +17,7 @@ pub(crate) use check::check_leaf;
 pub use check::{MAX_FEATURES, MAX_OBJECTS, check_names};
 pub use error::{EnsembleProblem, NameProblem, TreeProblem};
 #[cfg(test)]
-pub(crate) use inputs::made;
+pub(crate) use inputs::computed;
 pub use inputs::{Inputs, Occurring, Schema};
 pub use nodes::Threshold;
 pub use origin::{Columns, Imported, Origin};
@@ -160,7 +160,7 @@ impl Ensemble {
         Some(stated.copied().unwrap_or(Threshold::below(f64::from(*threshold))))
     }
 
-    /// The schema of features that the model makes itself; none of rows.
+    /// The schema of features that the model computes; none of rows.
     pub fn schema(&self) -> Option<&Schema> {
         self.inputs.schema()
     }

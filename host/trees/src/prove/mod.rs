@@ -105,7 +105,7 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
     if proof.margin_error > proof.stated
         && let Some(exact) = tables::error_in_cells(&chip, subject)?
     {
-        // Features that a model makes have fewer values than rows of them.
+        // Features that a model computes have fewer values than rows of them.
         if exact > proof.stated * (1.0 + 1e-6) && ensemble.schema().is_none() {
             return Err(ProofProblem::Beyond { stated: proof.stated, found: exact }.into());
         }

@@ -14,7 +14,7 @@ pub enum Candidate<'m> {
 }
 
 impl Candidate<'_> {
-    /// True if the model is over rows of features; otherwise it makes its features itself.
+    /// True if the model is over rows of features; otherwise it computes its features.
     pub fn is_of_rows(&self) -> bool {
         match self {
             Self::Full(ensemble) => ensemble.schema().is_none(),

@@ -152,7 +152,7 @@ pub fn verify(
     progress: &dyn Progress,
 ) -> Result<Verified> {
     if model.descriptor().is_some() || ensemble.schema().is_some() {
-        return Err(RowsProblem::MakesFeatures.into());
+        return Err(RowsProblem::ComputesFeatures.into());
     }
     let trees = usize::try_from(model.header().trees()).unwrap_or(usize::MAX);
     let own = [model.feature_count(), model.object_count(), trees];

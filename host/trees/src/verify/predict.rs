@@ -46,7 +46,7 @@ pub fn predict<V: Copy + Into<f64> + Sync>(
         Candidate::Compiled(model) => (model.feature_count(), model.object_count()),
     };
     if !candidate.is_of_rows() {
-        return Err(RowsProblem::MakesFeatures.into());
+        return Err(RowsProblem::ComputesFeatures.into());
     }
     if features != wanted {
         return Err(RowsProblem::Columns { found: features, wanted, all: None }.into());

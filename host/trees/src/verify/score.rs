@@ -54,7 +54,7 @@ pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvalua
         Candidate::Compiled(model) => (model.feature_count(), crate::compile::names(model)),
     };
     if !candidate.is_of_rows() {
-        return Err(RowsProblem::MakesFeatures.into());
+        return Err(RowsProblem::ComputesFeatures.into());
     }
     if features != rows.features {
         return Err(RowsProblem::Columns { found: rows.features, wanted: features, all: None }.into());

@@ -42,7 +42,7 @@ use std::path::Path;
 impl Ensemble {
     /// Reads an ensemble over rows of features from a file of XGBoost, LightGBM, CatBoost or an ONNX file: see
     /// [`import`](self). The content determines the kind. XGBoost's JSON with the attribute `palpate_descriptor` is over
-    /// features that the model makes itself; [`Options::schemas`] has those that can be read.
+    /// features that the model computes; [`Options::schemas`] has those that can be read.
     ///
     /// # Errors
     /// If the file cannot be read, is of no such kind, or has something in it that no compiled model can do
@@ -55,7 +55,7 @@ impl Ensemble {
         Self::load_with(path, &Options::default())
     }
 
-    /// As [`load`](Self::load), with what the file does not say.
+    /// Reads an ensemble as [`load`](Self::load) does, with facts that the file does not state.
     ///
     /// # Errors
     /// As [`load`](Self::load); [`EnsembleProblem::Names`] if there are other names than outputs;

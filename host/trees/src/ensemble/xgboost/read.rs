@@ -59,7 +59,7 @@ impl Document {
                 if classes != own.len() {
                     return Err(EnsembleProblem::Classes { classes, objects: own.len() });
                 }
-                (Inputs::Made(schema), named(names, own)?)
+                (Inputs::Computed(schema), named(names, own)?)
             }
             None => {
                 let own = object_names(&attributes)?.unwrap_or_else(|| default_names(objects, outputs == Kind::One));
