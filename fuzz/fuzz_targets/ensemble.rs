@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use palpate::ensemble::import;
+use palpate::ensemble::{import::Options, read};
 use peak_alloc::PeakAlloc;
 use std::path::Path;
 
@@ -18,10 +18,10 @@ const EACH: usize = 4096;
 fuzz_target!(|bytes: &[u8]| {
     let before = MEMORY.current_usage();
     MEMORY.reset_peak_usage();
-    let read = import::read(Path::new("fuzz.model"), bytes, None);
+    let found = read(Path::new("fuzz.model"), bytes, &Options::default());
     let taken = MEMORY.peak_usage() - before;
     assert!(taken <= BASE + EACH * bytes.len(), "{taken} bytes of memory for a file of {} bytes", bytes.len());
-    match read {
+    match found {
         Err(error) => assert!(error.to_string().starts_with("fuzz.model:"), "{error}"),
         Ok(ensemble) => {
             ensemble.check().expect("what was read is sound");

@@ -20,8 +20,8 @@
 
 use palpate::capture;
 use palpate::compile::{self, Compiled, Goal, Layout, Leaf};
-use palpate::ensemble::Ensemble;
 use palpate::ensemble::train::{self, train};
+use palpate::ensemble::{Ensemble, OverTouches};
 use palpate::evaluate::{Candidate, Margins, SequentialSettings};
 use palpate::mesh::builtin;
 use palpate::onboard::{Model, Recognizer, Refused, Stopping, Verdict};

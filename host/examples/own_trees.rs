@@ -5,10 +5,10 @@
 //! ```
 //!
 //! Any trainer of boosted trees will do, as long as its trees split on the features of a descriptor: here curvature
-//! (κ = t1 − 2·t2 + t3, and the slope |t3 − t1|, both in microseconds). XGBoost's JSON is read by `Ensemble::load`.
+//! (κ = t1 − 2·t2 + t3, and the slope |t3 − t1|, both in microseconds). XGBoost's JSON is read by `ensemble::load`.
 
 use palpate::compile::{self, compile};
-use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree, feature_row};
+use palpate::ensemble::{Ensemble, Node, Origin, Output, OverTouches, Tree, feature_row, inputs};
 use palpate::onboard::Model;
 use palpate::shared::{Descriptor, Touch};
 use std::error::Error;
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let split = |feature, threshold, left, right| Node::Split { feature, threshold, missing_left: true, left, right };
     let leaf = |flat: f32, round: f32| Node::Leaf(vec![flat, round]);
     let ensemble = Ensemble {
-        inputs: Descriptor::Curvature.into(),
+        inputs: inputs(Descriptor::Curvature),
         objects: vec!["flat".into(), "round".into()],
         base_margins: vec![0.0, 0.0],
         trees: vec![

@@ -1,10 +1,26 @@
 //! From an ensemble to the bytes that the chip reads: `palpate_trees::compile`, with what an ensemble states of its touches.
 
+#[cfg(test)]
+mod tests;
+
 pub use palpate_trees::compile::*;
 
-use crate::ensemble::{Ensemble, TouchOrigin};
+use crate::ensemble::{Ensemble, OverTouches, TouchOrigin};
 use crate::error::{Error, Result};
+use palpate_onboard::Model;
+use palpate_shared::format::Tag;
 use palpate_trees::compile as trees;
+
+/// Models of more objects than this are usually compiled with leaves of one byte: `docs/measurements/growth.md`
+/// has what that saves and what it costs.
+pub const MANY: usize = 50;
+
+/// The defaults for a model of touches of this number of objects: leaves of one byte for more than [`MANY`] objects,
+/// where nearly all of a model is leaves, and two bytes for fewer.
+pub fn for_touches(objects: usize) -> Settings {
+    let leaf = if objects > MANY { Leaf::I8 } else { Leaf::I16 };
+    Settings { leaf, ..Settings::default() }
+}
 
 /// Compiles an ensemble. The model states the ensemble's own probe, or the published one where the ensemble states none.
 ///
@@ -25,8 +41,13 @@ pub fn compile_within(ensemble: &Ensemble, settings: &Settings, most: usize) -> 
 
 /// The settings, with what the ensemble states of its touches.
 fn stated(ensemble: &Ensemble, settings: &Settings) -> Result<Settings> {
-    let stated = TouchOrigin::of(&ensemble.origin)?.stated(&ensemble.objects);
-    let priors = match &stated.outputs {
+    let origin = TouchOrigin::of(&ensemble.origin)?;
+    let mut stated = origin.stated(&ensemble.objects);
+    if ensemble.descriptor().is_none() {
+        // Rows of features are no touches of any probe.
+        stated.sections.retain(|section| section.tag == Tag::Outputs.code());
+    }
+    let priors = match &origin.outputs(&ensemble.objects) {
         Some(outputs) => Some(priors(outputs, settings.priors.as_deref())?),
         None => settings.priors.clone(),
     };
@@ -45,4 +66,18 @@ fn priors(outputs: &[(u8, f64)], priors: Option<&[f64]>) -> Result<Vec<f64>> {
     found.ok_or_else(|| {
         Error::setting("priors", priors.map_or(0, <[f64]>::len), format!("{objects} numbers, one for each object"))
     })
+}
+
+/// The longest time between two contacts that a model's touches can plausibly have, in seconds; for finding times in
+/// another unit.
+///
+/// A model states its probe's spacing and speed. An object of at most 10 units on its longest side has a diagonal of at
+/// most 10·√3, so that no contact comes later than (10·√3 + 2 · spacing) / speed after the first, and no feature of a
+/// full touch is larger than twice that. A model with thresholds beyond was trained on larger objects, and takes up to
+/// four times its largest threshold.
+pub fn longest_time(model: &Model<'_>) -> f64 {
+    let header = model.header();
+    let of_ten_units = (10.0 * 3.0_f64.sqrt() + 2.0 * f64::from(header.spacing())) / f64::from(header.speed());
+    let largest = thresholds(model).iter().fold(0.0_f64, |most, cut| most.max(f64::from(cut.unsigned_abs()) * 1e-6));
+    if largest > 2.0 * of_ten_units { 4.0 * largest } else { of_ten_units }
 }

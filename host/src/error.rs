@@ -3,6 +3,8 @@
 pub use crate::calibrate::{CalibrateProblem, Supplied};
 pub use crate::capture::CaptureProblem;
 pub use crate::chip::ChipProblem;
+#[cfg(feature = "train")]
+pub use crate::ensemble::train::TrainProblem;
 pub use crate::evaluate::EvaluateProblem;
 #[cfg(feature = "train")]
 pub use crate::fit::FitProblem;
@@ -12,3 +14,4 @@ pub use crate::touches::TouchesProblem;
 #[cfg(feature = "train")]
 pub use crate::tune::TuneProblem;
 pub use palpate_simulator::error::*;
+pub use palpate_trees::error::*;

@@ -1,7 +1,6 @@
 //! Models of five kinds, calibrated on sequences of rows.
 
 use palpate::compile::{self, Settings, compile};
-use palpate::ensemble::Ensemble;
 use palpate::rows::{Encoder, RowSequence, Rows, Sequences, feature_names};
 use palpate::stream;
 use palpate_onboard::Model;
@@ -45,13 +44,13 @@ pub fn streams(rows: usize) -> Vec<Stream> {
         let path = Path::new(IMPORT).join(file);
         let directory = tempfile::tempdir().expect("a directory");
         let ensemble = match replaced {
-            None => Ensemble::load(&path),
+            None => palpate::ensemble::load(&path),
             Some([old, new]) => {
                 let text = std::fs::read_to_string(&path).expect("text");
                 assert!(text.contains(old), "{file}");
                 let changed: PathBuf = directory.path().join(file);
                 std::fs::write(&changed, text.replace(old, new)).expect("a file");
-                Ensemble::load(&changed)
+                palpate::ensemble::load(&changed)
             }
         };
         let ensemble = ensemble.expect("an ensemble");

@@ -1,7 +1,7 @@
 //! A compiled model's margins are those of its ensemble: exactly with f32 leaves, within the stated error otherwise.
 
 use palpate::compile::{Compiled, Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Inputs, Node};
+use palpate::ensemble::{Ensemble, Inputs, Node, OverTouches};
 use palpate_onboard::Model;
 use palpate_shared::format::f32_key;
 use palpate_shared::{Descriptor, Touch};

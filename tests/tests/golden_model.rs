@@ -1,7 +1,7 @@
 //! Pins the model format: these bytes are what version 1 means (`shared/FORMAT.md`).
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree};
+use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree, inputs};
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::{ContactTime, Descriptor, Touch};
 
@@ -19,7 +19,7 @@ fn ensemble() -> Ensemble {
     ];
     let second = vec![split(0, 70000.0, true, 1, 2), leaf(0.125, 0.0), leaf(-0.125, 0.0625)];
     Ensemble {
-        inputs: Descriptor::Curvature.into(),
+        inputs: inputs(Descriptor::Curvature),
         objects: vec!["ab".into(), "c".into()],
         base_margins: vec![0.5, -0.5],
         trees: [first, second].into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
@@ -42,7 +42,7 @@ fn over_patterns() -> Ensemble {
     ];
     let second = vec![split(3, 70000.0, false, 1, 2), leaf(0.125, 0.0), leaf(-0.125, 0.0625)];
     let trees = [first, second].into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect();
-    Ensemble { inputs: Descriptor::ContactsCurvature.into(), trees, ..ensemble() }
+    Ensemble { inputs: inputs(Descriptor::ContactsCurvature), trees, ..ensemble() }
 }
 
 /// Compiles with the version and the ensemble's hash, which may change with a release, set to zero.

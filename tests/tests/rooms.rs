@@ -1,11 +1,23 @@
-//! Rooms, the top-level modules of a crate, depend on each other in one direction.
+//! Crates depend on each other in one direction, and so do rooms, the top-level modules of a crate. Trees know no touch.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
 /// Sources of the crates whose rooms have an order, relative to the root of the project.
-const CRATES: [&str; 5] = ["shared/src", "onboard/src", "host/trees/src", "host/simulator/src", "host/src"];
+const CRATES: [&str; 6] =
+    ["shared/src", "onboard/src", "host/base/src", "host/trees/src", "host/simulator/src", "host/src"];
+/// Crates in their order, by folder, and those of the same project that each is built on.
+const BUILT_ON: [(&str, &[&str]); 8] = [
+    ("shared", &[]),
+    ("onboard", &["shared"]),
+    ("host/base", &["shared"]),
+    ("host/trees", &["base", "onboard", "shared"]),
+    ("host/simulator", &["base", "shared"]),
+    ("host", &["base", "onboard", "shared", "simulator", "trees"]),
+    ("host/report", &["palpate", "onboard", "shared"]),
+    ("host/program", &["palpate", "onboard", "report", "shared"]),
+];
 /// Modules that gather names of all rooms, and modules of tests.
 const OUTSIDE: [&str; 3] = ["error", "lib", "tests"];
 
@@ -87,11 +99,37 @@ fn circle(mut uses: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTre
 }
 
 #[test]
+fn crates_are_built_on_those_below_them_alone() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    for (folder, expected) in BUILT_ON {
+        let manifest = read_to_string(root.join(folder).join("Cargo.toml")).unwrap();
+        let lines = manifest.lines().skip_while(|line| *line != "[dependencies]").skip(1);
+        let keys = lines.take_while(|line| !line.starts_with('[')).filter_map(|line| line.split(['.', ' ']).next());
+        let own = keys.filter(|key| key.starts_with("palpate")).map(|key| key.trim_start_matches("palpate-"));
+        assert_eq!(own.collect::<Vec<_>>(), expected, "{folder}");
+    }
+}
+
+#[test]
+fn trees_know_no_touch() {
+    // The format's limit of steps, and ordinary words.
+    let others = ["max_touches", "compos", "dispos", "expos", "oppos", "propos", "purpos", "suppos", "transpos"];
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    for file in sources(&root.join("host/trees/src")) {
+        for (number, line) in read_to_string(&file).unwrap().lines().enumerate() {
+            let words = others.iter().fold(line.to_lowercase(), |line, other| line.replace(other, ""));
+            let known = ["touch", "probe", "finger", "pose"].into_iter().find(|word| words.contains(word));
+            assert_eq!(known, None, "{}:{}: {line}", file.display(), number + 1);
+        }
+    }
+}
+
+#[test]
 fn rooms_have_no_circle() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     for source in CRATES.map(|source| root.join(source)).iter().filter(|source| source.exists()) {
         let uses = uses(source);
-        assert!(uses.len() > 3, "{}: {uses:?}", source.display());
+        assert!(uses.len() > 2, "{}: {uses:?}", source.display());
         let circle = circle(uses);
         assert!(circle.is_empty(), "rooms of {} use each other in a circle: {circle:#?}", source.display());
     }

@@ -1,7 +1,7 @@
 //! Rows that go through a model together have the margins that each has by itself, to the bit.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Inputs, Node};
+use palpate::ensemble::{Ensemble, Inputs, Node, OverTouches};
 use palpate_onboard::{Batch, Model};
 use palpate_shared::format::{Header, checksum};
 use palpate_shared::{Descriptor, MISSING_FEATURE};

@@ -8,7 +8,7 @@ use crate::work::{Callback, long};
 use numpy::ndarray::{Ix1, Ix2};
 use palpate::ensemble::import::{self, Options, PartTree, Parts};
 use palpate::ensemble::train::{self as library, Outputs, Settings, Small};
-use palpate::ensemble::{self, Inputs, StatedProbe};
+use palpate::ensemble::{self, Inputs, OverTouches, StatedProbe};
 use palpate::error::{Error, EvaluateProblem};
 use palpate::rows::{Features, notes};
 use palpate::shared::Descriptor;
@@ -56,8 +56,8 @@ impl Ensemble {
         all_trees: bool,
         missing: Option<f32>,
     ) -> Result<Self, Failure> {
-        let options = Options { names: names.as_deref(), all_trees, missing };
-        let ensemble = py.detach(|| ensemble::Ensemble::load_with(&path, &options))?;
+        let options = Options { names: names.as_deref(), all_trees, missing, ..Options::default() };
+        let ensemble = py.detach(|| ensemble::load_with(&path, &options))?;
         Ok(Self { ensemble: Arc::new(ensemble) })
     }
 
@@ -72,8 +72,8 @@ impl Ensemble {
         missing: Option<f32>,
         notes: Vec<String>,
     ) -> Result<Self, Failure> {
-        let options = Options { names: names.as_deref(), all_trees, missing };
-        let mut ensemble = py.detach(|| import::read_with(Path::new("the model"), &content, &options))?;
+        let options = Options { names: names.as_deref(), all_trees, missing, ..Options::default() };
+        let mut ensemble = py.detach(|| ensemble::read(Path::new("the model"), &content, &options))?;
         if let Some(imported) = &mut ensemble.origin.imported {
             imported.notes.extend(notes);
         }
@@ -194,7 +194,7 @@ impl Ensemble {
 
     fn __repr__(&self) -> String {
         let kind = match &self.ensemble.inputs {
-            Inputs::Touches(descriptor) => descriptor.name().to_owned(),
+            Inputs::Computed(schema) => schema.name.to_owned(),
             Inputs::Rows(names) => format!("{} features", names.len()),
         };
         format!("Ensemble({} trees, {kind}, {} objects)", self.ensemble.trees.len(), self.ensemble.objects.len())

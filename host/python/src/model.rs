@@ -7,10 +7,10 @@ use crate::ensemble::Ensemble;
 use crate::failure::Failure;
 use numpy::ndarray::{Ix1, Ix2};
 use palpate::compile::{self as library, CompiledModel, Core, Goal, Layout, Leaf, Settings};
-use palpate::error::{CompileProblem, Error, RowsProblem, TouchesProblem};
+use palpate::error::{CompileProblem, Error, EvaluateProblem, TouchesProblem};
 use palpate::evaluate::Candidate;
 use palpate::evaluate::predict::{Predicted, predict};
-use palpate::evaluate::together::{AT_ONCE, Together};
+use palpate::evaluate::together::{AT_ONCE, Together, TouchesTogether};
 use palpate::onboard;
 use palpate::output;
 use palpate::rows::{Encoder, Features, feature_names, notes};
@@ -247,7 +247,7 @@ impl Model {
             other => other,
         };
         let margins = match (rows, own.model().descriptor()) {
-            (Rows::Data(_), None) => return Err(Error::from(palpate::error::EvaluateProblem::RawFeatures).into()),
+            (Rows::Data(_), None) => return Err(Error::from(EvaluateProblem::RawFeatures).into()),
             (Rows::Data(data), Some(_)) => {
                 let touches: Vec<Touch> = data.get().touches().copied().collect();
                 own.of_touches(py, &touches)?
@@ -278,10 +278,10 @@ impl Model {
     /// `margins`.
     #[pyo3(signature = (rows, *, raw=false))]
     fn predict<'py>(slf: &Bound<'py, Self>, rows: Rows<'py>, raw: bool) -> Result<Predictions<'py>, Failure> {
-        let Rows::Array(array) = rows else { return Err(Error::from(RowsProblem::Touches).into()) };
+        let Rows::Array(array) = rows else { return Err(Error::from(EvaluateProblem::OverTouches).into()) };
         let (py, own) = (slf.py(), slf.get());
         if own.model().descriptor().is_some() {
-            return Err(Error::from(RowsProblem::Touches).into());
+            return Err(Error::from(EvaluateProblem::OverTouches).into());
         }
         let array = features(slf, array)?;
         let predicted = match &own.encoder {

@@ -4,8 +4,8 @@ use super::cache::Cache;
 use super::settings::Settings;
 use palpate::capture::{self, Sampler};
 use palpate::compile;
-use palpate::ensemble::Ensemble;
 use palpate::ensemble::train;
+use palpate::ensemble::{self, Ensemble};
 use palpate::error::Result;
 use palpate::in_order::in_order;
 use palpate::mesh::Object;
@@ -102,7 +102,7 @@ impl<'a> Context<'a> {
         get_or_try(&self.models, || {
             let trained = |name: &str, settings: &train::Settings| -> Result<Ensemble> {
                 let path = self.cache.path(&format!("fold0-{name}"), "ensemble");
-                if let Ok(kept) = Ensemble::load(&path) {
+                if let Ok(kept) = ensemble::load(&path) {
                     return Ok(kept);
                 }
                 let ensemble = self.train(&self.first()?.train, settings)?;

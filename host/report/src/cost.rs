@@ -9,8 +9,8 @@ use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::compile::{self, Leaf};
-use palpate::ensemble::Ensemble;
 use palpate::ensemble::train;
+use palpate::ensemble::{Ensemble, OverTouches};
 use palpate::error::{CompileProblem, Error, Result};
 use palpate::evaluate::{Candidate, Margins, parity};
 use palpate::wording::count;
@@ -344,7 +344,7 @@ mod tests {
         }
         nodes.push(Node::Leaf(vec![0.0, leaf]));
         Ensemble {
-            inputs: palpate_shared::Descriptor::Curvature.into(),
+            inputs: palpate::ensemble::inputs(palpate_shared::Descriptor::Curvature),
             objects: vec!["a".into(), "b".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],

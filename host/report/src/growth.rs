@@ -118,7 +118,7 @@ fn objects_cost(context: &Context, touched: &[Touched]) -> Result<Objects> {
     let began = Instant::now();
     let ensemble = context.train(&train, &context.ours())?;
     let seconds = began.elapsed().as_secs_f64();
-    let usual = compile::Settings { max_touches: MAX_TOUCHES, ..compile::Settings::for_touches(touched.len()) };
+    let usual = compile::Settings { max_touches: MAX_TOUCHES, ..compile::for_touches(touched.len()) };
     let compiled = compile::compile(&ensemble, &usual)?;
     let two_bytes = match usual.leaf {
         Leaf::I16 => compiled.bytes.len(),

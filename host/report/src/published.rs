@@ -253,7 +253,7 @@ mod tests {
     #[test]
     fn a_method_of_500_trees_is_not_called_one_of_1000() {
         let of = |trees: usize| Ensemble {
-            inputs: Descriptor::Times.into(),
+            inputs: palpate::ensemble::inputs(Descriptor::Times),
             objects: (0..10).map(|k| k.to_string()).collect(),
             base_margins: vec![0.0; 10],
             trees: vec![Tree { nodes: vec![Node::Leaf(vec![0.5; 10])], output: Output::Each }; trees],

@@ -1,7 +1,7 @@
 //! The smallest model, for tests of pages.
 
 use palpate::compile::{self, CompiledModel, compile};
-use palpate::ensemble::{self, Ensemble, Node, Output, Tree};
+use palpate::ensemble::{self, Ensemble, Node, Output, Tree, inputs};
 use palpate_shared::Descriptor;
 
 /// One split between two objects of these names.
@@ -12,7 +12,7 @@ pub(crate) fn model(names: [&str; 2]) -> CompiledModel {
         Node::Leaf(vec![-0.5, 0.5]),
     ];
     let ensemble = Ensemble {
-        inputs: Descriptor::Curvature.into(),
+        inputs: inputs(Descriptor::Curvature),
         objects: names.map(String::from).into(),
         base_margins: vec![0.0; 2],
         trees: vec![Tree { nodes, output: Output::Each }],

@@ -2,7 +2,7 @@
 
 use super::demand::Demand;
 use crate::error::Result;
-use crate::evaluate::together::{AT_ONCE, Together};
+use crate::evaluate::together::{AT_ONCE, Together, TouchesTogether};
 use palpate_onboard::{Model, Refused};
 use palpate_shared::Touch;
 use palpate_shared::format::TrainedTouches;

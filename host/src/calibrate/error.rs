@@ -4,6 +4,7 @@ use super::choose::Terms;
 use super::recorded::{GROWN, GROWTH, LIKELY};
 use super::walk::{Tally, allowed, binomial_tail};
 use crate::error::Problem;
+use palpate_base::wording::two_digits;
 
 /// Problems with calibrating.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -363,12 +364,6 @@ fn in_touches(supplied: Option<Supplied>, found: u64, needed: u64) -> String {
         two_digits(enough),
         percent((supported * 1e3).ceil() / 1e3)
     )
-}
-
-/// An estimate, rounded up to two digits.
-pub(crate) fn two_digits(number: f64) -> u64 {
-    let digit = 10.0_f64.powf((number.max(1.0).log10().floor() - 1.0).max(0.0));
-    ((number / digit).ceil() * digit) as u64
 }
 
 fn not_supported(object: &Option<String>, rate: f64, tally: Tally, needed: u64, forecast: &Forecast) -> String {

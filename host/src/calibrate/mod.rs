@@ -55,7 +55,6 @@ pub(crate) use begin::Begin;
 pub(crate) use choose::share_tested;
 pub use choose::{Chosen, Terms, Way, choose, choose_independent};
 pub use draw::{Moment, Supply, Until, follow, follow_plan};
-pub(crate) use error::two_digits;
 pub use error::{CalibrateProblem, Enough, Forecast, Remedy, Supplied};
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
 pub use groups::{Grouped, choose_groups};

@@ -15,7 +15,7 @@
 
 use super::choose::{By, Terms, steps, summary, tallies};
 use super::draw::{Moment, Supply, Until, follow, follow_plan};
-use super::error::{Enough, Forecast, two_digits};
+use super::error::{Enough, Forecast};
 use super::model::{
     Calibrated, OfRecorded, STRICTEST, Settings, add_noise, check, finished, named, noise_seed, outputs,
     refuse_names_of_placements, refuse_unstated, shares,
@@ -29,6 +29,7 @@ use crate::evaluate::{Candidate, OfTouches};
 use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, Source};
+use palpate_base::wording::two_digits;
 use palpate_onboard::{Model, Stopping};
 
 /// The probability with which a forecast number of approaches is enough, if the simulation is right.

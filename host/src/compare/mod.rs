@@ -17,7 +17,7 @@ pub use cost::{Confused, Cost};
 pub use features::FeatureComparison;
 pub use promise::Promised;
 
-use crate::ensemble::{feature_row, train};
+use crate::ensemble::{OverTouches, feature_row, train};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::evaluate::{Estimate, Finding};
 use crate::in_order::in_order;

@@ -1,6 +1,6 @@
 use super::*;
 use crate::ensemble::train::{Settings, train};
-use crate::ensemble::{Inputs, Node, Output};
+use crate::ensemble::{Inputs, Node, Output, OverTouches};
 use crate::tests::synthetic;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
@@ -20,7 +20,7 @@ fn document(multi_output: bool) -> Value {
 fn load(text: &[u8]) -> Result<Ensemble> {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), text).unwrap();
-    Ensemble::load(file.path()).map_err(|error| {
+    super::load(file.path()).map_err(|error| {
         assert!(error.to_string().contains(&file.path().display().to_string()), "{error} names no file");
         assert_eq!(error.exit_code(), 1);
         error
@@ -42,7 +42,7 @@ fn what_is_saved_loads_again_bit_for_bit() {
         for base_margins in [vec![0.5; 3], vec![0.1, -2.5e-8, 3.0]] {
             saved.base_margins = base_margins;
             saved.save(file.path()).unwrap();
-            assert_eq!(Ensemble::load(file.path()).unwrap(), saved);
+            assert_eq!(super::load(file.path()).unwrap(), saved);
         }
     }
 }
@@ -63,7 +63,7 @@ fn leaves_in_the_layout_of_xgboost_2_are_read_too() {
 #[test]
 fn a_model_that_xgboost_wrote_is_read() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/trees/src/ensemble/xgboost/xgboost-3.2.json");
-    let ensemble = Ensemble::load(file).unwrap();
+    let ensemble = super::load(file).unwrap();
     assert_eq!(ensemble.objects, ["bowl", "fork", "mouse"]);
     assert_eq!(ensemble.descriptor(), Some(Descriptor::Curvature));
     // `booster.predict(..., output_margin=True)` of XGBoost 3.2.0 on the same rows.
@@ -159,7 +159,7 @@ fn what_is_no_json_is_refused_with_its_line() {
         let complaint = load(text).unwrap_err().to_string();
         assert!(complaint.contains(expected), "{complaint}");
     }
-    let missing = Ensemble::load("no/such.json").unwrap_err().to_string();
+    let missing = super::load("no/such.json").unwrap_err().to_string();
     assert!(missing.contains("no/such.json: cannot read the ensemble"), "{missing}");
 }
 
@@ -203,12 +203,13 @@ fn an_ensemble_without_a_descriptor_is_over_rows_and_names_may_be_given() {
     rows["learner"]["feature_names"] = json!(["width", "height"]);
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), rows.to_string()).unwrap();
-    let read = Ensemble::load(file.path()).unwrap();
+    let read = super::load(file.path()).unwrap();
     assert_eq!(read.inputs, Inputs::Rows(vec!["width".into(), "height".into()]));
     assert_eq!((&read.trees, &read.objects[..]), (&ensemble(true).trees, &["0", "1", "2"].map(String::from)[..]));
     let names = ["a", "b", "c"].map(String::from);
-    assert_eq!(Ensemble::load_named(file.path(), Some(&names)).unwrap().objects, names);
-    let error = Ensemble::load_named(file.path(), Some(&names[..2])).unwrap_err().to_string();
+    assert_eq!(load_with(file.path(), &Options { names: Some(&names), ..Options::default() }).unwrap().objects, names);
+    let error =
+        load_with(file.path(), &Options { names: Some(&names[..2]), ..Options::default() }).unwrap_err().to_string();
     assert!(error.contains("2 names were given for 3 outputs"), "{error}");
 }
 
@@ -226,7 +227,7 @@ fn finite_values_take_the_same_way_at_infinite_thresholds() {
         }
         let file = tempfile::NamedTempFile::new().unwrap();
         infinite.save(file.path()).unwrap();
-        let read = Ensemble::load(file.path()).unwrap();
+        let read = super::load(file.path()).unwrap();
         for first in [f32::MIN, -3e5, 0.0, 1e5, f32::MAX, f32::NAN] {
             for row in [[first, 0.0], [first, f32::NAN], [9e4, first]] {
                 assert_eq!(read.margins_of_features(&row), infinite.margins_of_features(&row), "{bound} {row:?}");
@@ -241,7 +242,7 @@ fn trees_of_one_object_and_of_all_are_written_as_trees_of_all() {
     mixed.trees.extend(of_all.trees);
     let file = tempfile::NamedTempFile::new().unwrap();
     mixed.save(file.path()).unwrap();
-    let read = Ensemble::load(file.path()).unwrap();
+    let read = super::load(file.path()).unwrap();
     assert!(read.trees.iter().all(|tree| tree.output == Output::Each));
     for row in [[-3e5, 0.0], [f32::NAN, 2e4], [1e5, f32::NAN], [7.0, 9e4]] {
         assert_eq!(read.margins_of_features(&row), mixed.margins_of_features(&row));

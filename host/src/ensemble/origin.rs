@@ -1,4 +1,4 @@
-//! Where the touches that an ensemble was trained on came from.
+//! Origin of the touches that an ensemble was trained on.
 
 use super::{Origin, Trained};
 use crate::error::{EnsembleProblem, ProbeProblem, Result};
@@ -7,8 +7,8 @@ use crate::probe::hand;
 use crate::probe::noise::Noise;
 use crate::probe::unit::{self, tenth};
 use crate::touches::{self, Captured, Dataset, Surroundings, short};
-use palpate_shared::format::{Length, TrainedProbe};
-use palpate_trees::compile::{self, CompiledModel};
+use palpate_shared::format::{Length, Outputs, Tag, TrainedProbe};
+use palpate_trees::compile::{self, CompiledModel, OwnedSection};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -23,6 +23,8 @@ pub struct TouchOrigin {
     pub touches: BTreeMap<String, u64>,
     /// The same of recorded touches that the ensemble was adjusted to.
     pub adjusted: BTreeMap<String, u64>,
+    /// Kind of touches, and so which ones are evidence.
+    pub trained: Option<Trained>,
     /// The capture that made them, where that is known.
     pub captured: Option<Captured>,
     /// For outputs that are placements of objects, called `object/placement`: the weight of each among those of its object.
@@ -34,6 +36,7 @@ impl TouchOrigin {
     const NOISE: &str = "palpate_noise";
     const TOUCHES: &str = "palpate_touches";
     const ADJUSTED: &str = "palpate_adjusted";
+    const TRAINED: &str = "palpate_trained";
     const CAPTURED: &str = "palpate_captured";
     const PLACEMENTS: &str = "palpate_placements";
 
@@ -62,6 +65,7 @@ impl TouchOrigin {
             noise: parsed(attributes, Self::NOISE, "a JSON object of what was added to the touches in training")?,
             touches: numbers(Self::TOUCHES)?,
             adjusted: numbers(Self::ADJUSTED)?,
+            trained: trained(origin)?,
             captured: parsed(attributes, Self::CAPTURED, "a JSON object of settings, samples and objects")?,
             placements: parsed(attributes, Self::PLACEMENTS, "a JSON object of weights")?.unwrap_or_default(),
         })
@@ -81,6 +85,7 @@ impl TouchOrigin {
             (Self::NOISE, self.noise.and_then(|noise| serde_json::to_string(&noise).ok())),
             (Self::TOUCHES, hexadecimal(&self.touches)),
             (Self::ADJUSTED, hexadecimal(&self.adjusted)),
+            (Self::TRAINED, self.trained.and_then(|trained| serde_json::to_string(&trained).ok())),
             (Self::CAPTURED, self.captured.as_ref().and_then(|captured| serde_json::to_string(captured).ok())),
             (Self::PLACEMENTS, placements.and_then(|placements| serde_json::to_string(placements).ok())),
         ];
@@ -92,9 +97,9 @@ impl TouchOrigin {
         }
     }
 
-    /// The same as [`state`](Self::state), of an ensemble that states nothing else but which touches are evidence.
-    pub fn origin(&self, trained: Option<Trained>) -> Origin {
-        let mut origin = Origin { trained, ..Origin::default() };
+    /// Origin of an ensemble that states this and nothing else.
+    pub fn origin(&self) -> Origin {
+        let mut origin = Origin::default();
         self.state(&mut origin);
         origin
     }
@@ -103,14 +108,32 @@ impl TouchOrigin {
     pub fn stated(&self, objects: &[String]) -> compile::Stated {
         // Where nothing is known, the published probe.
         let probe = self.probe.map_or_else(Probe::default, |stated| stated.probe);
-        compile::Stated {
-            spacing: probe.spacing as f32,
-            speed: probe.speed as f32,
-            probe: self.probe.map(|stated| stated.trained()),
-            noise: self.noise.map(|noise| noise.trained()),
-            capture: self.section(objects),
-            outputs: self.outputs(objects),
+        let mut sections = Vec::new();
+        let mut put = |tag, must_understand, content: &[u8]| {
+            sections.push(OwnedSection::new(tag, must_understand, content));
+        };
+        if let Some(probe) = self.probe.map(|stated| stated.trained()) {
+            put(Tag::Probe, false, &probe.to_bytes()[..probe.length()]);
         }
+        if let Some(trained) = &self.trained {
+            // Whoever does not know it would take as evidence what is none.
+            put(Tag::Touches, true, &trained.touches.to_bytes());
+        }
+        if let Some(noise) = self.noise {
+            put(Tag::Noise, false, &noise.trained().to_bytes());
+        }
+        if let Some(shares) = self.trained.and_then(|trained| trained.pattern_shares()) {
+            put(Tag::PatternShares, false, &shares.to_bytes());
+        }
+        if let Some(capture) = self.section(objects) {
+            put(Tag::Capture, false, &capture);
+        }
+        if let Some(outputs) = self.outputs(objects) {
+            let mut content = Vec::new();
+            Outputs::write(outputs.into_iter(), &mut |part| content.extend_from_slice(part));
+            put(Tag::Outputs, true, &content);
+        }
+        compile::Stated { spacing: probe.spacing as f32, speed: probe.speed as f32, sections }
     }
 
     /// For each of an ensemble's outputs the number of its object, and its share of it; none if each is an object.
@@ -391,6 +414,12 @@ pub fn compiled_trained_on<'d>(compiled: &CompiledModel, dataset: &'d Dataset) -
         object.is_some() && (is_captured || begins == object || (begins.is_some() && begins == adjusted))
     };
     dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
+}
+
+/// The touches that an ensemble states to be trained on.
+pub(super) fn trained(origin: &Origin) -> Result<Option<Trained>, EnsembleProblem> {
+    let expected = "a JSON object of counted, patterns, needs_pose and largest_spread";
+    parsed(&origin.attributes, TouchOrigin::TRAINED, expected)
 }
 
 /// An attribute, read as JSON.

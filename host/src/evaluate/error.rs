@@ -1,8 +1,8 @@
 //! Problems with evaluating.
 
-use crate::calibrate::two_digits;
 use crate::ensemble::object_of;
 use crate::error::Problem;
+use palpate_base::wording::two_digits;
 use palpate_shared::Descriptor;
 
 /// Problems with evaluating.
@@ -81,6 +81,9 @@ pub enum EvaluateProblem {
     /// The model works on other rows than touches.
     #[error("the model works on rows of features, not on touches")]
     RawFeatures,
+    /// The model works on touches instead of other rows.
+    #[error("the model is over touches, not over rows of features")]
+    OverTouches,
     /// The descriptor needs the probe's pose.
     #[error("the descriptor {} needs the probe's pose, which no touch has", descriptor.name())]
     NoPose {
@@ -238,6 +241,7 @@ impl Problem for EvaluateProblem {
             Self::RecordedUnknown { .. } => {
                 "Fit the probe to the recordings (`palpate probe fit`) and check the meshes, or calibrate on simulated touches alone."
             }
+            Self::OverTouches => "Use `palpate verify` and `palpate evaluate` for models of touches.",
             Self::RawFeatures => {
                 "Give it rows of features: `palpate help recognize` and `palpate help evaluate` say how."
             }

@@ -2,13 +2,13 @@
 
 use super::Candidate;
 use super::together::margins_of_touches;
-use crate::ensemble::{StatedProbe, TouchOrigin, feature_row, object_of, stroke_of};
+use crate::ensemble::{OverTouches, StatedProbe, TouchOrigin, feature_row, object_of, stroke_of};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::probe::hand;
 use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping};
-use palpate_shared::format::TrainedProbe;
+use palpate_shared::format::{TrainedProbe, TrainedTouches};
 use palpate_shared::{Descriptor, Touch};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -74,6 +74,10 @@ pub(super) enum Values<'m> {
 
 /// A [`Candidate`] and touches.
 pub(crate) trait OfTouches {
+    /// The descriptor, if the model is over touches.
+    fn descriptor(&self) -> Option<Descriptor>;
+    /// The touches that are evidence to the model.
+    fn trained_touches(&self) -> TrainedTouches;
     /// The probe that the model states, if it states one.
     fn probe(&self) -> Result<Option<TrainedProbe>>;
     /// The descriptor, if the data set's touches can be evidence; see [`Margins::new`].
@@ -113,6 +117,20 @@ pub(crate) fn objects_of(outputs: &[String], has_placements: bool) -> Vec<String
 }
 
 impl OfTouches for Candidate<'_> {
+    fn descriptor(&self) -> Option<Descriptor> {
+        match self {
+            Self::Full(ensemble) => ensemble.descriptor(),
+            Self::Compiled(model) => model.descriptor(),
+        }
+    }
+
+    fn trained_touches(&self) -> TrainedTouches {
+        match self {
+            Self::Full(ensemble) => ensemble.trained_touches(),
+            Self::Compiled(model) => model.trained_touches(),
+        }
+    }
+
     fn probe(&self) -> Result<Option<TrainedProbe>> {
         Ok(match self {
             Self::Full(ensemble) => TouchOrigin::of(&ensemble.origin)?.probe.as_ref().map(StatedProbe::trained),

@@ -51,6 +51,7 @@ mod strangers;
 mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
+pub mod together;
 
 pub use approaches::{ApproachSequential, Approaches};
 #[cfg(feature = "train")]
@@ -64,7 +65,7 @@ pub(crate) use margins::{OfTouches, leading, objects_of};
 pub use measure::{Confusion, Evaluated, Expecting, Wanted, measure, own_weights};
 pub use noisy::{ROBOTS, add_noise};
 pub use palpate_trees::verify::{
-    self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict, together,
+    self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict,
 };
 pub use plan::{Active, ActiveFacts, ByPose, Hardest, LEAST_IN_POSE, Planned, Stock, evaluate_active, plan};
 pub use promise::{AlarmCheck, Finding, PromiseCheck, by_theory};

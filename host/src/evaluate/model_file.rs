@@ -1,7 +1,7 @@
 //! A model on disk: compiled, or still an ensemble.
 
 use crate::compile::CompiledModel;
-use crate::ensemble::{self, Ensemble, TouchOrigin, compiled_trained_on, import};
+use crate::ensemble::{self, Ensemble, TouchOrigin, compiled_trained_on, import::Options};
 use crate::error::{Error, Result};
 use crate::evaluate::Candidate;
 use crate::touches::Dataset;
@@ -11,7 +11,7 @@ use std::path::Path;
 /// A model read from a file, of either kind.
 #[derive(Clone, Debug)]
 pub enum ModelFile {
-    /// The full model, from a file of any kind that [`Ensemble::load`] reads.
+    /// The full model, from a file of any kind that [`ensemble::load`] reads.
     Full(Box<Ensemble>),
     /// The bytes that the chip reads, checked.
     Compiled(CompiledModel),
@@ -21,15 +21,14 @@ impl ModelFile {
     /// Reads a model; its first bytes say whether it is a compiled one.
     ///
     /// # Errors
-    /// As [`Ensemble::load`] and [`CompiledModel::read`].
+    /// As [`ensemble::load`] and [`CompiledModel::read`].
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the model", source))?;
         if bytes.starts_with(&MAGIC) {
             return Ok(Self::Compiled(CompiledModel::from_file(path, bytes)?));
         }
-        let ensemble = ensemble::checked(path, import::read(path, &bytes, None)?)?;
-        Ok(Self::Full(Box::new(ensemble)))
+        Ok(Self::Full(Box::new(ensemble::read(path, &bytes, &Options::default())?)))
     }
 
     /// The names of its outputs, in order.

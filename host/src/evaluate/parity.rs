@@ -4,7 +4,7 @@ use super::Candidate;
 use super::full::FullRecognizer;
 use super::margins::{OfTouches, best, row};
 use super::together::margins_of_touches;
-use crate::ensemble::Ensemble;
+use crate::ensemble::{Ensemble, OverTouches};
 use crate::error::{EvaluateProblem, Result};
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};

@@ -1,7 +1,7 @@
 use super::*;
 use crate::compile::{self, Leaf, compile};
-use crate::ensemble::Ensemble;
 use crate::ensemble::train;
+use crate::ensemble::{Ensemble, OverTouches};
 use crate::error::Setting;
 use crate::tests::synthetic;
 use crate::touches::Dataset;

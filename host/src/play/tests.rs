@@ -1,7 +1,7 @@
 use super::*;
 use crate::capture;
 use crate::compile::{self, compile};
-use crate::ensemble::{self, Ensemble, Node, Output, Tree};
+use crate::ensemble::{self, Ensemble, Node, Output, Tree, inputs};
 
 use palpate_shared::Descriptor;
 
@@ -13,7 +13,7 @@ fn model() -> Vec<u8> {
         Node::Leaf(vec![-0.75, 0.75]),
     ];
     let ensemble = Ensemble {
-        inputs: Descriptor::Curvature.into(),
+        inputs: inputs(Descriptor::Curvature),
         objects: vec!["disc".into(), "globe".into()],
         base_margins: vec![0.0; 2],
         trees: vec![Tree { nodes, output: Output::Each }],

@@ -18,13 +18,14 @@
 //! without the test too.
 
 use super::{Calibrated, Settings, calibrate, calibrate_recorded, tested_means, without};
-use crate::calibrate::{self, Start, add_noise, begin, calibrate_from, odds_of, two_digits};
+use crate::calibrate::{self, Start, add_noise, begin, calibrate_from, odds_of};
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};
 use crate::mesh::BACKGROUND;
 use crate::progress::Progress;
 use crate::touches::folds::split;
 use crate::touches::{Dataset, ObjectTouches};
+use palpate_base::wording::two_digits;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::Tag;
 

@@ -119,7 +119,7 @@ fn full_and_compiled_model_agree_on_a_background() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("ensemble.json");
     ensemble.save(&path).unwrap();
-    let loaded = crate::ensemble::Ensemble::load(&path).unwrap();
+    let loaded = crate::ensemble::load(&path).unwrap();
     assert_eq!(loaded, ensemble);
     let model = compile::open(&MODELS[1]).unwrap();
     let parity = evaluate::parity::parity(&loaded, &model, &of(0..KNOWN, 2_000, 3), 500, 1, &()).unwrap();

@@ -45,7 +45,7 @@ pub use settings::Settings;
 pub use settings::Strangers;
 pub use shape::Gain;
 
-use crate::error::{Result, RowsProblem};
+use crate::error::{EvaluateProblem, Result, RowsProblem};
 use crate::evaluate::together::units_of_rows;
 use palpate_onboard::Model;
 use palpate_trees::rows::{Encoder, Features, SequenceColumns, Sequences};
@@ -70,7 +70,7 @@ impl Rows<'_> {
     /// The margins of all rows of sequences, on all threads.
     ///
     /// # Errors
-    /// [`RowsProblem::Touches`] for a model over touches, [`RowsProblem::Regression`] for one with a single output,
+    /// [`EvaluateProblem::OverTouches`] for a model over touches, [`RowsProblem::Regression`] for one with a single output,
     /// [`RowsProblem::Columns`] for rows of another number of features.
     pub fn new(model: &Model<'_>, sequences: &Sequences) -> Result<Self> {
         check(model)?;
@@ -99,10 +99,10 @@ impl<'r> Rows<'r> {
 /// Refuses a model that has no classes of rows.
 ///
 /// # Errors
-/// [`RowsProblem::Touches`] and [`RowsProblem::Regression`].
+/// [`EvaluateProblem::OverTouches`] and [`RowsProblem::Regression`].
 pub fn check(model: &Model<'_>) -> Result<()> {
     if model.descriptor().is_some() {
-        return Err(RowsProblem::Touches.into());
+        return Err(EvaluateProblem::OverTouches.into());
     }
     if model.known_count() < 2 {
         return Err(RowsProblem::Regression { output: model.object_name(0).into() }.into());

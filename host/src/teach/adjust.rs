@@ -303,10 +303,10 @@ fn changed(
     // What cannot be read was refused before.
     if let Ok(mut stated) = TouchOrigin::of(&changed.origin) {
         stated.adjusted.extend(TouchOrigin::new(recorded, None).touches);
+        if let Some(trained) = &mut stated.trained {
+            trained.touches = with(ensemble, trained.touches, &recorded.objects);
+        }
         stated.state(&mut changed.origin);
-    }
-    if let Some(trained) = &mut changed.origin.trained {
-        trained.touches = with(ensemble, trained.touches, &recorded.objects);
     }
     changed
 }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::compile::{self, CompiledModel};
-use crate::ensemble::compiled_trained_on;
 use crate::ensemble::train::{self, train};
+use crate::ensemble::{OverTouches, compiled_trained_on};
 use crate::evaluate::{Candidate, Margins};
 use crate::tests::synthetic;
 
@@ -91,7 +91,7 @@ fn recorded_touches_are_known_again_after_adjusting_and_after_compiling() {
     assert!(compiled_trained_on(&compiled, &of_robot(&[300; 3], 3)).is_empty());
     let file = tempfile::NamedTempFile::new().unwrap();
     changed.save(file.path()).unwrap();
-    assert_eq!(Ensemble::load(file.path()).unwrap(), changed);
+    assert_eq!(crate::ensemble::load(file.path()).unwrap(), changed);
 }
 
 #[test]

@@ -4,13 +4,14 @@ use super::balance::Held;
 use super::held_out::{Division, loss, places, repeated};
 use super::{Curve, JITTERS, Needed, Settings, Smoothing, Taught, TaughtObject, check, on_threads};
 use crate::ensemble::train::{self, train};
-use crate::ensemble::{Ensemble, TouchOrigin};
+use crate::ensemble::{Ensemble, OverTouches, TouchOrigin};
 use crate::error::Result;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, ObjectTouches, Source};
 use palpate_onboard::Refused;
 use palpate_shared::Touch;
 use palpate_shared::format::Counted;
+use palpate_shared::format::TrainedTouches;
 
 /// Division by which jitters are compared and errors counted. Trees are grown for each part.
 const COMPARED: Division = Division { parts: 5, used: 4 };
@@ -52,10 +53,11 @@ pub fn alone(
             let mut held: Vec<Held> = recorded.objects.iter().map(|object| vec![None; object.len()]).collect();
             for part in 0..division.parts {
                 let ensemble = fitted(jitter, &|place| division.uses(division.part(place), part))?;
+                let trained = ensemble.trained_touches();
                 for (object, (held, places)) in recorded.objects.iter().zip(held.iter_mut().zip(&places)) {
                     let touches = object.touches().iter().zip(places).zip(held);
                     for ((touch, _), held) in touches.filter(|((_, place), _)| division.part(**place) == part) {
-                        *held = margins(&ensemble, touch);
+                        *held = margins(&ensemble, &trained, touch);
                     }
                 }
                 progress::advance(progress, 1)?;
@@ -111,14 +113,14 @@ pub fn alone(
         progress.begin("training", None);
         let mut ensemble = fitted(jitter, &|_| true)?;
         // What is stated is what was recorded, not its copies.
-        let trained = ensemble.origin.trained;
-        ensemble.origin = TouchOrigin::new(recorded, training.probe).origin(trained);
+        let trained = TouchOrigin::of(&ensemble.origin)?.trained;
+        ensemble.origin = TouchOrigin { trained, ..TouchOrigin::new(recorded, training.probe) }.origin();
         Ok((ensemble, taught))
     })
 }
 
-fn margins(ensemble: &Ensemble, touch: &Touch) -> Option<Vec<f64>> {
-    let is_evidence = Refused::check(&ensemble.trained_touches(), touch).is_ok();
+fn margins(ensemble: &Ensemble, trained: &TrainedTouches, touch: &Touch) -> Option<Vec<f64>> {
+    let is_evidence = Refused::check(trained, touch).is_ok();
     is_evidence.then(|| ensemble.margins(touch).into_iter().map(f64::from).collect())
 }
 

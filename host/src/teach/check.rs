@@ -1,7 +1,7 @@
 //! Check that objects can be taught to an ensemble.
 
 use super::{LEAST, Settings};
-use crate::ensemble::{Ensemble, Output, StatedProbe, TouchOrigin};
+use crate::ensemble::{Ensemble, Output, OverTouches, StatedProbe, TouchOrigin};
 use crate::error::{Error, Result, TeachProblem};
 use crate::evaluate::{Candidate, OfTouches};
 use crate::mesh::BACKGROUND;
@@ -89,7 +89,7 @@ fn names(ensemble: &Ensemble, recorded: &Dataset) -> Result<()> {
     let names: Vec<String> = ensemble.objects.iter().cloned().chain(recorded.names()).collect();
     crate::ensemble::check_names(&names)?;
     if names.len() > crate::ensemble::MAX_OBJECTS {
-        return Err(crate::error::EnsembleProblem::TooManyObjects { objects: names.len() }.into());
+        return Err(crate::error::TrainProblem::TooManyObjects { objects: names.len() }.into());
     }
     Ok(())
 }

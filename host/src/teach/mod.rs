@@ -294,12 +294,12 @@ fn extended(ensemble: &Ensemble, recorded: &Dataset, columns: &[Vec<f64>], const
     // What cannot be read was refused before.
     if let Ok(mut stated) = TouchOrigin::of(&extended.origin) {
         stated.touches.extend(TouchOrigin::new(recorded, None).touches);
+        if let Some(trained) = &mut stated.trained {
+            let objects = (at, recorded.objects.len());
+            trained.touches = with(ensemble, trained.touches, &recorded.objects);
+            trained.shares = trained.shares.map(|shares| mean(shares, recorded.shares(), objects));
+        }
         stated.state(&mut extended.origin);
-    }
-    let objects = (at, recorded.objects.len());
-    if let Some(trained) = &mut extended.origin.trained {
-        trained.touches = with(ensemble, trained.touches, &recorded.objects);
-        trained.shares = trained.shares.map(|shares| mean(shares, recorded.shares(), objects));
     }
     extended
 }

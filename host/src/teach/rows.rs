@@ -1,6 +1,6 @@
 //! Touches as the leaves that they reach: what a column's values are fitted on, and read off.
 
-use crate::ensemble::{Ensemble, Node, feature_row};
+use crate::ensemble::{Ensemble, Node, OverTouches, feature_row};
 use palpate_onboard::Refused;
 use palpate_shared::format::TrainedTouches;
 use palpate_shared::{Descriptor, Touch};

@@ -5,6 +5,7 @@ use super::held_out::{places, repeated};
 use super::rows::{Leaves, Rows};
 use super::*;
 use crate::compile;
+use crate::ensemble::OverTouches;
 use crate::ensemble::train::{self, train, train_with_background};
 use crate::error::TeachProblem;
 use crate::evaluate::{Candidate, Margins};
@@ -81,7 +82,7 @@ fn a_taught_ensemble_is_saved_loaded_and_compiled_without_error() {
     let (extended, _) = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap();
     let file = tempfile::NamedTempFile::new().unwrap();
     extended.save(file.path()).unwrap();
-    assert_eq!(Ensemble::load(file.path()).unwrap(), extended);
+    assert_eq!(crate::ensemble::load(file.path()).unwrap(), extended);
     assert_eq!(TouchOrigin::of(&extended.origin).unwrap().trained_on(&recorded), ["object2"]);
     let compiled = compile::compile(&extended, &compile::Settings::default()).unwrap();
     assert_eq!(compiled.margin_error, 0.0);

@@ -28,7 +28,7 @@ mod tests;
 
 use crate::calibrate::{self, Calibrated};
 use crate::compile::{self, Compiled, Core, Layout, Leaf, compile};
-use crate::ensemble::{Ensemble, StatedProbe, train};
+use crate::ensemble::{Ensemble, OverTouches, StatedProbe, train};
 use crate::error::{CalibrateProblem, CompileProblem, Result};
 use crate::evaluate::{self, Candidate, Evaluation, Margins};
 use crate::probe::noise::Noise;

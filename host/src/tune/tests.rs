@@ -1,4 +1,5 @@
 use super::*;
+use crate::ensemble::OverTouches;
 use crate::error::Setting;
 use crate::tests::synthetic;
 

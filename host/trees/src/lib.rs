@@ -15,20 +15,18 @@
 //! | [`output`], [`progress`] | files that appear whole or not at all; progress of long calls | |
 //! | [`wording`] | numbers as people read them | [`wording::decimal`] |
 //!
-//! The crate `palpate` builds on this one and adds meshes, probes and touches. The crates [`onboard`] and [`shared`] run on
+//! The crate `palpate` builds on this one. The crates [`onboard`] and [`shared`] run on
 //! the chip.
 
 pub mod compile;
 pub mod ensemble;
 pub mod error;
-pub mod output;
-pub mod progress;
 pub mod prove;
 pub mod rows;
 pub mod train;
 pub mod verify;
-pub mod wording;
 
 pub use error::{Error, Result};
+pub use palpate_base::{output, progress, wording};
 pub use palpate_onboard as onboard;
 pub use palpate_shared as shared;

@@ -162,7 +162,7 @@ fn damaged_files_are_refused_or_are_sound_and_never_panic() {
                     }
                 }
             }
-            if let Ok(ensemble) = read(Path::new("mutant"), &bytes, None) {
+            if let Ok(ensemble) = read(Path::new("mutant"), &bytes, &Options::default()) {
                 ensemble.check().unwrap();
                 ensemble.margins_of_features(&vec![0.5; ensemble.inputs.count()]);
             }
@@ -182,10 +182,10 @@ fn counts_and_nesting_without_end_are_refused_soon() {
          leaf_value=1\nend of trees\n"
             .to_owned(),
     ] {
-        assert!(read(Path::new("endless"), text.as_bytes(), None).is_err());
+        assert!(read(Path::new("endless"), text.as_bytes(), &Options::default()).is_err());
     }
     // A field whose length is beyond the file.
-    assert!(read(Path::new("endless"), b"\x08\x0a\x3a\xff\xff\xff\xff\x7f", None).is_err());
+    assert!(read(Path::new("endless"), b"\x08\x0a\x3a\xff\xff\xff\xff\x7f", &Options::default()).is_err());
 }
 
 /// A LightGBM file of one tree with one split.
@@ -195,7 +195,7 @@ fn stump(threshold: &str, decision: u8) -> Ensemble {
          objective=regression\nfeature_names=a\n\nTree=0\nnum_leaves=2\nnum_cat=0\nsplit_feature=0\n\
          threshold={threshold}\ndecision_type={decision}\nleft_child=-1\nright_child=-2\nleaf_value=1 2\n\nend of trees\n"
     );
-    read(Path::new("stump"), text.as_bytes(), None).unwrap()
+    read(Path::new("stump"), text.as_bytes(), &Options::default()).unwrap()
 }
 
 #[test]
@@ -351,7 +351,7 @@ fn a_catboost_model_with_another_probability_threshold_is_refused_by_name() {
     let with = |threshold: &str| {
         let about = format!("\"model_info\":{{\"binclass_probability_threshold\":{threshold},");
         let text = text.replacen("\"model_info\":{", &about, 1);
-        read(Path::new("model.json"), text.as_bytes(), None)
+        read(Path::new("model.json"), text.as_bytes(), &Options::default())
     };
     for threshold in ["\"0.5\"", "0.5", "null"] {
         assert!(with(threshold).is_ok(), "{threshold}");
@@ -508,12 +508,15 @@ fn onnx_regressor(base_values: &[f32], transform: &str, times: usize) -> Vec<u8>
 
 #[test]
 fn an_onnx_regressor_that_starts_from_several_values_is_refused_and_is_no_classifier() {
-    let of = |base: &[f32], transform: &str| read(Path::new("m.onnx"), &onnx_regressor(base, transform, 1), None);
+    let of = |base: &[f32], transform: &str| {
+        read(Path::new("m.onnx"), &onnx_regressor(base, transform, 1), &Options::default())
+    };
     for base in [&[][..], &[0.5]] {
         let ensemble = of(base, "NONE").unwrap();
         assert_eq!(ensemble.margins_of_features(&[0.0]), [1.5 + base.iter().sum::<f32>()]);
     }
-    let error = read(Path::new("m.onnx"), &onnx_regressor(&[], "NONE", 2), None).unwrap_err().to_string();
+    let error =
+        read(Path::new("m.onnx"), &onnx_regressor(&[], "NONE", 2), &Options::default()).unwrap_err().to_string();
     assert!(error.contains("it has 2 tree ensembles") && error.contains("AdaBoost, Bagging"), "{error}");
     let error = of(&[0.5, 0.25], "NONE").unwrap_err().to_string();
     assert!(error.contains("base_values has 2 numbers for 1 target"), "{error}");
@@ -708,7 +711,7 @@ fn of_more_columns_than_a_model_can_have_those_that_are_used_are_stored_by_numbe
     for is_named in [true, false] {
         let name = |column: usize| if is_named { format!("sensor{column}") } else { format!("Column_{column}") };
         let text = many_columns(561, name);
-        let ensemble = read(Path::new("wide.txt"), text.as_bytes(), None).unwrap();
+        let ensemble = read(Path::new("wide.txt"), text.as_bytes(), &Options::default()).unwrap();
         assert_eq!(ensemble.inputs.names(), [name(7), name(560)]);
         let compiled = compile::compile(&ensemble, &Settings { leaf: Leaf::F32, ..Settings::default() }).unwrap();
         let model = compile::open(&compiled.bytes).unwrap();
@@ -777,7 +780,7 @@ fn of_more_columns_than_a_model_can_have_those_that_are_used_are_stored_by_numbe
             &format!("right_child={} -301\n", (1..300).map(|n| n.to_string()).collect::<Vec<_>>().join(" ")),
         )
         .replace("leaf_value=1 2 3", &format!("leaf_value={}", ["1"; 301].join(" ")));
-    let error = read(Path::new("wide.txt"), too_many.as_bytes(), None).unwrap_err().to_string();
+    let error = read(Path::new("wide.txt"), too_many.as_bytes(), &Options::default()).unwrap_err().to_string();
     assert!(error.contains("its trees use 300 of its 300 features, and not 1 to 256"), "{error}");
 }
 
@@ -789,7 +792,7 @@ fn an_xgboost_classifier_of_one_class_starts_where_xgboost_does_and_other_classi
     let text = std::fs::read_to_string(directory().join("xgboost-3.2-one-class.json")).unwrap();
     for (objective, base) in [("multi:softprob", None), ("count:poisson", Some("its base_score [0E0] is no margin"))] {
         let text = text.replace("binary:logistic", objective).replace("\"num_class\":\"0\"", "\"num_class\":\"1\"");
-        let error = read(Path::new("m.json"), text.as_bytes(), None).unwrap_err().to_string();
+        let error = read(Path::new("m.json"), text.as_bytes(), &Options::default()).unwrap_err().to_string();
         assert!(error.contains(base.unwrap_or("it has one class, and nothing to distinguish")), "{error}");
     }
 }
@@ -798,10 +801,11 @@ fn an_xgboost_classifier_of_one_class_starts_where_xgboost_does_and_other_classi
 fn json_of_windows_is_read_and_xgboosts_settings_are_called_what_they_are() {
     let bytes = std::fs::read(directory().join("xgboost-3.2-binary.json")).unwrap();
     let marked = [&b"\xef\xbb\xbf"[..], &bytes].concat();
-    let plain = read(Path::new("m.json"), &bytes, None).unwrap();
-    assert_eq!(read(Path::new("m.json"), &marked, None).unwrap(), plain);
+    let plain = read(Path::new("m.json"), &bytes, &Options::default()).unwrap();
+    assert_eq!(read(Path::new("m.json"), &marked, &Options::default()).unwrap(), plain);
     let mut document: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
     document["learner"]["gradient_booster"].as_object_mut().unwrap().remove("model");
-    let error = read(Path::new("m.json"), document.to_string().as_bytes(), None).unwrap_err().to_string();
+    let error =
+        read(Path::new("m.json"), document.to_string().as_bytes(), &Options::default()).unwrap_err().to_string();
     assert!(error.contains("settings and no trees") && error.contains("save_model"), "{error}");
 }

@@ -14,7 +14,7 @@
 use hessboost::prelude::{BoostedModel, Iterations, ModelFormat};
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::train;
-use palpate::ensemble::{Ensemble, Node, Output, Tree, feature_row};
+use palpate::ensemble::{Ensemble, Node, Output, OverTouches, Tree, feature_row, inputs};
 use palpate::touches::Dataset;
 use palpate_onboard::{Batch, Model};
 use palpate_peers::{QUICK, paired};
@@ -245,7 +245,7 @@ fn random(settings: &train::Settings) -> Ensemble {
     };
     let objects = (0..10).map(|object| object.to_string()).collect();
     Ensemble {
-        inputs: settings.descriptor.into(),
+        inputs: inputs(settings.descriptor),
         objects,
         base_margins: vec![0.5; 10],
         trees,

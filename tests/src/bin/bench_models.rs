@@ -33,7 +33,7 @@ fn main() -> Result<()> {
     let data = run.as_ref().map(|run| split(run)).transpose()?;
     let trained = data.as_ref().map(|data| &data.train);
     let one = match &run {
-        Some(run) => Ensemble::load(run.join("paper.json"))?,
+        Some(run) => palpate::ensemble::load(run.join("paper.json"))?,
         None => ensemble(None, train::Settings::paper(), Descriptor::Times)?,
     };
     let compact = |rounds, depth, bins| train::Settings { rounds, depth, bins, ..train::Settings::compact() };

@@ -13,7 +13,10 @@ use palpate::compile::{self, Compiled, Layout, Leaf, compile};
 use palpate::ensemble::Ensemble;
 use palpate::ensemble::train::{self, train};
 use palpate::error::Result;
-use palpate::evaluate::{Candidate, Margins, parity, together::Together};
+use palpate::evaluate::{
+    Candidate, Margins, parity,
+    together::{Together, TouchesTogether},
+};
 use palpate::mesh::{obj, source};
 use palpate::probe::cast;
 use palpate::probe::scene::Scene;

@@ -6,7 +6,8 @@ use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
 use super::sequences::{self, Evaluation, SequenceArguments};
-use palpate::error::RowsProblem;
+use palpate::ensemble::OverTouches;
+use palpate::error::{EvaluateProblem, RowsProblem};
 use palpate::evaluate::model_file::ModelFile;
 use palpate::evaluate::{self, Classes, Confusion, Evaluated, Regression, RowsEvaluation, Wanted, evaluate_rows};
 use palpate::output;
@@ -86,7 +87,7 @@ impl Arguments {
 /// True if the pattern of touching fingers is evidence to the model.
 fn counts_patterns(file: &ModelFile) -> bool {
     let counted = match file {
-        ModelFile::Full(ensemble) => ensemble.origin.trained.map_or(Counted::Full, |trained| trained.touches.counted),
+        ModelFile::Full(ensemble) => ensemble.trained_touches().counted,
         ModelFile::Compiled(compiled) => compiled.model().trained_touches().counted,
     };
     counted != Counted::Full
@@ -163,8 +164,8 @@ fn sequences_of(arguments: &Arguments, file: &ModelFile, columns: SequenceColumn
 
 /// Evaluates a model on labeled rows.
 fn rows(arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -> Result<()> {
-    if file.with(|candidate| Ok(candidate.is_of_touches()))? {
-        return Err(Error::from(RowsProblem::Touches).in_file(&arguments.model));
+    if file.with(|candidate| Ok(!candidate.is_of_rows()))? {
+        return Err(Error::from(EvaluateProblem::OverTouches).in_file(&arguments.model));
     }
     let features = match file {
         ModelFile::Full(ensemble) => Features::from(&**ensemble),

@@ -9,7 +9,7 @@ use palpate::compile::{
     self, Candidate, Compiled, CompiledModel, EarlyExit, EarlyExitFound, Goal, Instructions, Language, Layout, Leaf,
     Settings,
 };
-use palpate::ensemble::{Ensemble, Inputs, TouchOrigin, train};
+use palpate::ensemble::{self, Ensemble, Inputs, TouchOrigin, train};
 use palpate::error::Error;
 use palpate::output;
 use palpate::rows::scales::{self, Effect, Merged};
@@ -196,14 +196,14 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     output::admit(&arguments.output, arguments.inputs())?;
     let emitted = places(&arguments)?;
     let names = arguments.names.as_deref().map(names).transpose()?;
-    let mut ensemble = Ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(names.as_deref()))?;
+    let mut ensemble = ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(names.as_deref()))?;
     set_link(&mut ensemble, arguments.link)?;
     let (scales, fitted) = scales(&arguments, &ensemble)?;
     let (layout, forms) = arguments.code()?;
     let usual = match ensemble.inputs {
         // Where leaves were rounded to one byte, two hold nothing more.
-        Inputs::Touches(_) if train::is_rounded(&ensemble, 8) => Settings { leaf: Leaf::I8, ..Settings::default() },
-        Inputs::Touches(_) => Settings::for_touches(ensemble.objects.len()),
+        Inputs::Computed(_) if train::is_rounded(&ensemble, 8) => Settings { leaf: Leaf::I8, ..Settings::default() },
+        Inputs::Computed(_) => compile::for_touches(ensemble.objects.len()),
         Inputs::Rows(_) => Settings::default(),
     };
     let settings = Settings {
@@ -240,7 +240,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         candidates: compiled.candidates,
         features: match &ensemble.inputs {
             Inputs::Rows(names) => Some(names.clone()),
-            Inputs::Touches(_) => None,
+            Inputs::Computed(_) => None,
         },
         classes: ensemble.objects.clone(),
         predicts: Predicts::of(&ensemble),

@@ -5,8 +5,9 @@ use super::chips::instructions;
 use super::rows::read_rows;
 use palpate::Result;
 use palpate::compile::CompiledModel;
-use palpate::ensemble::import::{Options, read_with};
-use palpate::error::{CompileProblem, Error, Place, RowsProblem};
+use palpate::ensemble::import::Options;
+use palpate::ensemble::{OverTouches, read};
+use palpate::error::{CompileProblem, Error, EvaluateProblem, Place};
 use palpate::evaluate::verify::Verified;
 use palpate::output;
 use palpate::prove::{Certificate, Moves, Proof, check, check_code, moves, prove, prove_code};
@@ -39,7 +40,7 @@ pub(super) fn run(
     let model = Proved::read(asked.model)?;
     // The very bytes whose checksum is stated.
     let file = std::fs::read(path).map_err(|source| Error::io(path, "read the ensemble", source))?;
-    let ensemble = read_with(path, &file, options)?;
+    let ensemble = read(path, &file, options)?;
     let in_model = |error: Error| error.in_file(asked.model);
     if let Some(certificate) = asked.certificate {
         let certificate_read = Certificate::read(certificate)?;
@@ -57,7 +58,7 @@ pub(super) fn run(
     let has_classes = ensemble.objects.len() > 1 && !ensemble.prediction().targets;
     let rows = match asked.rows {
         Some(_) if ensemble.descriptor().is_some() => {
-            return Err(Error::at(Place::file(asked.model), RowsProblem::Touches));
+            return Err(Error::at(Place::file(asked.model), EvaluateProblem::OverTouches));
         }
         // They were read, and said how, before; a regression has no class that could change.
         Some(data) if verified.is_some() && has_classes => Some(Rows::read(data, &ensemble, None)?),

@@ -2,7 +2,7 @@
 
 use super::rows::read_rows;
 use palpate::Result;
-use palpate::error::{Error, Place, RowsProblem};
+use palpate::error::{Error, EvaluateProblem, Place, RowsProblem};
 use palpate::evaluate::verify::margins;
 use palpate::output;
 use palpate::rows::{Encoder, RowOf, SequencesBuilder};
@@ -55,7 +55,7 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
     let mut recognizer = recognizer;
     let model = *recognizer.model();
     if model.descriptor().is_some() {
-        return Err(RowsProblem::Touches.into());
+        return Err(EvaluateProblem::OverTouches.into());
     }
     let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
     let rows = read_rows(path, &model, sequence)?;
@@ -87,7 +87,7 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
                 None => recognizer.reset(),
             }
         }
-        recognizer.push_features(&encoded).map_err(|_| RowsProblem::Touches)?;
+        recognizer.push_features(&encoded).map_err(|_| EvaluateProblem::OverTouches)?;
         let own = model.predict_class(&encoded, &mut scratch).unwrap_or_default();
         let class = if adds_up { recognizer.best() } else { own };
         let verdict = match recognizer.verdict() {

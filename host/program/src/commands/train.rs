@@ -4,8 +4,8 @@ use super::progress::Bar;
 use super::real::RealArguments;
 use super::teach::TeachArguments;
 use super::trees::Trees;
-use palpate::ensemble::Ensemble;
 use palpate::ensemble::train::{self, Outputs, Settings};
+use palpate::ensemble::{self, Ensemble, OverTouches};
 use palpate::evaluate::{self, CostOfNoise};
 use palpate::mesh::BACKGROUND;
 use palpate::output;
@@ -204,7 +204,7 @@ fn simulated(arguments: &Arguments, global: &Global, directory: &PathBuf, record
         _ => error,
     };
     let ensemble = match (&arguments.teach.extend, &background) {
-        (Some(path), _) => Ensemble::load(path)?,
+        (Some(path), _) => ensemble::load(path)?,
         (None, None) => train::train(&dataset, &settings, &Bar::new()).map_err(in_directory)?,
         (None, Some(background)) => {
             train::train_with_background(&dataset, background, &settings, &Bar::new()).map_err(in_directory)?

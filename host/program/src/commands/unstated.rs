@@ -14,6 +14,6 @@ pub(super) struct UnstatedArguments {
 
 impl UnstatedArguments {
     pub(super) fn options<'a>(&self, names: Option<&'a [String]>) -> Options<'a> {
-        Options { names, all_trees: self.all_trees, missing: self.missing }
+        Options { names, all_trees: self.all_trees, missing: self.missing, ..Options::default() }
     }
 }

@@ -4,8 +4,8 @@ use super::prove::Asked;
 use super::unstated::UnstatedArguments;
 use palpate::Result;
 use palpate::compile::CompiledModel;
-use palpate::ensemble::Ensemble;
-use palpate::error::{Error, Place, RowsProblem};
+use palpate::ensemble::{self, OverTouches};
+use palpate::error::{Error, EvaluateProblem, Place, RowsProblem};
 use palpate::evaluate::verify::{Library, Verified, verify};
 use palpate::output;
 use palpate::rows::{read_margins, read_values};
@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         _ => return super::prove::run(&arguments.proof(), None, &options, global),
     };
     let compiled = CompiledModel::read(&arguments.model)?;
-    let ensemble = Ensemble::load_with(&arguments.ensemble, &options)?;
+    let ensemble = ensemble::load_with(&arguments.ensemble, &options)?;
     if ensemble.descriptor().is_some() {
         let names = [("library_margins", &arguments.library_margins), ("library_values", &arguments.library_values)];
         if let Some((name, Some(path))) = names.into_iter().find(|(_, path)| path.is_some()) {
@@ -72,7 +72,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         }
         // A log is a data set, too.
         if data.is_file() && !palpate::touches::is_log(data) {
-            return Err(Error::at(Place::file(&arguments.ensemble), RowsProblem::Touches));
+            return Err(Error::at(Place::file(&arguments.ensemble), EvaluateProblem::OverTouches));
         }
         let data = (data.as_path(), arguments.sequences);
         return super::parity::run((&arguments.model, &compiled), &ensemble, data, global);

@@ -1,6 +1,6 @@
 //! The commands around a compiled model, as a user calls them: export, inspect, parity, recognize.
 
-use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree};
+use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree, inputs};
 use palpate_shared::Descriptor;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
@@ -29,7 +29,7 @@ pub(crate) fn ensemble() -> Ensemble {
     let split = Node::Split { feature: 0, threshold: 50_000.0, missing_left: true, left: 1, right: 2 };
     let nodes = vec![split, leaf(0.7, -0.7), leaf(-0.7, 0.7)];
     Ensemble {
-        inputs: Descriptor::Curvature.into(),
+        inputs: inputs(Descriptor::Curvature),
         objects: vec!["bowl".into(), "fork".into()],
         base_margins: vec![0.0, 0.0],
         trees: vec![Tree { nodes, output: Output::Each }],
@@ -451,7 +451,7 @@ fn export_emits_sources_beside_the_model_and_refuses_a_name_that_leaves_no_room_
     assert_eq!(read("palpate.h"), palpate_onboard::C_HEADER);
     let exported = json(&["export", &ensemble, "-o", &model, "--emit", "json", "--json"]);
     assert_eq!(exported["ensemble"].as_str(), Some(&*place.text("cup.json")));
-    assert_eq!(Ensemble::load(place.path("cup.json")).unwrap(), Ensemble::load(&ensemble).unwrap());
+    assert_eq!(palpate::ensemble::load(place.path("cup.json")).unwrap(), palpate::ensemble::load(&ensemble).unwrap());
     // The file that it is made of stays.
     let own = ("ensemble.palpate", "json");
     for (output, language) in

@@ -4,8 +4,8 @@ use super::{Contender, Expected, Surface, surfaces};
 use palpate::calibrate::{self, calibrate_fresh};
 use palpate::capture::{capture, touches};
 use palpate::compile::{self, CompiledModel, compile};
-use palpate::ensemble::StatedProbe;
 use palpate::ensemble::train::{self as trainer, Settings};
+use palpate::ensemble::{OverTouches, StatedProbe};
 use palpate::error::{CalibrateProblem, Error, Result};
 use palpate::evaluate::{self, Candidate, Margins, SequentialSettings};
 use palpate::in_order::in_order;
@@ -77,7 +77,7 @@ pub fn train(objects: &[Object], training: &Training, progress: &dyn Progress) -
         progress::check(progress)?;
         let settings = compile::Settings { error_rate: ERROR_RATE, ..compile::Settings::default() };
         let mut bytes = compile(&ensemble, &settings)?.bytes;
-        if ensemble.inputs.descriptor().is_some_and(Descriptor::needs_pose) {
+        if ensemble.descriptor().is_some_and(Descriptor::needs_pose) {
             let dataset = captured("plan", approached(PLANNED, 4))?;
             progress.begin("planning", None);
             bytes = evaluate::plan(&compile::open(&bytes)?, &dataset, 4)?.bytes;

@@ -1,7 +1,7 @@
 use super::*;
 use crate::small::model;
 use palpate::compile::{self, compile};
-use palpate::ensemble::{self, Ensemble, Node, Output, Tree};
+use palpate::ensemble::{self, Ensemble, Node, Output, Tree, inputs};
 use palpate::mesh::Mesh;
 use palpate::play::Game;
 use palpate::probe::scene::Scene;
@@ -164,7 +164,7 @@ fn a_trace_is_what_the_game_computes() {
 #[test]
 fn models_of_one_name_are_told_apart_by_their_files() {
     let ensemble = Ensemble {
-        inputs: Descriptor::Curvature.into(),
+        inputs: inputs(Descriptor::Curvature),
         objects: vec!["a".into(), "b".into()],
         base_margins: vec![0.0; 2],
         trees: vec![Tree { nodes: vec![Node::Leaf(vec![0.5, 0.0])], output: Output::Each }],

@@ -9,9 +9,9 @@
 //! once per touch instead of once.
 
 use crate::ensemble::{
-    Ensemble, MAX_OBJECTS, Node, Origin, StatedProbe, TouchOrigin, Trained, check_names, feature_row,
+    Ensemble, MAX_OBJECTS, Node, Origin, StatedProbe, TouchOrigin, Trained, check_names, feature_row, inputs,
 };
-use crate::error::{EnsembleProblem, Error, Result};
+use crate::error::{Error, Result};
 use crate::mesh::BACKGROUND;
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
@@ -24,10 +24,12 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
+mod error;
 mod small;
 #[cfg(feature = "xgboost")]
 mod xgboost;
 
+pub use error::TrainProblem;
 pub use small::Small;
 pub(crate) use small::train_each as train_small;
 
@@ -186,7 +188,7 @@ impl Settings {
 /// of threads. Progress is counted in rounds.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) if a setting is out of its range; [`EnsembleProblem`] if there are
+/// [`Setting`](crate::error::Setting) if a setting is out of its range; [`TrainProblem`] if there are
 /// fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
 /// needs a pose that no touch has. All of it is found before the training starts. [`Error::Cancelled`].
 pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
@@ -240,7 +242,7 @@ fn train_outputs(dataset: &Dataset, settings: &Settings, progress: &dyn Progress
 fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Origin {
     let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
     let noise = Some(dataset.real().and(&settings.noise)).filter(|noise| !noise.is_none());
-    TouchOrigin { noise, ..TouchOrigin::new(dataset, settings.probe) }.origin(Some(trained))
+    TouchOrigin { noise, trained: Some(trained), ..TouchOrigin::new(dataset, settings.probe) }.origin()
 }
 
 /// Trains an ensemble with a background column: one more object, of the touches of all objects of `background` together,
@@ -249,7 +251,7 @@ fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Or
 ///
 /// # Errors
 /// As [`train`]; [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if the data sets were captured with
-/// different probes; [`EnsembleProblem::Background`] if only one of them holds approaches, or an object has the
+/// different probes; [`TrainProblem::Background`] if only one of them holds approaches, or an object has the
 /// background's name.
 pub fn train_with_background(
     dataset: &Dataset,
@@ -262,18 +264,20 @@ pub fn train_with_background(
     }
     if dataset.holds_approaches() != background.holds_approaches() {
         let detail = "one of the data sets holds approaches and the other full touches only";
-        return Err(EnsembleProblem::Background { detail }.into());
+        return Err(TrainProblem::Background { detail }.into());
     }
     if dataset.objects.iter().any(|object| object.name == BACKGROUND) {
         let detail = "an object of the data set is called background";
-        return Err(EnsembleProblem::Background { detail }.into());
+        return Err(TrainProblem::Background { detail }.into());
     }
     let mut both = dataset.clone();
     both.objects.push(ObjectTouches::joined(BACKGROUND, &background.objects));
     let mut ensemble = train(&both, settings, progress)?;
     ensemble.origin.background = true;
-    if let Some(trained) = &mut ensemble.origin.trained {
+    let mut stated = TouchOrigin::of(&ensemble.origin)?;
+    if let Some(trained) = &mut stated.trained {
         trained.shares = dataset.holds_approaches().then(|| dataset.shares());
+        stated.state(&mut ensemble.origin);
     }
     Ok(ensemble)
 }
@@ -329,9 +333,9 @@ fn with_palpate(
     let trained = boost::train(rows.lent(), objects.len(), parameters, settings.threads, &on_round);
     let (base_margins, trees) = trained.map_err(|failure| match failure {
         boost::Failure::Cancelled => Error::Cancelled,
-        refused => EnsembleProblem::Trainer { trainer: "palpate", detail: refused.to_string() }.into(),
+        refused => TrainProblem::Trainer { trainer: "palpate", detail: refused.to_string() }.into(),
     })?;
-    Ok(Ensemble { inputs: settings.descriptor.into(), objects, base_margins, trees, origin: Origin::default() })
+    Ok(Ensemble { inputs: inputs(settings.descriptor), objects, base_margins, trees, origin: Origin::default() })
 }
 
 #[cfg(feature = "xgboost")]
@@ -357,17 +361,17 @@ fn with_xgboost(_: &Rows, _: &Settings, _: Vec<String>, _: &dyn Progress) -> Res
 fn check(dataset: &Dataset, descriptor: Descriptor) -> Result<()> {
     let objects = &dataset.objects;
     match objects.len() {
-        0 | 1 => return Err(EnsembleProblem::OneObject.into()),
+        0 | 1 => return Err(TrainProblem::OneObject.into()),
         2..=MAX_OBJECTS => {}
-        objects => return Err(EnsembleProblem::TooManyObjects { objects }.into()),
+        objects => return Err(TrainProblem::TooManyObjects { objects }.into()),
     }
     check_names(&dataset.names())?;
     if let Some(empty) = objects.iter().find(|object| object.is_empty()) {
-        return Err(EnsembleProblem::NoTouches { object: empty.name.clone() }.into());
+        return Err(TrainProblem::NoTouches { object: empty.name.clone() }.into());
     }
     let posed = || objects.iter().flat_map(ObjectTouches::touches).any(|touch| touch.pose().is_some());
     if descriptor.needs_pose() && !posed() {
-        return Err(EnsembleProblem::NoPose { descriptor }.into());
+        return Err(TrainProblem::NoPose { descriptor }.into());
     }
     Ok(())
 }
@@ -428,7 +432,7 @@ impl<'d> Evidence<'d> {
     /// The touches that [`Settings::counted`] names, and that have a pose if the descriptor needs one.
     ///
     /// # Errors
-    /// [`EnsembleProblem::NothingCounts`] if an object has none.
+    /// [`TrainProblem::NothingCounts`] if an object has none.
     fn new(dataset: &'d Dataset, settings: &Settings) -> Result<Self> {
         let counted = settings.counted.unwrap_or(Counted::Full);
         let needs_pose = settings.descriptor.needs_pose();
@@ -444,7 +448,7 @@ impl<'d> Evidence<'d> {
                 touches.to_mut().retain(counts);
             }
             match touches.len() {
-                0 => Err(EnsembleProblem::NothingCounts { object: object.name.clone(), counted }.into()),
+                0 => Err(TrainProblem::NothingCounts { object: object.name.clone(), counted }.into()),
                 _ => Ok(touches),
             }
         });

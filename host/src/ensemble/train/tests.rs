@@ -1,6 +1,7 @@
 use super::*;
 use crate::compile;
-use crate::error::{NameProblem, Setting};
+use crate::ensemble::OverTouches;
+use crate::error::{EnsembleProblem, NameProblem, Setting};
 use crate::tests::synthetic;
 use crate::touches::{ObjectTouches, Source};
 use palpate_shared::ContactTime;
@@ -93,8 +94,8 @@ fn a_pose_descriptor_without_poses_says_how_to_get_them() {
     let settings = Settings { descriptor: Descriptor::Gravity, ..quick() };
     let error = train(&synthetic::dataset(&[50, 50], 7), &settings, &()).unwrap_err();
     assert!(error.to_string().contains("with their pose"), "{error}");
-    let problem = EnsembleProblem::NoPose { descriptor: Descriptor::Gravity };
-    assert_eq!(error.problem::<EnsembleProblem>(), Some(&problem));
+    let problem = TrainProblem::NoPose { descriptor: Descriptor::Gravity };
+    assert_eq!(error.problem::<TrainProblem>(), Some(&problem));
 }
 
 #[test]
@@ -107,7 +108,7 @@ fn more_objects_or_other_names_than_a_model_can_hold_are_refused_before_training
         }
     }
     let error = train(&synthetic::dataset(&[2; 300], 8), &quick(), &Never).unwrap_err();
-    assert_eq!(error.problem(), Some(&EnsembleProblem::TooManyObjects { objects: 300 }), "{error}");
+    assert_eq!(error.problem(), Some(&TrainProblem::TooManyObjects { objects: 300 }), "{error}");
     for (name, why) in [("", NameProblem::Empty), ("fo\trk", NameProblem::Control), ("object0", NameProblem::Twice)] {
         let mut dataset = synthetic::dataset(&[50, 50], 8);
         dataset.objects[1].name = name.into();
@@ -123,7 +124,7 @@ fn the_most_objects_that_can_be_trained_can_be_saved_loaded_and_compiled() {
     let ensemble = train(&dataset, &Settings { rounds: 1, depth: 2, ..quick() }, &()).unwrap();
     let file = tempfile::NamedTempFile::new().unwrap();
     ensemble.save(file.path()).unwrap();
-    assert_eq!(Ensemble::load(file.path()).unwrap(), ensemble);
+    assert_eq!(crate::ensemble::load(file.path()).unwrap(), ensemble);
     compile::compile(&ensemble, &compile::Settings::default()).unwrap();
 }
 
@@ -138,7 +139,7 @@ fn an_ensemble_states_the_probe_and_knows_its_touches_again_after_saving() {
     let file = tempfile::NamedTempFile::new().unwrap();
     for ensemble in [stated, silent] {
         ensemble.save(file.path()).unwrap();
-        let loaded = Ensemble::load(file.path()).unwrap();
+        let loaded = crate::ensemble::load(file.path()).unwrap();
         assert_eq!(loaded, ensemble);
         assert_eq!(TouchOrigin::of(&loaded.origin).unwrap().trained_on(&dataset).len(), 2);
     }
@@ -283,12 +284,12 @@ fn approaches_are_trained_on_by_their_contacts_unless_full_touches_or_all_are_as
         let stated = ensemble.trained_touches();
         assert_eq!((stated.patterns, stated.needs_pose), (patterns, false), "{descriptor:?}");
         assert!((3_000..=3_400).contains(&stated.largest_spread), "{stated:?}");
-        let shares = ensemble.origin.trained.unwrap().shares.unwrap();
+        let shares = TouchOrigin::of(&ensemble.origin).unwrap().trained.unwrap().shares.unwrap();
         assert_eq!(shares, [0.125, 0.25, 0.125, 0.25, 0.125, 0.125]);
         // The file and every compiled model state the same.
         let file = tempfile::NamedTempFile::new().unwrap();
         ensemble.save(file.path()).unwrap();
-        assert_eq!(Ensemble::load(file.path()).unwrap(), ensemble);
+        assert_eq!(crate::ensemble::load(file.path()).unwrap(), ensemble);
         let compiled = crate::compile::compile(&ensemble, &crate::compile::Settings::default()).unwrap();
         let model = crate::compile::open(&compiled.bytes).unwrap();
         assert_eq!(model.trained_touches(), stated);
@@ -304,8 +305,8 @@ fn an_object_without_a_touch_that_counts_is_named() {
     let mut dataset = approaches();
     dataset.objects[1] = dataset.objects[1].filtered(|touch| !touch.is_full());
     let error = train(&dataset, &Settings { counted: Some(Counted::Full), ..quick() }, &()).unwrap_err();
-    let problem = EnsembleProblem::NothingCounts { object: "fork".into(), counted: Counted::Full };
-    assert_eq!(error.problem::<EnsembleProblem>(), Some(&problem), "{error}");
+    let problem = TrainProblem::NothingCounts { object: "fork".into(), counted: Counted::Full };
+    assert_eq!(error.problem::<TrainProblem>(), Some(&problem), "{error}");
 }
 
 #[test]
@@ -320,7 +321,7 @@ fn a_stroke_is_the_largest_spread_of_the_ensemble_and_of_every_compiled_model() 
     assert_eq!(ensemble.trained_touches().largest_spread, 5_000);
     let file = tempfile::NamedTempFile::new().unwrap();
     ensemble.save(file.path()).unwrap();
-    assert_eq!(Ensemble::load(file.path()).unwrap(), ensemble);
+    assert_eq!(crate::ensemble::load(file.path()).unwrap(), ensemble);
     let compiled = crate::compile::compile(&ensemble, &crate::compile::Settings::default()).unwrap();
     let model = crate::compile::open(&compiled.bytes).unwrap();
     assert_eq!(model.trained_touches().largest_spread, 5_000);

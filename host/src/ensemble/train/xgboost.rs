@@ -1,8 +1,8 @@
 //! XGBoost itself as the trainer: version 1.6.2, built from source behind the cargo feature `xgboost`.
 
 use super::{BASE_MARGIN, Rows, Settings};
-use crate::ensemble::Ensemble;
-use crate::error::{EnsembleProblem, Error, Result};
+use crate::ensemble::{Ensemble, schema};
+use crate::error::{Error, Result, TrainProblem};
 use crate::progress::{self, Progress};
 use std::collections::HashMap;
 use xgboost_rs::{Booster, DMatrix, XGBError};
@@ -14,9 +14,8 @@ pub(super) fn train(
     objects: Vec<String>,
     progress: &dyn Progress,
 ) -> Result<Ensemble> {
-    let failed = |error: XGBError| -> Error {
-        EnsembleProblem::Trainer { trainer: "XGBoost", detail: error.to_string() }.into()
-    };
+    let failed =
+        |error: XGBError| -> Error { TrainProblem::Trainer { trainer: "XGBoost", detail: error.to_string() }.into() };
     let data = matrix(rows, settings).map_err(failed)?;
     let mut booster = Booster::new_with_json_config(&[&data], parameters(settings, objects.len())).map_err(failed)?;
     progress.begin("training", u64::try_from(settings.rounds).ok());
@@ -26,7 +25,7 @@ pub(super) fn train(
         progress::advance(progress, 1)?;
     }
     let json = booster.save_to_buffer("json".into()).map_err(failed)?;
-    Ensemble::from_xgboost(json.as_bytes(), settings.descriptor, objects)
+    Ensemble::from_xgboost(json.as_bytes(), schema(settings.descriptor), objects)
 }
 
 /// The wrapper swallows what XGBoost says about parameters, so each is written out, defaults that later versions changed

@@ -209,7 +209,7 @@ mod tests {
             Node::Leaf(vec![-0.5, 0.5]),
         ];
         Ensemble {
-            inputs: Descriptor::Curvature.into(),
+            inputs: crate::ensemble::inputs(Descriptor::Curvature),
             objects: vec!["bowl".into(), "fork".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],

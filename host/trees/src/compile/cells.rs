@@ -1,13 +1,13 @@
 //! Every case that an ensemble distinguishes, where they can be counted.
 //!
 //! Between its thresholds an ensemble is constant. Over two features that leaves some ten thousand cells at most, few
-//! enough to compute its margins for every possible touch: the grid layout stores them, and the worst error of a margin
-//! is the largest in any cell. The three times of a touch are no more than two dimensions, since the earliest is always 0,
-//! and a contact pattern leaves at most two differences of them: the layout patterns stores a table for each.
+//! enough to compute its margins for all values: the grid layout stores them, and the worst error of a margin is the
+//! largest in any cell. Planes of a schema have fewer dimensions than there are features: the layout patterns stores a table
+//! for each.
 
 use super::axes::visit;
 use super::forest::{Branch, Forest};
-use palpate_shared::{ContactPattern, Descriptor};
+use crate::ensemble::Occurring;
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::take;
 use std::ops::{AddAssign, Range};
@@ -22,10 +22,9 @@ const MAX_CELLS: usize = 4_000_000;
 pub(super) struct Cells {
     /// Features and their thresholds; at least two.
     pub(super) dimensions: Vec<(u8, Vec<i32>)>,
-    /// Boxes of places; a touch falls into one of them.
+    /// Boxes of places; values fall into one of them.
     planes: Vec<Vec<Range<usize>>>,
-    /// True if each plane is of a contact pattern, in the order of their codes, and the dimensions are all of the
-    /// features of contacts-curvature.
+    /// True if each plane has a table of its own, and the dimensions are all features.
     by_pattern: bool,
 }
 
@@ -47,28 +46,22 @@ impl Cells {
         }
         let mut dimensions: Vec<(u8, Vec<i32>)> =
             features.into_iter().map(|(feature, cuts)| (feature, cuts.into_iter().collect())).collect();
-        let by_pattern = forest.descriptor == Some(Descriptor::ContactsCurvature);
+        let by_pattern = forest.schema.is_some_and(|schema| schema.is_tabled);
         if by_pattern {
             let mut cuts = |feature| dimensions.iter_mut().find(|(of, _)| *of == feature).map(|(_, cuts)| take(cuts));
-            dimensions = (0..4).map(|feature| (feature, cuts(feature).unwrap_or_default())).collect();
+            dimensions = (0..).zip(0..forest.features).map(|(of, _)| (of, cuts(of).unwrap_or_default())).collect();
         }
+        // Planes are over all features.
+        let planes = forest.schema.map_or(&[][..], |schema| schema.planes);
+        let mut planes: Vec<Vec<Range<usize>>> = match dimensions.len() == forest.features {
+            true => planes.iter().map(|plane| places(plane, &dimensions)).collect(),
+            false => Vec::new(),
+        };
         while dimensions.len() < 2 {
             dimensions.push((0, Vec::new()));
         }
-        let whole: Vec<Range<usize>> = dimensions.iter().map(|(_, cuts)| 0..cuts.len() + 2).collect();
-        let mut planes = vec![whole.clone()];
-        if forest.descriptor == Some(Descriptor::Times) && dimensions.len() == 3 {
-            let missing: Vec<_> = whole.iter().map(|places| places.end - 1..places.end).collect();
-            planes = vec![missing];
-            for first in 0..3 {
-                let zero = dimensions[first].1.partition_point(|&cut| cut <= 0);
-                let mut plane = whole.clone();
-                plane[first] = zero..zero + 1;
-                planes.push(plane);
-            }
-        }
-        if by_pattern {
-            planes = ContactPattern::ALL.map(|pattern| plane(pattern, &dimensions)).into();
+        if planes.is_empty() {
+            planes.push(dimensions.iter().map(|(_, cuts)| 0..cuts.len() + 2).collect());
         }
         let cells = Self { dimensions, planes, by_pattern };
         let count = cells.count().filter(|&count| count <= MAX_CELLS)?;
@@ -87,7 +80,7 @@ impl Cells {
         self.dimensions.len() == 2
     }
 
-    /// True if there is a table for each contact pattern.
+    /// True if there is a table for each plane.
     pub(super) fn is_by_pattern(&self) -> bool {
         self.by_pattern
     }
@@ -137,23 +130,21 @@ impl Cells {
     }
 }
 
-/// The places of the touches with a contact pattern, in the dimensions pattern, κ, slope and pair: a difference of times
-/// exists with the patterns that have it, and with no other.
-fn plane(pattern: ContactPattern, dimensions: &[(u8, Vec<i32>)]) -> Vec<Range<usize>> {
-    let code = i32::from(pattern.code());
-    let is_there = match pattern {
-        ContactPattern::None | ContactPattern::Outer | ContactPattern::Middle => [false; 3],
-        ContactPattern::OuterAndMiddle => [false, false, true],
-        ContactPattern::BothOuter => [false, true, false],
-        ContactPattern::All => [true, true, false],
-    };
-    let (patterns, differences) = (&dimensions[0].1, &dimensions[1..]);
-    let place = patterns.partition_point(|&cut| cut <= code);
-    let places = differences.iter().zip(is_there).map(|((_, cuts), is_there)| {
+/// The places of a plane, along each dimension.
+fn places(plane: &[Occurring], dimensions: &[(u8, Vec<i32>)]) -> Vec<Range<usize>> {
+    let places = |(occurring, (_, cuts)): (&Occurring, &(u8, Vec<i32>))| {
         let missing = cuts.len() + 1;
-        if is_there { 0..missing } else { missing..missing + 1 }
-    });
-    std::iter::once(place..place + 1).chain(places).collect()
+        match occurring {
+            Occurring::Any => 0..missing + 1,
+            Occurring::Known => 0..missing,
+            Occurring::Only(value) => {
+                let place = cuts.partition_point(|cut| cut <= value);
+                place..place + 1
+            }
+            Occurring::Missing => missing..missing + 1,
+        }
+    };
+    plane.iter().zip(dimensions).map(places).collect()
 }
 
 /// Adds `value` to the cells of a plane that lie within all spans.

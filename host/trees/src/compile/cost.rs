@@ -1,6 +1,6 @@
 //! Cost of a compiled model on a chip: instructions, flash, RAM and stack, estimated.
 //!
-//! Instructions are those of one touch, from contact times to margins, by a model of the evaluator. The firmware's
+//! Instructions are those from measurements to margins, by a model of the evaluator. The firmware's
 //! `evaluator` prints the Cortex-M4F figure beside what the emulated chip counts, for ensembles of all shapes, and fails
 //! where the two are more than 15 % apart. The Cortex-M0+ figure is fitted to the same program's counts for thumbv6m
 //! (`onboard/README.md` lists them), within 10 % of each. Flash of the code is that of the firmware's `verdict` image,
@@ -22,7 +22,7 @@ pub enum Core {
     M0Plus,
 }
 
-/// About how many instructions a touch takes, from contact times to margins; right to 15 %.
+/// About how many instructions it takes from measurements to margins; right to 15 %.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Instructions {
     /// On a Cortex-M4F.
@@ -41,7 +41,7 @@ pub struct Memory {
     pub code_flash: usize,
     /// RAM of the opened model and of a recognizer with room for just the model's objects.
     pub ram: usize,
-    /// Stack of a touch with its verdict.
+    /// Stack of margins with their verdict.
     pub stack: usize,
 }
 
@@ -56,12 +56,12 @@ impl Core {
 }
 
 impl Instructions {
-    /// Instructions of a touch in a compiled model, with the steps to a leaf of each tree on average.
+    /// Instructions of the margins of a compiled model, with the steps to a leaf of each tree on average.
     pub fn of_model(model: &Model<'_>) -> Self {
         Self::with_steps(model, on_average)
     }
 
-    /// Instructions of the touch that takes most, if one goes the longest way through every tree.
+    /// The most instructions that margins take, if features lead the longest way through every tree.
     pub fn of_longest_ways(model: &Model<'_>) -> Self {
         Self::with_steps(model, f64::max)
     }
@@ -76,8 +76,8 @@ impl Instructions {
     }
 
     pub(super) fn new(shape: &Shape<'_>) -> Self {
-        let m0_plus = (shape.leaf != LeafType::F32).then(|| M0_PLUS.touch(shape));
-        Self { m4f: M4F.touch(shape), m0_plus }
+        let m0_plus = (shape.leaf != LeafType::F32).then(|| M0_PLUS.margins(shape));
+        Self { m4f: M4F.margins(shape), m0_plus }
     }
 
     /// On a processor.
@@ -132,7 +132,7 @@ fn code_flash(core: Core, model: &Model<'_>) -> usize {
     }
 }
 
-/// Properties of a model that the cost of a touch depends on.
+/// Properties of a model that the cost of margins depends on.
 pub(super) struct Shape<'a> {
     pub(super) layout: Layout,
     pub(super) leaf: LeafType,
@@ -155,7 +155,7 @@ pub(super) fn on_average(left: f64, right: f64) -> f64 {
 /// The costs of the evaluator's parts on one processor, in instructions.
 struct Costs {
     /// Features, clearing, and the base margins; then for each object.
-    touch: (usize, usize),
+    fixed: (usize, usize),
     /// Ranking in an axis of trees.
     axis: usize,
     /// A group of complete trees, or what it has beyond a block of 64.
@@ -191,7 +191,7 @@ struct Leaf {
 }
 
 const M4F: Costs = Costs {
-    touch: (550, 6),
+    fixed: (550, 6),
     axis: 90,
     block: 130,
     shift: 60,
@@ -206,7 +206,7 @@ const M4F: Costs = Costs {
 };
 
 const M0_PLUS: Costs = Costs {
-    touch: (800, 9),
+    fixed: (800, 9),
     axis: 110,
     block: 189,
     shift: 87,
@@ -222,8 +222,8 @@ const M0_PLUS: Costs = Costs {
 };
 
 impl Costs {
-    /// Instructions of a touch.
-    fn touch(&self, shape: &Shape<'_>) -> u64 {
+    /// Instructions of the margins.
+    fn margins(&self, shape: &Shape<'_>) -> u64 {
         let trees = match shape.layout {
             Layout::Grid => return (self.grid.0 + self.grid.1 * shape.objects) as u64,
             Layout::Patterns => return (self.grid.0 + self.patterns + self.grid.1 * shape.objects) as u64,
@@ -240,7 +240,7 @@ impl Costs {
             }
         };
         let axes = if shape.layout == Layout::Wide { 0 } else { shape.axes };
-        (self.touch.0 + self.axis * axes + self.touch.1 * shape.objects + trees) as u64
+        (self.fixed.0 + self.axis * axes + self.fixed.1 * shape.objects + trees) as u64
     }
 
     fn complete_group(&self, group: &Group, shape: &Shape<'_>, shifted: bool) -> usize {

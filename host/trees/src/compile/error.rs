@@ -52,7 +52,7 @@ pub enum CompileProblem {
     },
     /// Thresholds change when they are rounded up to whole numbers.
     #[error(
-        "the ensemble was not trained on whole numbers: the threshold {example} of {feature} is neither whole nor halfway between two, and of {thresholds} thresholds {rounded} stay different when rounded to the whole microseconds or Q15 units of touches"
+        "the ensemble was not trained on whole numbers: the threshold {example} of {feature} is neither whole nor halfway between two, and of {thresholds} thresholds {rounded} stay different when rounded to {whole}"
     )]
     Thresholds {
         /// The feature.
@@ -63,6 +63,13 @@ pub enum CompileProblem {
         rounded: usize,
         /// One that changes.
         example: f32,
+        /// Name of what features are of, numbers that thresholds are rounded to, and units to train in, as in the
+        /// [schema](crate::ensemble::Schema).
+        of: &'static str,
+        /// See `of`.
+        whole: &'static str,
+        /// See `of`.
+        units: &'static str,
     },
     /// The ensemble does not fit the layout that was asked for.
     #[error("the ensemble does not fit the layout {}: {}", layout.name(), limit(*layout))]
@@ -121,8 +128,10 @@ impl Problem for CompileProblem {
                 "Margins are log-probabilities, and a few dozen nats already mean certainty: train it again, or check the program that wrote it."
             }
             Self::Features { .. } => "Train on the features that matter, at most 256.",
-            Self::Thresholds { .. } => {
-                "Train on features in whole units: times in microseconds, direction cosines times 32767. If it is not a model of touches, remove its attribute palpate_descriptor: then its features are compared as they are."
+            Self::Thresholds { of, units, .. } => {
+                return format!(
+                    "Train on features in whole units: {units}. If it is not a model of {of}, remove its attribute palpate_descriptor: then its features are compared as they are."
+                );
             }
             Self::DoesNotFit { .. } => "Choose another layout, or leave the choice to the compiler (auto).",
             Self::FitsNoLayout | Self::TooLarge | Self::OverBudget { .. } => "Train fewer trees, or trees with fewer splits.",

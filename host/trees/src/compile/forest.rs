@@ -1,8 +1,7 @@
 //! An ensemble that was checked, with thresholds as the integers that the chip compares.
 
-use crate::ensemble::{Ensemble, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Output, Threshold, Tree, check_leaf};
+use crate::ensemble::{Ensemble, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Output, Schema, Threshold, Tree, check_leaf};
 use crate::error::{CompileProblem, Error, Result, TreeProblem};
-use palpate_shared::Descriptor;
 use palpate_shared::format::{Key, f32_key};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -20,7 +19,7 @@ pub(super) struct Forest<'a> {
     pub(super) trees: Vec<Branches<'a>>,
     pub(super) features: usize,
     pub(super) key: Key,
-    pub(super) descriptor: Option<Descriptor>,
+    pub(super) schema: Option<Schema>,
 }
 
 /// A tree of a checked ensemble.
@@ -88,11 +87,11 @@ impl<'a> Forest<'a> {
             trees,
             features,
             key: thresholds.key(),
-            descriptor: ensemble.descriptor(),
+            schema: ensemble.schema().copied(),
         };
         forest.check_range()?;
-        if let Some(descriptor) = forest.descriptor {
-            check_thresholds(ensemble, descriptor)?;
+        if let Some(schema) = &forest.schema {
+            check_thresholds(ensemble, schema)?;
         }
         Ok(forest)
     }
@@ -139,7 +138,7 @@ impl<'a> Forest<'a> {
             let range = self.range(object);
             if range.is_nan() || range > MARGIN_RANGE {
                 let largest = self.trees.iter().map(|tree| tree.largest).fold(self.base[object].abs(), f32::max);
-                let kind = if self.descriptor.is_some() { "object" } else { "class" };
+                let kind = if self.schema.is_some() { "object" } else { "class" };
                 let of = format!("the {kind} {}", self.names.get(object).map_or("", String::as_str));
                 return Err(CompileProblem::MarginRange { of, range, largest, most: MARGIN_RANGE }.into());
             }
@@ -243,7 +242,7 @@ impl<'a> Thresholds<'a> {
     fn new(inputs: &Inputs, scales: Option<&'a [f32]>) -> Result<Self> {
         let features = inputs.count();
         match (inputs, scales) {
-            (Inputs::Touches(_), None) => Ok(Self::Whole),
+            (Inputs::Computed(_), None) => Ok(Self::Whole),
             (Inputs::Rows(_), None) => Ok(Self::Real),
             (Inputs::Rows(_), Some(scales))
                 if scales.len() == features && scales.iter().all(|scale| scale.is_finite() && *scale > 0.0) =>
@@ -253,7 +252,7 @@ impl<'a> Thresholds<'a> {
             (_, Some(scales)) => {
                 let text = scales.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
                 let allowed = match inputs {
-                    Inputs::Touches(_) => "none: features of touches are whole numbers".to_owned(),
+                    Inputs::Computed(schema) => format!("none: features of {} are whole numbers", schema.of),
                     Inputs::Rows(_) => format!("{features} positive numbers, one for each feature"),
                 };
                 Err(Error::setting("scales", text, allowed))
@@ -316,8 +315,8 @@ pub(super) fn each_leaf<'f>(branch: &'f Branch<'f>, see: &mut impl FnMut(&'f [f3
 /// Refuses an ensemble that was trained on fractions, such as times in seconds: its thresholds move when they become
 /// whole numbers. Trainers put thresholds at values of the data, which are whole, or halfway between two; and XGBoost's
 /// outermost ones at twice a value and 1e-5 more.
-fn check_thresholds(ensemble: &Ensemble, descriptor: Descriptor) -> Result<()> {
-    for (feature, &name) in descriptor.feature_names().iter().enumerate() {
+fn check_thresholds(ensemble: &Ensemble, schema: &Schema) -> Result<()> {
+    for (feature, &name) in schema.features.iter().enumerate() {
         let splits = ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(|node| match *node {
             Node::Split { feature: own, threshold, .. } if own == feature => Some(threshold),
             _ => None,
@@ -331,7 +330,9 @@ fn check_thresholds(ensemble: &Ensemble, descriptor: Descriptor) -> Result<()> {
                 .map(|&threshold| Thresholds::Whole.cut(feature, threshold, Threshold::below(threshold.into())));
             let rounded = whole.collect::<BTreeSet<_>>().len();
             let thresholds = thresholds.len();
-            return Err(CompileProblem::Thresholds { feature: name, thresholds, rounded, example }.into());
+            let Schema { of, whole, units, .. } = *schema;
+            let problem = CompileProblem::Thresholds { feature: name, thresholds, rounded, example, of, whole, units };
+            return Err(problem.into());
         }
     }
     Ok(())

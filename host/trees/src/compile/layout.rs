@@ -215,7 +215,7 @@ pub(super) fn code_with_early_exit(
     }
 }
 
-/// Instructions of a touch in a layout that walks trees.
+/// Instructions of the margins in a layout that walks trees.
 fn instructions(layout: Layout, leaf: LeafType, objects: usize, parts: &Parts) -> Instructions {
     let Parts { axes, groups, nodes, shared, .. } = parts;
     let is_shared = shared.is_some();

@@ -9,18 +9,18 @@
 //!
 //! ```
 //! use palpate_trees::compile::{self, compile};
-//! use palpate_trees::ensemble::{Ensemble, Node, Origin, Output, Tree};
-//! use palpate_shared::{Descriptor, Touch};
+//! use palpate_trees::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
+//! use palpate_trees::rows::Encoder;
 //!
 //! # fn main() -> palpate_trees::Result<()> {
-//! // One split at a curvature of 50 ms: flatter is a bowl, more curved a fork.
+//! // One split: narrow things are forks, wide ones bowls.
 //! let nodes = vec![
-//!     Node::Split { feature: 0, threshold: 50_000.0, missing_left: true, left: 1, right: 2 },
-//!     Node::Leaf(vec![0.5, -0.5]),
+//!     Node::Split { feature: 0, threshold: 50.0, missing_left: true, left: 1, right: 2 },
 //!     Node::Leaf(vec![-0.5, 0.5]),
+//!     Node::Leaf(vec![0.5, -0.5]),
 //! ];
 //! let ensemble = Ensemble {
-//!     inputs: Descriptor::Curvature.into(),
+//!     inputs: Inputs::Rows(vec!["width".into()]),
 //!     objects: vec!["bowl".into(), "fork".into()],
 //!     base_margins: vec![0.0; 2],
 //!     trees: vec![Tree { nodes, output: Output::Each }],
@@ -29,8 +29,8 @@
 //! let compiled = compile(&ensemble, &compile::Settings::default())?;
 //! let model = compile::open(&compiled.bytes)?;
 //! let mut margins = [0; 2];
-//! model.margins(&Touch::from_micros([0, 0, 80_000]), &mut margins);
-//! assert!(margins[1] > margins[0]);
+//! model.margins_of(&Encoder::of(&model).row(&[80.0]), &mut margins);
+//! assert!(margins[0] > margins[1]);
 //! # Ok(())
 //! # }
 //! ```
@@ -39,6 +39,7 @@ mod axes;
 mod budget;
 mod cells;
 pub mod code;
+mod container;
 mod cost;
 mod early;
 mod emit;
@@ -61,13 +62,14 @@ mod trees;
 mod write;
 
 pub use budget::compile_within;
+pub use container::OwnedSection;
 pub use cost::{Core, Instructions, Memory};
 pub use early::{EarlyExit, EarlyExitFound};
 pub use emit::{Language, emit, emit_code};
 pub use error::CompileProblem;
 pub use groups::{ends_of_walks, leaves_of_trees};
 pub use merge::Source;
-pub use model::{CompiledModel, longest_time, names, open, open_with_code};
+pub use model::{CompiledModel, names, open, open_with_code, thresholds};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
 pub use share::{different_leaves, unshared};
@@ -78,7 +80,6 @@ use cells::Cells;
 use code::{Form, Program, Statements};
 use forest::Forest;
 use palpate_onboard::Stopping;
-use palpate_shared::format::{TrainedNoise, TrainedProbe};
 
 /// Settings of compilation.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,7 +95,7 @@ pub struct Settings {
     pub shared_leaves: Option<bool>,
     /// The error rate that recognizers stop at unless told otherwise: above 0, below 0.5.
     pub error_rate: f64,
-    /// The touches after which they give up.
+    /// Steps after which they give up.
     pub max_touches: u32,
     /// Prior probability of each object, in any common unit; `None` makes all equal.
     pub priors: Option<Vec<f64>>,
@@ -105,32 +106,25 @@ pub struct Settings {
     pub scales: Option<Vec<f32>>,
     /// For classes of rows: walks for a class alone end where the class is known. Nothing else changes.
     pub early_exit: Option<EarlyExit>,
-    /// For an ensemble over touches: what the model states of them. The crate `palpate` fills it in from the ensemble.
+    /// Statements of whoever defines the features. The crate `palpate` fills them in from the ensemble.
     pub stated: Stated,
 }
 
-/// Statements of a model over touches about the touches that it was trained on; it changes no margin.
+/// Statements that a model carries and no tree depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stated {
-    /// Distance between neighboring fingers, in the probe's unit.
+    /// The header's spacing.
     pub spacing: f32,
-    /// Speed of an approach, in units per second.
+    /// The header's speed.
     pub speed: f32,
-    /// The probe, where it is known.
-    pub probe: Option<TrainedProbe>,
-    /// Noise added to the touches in training.
-    pub noise: Option<TrainedNoise>,
-    /// The capture that made the touches: the content of the section [`Tag::Capture`](palpate_shared::format::Tag::Capture).
-    pub capture: Option<Vec<u8>>,
-    /// For each output the number of its object, and its share of the object's prior, where several belong to one: the content
-    /// of the section [`Tag::Outputs`](palpate_shared::format::Tag::Outputs).
-    pub outputs: Option<Vec<(u8, f64)>>,
+    /// Optional sections.
+    pub sections: Vec<OwnedSection>,
 }
 
-/// The published probe: a spacing of 1.5, and 10 units per second.
+/// A spacing of 1.5, and a speed of 10.
 impl Default for Stated {
     fn default() -> Self {
-        Self { spacing: 1.5, speed: 10.0, probe: None, noise: None, capture: None, outputs: None }
+        Self { spacing: 1.5, speed: 10.0, sections: Vec::new() }
     }
 }
 
@@ -151,19 +145,6 @@ impl Default for Settings {
         }
     }
 }
-
-impl Settings {
-    /// The defaults for a model of touches of this number of objects: leaves of one byte for more than [`MANY`] objects,
-    /// where nearly all of a model is leaves, and two bytes for fewer.
-    pub fn for_touches(objects: usize) -> Self {
-        let leaf = if objects > MANY { Leaf::I8 } else { Leaf::I16 };
-        Self { leaf, ..Self::default() }
-    }
-}
-
-/// Models of more objects than this are usually compiled with leaves of one byte: `docs/measurements/growth.md`
-/// has what that saves and what it costs.
-pub const MANY: usize = 50;
 
 /// Goal of the choice of a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -189,7 +170,7 @@ pub struct Candidate {
     pub shared_leaves: bool,
     /// Bytes of the model, and of the code beside it.
     pub bytes: usize,
-    /// About how many instructions a touch takes.
+    /// About how many instructions the margins take.
     pub instructions: Instructions,
     /// The farthest that a margin can be from the ensemble's, in nats.
     pub margin_error: f32,
@@ -215,7 +196,7 @@ pub struct Compiled {
     pub layout: Layout,
     /// Number of different leaves in the table, if equal ones are stored once.
     pub shared_leaves: Option<usize>,
-    /// About how many instructions a touch takes.
+    /// About how many instructions the margins take.
     pub instructions: Instructions,
     /// All layouts that were tried.
     pub candidates: Vec<Candidate>,
@@ -237,7 +218,7 @@ pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
         .ok_or_else(|| Error::setting("error_rate", error_rate, "a number of at least 1e-15 and below 0.5"))
 }
 
-/// Compiles an ensemble. The model states the probe of the settings.
+/// Compiles an ensemble.
 ///
 /// # Errors
 /// [`CompileProblem`] for an ensemble that contradicts itself, has leaves that are not finite or too large, thresholds
@@ -338,8 +319,8 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
 fn check_early_exit(ensemble: &Ensemble, settings: &Settings) -> Result<()> {
     let why = if settings.early_exit.is_none() {
         return Ok(());
-    } else if ensemble.descriptor().is_some() {
-        "none with a model of touches, whose recognizer takes all margins"
+    } else if let Some(schema) = ensemble.schema() {
+        &format!("none with a model of {}, whose recognizer takes all margins", schema.of)
     } else if ensemble.objects.len() < 2 {
         "none with a model of one output, which has no class"
     } else if settings.leaf == Leaf::F32 {

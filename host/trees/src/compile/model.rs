@@ -113,22 +113,8 @@ pub fn names(model: &Model<'_>) -> Vec<String> {
     (0..model.object_count()).map(|object| model.object_name(object).to_owned()).collect()
 }
 
-/// The longest time between two contacts that a model's touches can plausibly have, in seconds; for finding times in
-/// another unit.
-///
-/// A model states its probe's spacing and speed. An object of at most 10 units on its longest side has a diagonal of at
-/// most 10·√3, so that no contact comes later than (10·√3 + 2 · spacing) / speed after the first, and no feature of a
-/// full touch is larger than twice that. A model with thresholds beyond was trained on larger objects, and takes up to
-/// four times its largest threshold.
-pub fn longest_time(model: &Model<'_>) -> f64 {
-    let header = model.header();
-    let of_ten_units = (10.0 * 3.0_f64.sqrt() + 2.0 * f64::from(header.spacing())) / f64::from(header.speed());
-    let largest = thresholds(model).iter().fold(0.0_f64, |most, cut| most.max(f64::from(cut.unsigned_abs()) * 1e-6));
-    if largest > 2.0 * of_ten_units { 4.0 * largest } else { of_ten_units }
-}
-
-/// The thresholds of all features together.
-fn thresholds(model: &Model<'_>) -> Vec<i32> {
+/// The thresholds of all features together, as the chip compares them.
+pub fn thresholds(model: &Model<'_>) -> Vec<i32> {
     let header = model.header();
     let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
     let base_start = HEADER_LENGTH + length(header.text_length()) + length(header.optional_length());

@@ -1,7 +1,8 @@
 //! The parts of a compiled model, before they are written.
 
+use super::container::OwnedSection;
 use super::cost::Instructions;
-use palpate_shared::format::{Axis, EarlyExit, Group, HEADER_LENGTH, Tag, write_section};
+use palpate_shared::format::{Axis, EarlyExit, Group, HEADER_LENGTH, SECTION_HEADER_LENGTH, Tag};
 
 /// Parts of a layout of a forest.
 #[derive(Clone)]
@@ -23,29 +24,31 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// The optional section with the values of leaves; nothing if there is none.
-    pub(super) fn section(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        if let Some(content) = &self.shared {
-            write_section(Tag::SharedLeaves, true, content, &mut |part| bytes.extend_from_slice(part));
-        }
-        bytes
+    /// The optional section with the values of leaves, and that with the places where walks may end.
+    pub(super) fn sections(&self) -> impl Iterator<Item = OwnedSection> {
+        let shared = self.shared.as_ref().map(|content| OwnedSection::new(Tag::SharedLeaves, true, content.clone()));
+        let exits: Vec<u8> = self.exits.iter().flat_map(|exit| exit.to_bytes()).collect();
+        // Whoever does not know it walks on.
+        let exits = (!exits.is_empty()).then(|| OwnedSection::new(Tag::EarlyExit, false, exits));
+        shared.into_iter().chain(exits)
     }
 
-    /// The optional section with the places where walks may end; nothing if there are none.
-    pub(super) fn exits_section(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        if !self.exits.is_empty() {
-            let content: Vec<u8> = self.exits.iter().flat_map(|exit| exit.to_bytes()).collect();
-            // Whoever does not know it walks on.
-            write_section(Tag::EarlyExit, false, &content, &mut |part| bytes.extend_from_slice(part));
-        }
+    /// Trees or a table, as the chip reads them.
+    pub(super) fn content(&self, priors: &[i32]) -> Vec<u8> {
+        let mut bytes: Vec<u8> = self.base.iter().chain(priors).flat_map(|number| number.to_le_bytes()).collect();
+        bytes.extend(self.axes.iter().flat_map(|axis| axis.to_bytes()));
+        bytes.extend(&self.cuts);
+        bytes.extend(self.groups.iter().flat_map(|group| group.to_bytes()));
+        bytes.extend(&self.nodes);
+        bytes.extend(&self.leaves);
         bytes
     }
 
     /// Bytes of the model, except its text and the parts that all layouts share.
     pub(super) fn bytes(&self) -> usize {
         let records = Axis::LENGTH * self.axes.len() + Group::LENGTH * self.groups.len() + 8 * self.base.len();
-        HEADER_LENGTH + records + self.cuts.len() + self.nodes.len() + self.leaves.len() + self.section().len()
+        let shared = |content: &Vec<u8>| SECTION_HEADER_LENGTH + content.len().next_multiple_of(4);
+        let shared = self.shared.as_ref().map_or(0, shared);
+        HEADER_LENGTH + records + self.cuts.len() + self.nodes.len() + self.leaves.len() + shared
     }
 }

@@ -10,7 +10,7 @@ const SMALL: f64 = 1.0 / 16.0;
 /// The ensemble with margins that a model can hold, if it is a regression over rows: its scale makes them what they were.
 pub(super) fn scaled(ensemble: &Ensemble) -> Cow<'_, Ensemble> {
     let is_value = ensemble.objects.len() == 1 || ensemble.prediction().targets;
-    let is_regression = ensemble.descriptor().is_none() && is_value;
+    let is_regression = ensemble.schema().is_none() && is_value;
     let range = range(ensemble);
     if !is_regression || !range.is_finite() || range == 0.0 || (SMALL..=MARGIN_RANGE).contains(&range) {
         return Cow::Borrowed(ensemble);

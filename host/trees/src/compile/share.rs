@@ -1,12 +1,11 @@
 //! Equal leaves once: what stands for a leaf is its number in a table.
 
+use super::container::Container;
 use super::groups::leaves_of_trees;
 use super::parts::Parts;
 use crate::error::Result;
 use palpate_onboard::Model;
-use palpate_shared::format::{
-    CHECKSUM_LENGTH, Group, HEADER_LENGTH, HeaderBuilder, LeafType, SharedLeaves, Tag, checksum,
-};
+use palpate_shared::format::{Group, LeafType, SharedLeaves, Tag};
 use std::collections::HashMap;
 
 /// The most leaves that two bytes number.
@@ -53,35 +52,24 @@ pub(super) fn share(parts: &Parts, leaf: LeafType, objects: usize) -> Option<Par
 /// [`CompileProblem`](crate::error::CompileProblem) for more than 4 GB.
 pub fn unshared(model: &Model<'_>) -> Result<Option<Vec<u8>>> {
     let Some(shared) = model.shared_leaves() else { return Ok(None) };
-    let (bytes, header) = (model.bytes(), model.header());
-    let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
-    let end = bytes.len() - CHECKSUM_LENGTH;
-    let numbers = &bytes[end - length(header.leaves_length())..end];
+    let mut container = Container::of(model);
+    let length = usize::try_from(model.header().leaves_length()).unwrap_or(usize::MAX);
+    let numbers = container.content.split_off(container.content.len() - length);
     let mut leaves = Vec::new();
     let mut index = 0;
     for (group, trees) in leaves_of_trees(model) {
         let values = if group.object.is_some() { 1 } else { model.object_count() };
         let length = values * model.leaf_type().size();
         for _ in 0..trees.into_iter().sum() {
-            let start = usize::from(shared.number(numbers, index)) * length;
+            let start = usize::from(shared.number(&numbers, index)) * length;
             leaves.extend_from_slice(&shared.values()[start..start + length]);
             index += 1;
         }
     }
-    let text_end = HEADER_LENGTH + length(header.text_length());
-    let mut sections = Vec::new();
-    let others = model.optional_sections().filter(|section| section.tag != Tag::SharedLeaves.code());
-    others.for_each(|section| section.write(&mut |part| sections.extend_from_slice(part)));
-    let rest = &bytes[text_end + length(header.optional_length())..end - numbers.len()];
-    let mut all = [&bytes[..text_end], &sections, rest, &leaves].concat();
-    let header = HeaderBuilder::from(header)
-        .with_length(super::write::count(all.len() + CHECKSUM_LENGTH)?)
-        .with_sections(super::write::count(sections.len())?)
-        .with_leaves_length(super::write::count(leaves.len())?);
-    all[..HEADER_LENGTH].copy_from_slice(header.bytes());
-    let sum = checksum(&all);
-    all.extend(sum.to_le_bytes());
-    Ok(Some(all))
+    container.header = container.header.with_leaves_length(super::write::count(leaves.len())?);
+    container.sections.retain(|section| section.tag != Tag::SharedLeaves.code());
+    container.content.extend(leaves);
+    Ok(Some(container.bytes()?))
 }
 
 /// Number of leaves in a model's table; `None` if its leaves are where they belong. Where some have one value and some

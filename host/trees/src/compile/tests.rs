@@ -1,9 +1,8 @@
 use super::*;
-use crate::ensemble::{Inputs, Node, Origin, Output, Tree};
+use crate::ensemble::{Inputs, Node, Origin, Output, Tree, computed};
 use crate::error::{Setting, TreeProblem};
 use palpate_onboard::ModelError;
-use palpate_shared::format::Length;
-use palpate_shared::{ContactTime, Descriptor, Touch};
+use palpate_shared::{Descriptor, MISSING_FEATURE};
 
 fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
     Node::Split { feature, threshold, missing_left: true, left, right }
@@ -16,7 +15,7 @@ fn leaf(values: &[f32]) -> Node {
 /// An ensemble of two objects over these trees, whose leaves have a value for each.
 fn ensemble(descriptor: Descriptor, trees: Vec<Vec<Node>>) -> Ensemble {
     Ensemble {
-        inputs: descriptor.into(),
+        inputs: computed(descriptor).into(),
         objects: vec!["bowl".into(), "fork".into()],
         base_margins: vec![0.0; 2],
         trees: trees.into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
@@ -131,7 +130,7 @@ fn the_stated_margin_error_is_what_rounding_does_and_no_more() {
             let mut worst = 0.0_f64;
             for (curvature, leaf) in [(0, leaves[0]), (500, leaves[1])] {
                 let mut margins = [0; 2];
-                model.margins(&Touch::from_micros([0, 0, curvature]), &mut margins);
+                model.margins_of(&[curvature, curvature], &mut margins);
                 for (margin, value) in margins.into_iter().zip(leaf) {
                     worst = worst.max((f64::from(margin) * f64::from(model.unit()) - f64::from(value)).abs());
                 }
@@ -176,22 +175,10 @@ fn the_header_says_what_was_compiled() {
     // Which ensemble it was, wherever that came from.
     let hash = |ensemble: &Ensemble| open(&compile(ensemble, &settings).unwrap().bytes).unwrap().header().ensemble();
     let first = hash(&ensemble);
-    ensemble.origin.attributes.insert("palpate_touches".into(), "{}".into());
+    ensemble.origin.attributes.insert("palpate_other".into(), "{}".into());
     assert_eq!(hash(&ensemble), first);
     ensemble.base_margins[0] = 0.25;
     assert_ne!(hash(&ensemble), first);
-}
-
-#[test]
-fn a_model_states_the_probe_of_its_touches_and_the_published_one_only_where_none_is_known() {
-    let ensemble = stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]);
-    let header = |stated: Stated| {
-        let compiled = compile(&ensemble, &Settings { stated, ..Settings::default() }).unwrap();
-        let model = open(&compiled.bytes).unwrap();
-        (model.header().spacing(), model.header().speed())
-    };
-    assert_eq!(header(Stated::default()), (1.5, 10.0));
-    assert_eq!(header(Stated { spacing: 2.0, speed: 25.0, ..Stated::default() }), (2.0, 25.0));
 }
 
 #[test]
@@ -253,7 +240,7 @@ fn settings_out_of_range_are_refused_by_name() {
     assert_eq!(setting(&Settings { max_touches: 0, ..Settings::default() }), "max_touches");
     assert_eq!(setting(&Settings { priors: Some(vec![1.0]), ..Settings::default() }), "priors");
     assert_eq!(setting(&Settings { priors: Some(vec![1.0, 0.0]), ..Settings::default() }), "priors");
-    // Touches are whole numbers already, and a row has a scale for each feature.
+    // Features that a model computes are whole numbers already, and a row has a scale for each feature.
     assert_eq!(setting(&Settings { scales: Some(vec![1.0, 1.0]), ..Settings::default() }), "scales");
 }
 
@@ -264,7 +251,9 @@ fn thresholds_that_fall_together_when_rounded_are_refused_by_their_feature() {
         .map(|number| vec![split(0, number as f32 * 0.05 - 0.2, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])])
         .collect();
     let problem = refusal(&ensemble(Descriptor::Curvature, seconds.clone()), &Settings::default());
-    assert_eq!(problem, CompileProblem::Thresholds { feature: "curvature", thresholds: 9, rounded: 2, example: -0.2 });
+    let (of, whole, units) = ("things", "whole units", "units");
+    let (feature, thresholds, rounded, example) = ("curvature", 9, 2, -0.2);
+    assert_eq!(problem, CompileProblem::Thresholds { feature, thresholds, rounded, example, of, whole, units });
     // Rows of features are compared as they are, fractions and all.
     let rows = Ensemble { inputs: Inputs::unnamed(2), ..ensemble(Descriptor::Curvature, seconds) };
     compile(&rows, &Settings { leaf: Leaf::F32, ..Settings::default() }).unwrap();
@@ -300,141 +289,6 @@ fn a_compiled_model_opens_in_one_place_and_says_what_is_wrong_at_which_byte() {
 }
 
 #[test]
-fn estimates_from_a_models_bytes_are_those_of_its_compilation() {
-    let trees: Vec<Vec<Node>> = (1..8).map(|splits| chain(splits, |number| number % 2)).collect();
-    let many: Vec<Vec<Node>> = (1..8).map(|splits| chain(splits, |number| number % 8)).collect();
-    let mut seen = std::collections::HashSet::new();
-    let some: Vec<Vec<Node>> = (1..8).map(|splits| chain(splits, |number| number % 4)).collect();
-    let kinds = [(Descriptor::Curvature, trees), (Descriptor::Oriented, many), (Descriptor::ContactsCurvature, some)];
-    for (descriptor, trees) in kinds {
-        let ensemble = ensemble(descriptor, trees);
-        for &layout in Layout::OF_DATA {
-            for kind in [Leaf::I8, Leaf::I16, Leaf::F32] {
-                let Ok(compiled) = compile(&ensemble, &with(Some(layout), kind)) else { continue };
-                let model = open(&compiled.bytes).unwrap();
-                assert_eq!(Instructions::of_model(&model), compiled.instructions, "{layout:?} {kind:?}");
-                seen.insert(layout);
-            }
-        }
-    }
-    assert_eq!(seen.len(), 5);
-}
-
-#[test]
-fn what_is_read_from_a_model_is_found_behind_its_optional_sections() {
-    let trees = (1..8).map(|splits| chain(splits, |number| number % 2)).collect();
-    let ensemble = ensemble(Descriptor::Curvature, trees);
-    let probe = TrainedProbe {
-        radius: 0.15,
-        spacing: 1.5,
-        speed: 10.0,
-        length: Length::Tenth,
-        stroke: None,
-        travel: None,
-        cone: 0,
-        stroke_tolerance: None,
-    };
-    for &layout in Layout::OF_DATA {
-        let compiled = |probe| {
-            let stated = Stated { probe, ..Stated::default() };
-            compile(&ensemble, &Settings { stated, ..with(Some(layout), Leaf::I16) })
-        };
-        let [Ok(plain), Ok(stated)] = [None, Some(probe)].map(compiled) else {
-            continue;
-        };
-        assert!(stated.bytes.len() > plain.bytes.len());
-        let [plain, stated] = [&plain, &stated].map(|compiled| open(&compiled.bytes).unwrap());
-        assert_eq!(Instructions::of_model(&stated), Instructions::of_model(&plain), "{layout:?}");
-        assert_eq!(longest_time(&stated), longest_time(&plain), "{layout:?}");
-    }
-}
-
-/// A tree over patterns and differences: a chain of splits, with a missing value to either side in turn.
-fn chain_over_patterns(splits: usize, tree: usize) -> Vec<Node> {
-    let mut nodes = Vec::new();
-    for number in 0..splits {
-        let feature = (number + tree) % 4;
-        let threshold = if feature == 0 { (number % 6) as f32 } else { 500.0 * (number + tree) as f32 - 2_000.0 };
-        let (left, right) = (2 * number + 1, 2 * number + 2);
-        nodes.push(Node::Split { feature, threshold, missing_left: number % 3 == 0, left, right });
-        nodes.push(leaf(&[0.5 - 0.015_625 * number as f32, 0.25 * (tree % 3) as f32]));
-    }
-    nodes.push(leaf(&[-0.5, 0.5]));
-    nodes
-}
-
-/// Touches of every contact pattern, at thresholds of `chain_over_patterns` and elsewhere.
-fn touches_of_every_pattern() -> Vec<Touch> {
-    let some = ContactTime::from_micros;
-    let times = [0, 1, 499, 500, 999, 1_000, 1_500, 2_999, 7_000, 40_000].map(some);
-    let mut touches = vec![];
-    for fingers in 0..8 {
-        for first in times {
-            for last in times {
-                let of = |finger: u32, time| if fingers >> finger & 1 == 1 { time } else { ContactTime::MISSING };
-                touches.push(Touch::new([of(0, first), of(1, some(0)), of(2, last)]));
-            }
-        }
-    }
-    touches
-}
-
-#[test]
-fn tables_by_contact_pattern_give_the_ensembles_margins_for_touches_of_every_pattern() {
-    for splits in [1, 7, 30] {
-        let trees = (0..12).map(|tree| chain_over_patterns(splits, tree)).collect();
-        let ensemble = ensemble(Descriptor::ContactsCurvature, trees);
-        let [table, trees] = [Layout::Patterns, Layout::Compact]
-            .map(|layout| compile(&ensemble, &with(Some(layout), Leaf::I16)).unwrap());
-        // Leaves are whole multiples of a power of two: nothing is rounded in 16 bits.
-        assert_eq!((table.margin_error, trees.margin_error), (0.0, 0.0));
-        let bytes = compile(&ensemble, &with(Some(Layout::Patterns), Leaf::I8)).unwrap();
-        assert!(bytes.margin_error < 0.1, "{}", bytes.margin_error);
-        let floats = compile(&ensemble, &with(Some(Layout::Patterns), Leaf::F32)).unwrap();
-        for touch in touches_of_every_pattern() {
-            let full = ensemble.margins(&touch);
-            for compiled in [&table, &trees, &bytes, &floats] {
-                let model = open(&compiled.bytes).unwrap();
-                let mut margins = vec![0; full.len()];
-                assert!(model.margins(&touch, &mut margins));
-                for (full, margin) in full.iter().zip(margins) {
-                    let error = (f64::from(*full) - f64::from(margin) * f64::from(model.unit())).abs();
-                    assert!(error <= f64::from(compiled.margin_error), "{error} for {touch:?}, {:?}", compiled.layout);
-                }
-            }
-        }
-    }
-}
-
-#[test]
-fn a_table_for_each_contact_pattern_has_no_cell_that_no_touch_reaches() {
-    // Thresholds: the pattern's below 3 and below 5, three of κ, two of slope and one of pair.
-    let cuts = [(0, 3.0), (0, 5.0), (1, -7.0), (1, 0.0), (1, 9.0), (2, 4.0), (2, 8.0), (3, 2.0)];
-    let trees = cuts.map(|(feature, cut)| vec![split(feature, cut, 1, 2), leaf(&[0.5, 0.25]), leaf(&[-0.5, 0.125])]);
-    let ensemble = ensemble(Descriptor::ContactsCurvature, trees.into());
-    let compiled = compile(&ensemble, &with(Some(Layout::Patterns), Leaf::I16)).unwrap();
-    let model = open(&compiled.bytes).unwrap();
-    assert_eq!(model.header().leaves_length(), 2 * 2 * (3 + 2 + 3 + 4 * 3));
-    // Full touches are not what it is for, nor rows of features.
-    let problem = CompileProblem::DoesNotFit { layout: Layout::Patterns };
-    let rows = Ensemble { inputs: Inputs::unnamed(4), ..ensemble };
-    assert_eq!(refusal(&rows, &with(Some(Layout::Patterns), Leaf::I16)), problem);
-    assert_eq!(refusal(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), &with(Some(Layout::Patterns), Leaf::I16)), problem);
-}
-
-#[test]
-fn the_longest_time_is_that_of_ten_units_or_follows_larger_thresholds() {
-    let longest = |threshold: f32, layout| {
-        let compiled = compile(&stump(threshold, [[1.0, -1.0], [-1.0, 1.0]]), &with(Some(layout), Leaf::I16)).unwrap();
-        longest_time(&open(&compiled.bytes).unwrap())
-    };
-    for layout in [Layout::Compact, Layout::Wide, Layout::Grid] {
-        assert!((longest(500_000.0, layout) - (10.0 * 3.0_f64.sqrt() + 3.0) / 10.0).abs() < 1e-9);
-        assert!((longest(-16_000_000.0, layout) - 64.0).abs() < 1e-9, "{}", longest(-16_000_000.0, layout));
-    }
-}
-
-#[test]
 fn what_fits_a_budget_is_as_exact_as_there_is_room_for() {
     let leaf_of = |compiled: &Compiled| open(&compiled.bytes).unwrap().leaf_type();
     let trees = (0..40).map(|i| vec![split(0, 10.0 * i as f32, 1, 2), leaf(&[0.7, -0.3]), leaf(&[-0.123, 0.456])]);
@@ -454,7 +308,7 @@ fn what_fits_a_budget_is_as_exact_as_there_is_room_for() {
     assert_eq!(problem, Some(over));
 }
 
-/// Trees of three splits over the oriented touch's features, whose leaves are taken from the start of a sequence.
+/// Trees of three splits over eight features, whose leaves are taken from the start of a sequence.
 fn few_leaves(trees: usize, different: usize) -> Ensemble {
     let values = |number: usize| leaf(&[(number % different) as f32 / 1024.0, -((number % different) as f32) / 2048.0]);
     let tree = |tree: usize| {
@@ -480,9 +334,11 @@ fn equal_leaves_stand_once_where_that_is_smaller_and_give_the_same_margins() {
             assert_eq!(unshared(&model).unwrap().unwrap(), plain.bytes);
             assert_eq!(unshared(&open(&plain.bytes).unwrap()).unwrap(), None);
             let mut margins = [[0; 2]; 2];
-            for touch in (0..50).map(|at| Touch::from_micros([1_900 * at, 0, 700 * at])) {
-                open(&plain.bytes).unwrap().margins(&touch, &mut margins[0]);
-                model.margins(&touch, &mut margins[1]);
+            for at in 0..50 {
+                let mut row = [MISSING_FEATURE; 8];
+                row[..2].copy_from_slice(&[2_600 * at, 1_200 * at]);
+                open(&plain.bytes).unwrap().margins_of(&row, &mut margins[0]);
+                model.margins_of(&row, &mut margins[1]);
                 assert_eq!(margins[0], margins[1]);
             }
         }

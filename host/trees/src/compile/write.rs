@@ -1,6 +1,7 @@
-//! The bytes, in the order of `FORMAT.md`.
+//! Header and sections of a model of trees or tables.
 
 use super::Settings;
+use super::container::{Container, OwnedSection, bytes_of};
 use super::forest::Forest;
 use super::parts::Parts;
 use crate::ensemble::{Ensemble, Node, Output};
@@ -8,8 +9,7 @@ use crate::error::{CompileProblem, Error, Result};
 use crate::rows::whole;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{
-    CHECKSUM_LENGTH, HeaderBuilder, Layout, Outputs, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained,
-    checksum, f32_key, write_section,
+    CHECKSUM_LENGTH, HeaderBuilder, Layout, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, f32_key,
 };
 
 /// The model's bytes; `hash` is that of the ensemble as it was read.
@@ -22,36 +22,12 @@ pub(super) fn write(
     layout: Layout,
     parts: &Parts,
 ) -> Result<Vec<u8>> {
-    let mut text = text(ensemble)?;
     let priors = priors(settings, forest.objects(), parts.unit)?;
     let (unit_bits, unit_shift) = unit_bits(parts.unit);
-    // In the order of the tags.
-    let optional = [
-        optional(ensemble, settings, forest)?,
-        parts.section(),
-        of_rows(ensemble, settings),
-        captured(ensemble, settings),
-        parts.exits_section(),
-        outputs(settings),
-        columns(ensemble),
-    ]
-    .concat();
-    let records = 4 * parts.axes.len() + 8 * parts.groups.len() + 8 * forest.objects();
-    // Zeros, so that numbers are aligned where the model is: chips that cannot load words from anywhere are faster then.
-    text.resize(text.len().next_multiple_of(4), 0);
-    let length = HeaderBuilder::default().bytes().len()
-        + text.len()
-        + optional.len()
-        + records
-        + parts.cuts.len()
-        + parts.nodes.len()
-        + parts.leaves.len()
-        + 4;
     let header = HeaderBuilder::default()
         .with_layout(layout.code())
         .with_leaf(settings.leaf.code())
-        .with_length(count(length)?)
-        .with_descriptor(forest.descriptor.map_or(RAW_FEATURES, palpate_shared::Descriptor::code))
+        .with_descriptor(forest.schema.map_or(RAW_FEATURES, |schema| schema.code))
         .with_key(forest.key.code())
         .with_last_object(byte(forest.objects() - 1)?)
         .with_last_feature(byte(forest.features - 1)?)
@@ -68,55 +44,30 @@ pub(super) fn write(
         .with_max_touches(stopping.max_touches())
         .with_spacing(settings.stated.spacing)
         .with_speed(settings.stated.speed)
-        .with_text_length(count(text.len())?)
-        .with_sections(count(optional.len())?)
         .with_ensemble(hash)
         .with_cuts_length(count(parts.cuts.len())?)
         .with_nodes_length(count(parts.nodes.len())?)
         .with_leaves_length(count(parts.leaves.len())?);
-    let mut bytes = header.bytes().to_vec();
-    bytes.extend(text);
-    bytes.extend(optional);
-    bytes.extend(parts.base.iter().chain(&priors).flat_map(|number| number.to_le_bytes()));
-    bytes.extend(parts.axes.iter().flat_map(|axis| axis.to_bytes()));
-    bytes.extend(&parts.cuts);
-    bytes.extend(parts.groups.iter().flat_map(|group| group.to_bytes()));
-    bytes.extend(&parts.nodes);
-    bytes.extend(&parts.leaves);
-    bytes.extend(checksum(&bytes).to_le_bytes());
-    Ok(bytes)
+    let sections = sections(ensemble, settings, forest)?.into_iter().chain(parts.sections()).collect();
+    Container { header, text: text(ensemble)?, sections, content: parts.content(&priors) }.bytes()
 }
 
-/// Bytes that are the same in all layouts, beside those of [`Parts::bytes`]: text, optional sections and checksum.
+/// Number of bytes that are the same in all layouts, beside those of [`Parts::bytes`]: text, optional sections and checksum.
 pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<usize> {
-    let sections = optional(ensemble, settings, forest)?.len()
-        + of_rows(ensemble, settings).len()
-        + captured(ensemble, settings).len()
-        + outputs(settings).len()
-        + columns(ensemble).len();
-    Ok(text(ensemble)?.len().next_multiple_of(4) + sections + CHECKSUM_LENGTH)
+    let sections = bytes_of(&sections(ensemble, settings, forest)?);
+    Ok(text(ensemble)?.len() + sections.len() + CHECKSUM_LENGTH)
 }
 
-/// Statements of the model about its training.
-fn optional(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
+/// Sections that are the same in all layouts.
+fn sections(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<Vec<OwnedSection>> {
+    let mut sections = settings.stated.sections.clone();
+    let mut put = |tag, must_understand, content| sections.push(OwnedSection::new(tag, must_understand, content));
     let origin = &ensemble.origin;
-    // Rows of features are no touches of any probe.
-    if forest.descriptor.is_some() {
-        let trained = Trained {
-            probe: settings.stated.probe,
-            touches: origin.trained.map(|trained| trained.touches),
-            noise: settings.stated.noise,
-            shares: origin.trained.and_then(|trained| trained.pattern_shares()),
-        };
-        // In the order of the tags.
-        Trained { shares: None, ..trained }.write(|part| bytes.extend_from_slice(part));
+    if forest.schema.is_some() {
         if origin.background {
             // Whoever does not know it would name the background.
-            let section = Strangers::header(true, false);
-            write_section(Tag::Strangers, true, &section, &mut |part| bytes.extend_from_slice(part));
+            put(Tag::Strangers, true, Strangers::header(true, false).to_vec());
         }
-        Trained { shares: trained.shares, ..Trained::default() }.write(|part| bytes.extend_from_slice(part));
     } else if settings.scales.is_some() || ensemble.inputs.are_named() {
         let mut features = Vec::new();
         for (index, name) in ensemble.inputs.names().into_iter().enumerate() {
@@ -125,34 +76,33 @@ fn optional(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Re
             features.push(u8::try_from(name.len()).map_err(|_| CompileProblem::NameTooLong { name: name.into() })?);
             features.extend(name.bytes());
         }
-        write_section(Tag::FeatureNames, false, &features, &mut |part: &[u8]| bytes.extend_from_slice(part));
+        put(Tag::FeatureNames, false, features);
     }
-    Ok(bytes)
-}
-
-/// Prediction of a model over rows, and the features that stand for a missing value.
-fn of_rows(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let Some(imported) = ensemble.origin.imported.as_ref().filter(|_| ensemble.descriptor().is_none()) else {
-        return bytes;
-    };
-    let mut put = |part: &[u8]| bytes.extend_from_slice(part);
-    let prediction = imported.prediction;
-    if prediction != Prediction::default() {
-        let mut content = Vec::new();
-        prediction.write(&mut |part| content.extend_from_slice(part));
-        // Whoever does not know it would take scaled margins for values, or targets for classes.
-        write_section(Tag::Prediction, prediction.scale != 1.0 || prediction.targets, &content, &mut put);
+    let imported = origin.imported.as_ref();
+    if let Some(imported) = imported.filter(|_| forest.schema.is_none()) {
+        let prediction = imported.prediction;
+        if prediction != Prediction::default() {
+            let mut content = Vec::new();
+            prediction.write(&mut |part| content.extend_from_slice(part));
+            // Whoever does not know it would take scaled margins for values, or targets for classes.
+            put(Tag::Prediction, prediction.scale != 1.0 || prediction.targets, content);
+        }
+        if let Some(sentinel) = sentinel(ensemble, settings) {
+            put(Tag::Sentinel, true, sentinel.to_bytes().to_vec());
+        }
     }
-    if let Some(sentinel) = sentinel(ensemble, settings) {
-        write_section(Tag::Sentinel, true, &sentinel.to_bytes(), &mut put);
+    if let Some(columns) = imported.and_then(|imported| imported.columns.as_ref()) {
+        // Their number was checked: it is the last one's number that is written.
+        let number = |column: usize| u16::try_from(column).unwrap_or(u16::MAX).to_le_bytes();
+        let all = std::iter::once(columns.names.len().saturating_sub(1)).chain(columns.used.iter().copied());
+        put(Tag::Columns, false, all.flat_map(number).collect());
     }
-    bytes
+    Ok(sections)
 }
 
 /// The features that stand for a missing value in a model over rows.
 pub(super) fn sentinel(ensemble: &Ensemble, settings: &Settings) -> Option<Sentinel> {
-    let imported = ensemble.origin.imported.as_ref().filter(|_| ensemble.descriptor().is_none())?;
+    let imported = ensemble.origin.imported.as_ref().filter(|_| ensemble.schema().is_none())?;
     let [low, high] = imported.sentinel?;
     // The same for every feature, which was checked.
     let [low, high] = match settings.scales.as_ref().and_then(|scales| scales.first().copied()) {
@@ -160,39 +110,6 @@ pub(super) fn sentinel(ensemble: &Ensemble, settings: &Settings) -> Option<Senti
         Some(scale) => [whole(low, scale), whole(high, scale)],
     };
     Some(Sentinel { low, high })
-}
-
-/// The section that says which touches it was trained on; nothing where that is not known.
-fn captured(ensemble: &Ensemble, settings: &Settings) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    if let Some(content) = settings.stated.capture.as_ref().filter(|_| ensemble.descriptor().is_some()) {
-        write_section(Tag::Capture, false, content, &mut |part| bytes.extend_from_slice(part));
-    }
-    bytes
-}
-
-/// The section about outputs that belong together.
-fn outputs(settings: &Settings) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    if let Some(outputs) = &settings.stated.outputs {
-        let mut content = Vec::new();
-        Outputs::write(outputs.iter().copied(), &mut |part| content.extend_from_slice(part));
-        write_section(Tag::Outputs, true, &content, &mut |part| bytes.extend_from_slice(part));
-    }
-    bytes
-}
-
-/// The section about the columns that the features are of the library's rows.
-fn columns(ensemble: &Ensemble) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    if let Some(columns) = ensemble.origin.imported.as_ref().and_then(|imported| imported.columns.as_ref()) {
-        // Their number was checked: it is the last one's number that is written.
-        let number = |column: usize| u16::try_from(column).unwrap_or(u16::MAX).to_le_bytes();
-        let all = std::iter::once(columns.names.len().saturating_sub(1)).chain(columns.used.iter().copied());
-        let content: Vec<u8> = all.flat_map(number).collect();
-        write_section(Tag::Columns, false, &content, &mut |part| bytes.extend_from_slice(part));
-    }
-    bytes
 }
 
 /// Returns an error unless the features that stand for a missing value are the same whole numbers for every feature: a
@@ -210,7 +127,8 @@ pub(super) fn check_sentinel(ensemble: &Ensemble, settings: &Settings) -> Result
     Ok(())
 }
 
-/// The program's version and the objects' names, each with its length in a byte.
+/// The program's version and the objects' names, each with its length in a byte. Zeros follow, so that numbers are aligned
+/// where the model is: chips that cannot load words from anywhere are faster then.
 fn text(ensemble: &Ensemble) -> Result<Vec<u8>> {
     let mut text = Vec::new();
     for string in std::iter::once(env!("CARGO_PKG_VERSION")).chain(ensemble.objects.iter().map(String::as_str)) {
@@ -218,6 +136,7 @@ fn text(ensemble: &Ensemble) -> Result<Vec<u8>> {
         text.push(length);
         text.extend(string.bytes());
     }
+    text.resize(text.len().next_multiple_of(4), 0);
     Ok(text)
 }
 
@@ -244,7 +163,7 @@ fn unit_bits(unit: f32) -> (u32, u8) {
 pub(super) fn hash(ensemble: &Ensemble) -> u64 {
     const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
     let mut digest = CRC.digest();
-    digest.update(&[ensemble.descriptor().map_or(RAW_FEATURES, palpate_shared::Descriptor::code)]);
+    digest.update(&[ensemble.schema().map_or(RAW_FEATURES, |schema| schema.code)]);
     for name in &ensemble.objects {
         digest.update(name.as_bytes());
         digest.update(&[0]);

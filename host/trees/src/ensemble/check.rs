@@ -13,13 +13,13 @@ pub const MAX_FEATURES: usize = 256;
 impl Ensemble {
     /// Checks an ensemble that was put together by hand: 2 to 256 objects (over rows of 1 to 256 features also one) with
     /// names that a file can hold, a base margin for each, at least one tree; in each tree a root, children and features in range, no node reached twice, finite
-    /// leaves, thresholds that are numbers (over touches finite ones), and as many values in a leaf as the tree's [`Output`] says.
+    /// leaves, thresholds that are numbers (finite ones where the model computes its features), and as many values in a leaf as the tree's [`Output`] says.
     ///
     /// # Errors
     /// The first thing that is wrong.
     pub fn check(&self) -> Result<(), EnsembleProblem> {
         match &self.inputs {
-            Inputs::Touches(_) => check_names(&self.objects)?,
+            Inputs::Computed(_) => check_names(&self.objects)?,
             Inputs::Rows(features) => {
                 if self.objects.len() != 1 {
                     check_names(&self.objects)?;
@@ -36,7 +36,7 @@ impl Ensemble {
             return Err(EnsembleProblem::NoTrees);
         }
         let features = self.inputs.count();
-        let infinite = self.descriptor().is_none();
+        let infinite = self.schema().is_none();
         for (number, tree) in self.trees.iter().enumerate() {
             tree.check(features, objects, infinite)
                 .map_err(|problem| EnsembleProblem::Tree { tree: number, problem })?;
@@ -142,14 +142,15 @@ pub fn check_names(names: &[String]) -> Result<(), EnsembleProblem> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ensemble::Origin;
+    use crate::ensemble::import::Options;
+    use crate::ensemble::{Origin, computed};
     use palpate_shared::Descriptor;
 
     fn ensemble() -> Ensemble {
         let split = Node::Split { feature: 0, threshold: 5.0, missing_left: true, left: 1, right: 2 };
         let nodes = vec![split, Node::Leaf(vec![1.0, 2.0]), Node::Leaf(vec![3.0, 4.0])];
         Ensemble {
-            inputs: Descriptor::Curvature.into(),
+            inputs: computed(Descriptor::Curvature).into(),
             objects: vec!["bowl".into(), "fork".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],
@@ -203,7 +204,11 @@ mod tests {
         );
         assert_eq!(refused(&|e| e.objects.truncate(1)), EnsembleProblem::ObjectCount { count: 1 });
         ensemble().save(&path).unwrap();
-        assert_eq!(Ensemble::load(&path).unwrap(), ensemble());
+        let schemas = [computed(Descriptor::Curvature)];
+        let options = Options { schemas: &schemas, ..Options::default() };
+        assert_eq!(Ensemble::load_with(&path, &options).unwrap(), ensemble());
+        let unknown = Ensemble::load(&path).unwrap_err();
+        assert!(unknown.to_string().contains("its descriptor \"curvature\" is unknown"), "{unknown}");
     }
 
     #[test]

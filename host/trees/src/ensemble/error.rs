@@ -1,10 +1,8 @@
-//! Problems with ensembles, their files and their training.
+//! Problems with ensembles and their files.
 
 use crate::error::Problem;
-use palpate_shared::Descriptor;
-use palpate_shared::format::Counted;
 
-/// Problems with ensembles, their files and their training.
+/// Problems with ensembles and their files.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EnsembleProblem {
@@ -59,6 +57,8 @@ pub enum EnsembleProblem {
     Objective {
         /// The objective found.
         found: String,
+        /// Name of what it is over, if the model computes its features.
+        of: Option<&'static str>,
     },
     /// The booster has no trees.
     #[error("its booster is {found}, which has no trees")]
@@ -84,11 +84,13 @@ pub enum EnsembleProblem {
         /// The parser's message.
         detail: String,
     },
-    /// The descriptor's name is unknown.
+    /// The schema of its features is not one of those that were given.
     #[error("its descriptor {found:?} is unknown")]
     UnknownDescriptor {
-        /// The name.
+        /// Its name.
         found: String,
+        /// Names of those that were given.
+        known: Vec<&'static str>,
     },
     /// Too few objects, or too many.
     #[error("it names {count} objects")]
@@ -112,16 +114,15 @@ pub enum EnsembleProblem {
         /// Objects that the attribute names.
         objects: usize,
     },
-    /// There are other features than the descriptor has.
-    #[error(
-        "it has {found} features, but its descriptor {} has {} ({})",
-        descriptor.name(), descriptor.feature_count(), descriptor.feature_names().join(", ")
-    )]
+    /// There are other features than the schema has.
+    #[error("it has {found} features, but its descriptor {name} has {} ({})", features.len(), features.join(", "))]
     Features {
         /// Features in the file.
         found: usize,
-        /// The descriptor that it names.
-        descriptor: Descriptor,
+        /// Name of the schema that the file states.
+        name: &'static str,
+        /// Features of the schema.
+        features: &'static [&'static str],
     },
     /// The base score cannot be used.
     #[error("its base_score {text:?} is neither a number nor {objects} numbers, or is not finite")]
@@ -173,49 +174,6 @@ pub enum EnsembleProblem {
         tree: usize,
         /// Description of the fault.
         problem: TreeProblem,
-    },
-    /// One object cannot be distinguished from anything.
-    #[error("there is only one object to train on")]
-    OneObject,
-    /// There are more objects than a model can hold.
-    #[error("there are {objects} objects to train on, more than the 256 that a model can distinguish")]
-    TooManyObjects {
-        /// Objects.
-        objects: usize,
-    },
-    /// An object has no touches.
-    #[error("{object} has no touches to train on")]
-    NoTouches {
-        /// The object.
-        object: String,
-    },
-    /// A background does not go with a data set.
-    #[error("the background does not match the data set: {detail}")]
-    Background {
-        /// The reason.
-        detail: &'static str,
-    },
-    /// An object has no touch of those that were asked for.
-    #[error("no touch of {object} is evidence: {}", none_of(*counted))]
-    NothingCounts {
-        /// Its name.
-        object: String,
-        /// Touches that were to be evidence.
-        counted: Counted,
-    },
-    /// The descriptor needs the probe's pose.
-    #[error("the descriptor {} needs the probe's pose, which no touch has", descriptor.name())]
-    NoPose {
-        /// The descriptor.
-        descriptor: Descriptor,
-    },
-    /// The trainer refused what it was given, or failed.
-    #[error("the trainer {trainer} refused the touches: {detail}")]
-    Trainer {
-        /// Its name.
-        trainer: &'static str,
-        /// Its message.
-        detail: String,
     },
 }
 
@@ -372,18 +330,19 @@ impl Problem for EnsembleProblem {
             Self::NotJson { .. } => {
                 "Give a file that `palpate train` or XGBoost's `save_model(\"….json\")` wrote.".into()
             }
-            Self::Objective { .. } => {
-                "Train with multi:softprob, binary:logistic or a regression of one target; a model of touches with multi:softprob."
-                    .into()
+            Self::Objective { of: Some(of), .. } => format!("Train a model of {of} with multi:softprob."),
+            Self::Objective { of: None, .. } => {
+                "Train with multi:softprob, binary:logistic or a regression of one target.".into()
             }
             Self::Booster { .. } => "Train with booster=gbtree or dart.".into(),
             Self::NoAttribute { name, example } => {
                 format!("Before saving it in Python, set it: `booster.set_attr({name}={example})`.")
             }
             Self::Attribute { .. } => "Correct the attribute, or remove it if it is not palpate_objects.".into(),
-            Self::UnknownDescriptor { .. } => {
-                format!("Use one of {}.", Descriptor::ALL.map(Descriptor::name).join(", "))
+            Self::UnknownDescriptor { known, .. } if known.is_empty() => {
+                "Read it with the crate that defines the descriptor's features.".into()
             }
+            Self::UnknownDescriptor { known, .. } => format!("Use one of {}.", known.join(", ")),
             Self::ObjectCount { .. } | Self::ObjectName { .. } => {
                 "Use 2 to 256 different names of at most 255 bytes, without tabs and line ends.".into()
             }
@@ -399,21 +358,6 @@ impl Problem for EnsembleProblem {
             | Self::WeightDrop { .. }
             | Self::Count { .. }
             | Self::Tree { .. } => "The ensemble is damaged or was changed by hand; train or export it again.".into(),
-            Self::OneObject => "Capture at least two.".into(),
-            Self::TooManyObjects { .. } => "Leave some objects out of the data set.".into(),
-            Self::NoTouches { .. } => "Capture it again.".into(),
-            Self::Background { .. } => "Capture the background as the data set: `palpate capture background`.".into(),
-            Self::NothingCounts { .. } => "Capture more approaches, or train on touches with any contact.".into(),
-            Self::NoPose { .. } => "Capture the touches with their pose, or use the descriptor curvature.".into(),
-            Self::Trainer { .. } => "Report this as a bug, with the data.".into(),
         }
-    }
-}
-
-fn none_of(counted: Counted) -> &'static str {
-    match counted {
-        Counted::Full => "none has three contacts",
-        Counted::Contacts => "none has a contact",
-        Counted::All => "none has what the descriptor needs",
     }
 }

@@ -1,12 +1,44 @@
 //! Features of an ensemble.
 
-use palpate_shared::Descriptor;
+/// Features that a model computes from measurements: whole numbers. Trees know nothing of their meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Schema {
+    /// Code in a model's header.
+    pub code: u8,
+    /// Name in an ensemble's file.
+    pub name: &'static str,
+    /// Names of the features, in order.
+    pub features: &'static [&'static str],
+    /// Name of the measurements, in the plural, for messages.
+    pub of: &'static str,
+    /// Whole numbers that thresholds are rounded to, for messages.
+    pub whole: &'static str,
+    /// Units to train in, for messages.
+    pub units: &'static str,
+    /// Values of the features that occur together, in planes; none if any may.
+    pub planes: &'static [&'static [Occurring]],
+    /// True if the layout of patterns has a table for each plane.
+    pub is_tabled: bool,
+}
+
+/// Values of a feature in a plane of a [`Schema`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Occurring {
+    /// Any value, or a missing one.
+    Any,
+    /// Any value but a missing one.
+    Known,
+    /// This value alone.
+    Only(i32),
+    /// A missing value alone.
+    Missing,
+}
 
 /// Features of an ensemble.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Inputs {
-    /// Those that a descriptor turns touches into: whole numbers.
-    Touches(Descriptor),
+    /// Whole numbers that the model computes.
+    Computed(Schema),
     /// Rows of f32 values with these names, NaN where one is missing: an ensemble that was trained elsewhere.
     Rows(Vec<String>),
 }
@@ -22,10 +54,10 @@ impl Inputs {
         format!("f{index}")
     }
 
-    /// The descriptor, if the features are those of touches.
-    pub fn descriptor(&self) -> Option<Descriptor> {
+    /// The schema of features that the model computes; none of rows.
+    pub fn schema(&self) -> Option<&Schema> {
         match self {
-            Self::Touches(descriptor) => Some(*descriptor),
+            Self::Computed(schema) => Some(schema),
             Self::Rows(_) => None,
         }
     }
@@ -33,7 +65,7 @@ impl Inputs {
     /// Number of features.
     pub fn count(&self) -> usize {
         match self {
-            Self::Touches(descriptor) => descriptor.feature_count(),
+            Self::Computed(schema) => schema.features.len(),
             Self::Rows(names) => names.len(),
         }
     }
@@ -41,7 +73,7 @@ impl Inputs {
     /// The features' names, in order.
     pub fn names(&self) -> Vec<&str> {
         match self {
-            Self::Touches(descriptor) => descriptor.feature_names().to_vec(),
+            Self::Computed(schema) => schema.features.to_vec(),
             Self::Rows(names) => names.iter().map(String::as_str).collect(),
         }
     }
@@ -49,7 +81,7 @@ impl Inputs {
     /// True if features have names.
     pub fn are_named(&self) -> bool {
         match self {
-            Self::Touches(_) => true,
+            Self::Computed(_) => true,
             Self::Rows(names) => Self::has_names(names),
         }
     }
@@ -60,8 +92,23 @@ impl Inputs {
     }
 }
 
-impl From<Descriptor> for Inputs {
-    fn from(descriptor: Descriptor) -> Self {
-        Self::Touches(descriptor)
+impl From<Schema> for Inputs {
+    fn from(schema: Schema) -> Self {
+        Self::Computed(schema)
+    }
+}
+
+/// Schema of a descriptor's features, without planes.
+#[cfg(test)]
+pub(crate) fn computed(descriptor: palpate_shared::Descriptor) -> Schema {
+    Schema {
+        code: descriptor.code(),
+        name: descriptor.name(),
+        features: descriptor.feature_names(),
+        of: "things",
+        whole: "whole units",
+        units: "units",
+        planes: &[],
+        is_tabled: false,
     }
 }

@@ -16,15 +16,16 @@ mod xgboost;
 pub(crate) use check::check_leaf;
 pub use check::{MAX_FEATURES, MAX_OBJECTS, check_names};
 pub use error::{EnsembleProblem, NameProblem, TreeProblem};
-pub use inputs::Inputs;
+#[cfg(test)]
+pub(crate) use inputs::computed;
+pub use inputs::{Inputs, Occurring, Schema};
 pub use nodes::Threshold;
-pub use origin::{Columns, Imported, Origin, Trained};
+pub use origin::{Columns, Imported, Origin};
 
-use palpate_shared::format::{Prediction, TrainedTouches};
-use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
+use palpate_shared::format::Prediction;
 use std::borrow::Cow;
 
-/// Boosted trees over features of touches or of rows, with one margin for each object.
+/// Boosted trees over features, with one margin for each object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ensemble {
     /// The features.
@@ -36,7 +37,7 @@ pub struct Ensemble {
     pub base_margins: Vec<f32>,
     /// The trees, in the order in which their leaves are added.
     pub trees: Vec<Tree>,
-    /// Facts about the touches that it was trained on; changes no margin.
+    /// Facts about its training; changes no margin.
     pub origin: Origin,
 }
 
@@ -159,38 +160,13 @@ impl Ensemble {
         Some(stated.copied().unwrap_or(Threshold::below(f64::from(*threshold))))
     }
 
-    /// The margins of a touch.
-    ///
-    /// # Panics
-    /// If the ensemble is not over features of touches, or one that [`Ensemble::check`] refuses.
-    pub fn margins(&self, touch: &Touch) -> Vec<f32> {
-        match self.inputs {
-            Inputs::Touches(descriptor) => self.margins_of_features(&feature_row(descriptor, touch)),
-            Inputs::Rows(_) => panic!("an ensemble over rows of features has no margins of a touch"),
-        }
-    }
-
-    /// The descriptor, if the ensemble is over features of touches.
-    pub fn descriptor(&self) -> Option<Descriptor> {
-        self.inputs.descriptor()
+    /// The schema of features that the model computes; none of rows.
+    pub fn schema(&self) -> Option<&Schema> {
+        self.inputs.schema()
     }
 
     /// Number of objects that can be named: all but the background.
     pub fn known_count(&self) -> usize {
         self.objects.len() - usize::from(self.origin.background && !self.objects.is_empty())
     }
-
-    /// The touches that are evidence: those that the ensemble states; full touches, with a pose if the descriptor needs
-    /// one, where it states none. Every model compiled from it takes the same.
-    pub fn trained_touches(&self) -> TrainedTouches {
-        let unstated = TrainedTouches::full(self.descriptor().is_some_and(Descriptor::needs_pose));
-        self.origin.trained.map_or(unstated, |trained| trained.touches)
-    }
-}
-
-/// The features of a touch as a trainer sees them: f32, NaN where missing. Exact, since features are whole numbers
-/// below 2²⁴.
-pub fn feature_row(descriptor: Descriptor, touch: &Touch) -> Vec<f32> {
-    let to_f32 = |&feature: &i32| if feature == MISSING_FEATURE { f32::NAN } else { feature as f32 };
-    descriptor.features(touch).as_slice().iter().map(to_f32).collect()
 }

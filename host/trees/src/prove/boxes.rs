@@ -147,7 +147,7 @@ impl Tree {
 /// Numbers that a model's features are counted in.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Keys {
-    /// Whole numbers, as touches have them.
+    /// Whole numbers.
     Whole,
     /// Keys of f32 values.
     Real,

@@ -105,8 +105,8 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
     if proof.margin_error > proof.stated
         && let Some(exact) = tables::error_in_cells(&chip, subject)?
     {
-        // Of three times one is 0, so touches are fewer than rows of their features.
-        if exact > proof.stated * (1.0 + 1e-6) && ensemble.descriptor().is_none() {
+        // Features that a model computes have fewer values than rows of them.
+        if exact > proof.stated * (1.0 + 1e-6) && ensemble.schema().is_none() {
             return Err(ProofProblem::Beyond { stated: proof.stated, found: exact }.into());
         }
         proof.margin_error = exact;
@@ -341,7 +341,7 @@ fn statements(plain: &Plain, ensemble: &Ensemble) -> Result<(), ProofProblem> {
         same("outputs", own.join(", "), theirs.join(", "))?;
     }
     same("features", plain.features.to_string(), ensemble.inputs.count().to_string())?;
-    let descriptor = ensemble.descriptor().map_or(255, |descriptor| descriptor.code());
+    let descriptor = ensemble.schema().map_or(255, |schema| schema.code);
     same("descriptor codes", plain.descriptor.to_string(), descriptor.to_string())?;
     if let Inputs::Rows(names) = &ensemble.inputs
         && !plain.feature_names.is_empty()

@@ -5,7 +5,8 @@ use super::chip::Chip;
 use super::format::Plain;
 use super::span::{Span, spans};
 use super::{Found, ProofProblem, Subject, output_of};
-use palpate_shared::{Descriptor, MISSING_FEATURE};
+use crate::ensemble::Occurring;
+use palpate_shared::MISSING_FEATURE;
 
 /// The sums of the ensemble's leaves that `rows` reach, rounded to f32 at each addition, as libraries do.
 fn sums(subject: Subject<'_>, rows: &mut Rows) -> Vec<Span> {
@@ -114,23 +115,19 @@ fn choices(chip: &Chip<'_>, subject: Subject<'_>) -> Vec<Vec<Vec<Values>>> {
     };
     // Whether a missing value may go another way than all others, even where no threshold is between those.
     let (is_split, intervals): (Vec<bool>, Vec<Vec<Values>>) = all.iter().enumerate().map(intervals).unzip();
-    if ensemble.descriptor() != Some(Descriptor::ContactsCurvature) {
-        let with_missing = |((own, is_split), &all): ((Vec<Values>, bool), &Values)| {
-            if is_split { own.into_iter().chain([Values::MISSING]).collect() } else { vec![all] }
-        };
-        return vec![intervals.into_iter().zip(is_split).zip(&all).map(with_missing).collect()];
-    }
-    // A pattern fixes which differences are there.
-    let there = [[false; 3], [false; 3], [false; 3], [false, false, true], [false, true, false], [true, true, false]];
-    let of_pattern = |(there, code): ([bool; 3], i64)| {
-        let mut choices = intervals.clone();
-        choices[0] = vec![Values::of(code, code, false)];
-        for (choices, _) in choices[1..].iter_mut().zip(there).filter(|(_, is_there)| !is_there) {
-            *choices = vec![Values::MISSING];
-        }
-        choices
+    let with_missing = |((own, is_split), &all): ((&Vec<Values>, &bool), &Values)| {
+        if *is_split { own.iter().copied().chain([Values::MISSING]).collect() } else { vec![all] }
     };
-    there.into_iter().zip(0..).map(of_pattern).collect()
+    let whole: Vec<Vec<Values>> = intervals.iter().zip(&is_split).zip(&all).map(with_missing).collect();
+    let Some(schema) = ensemble.schema().filter(|schema| schema.is_tabled) else { return vec![whole] };
+    // A plane fixes which values are there.
+    let of_feature = |(feature, occurring): (usize, &Occurring)| match *occurring {
+        Occurring::Any => whole[feature].clone(),
+        Occurring::Known => intervals[feature].clone(),
+        Occurring::Only(value) => vec![Values::of(value.into(), value.into(), false)],
+        Occurring::Missing => vec![Values::MISSING],
+    };
+    schema.planes.iter().map(|plane| plane.iter().enumerate().map(of_feature).collect()).collect()
 }
 
 /// Calls `see` with the margins of each combination of values, as the chip computes them.

@@ -152,9 +152,9 @@ pub enum RowsProblem {
         /// The first of them.
         first: ValueDiffers,
     },
-    /// The model is over touches.
-    #[error("the model is over touches, not over rows of features")]
-    Touches,
+    /// The model computes its features.
+    #[error("the model is not over rows of features")]
+    ComputesFeatures,
     /// A model and an ensemble do not belong together.
     #[error("the model has {}, the ensemble {}", of(*model), of(*ensemble))]
     OtherModel {
@@ -299,7 +299,7 @@ impl Problem for RowsProblem {
             Self::Class { .. } => {
                 "Export with `--leaf f32`, and check that the margins are the library's raw scores of these rows."
             }
-            Self::Touches => "Use `palpate verify` and `palpate evaluate` for models of touches.",
+            Self::ComputesFeatures => "Give a model that takes rows of features.",
             Self::OtherModel { .. } => {
                 "Give the file that the model was exported from, and --all-trees if it was exported with that."
             }

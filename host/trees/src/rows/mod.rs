@@ -130,7 +130,7 @@ fn number(text: &str) -> Option<f64> {
 }
 
 impl Encoder {
-    /// Encoder of a model. A model over touches compares whole numbers as they are.
+    /// Encoder of a model. One that computes its features compares whole numbers as they are.
     pub fn of(model: &Model<'_>) -> Self {
         if model.key() == Key::Real {
             return Self::Real;

@@ -3,8 +3,6 @@
 use crate::compile;
 use crate::ensemble::Ensemble;
 use palpate_onboard::Model;
-use palpate_shared::Descriptor;
-use palpate_shared::format::TrainedTouches;
 
 /// A model that can be evaluated.
 #[derive(Clone, Copy, Debug)]
@@ -16,24 +14,11 @@ pub enum Candidate<'m> {
 }
 
 impl Candidate<'_> {
-    /// True if the model is over touches; otherwise it is over rows of features.
-    pub fn is_of_touches(&self) -> bool {
-        self.descriptor().is_some()
-    }
-
-    /// The descriptor, if the model is over touches.
-    pub fn descriptor(&self) -> Option<Descriptor> {
+    /// True if the model is over rows of features; otherwise it computes its features.
+    pub fn is_of_rows(&self) -> bool {
         match self {
-            Self::Full(ensemble) => ensemble.descriptor(),
-            Self::Compiled(model) => model.descriptor(),
-        }
-    }
-
-    /// The touches that are evidence to the model.
-    pub fn trained_touches(&self) -> TrainedTouches {
-        match self {
-            Self::Full(ensemble) => ensemble.trained_touches(),
-            Self::Compiled(model) => model.trained_touches(),
+            Self::Full(ensemble) => ensemble.schema().is_none(),
+            Self::Compiled(model) => model.descriptor().is_none(),
         }
     }
 

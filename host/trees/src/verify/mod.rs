@@ -18,9 +18,9 @@ pub use score::{Classes, Regression, RowsEvaluation, evaluate_rows};
 
 use crate::ensemble::{Ensemble, Threshold};
 use crate::error::{Result, RowsProblem};
-use crate::progress::{self, Progress};
 use crate::rows::{Encoder, Rows, ValueDiffers, generate};
 use isolated::first_different_tree;
+use palpate_base::progress::{self, Progress};
 use palpate_onboard::Model;
 use predict::class_by;
 use rayon::prelude::*;
@@ -151,8 +151,8 @@ pub fn verify(
     library: Library<'_>,
     progress: &dyn Progress,
 ) -> Result<Verified> {
-    if model.descriptor().is_some() || ensemble.descriptor().is_some() {
-        return Err(RowsProblem::Touches.into());
+    if model.descriptor().is_some() || ensemble.schema().is_some() {
+        return Err(RowsProblem::ComputesFeatures.into());
     }
     let trees = usize::try_from(model.header().trees()).unwrap_or(usize::MAX);
     let own = [model.feature_count(), model.object_count(), trees];

@@ -34,7 +34,7 @@ pub(super) fn class_by(margins: &[f64], prediction: &Prediction) -> usize {
 /// a chip, and gives the same bits.
 ///
 /// # Errors
-/// [`RowsProblem`] for a model over touches, or rows of another number of features.
+/// [`RowsProblem`] for a model that is not over rows, or rows of another number of features.
 pub fn predict<V: Copy + Into<f64> + Sync>(
     candidate: Candidate<'_>,
     values: &[V],
@@ -45,8 +45,8 @@ pub fn predict<V: Copy + Into<f64> + Sync>(
         Candidate::Full(ensemble) => (ensemble.inputs.count(), ensemble.objects.len()),
         Candidate::Compiled(model) => (model.feature_count(), model.object_count()),
     };
-    if candidate.is_of_touches() {
-        return Err(RowsProblem::Touches.into());
+    if !candidate.is_of_rows() {
+        return Err(RowsProblem::ComputesFeatures.into());
     }
     if features != wanted {
         return Err(RowsProblem::Columns { found: features, wanted, all: None }.into());

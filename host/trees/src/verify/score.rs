@@ -47,14 +47,14 @@ pub struct Regression {
 /// Compares a model's answers with the rows' labels: names of classes or their numbers, or for one output numbers.
 ///
 /// # Errors
-/// [`RowsProblem`] for a model over touches, rows of another number of features, and labels that are none.
+/// [`RowsProblem`] for a model that is not over rows, rows of another number of features, and labels that are none.
 pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvaluation> {
     let (features, names) = match candidate {
         Candidate::Full(ensemble) => (ensemble.inputs.count(), ensemble.objects.clone()),
         Candidate::Compiled(model) => (model.feature_count(), crate::compile::names(model)),
     };
-    if candidate.is_of_touches() {
-        return Err(RowsProblem::Touches.into());
+    if !candidate.is_of_rows() {
+        return Err(RowsProblem::ComputesFeatures.into());
     }
     if features != rows.features {
         return Err(RowsProblem::Columns { found: rows.features, wanted: features, all: None }.into());

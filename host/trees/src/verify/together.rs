@@ -1,20 +1,18 @@
-//! A compiled model's margins of many touches or rows at once, on all threads.
+//! A compiled model's margins of many rows at once, on all threads.
 
 use super::reference;
 use crate::rows::Encoder;
 use palpate_onboard::{Batch, Model};
 use palpate_shared::format::LeafType;
-use palpate_shared::{MISSING_FEATURE, Touch};
 use rayon::prelude::*;
-use std::borrow::Borrow;
 
-/// Touches or rows of a task: as many as go down a tree together.
+/// Rows of a task: as many as go down a tree together.
 pub const AT_ONCE: usize = 1024;
 
 /// Fewer than this go one after the other.
 const FEW: usize = 16;
 
-/// Room for the margins of many touches or rows at once: the same as one after the other, to the bit, and faster; see
+/// Room for the margins of many rows at once: the same as one after the other, to the bit, and faster; see
 /// [`Model::margins_of_rows`]. For one thread.
 #[derive(Debug)]
 pub struct Together {
@@ -37,34 +35,14 @@ impl Together {
         Self { batch: None, features: Vec::new(), units: Vec::new(), exact: Vec::new() }
     }
 
-    /// The margins of touches in the model's units, as [`Model::margins`] gives them: one row for each touch, one number for
-    /// each object. `margins` is as long as that.
-    pub fn touches<T: Borrow<Touch>>(&mut self, model: &Model<'_>, touches: &[T], margins: &mut [i32]) {
-        if touches.len() < FEW {
-            let margins = margins.chunks_exact_mut(model.object_count());
-            margins.zip(touches).for_each(|(margins, touch)| _ = model.margins(touch.borrow(), margins));
-            return;
-        }
+    /// Margins in the model's units, as [`Model::margins_of`] gives them, of the features that `put` appends: one row of
+    /// `margins` for each row of them.
+    pub fn units(&mut self, model: &Model<'_>, put: impl FnOnce(&mut Vec<i32>), margins: &mut [i32]) {
         self.features.clear();
-        match model.descriptor() {
-            Some(descriptor) => {
-                let features = touches.iter().map(|touch| descriptor.features(touch.borrow()));
-                features.for_each(|features| self.features.extend_from_slice(features.as_slice()));
-            }
-            None => self.features.resize(touches.len() * model.feature_count(), MISSING_FEATURE),
-        }
+        put(&mut self.features);
         let batch = self.batch.get_or_insert_with(Box::default);
         let is_whole = model.margins_of_rows(&self.features, margins, batch);
-        debug_assert!(is_whole, "a row of margins for each touch");
-    }
-
-    /// Margins of touches in nats.
-    pub fn touches_in_nats<T: Borrow<Touch>>(&mut self, model: &Model<'_>, touches: &[T], margins: &mut [f64]) {
-        let mut units = std::mem::take(&mut self.units);
-        units.resize(margins.len(), 0);
-        self.touches(model, touches, &mut units);
-        in_nats(model, &units, margins);
-        self.units = units;
+        debug_assert!(is_whole, "a row of margins for each row");
     }
 
     /// The margins of rows of features as the library has them (see [`verify::margins`](super::margins)): one row for each row of
@@ -103,18 +81,10 @@ impl Together {
     }
 }
 
+/// Margins in nats of those in the model's units.
 fn in_nats(model: &Model<'_>, units: &[i32], margins: &mut [f64]) {
     let unit = reference::unit(model);
     margins.iter_mut().zip(units).for_each(|(margin, units)| *margin = f64::from(*units) * unit);
-}
-
-/// The margins of touches in the model's units, one row for each touch, on all threads.
-pub fn margins_of_touches<T: Borrow<Touch> + Sync>(model: &Model<'_>, touches: &[T]) -> Vec<i32> {
-    let objects = model.object_count();
-    let mut margins = vec![0; touches.len() * objects];
-    let tasks = margins.par_chunks_mut(AT_ONCE * objects).zip(touches.par_chunks(AT_ONCE));
-    tasks.for_each_init(Together::new, |together, (margins, touches)| together.touches(model, touches, margins));
-    margins
 }
 
 /// The margins of rows of features in the model's units, as [`Model::margins_of`] gives them: one row for each, on all

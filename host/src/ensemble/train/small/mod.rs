@@ -15,7 +15,7 @@ mod grow;
 mod lists;
 
 use super::{Engine, Evidence, Rows, Settings, origin};
-use crate::ensemble::{Ensemble, Node, Output, Tree};
+use crate::ensemble::{Ensemble, Node, Output, Tree, inputs};
 use crate::error::{Error, Result};
 use crate::in_order::in_order;
 use crate::progress::{self, Progress};
@@ -94,7 +94,7 @@ pub(crate) fn train_each(
             let fitted = lists::fit(&cases, grown, leaves, settings.leaf_bits);
             progress::check(progress)?;
             Ok(Ensemble {
-                inputs: settings.descriptor.into(),
+                inputs: inputs(settings.descriptor),
                 objects: dataset.names(),
                 base_margins: fitted.base,
                 trees: grown.iter().zip(fitted.leaves).map(|(tree, leaves)| with_leaves(tree, leaves)).collect(),

@@ -1,6 +1,7 @@
 use super::super::train;
 use super::*;
 use crate::compile::{self, Layout, Leaf, compile};
+use crate::ensemble::OverTouches;
 use crate::error::Setting;
 use crate::tests::synthetic;
 use palpate_shared::{Descriptor, Touch};
@@ -118,7 +119,7 @@ fn touches_with_missing_contacts_are_learned_from() {
         // Saved and read, it is the same.
         let file = tempfile::NamedTempFile::new().unwrap();
         ensemble.save(file.path()).unwrap();
-        assert_eq!(Ensemble::load(file.path()).unwrap(), ensemble);
+        assert_eq!(crate::ensemble::load(file.path()).unwrap(), ensemble);
     }
 }
 

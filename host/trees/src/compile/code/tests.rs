@@ -3,7 +3,7 @@
 use super::super::{Leaf, Settings, compile, emit_code, open};
 use super::{Chip, Form, Program};
 use crate::compile::{Compiled, EarlyExit, Language, Layout};
-use crate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
+use crate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree, computed};
 use crate::rows::Rows;
 use palpate_shared::Descriptor;
 use palpate_shared::MISSING_FEATURE;
@@ -116,7 +116,7 @@ pub(crate) fn cases() -> Vec<Case> {
     let wide: fn(&mut Numbers) -> f32 = |numbers| (numbers.below(60) as f32 + 1.0) * 64.0;
     let after: fn(&mut Numbers) -> f32 = |numbers| (numbers.below(15) as f32 + 0.5).next_up();
     let whole: fn(&mut Numbers) -> f32 = |numbers| numbers.value(50_000.0).round();
-    let touches = || Random { inputs: Descriptor::Oriented.into(), threshold: whole, ..usual() };
+    let computed_random = || Random { inputs: computed(Descriptor::Oriented).into(), threshold: whole, ..usual() };
     let random = [
         ("keys", usual()),
         ("ranks", Random { trees: 150, ..usual() }),
@@ -127,8 +127,8 @@ pub(crate) fn cases() -> Vec<Case> {
         ("many columns", Random { inputs: Inputs::unnamed(90), trees: 300, ..usual() }),
         ("thresholds past 255", Random { inputs: Inputs::unnamed(2), trees: 300, depth: 6, ..usual() }),
         ("deep", Random { trees: 12, depth: 11, ..usual() }),
-        ("touches", touches()),
-        ("touches, vectors", Random { each: true, objects: 10, ..touches() }),
+        ("computed", computed_random()),
+        ("computed, vectors", Random { each: true, objects: 10, ..computed_random() }),
         ("vectors of two", Random { each: true, objects: 2, ..usual() }),
         ("vectors of eleven", Random { each: true, objects: 11, ..usual() }),
         ("vectors of seventy", Random { each: true, objects: 70, trees: 10, ..usual() }),
@@ -187,7 +187,7 @@ impl Case {
 
     /// True if it has classes of rows.
     pub(crate) fn has_classes(&self) -> bool {
-        self.ensemble.descriptor().is_none() && self.ensemble.objects.len() > 1
+        self.ensemble.schema().is_none() && self.ensemble.objects.len() > 1
     }
 
     /// True if assembly of it has leaves that are added two to a register, or row by row.
@@ -225,7 +225,7 @@ impl Case {
     /// Rows on and beside thresholds, with missing values, infinities, zeros of both signs and denormals: as f32 values.
     fn rows(&self, count: usize) -> Vec<Vec<f32>> {
         let features = self.ensemble.inputs.count();
-        let is_real = self.ensemble.descriptor().is_none();
+        let is_real = self.ensemble.schema().is_none();
         let mut thresholds: Vec<Vec<f32>> = vec![Vec::new(); features];
         for node in self.ensemble.trees.iter().flat_map(|tree| &tree.nodes) {
             if let Node::Split { feature, threshold, .. } = node {
@@ -455,7 +455,7 @@ fn columns_are_made_by_conversion_where_thresholds_are_on_a_grid() {
     assert!(all("halves, i16", "Grid { bits: 1, before: false }"));
     assert!(all("steps of 64, i16", "Grid { bits: -6, before: false }"));
     assert!(all("at or below, i16", "Grid { bits: 1, before: true }"));
-    assert!(all("keys, i16", "Search") && all("touches, i16", "Search"));
+    assert!(all("keys, i16", "Search") && all("computed, i16", "Search"));
 }
 
 #[test]

@@ -146,7 +146,7 @@ fn objective(text: Option<&str>, outputs: usize, rounds: usize, draft: &mut Draf
     let sigmoid: f64 = sigmoid.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor > 0.0).unwrap_or(1.0);
     let is_classes = matches!(name, "multiclass" | "multiclassova");
     if outputs > 1 && !is_classes && name != "custom" {
-        return Err(EnsembleProblem::Objective { found: name.into() }.into());
+        return Err(EnsembleProblem::Objective { found: name.into(), of: None }.into());
     }
     if is_classes || name == "binary" {
         // Of these, and of no others, margins are evidence.

@@ -40,9 +40,9 @@ use options::MISSING_UNKNOWN;
 use std::path::Path;
 
 impl Ensemble {
-    /// Reads an ensemble: XGBoost's JSON, which [`Ensemble::save`] and `palpate train` write, over features of touches
-    /// if it has the attribute `palpate_descriptor`; else a file of XGBoost, LightGBM, CatBoost or an ONNX file, over
-    /// rows of features: see [`import`](self). The content determines the kind.
+    /// Reads an ensemble over rows of features from a file of XGBoost, LightGBM, CatBoost or an ONNX file: see
+    /// [`import`](self). The content determines the kind. XGBoost's JSON with the attribute `palpate_descriptor` is over
+    /// features that the model computes; [`Options::schemas`] has those that can be read.
     ///
     /// # Errors
     /// If the file cannot be read, is of no such kind, or has something in it that no compiled model can do
@@ -52,27 +52,18 @@ impl Ensemble {
     /// twice (a cycle); a leaf that is not finite; categorical splits, or no trees at all. The error names the file, the
     /// tree and the node.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
-        Self::load_named(path, None)
+        Self::load_with(path, &Options::default())
     }
 
-    /// As [`load`](Self::load), with other names for its objects: one for each class, or for the one output of a
-    /// regression.
+    /// Reads an ensemble as [`load`](Self::load) does, with facts that the file does not state.
     ///
     /// # Errors
-    /// As [`load`](Self::load); [`EnsembleProblem::Names`] if their number is not that of the outputs.
-    pub fn load_named(path: impl AsRef<Path>, names: Option<&[String]>) -> Result<Self> {
-        Self::load_with(path, &Options { names, ..Options::default() })
-    }
-
-    /// As [`load`](Self::load), with what the file does not say.
-    ///
-    /// # Errors
-    /// As [`load_named`](Self::load_named); [`EnsembleProblem::Unsupported`] for a missing value of an ensemble over
-    /// touches.
+    /// As [`load`](Self::load); [`EnsembleProblem::Names`] if there are other names than outputs;
+    /// [`EnsembleProblem::Unsupported`] for a missing value of an ensemble that is not over rows.
     pub fn load_with(path: impl AsRef<Path>, options: &Options<'_>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the ensemble", source))?;
-        read_with(path, &bytes, options)
+        read(path, &bytes, options)
     }
 }
 
@@ -81,16 +72,8 @@ impl Ensemble {
 /// Memory: some 50 bytes for each byte of the file at most.
 ///
 /// # Errors
-/// As [`Ensemble::load`], but for reading the file.
-pub fn read(path: &Path, bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
-    read_with(path, bytes, &Options { names, ..Options::default() })
-}
-
-/// As [`read`], with what the file does not say.
-///
-/// # Errors
-/// As [`Ensemble::load_with`], but for reading the file.
-pub fn read_with(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
+/// As [`Ensemble::load_with`], except for reading the file.
+pub fn read(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
     let mut ensemble = read_as_it_is(path, bytes, options)?;
     if options.missing.is_some()
         && let Some(imported) = ensemble.origin.imported.as_mut()
@@ -99,7 +82,8 @@ pub fn read_with(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
     }
     if let Some(missing) = options.missing.filter(|missing| !missing.is_nan()) {
         let Some(imported) = ensemble.origin.imported.as_mut() else {
-            let what = "it is over touches, where no number stands for a missing contact";
+            let of = ensemble.schema().map_or("other features", |schema| schema.of);
+            let what = format!("it is over {of}, where no number stands for a missing contact");
             return Err(Error::at(Place::file(path), unsupported(what, "Leave the missing value out.")));
         };
         imported.sentinel = Some([missing; 2]);

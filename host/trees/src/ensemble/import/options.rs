@@ -1,5 +1,6 @@
 //! Facts that files of other libraries do not state, and the names that they leave out.
 
+use crate::ensemble::Schema;
 use crate::error::EnsembleProblem;
 
 /// Facts that a file of another library does not state, or that a user wants otherwise.
@@ -12,6 +13,8 @@ pub struct Options<'a> {
     /// The number that stood for a missing value in training, beside NaN: XGBoost's `missing`, which no file holds. NaN if
     /// there was none.
     pub missing: Option<f32>,
+    /// Schemas that an ensemble's features may be of.
+    pub schemas: &'a [Schema],
 }
 
 /// Note about every file of XGBoost.

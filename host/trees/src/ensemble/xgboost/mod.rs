@@ -8,11 +8,10 @@
 //!
 //! | attribute | value |
 //! |---|---|
-//! | `palpate_descriptor` | the descriptor's name; absent for an ensemble over rows |
+//! | `palpate_descriptor` | the name of the features' [`Schema`]; absent for an ensemble over rows |
 //! | `palpate_objects` | a JSON array of the objects' names, in the order of the labels |
 //! | `palpate_background` | optional: `true` where the last object is a background, which is never named |
 //! | `palpate_prediction` | optional: what the library that trained an ensemble over rows makes of margins, and which numbers stand for a missing value there, a JSON object |
-//! | `palpate_trained` | optional: which touches it was trained on, a JSON object |
 //! | `palpate_…` | others are kept as they are: [`Origin::attributes`](super::Origin::attributes) |
 //!
 //! What is read is checked as a whole before any of it is used: see [`Ensemble::load`]. UBJSON holds the same.
@@ -24,10 +23,10 @@ mod schema;
 mod trees;
 mod write;
 
-use super::Ensemble;
 use super::import::options::Options;
+use super::{Ensemble, Schema};
 use crate::error::{EnsembleProblem, Error, Place, Result};
-use crate::output;
+use palpate_base::output;
 use schema::Document;
 use std::borrow::Cow;
 use std::path::Path;
@@ -101,16 +100,17 @@ fn without_literals(bytes: &[u8]) -> Cow<'_, [u8]> {
 }
 
 impl Ensemble {
-    /// Ensemble of a model that XGBoost itself has just trained on `descriptor`'s features of `objects`.
+    /// Ensemble of a model that XGBoost itself has just trained on the features of `schema` of `objects`.
     ///
     /// # Errors
     /// [`EnsembleProblem`] for what [`load`](Self::load) refuses.
-    pub fn from_xgboost(json: &[u8], descriptor: palpate_shared::Descriptor, objects: Vec<String>) -> Result<Self> {
+    pub fn from_xgboost(json: &[u8], schema: Schema, objects: Vec<String>) -> Result<Self> {
         let path = Path::new("XGBoost's model");
         let mut document: Document =
             serde_json::from_slice(&without_literals(json)).map_err(|error| not_json(path, &error))?;
-        document.learner.attributes = write::attributes(&descriptor.into(), &objects, &super::Origin::default());
-        document.into_ensemble(&Options::default(), "JSON").map_err(|problem| Error::at(Place::file(path), problem))
+        document.learner.attributes = write::attributes(&schema.into(), &objects, &super::Origin::default());
+        let options = Options { schemas: &[schema], ..Options::default() };
+        document.into_ensemble(&options, "JSON").map_err(|problem| Error::at(Place::file(path), problem))
     }
 
     /// Writes the ensemble in XGBoost's JSON model schema, whole or not at all. What is written can be

@@ -50,7 +50,7 @@ impl Objective {
             | "rank:pairwise"
             | "rank:ndcg"
             | "rank:map" => (Kind::One, Link::Identity),
-            _ => return Err(EnsembleProblem::Objective { found: name.into() }),
+            _ => return Err(EnsembleProblem::Objective { found: name.into(), of: None }),
         };
         let inverse = match (kind, link) {
             (Kind::One, Link::Logit) => Inverse::Logistic,

@@ -21,7 +21,7 @@ impl Outputs {
     /// A regression for one output; a binary model for two if the first one's margin is 0; else a group for each.
     pub(super) fn of(ensemble: &Ensemble) -> Self {
         let margins = &ensemble.base_margins;
-        let is_binary = ensemble.descriptor().is_none()
+        let is_binary = ensemble.schema().is_none()
             && ensemble.objects.len() == 2
             && margins[0].to_bits() == 0
             && ensemble.trees.iter().all(|tree| tree.output == Output::One(1));

@@ -5,16 +5,15 @@ use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
 use super::trees::{Shape, has_sets, tree};
 use crate::ensemble::check::check_names;
 use crate::ensemble::import::options::{CATEGORIES, MISSING_UNKNOWN, Options, default_names, named, one_class};
-use crate::ensemble::{Ensemble, Imported, Inputs, Node, Origin, Tree, columns};
+use crate::ensemble::{Ensemble, Imported, Inputs, Node, Origin, Schema, Tree, columns};
 use crate::error::EnsembleProblem;
-use palpate_shared::Descriptor;
 use palpate_shared::format::{Link as Inverse, Prediction};
 use std::collections::BTreeMap;
 
 type Attributes = BTreeMap<String, String>;
 
 impl Document {
-    /// The ensemble in the document: over touches if it names a descriptor, else over rows. `names` are the objects'
+    /// The ensemble in the document: over the features of a schema if it names one, else over rows. `names` are the objects'
     /// names; `kind` is JSON or UBJSON.
     pub(super) fn into_ensemble(self, options: &Options<'_>, kind: &str) -> Result<Ensemble, EnsembleProblem> {
         let names = options.names;
@@ -45,12 +44,13 @@ impl Document {
         let features = count("num_feature", &learner_model_param.num_feature)?;
         let (inputs, objects) = match attributes.get("palpate_descriptor") {
             Some(name) => {
+                let schema = schema(name, options.schemas)?;
                 if outputs != Kind::Classes {
-                    return Err(EnsembleProblem::Objective { found: objective.name });
+                    return Err(EnsembleProblem::Objective { found: objective.name, of: Some(schema.of) });
                 }
-                let descriptor = descriptor(name)?;
-                if features != descriptor.feature_count() {
-                    return Err(EnsembleProblem::Features { found: features, descriptor });
+                if features != schema.features.len() {
+                    let Schema { name, features: own, .. } = schema;
+                    return Err(EnsembleProblem::Features { found: features, name, features: own });
                 }
                 let own = object_names(&attributes)?.ok_or(EnsembleProblem::NoAttribute {
                     name: "palpate_objects",
@@ -59,7 +59,7 @@ impl Document {
                 if classes != own.len() {
                     return Err(EnsembleProblem::Classes { classes, objects: own.len() });
                 }
-                (Inputs::Touches(descriptor), named(names, own)?)
+                (Inputs::Computed(schema), named(names, own)?)
             }
             None => {
                 let own = object_names(&attributes)?.unwrap_or_else(|| default_names(objects, outputs == Kind::One));
@@ -99,7 +99,7 @@ impl Document {
             features: inputs.names().into_iter().map(String::from).collect(),
             groups,
             first,
-            infinite: inputs.descriptor().is_none(),
+            infinite: inputs.schema().is_none(),
             unknown_as_missing,
         };
         let read = |((number, columns), group): ((usize, &TreeColumns), u64)| tree(columns, (number, group), &shape);
@@ -125,7 +125,7 @@ impl Document {
         if let Some(weights) = weights {
             weigh(&mut ensemble, &weights);
         }
-        // Rows may have any number of features, and names; touches and trees were checked above.
+        // Rows may have any number of features, and names; other features and trees were checked above.
         ensemble.check()?;
         Ok(ensemble)
     }
@@ -250,27 +250,27 @@ fn weigh(ensemble: &mut Ensemble, weights: &[f32]) {
     }
 }
 
-fn descriptor(name: &str) -> Result<Descriptor, EnsembleProblem> {
-    Descriptor::from_name(name).ok_or_else(|| EnsembleProblem::UnknownDescriptor { found: name.into() })
+fn schema(name: &str, schemas: &[Schema]) -> Result<Schema, EnsembleProblem> {
+    let unknown = || EnsembleProblem::UnknownDescriptor {
+        found: name.into(),
+        known: schemas.iter().map(|schema| schema.name).collect(),
+    };
+    schemas.iter().find(|schema| schema.name == name).copied().ok_or_else(unknown)
 }
 
 fn object_names(attributes: &Attributes) -> Result<Option<Vec<String>>, EnsembleProblem> {
     let name = "palpate_objects";
     let Some(text) = attributes.get(name) else { return Ok(None) };
     let names: Vec<String> = parsed(name, "a JSON array of names", text)?;
-    // Over rows there may be one output; over touches the whole is checked in the end.
+    // Over rows there may be one output; otherwise the whole is checked in the end.
     if names.len() != 1 {
         check_names(&names)?;
     }
     Ok(Some(names))
 }
 
-/// Facts about the training touches from the optional attributes.
+/// Facts about the training from the optional attributes.
 fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
-    let trained = attributes.get("palpate_trained").map(|text| {
-        let expected = "a JSON object of counted, patterns, needs_pose and largest_spread";
-        parsed("palpate_trained", expected, text)
-    });
     let background = attributes.get("palpate_background").map(|text| {
         let expected = "true where the last object is a background, else false";
         parsed("palpate_background", expected, text)
@@ -280,15 +280,13 @@ fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
     let others = attributes.iter().filter(|(name, _)| !is_read(name));
     Ok(Origin {
         background: background.transpose()?.unwrap_or_default(),
-        trained: trained.transpose()?,
         imported: None,
         attributes: others.map(|(name, text)| (name.clone(), text.clone())).collect(),
     })
 }
 
 /// Attributes that this crate reads.
-const READ: [&str; 5] =
-    ["palpate_background", "palpate_descriptor", "palpate_objects", "palpate_prediction", "palpate_trained"];
+const READ: [&str; 4] = ["palpate_background", "palpate_descriptor", "palpate_objects", "palpate_prediction"];
 
 fn parsed<'t, T: serde::Deserialize<'t>>(
     name: &'static str,

@@ -67,8 +67,8 @@ impl Document {
 pub(super) fn attributes(inputs: &Inputs, objects: &[String], origin: &Origin) -> BTreeMap<String, String> {
     let names = serde_json::Value::from(objects.to_vec()).to_string();
     let mut attributes = BTreeMap::from([("palpate_objects".to_owned(), names)]);
-    if let Some(descriptor) = inputs.descriptor() {
-        attributes.insert("palpate_descriptor".into(), descriptor.name().into());
+    if let Some(schema) = inputs.schema() {
+        attributes.insert("palpate_descriptor".into(), schema.name.into());
     }
     if let Some(Imported { prediction, sentinel, .. }) = &origin.imported
         && (*prediction != Prediction::default() || sentinel.is_some())
@@ -83,10 +83,6 @@ pub(super) fn attributes(inputs: &Inputs, objects: &[String], origin: &Origin) -
         if let Ok(text) = serde_json::to_string(&stated) {
             attributes.insert("palpate_prediction".into(), text);
         }
-    }
-    // Numbers and strings are always JSON.
-    if let Some(trained) = origin.trained.and_then(|trained| serde_json::to_string(&trained).ok()) {
-        attributes.insert("palpate_trained".into(), trained);
     }
     if origin.background {
         attributes.insert("palpate_background".into(), "true".into());

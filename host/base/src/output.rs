@@ -43,7 +43,7 @@ pub fn lock(directory: &Path) -> Result<Option<File>> {
     }
 }
 
-/// Where writing to a path leads.
+/// Destination of writing to a path.
 enum Target {
     /// The program's own standard output: `-`, `/dev/stdout`.
     Stdout,

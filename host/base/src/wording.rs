@@ -4,7 +4,7 @@
 /// that is not finite becomes a dash.
 ///
 /// ```
-/// use palpate_trees::wording::decimal;
+/// use palpate_base::wording::decimal;
 ///
 /// assert_eq!([decimal(1234.5, 1), decimal(-0.04, 1), decimal(-2.0, 0)], ["1,234.5", "0.0", "−2"]);
 /// assert_eq!(decimal(f64::NAN, 1), "–");
@@ -23,7 +23,7 @@ pub fn decimal(value: f64, decimals: usize) -> String {
 /// A whole number, with commas between thousands.
 ///
 /// ```
-/// assert_eq!(palpate_trees::wording::count(44_336_usize), "44,336");
+/// assert_eq!(palpate_base::wording::count(44_336_usize), "44,336");
 /// ```
 pub fn count(number: impl TryInto<u64>) -> String {
     number.try_into().map_or_else(|_| "–".to_owned(), |number: u64| grouped(&number.to_string()))
@@ -32,7 +32,7 @@ pub fn count(number: impl TryInto<u64>) -> String {
 /// A whole number and what it counts: "1 fold", "2 folds".
 ///
 /// ```
-/// use palpate_trees::wording::counted;
+/// use palpate_base::wording::counted;
 ///
 /// assert_eq!([counted(1, "fold", "folds"), counted(2_000, "fold", "folds")], ["1 fold", "2,000 folds"]);
 /// ```
@@ -51,7 +51,7 @@ pub fn percent(share: f64, decimals: usize) -> String {
 /// A share of one that somebody chose, in percent as it was meant, without the last bits: 0.07 is "7 %".
 ///
 /// ```
-/// use palpate_trees::wording::rate;
+/// use palpate_base::wording::rate;
 ///
 /// assert_eq!([rate(0.07), rate(0.005), rate(1e-3)], ["7 %", "0.5 %", "0.1 %"]);
 /// ```
@@ -62,7 +62,7 @@ pub fn rate(share: f64) -> String {
 /// A number compared with another one: "41 % fewer", "10 % more" or "as many".
 ///
 /// ```
-/// use palpate_trees::wording::compared;
+/// use palpate_base::wording::compared;
 ///
 /// assert_eq!([compared(3.54, 6.0), compared(6.6, 6.0), compared(6.0, 6.0)], ["41 % fewer", "10 % more", "as many"]);
 /// ```
@@ -77,12 +77,24 @@ pub fn compared(number: f64, with: f64) -> String {
 /// A small number with three digits and an exponent; 0 is "0".
 ///
 /// ```
-/// use palpate_trees::wording::scientific;
+/// use palpate_base::wording::scientific;
 ///
 /// assert_eq!([scientific(2.279e-4), scientific(0.0)], ["2.28e-4", "0"]);
 /// ```
 pub fn scientific(value: f64) -> String {
     if value == 0.0 { "0".to_owned() } else { format!("{value:.2e}") }
+}
+
+/// An estimate, rounded up to two digits.
+///
+/// ```
+/// use palpate_base::wording::two_digits;
+///
+/// assert_eq!([two_digits(1_204.0), two_digits(7.2), two_digits(0.0)], [1_300, 8, 0]);
+/// ```
+pub fn two_digits(number: f64) -> u64 {
+    let digit = 10.0_f64.powf((number.max(1.0).log10().floor() - 1.0).max(0.0));
+    ((number / digit).ceil() * digit) as u64
 }
 
 /// Names or words as a list: "a", "a and b", "a, b and c".

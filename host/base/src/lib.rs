@@ -1,0 +1,17 @@
+//! The ground of Palpate's host side.
+//!
+//! | module | what it does | start with |
+//! |---|---|---|
+//! | [`error`] | one error, with any crate's problem, its place and its fix | [`error::Error`] |
+//! | [`output`] | files that appear whole or not at all | [`output::write_whole`] |
+//! | [`progress`] | progress of long calls, and a way to cancel them | [`progress::Progress`] |
+//! | [`wording`] | numbers as people read them | [`wording::decimal`] |
+//!
+//! The crates `palpate-trees`, `palpate-simulator` and `palpate` build on this one and re-export it.
+
+pub mod error;
+pub mod output;
+pub mod progress;
+pub mod wording;
+
+pub use error::{Error, Result};

@@ -1,0 +1,84 @@
+//! The file of a model around its content: header, text, optional sections, checksum. The content here is trees or tables.
+
+use super::write::count;
+use crate::error::Result;
+use palpate_onboard::Model;
+use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, HeaderBuilder, Section, Tag, checksum};
+
+/// An optional section of a model's file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OwnedSection {
+    /// Its tag.
+    pub tag: u16,
+    /// True if a reader that does not know the tag must refuse the model.
+    pub must_understand: bool,
+    /// Its content.
+    pub content: Vec<u8>,
+}
+
+impl OwnedSection {
+    /// A section with one of the format's tags.
+    pub fn new(tag: Tag, must_understand: bool, content: impl Into<Vec<u8>>) -> Self {
+        Self { tag: tag.code(), must_understand, content: content.into() }
+    }
+}
+
+/// Parts of a model's file.
+pub(super) struct Container {
+    /// Lengths of the other parts are filled in when it is written.
+    pub(super) header: HeaderBuilder,
+    /// Texts, with zeros up to a multiple of four.
+    pub(super) text: Vec<u8>,
+    /// In any order.
+    pub(super) sections: Vec<OwnedSection>,
+    /// Everything between sections and checksum.
+    pub(super) content: Vec<u8>,
+}
+
+impl Container {
+    /// The parts of a model, including sections that nobody knows.
+    pub(super) fn of(model: &Model<'_>) -> Self {
+        let (bytes, header) = (model.bytes(), model.header());
+        let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
+        let (text, rest) = bytes[HEADER_LENGTH..bytes.len() - CHECKSUM_LENGTH].split_at(length(header.text_length()));
+        let owned = |Section { tag, must_understand, content }: Section<'_>| OwnedSection {
+            tag,
+            must_understand,
+            content: content.into(),
+        };
+        Self {
+            header: HeaderBuilder::from(header),
+            text: text.into(),
+            sections: model.optional_sections().map(owned).collect(),
+            content: rest[length(header.optional_length())..].into(),
+        }
+    }
+
+    /// The file's bytes.
+    ///
+    /// # Errors
+    /// [`CompileProblem::TooLarge`](crate::error::CompileProblem::TooLarge) for more than 4 GB.
+    pub(super) fn bytes(mut self) -> Result<Vec<u8>> {
+        self.sections.sort_by_key(|section| section.tag);
+        let sections = bytes_of(&self.sections);
+        let length = HEADER_LENGTH + self.text.len() + sections.len() + self.content.len() + CHECKSUM_LENGTH;
+        let header = self
+            .header
+            .with_length(count(length)?)
+            .with_text_length(count(self.text.len())?)
+            .with_sections(count(sections.len())?);
+        let mut bytes = [&header.bytes()[..], &self.text, &sections, &self.content].concat();
+        bytes.extend(checksum(&bytes).to_le_bytes());
+        Ok(bytes)
+    }
+}
+
+/// Bytes of sections, in their order.
+pub(super) fn bytes_of<'s>(sections: impl IntoIterator<Item = &'s OwnedSection>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for OwnedSection { tag, must_understand, content } in sections {
+        let section = Section { tag: *tag, must_understand: *must_understand, content };
+        section.write(&mut |part| bytes.extend_from_slice(part));
+    }
+    bytes
+}
