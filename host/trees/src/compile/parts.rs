@@ -1,10 +1,9 @@
 //! The parts of a compiled model, before they are written.
 
-use super::cost::Instructions;
-use palpate_shared::format::{Axis, EarlyExit, Group, HEADER_LENGTH, Tag, write_section};
+use palpate_shared::format::{Axis, EarlyExit, Group, Tag, write_section};
 
 /// Parts of a layout of a forest.
-#[derive(Clone)]
+#[derive(Default)]
 pub(super) struct Parts {
     pub(super) axes: Vec<Axis>,
     pub(super) cuts: Vec<u8>,
@@ -19,7 +18,6 @@ pub(super) struct Parts {
     pub(super) base: Vec<i32>,
     pub(super) unit: f32,
     pub(super) margin_error: f32,
-    pub(super) instructions: Instructions,
 }
 
 impl Parts {
@@ -41,11 +39,5 @@ impl Parts {
             write_section(Tag::EarlyExit, false, &content, &mut |part| bytes.extend_from_slice(part));
         }
         bytes
-    }
-
-    /// Bytes of the model, except its text and the parts that all layouts share.
-    pub(super) fn bytes(&self) -> usize {
-        let records = Axis::LENGTH * self.axes.len() + Group::LENGTH * self.groups.len() + 8 * self.base.len();
-        HEADER_LENGTH + records + self.cuts.len() + self.nodes.len() + self.leaves.len() + self.section().len()
     }
 }

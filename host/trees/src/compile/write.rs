@@ -87,7 +87,7 @@ pub(super) fn write(
     Ok(bytes)
 }
 
-/// Bytes that are the same in all layouts, beside those of [`Parts::bytes`]: text, optional sections and checksum.
+/// Bytes that are the same in all layouts, beside those that a layout takes: text, optional sections and checksum.
 pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<usize> {
     let sections = optional(ensemble, settings, forest)?.len()
         + of_rows(ensemble, settings).len()

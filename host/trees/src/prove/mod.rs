@@ -98,7 +98,7 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
     let found = if chip.is_table() {
         tables::of_chip(&chip, subject)?
     } else {
-        let order = compile::order_of_trees(ensemble, model.leaf_type(), &compile::ends_of_walks(&model))?;
+        let order = compile::order(ensemble, model.leaf_type(), &compile::ends_of_walks(&model), None)?;
         trees::of_chip(&chip, subject, &order)?
     };
     let mut proof = subject.proof(&found);
@@ -127,7 +127,7 @@ pub fn prove_code(bytes: &[u8], code: &str, ensemble: &Ensemble, file: &[u8]) ->
     let sources = of_ensemble(ensemble, &plain.keys)?;
     let subject = Subject { plain: &plain, sources: &sources, ensemble };
     let ends: Vec<usize> = read.exits.iter().map(|exit| exit.0).collect();
-    let order = compile::order_of_code(ensemble, model.leaf_type(), &ends, read.is_m4f)?;
+    let order = compile::order(ensemble, model.leaf_type(), &ends, Some(read.chip))?;
     let found = trees::of_code(subject, &order, true)?;
     let proof = Proof { instructions: Some(read.instructions), ..subject.proof(&found) };
     let Found { trees, table, outputs, .. } = found;

@@ -20,7 +20,7 @@ pub(super) fn first_different_tree(
     let plain = compile::unshared(model).ok()?;
     let plain = plain.as_deref().map(Model::new).transpose().ok()?;
     let model = plain.as_ref().unwrap_or(model);
-    let order = compile::order_of_trees(ensemble, model.leaf_type(), &compile::ends_of_walks(model)).ok()?;
+    let order = compile::order(ensemble, model.leaf_type(), &compile::ends_of_walks(model), None).ok()?;
     let leaves = leaves(model)?;
     if order.len() != leaves.len() {
         return None;
