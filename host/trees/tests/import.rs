@@ -3,7 +3,7 @@
 use palpate_trees::compile::code::Form;
 use palpate_trees::compile::{self, Core, Goal, Instructions, Layout, Leaf, Settings};
 use palpate_trees::ensemble::import::{Options, read};
-use palpate_trees::ensemble::{Ensemble, Inputs, Node, Origin};
+use palpate_trees::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
 use palpate_trees::prove::{check, prove};
 use palpate_trees::rows::{Features, Rows, columns_of, read_margins, read_values, scales};
 use palpate_trees::shared::Descriptor;
@@ -689,6 +689,31 @@ fn every_model_is_proved_with_every_leaf_in_every_layout_and_in_whole_units() {
     println!("{counts:?}");
     for layout in ["compact", "complete", "wide"] {
         assert!(counts[&(false, layout)] > 300 && counts[&(true, layout)] > 250, "{counts:?}");
+    }
+}
+
+#[test]
+fn trees_of_one_split_whose_thresholds_fall_together_in_whole_units_are_proved() {
+    // More thresholds than a merged tree may have, and ten in tenths.
+    let stumps = (0..300).map(|number| {
+        let leaf = |value| Node::Leaf(vec![value]);
+        let threshold = number as f32 / 300.0;
+        let split = Node::Split { feature: 0, threshold, missing_left: true, left: 1, right: 2 };
+        let nodes = vec![split, leaf(0.01), leaf(-0.01 * number as f32)];
+        Tree { nodes, output: Output::One(0) }
+    });
+    let ensemble = Ensemble {
+        inputs: Inputs::unnamed(1),
+        objects: vec!["value".into()],
+        base_margins: vec![0.0],
+        trees: stumps.collect(),
+        origin: Origin::default(),
+    };
+    for scales in [None, Some(vec![10.0])] {
+        let settings = Settings { layout: Some(Layout::Complete), scales, ..Settings::default() };
+        let bytes = compile::compile(&ensemble, &settings).unwrap().bytes;
+        let (_, certificate) = prove(&bytes, &ensemble, b"").unwrap();
+        check(&certificate, &bytes, &ensemble, b"").unwrap();
     }
 }
 

@@ -340,10 +340,18 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
 }
 
 /// Trees of the ensemble that each tree of a model with such leaves stands for, in the model's order, or in that of assembly
-/// for a chip. `ends` are the numbers of trees after which a walk may end.
-pub(crate) fn order(ensemble: &Ensemble, leaf: Leaf, ends: &[usize], chip: Option<code::Chip>) -> Result<Vec<Source>> {
+/// for a chip. `scales` are those of features of rows that are whole numbers, `ends` the numbers of trees after which a walk
+/// may end.
+pub(crate) fn order(
+    ensemble: &Ensemble,
+    leaf: Leaf,
+    scales: Option<&[f32]>,
+    ends: &[usize],
+    chip: Option<code::Chip>,
+) -> Result<Vec<Source>> {
     let ensemble = range::scaled(ensemble);
-    let mut lowered = Lowered::new(&Forest::new(&ensemble, None)?, leaf).ok_or(CompileProblem::FitsNoLayout)?;
+    let forest = Forest::new(&ensemble, scales.filter(|_| ensemble.descriptor().is_none()))?;
+    let mut lowered = Lowered::new(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?;
     let ends: Vec<(usize, u32)> = ends.iter().map(|&end| (end, 0)).collect();
     let walk = || early::order(&lowered.forest, &lowered.scale);
     let Some(chip) = chip else {
