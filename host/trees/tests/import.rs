@@ -1,11 +1,14 @@
 //! Files that other libraries wrote, with their own margins: `tests/data/import`.
 
-use palpate_trees::compile::{self, Goal, Layout, Leaf, Settings};
+use palpate_trees::compile::code::Form;
+use palpate_trees::compile::{self, Core, Goal, Instructions, Layout, Leaf, Settings};
 use palpate_trees::ensemble::import::{Options, read};
-use palpate_trees::ensemble::{Ensemble, Inputs, Node};
+use palpate_trees::ensemble::{Ensemble, Inputs, Node, Origin, Output, Schema, Tree};
 use palpate_trees::prove::{check, prove};
 use palpate_trees::rows::{Features, Rows, columns_of, read_margins, read_values, scales};
+use palpate_trees::shared::Descriptor;
 use palpate_trees::shared::format::f32_key;
+use palpate_trees::train::{self, train};
 use palpate_trees::verify::predict::{Predicted, predict};
 use palpate_trees::verify::{Candidate, Library, verify};
 use std::path::{Path, PathBuf};
@@ -689,6 +692,131 @@ fn every_model_is_proved_with_every_leaf_in_every_layout_and_in_whole_units() {
     println!("{counts:?}");
     for layout in ["compact", "complete", "wide"] {
         assert!(counts[&(false, layout)] > 300 && counts[&(true, layout)] > 250, "{counts:?}");
+    }
+}
+
+#[test]
+fn trees_of_one_split_whose_thresholds_fall_together_in_whole_units_are_proved() {
+    // More thresholds than a merged tree may have, and ten in tenths.
+    let stumps = (0..300).map(|number| {
+        let leaf = |value| Node::Leaf(vec![value]);
+        let threshold = number as f32 / 300.0;
+        let split = Node::Split { feature: 0, threshold, missing_left: true, left: 1, right: 2 };
+        let nodes = vec![split, leaf(0.01), leaf(-0.01 * number as f32)];
+        Tree { nodes, output: Output::One(0) }
+    });
+    let ensemble = Ensemble {
+        inputs: Inputs::unnamed(1),
+        objects: vec!["value".into()],
+        base_margins: vec![0.0],
+        trees: stumps.collect(),
+        origin: Origin::default(),
+    };
+    for scales in [None, Some(vec![10.0])] {
+        let settings = Settings { layout: Some(Layout::Complete), scales, ..Settings::default() };
+        let bytes = compile::compile(&ensemble, &settings).unwrap().bytes;
+        let (_, certificate) = prove(&bytes, &ensemble, b"").unwrap();
+        check(&certificate, &bytes, &ensemble, b"").unwrap();
+    }
+}
+
+/// An ensemble that was trained on touches of three spheres, each with an error: larger ones are flatter.
+fn trained() -> Ensemble {
+    let mut state = 1_u64;
+    let mut random = |below: u64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 33) % below) as f32
+    };
+    let labels: Vec<u32> = (0..3_000).map(|row| row % 3).collect();
+    let features: Vec<f32> = labels
+        .iter()
+        .flat_map(|&label| [90_000.0 / (label + 1) as f32 + random(30_000) - random(30_000), random(80_000)])
+        .collect();
+    let rows = train::Rows { features: &features, columns: 2, labels: &labels, weights: None };
+    let parameters = train::Parameters {
+        multi_output: true,
+        rounds: 20,
+        depth: 4,
+        eta: 0.3,
+        min_child_weight: 1.0,
+        bins: 64,
+        base_margin: 0.5,
+    };
+    let (base_margins, trees) = train(rows, 3, &parameters, None, &|| std::ops::ControlFlow::Continue(())).unwrap();
+    let objects = ["small", "middle", "large"].map(String::from).into();
+    let schema = Schema {
+        code: Descriptor::Curvature.code(),
+        name: Descriptor::Curvature.name(),
+        features: Descriptor::Curvature.feature_names(),
+        of: "touches",
+        whole: "whole microseconds",
+        units: "microseconds",
+        planes: &[],
+        is_tabled: false,
+    };
+    Ensemble { inputs: schema.into(), objects, base_margins, trees, origin: Origin::default() }
+}
+
+/// The candidate that a goal is for.
+fn best_for(goal: Goal, candidates: &[compile::Candidate]) -> compile::Candidate {
+    let is_exact = candidates.iter().any(|candidate| candidate.margin_error == 0.0);
+    let mut of = candidates.to_vec();
+    of.retain(|candidate| !is_exact || candidate.margin_error == 0.0);
+    let least = of.iter().map(|candidate| candidate.bytes).min().unwrap();
+    of.sort_by_key(|candidate| match goal {
+        Goal::Size => (0, candidate.bytes as u64, candidate.instructions.m4f),
+        Goal::Speed => (0, candidate.instructions.m4f, candidate.bytes as u64),
+        Goal::Balanced(_) => {
+            (u8::from(candidate.bytes > 3 * least), candidate.instructions.m4f, candidate.bytes as u64)
+        }
+    });
+    of[0]
+}
+
+#[test]
+fn every_candidate_of_every_model_costs_what_it_takes_once_it_is_written_and_the_best_is_chosen() {
+    let name = |path: &Path| path.file_stem().unwrap().to_str().unwrap().to_owned();
+    let paths = models().into_iter().filter(|path| !REFUSED.contains(&name(path).as_str()));
+    let mut all: Vec<(String, Ensemble)> = paths.map(|path| (name(&path), load(&path))).collect();
+    all.push(("touches".into(), trained()));
+    let mut counts = std::collections::BTreeMap::new();
+    for ((name, ensemble), &leaf) in all.iter().flat_map(|own| Leaf::ALL.iter().map(move |leaf| (own, leaf))) {
+        let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding) as f32;
+        let settings = Settings { leaf, forms: Form::ALL.into(), ..Settings::default() };
+        for goal in [Goal::Size, Goal::Speed, Goal::Balanced(Core::M4F)] {
+            let chosen = compile::compile(ensemble, &Settings { goal, ..settings.clone() }).unwrap();
+            let best = best_for(goal, &chosen.candidates);
+            let written = chosen.code.as_ref().map_or(0, |(program, form)| program.cost(*form).bytes);
+            assert_eq!((chosen.layout, chosen.instructions), (best.layout, best.instructions), "{name}, {leaf:?}");
+            assert_eq!(
+                (chosen.bytes.len() + written, chosen.shared_leaves.is_some()),
+                (best.bytes, best.shared_leaves)
+            );
+        }
+        for candidate in compile::compile(ensemble, &settings).unwrap().candidates {
+            let of = format!("{name}, {leaf:?}, {candidate:?}");
+            let form = Form::ALL.into_iter().filter(|form| Some(form.name()) == candidate.form);
+            let own = Settings {
+                layout: Some(candidate.layout),
+                shared_leaves: Some(candidate.shared_leaves),
+                forms: form.collect(),
+                ..settings.clone()
+            };
+            let written = compile::compile(ensemble, &own).unwrap_or_else(|error| panic!("{of}: {error}"));
+            let (bytes, instructions) = match &written.code {
+                Some((program, form)) => (program.cost(*form).bytes, program.cost(*form).instructions),
+                None => (0, Instructions::of_model(&compile::open(&written.bytes).unwrap())),
+            };
+            assert_eq!((written.bytes.len() + bytes, instructions), (candidate.bytes, candidate.instructions), "{of}");
+            let error = written.margin_error - candidate.margin_error;
+            let ulps = 2.0 * f32::EPSILON * written.margin_error;
+            assert!((0.0..=rounding + ulps).contains(&error) && (error == 0.0 || rounding > 0.0), "{of}: {error}");
+            *counts.entry((candidate.layout.name(), candidate.shared_leaves)).or_insert(0) += 1;
+        }
+    }
+    let layouts = ["compact", "complete", "grid", "code"].map(|layout| (layout, false));
+    for kind in layouts.into_iter().chain([("compact", true), ("complete", true)]) {
+        assert!(counts.contains_key(&kind), "{counts:?}");
     }
 }
 

@@ -5,10 +5,10 @@
 //! largest in any cell. Planes of a schema have fewer dimensions than there are features: the layout patterns stores a table
 //! for each.
 
-use super::axes::visit;
+use super::axes::different_splits;
 use super::forest::{Branch, Forest};
 use crate::ensemble::Occurring;
-use std::collections::{BTreeMap, BTreeSet};
+use palpate_shared::format::Layout;
 use std::mem::take;
 use std::ops::{AddAssign, Range};
 
@@ -21,7 +21,7 @@ const MAX_CELLS: usize = 4_000_000;
 /// has the place after the last.
 pub(super) struct Cells {
     /// Features and their thresholds; at least two.
-    pub(super) dimensions: Vec<(u8, Vec<i32>)>,
+    dimensions: Vec<(u8, Vec<i32>)>,
     /// Boxes of places; values fall into one of them.
     planes: Vec<Vec<Range<usize>>>,
     /// True if each plane has a table of its own, and the dimensions are all features.
@@ -38,14 +38,12 @@ struct Span {
 
 impl Cells {
     pub(super) fn new(forest: &Forest<'_>) -> Option<Self> {
-        let mut features: BTreeMap<u8, BTreeSet<i32>> = BTreeMap::new();
-        for tree in &forest.trees {
-            visit(&tree.root, &mut |split| {
-                features.entry(split.feature).or_default().insert(split.cut);
-            });
+        let mut dimensions: Vec<(u8, Vec<i32>)> = Vec::new();
+        for splits in different_splits(forest).chunk_by(|a, b| a.0 == b.0) {
+            let mut cuts: Vec<i32> = splits.iter().map(|split| split.1).collect();
+            cuts.dedup();
+            dimensions.push((splits[0].0, cuts));
         }
-        let mut dimensions: Vec<(u8, Vec<i32>)> =
-            features.into_iter().map(|(feature, cuts)| (feature, cuts.into_iter().collect())).collect();
         let by_pattern = forest.schema.is_some_and(|schema| schema.is_tabled);
         if by_pattern {
             let mut cuts = |feature| dimensions.iter_mut().find(|(of, _)| *of == feature).map(|(_, cuts)| take(cuts));
@@ -75,14 +73,14 @@ impl Cells {
         lengths.sum()
     }
 
-    /// True if all cells form one table of two dimensions.
-    pub(super) fn is_table(&self) -> bool {
-        self.dimensions.len() == 2
-    }
-
-    /// True if there is a table for each plane.
-    pub(super) fn is_by_pattern(&self) -> bool {
-        self.by_pattern
+    /// Layout of a table of all cells, and its dimensions, if there is one.
+    pub(super) fn table(&self) -> Option<(Layout, &[(u8, Vec<i32>)])> {
+        match self.dimensions.as_slice() {
+            // The pattern takes no axis: it says which table it is.
+            [_, differences @ ..] if self.by_pattern => Some((Layout::Patterns, differences)),
+            both @ [_, _] => Some((Layout::Grid, both)),
+            _ => None,
+        }
     }
 
     /// Sums over an object's trees, in their order, in every cell: `start`, and `value` of each leaf that is reached,

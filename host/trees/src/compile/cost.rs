@@ -72,7 +72,12 @@ impl Instructions {
         let (groups, nodes) = groups_and_splits(model);
         let is_shared = model.shared_leaves().is_some();
         let (layout, leaf) = (model.layout(), model.leaf_type());
-        Self::new(&Shape { layout, leaf, objects, axes, groups: &groups, nodes, is_shared, below })
+        let steps = match layout {
+            Layout::Compact => steps_to_leaves(nodes, 3, &|node| node[2].into(), below),
+            Layout::Wide => steps_to_leaves(nodes, 6, &|node| u16::from_le_bytes([node[4], node[5]]).into(), below),
+            Layout::Complete | Layout::Grid | Layout::Patterns | Layout::Code => Vec::new(),
+        };
+        Self::new(&Shape { layout, leaf, objects, axes, groups: &groups, steps: &steps, is_shared })
     }
 
     pub(super) fn new(shape: &Shape<'_>) -> Self {
@@ -139,16 +144,14 @@ pub(super) struct Shape<'a> {
     pub(super) objects: usize,
     pub(super) axes: usize,
     pub(super) groups: &'a [Group],
-    /// The splits, as the model has them.
-    pub(super) nodes: &'a [u8],
+    /// Steps to a leaf of each tree in preorder.
+    pub(super) steps: &'a [f64],
     /// True if leaves are indices into a table.
     pub(super) is_shared: bool,
-    /// Steps below a split in preorder, of those below its two sides.
-    pub(super) below: fn(f64, f64) -> f64,
 }
 
 /// Steps below a split if either side is as likely.
-pub(super) fn on_average(left: f64, right: f64) -> f64 {
+fn on_average(left: f64, right: f64) -> f64 {
     (left + right) / 2.0
 }
 
@@ -233,11 +236,8 @@ impl Costs {
                 let groups = shape.groups.iter().enumerate();
                 groups.map(|(index, group)| self.complete_group(group, shape, index > 0)).sum()
             }
-            Layout::Compact => self.preorder_trees(shape, 3, self.step.0, |node| usize::from(node[2])),
-            Layout::Wide => {
-                let left = |node: &[u8]| usize::from(u16::from_le_bytes([node[4], node[5]]));
-                self.preorder_trees(shape, 6, self.step.1, left)
-            }
+            Layout::Compact => self.preorder_trees(shape, self.step.0),
+            Layout::Wide => self.preorder_trees(shape, self.step.1),
         };
         let axes = if shape.layout == Layout::Wide { 0 } else { shape.axes };
         (self.fixed.0 + self.axis * axes + self.fixed.1 * shape.objects + trees) as u64
@@ -262,10 +262,10 @@ impl Costs {
         together * (values / few) + self.leaf.alone * (values % few)
     }
 
-    /// Trees in preorder, each after its number of splits: steps to the leaf that is reached, and its values.
-    fn preorder_trees(&self, shape: &Shape<'_>, length: usize, step: f64, left: impl Fn(&[u8]) -> usize) -> usize {
+    /// Trees in preorder: steps to the leaf that is reached, and its values.
+    fn preorder_trees(&self, shape: &Shape<'_>, step: f64) -> usize {
         let (start, tree, value) = self.preorder;
-        let mut rest = shape.nodes;
+        let mut trees = shape.steps.iter();
         let mut sum = 0;
         for group in shape.groups {
             let values = values(group, shape);
@@ -273,14 +273,8 @@ impl Costs {
                 true => self.shared_tree + self.leaf_together(values, shape.leaf),
                 false => tree + value * values,
             };
-            for _ in 0..group.trees {
-                let Some((splits, after)) = rest.split_first_chunk() else { return sum };
-                let splits = length * usize::from(u16::from_le_bytes(*splits));
-                let Some((splits, after)) = after.split_at_checked(splits) else { return sum };
-                rest = after;
-                let steps = steps_to_leaf(splits, length, &left, shape.below);
-                sum += (start + step * steps).round() as usize + leaf;
-            }
+            let own = trees.by_ref().take(group.trees as usize);
+            sum += own.map(|steps| (start + step * steps).round() as usize + leaf).sum::<usize>();
         }
         sum
     }
@@ -289,6 +283,23 @@ impl Costs {
 /// Values of a leaf.
 fn values(group: &Group, shape: &Shape<'_>) -> usize {
     if group.object.is_some() { 1 } else { shape.objects }
+}
+
+/// Steps to a leaf of each tree in preorder, each after its number of splits.
+fn steps_to_leaves(
+    mut nodes: &[u8],
+    length: usize,
+    left: &impl Fn(&[u8]) -> usize,
+    below: fn(f64, f64) -> f64,
+) -> Vec<f64> {
+    let mut steps = Vec::new();
+    while let Some((splits, rest)) = nodes.split_first_chunk() {
+        let splits = length * usize::from(u16::from_le_bytes(*splits));
+        let Some((splits, rest)) = rest.split_at_checked(splits) else { break };
+        steps.push(steps_to_leaf(splits, length, left, below));
+        nodes = rest;
+    }
+    steps
 }
 
 /// Steps to a leaf of a tree in preorder, where `below` joins those of a split's sides; `left` gives the splits in a split's
@@ -341,9 +352,8 @@ mod tests {
                 objects: 10,
                 axes,
                 groups: &groups,
-                nodes: &[],
+                steps: &[],
                 is_shared: false,
-                below: on_average,
             };
             let estimate = Instructions::new(&shape);
             for (estimate, counted) in [estimate.m4f, estimate.m0_plus.unwrap()].into_iter().zip(counted) {
@@ -354,17 +364,8 @@ mod tests {
             }
         }
         let table = |layout, axes| {
-            let (leaf, objects, groups, nodes) = (LeafType::I8, 10, &[], &[]);
-            Instructions::new(&Shape {
-                layout,
-                leaf,
-                objects,
-                axes,
-                groups,
-                nodes,
-                is_shared: false,
-                below: on_average,
-            })
+            let (leaf, objects) = (LeafType::I8, 10);
+            Instructions::new(&Shape { layout, leaf, objects, axes, groups: &[], steps: &[], is_shared: false })
         };
         assert_eq!(table(Layout::Grid, 2), Instructions { m4f: 330, m0_plus: Some(375) });
         assert_eq!(table(Layout::Patterns, 3), Instructions { m4f: 598, m0_plus: Some(685) });
@@ -378,9 +379,8 @@ mod tests {
             objects: 10,
             axes: 2,
             groups: &[],
-            nodes: &[],
+            steps: &[],
             is_shared: false,
-            below: on_average,
         };
         assert_eq!(Instructions::new(&shape).on(Core::M0Plus), None);
         assert!(Instructions::new(&shape).on(Core::M4F).is_some());

@@ -6,12 +6,14 @@
 //!
 //! Where to look is chosen by the rows: every place costs a comparison of all margins, and groups of trees of its own.
 
-use super::forest::{Branch, Forest, each_leaf};
+use super::forest::{Branch, Branches, Forest, each_leaf};
+use super::lower::Lowered;
 use super::quantize::Scale;
 use crate::ensemble::Output;
 use crate::rows::{Encoder, Rows};
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Layout, Sentinel};
+use std::sync::Arc;
 
 /// Choice of models whose walks may end early.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,12 +49,16 @@ pub(super) struct Plan {
     pub(super) found: EarlyExitFound,
 }
 
+/// Instructions of a place where a walk may end: the comparison of the margins, in all and for each.
+const PLACE: f64 = 30.0;
+const PLACE_OF_OBJECT: f64 = 9.0;
+
 /// Costs of a walk, in instructions.
-pub(super) struct Work<'w> {
+struct Work<'w> {
     /// Cost of walking trees one after the other.
-    pub(super) trees: &'w dyn Fn(&[usize]) -> f64,
+    trees: &'w dyn Fn(&[usize]) -> f64,
     /// Cost of a place.
-    pub(super) place: f64,
+    place: f64,
 }
 
 /// Trees in the order in which they are walked: those whose leaves differ most first.
@@ -76,15 +82,16 @@ pub(super) fn parts(order: &[usize], ends: impl Iterator<Item = usize>) -> Vec<u
     parts
 }
 
-/// Chooses where walks may end; `None` for a model without classes. `base` are margins before any tree, in units.
+/// Chooses where walks in a layout may end; `None` for a model without classes.
 pub(super) fn plan(
-    forest: &Forest<'_>,
-    scale: &Scale,
-    base: &[i32],
+    lowered: &Lowered<'_>,
+    layout: Layout,
     wanted: &EarlyExit,
-    work: &Work<'_>,
     (scales, sentinel): (Option<&[f32]>, Option<Sentinel>),
 ) -> Option<Plan> {
+    let Lowered { forest, scale, base, .. } = lowered;
+    let place = PLACE + PLACE_OF_OBJECT * forest.objects() as f64;
+    let work = &Work { trees: &|trees| walk_cost(forest, layout, trees), place };
     let trees = forest.trees.len();
     if forest.objects() < 2 || trees < 2 {
         return None;
@@ -127,7 +134,7 @@ enum Change {
 }
 
 fn changes(forest: &Forest<'_>, scale: &Scale) -> Vec<Change> {
-    let change = |(tree, &shift): (&super::forest::Branches<'_>, &u8)| {
+    let change = |(tree, &shift): (&Arc<Branches<'_>>, &u8)| {
         let units = |value: &f32| i64::from(scale.integer(*value, shift)) << shift;
         let (mut low, mut high, mut most) = (i64::MAX, i64::MIN, 0);
         each_leaf(&tree.root, &mut |values| {
@@ -270,7 +277,7 @@ fn cheapest(order: &[usize], ends: &[usize], decided: &[Vec<bool>], work: &Work<
 }
 
 /// About how many instructions a walk takes through trees of one object or of all; for choosing places, not for statements.
-pub(super) fn walk_cost(forest: &Forest<'_>, layout: Layout, trees: &[usize]) -> f64 {
+fn walk_cost(forest: &Forest<'_>, layout: Layout, trees: &[usize]) -> f64 {
     // By layout: of a tree, of each of its levels or steps, of a value, and of a group, as `cost.rs` has them.
     let (tree, step, value, group) = match layout {
         Layout::Complete => (14.0, 6.5, 8.0, 150.0),
@@ -295,7 +302,7 @@ pub(super) fn walk_cost(forest: &Forest<'_>, layout: Layout, trees: &[usize]) ->
 }
 
 /// Steps to a leaf, if either side of a split is as likely.
-fn steps(branch: &Branch<'_>) -> f64 {
+pub(super) fn steps(branch: &Branch<'_>) -> f64 {
     match branch {
         Branch::Leaf(_) => 0.0,
         Branch::Split(split) => 1.0 + (steps(&split.left) + steps(&split.right)) / 2.0,

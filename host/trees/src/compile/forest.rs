@@ -5,6 +5,7 @@ use crate::error::{CompileProblem, Error, Result, TreeProblem};
 use palpate_shared::format::{Key, f32_key};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// Margins beyond ± this many nats are refused: e^16384 is sure enough.
 pub(super) const MARGIN_RANGE: f64 = 16384.0;
@@ -16,14 +17,13 @@ const MAX_DEPTH: usize = 256;
 pub(super) struct Forest<'a> {
     pub(super) base: &'a [f32],
     pub(super) names: &'a [String],
-    pub(super) trees: Vec<Branches<'a>>,
+    pub(super) trees: Vec<Arc<Branches<'a>>>,
     pub(super) features: usize,
     pub(super) key: Key,
     pub(super) schema: Option<Schema>,
 }
 
 /// A tree of a checked ensemble.
-#[derive(Clone)]
 pub(super) struct Branches<'a> {
     pub(super) root: Branch<'a>,
     pub(super) output: Output,
@@ -34,14 +34,12 @@ pub(super) struct Branches<'a> {
 }
 
 /// A split or a leaf.
-#[derive(Clone)]
 pub(super) enum Branch<'a> {
     Leaf(Cow<'a, [f32]>),
     Split(Box<Split<'a>>),
 }
 
 /// A split: left if the feature's key is below `cut`.
-#[derive(Clone)]
 pub(super) struct Split<'a> {
     pub(super) feature: u8,
     pub(super) cut: i32,
@@ -79,7 +77,7 @@ impl<'a> Forest<'a> {
             let mut reader =
                 Reader { tree, own: &own, values, features, thresholds, left: tree.nodes.len(), largest: 0.0 };
             let (root, splits, depth) = reader.branch(0, 0).map_err(place)?;
-            trees.push(Branches { root, output: tree.output, depth, splits, largest: reader.largest });
+            trees.push(Arc::new(Branches { root, output: tree.output, depth, splits, largest: reader.largest }));
         }
         let forest = Self {
             base: &ensemble.base_margins,
@@ -130,7 +128,7 @@ impl<'a> Forest<'a> {
 
     /// The trees that add to an object's margin.
     pub(super) fn trees_of(&self, object: usize) -> impl Iterator<Item = &Branches<'a>> {
-        self.trees.iter().filter(move |tree| tree.values_for(object))
+        self.trees.iter().map(Arc::as_ref).filter(move |tree| tree.values_for(object))
     }
 
     fn check_range(&self) -> Result<()> {

@@ -20,7 +20,7 @@ pub(super) fn groups_and_splits<'m>(model: &Model<'m>) -> (Vec<Group>, &'m [u8])
 }
 
 /// Numbers of trees after which a walk for a class alone may end.
-pub fn ends_of_walks(model: &Model<'_>) -> Vec<usize> {
+pub(crate) fn ends_of_walks(model: &Model<'_>) -> Vec<usize> {
     let groups = groups_and_splits(model).0;
     let trees = |groups: &[Group]| groups.iter().map(|group| group.trees as usize).sum();
     let exits = model.early_exits().map(|exit| groups.len().min(exit.groups.into()));
@@ -28,7 +28,7 @@ pub fn ends_of_walks(model: &Model<'_>) -> Vec<usize> {
 }
 
 /// The groups of a model, and how many leaves each of their trees has, in the model's order. Tables have no groups.
-pub fn leaves_of_trees(model: &Model<'_>) -> Vec<(Group, Vec<usize>)> {
+pub(crate) fn leaves_of_trees(model: &Model<'_>) -> Vec<(Group, Vec<usize>)> {
     let (groups, mut rest) = groups_and_splits(model);
     let size = if model.layout() == Layout::Wide { 6 } else { 3 };
     let mut leaves = |group: &Group| {

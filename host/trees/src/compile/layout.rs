@@ -1,227 +1,155 @@
-//! The layouts: the same trees as different bytes.
+//! The layouts that a forest may take: each is costed, and one is written.
 
-use super::axes::Axes;
 use super::cells::Cells;
 use super::code::{Form, Program, Statements};
-use super::cost::{Instructions, Shape, on_average};
-use super::early::{self, EarlyExitFound, Plan, Work};
+use super::early::{self, EarlyExit, EarlyExitFound};
 use super::forest::Forest;
-use super::merge::{Merged, merge};
+use super::lower::Lowered;
 use super::parts::Parts;
-use super::quantize::Scale;
 use super::rounding;
-use super::share::share;
-use super::table;
-use super::trees::{self, Leaves, Sections};
+use super::share::Sharing;
+use super::table::Table;
+use super::{Candidate, Settings};
 use crate::error::{CompileProblem, Result};
-use palpate_shared::format::{EarlyExit, Layout, LeafType, Sentinel};
-use std::cell::OnceCell;
+use palpate_shared::format::{HEADER_LENGTH, Layout, LeafType, Sentinel};
 
-/// Layouts of a forest: the one that was asked for, or all that fit.
-pub(super) fn candidates(
-    forest: &Forest<'_>,
-    cells: Option<&Cells>,
-    leaf: LeafType,
-    wanted: Option<Layout>,
-    shared: Option<bool>,
-) -> Result<Vec<(Layout, Parts)>> {
-    let mut layouts = wanted
-        .map_or_else(|| vec![Layout::Complete, Layout::Compact, Layout::Grid, Layout::Patterns], |layout| vec![layout]);
-    let scale = Scale::for_trees(forest, leaf);
-    let merged = scale.as_ref().and_then(|scale| merge(forest, leaf, scale));
-    // What is walked: fewer trees with the same sums, where there are such.
-    let walk = Walk::new(forest, leaf, scale.as_ref(), merged.as_ref());
-    let axes = &Axes::new(walk.forest);
-    if !trees::fits_narrow(walk.forest, axes) {
-        layouts.iter_mut().filter(|layout| **layout == Layout::Compact).for_each(|layout| *layout = Layout::Wide);
-    }
-    let mut candidates = Vec::new();
-    // The same for every layout that walks trees, and slow to find.
-    let error = OnceCell::new();
-    let error = || {
-        let bound = |scale: &Scale| rounding::margin_error(forest, cells, leaf, scale);
-        *error.get_or_init(|| scale.as_ref().map_or(0.0, bound))
-    };
-    for layout in layouts {
-        let parts = match layout {
-            Layout::Complete | Layout::Compact | Layout::Wide => walk.parts(layout, axes, leaf, None, &error),
-            Layout::Code => None,
-            Layout::Grid => cells.and_then(|cells| table::grid(forest, cells, leaf)),
-            Layout::Patterns => cells.and_then(|cells| table::patterns(forest, cells, leaf)),
-        };
-        match parts {
-            Some(parts) => {
-                let sharing = if shared == Some(false) { None } else { share(&parts, leaf, forest.objects()) };
-                let sharing = sharing.filter(|sharing| shared == Some(true) || sharing.bytes() < parts.bytes());
-                if shared != Some(true) || sharing.is_none() {
-                    candidates.push((layout, parts));
-                }
-                if let Some(mut parts) = sharing {
-                    parts.instructions = instructions(layout, leaf, forest.objects(), &parts);
-                    candidates.push((layout, parts));
-                }
-            }
-            None if wanted.is_some() => return Err(CompileProblem::DoesNotFit { layout }.into()),
-            None => {}
-        }
-    }
-    Ok(candidates)
-}
-
-/// The same trees as code, and what a model beside it has; `None` if they do not fit.
-pub(super) fn code(
-    forest: &Forest<'_>,
-    cells: Option<&Cells>,
-    leaf: LeafType,
-    stated: &Statements,
-) -> Option<(Program, Parts)> {
-    if leaf == LeafType::F32 {
-        return None;
-    }
-    let scale = Scale::for_trees(forest, leaf)?;
-    let merged = merge(forest, leaf, &scale);
-    let walk = Walk::new(forest, leaf, Some(&scale), merged.as_ref());
-    let program = Program::new(walk.forest, walk.scale?, walk.base, stated)?;
-    let parts = Parts {
-        axes: Vec::new(),
-        cuts: Vec::new(),
-        groups: Vec::new(),
-        nodes: Vec::new(),
-        leaves: Vec::new(),
-        shared: None,
-        exits: Vec::new(),
-        base: vec![0; forest.objects()],
-        unit: scale.unit,
-        margin_error: rounding::margin_error(forest, cells, leaf, &scale),
-        instructions: Instructions { m4f: 0, m0_plus: None },
-    };
-    Some((program, parts))
-}
-
-/// Trees that layouts walk.
-struct Walk<'f> {
-    forest: &'f Forest<'f>,
+/// A forest as it may be written.
+pub(super) struct Layouts<'f> {
+    objects: usize,
     /// `None` where leaves do not fit their type.
-    scale: Option<&'f Scale>,
-    /// Starting values of the margins: in units, or f32 bits.
-    base: Vec<i32>,
+    lowered: Option<Lowered<'f>>,
+    /// The farthest that a margin of the trees can be from the ensemble's.
+    margin_error: f32,
+    /// A table of equal leaves, if there can be one.
+    sharing: Option<Sharing>,
+    table: Option<Table>,
+    /// The trees as code, if that is asked for and they fit.
+    program: Option<Program>,
 }
 
-impl<'f> Walk<'f> {
-    fn new(forest: &'f Forest<'f>, leaf: LeafType, scale: Option<&'f Scale>, merged: Option<&'f Merged<'f>>) -> Self {
-        if let Some(merged) = merged {
-            return Self { forest: &merged.forest, scale: Some(&merged.scale), base: merged.base.clone() };
-        }
-        let bits = |&base: &f32| scale.map_or(0, |scale| base_bits(base, leaf, scale));
-        Self { forest, scale, base: forest.base.iter().map(bits).collect() }
-    }
-}
-
-impl Walk<'_> {
-    /// The parts of a layout that walks trees, in the order of a plan if there is one.
-    fn parts(
-        &self,
-        layout: Layout,
-        axes: &Axes,
-        leaf: LeafType,
-        plan: Option<&Plan>,
-        margin_error: &dyn Fn() -> f32,
-    ) -> Option<Parts> {
-        let (forest, scale) = (self.forest, self.scale?);
-        let mut leaves = Leaves::new(leaf, scale);
-        let walked_in =
-            plan.map_or_else(Vec::new, |plan| early::parts(&plan.order, plan.ends.iter().map(|(end, _)| *end)));
-        let runs = trees::runs(forest, leaf, scale, &walked_in);
-        let Sections { axes, cuts, groups, nodes } = match layout {
-            Layout::Complete => trees::complete(forest, axes, &runs, &mut leaves)?,
-            Layout::Compact => trees::compact(forest, axes, &runs, &mut leaves)?,
-            Layout::Wide => trees::wide(forest, &runs, &mut leaves)?,
-            Layout::Code | Layout::Grid | Layout::Patterns => return None,
+impl<'f> Layouts<'f> {
+    /// What the layouts need that are asked for.
+    pub(super) fn new(forest: &Forest<'f>, settings: &Settings, stated: &Statements) -> Self {
+        let (objects, leaf) = (forest.objects(), settings.leaf);
+        let cells = Cells::new(forest);
+        let lowered = Lowered::new(forest, leaf);
+        let wants_table = matches!(settings.layout, None | Some(Layout::Grid | Layout::Patterns));
+        let wants_trees = !matches!(settings.layout, Some(Layout::Grid | Layout::Patterns));
+        let in_table = cells.as_ref().filter(|cells| wants_table && Table::fits(cells, objects, leaf));
+        let (margin_error, sums) = match lowered.as_ref().filter(|_| wants_trees) {
+            None => (0.0, in_table.map(|cells| rounding::sums(forest, cells))),
+            Some(lowered) => {
+                rounding::margin_error(forest, cells.as_ref(), leaf, &lowered.rounding, in_table.is_some())
+            }
         };
-        if groups.len() > usize::from(u16::MAX) {
-            return None;
-        }
-        let ends = plan.into_iter().flat_map(|plan| &plan.ends);
-        let exits = trees::groups_before(&runs, &walked_in).into_iter().zip(ends);
-        let mut parts = Parts {
-            axes,
-            cuts,
-            groups,
-            nodes,
-            leaves: leaves.into_bytes(),
-            shared: None,
-            exits: exits.map(|(groups, &(_, bound))| EarlyExit { groups, bound }).collect(),
-            base: self.base.clone(),
-            unit: scale.unit,
-            margin_error: margin_error(),
-            instructions: Instructions { m4f: 0, m0_plus: None },
-        };
-        parts.instructions = instructions(layout, leaf, forest.objects(), &parts);
-        Some(parts)
+        let table = in_table.zip(sums).and_then(|(cells, sums)| Table::new(cells, sums, leaf));
+        let may_be_code = !settings.forms.is_empty() && matches!(settings.layout, None | Some(Layout::Code));
+        let in_code = lowered.as_ref().filter(|_| may_be_code && leaf != LeafType::F32);
+        let program = in_code.and_then(|lowered| Program::new(lowered, stated));
+        let is_shared = wants_trees && settings.shared_leaves != Some(false);
+        let sharing = lowered.as_ref().filter(|_| is_shared).and_then(Lowered::sharing);
+        Self { objects, lowered, margin_error, sharing, table, program }
     }
 
-    /// Plan of a walk that may end early.
-    fn plan(
-        &self,
-        layout: Layout,
-        wanted: &super::EarlyExit,
+    /// Costs of the layout that is asked for, or of all that fit, without the bytes that are the same for all. Errors are in
+    /// margins of the trees.
+    pub(super) fn candidates(&self, settings: &Settings) -> Result<Vec<Candidate>> {
+        let all = || vec![Layout::Complete, Layout::Compact, Layout::Grid, Layout::Patterns];
+        let mut candidates = Vec::new();
+        for layout in settings.layout.map_or_else(all, |layout| vec![layout]) {
+            let is_wide =
+                layout == Layout::Compact && self.lowered.as_ref().is_some_and(|lowered| !lowered.is_narrow());
+            let layout = if is_wide { Layout::Wide } else { layout };
+            let before = candidates.len();
+            candidates.extend(self.trees_in(layout, settings.shared_leaves));
+            candidates.extend(self.table_in(layout));
+            if settings.layout.is_some() && layout != Layout::Code && candidates.len() == before {
+                return Err(CompileProblem::DoesNotFit { layout }.into());
+            }
+        }
+        if let Some(program) = &self.program {
+            candidates.extend(settings.forms.iter().map(|&form| {
+                let (cost, model) = (program.cost(form), HEADER_LENGTH + 8 * self.objects);
+                Candidate {
+                    layout: Layout::Code,
+                    form: Some(form.name()),
+                    shared_leaves: false,
+                    bytes: model + cost.bytes,
+                    instructions: cost.instructions,
+                    margin_error: self.margin_error,
+                }
+            }));
+        }
+        Ok(candidates)
+    }
+
+    /// Trees in a layout, with and without a table of equal leaves; nothing where they do not fit.
+    fn trees_in(&self, layout: Layout, shared: Option<bool>) -> impl Iterator<Item = Candidate> {
+        let lowered = self.lowered.as_ref().filter(|lowered| lowered.fits(layout));
+        let candidate = move |lowered: &Lowered<'_>, sharing: Option<Sharing>| Candidate {
+            layout,
+            form: None,
+            shared_leaves: sharing.is_some(),
+            bytes: lowered.bytes(layout, sharing),
+            instructions: lowered.instructions(layout, sharing.is_some()),
+            margin_error: self.margin_error,
+        };
+        let plain = lowered.map(|lowered| candidate(lowered, None));
+        let sharing = self.sharing;
+        let with_table = lowered.zip(sharing).map(|(lowered, sharing)| candidate(lowered, Some(sharing)));
+        let (plain, with_table) = match (shared, plain, with_table) {
+            (Some(true), _, Some(table)) => (None, Some(table)),
+            (None, Some(plain), Some(table)) if table.bytes >= plain.bytes => (Some(plain), None),
+            (_, plain, table) => (plain, table),
+        };
+        plain.into_iter().chain(with_table)
+    }
+
+    /// The table, if it has this layout.
+    fn table_in(&self, layout: Layout) -> Option<Candidate> {
+        let table = self.table.as_ref().filter(|table| table.layout == layout)?;
+        Some(Candidate {
+            layout,
+            form: None,
+            shared_leaves: false,
+            bytes: table.bytes(),
+            instructions: table.instructions(),
+            margin_error: table.margin_error,
+        })
+    }
+
+    /// Chooses where walks for a class alone may end in this layout, or form of code. Instructions of the candidate follow.
+    pub(super) fn end_early(
+        &mut self,
+        chosen: &mut Candidate,
+        form: Option<Form>,
+        wanted: &EarlyExit,
         features: (Option<&[f32]>, Option<Sentinel>),
-    ) -> Option<Plan> {
-        let place = PLACE + PLACE_OF_OBJECT * self.forest.objects() as f64;
-        let work = Work { trees: &|trees| early::walk_cost(self.forest, layout, trees), place };
-        early::plan(self.forest, self.scale?, &self.base, wanted, &work, features)
+    ) -> Option<EarlyExitFound> {
+        let lowered = self.lowered.as_mut().filter(|_| !matches!(chosen.layout, Layout::Grid | Layout::Patterns))?;
+        let early::Plan { order, ends, found } = early::plan(lowered, chosen.layout, wanted, features)?;
+        if let Some(form) = form {
+            let program = self.program.take_if(|program| program.may_exit(form))?.with_exits(&order, ends);
+            chosen.instructions = program.cost(form).instructions;
+            self.program = Some(program);
+        } else if !lowered.end_after(&order, &ends) {
+            return None;
+        } else {
+            chosen.instructions = lowered.instructions(chosen.layout, chosen.shared_leaves);
+        }
+        Some(found)
     }
-}
 
-/// Instructions of a place where a walk may end: the comparison of the margins, in all and for each.
-const PLACE: f64 = 30.0;
-const PLACE_OF_OBJECT: f64 = 9.0;
-
-/// The parts of a layout with places where walks for a class alone may end, and which these are; `None` where there are none.
-pub(super) fn with_early_exit(
-    forest: &Forest<'_>,
-    leaf: LeafType,
-    layout: Layout,
-    before: &Parts,
-    wanted: &super::EarlyExit,
-    features: (Option<&[f32]>, Option<Sentinel>),
-) -> Option<(Parts, EarlyExitFound)> {
-    let scale = Scale::for_trees(forest, leaf)?;
-    let merged = merge(forest, leaf, &scale);
-    let walk = Walk::new(forest, leaf, Some(&scale), merged.as_ref());
-    let plan = walk.plan(layout, wanted, features)?;
-    let parts = walk.parts(layout, &Axes::new(walk.forest), leaf, Some(&plan), &|| before.margin_error)?;
-    let mut parts = if before.shared.is_some() { share(&parts, leaf, forest.objects())? } else { parts };
-    parts.instructions = instructions(layout, leaf, forest.objects(), &parts);
-    Some((parts, plan.found))
-}
-
-/// Candidates of code.
-pub(super) fn code_with_early_exit(
-    forest: &Forest<'_>,
-    leaf: LeafType,
-    (program, form): (Program, Form),
-    wanted: &super::EarlyExit,
-    features: (Option<&[f32]>, Option<Sentinel>),
-) -> (Program, Option<EarlyExitFound>) {
-    let plan = || {
-        let scale = Scale::for_trees(forest, leaf)?;
-        let merged = merge(forest, leaf, &scale);
-        Walk::new(forest, leaf, Some(&scale), merged.as_ref()).plan(Layout::Code, wanted, features)
-    };
-    match plan().filter(|_| program.may_exit(form)) {
-        Some(plan) => (program.with_exits(&plan.order, plan.ends), Some(plan.found)),
-        None => (program, None),
+    /// The chosen layout, and the program if it is code; `None` where it has none of these.
+    pub(super) fn write(self, chosen: &Candidate) -> Option<(Parts, Option<Program>)> {
+        let Self { objects, lowered, margin_error, table, program, .. } = self;
+        match chosen.layout {
+            Layout::Grid | Layout::Patterns => Some((table?.write(), None)),
+            Layout::Code => {
+                let (base, unit) = (vec![0; objects], lowered?.scale.unit);
+                Some((Parts { base, unit, margin_error, ..Parts::default() }, Some(program?)))
+            }
+            layout => Some((lowered?.write(layout, chosen.shared_leaves, margin_error), None)),
+        }
     }
-}
-
-/// Instructions of the margins in a layout that walks trees.
-fn instructions(layout: Layout, leaf: LeafType, objects: usize, parts: &Parts) -> Instructions {
-    let Parts { axes, groups, nodes, shared, .. } = parts;
-    let is_shared = shared.is_some();
-    Instructions::new(&Shape { layout, leaf, objects, axes: axes.len(), groups, nodes, is_shared, below: on_average })
-}
-
-fn base_bits(base: f32, leaf: LeafType, scale: &Scale) -> i32 {
-    if leaf == LeafType::F32 { base.to_bits().cast_signed() } else { scale.integer(base, 0) }
 }

@@ -10,15 +10,16 @@ use crate::ensemble::Output;
 use palpate_shared::format::LeafType;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The most thresholds of a merged tree: then it is no deeper than a complete tree may be.
 const MAX_CUTS: usize = 255;
 
-/// A forest whose trees are fewer, in units.
+/// A forest with the same sums, of fewer trees where there are such.
 pub(super) struct Merged<'a> {
     pub(super) forest: Forest<'a>,
     pub(super) scale: Scale,
-    /// Base margins in units.
+    /// Base margins: in units, or f32 bits.
     pub(super) base: Vec<i32>,
     /// For each tree, what it stands for.
     pub(super) sources: Vec<Source>,
@@ -26,11 +27,11 @@ pub(super) struct Merged<'a> {
 
 /// Trees of an ensemble that a tree of a model stands for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Source {
+pub(crate) struct Source {
     /// Their numbers.
-    pub trees: Vec<usize>,
+    pub(crate) trees: Vec<usize>,
     /// Amount that the model's tree adds less than they do, in units times 2^shift of its leaves; the base has it.
-    pub offset: i32,
+    pub(crate) offset: i32,
 }
 
 /// A tree of one split.
@@ -48,18 +49,25 @@ struct Steps {
     values: Vec<i64>,
 }
 
-/// The same sums from fewer trees; `None` where no tree can go.
-pub(super) fn merge<'a>(forest: &Forest<'a>, leaf: LeafType, scale: &Scale) -> Option<Merged<'a>> {
+/// The same sums from as few trees as can be.
+pub(super) fn merge<'a>(forest: &Forest<'a>, leaf: LeafType, scale: &Scale) -> Merged<'a> {
     let most = match leaf {
         LeafType::I8 => 127,
         LeafType::I16 => 32767,
-        LeafType::F32 => return None,
+        LeafType::F32 => {
+            return Merged {
+                forest: Forest { trees: forest.trees.clone(), ..*forest },
+                scale: scale.clone(),
+                base: forest.base.iter().map(|base| base.to_bits().cast_signed()).collect(),
+                sources: (0..forest.trees.len()).map(Source::of).collect(),
+            };
+        }
     };
     let integer = |tree: usize, value: f32| scale.integer(value, scale.shifts[tree]);
     let mut base: Vec<i32> = forest.base.iter().map(|&base| scale.integer(base, 0)).collect();
     let mut stumps: BTreeMap<(usize, u8, bool, u8), Vec<Stump<'_>>> = BTreeMap::new();
     // By the first of their trees.
-    let mut kept: BTreeMap<usize, (Source, Branches<'a>, u8)> = BTreeMap::new();
+    let mut kept: BTreeMap<usize, (Source, Arc<Branches<'a>>, u8)> = BTreeMap::new();
     for (index, tree) in forest.trees.iter().enumerate() {
         let shift = scale.shifts[index];
         match (&tree.root, tree.output) {
@@ -94,11 +102,8 @@ pub(super) fn merge<'a>(forest: &Forest<'a>, leaf: LeafType, scale: &Scale) -> O
             let values: Vec<f32> = steps.values.iter().map(|&sum| value(sum)).collect();
             let tree = balanced(&steps.cuts, &values, feature, missing_left, object);
             let source = Source { trees: group.iter().map(|stump| stump.tree).collect(), offset: offset as i32 };
-            kept.insert(first, (source, tree, shift));
+            kept.insert(first, (source, Arc::new(tree), shift));
         }
-    }
-    if kept.len() == forest.trees.len() {
-        return None;
     }
     let mut merged = Merged {
         forest: Forest { trees: Vec::new(), ..*forest },
@@ -111,12 +116,12 @@ pub(super) fn merge<'a>(forest: &Forest<'a>, leaf: LeafType, scale: &Scale) -> O
         merged.scale.shifts.push(shift);
         merged.sources.push(source);
     }
-    Some(merged)
+    merged
 }
 
 impl Source {
     /// A tree that stands for itself.
-    pub(super) fn of(tree: usize) -> Self {
+    fn of(tree: usize) -> Self {
         Self { trees: vec![tree], offset: 0 }
     }
 }
@@ -279,14 +284,15 @@ mod tests {
         let ensemble = random(5, 300, 0.001);
         let forest = super::Forest::new(&ensemble, None).unwrap();
         let scale = super::Scale::for_trees(&forest, Leaf::I16).unwrap();
-        let merged = super::merge(&forest, Leaf::I16, &scale).unwrap();
+        let merged = super::merge(&forest, Leaf::I16, &scale);
         assert!(merged.forest.trees.len() < 200, "{}", merged.forest.trees.len());
         let mut all: Vec<usize> = merged.sources.iter().flat_map(|source| source.trees.clone()).collect();
         all.sort_unstable();
         let splits = (0..300).filter(|&tree| ensemble.trees[tree].nodes.len() > 1);
         assert!(all.into_iter().eq(splits), "every tree with a split is in one place");
         // With leaves as the trainer left them nothing is added up beforehand.
-        assert!(super::merge(&forest, Leaf::F32, &scale).is_none());
+        let kept = super::merge(&forest, Leaf::F32, &scale).sources;
+        assert!(kept.into_iter().eq((0..300).map(super::Source::of)));
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! From an ensemble to the bytes that the chip reads.
 //!
 //! ```text
-//! Ensemble ──► Forest (checked, whole thresholds) ──► Axes (ranks) ──► units ──► layout ──► bytes
-//!                                        └──────────► cells: the worst error of a margin
+//! Ensemble ──► Forest (checked, whole thresholds) ──► Lowered (merged trees, units, ranks, order) ──► costs of all layouts
+//!                                        └──────────► cells: the worst error of a margin                      │
+//!                                                                                      bytes ◄── the chosen one ┘
 //! ```
 //!
 //! [`compile`] does all of it; [`CompiledModel`] is a compiled model read from a file.
@@ -47,6 +48,7 @@ mod error;
 mod forest;
 mod groups;
 mod layout;
+mod lower;
 mod merge;
 mod model;
 mod parts;
@@ -67,18 +69,20 @@ pub use cost::{Core, Instructions, Memory};
 pub use early::{EarlyExit, EarlyExitFound};
 pub use emit::{Language, emit, emit_code};
 pub use error::CompileProblem;
-pub use groups::{ends_of_walks, leaves_of_trees};
-pub use merge::Source;
+pub(crate) use groups::{ends_of_walks, leaves_of_trees};
+pub(crate) use merge::Source;
 pub use model::{CompiledModel, names, open, open_with_code, thresholds};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
-pub use share::{different_leaves, unshared};
+pub use share::different_leaves;
+pub(crate) use share::unshared;
 
 use crate::ensemble::Ensemble;
 use crate::error::{Error, Result};
-use cells::Cells;
 use code::{Form, Program, Statements};
 use forest::Forest;
+use layout::Layouts;
+use lower::Lowered;
 use palpate_onboard::Stopping;
 
 /// Settings of compilation.
@@ -231,73 +235,28 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let forest = Forest::new(ensemble, settings.scales.as_deref())?;
     check_early_exit(ensemble, settings)?;
     write::check_sentinel(ensemble, settings)?;
-    let cells = Cells::new(&forest);
-    let wants_code = settings.layout == Some(Layout::Code);
-    let made = if wants_code {
-        Vec::new()
-    } else {
-        layout::candidates(&forest, cells.as_ref(), settings.leaf, settings.layout, settings.shared_leaves)?
-    };
-    let may_be_code = !settings.forms.is_empty() && (wants_code || settings.layout.is_none());
-    let code = if may_be_code {
-        layout::code(&forest, cells.as_ref(), settings.leaf, &stated(ensemble, settings))
-    } else {
-        None
-    };
+    let mut layouts = Layouts::new(&forest, settings, &stated(ensemble, settings));
+    let mut candidates = layouts.candidates(settings)?;
     let overhead = write::overhead(ensemble, settings, &forest)?;
     let scale = f64::from(ensemble.prediction().scale);
-    let candidate = |layout: Layout, parts: &parts::Parts| Candidate {
-        layout,
-        form: None,
-        shared_leaves: parts.shared.is_some(),
-        bytes: parts.bytes() + overhead,
-        instructions: parts.instructions,
-        margin_error: rounding::round_up(f64::from(parts.margin_error) * scale),
-    };
-    let mut candidates: Vec<Candidate> = made.iter().map(|(layout, parts)| candidate(*layout, parts)).collect();
-    if let Some((program, parts)) = &code {
-        candidates.extend(settings.forms.iter().map(|&form| {
-            let cost = program.cost(form);
-            let model = candidate(Layout::Code, parts);
-            let bytes = model.bytes + cost.bytes;
-            Candidate { form: Some(form.name()), bytes, instructions: cost.instructions, ..model }
-        }));
+    for candidate in &mut candidates {
+        candidate.bytes += overhead;
+        candidate.margin_error = rounding::round_up(f64::from(candidate.margin_error) * scale);
     }
-    let Some(chosen) = chosen(&candidates, settings.goal) else {
-        return Err(match wants_code {
-            true => CompileProblem::DoesNotFit { layout: Layout::Code }.into(),
-            false => CompileProblem::FitsNoLayout.into(),
-        });
+    let does_not_fit = || match settings.layout {
+        Some(layout) => CompileProblem::DoesNotFit { layout },
+        None => CompileProblem::FitsNoLayout,
     };
-    let mut instructions = candidates[chosen].instructions;
-    let form = settings.forms.iter().copied().find(|form| Some(form.name()) == candidates[chosen].form);
-    let (layout, mut parts, code) = match (code.zip(form), made.into_iter().nth(chosen)) {
-        (Some(((program, parts), form)), _) => (Layout::Code, parts, Some((program, form))),
-        (None, Some((layout, parts))) => (layout, parts, None),
-        (None, None) => return Err(CompileProblem::FitsNoLayout.into()),
-    };
-    let (mut code, mut early_exit) = (code, None);
-    if let Some(wanted) = &settings.early_exit {
-        let features = (settings.scales.as_deref(), write::sentinel(ensemble, settings));
-        if let Some((program, form)) = code {
-            let (program, found) =
-                layout::code_with_early_exit(&forest, settings.leaf, (program, form), wanted, features);
-            instructions = program.cost(form).instructions;
-            (code, early_exit) = (Some((program, form)), found);
-        } else if let Some((planned, found)) =
-            layout::with_early_exit(&forest, settings.leaf, layout, &parts, wanted, features)
-        {
-            // Groups of their own cost bytes only where they are used.
-            if !planned.exits.is_empty() {
-                (parts, instructions) = (planned.clone(), planned.instructions);
-            }
-            early_exit = Some(found);
-        }
-        early_exit = Some(early_exit.unwrap_or_default());
-    }
+    let mut chosen = chosen(&candidates, settings.goal).map(|chosen| candidates[chosen]).ok_or_else(does_not_fit)?;
+    let form = settings.forms.iter().copied().find(|form| Some(form.name()) == chosen.form);
+    let features = (settings.scales.as_deref(), write::sentinel(ensemble, settings));
+    let early_exit = settings.early_exit.as_ref();
+    let early_exit =
+        early_exit.map(|wanted| layouts.end_early(&mut chosen, form, wanted, features).unwrap_or_default());
+    let (mut parts, program) = layouts.write(&chosen).ok_or_else(does_not_fit)?;
     let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding);
     parts.margin_error = rounding::round_up(f64::from(parts.margin_error) + rounding / scale);
-    let bytes = write::write(ensemble, write::hash(original), settings, &forest, stopping, layout, &parts)?;
+    let bytes = write::write(ensemble, write::hash(original), settings, &forest, stopping, chosen.layout, &parts)?;
     let (splits, leaves) = (forest.splits(), forest.leaves());
     let shared_leaves = open(&bytes).ok().and_then(|model| different_leaves(&model));
     let margin_error = rounding::round_up(f64::from(parts.margin_error) * scale);
@@ -306,11 +265,11 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
         splits,
         leaves,
         margin_error,
-        layout,
+        layout: chosen.layout,
         shared_leaves,
-        instructions,
+        instructions: chosen.instructions,
         candidates,
-        code,
+        code: program.zip(form),
         early_exit,
     })
 }
@@ -361,56 +320,34 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
     best.map(|(index, _)| index)
 }
 
-/// The trees of a model with such leaves, in its order, and which trees of the ensemble each stands for. `ends` are the
-/// numbers of trees after which a walk may end.
-///
-/// # Errors
-/// As [`compile`].
-pub fn order_of_trees(ensemble: &Ensemble, leaf: Leaf, ends: &[usize]) -> Result<Vec<Source>> {
+/// Trees of the ensemble that each tree of a model with such leaves stands for, in the model's order, or in that of assembly
+/// for a chip. `scales` are those of features of rows that are whole numbers, `ends` the numbers of trees after which a walk
+/// may end.
+pub(crate) fn order(
+    ensemble: &Ensemble,
+    leaf: Leaf,
+    scales: Option<&[f32]>,
+    ends: &[usize],
+    chip: Option<code::Chip>,
+) -> Result<Vec<Source>> {
     let ensemble = range::scaled(ensemble);
-    let forest = Forest::new(&ensemble, None)?;
-    let scale = quantize::Scale::for_trees(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?;
-    let parts = |forest: &Forest<'_>, scale: &quantize::Scale| match ends {
-        [] => Vec::new(),
-        _ => early::parts(&early::order(forest, scale), ends.iter().copied()),
-    };
-    Ok(match merge::merge(&forest, leaf, &scale) {
-        Some(merged) => {
-            let parts = parts(&merged.forest, &merged.scale);
-            let order = trees::order(&merged.forest, leaf, &merged.scale, &parts);
-            order.into_iter().map(|tree| merged.sources[tree].clone()).collect()
+    let forest = Forest::new(&ensemble, scales.filter(|_| ensemble.schema().is_none()))?;
+    let mut lowered = Lowered::new(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?;
+    let ends: Vec<(usize, u32)> = ends.iter().map(|&end| (end, 0)).collect();
+    let walk = || early::order(&lowered.forest, &lowered.scale);
+    let Some(chip) = chip else {
+        if !ends.is_empty() {
+            let walk = walk();
+            lowered.end_after(&walk, &ends);
         }
-        None => trees::order(&forest, leaf, &scale, &parts(&forest, &scale)).into_iter().map(Source::of).collect(),
-    })
-}
-
-/// The trees of code with such leaves, in the order in which assembly has them, and which trees of the ensemble each stands for.
-/// `ends` are the numbers of trees after which a walk may end; `is_m4f` says for which processor it is.
-///
-/// # Errors
-/// As [`compile`].
-pub fn order_of_code(ensemble: &Ensemble, leaf: Leaf, ends: &[usize], is_m4f: bool) -> Result<Vec<Source>> {
-    let ensemble = range::scaled(ensemble);
-    let forest = Forest::new(&ensemble, None)?;
-    let scale = quantize::Scale::for_trees(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?;
-    let merged = merge::merge(&forest, leaf, &scale);
-    let (forest, scale) = merged.as_ref().map_or((&forest, &scale), |merged| (&merged.forest, &merged.scale));
-    let stated = Statements { sentinel: None, known: forest.objects(), last_of_ties: false };
-    let program = Program::new(forest, scale, vec![0; forest.objects()], &stated);
-    let program = program.ok_or(CompileProblem::DoesNotFit { layout: Layout::Code })?;
-    let (order, program) = match ends {
-        [] => ((0..forest.trees.len()).collect(), program),
-        _ => {
-            let order = early::order(forest, scale);
-            let program = program.with_exits(&order, ends.iter().map(|&end| (end, 0)).collect());
-            (order, program)
-        }
+        return Ok(lowered.order());
     };
+    let walk = if ends.is_empty() { (0..lowered.sources.len()).collect() } else { walk() };
+    let stated = Statements { sentinel: None, known: ensemble.objects.len(), last_of_ties: false };
+    let program = Program::new(&lowered, &stated).ok_or(CompileProblem::DoesNotFit { layout: Layout::Code })?;
     let source = |(tree, zero): (usize, i32)| {
-        let tree = order[tree];
-        let source = merged.as_ref().map_or_else(|| Source::of(tree), |merged| merged.sources[tree].clone());
-        Source { offset: source.offset + (zero >> scale.shifts[tree]), ..source }
+        let source = lowered.sources[walk[tree]].clone();
+        Source { offset: source.offset + (zero >> lowered.scale.shifts[walk[tree]]), ..source }
     };
-    let chip = if is_m4f { code::Chip::M4F } else { code::Chip::M0Plus };
-    Ok(program.in_assembly(chip).into_iter().map(source).collect())
+    Ok(program.with_exits(&walk, ends).in_assembly(chip).into_iter().map(source).collect())
 }

@@ -1,11 +1,10 @@
 //! The parts of a compiled model, before they are written.
 
 use super::container::OwnedSection;
-use super::cost::Instructions;
-use palpate_shared::format::{Axis, EarlyExit, Group, HEADER_LENGTH, SECTION_HEADER_LENGTH, Tag};
+use palpate_shared::format::{Axis, EarlyExit, Group, Tag};
 
 /// Parts of a layout of a forest.
-#[derive(Clone)]
+#[derive(Default)]
 pub(super) struct Parts {
     pub(super) axes: Vec<Axis>,
     pub(super) cuts: Vec<u8>,
@@ -20,7 +19,6 @@ pub(super) struct Parts {
     pub(super) base: Vec<i32>,
     pub(super) unit: f32,
     pub(super) margin_error: f32,
-    pub(super) instructions: Instructions,
 }
 
 impl Parts {
@@ -42,13 +40,5 @@ impl Parts {
         bytes.extend(&self.nodes);
         bytes.extend(&self.leaves);
         bytes
-    }
-
-    /// Bytes of the model, except its text and the parts that all layouts share.
-    pub(super) fn bytes(&self) -> usize {
-        let records = Axis::LENGTH * self.axes.len() + Group::LENGTH * self.groups.len() + 8 * self.base.len();
-        let shared = |content: &Vec<u8>| SECTION_HEADER_LENGTH + content.len().next_multiple_of(4);
-        let shared = self.shared.as_ref().map_or(0, shared);
-        HEADER_LENGTH + records + self.cuts.len() + self.nodes.len() + self.leaves.len() + shared
     }
 }

@@ -7,28 +7,52 @@ use palpate_shared::format::LeafType;
 use rayon::prelude::*;
 use std::ops::AddAssign;
 
+/// The ensemble's f32 sums in every cell, for each object.
+pub(super) type Sums = Vec<Vec<f32>>;
+
 /// The farthest that a margin can be from the ensemble's f32 sum: the largest error in any cell, where cells can be
-/// counted; otherwise the sum of the trees' largest roundings, and what f32 sums lose.
-pub(super) fn margin_error(forest: &Forest<'_>, cells: Option<&Cells>, leaf: LeafType, scale: &Scale) -> f32 {
-    if leaf == LeafType::F32 {
-        return scale.unit / 2.0;
-    }
-    let error = |object| match cells {
-        Some(cells) => largest_in_cells(forest, cells, object, scale),
-        None => bound(forest, object, scale),
+/// counted; otherwise the sum of the trees' largest roundings, and what f32 sums lose. Sums in the cells come with it where
+/// they are asked for.
+pub(super) fn margin_error(
+    forest: &Forest<'_>,
+    cells: Option<&Cells>,
+    leaf: LeafType,
+    scale: &Scale,
+    with_sums: bool,
+) -> (f32, Option<Sums>) {
+    let objects = || (0..forest.objects()).into_par_iter();
+    let with_sums = cells.filter(|_| with_sums);
+    let error = if leaf == LeafType::F32 {
+        f64::from(scale.unit) / 2.0
+    } else {
+        objects().map(|object| bound(forest, object, scale)).reduce(|| 0.0, f64::max)
     };
-    round_up((0..forest.objects()).into_par_iter().map(error).reduce(|| 0.0, f64::max))
+    let Some(cells) = cells.filter(|_| leaf != LeafType::F32 && error > 0.0) else {
+        return (round_up(error), with_sums.map(|cells| sums(forest, cells)));
+    };
+    let in_cells = |object| {
+        let margins = in_cells(forest, cells, object, scale);
+        let unit = f64::from(scale.unit);
+        let error = margins.iter().fold(0.0, |worst, margins| f64::max(worst, margins.difference(unit)));
+        (error, with_sums.map(|_| margins.iter().map(|margins| margins.full).collect()))
+    };
+    let (errors, sums): (Vec<f64>, Vec<Option<Vec<f32>>>) = objects().map(in_cells).unzip();
+    (round_up(errors.into_iter().fold(0.0, f64::max)), sums.into_iter().collect())
 }
 
-/// The largest error of an object's margin in any cell.
-fn largest_in_cells(forest: &Forest<'_>, cells: &Cells, object: usize, scale: &Scale) -> f64 {
+/// The ensemble's f32 sums.
+pub(super) fn sums(forest: &Forest<'_>, cells: &Cells) -> Sums {
+    let sums = |object| cells.sums(forest, object, forest.base[object], |_, value| value);
+    (0..forest.objects()).into_par_iter().map(sums).collect()
+}
+
+/// An object's margins in every cell.
+fn in_cells(forest: &Forest<'_>, cells: &Cells, object: usize, scale: &Scale) -> Vec<Margins> {
     let start = Margins { full: forest.base[object], compiled: scale.integer(forest.base[object], 0) };
-    let sums = cells.sums(forest, object, start, |tree, value| {
+    cells.sums(forest, object, start, |tree, value| {
         let shift = scale.shifts[tree];
         Margins { full: value, compiled: scale.integer(value, shift) << shift }
-    });
-    let unit = f64::from(scale.unit);
-    sums.iter().fold(0.0, |worst, sum| f64::max(worst, sum.difference(unit)))
+    })
 }
 
 /// A bound on the error of an object's margin, from its trees one by one.
@@ -39,9 +63,9 @@ fn bound(forest: &Forest<'_>, object: usize, scale: &Scale) -> f64 {
     let rounding: f64 = trees.map(|(tree, &shift)| leaf_error(tree, object, scale, shift)).sum();
     let bound = base.difference(unit) + rounding;
     // What f32 sums lose: half an ulp of the largest partial sum at each addition, or nothing at all while they are
-    // whole numbers of units that f32 holds.
+    // whole numbers of a power of two that f32 holds.
     let range = forest.range(object);
-    if bound == 0.0 && range / unit <= f64::from(1 << 24) {
+    if bound == 0.0 && unit.to_bits().trailing_zeros() >= f64::MANTISSA_DIGITS - 1 && range / unit <= f64::from(1 << 24) {
         return 0.0;
     }
     bound + forest.trees_of(object).count() as f64 * range * f64::from(f32::EPSILON) / 2.0

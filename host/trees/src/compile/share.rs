@@ -5,27 +5,48 @@ use super::groups::leaves_of_trees;
 use super::parts::Parts;
 use crate::error::Result;
 use palpate_onboard::Model;
-use palpate_shared::format::{Group, LeafType, SharedLeaves, Tag};
-use std::collections::HashMap;
+use palpate_shared::format::{Group, LeafType, SECTION_HEADER_LENGTH, SharedLeaves, Tag};
+use std::collections::{HashMap, HashSet};
 
 /// The most leaves that two bytes number.
 const MOST: usize = 1 << 16;
 
-/// The same parts with each leaf once; `None` where leaves are not all of one length, or too many of them differ.
-pub(super) fn share(parts: &Parts, leaf: LeafType, objects: usize) -> Option<Parts> {
+/// Bytes of a leaf, if they are as many in each of these groups.
+fn leaf_length(groups: &[Group], leaf: LeafType, objects: usize) -> Option<usize> {
     let length = |group: &Group| leaf.size() * if group.object.is_some() { 1 } else { objects };
-    let first = length(parts.groups.first()?);
-    if parts.groups.iter().any(|group| length(group) != first) {
-        return None;
+    let first = length(groups.first()?);
+    groups.iter().all(|group| length(group) == first).then_some(first)
+}
+
+/// Lengths of a table of leaves.
+#[derive(Clone, Copy)]
+pub(super) struct Sharing {
+    /// Bytes of the section with the leaves' values.
+    pub(super) section: usize,
+    /// Bytes of a leaf's number.
+    pub(super) number: usize,
+}
+
+impl Sharing {
+    /// The lengths for these leaves, each of which a layout may repeat; `None` where leaves are not all of one length, or too
+    /// many of them differ.
+    pub(super) fn new(groups: &[Group], leaf: LeafType, objects: usize, leaves: &[u8]) -> Option<Self> {
+        let length = leaf_length(groups, leaf, objects)?;
+        let different = leaves.chunks_exact(length).collect::<HashSet<_>>().len();
+        let number = 1 + usize::from(different > 1 << 8);
+        let content = SharedLeaves::header(number == 2).len() + different * length;
+        (different <= MOST).then_some(Self { section: SECTION_HEADER_LENGTH + content.next_multiple_of(4), number })
     }
-    let leaves = || parts.leaves.chunks_exact(first);
+}
+
+/// The same parts with each leaf once; as they are where they have no [`Sharing`].
+pub(super) fn share(mut parts: Parts, leaf: LeafType) -> Parts {
+    let Some(length) = leaf_length(&parts.groups, leaf, parts.base.len()) else { return parts };
+    let leaves = || parts.leaves.chunks_exact(length);
     // The commonest first: then what is loaded most is close together.
     let mut places: HashMap<&[u8], (usize, usize)> = HashMap::new();
     for (index, values) in leaves().enumerate() {
         places.entry(values).or_insert((0, index)).0 += 1;
-    }
-    if places.len() > MOST {
-        return None;
     }
     let mut order: Vec<(&[u8], (usize, usize))> = places.into_iter().collect();
     order.sort_unstable_by_key(|&(_, (count, index))| (std::cmp::Reverse(count), index));
@@ -42,7 +63,8 @@ pub(super) fn share(parts: &Parts, leaf: LeafType, objects: usize) -> Option<Par
             short.push(high);
         }
     }
-    Some(Parts { leaves: short, shared: Some(table), ..parts.clone() })
+    (parts.leaves, parts.shared) = (short, Some(table));
+    parts
 }
 
 /// The bytes of a model whose leaves are shared, with every leaf's values where the leaf is; `None` if they are there already.
@@ -50,7 +72,7 @@ pub(super) fn share(parts: &Parts, leaf: LeafType, objects: usize) -> Option<Par
 ///
 /// # Errors
 /// [`CompileProblem`](crate::error::CompileProblem) for more than 4 GB.
-pub fn unshared(model: &Model<'_>) -> Result<Option<Vec<u8>>> {
+pub(crate) fn unshared(model: &Model<'_>) -> Result<Option<Vec<u8>>> {
     let Some(shared) = model.shared_leaves() else { return Ok(None) };
     let mut container = Container::of(model);
     let length = usize::try_from(model.header().leaves_length()).unwrap_or(usize::MAX);

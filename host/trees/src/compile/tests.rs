@@ -147,6 +147,22 @@ fn the_stated_margin_error_is_what_rounding_does_and_no_more() {
 }
 
 #[test]
+fn sums_that_f32_rounds_are_not_stated_to_be_exact_where_no_leaf_is_rounded() {
+    // Leaves of 127 times the unit, whose threefold has more digits than an f32.
+    let value = 127.0 * 131_071.0 * 0.5_f32.powi(24);
+    let tree = |feature| vec![split(feature, 500.0, 1, 2), leaf(&[value, -value]), leaf(&[-value, value])];
+    for features in [[0, 0, 0], [0, 1, 2]] {
+        let ensemble = ensemble(Descriptor::Oriented, features.map(tree).into());
+        let compiled = compile(&ensemble, &with(Some(Layout::Compact), Leaf::I8)).unwrap();
+        let model = open(&compiled.bytes).unwrap();
+        let mut margins = [0; 2];
+        model.margins_of(&[0; 8], &mut margins);
+        let error = f64::from(margins[0]) * f64::from(model.unit()) - f64::from(value + value + value);
+        assert!(error != 0.0 && error.abs() <= f64::from(compiled.margin_error), "{error} {}", compiled.margin_error);
+    }
+}
+
+#[test]
 fn leaves_of_a_common_power_of_two_are_exact_in_every_width() {
     for kind in [Leaf::I8, Leaf::I16] {
         let compiled = compile(&stump(500.0, [[1.5, -0.25], [0.75, 0.5]]), &with(None, kind)).unwrap();

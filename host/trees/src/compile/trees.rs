@@ -2,10 +2,10 @@
 
 use super::axes::{Axes, cuts_bytes, visit};
 use super::forest::{Branch, Forest, Split, each_leaf};
+use super::lower::Lowered;
 use super::quantize::Scale;
 use crate::ensemble::Output;
-use palpate_shared::format::{Axis, Group, LeafType, MAX_COMPLETE_DEPTH};
-use std::collections::BTreeSet;
+use palpate_shared::format::{Axis, Group, Layout, LeafType};
 
 /// Rule for writing leaves.
 pub(super) struct Leaves<'a> {
@@ -19,7 +19,9 @@ impl<'a> Leaves<'a> {
         Self { leaf, scale, bytes: Vec::new() }
     }
 
-    pub(super) fn push(&mut self, values: &[f32], shift: u8) {
+    /// Adds a leaf so many times.
+    pub(super) fn push(&mut self, values: &[f32], shift: u8, times: usize) {
+        let start = self.bytes.len();
         for &value in values {
             let integer = self.scale.integer(value, shift);
             match self.leaf {
@@ -28,6 +30,8 @@ impl<'a> Leaves<'a> {
                 LeafType::F32 => self.bytes.extend(value.to_le_bytes()),
             }
         }
+        let end = self.bytes.len();
+        (1..times).for_each(|_| self.bytes.extend_from_within(start..end));
     }
 
     pub(super) fn into_bytes(self) -> Vec<u8> {
@@ -35,19 +39,25 @@ impl<'a> Leaves<'a> {
     }
 }
 
-/// Sections of trees, except their leaves.
+/// Sections of trees, except their groups and leaves.
 pub(super) struct Sections {
     pub(super) axes: Vec<Axis>,
     pub(super) cuts: Vec<u8>,
-    pub(super) groups: Vec<Group>,
     pub(super) nodes: Vec<u8>,
 }
 
 /// Trees that share a group, in order.
 pub(super) struct Run {
-    object: Option<u8>,
+    pub(super) object: Option<u8>,
     shift: u8,
-    trees: Vec<usize>,
+    pub(super) trees: Vec<usize>,
+}
+
+impl Run {
+    /// Levels of its trees as complete trees.
+    pub(super) fn depth(&self, forest: &Forest<'_>) -> usize {
+        self.trees.iter().map(|&tree| forest.trees[tree].depth).max().unwrap_or(0).max(1)
+    }
 }
 
 /// Groups of trees. Integers add up in any order, so trees are sorted by shift, object and depth; f32 leaves keep the
@@ -83,34 +93,33 @@ pub(super) fn runs(forest: &Forest<'_>, leaf: LeafType, scale: &Scale, parts: &[
     runs
 }
 
-/// The numbers of all trees, in the order in which they are written.
-pub(super) fn order(forest: &Forest<'_>, leaf: LeafType, scale: &Scale, parts: &[usize]) -> Vec<usize> {
-    runs(forest, leaf, scale, parts).into_iter().flat_map(|run| run.trees).collect()
+/// The groups of a layout.
+pub(super) fn groups(lowered: &Lowered<'_>, layout: Layout) -> Vec<Group> {
+    let group = |run: &Run| {
+        let depth = if layout == Layout::Complete { run.depth(&lowered.forest) as u8 } else { 0 };
+        Group { depth, shift: run.shift, object: run.object, trees: run.trees.len() as u32 }
+    };
+    lowered.runs.iter().map(group).collect()
 }
 
-/// Every tree filled up to its group's depth; `None` if some are too deep or have too many thresholds.
-pub(super) fn complete(forest: &Forest<'_>, axes: &Axes, runs: &[Run], leaves: &mut Leaves<'_>) -> Option<Sections> {
-    if axes.columns > 256 || forest.trees.iter().any(|tree| tree.depth > usize::from(MAX_COMPLETE_DEPTH)) {
-        return None;
-    }
-    let (mut groups, mut nodes) = (Vec::new(), Vec::new());
-    for run in runs {
-        let depth = run.trees.iter().map(|&tree| forest.trees[tree].depth).max()?.max(1);
+/// Every tree filled up to its group's depth.
+pub(super) fn complete(lowered: &Lowered<'_>, leaves: &mut Leaves<'_>) -> Sections {
+    let mut nodes = Vec::new();
+    for run in &lowered.runs {
+        let depth = run.depth(&lowered.forest);
         let (mut columns, mut thresholds) = (Vec::new(), Vec::new());
         for &tree in &run.trees {
             let mut slots = vec![(0, 0); 1 << depth];
             // The number of the root; see `palpate_onboard`'s walk.
             slots[0].0 = 1;
-            fill(&forest.trees[tree].root, &mut slots, axes, 1, depth, run.shift, leaves);
+            fill(&lowered.forest.trees[tree].root, &mut slots, &lowered.axes, 1, depth, run.shift, leaves);
             columns.extend(slots.iter().map(|slot| slot.0));
             thresholds.extend(slots.iter().map(|slot| slot.1));
         }
         nodes.append(&mut columns);
         nodes.append(&mut thresholds);
-        groups.push(group(run, u8::try_from(depth).ok()?));
     }
-    let (axes, cuts) = records(axes);
-    Some(Sections { axes, cuts, groups, nodes })
+    Sections { nodes, ..records(&lowered.axes) }
 }
 
 /// Writes a branch into the slots below `slot`, `levels` deep; a leaf further up is repeated, and the splits above its
@@ -125,7 +134,7 @@ fn fill(
     leaves: &mut Leaves<'_>,
 ) {
     match branch {
-        Branch::Leaf(values) => (0..1_usize << levels).for_each(|_| leaves.push(values, shift)),
+        Branch::Leaf(values) => leaves.push(values, shift, 1 << levels),
         Branch::Split(split) => {
             let (column, threshold) = axes.place(split);
             slots[slot] = (column as u8, threshold);
@@ -135,68 +144,39 @@ fn fill(
     }
 }
 
-/// True if splits fit three bytes: columns and left subtrees are numbered in a byte.
-pub(super) fn fits_narrow(forest: &Forest<'_>, axes: &Axes) -> bool {
-    let mut narrow = axes.columns <= 256;
-    for tree in &forest.trees {
-        visit(&tree.root, &mut |split| narrow &= split.left_splits <= 255);
-    }
-    narrow
-}
-
-/// Splits in preorder, three bytes each; `None` if they do not fit.
-pub(super) fn compact(forest: &Forest<'_>, axes: &Axes, runs: &[Run], leaves: &mut Leaves<'_>) -> Option<Sections> {
-    if !fits_narrow(forest, axes) {
-        return None;
-    }
-    let (groups, nodes) = preorder(forest, runs, leaves, |split, nodes| {
-        let (column, threshold) = axes.place(split);
+/// Splits in preorder, three bytes each.
+pub(super) fn compact(lowered: &Lowered<'_>, leaves: &mut Leaves<'_>) -> Sections {
+    let nodes = preorder(lowered, leaves, |split, nodes| {
+        let (column, threshold) = lowered.axes.place(split);
         nodes.extend([column as u8, threshold, split.left_splits as u8]);
-    })?;
-    let (axes, cuts) = records(axes);
-    Some(Sections { axes, cuts, groups, nodes })
+    });
+    Sections { nodes, ..records(&lowered.axes) }
 }
 
-/// Splits in preorder, six bytes each; `None` if there are too many thresholds.
-pub(super) fn wide(forest: &Forest<'_>, runs: &[Run], leaves: &mut Leaves<'_>) -> Option<Sections> {
-    let mut cuts = BTreeSet::new();
-    for tree in &forest.trees {
-        visit(&tree.root, &mut |split| {
-            cuts.insert(split.cut);
-        });
-    }
-    let cuts: Vec<i32> = cuts.into_iter().collect();
-    if cuts.len() > 1 << 16 {
-        return None;
-    }
-    let (groups, nodes) = preorder(forest, runs, leaves, |split, nodes| {
+/// Splits in preorder, six bytes each.
+pub(super) fn wide(lowered: &Lowered<'_>, leaves: &mut Leaves<'_>) -> Sections {
+    let cuts = lowered.axes.cuts();
+    let nodes = preorder(lowered, leaves, |split, nodes| {
         let number = cuts.partition_point(|&cut| cut < split.cut) as u16;
         nodes.extend([split.feature, u8::from(split.missing_left)]);
         nodes.extend(number.to_le_bytes());
         nodes.extend((split.left_splits as u16).to_le_bytes());
-    })?;
-    let cuts = cuts.into_iter().flat_map(i32::to_le_bytes).collect();
-    Some(Sections { axes: Vec::new(), cuts, groups, nodes })
+    });
+    Sections { axes: Vec::new(), cuts: cuts.into_iter().flat_map(i32::to_le_bytes).collect(), nodes }
 }
 
 /// Writes trees in preorder.
-fn preorder<'f>(
-    forest: &'f Forest<'f>,
-    runs: &[Run],
-    leaves: &mut Leaves<'_>,
-    put: impl Fn(&Split<'f>, &mut Vec<u8>),
-) -> Option<(Vec<Group>, Vec<u8>)> {
-    let (mut groups, mut nodes) = (Vec::new(), Vec::new());
-    for run in runs {
+fn preorder(lowered: &Lowered<'_>, leaves: &mut Leaves<'_>, put: impl Fn(&Split<'_>, &mut Vec<u8>)) -> Vec<u8> {
+    let mut nodes = Vec::new();
+    for run in &lowered.runs {
         for &tree in &run.trees {
-            let tree = &forest.trees[tree];
-            nodes.extend(u16::try_from(tree.splits).ok()?.to_le_bytes());
+            let tree = &lowered.forest.trees[tree];
+            nodes.extend((tree.splits as u16).to_le_bytes());
             visit(&tree.root, &mut |split| put(split, &mut nodes));
-            each_leaf(&tree.root, &mut |values| leaves.push(values, run.shift));
+            each_leaf(&tree.root, &mut |values| leaves.push(values, run.shift, 1));
         }
-        groups.push(group(run, 0));
     }
-    Some((groups, nodes))
+    nodes
 }
 
 /// For each part of the walk but the last, the groups up to its end.
@@ -206,11 +186,8 @@ pub(super) fn groups_before(runs: &[Run], parts: &[usize]) -> Vec<u16> {
     (0..last).map(|number| runs.partition_point(|run| part(run) <= number) as u16).collect()
 }
 
-fn records(axes: &Axes) -> (Vec<Axis>, Vec<u8>) {
+/// The axes and their thresholds, without splits.
+fn records(axes: &Axes) -> Sections {
     let cuts = axes.axes.iter().flat_map(|(axis, cuts)| cuts_bytes(*axis, cuts)).collect();
-    (axes.axes.iter().map(|(axis, _)| *axis).collect(), cuts)
-}
-
-fn group(run: &Run, depth: u8) -> Group {
-    Group { depth, shift: run.shift, object: run.object, trees: run.trees.len() as u32 }
+    Sections { axes: axes.axes.iter().map(|(axis, _)| *axis).collect(), cuts, nodes: Vec::new() }
 }

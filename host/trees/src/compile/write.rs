@@ -52,7 +52,7 @@ pub(super) fn write(
     Container { header, text: text(ensemble)?, sections, content: parts.content(&priors) }.bytes()
 }
 
-/// Number of bytes that are the same in all layouts, beside those of [`Parts::bytes`]: text, optional sections and checksum.
+/// Bytes that are the same in all layouts, beside those that a layout takes: text, optional sections and checksum.
 pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<usize> {
     let sections = bytes_of(&sections(ensemble, settings, forest)?);
     Ok(text(ensemble)?.len() + sections.len() + CHECKSUM_LENGTH)

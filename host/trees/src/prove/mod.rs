@@ -27,14 +27,14 @@ pub use certificate::{Certificate, CertifiedTree};
 pub use error::ProofProblem;
 pub use moves::{Moves, moves};
 
-use crate::compile::{self, Instructions};
+use crate::compile::{self, Instructions, Source, code};
 use crate::ensemble::{Ensemble, Inputs};
 use crate::error::Result;
 use crate::verify::unit;
 use boxes::{Keys, Rows, Tree, Values, of_ensemble};
 use chip::Chip;
 use format::Plain;
-use palpate_shared::format::{Link, f32_key};
+use palpate_shared::format::{LeafType, Link, f32_key};
 
 /// Result of a proof.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -98,8 +98,7 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
     let found = if chip.is_table() {
         tables::of_chip(&chip, subject)?
     } else {
-        let order = compile::order_of_trees(ensemble, model.leaf_type(), &compile::ends_of_walks(&model))?;
-        trees::of_chip(&chip, subject, &order)?
+        trees::of_chip(&chip, subject, &subject.order(model.leaf_type(), &compile::ends_of_walks(&model), None)?)?
     };
     let mut proof = subject.proof(&found);
     if proof.margin_error > proof.stated
@@ -127,7 +126,7 @@ pub fn prove_code(bytes: &[u8], code: &str, ensemble: &Ensemble, file: &[u8]) ->
     let sources = of_ensemble(ensemble, &plain.keys)?;
     let subject = Subject { plain: &plain, sources: &sources, ensemble };
     let ends: Vec<usize> = read.exits.iter().map(|exit| exit.0).collect();
-    let order = compile::order_of_code(ensemble, model.leaf_type(), &ends, read.is_m4f)?;
+    let order = subject.order(model.leaf_type(), &ends, Some(read.chip))?;
     let found = trees::of_code(subject, &order, true)?;
     let proof = Proof { instructions: Some(read.instructions), ..subject.proof(&found) };
     let Found { trees, table, outputs, .. } = found;
@@ -157,10 +156,10 @@ pub fn check_code(
     statements(&plain, ensemble)?;
     let sources = of_ensemble(ensemble, &plain.keys)?;
     let subject = Subject { plain: &plain, sources: &sources, ensemble };
-    let order: Vec<compile::Source> = certificate
+    let order: Vec<Source> = certificate
         .trees
         .iter()
-        .map(|tree| compile::Source { trees: tree.sources.clone(), offset: tree.offset })
+        .map(|tree| Source { trees: tree.sources.clone(), offset: tree.offset })
         .collect();
     let found = trees::of_code(subject, &order, false)?;
     holds(certificate, &found, ensemble)?;
@@ -270,6 +269,13 @@ struct Subject<'s> {
 }
 
 impl Subject<'_> {
+    /// Trees of the ensemble that each tree of the model should stand for.
+    fn order(self, leaf: LeafType, ends: &[usize], chip: Option<code::Chip>) -> Result<Vec<Source>, ProofProblem> {
+        let scales = if let Keys::Scaled(scales) = &self.plain.keys { Some(scales.as_slice()) } else { None };
+        let order = compile::order(self.ensemble, leaf, scales, ends, chip);
+        order.map_err(|error| ProofProblem::Trees { what: error.to_string() })
+    }
+
     fn proof(self, found: &Found) -> Proof {
         let Self { plain, ensemble, .. } = self;
         let largest = found.trees.iter().map(|tree| tree.error).fold(found.table.unwrap_or(0.0), f64::max);

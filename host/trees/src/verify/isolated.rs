@@ -4,6 +4,7 @@
 use super::reference::{self, Reference};
 use crate::compile;
 use crate::ensemble::{Ensemble, Output};
+use crate::rows::Encoder;
 use palpate_onboard::Model;
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, Layout, LeafType, checksum};
 use std::ops::Range;
@@ -20,7 +21,8 @@ pub(super) fn first_different_tree(
     let plain = compile::unshared(model).ok()?;
     let plain = plain.as_deref().map(Model::new).transpose().ok()?;
     let model = plain.as_ref().unwrap_or(model);
-    let order = compile::order_of_trees(ensemble, model.leaf_type(), &compile::ends_of_walks(model)).ok()?;
+    let scales = if let Encoder::Scaled(scales) = &reference.encoder { Some(scales.as_slice()) } else { None };
+    let order = compile::order(ensemble, model.leaf_type(), scales, &compile::ends_of_walks(model), None).ok()?;
     let leaves = leaves(model)?;
     if order.len() != leaves.len() {
         return None;

@@ -1,7 +1,8 @@
 //! Trees over columns of ranks, with leaves in units: what every form of code is written from.
 
 use super::super::axes::Axes;
-use super::super::forest::{Branch, Forest};
+use super::super::forest::Branch;
+use super::super::lower::Lowered;
 use super::super::quantize::Scale;
 use super::Form;
 use super::columns::{Column, Columns};
@@ -66,21 +67,16 @@ pub(crate) struct Statements {
 }
 
 impl Program {
-    /// The program of walked trees; `None` where there are more than 256 columns.
-    pub(in super::super) fn new(
-        forest: &Forest<'_>,
-        scale: &Scale,
-        base: Vec<i32>,
-        stated: &Statements,
-    ) -> Option<Self> {
-        let axes = Axes::new(forest);
+    /// The program of lowered trees with integer leaves; `None` where there are more than 256 columns.
+    pub(in super::super) fn new(lowered: &Lowered<'_>, stated: &Statements) -> Option<Self> {
+        let Lowered { forest, scale, axes, .. } = lowered;
         if axes.columns > 256 {
             return None;
         }
-        let columns = Columns::new(forest, &axes, stated.sentinel.is_some());
+        let columns = Columns::new(forest, axes, stated.sentinel.is_some());
         let trees = forest.trees.iter().zip(&scale.shifts).map(|(tree, &shift)| CodeTree {
             object: if let Output::One(object) = tree.output { Some(object) } else { None },
-            root: node(&tree.root, scale, shift, &axes, &columns),
+            root: node(&tree.root, scale, shift, axes, &columns),
         });
         let trees: Vec<CodeTree> = trees.collect();
         // Values of a vector are stored in two bytes.
@@ -92,7 +88,7 @@ impl Program {
             features: forest.features,
             key: forest.key,
             sentinel: stated.sentinel,
-            base,
+            base: lowered.base.clone(),
             known: stated.known,
             last_of_ties: stated.last_of_ties,
             columns: columns.columns,

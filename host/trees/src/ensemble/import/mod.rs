@@ -110,7 +110,7 @@ fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
             JsonKind::XgBoost => xgboost::from_json(path, bytes, options),
         },
         Kind::Ubjson => match ubjson::read(bytes) {
-            Ok(value) => xgboost::from_ubjson(path, value, options),
+            Ok(value) => xgboost::from_ubjson(path, &value, options),
             Err(at) => Err(Error::at(
                 Place::byte(path, at),
                 EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: "not UBJSON from here on".into() },
@@ -178,20 +178,23 @@ enum JsonKind {
     LightGbmDump,
 }
 
-/// Whose JSON a text is; XGBoost's where nothing says otherwise.
+/// Whose JSON a text is; XGBoost's where nothing says otherwise, or where it has a learner: no further is read.
 fn json_kind(bytes: &[u8]) -> JsonKind {
     #[derive(Default, serde::Deserialize)]
     struct Keys {
-        learner: Option<serde::de::IgnoredAny>,
+        #[serde(rename = "learner", default, deserialize_with = "stop")]
+        _learner: (),
         oblivious_trees: Option<serde::de::IgnoredAny>,
         features_info: Option<serde::de::IgnoredAny>,
         tree_info: Option<serde::de::IgnoredAny>,
+    }
+    fn stop<'de, D: serde::Deserializer<'de>>(_: D) -> Result<(), D::Error> {
+        Err(serde::de::Error::custom("XGBoost's"))
     }
     if bytes.trim_ascii_start().starts_with(b"[") {
         return JsonKind::XgBoostDump;
     }
     match serde_json::from_slice(bytes).unwrap_or_default() {
-        Keys { learner: Some(_), .. } => JsonKind::XgBoost,
         Keys { oblivious_trees: Some(_), .. } | Keys { features_info: Some(_), .. } => JsonKind::CatBoost,
         Keys { tree_info: Some(_), .. } => JsonKind::LightGbmDump,
         _ => JsonKind::XgBoost,

@@ -28,75 +28,92 @@ use super::{Ensemble, Schema};
 use crate::error::{EnsembleProblem, Error, Place, Result};
 use palpate_base::output;
 use schema::Document;
+use serde::Deserialize;
 use std::borrow::Cow;
 use std::path::Path;
 
 /// Reads XGBoost's JSON.
 pub(super) fn from_json(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
-    check_booster(&serde_json::from_slice(&without_literals(bytes)).unwrap_or_default())
-        .map_err(|problem| Error::at(Place::file(path), problem))?;
-    let document: Document =
-        serde_json::from_slice(&without_literals(bytes)).map_err(|error| not_json(path, &error))?;
-    document.into_ensemble(options, "JSON").map_err(|problem| Error::at(Place::file(path), problem))
+    let wrong = |problem| Error::at(Place::file(path), problem);
+    let text = without_literals(bytes);
+    let refused = |error| {
+        let peek: Peek = serde_json::from_slice(&text).unwrap_or_default();
+        peek.problem().map_or_else(|| not_json(path, &error), wrong)
+    };
+    let document: Document = serde_json::from_slice(&text).map_err(refused)?;
+    document.into_ensemble(options, "JSON").map_err(wrong)
 }
 
 /// Reads XGBoost's UBJSON, which holds the same as its JSON.
-pub(super) fn from_ubjson(path: &Path, value: serde_json::Value, options: &Options<'_>) -> Result<Ensemble> {
+pub(super) fn from_ubjson(path: &Path, value: &serde_json::Value, options: &Options<'_>) -> Result<Ensemble> {
     let wrong = |problem| Error::at(Place::file(path), problem);
-    check_booster(&serde_json::from_value(value.clone()).unwrap_or_default()).map_err(wrong)?;
-    let damaged =
-        |error: serde_json::Error| EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: error.to_string() };
-    let document: Document = serde_json::from_value(value).map_err(|error| wrong(damaged(error)))?;
-    document.into_ensemble(options, "UBJSON").map_err(wrong)
+    let refused = |error: serde_json::Error| {
+        let damaged = || EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: error.to_string() };
+        wrong(Peek::deserialize(value).unwrap_or_default().problem().unwrap_or_else(damaged))
+    };
+    Document::deserialize(value).map_err(refused)?.into_ensemble(options, "UBJSON").map_err(wrong)
 }
 
-/// The part of a document that is read first: a booster without trees has another schema.
-#[derive(Default, serde::Deserialize)]
+/// The booster of a document of any schema.
+#[derive(Default, Deserialize)]
 struct Peek {
     #[serde(default)]
     learner: PeekLearner,
 }
 
-#[derive(Default, serde::Deserialize)]
+#[derive(Default, Deserialize)]
 struct PeekLearner {
     #[serde(default)]
     gradient_booster: PeekBooster,
 }
 
-#[derive(Default, serde::Deserialize)]
+#[derive(Default, Deserialize)]
 struct PeekBooster {
     #[serde(default)]
     name: String,
 }
 
-fn check_booster(peek: &Peek) -> Result<(), EnsembleProblem> {
-    let name = &peek.learner.gradient_booster.name;
-    if name == "gblinear" { Err(EnsembleProblem::Booster { found: name.clone() }) } else { Ok(()) }
+impl Peek {
+    /// A booster that has no trees, and so another schema.
+    fn problem(self) -> Option<EnsembleProblem> {
+        let found = self.learner.gradient_booster.name;
+        (found == "gblinear").then_some(EnsembleProblem::Booster { found })
+    }
 }
 
 /// The text with `null` for the numbers that XGBoost writes and JSON does not have: NaN and the infinities.
 fn without_literals(bytes: &[u8]) -> Cow<'_, [u8]> {
     const LITERALS: [&[u8]; 3] = [b"-Infinity", b"Infinity", b"NaN"];
-    let mut text: Option<Vec<u8>> = None;
+    let (mut text, mut copied) = (Vec::new(), 0);
     let mut is_string = false;
     let mut at = 0;
-    while let Some(&byte) = bytes.get(at) {
-        let rest = &bytes[at..];
-        let literal = LITERALS.iter().find(|literal| !is_string && rest.starts_with(literal));
-        let length = match (byte, literal) {
-            (_, Some(literal)) => literal.len(),
-            (b'\\', None) if is_string => 2.min(rest.len()),
-            _ => 1,
+    while let Some(byte) = bytes.get(at) {
+        let literal = match byte {
+            b'"' => {
+                is_string = !is_string;
+                None
+            }
+            b'\\' if is_string => {
+                at += 1;
+                None
+            }
+            b'-' | b'I' | b'N' if !is_string => LITERALS.iter().find(|literal| bytes[at..].starts_with(literal)),
+            _ => None,
         };
-        is_string ^= byte == b'"';
-        if literal.is_some() {
-            text.get_or_insert_with(|| bytes[..at].to_vec()).extend(b"null");
-        } else if let Some(text) = &mut text {
-            text.extend(&rest[..length]);
+        if let Some(literal) = literal {
+            text.extend_from_slice(&bytes[copied..at]);
+            text.extend(b"null");
+            at += literal.len();
+            copied = at;
+        } else {
+            at += 1;
         }
-        at += length;
     }
-    text.map_or(Cow::Borrowed(bytes), Cow::Owned)
+    if copied == 0 {
+        return Cow::Borrowed(bytes);
+    }
+    text.extend_from_slice(&bytes[copied..]);
+    Cow::Owned(text)
 }
 
 impl Ensemble {

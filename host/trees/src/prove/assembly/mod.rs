@@ -12,6 +12,7 @@ mod text;
 
 use super::ProofProblem;
 use super::boxes::{Keys, Rule, Step, Tree};
+use crate::compile::code::Chip;
 use columns::{Column, Walk};
 use machine::{Added, Flow, LR, PC, SP, State, Value, is_true};
 use text::{Text, problem};
@@ -25,8 +26,8 @@ pub(super) struct Code {
     pub(super) trees: Vec<Tree>,
     /// Places where the walk may end: the trees before, the bound, and the margins' base so far.
     pub(super) exits: Vec<(usize, u32, Vec<i64>)>,
-    /// True if instructions of a Cortex-M4F are in it.
-    pub(super) is_m4f: bool,
+    /// A Cortex-M4F if its instructions are in it.
+    pub(super) chip: Chip,
     /// The most instructions that a row takes, from its features to its margins.
     pub(super) instructions: usize,
 }
@@ -212,7 +213,8 @@ impl Reader<'_> {
         let base: Option<Vec<i64>> = self.base.into_iter().collect();
         let base = base.ok_or_else(|| problem(line, "a margin is not stored"))?;
         let is_m4f = self.text.instructions.iter().any(|own| own.operands.iter().any(|own| own.contains("r4-r11")));
-        Ok(Code { base, trees: self.trees, exits: self.exits, is_m4f, instructions: self.instructions })
+        let chip = if is_m4f { Chip::M4F } else { Chip::M0Plus };
+        Ok(Code { base, trees: self.trees, exits: self.exits, chip, instructions: self.instructions })
     }
 
     /// The feature that an instruction loads.
