@@ -200,7 +200,7 @@ typedef struct {
     const uint8_t *exits_; /* places in the walk where a class may be known, 8 bytes each, up to `exits_end_` */
     const uint8_t *exits_end_;
 #endif
-    uint32_t wrong;          /* the place of what is wrong, in bytes from the start */
+    uint32_t wrong;          /* the place of the error, in bytes from the start */
     uint32_t largest_spread; /* of touches that count, in microseconds */
     uint16_t objects;        /* that there are margins for, 1 to 256 */
     uint16_t known;          /* that can be named: all, or all but the last, a background */
@@ -266,7 +266,7 @@ enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPAT
 /* Bytes between two places. */
 static inline uint32_t palpate_between_(const uint8_t *start, const uint8_t *end)
 {
-    /* As a size first: where pointers have 16 bits, a difference above 32,767 is negative. */
+    /* Cast to a size first: with pointers of 16 bits, a difference above 32,767 is negative. */
     const size_t length = PALPATE_AS_(size_t, end - start);
     return PALPATE_AS_(uint32_t, length);
 }
@@ -490,7 +490,7 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
     uint32_t last = 0;
     while (p != end) {
         const uint8_t *content = p + 8;
-        /* What the content has at least: so many bytes, and so many pieces. */
+        /* Least content: so many bytes, and so many pieces. */
         uint32_t length, tag, least = 0, pieces = 0, piece = 0;
         palpate_wrong_(model, PALPATE_OK, p);
         if (!palpate_is_section_(p, end)) {
@@ -1015,7 +1015,7 @@ static inline palpate_answer palpate_accepts_(const palpate_model *model, const 
     return model->needs_pose != 0 && touch->has_pose == 0 ? PALPATE_REFUSED_NO_POSE : PALPATE_COUNTED;
 }
 
-/* The features of a touch, of which there are `model->features`; of a model over touches. */
+/* The `model->features` features of a touch, for a model over touches. */
 static inline void palpate_features_(const palpate_model *model, const palpate_touch *touch, const uint32_t *times, int32_t *features)
 {
     const int32_t none = PALPATE_MISSING_FEATURE;
@@ -1172,7 +1172,7 @@ PALPATE_APART_ uint32_t palpate_walk_compact_(const uint8_t *ranks, const uint8_
     return leaf;
 }
 
-/* The same of a wide tree. */
+/* Walk through a wide tree, as above. */
 PALPATE_APART_ uint32_t palpate_walk_wide_(const palpate_model *model, const int32_t *features, uint16_t count, const uint8_t *split,
                                            uint32_t below)
 {
@@ -1202,7 +1202,7 @@ PALPATE_APART_ uint32_t palpate_walk_wide_(const palpate_model *model, const int
     return leaf;
 }
 
-/* Where the `length` bytes of a leaf's values are. */
+/* Start of the `length` bytes of a leaf's values. */
 static inline const uint8_t *palpate_values_(const palpate_model *model, const uint8_t *leaf, size_t length)
 {
     return PALPATE_IS_SHARED_(model) ? model->table_ + palpate_number_(model, leaf) * length : leaf;
@@ -1281,7 +1281,7 @@ static inline uint_fast16_t palpate_sum_until_(const palpate_model *model, const
         /* f32 values are added from the base on; to a table's nothing is, which -0 does not change. */
         sums[i] = !PALPATE_IS_F32_(model) ? 0 : table ? 0x80000000u : palpate_u32_(base + 4 * PALPATE_AS_(size_t, i));
     }
-    /* Columns beyond those that there are have rank 0. */
+    /* Columns beyond the last have rank 0. */
     for (i = 0; i < 64; i += 4) {
         words[i] = 0;
         words[i + 1] = 0;
@@ -1540,7 +1540,7 @@ static inline uint32_t palpate_bits_(const palpate_model *model, uint32_t touche
     return (bits >> 16) * at + ((bits & 0xffff) * at >> 16);
 }
 
-/* The same of the evidence so far; next to no cost while it stays. */
+/* Bits in a unit of the evidence so far; next to no cost while it stays. */
 static inline uint32_t palpate_unit_(palpate_recognizer *recognizer)
 {
 #if PALPATE_ROW_EVIDENCE
@@ -1565,7 +1565,7 @@ static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uin
     return units * bits >> (PALPATE_BYTE(recognizer->model->bytes + 40) & 63);
 }
 
-/* Of the first objects, the one with the most evidence; the first of several. */
+/* Object with the most evidence among the first `count`; the first of several. */
 static inline uint_fast16_t palpate_leader_(const palpate_recognizer *recognizer, uint_fast16_t count)
 {
     uint_fast16_t best = 0, i;
@@ -1654,7 +1654,7 @@ static inline int32_t palpate_i16_(const uint8_t *p)
     return number;
 }
 
-/* The evidence for an object without its prior; `is_there` becomes 0 for one that cannot be there, of which nothing is
+/* Evidence for an object without its prior; `is_there` becomes 0 for an object that cannot be there, about which nothing is
  * known. */
 static inline int64_t palpate_own_(const palpate_recognizer *recognizer, uint_fast16_t object, int *is_there)
 {
@@ -1706,7 +1706,7 @@ static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint
     return palpate_subtract_(slope, PALPATE_AS_(int64_t, palpate_i32_(record + 4)) * touches);
 }
 
-/* Whether the leader may be named by the model's misfit test: PALPATE_RECOGNIZED, PALPATE_UNDECIDED or PALPATE_UNKNOWN. */
+/* Answer of the model's misfit test for the leader: PALPATE_RECOGNIZED, PALPATE_UNDECIDED or PALPATE_UNKNOWN. */
 static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
 {
     const palpate_model *model = recognizer->model;
@@ -1739,7 +1739,7 @@ static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recog
     return PALPATE_RECOGNIZED;
 }
 
-/* Evidence of a row by its margins, of which it takes the place: by the model's table from margins to evidence. */
+/* Replaces the margins of a row by its evidence, by the model's table from margins to evidence. */
 static inline void palpate_evidence_of_(const palpate_model *model, int32_t *margins)
 {
     const uint8_t *row = model->row_;
@@ -1819,8 +1819,8 @@ static inline uint64_t palpate_plus_(uint64_t a, uint64_t b)
     return a > UINT64_MAX - b ? UINT64_MAX : a + b;
 }
 
-/* Whether no object can be recognized, by one exponential: the strongest output of another object than the strongest output's
- * weighs more than the loosest threshold times the most outputs of an object. */
+/* True if no object can be recognized, by one exponential: the strongest output of an object other than the leader's weighs
+ * more than the loosest threshold times the most outputs of an object. */
 static inline int palpate_undecided_(const palpate_recognizer *recognizer, uint64_t loosest, uint32_t bits)
 {
     const palpate_model *model = recognizer->model;
@@ -1910,8 +1910,8 @@ PALPATE_API uint64_t palpate_posterior_together(const palpate_recognizer *recogn
 }
 #endif
 
-/* Of the objects that can be named, the one with the most evidence; the first of several. Of an object with several outputs, whose
- * weights add up, the output with the most evidence. */
+/* Object with the most evidence among those that can be named; the first of several. If the object has several outputs,
+ * whose weights add up, it is the output with the most evidence. */
 PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
 {
 #if PALPATE_OUTPUTS

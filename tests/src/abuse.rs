@@ -20,7 +20,7 @@ pub struct Abuse {
     pub name: String,
     /// The kind of error, see [`kind`].
     pub kind: &'static str,
-    /// Where it is, in bytes from the start.
+    /// Offset, in bytes from the start.
     pub offset: usize,
     /// The bytes.
     pub bytes: Vec<u8>,
@@ -84,7 +84,7 @@ fn longer(model: &[u8], more: &[u8]) -> Vec<u8> {
     sealed(bytes)
 }
 
-/// Where the parts of a model start: optional sections, base margins, axes, thresholds, groups, splits, leaves, checksum.
+/// Offsets of the parts of a model: optional sections, base margins, axes, thresholds, groups, splits, leaves, checksum.
 pub fn places(model: &[u8]) -> [usize; 8] {
     let (header, _) = Header::split(model).expect("a model");
     let objects = usize::from(header.last_object()) + 1;
@@ -505,7 +505,7 @@ fn shared_leaves(put: Put<'_>) {
     }
 }
 
-/// Where a model's splits start.
+/// Offset of a model's splits.
 fn splits_of(model: &[u8]) -> usize {
     let [.., splits, _, _] = places(model);
     splits

@@ -52,7 +52,7 @@ pub struct Desk {
     pub script: VecDeque<Step>,
     /// Bytes on the line.
     pub to_chip: VecDeque<u8>,
-    /// Of all commands, in order.
+    /// Outcomes of all commands, in order.
     pub outcomes: Vec<Outcome>,
     /// To all questions, in order.
     pub answers: Vec<String>,

@@ -146,7 +146,7 @@ fn the_crates_readme_states_what_exponentials_and_state_cost() {
     let lines = printed("evaluator", M4F);
     let state = numbers(&lines, "state:", 0);
     readme.cell("state for ten objects", 1, state[0], 0);
-    readme.after("bytes, of which ", state[1], 0);
+    readme.after("bytes, including ", state[1], 0);
     readme.finish();
 }
 

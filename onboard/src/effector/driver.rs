@@ -4,7 +4,7 @@ use super::debounce::{Change, Debounce, after};
 use super::{Edge, Fault, Finger, Settings};
 use palpate_shared::{ContactTime, Touch};
 
-/// Where the effector is in a touch.
+/// State of the effector within a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
@@ -88,7 +88,7 @@ impl Faults {
 }
 
 impl Effector {
-    /// A driver whose fingers are open, as far as it knows.
+    /// A driver that takes its fingers for open.
     pub fn new(settings: Settings) -> Self {
         Self {
             settings: settings.in_range(),
@@ -116,7 +116,7 @@ impl Effector {
         self.until_timer(now)
     }
 
-    /// Where the effector is in a touch, as of the last call.
+    /// State of the effector within a touch, at the last call.
     pub const fn state(&self) -> State {
         self.state
     }

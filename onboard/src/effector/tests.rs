@@ -32,7 +32,7 @@ fn play(start: u32, edges: &[(Finger, bool, u32)], polls: &[u32], end: u32) -> (
     play_after(SETTINGS.release, start, edges, polls, end)
 }
 
-/// The same with power-up `rested` before `start`.
+/// Like [`play`], with power-up `rested` before `start`.
 fn play_after(rested: u32, start: u32, edges: &[(Finger, bool, u32)], polls: &[u32], end: u32) -> (Outcomes, Effector) {
     let mut effector = Effector::new(SETTINGS);
     let mut outcomes = Outcomes::new();

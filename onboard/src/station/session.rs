@@ -206,7 +206,7 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
         self.storage
     }
 
-    /// Where the next model goes: not over the one in use, nor over the one that a power cut would bring back.
+    /// Place of the next model: neither the one in use, nor the one that a power cut would bring back.
     fn next_place(&self) -> Option<Place> {
         let free = |place: &Place| !self.source.is_in(*place) && !self.kept.is_in(*place);
         [Place::First, Place::Second].into_iter().find(free)
@@ -255,7 +255,7 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
     }
 }
 
-/// As the link reports it.
+/// Converts to the link's message.
 const fn refusal(refused: Refused) -> Refusal {
     match refused {
         Refused::Pattern(_) => Refusal::Pattern,

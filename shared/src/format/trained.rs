@@ -498,7 +498,7 @@ mod tests {
             let probe = TrainedProbe { stroke, travel, ..PROBE };
             assert_eq!(probe.length(), 24);
             assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), Some(probe));
-            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()[..23]), Some(PROBE), "as far as it is whole");
+            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()[..23]), Some(PROBE), "whole fields only");
         }
     }
 

@@ -107,7 +107,7 @@ impl Progress {
         self.next
     }
 
-    /// Where a command's outcome is kept.
+    /// Slot of a command's outcome.
     fn slot(&mut self, sequence: u32) -> Option<&mut Option<Outcome>> {
         // WINDOW fits any integer, and divides 2³², so that slots stay in order when the sequence wraps.
         let window = u32::try_from(WINDOW).unwrap_or(1);

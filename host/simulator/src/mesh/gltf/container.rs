@@ -57,7 +57,7 @@ pub(super) fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>> {
     Ok(Parts { json, start, binary })
 }
 
-/// The bytes of the document's buffers, as many as it states; none where a buffer has no place to be read from.
+/// Bytes of the document's buffers, as many as it states; none for a buffer that cannot be read from anywhere.
 pub(super) fn buffers<'a>(
     document: &Document,
     parts: &Parts<'a>,
@@ -137,7 +137,7 @@ fn short(uri: &str) -> String {
     uri.chars().take(80).collect()
 }
 
-/// A URI's `%20` and the like as the characters that they stand for; what is no such escape stays.
+/// Decodes a URI's `%20` and the like; invalid escapes stay.
 fn unescaped(uri: &str) -> String {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();

@@ -21,8 +21,8 @@ use std::path::Path;
 /// Reads the mesh of a glTF file; errors name `path`. Files that it names are looked for in `folder`.
 ///
 /// # Errors
-/// Where the JSON is none, a number that it states is impossible, a file beside it cannot be read, it uses what is not
-/// read, or no face is left.
+/// If the JSON is invalid, a number that it states is impossible, a file beside it cannot be read, it uses an unsupported
+/// feature, or no face is left.
 pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<Moved> {
     let parts = container::parts(bytes, path)?;
     let document: Document = serde_json::from_slice(parts.json).map_err(|error| {
@@ -54,7 +54,7 @@ fn damaged(path: &Path, what: String) -> Error {
     Error::at(Place::file(path), accessor::damaged(what))
 }
 
-/// Where a line and a column (both from 1) are in a text.
+/// Offset of a line and a column (both from 1) in a text.
 fn offset(text: &[u8], line: usize, column: usize) -> u64 {
     let before: usize = text.split_inclusive(|&byte| byte == b'\n').take(line.saturating_sub(1)).map(<[u8]>::len).sum();
     (before + column.saturating_sub(1)).min(text.len()) as u64
@@ -272,7 +272,7 @@ impl Faces {
     }
 }
 
-/// Where a node places its mesh, within its parent.
+/// Transform of a node's mesh, within its parent.
 fn transform(node: &Node, index: u32) -> Result<DAffine3, MeshProblem> {
     if let Some(matrix) = &node.matrix {
         let matrix = DMat4::from_cols_array(matrix);
@@ -287,7 +287,7 @@ fn transform(node: &Node, index: u32) -> Result<DAffine3, MeshProblem> {
         None => DQuat::IDENTITY,
         Some(&rotation) => {
             let rotation = DQuat::from_array(rotation);
-            // Exporters round; but what is no rotation at all would scale the mesh.
+            // Exporters round, but a quaternion far from length 1 would scale the mesh.
             if !(0.9..1.1).contains(&rotation.length()) {
                 return Err(accessor::damaged(format!("nodes[{index}] has a rotation of a length other than 1")));
             }

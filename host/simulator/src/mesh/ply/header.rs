@@ -30,7 +30,7 @@ struct Element {
 
 struct Property {
     name: String,
-    /// As it stands in the file: a kind of number, or a list of them.
+    /// Type as the file states it: a kind of number, or a list of them.
     kind: String,
     /// True if it is a list of whole numbers, false if of any.
     list: Option<bool>,

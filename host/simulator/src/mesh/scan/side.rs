@@ -190,7 +190,7 @@ struct ByNeighbors {
     judged: Judged,
 }
 
-/// What outward directions are worth.
+/// Quality of outward directions.
 struct Judged {
     winding: f64,
     openness: f64,

@@ -60,7 +60,7 @@ fn is_text(head: &[u8]) -> bool {
     !head.is_empty() && !start.contains(&0) && (is_solid || start.is_ascii())
 }
 
-/// What was read, and a note on what is odd about the file.
+/// Content of a file, and a remark on it.
 type Noted = (Welder, Option<String>);
 
 fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Noted> {
@@ -131,7 +131,7 @@ impl Welder {
     }
 }
 
-/// Where a text stands: after which word.
+/// Position in a text: after which word.
 #[derive(Clone, Copy, PartialEq)]
 enum State {
     /// Outside of solids.
@@ -166,7 +166,7 @@ struct Text<'a, R> {
     path: &'a Path,
     line: u64,
     raw: Vec<u8>,
-    /// Where in `raw` the next word is looked for.
+    /// Position in `raw` from which the next word is searched.
     next: usize,
 }
 
