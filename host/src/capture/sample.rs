@@ -74,7 +74,7 @@ impl<'a> Sampler<'a> {
         self.drawn(index).map(|drawn| (drawn.touch, drawn.approaches))
     }
 
-    /// The same, with the contacts that the hand did not reach.
+    /// Sample `index`, with the contacts that the hand did not reach.
     ///
     /// # Errors
     /// As [`sample`](Self::sample).

@@ -23,7 +23,7 @@ const CHECKPOINT: Duration = Duration::from_millis(500);
 pub(super) struct Store {
     directory: PathBuf,
     listing: Listing,
-    /// Where in the listing the objects of this capture stand; when objects are added there are others.
+    /// Indices in the listing of this capture's objects; when objects are added there are others.
     positions: Vec<usize>,
     samples: u64,
     /// The object that is being written.

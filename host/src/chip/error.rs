@@ -107,7 +107,7 @@ pub enum ChipProblem {
     /// A firmware image has not been built.
     #[error("the firmware image {} does not exist", path.display())]
     NoImage {
-        /// Where it should be.
+        /// Expected path.
         path: PathBuf,
     },
     /// The emulator ended by itself.

@@ -24,7 +24,7 @@ pub struct Cost {
     pub known: usize,
     /// Accuracy after a number of approaches, on simulated touches that the model was not trained on.
     pub simulated: BTreeMap<usize, Share>,
-    /// The same on recorded touches of the same objects.
+    /// Accuracy on recorded touches of the same objects.
     pub recorded: BTreeMap<usize, Share>,
     /// Number of approaches behind the accuracy on simulated touches.
     pub after: usize,
@@ -50,7 +50,7 @@ pub struct Confused {
     pub touches: usize,
     /// The share of the groups of touches for which it was, on simulated touches.
     pub simulated: f64,
-    /// The same on recorded ones.
+    /// This share on recorded ones.
     pub recorded: f64,
 }
 

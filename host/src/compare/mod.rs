@@ -459,7 +459,7 @@ mod tests {
         assert_eq!(said(false, 0.6), format!("{lost} Fit the probe to recorded touches, or record more of them."));
         let fitted = said(true, 0.6);
         assert!(fitted.starts_with(lost) && fitted.contains("most of the loss is scissors as hammer"), "{fitted}");
-        // A ninth of 5 points is no explanation of 3.9.
+        // A ninth of 5 points does not explain 3.9.
         let elsewhere = said(true, 0.13);
         assert!(elsewhere.contains("check the meshes and their sizes") && !elsewhere.contains("Fit"), "{elsewhere}");
     }

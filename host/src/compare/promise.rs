@@ -25,7 +25,7 @@ pub struct Promised {
     pub rate: f64,
     /// Share of the names given to the same objects that are wrong on simulated touches; none if no name was given.
     pub simulated: Option<f64>,
-    /// The same on recorded touches, of the names given in several orders of them.
+    /// Share on recorded touches, of the names given in several orders of them.
     pub recorded: Option<f64>,
     /// Names given on recorded touches in sequences that share no touch, on average over the same orders.
     pub names: f64,

@@ -1,4 +1,4 @@
-//! Where the touches that an ensemble was trained on came from.
+//! Origin of the touches that an ensemble was trained on.
 
 use super::{Origin, Trained};
 use crate::error::{EnsembleProblem, ProbeProblem, Result};
@@ -21,7 +21,7 @@ pub struct TouchOrigin {
     pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
-    /// The same of recorded touches that the ensemble was adjusted to.
+    /// Fingerprints of recorded touches that the ensemble was adjusted to.
     pub adjusted: BTreeMap<String, u64>,
     /// The capture that made them, where that is known.
     pub captured: Option<Captured>,
@@ -92,7 +92,7 @@ impl TouchOrigin {
         }
     }
 
-    /// The same as [`state`](Self::state), of an ensemble that states nothing else but which touches are evidence.
+    /// Like [`state`](Self::state), for an ensemble that states nothing else but which touches are evidence.
     pub fn origin(&self, trained: Option<Trained>) -> Origin {
         let mut origin = Origin { trained, ..Origin::default() };
         self.state(&mut origin);
@@ -337,7 +337,7 @@ fn scene(cone: u16) -> String {
 
 /// Contacts that end before this share of the longest time between them were ended by a stroke.
 const ENDED: f64 = 0.75;
-/// The same of a stated stroke, at which contacts end at once in any case.
+/// This share for a stated stroke, at which contacts end at once in any case.
 const STATED: f64 = 1.2;
 
 /// The latest contacts of touches.
@@ -374,14 +374,14 @@ impl From<&touches::Origin> for StatedProbe {
 /// A fingerprint is made of this many touches at most.
 const FINGERPRINTED: usize = 16;
 
-/// The objects whose touches in `dataset` a compiled model was trained on, as far as it states that: what it does on them
-/// says nothing about others. Of other touches, one object in 65,536 is taken for one of these.
+/// The objects whose touches in `dataset` a compiled model was trained on, if it states that: results on them say nothing
+/// about others. One in 65,536 other objects is taken for one of these.
 pub fn compiled_trained_on<'d>(compiled: &CompiledModel, dataset: &'d Dataset) -> Vec<&'d str> {
     let (model, names) = (compiled.model(), compiled.names());
     let Some(stated) = model.trained_capture() else { return Vec::new() };
     let captured = Captured::of(dataset);
     let is_near = captured.as_ref().is_some_and(|captured| captured.is_near(&stated));
-    // A capture of another seed has other touches; what is not captured is identified by its first touches.
+    // A capture with another seed has other touches; recordings are identified by their first touches.
     let fingerprints = if captured.is_none() || stated.settings == 0 { fingerprints(dataset) } else { BTreeMap::new() };
     let same = |name: &&str| {
         let object = names.iter().position(|own| own == name).and_then(|object| stated.object(object));

@@ -182,7 +182,7 @@ fn useful(recorded: &Dataset, touched: &[Touched], plate: Option<&[Touch]>) -> R
     Ok(of)
 }
 
-/// As [`fit`], to simulated touches.
+/// Like [`fit`], to simulated touches.
 fn fit_to(
     simulated: &Simulated,
     stroke: Stroke,
@@ -253,7 +253,7 @@ fn scenes(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> R
     capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)
 }
 
-/// Each object, touched by the probe as it should be whose hand goes on past it, but for fingers that bend.
+/// Each object, touched by the nominal probe, with a hand that goes on past it; fingers may bend.
 struct Simulated {
     touches: Vec<ObjectTouches>,
     touched: Vec<Touched>,

@@ -68,13 +68,13 @@ pub struct Fit {
     pub readings: Option<f64>,
     /// Recorded touches and approaches.
     pub recorded: usize,
-    /// Those of them with three contacts, and with two.
+    /// Number of these with three contacts, and with two.
     pub contacts: [usize; 2],
     /// Presses on a flat plate.
     pub presses: usize,
     /// Names of the recorded objects, or placements.
     pub objects: Vec<String>,
-    /// Those of them that state no placement on a table, and were not checked for other objects.
+    /// Names of these without a placement on a table, which were not checked for other objects.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unchecked: Vec<String>,
     /// Surroundings of the objects.
@@ -107,7 +107,7 @@ pub(super) fn outcome(
         // An end that falls short of the value, by rounding, is the value.
         Estimate { value, low: low.map(|low| low.min(value)), high: high.map(|high| high.max(value)) }
     };
-    // A time that is rounded down to ticks of a clock of any phase is off by as much as a uniform number.
+    // A time rounded down to ticks of a clock with any phase is off by as much as a uniform number.
     let ticks = resolution.unwrap_or(0.0) / 12.0_f64.sqrt();
     let noise = |candidate: &Candidate| (candidate.noise.powi(2) - ticks.powi(2)).max(0.0).sqrt();
     let only_full = evidence.plate.is_none() && evidence.recordings.iter().all(|own| own.kept == Kept::Full);

@@ -70,7 +70,7 @@ fn approaches(object: &Object, count: usize, seed: u64, probe: &Crooked) -> Vec<
     approaches_of(object, count, seed, probe, Noise::default())
 }
 
-/// The same with fingers that bend.
+/// Like [`approaches`], with fingers that bend.
 fn approaches_of(object: &Object, count: usize, seed: u64, probe: &Crooked, real: Noise) -> Vec<Touch> {
     let origin = Origin { approaches: true, seed: 1_000 + seed, real, ..Origin::default() };
     let scenes = capture::scenes(&[object], &origin, &()).unwrap();
@@ -137,7 +137,7 @@ fn layered(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
     fit(recorded, &objects(), plate, &Settings { approaches: 12_000, ..settings() }, &()).unwrap()
 }
 
-/// That the values are near those of the probe, and the intervals hold them but for an error of the simulation.
+/// Asserts that the values are near the probe's, and within the intervals except for an error of the simulation.
 fn near(fit: &Fit, probe: &Crooked, [factor, offset, noise]: [f64; 3]) {
     let told = format!("{:?} {:?} {:?} {:?}", fit.speed_factor, fit.late, fit.noise, fit.missed);
     assert!((fit.speed_factor.value * probe.longer - 1.0).abs() < factor, "{told}");

@@ -11,7 +11,7 @@ pub(super) struct Touched {
     pub(super) name: String,
     /// One for each instance, or placement of each.
     pub(super) scenes: Vec<Scene>,
-    /// How often each is touched, compared with the others.
+    /// Relative frequencies of touching each.
     pub(super) weights: Vec<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Objects that are learned from recorded touches, since there is no mesh of them.
+//! Objects that are learned from recorded touches, because they have no mesh.
 //!
 //! [`teach`] adds such objects to an ensemble that knows others: its trees stay as they are, and each leaf gets a value
 //! more. A few hundred touches suffice where new trees would need thousands, and the values of the other objects do not
@@ -77,7 +77,7 @@ pub struct Settings {
     pub seed: u64,
     /// Threads, or all of the machine's; the ensemble is the same for any number.
     pub threads: Option<usize>,
-    /// As [`crate::ensemble::train::Settings::leaf_bits`].
+    /// See [`crate::ensemble::train::Settings::leaf_bits`].
     pub leaf_bits: Option<u32>,
     /// Noise added to the touches of the known objects; `None` takes what the ensemble states, less what they have
     /// already.
@@ -127,7 +127,7 @@ pub struct TaughtObject {
     pub name: String,
     /// Approaches that were recorded.
     pub approaches: usize,
-    /// Those of them that are evidence.
+    /// Number of these that are evidence.
     pub touches: usize,
     /// Their smoothing.
     pub smoothing: Smoothing,

@@ -52,7 +52,7 @@ impl Dataset {
         Self { objects, origin: self.origin.clone(), warnings: Vec::new() }
     }
 
-    /// The same for a model with outputs of these names: each object that has placements among them is divided into its own.
+    /// Divides objects for a model with outputs of these names: each object that has placements among them into its own.
     /// Others stay as they are, such as recordings that state no placement, which are of all outputs of their object.
     #[must_use]
     pub fn matching(self, outputs: &[String]) -> Self {
@@ -73,7 +73,7 @@ impl Dataset {
         }
     }
 
-    /// The same by the stroke of a probe, if a hand with this stroke explains all contacts; otherwise as they are.
+    /// Removes contacts by the stroke of a probe, if a hand with this stroke explains all of them; else changes nothing.
     pub fn delivered_by(&self, probe: &Probe) -> Cow<'_, Self> {
         let is_explained = |latest: f64| self.touches().all(|touch| f64::from(touch.spread()) <= latest);
         self.within(probe.window().filter(|_| probe.latest().is_some_and(is_explained)))
@@ -160,10 +160,10 @@ impl Dataset {
         }
     }
 
-    /// The same for a data set that may hold a single object: a background, or a stranger.
+    /// Reads a data set that may hold a single object: a background, or a stranger.
     ///
     /// # Errors
-    /// As [`read`](Self::read), but for the number of objects: at least one.
+    /// Those of [`read`](Self::read), except that one object is enough.
     pub fn read_any(directory: &Path) -> Result<Self> {
         let dataset = match is_log(directory) {
             true => {

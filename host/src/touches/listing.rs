@@ -121,7 +121,7 @@ impl Listing {
         !self.recorded.is_empty()
     }
 
-    /// Where the listing of a directory is.
+    /// Path of a directory's listing.
     pub fn path(directory: &Path) -> PathBuf {
         directory.join(Self::FILE)
     }

@@ -33,7 +33,7 @@ pub struct Logged {
     pub time: u64,
     /// The touch.
     pub touch: Touch,
-    /// Where in the file it stands: the byte at which its message, or the chunk with it, begins.
+    /// Offset in the file: the byte at which its message, or the chunk with it, begins.
     pub offset: u64,
     /// The object's number among the log's.
     object: Option<u32>,

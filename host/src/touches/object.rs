@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// a robot touches one cup until it knows it, not several cups in turn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The object, of which nothing says that it has several instances or recordings.
+    /// The object, not known to have several instances or recordings.
     Object,
     /// One of its instances, by name.
     Instance(String),
@@ -226,7 +226,7 @@ impl ObjectTouches {
         self
     }
 
-    /// The same touches, of which it is known what was touched.
+    /// These touches, with the meshes that were touched.
     #[must_use]
     pub fn of_meshes(self, meshes: Option<Meshes>) -> Self {
         Self { meshes, ..self }
@@ -246,7 +246,7 @@ impl ObjectTouches {
         touches
     }
 
-    /// The meshes that the object was touched as, as far as that is known.
+    /// The meshes that were touched, if they are known.
     pub fn meshes(&self) -> Option<&Meshes> {
         self.meshes.as_ref()
     }
@@ -337,8 +337,8 @@ impl ObjectTouches {
         weights.into_iter().map(of).collect()
     }
 
-    /// The same touches, of which each placement has as many as its weight says, compared with the others: as an object that is
-    /// put down at random is touched. All of them without placements, and of recordings, whose shares are those of the robot.
+    /// These touches, with a number of each placement in proportion to its weight: as an object that is put down at random is
+    /// touched. All of them without placements, and for recordings, whose shares are those of the robot.
     #[must_use]
     pub fn as_often_as_placed(&self) -> Self {
         let is_recorded = self.sources.iter().any(|source| matches!(source, Source::Recording(_)));

@@ -27,7 +27,7 @@ pub struct Origin {
     pub length: f64,
     /// The probe's measures.
     pub probe: Probe,
-    /// Where approaches aim.
+    /// Target of approaches.
     #[serde(default, skip_serializing_if = "Aim::is_box")]
     pub aim: Aim,
     /// Surroundings of the objects: floating, or on a table.

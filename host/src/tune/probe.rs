@@ -66,7 +66,7 @@ pub struct Settings {
     /// Strokes of the hand: the best probe is searched with the longest, and every one is tried with it. None: it is searched
     /// for a hand that goes on past the object, and strokes of 0.5 to 5 units are tried with it.
     pub stroke: Option<RangeInclusive<f64>>,
-    /// Where approaches may aim, at least one.
+    /// Aims that approaches may have, at least one.
     pub aims: Vec<Aim>,
     /// The probe's speed, per second.
     pub speed: f64,
@@ -189,7 +189,7 @@ pub struct Trial {
     /// The probe's measures.
     #[serde(flatten)]
     pub probe: Probe,
-    /// Where its approaches aimed.
+    /// Aim of its approaches.
     pub aim: Aim,
     /// Approaches per object that a model was trained on; it was tested on as many others.
     pub trained_on: u64,

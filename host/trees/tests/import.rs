@@ -586,7 +586,7 @@ fn categories_as_whole_numbers_of_a_scaled_model_go_where_the_library_sends_them
         let encoder = palpate_trees::rows::Encoder::of(&model);
         let mut whole = 0;
         for mut row in rows {
-            // Away from thresholds of the other features, which fall together; what is no whole number is rounded.
+            // Away from thresholds of the other features, which fall together; a fraction would be rounded.
             for feature in [0, 1, 3] {
                 row[feature] = (row[feature] * 7.0).round() / 7.0 + 0.013;
             }
@@ -689,7 +689,7 @@ fn every_model_is_proved_with_every_leaf_in_every_layout_and_in_whole_units() {
     }
 }
 
-/// LightGBM's text of a tree over so many columns, of which it splits on two, with these names or none.
+/// LightGBM's text of a tree over so many columns, two of which it splits on, with these names or none.
 fn many_columns(columns: usize, name: impl Fn(usize) -> String) -> String {
     let names: Vec<String> = (0..columns).map(name).collect();
     format!(

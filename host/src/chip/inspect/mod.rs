@@ -29,7 +29,7 @@ pub struct Inspected<'a> {
     pub descriptor: &'static str,
     /// Number of features.
     pub features: usize,
-    /// Of a model over rows: each feature's name, and how many units make up 1 (null where f32 values are compared).
+    /// For a model over rows: each feature's name, and how many units make up 1 (null where f32 values are compared).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feature_names: Option<Vec<Feature>>,
     /// Numbers of the columns of the library's rows, for a model over some of them.
@@ -37,7 +37,7 @@ pub struct Inspected<'a> {
     pub columns: Option<SomeColumns>,
     /// The objects' names.
     pub objects: Vec<&'a str>,
-    /// Of a model over rows: what it predicts.
+    /// Predictions of a model over rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub predicts: Option<Predicts>,
     /// The layout's name.

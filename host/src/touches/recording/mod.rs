@@ -37,7 +37,7 @@ pub struct Recorded {
     pub touches: u64,
     /// When it began, in UTC: `2026-11-22T11:00:00Z`.
     pub began: String,
-    /// Where the touches came from: a port or a file.
+    /// Source of the touches: a port or a file.
     pub source: String,
     /// Name and version of the chip's program, where it says so.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -5,7 +5,7 @@ use palpate_shared::Descriptor;
 /// Features of an ensemble.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Inputs {
-    /// Those that a descriptor turns touches into: whole numbers.
+    /// Features that a descriptor computes from touches: whole numbers.
     Touches(Descriptor),
     /// Rows of f32 values with these names, NaN where one is missing: an ensemble that was trained elsewhere.
     Rows(Vec<String>),

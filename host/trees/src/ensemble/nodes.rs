@@ -42,7 +42,7 @@ impl Threshold {
     /// The least whole number of units that goes right, where `scale` units make up 1.
     pub fn units(self, scale: f32) -> f64 {
         let units = self.value * f64::from(scale);
-        // A product that is a whole number but for its rounding is that number.
+        // A product within rounding of a whole number is that number.
         let whole = units.round();
         let units = if (units - whole).abs() <= 2.0 * f64::EPSILON * units.abs() { whole } else { units };
         if self.inclusive { units.floor() + 1.0 } else { units.ceil() }

@@ -82,7 +82,7 @@ impl Features {
         self.names.iter().map(String::as_str)
     }
 
-    /// The features among the columns of a table with this header, of which `others` are none.
+    /// The features among the columns of a table with this header, except for the columns `others`.
     ///
     /// Where both have names, each feature has to be one of the columns; there may be more of them, in any order. Names are
     /// equal also where one has `_` for the other one's blanks, brackets and control characters, as LightGBM writes them.

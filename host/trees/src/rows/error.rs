@@ -160,7 +160,7 @@ pub enum RowsProblem {
     OtherModel {
         /// Features, outputs and trees of the model.
         model: [usize; 3],
-        /// Those of the ensemble.
+        /// Numbers of the ensemble.
         ensemble: [usize; 3],
     },
     /// Margins are farther apart than the model states.
@@ -246,7 +246,7 @@ pub enum RowsProblem {
     },
 }
 
-/// The first names of many, `?` for what is no text.
+/// The first names of many, `?` for those that are not text.
 fn some(names: &[String]) -> String {
     let plain = |name: &String| name.chars().map(|own| if own.is_control() { '?' } else { own }).collect::<String>();
     let names: Vec<String> = names.iter().map(plain).collect();

@@ -45,8 +45,8 @@ pub struct Verified {
     pub library_max_margin_error: Option<f64>,
     /// Given rows that the library puts into another class by its margins; `None` without these.
     pub library_class_differs: Option<usize>,
-    /// Those of them that the rounding that the model states does not explain: the library's margins of the two classes are
-    /// farther apart, or equal where nothing that decides between the two was rounded.
+    /// Number of these that the model's stated rounding does not explain: the library's margins of the two classes are
+    /// farther apart, or equal although nothing that decides between the two was rounded.
     pub library_class_unexplained: Option<usize>,
     /// The largest difference of a value to what the library predicts; `None` without its predictions, or for classes.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -94,7 +94,7 @@ impl Rounding {
         Self { largest: if is_f32 { of_import } else { stated }, ties_are_exact }
     }
 
-    /// True if it explains another class than the library's, of which the margins are this far apart.
+    /// True if it explains another class than the library's, if their margins are this far apart.
     pub(super) fn explains(self, gap: f64) -> bool {
         self.largest > 0.0 && gap <= 2.0 * self.largest && !(gap == 0.0 && self.ties_are_exact)
     }

@@ -381,7 +381,7 @@ impl Grower<'_> {
                 let (above, zero_or_above) = (self.reserve(), self.reserve());
                 let side = |goes_left: bool| if goes_left { left } else { right };
                 let (below, over) = if zero_is_left {
-                    // All of what is below zero goes left.
+                    // Everything below zero goes left.
                     (left, Side::At(above))
                 } else {
                     (Side::At(above), right)

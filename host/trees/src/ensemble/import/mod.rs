@@ -55,7 +55,7 @@ impl Ensemble {
         Self::load_named(path, None)
     }
 
-    /// As [`load`](Self::load), with other names for its objects: one for each class, or for the one output of a
+    /// Like [`load`](Self::load), with other names for its objects: one for each class, or for the one output of a
     /// regression.
     ///
     /// # Errors
@@ -64,7 +64,7 @@ impl Ensemble {
         Self::load_with(path, &Options { names, ..Options::default() })
     }
 
-    /// As [`load`](Self::load), with what the file does not say.
+    /// Like [`load`](Self::load), with options for what the file leaves open.
     ///
     /// # Errors
     /// As [`load_named`](Self::load_named); [`EnsembleProblem::Unsupported`] for a missing value of an ensemble over
@@ -81,15 +81,15 @@ impl Ensemble {
 /// Memory: some 50 bytes for each byte of the file at most.
 ///
 /// # Errors
-/// As [`Ensemble::load`], but for reading the file.
+/// Those of [`Ensemble::load`], except for reading the file.
 pub fn read(path: &Path, bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     read_with(path, bytes, &Options { names, ..Options::default() })
 }
 
-/// As [`read`], with what the file does not say.
+/// Like [`read`], with options for what the file leaves open.
 ///
 /// # Errors
-/// As [`Ensemble::load_with`], but for reading the file.
+/// Those of [`Ensemble::load_with`], except for reading the file.
 pub fn read_with(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
     let mut ensemble = read_as_it_is(path, bytes, options)?;
     if options.missing.is_some()

@@ -14,7 +14,7 @@ pub(super) struct Instruction {
 /// A file of assembly.
 pub(super) struct Text {
     pub(super) instructions: Vec<Instruction>,
-    /// Where labels are: which instruction comes next, and the address of the data there.
+    /// Positions of labels: the index of the next instruction, and the address of the data there.
     labels: HashMap<String, (usize, u32)>,
     /// Data in their order; an instruction takes no room.
     data: Vec<u8>,

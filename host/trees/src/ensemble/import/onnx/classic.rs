@@ -167,9 +167,9 @@ impl Weights {
 enum Map {
     /// The one that it names.
     Same,
-    /// Of two classes, whose file has one number: log-odds of the second.
+    /// Log-odds of the second of two classes, for which the file has one number.
     Second,
-    /// The same, but the number is the share of votes for the second.
+    /// Share of votes for the second of two classes.
     Votes,
 }
 
