@@ -152,7 +152,8 @@ def measure(ensemble, name, exporter, scratch):
         others = [on_risc_v(ensemble, directory, source)]
     by_clang = f", clang {seconds[1]:.1f}" if source.clang else ""
     by_gcc = "–" if source.library else f"{seconds[0]:.1f}{by_clang}"
-    return " | ".join([*cells, " / ".join(wrong), "; ".join([by_gcc, *others])])
+    all_wrong = " / ".join(wrong) if any(part != "0" for part in wrong) else "none"
+    return " | ".join([*cells, all_wrong, "; ".join([by_gcc, *others])])
 
 
 def main():
