@@ -19,7 +19,7 @@ static MEMORY: PeakAlloc = PeakAlloc;
 const MOST: usize = 256 << 20;
 
 fuzz_target!(|bytes: &[u8]| {
-    // The first byte chooses what the others are.
+    // The first byte chooses the kind of the others.
     let Some((&first, bytes)) = bytes.split_first() else { return };
     let ros2 = |name: &str, definition: &str| {
         let records = [

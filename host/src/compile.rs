@@ -1,4 +1,4 @@
-//! From an ensemble to the bytes that the chip reads: `palpate_trees::compile`, with what an ensemble states of its touches.
+//! From an ensemble to the bytes that the chip reads: `palpate_trees::compile`, with the ensemble's statements about touches.
 
 pub use palpate_trees::compile::*;
 
@@ -23,7 +23,7 @@ pub fn compile_within(ensemble: &Ensemble, settings: &Settings, most: usize) -> 
     trees::compile_within(ensemble, &stated(ensemble, settings)?, most)
 }
 
-/// The settings, with what the ensemble states of its touches.
+/// The settings, with the ensemble's statements about touches.
 fn stated(ensemble: &Ensemble, settings: &Settings) -> Result<Settings> {
     let stated = TouchOrigin::of(&ensemble.origin)?.stated(&ensemble.objects);
     let priors = match &stated.outputs {

@@ -348,7 +348,7 @@ fn axes(put: Put<'_>) {
     put("a threshold of wide trees that is cut", "section", cuts, longer(&bytes, &[]));
 }
 
-/// Groups and what they count for.
+/// Groups and their contributions.
 fn groups(put: Put<'_>) {
     for (layout, name) in [(Layout::Compact, "compact"), (Layout::Complete, "complete"), (Layout::Wide, "wide")] {
         let good = model(layout, Leaf::I8, true);

@@ -60,7 +60,7 @@ pub struct Desk {
     pub open: bool,
     /// Microseconds.
     pub now: u64,
-    /// Splits what is sent, and cuts the power.
+    /// Splits sent bytes, and cuts the power.
     pub rng: ChaCha8Rng,
     /// Writes per power cut, on average; 0 for no cuts.
     pub cut_every: u32,

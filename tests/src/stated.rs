@@ -68,7 +68,7 @@ impl Readme {
         }
     }
 
-    /// Fails unless all numbers held: what is stated, or was changed, is right.
+    /// Fails unless all numbers held, as stated or after the change.
     ///
     /// # Panics
     /// If one did not, or the file cannot be written.

@@ -13,7 +13,7 @@ const IMPORT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/import");
 /// Rows of a sequence.
 const LENGTH: usize = 12;
 
-/// The kinds: the file of each, and what is replaced in it.
+/// The kinds: the file of each, and the text replaced in it.
 const KINDS: [(&str, &str, Option<[&str; 2]>); 5] = [
     ("softmax", "xgboost-3.4-softprob.ubj", None),
     ("binary", "xgboost-3.4-binary.json", None),

@@ -43,7 +43,7 @@ fn here(flags: &[&str], directory: &Path) -> Result<PathBuf, String> {
     compile(&compiler, flags, "host.c", &program).map(|()| program)
 }
 
-/// Output of the program, or what it said when it failed.
+/// Output of the program, or its error.
 fn answers(program: &mut Command, commands: &[u8]) -> Result<String, String> {
     program.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = program.spawn().map_err(|error| format!("{program:?}: {error}"))?;
@@ -65,7 +65,7 @@ fn run(program: &mut Command, commands: &[u8]) -> String {
     answers(program, commands).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// That it wrote what it has to; otherwise the first line that differs.
+/// Asserts that it wrote the expected output; otherwise reports the first line that differs.
 fn compare(found: &str, script: &Script<'_>) {
     let mut model = 0;
     for (number, (found, expected)) in found.lines().zip(script.expected.lines()).enumerate() {

@@ -190,7 +190,7 @@ const CHIPS: [(usize, &str, &str); 4] = [
     (4, "avr", "-mmcu=atmega2560"),
 ];
 
-/// The rows of that table, and what is defined for them.
+/// The rows of that table, and the macros defined for them.
 const C_ROWS: [(&str, &str); 5] = [
     (
         "rows, one layout (complete), i8 leaves",

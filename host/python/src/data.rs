@@ -206,7 +206,7 @@ impl DataSet {
         self.dataset.probe().copied().map(Probe)
     }
 
-    /// Warnings from reading the data set; what they name may be intended.
+    /// Warnings from reading the data set, which may be about something intended.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.dataset.warnings.iter().map(ToString::to_string).collect()

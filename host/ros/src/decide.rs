@@ -17,7 +17,7 @@ self_cell::self_cell!(
     }
 );
 
-/// When to stop; 0 stands for what the model states.
+/// Stopping thresholds; 0 stands for the model's own.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Thresholds {
     /// The posterior has to exceed 1 less this.
@@ -91,7 +91,7 @@ impl Decider {
         Ok(Self { opened, expected: None, object: String::new() })
     }
 
-    /// The same model under other thresholds, which begins again; priors of the last reset stay.
+    /// This model under other thresholds, without touches; priors of the last reset stay.
     ///
     /// # Errors
     /// The threshold that cannot be used.

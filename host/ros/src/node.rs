@@ -1,4 +1,4 @@
-//! The node while it runs: what happens on its topics, and what it says then.
+//! The running node: its topics, and its answers on them.
 
 use crate::chip::{self, Heard, Order};
 use crate::clients::{AllClients, Clients};

@@ -1,4 +1,4 @@
-//! Random numbers that depend on a seed and on what they are for, and on nothing else.
+//! Random numbers that depend on a seed and on their purpose only.
 //!
 //! The touches of a capture have a generator of their own (`palpate::capture::Sampler`).
 

@@ -112,7 +112,7 @@ pub enum CaptureProblem {
         /// Its objects.
         objects: Vec<String>,
     },
-    /// A part lost what was checkpointed.
+    /// A part lost checkpointed touches.
     #[error("shorter than the {bytes} bytes that dataset.json states")]
     Shorter {
         /// Stated size in bytes.

@@ -53,7 +53,7 @@ use std::time::Instant;
 pub use memory::in_memory;
 pub use sample::{Drawn, MOST_ATTEMPTS, Sampler};
 
-/// Settings of a capture, and how it treats what is already there.
+/// Settings of a capture, and its treatment of existing files.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Settings {
     /// Origin of the touches.

@@ -135,7 +135,7 @@ impl Store {
         self.write_listing()
     }
 
-    /// The object's part, cut to what the listing states when it is opened.
+    /// The object's part, cut to the listed length when it is opened.
     fn part_file(&mut self, object: usize) -> Result<&mut File> {
         let path = self.part(object);
         let io = |error| stopped(&path, &error);

@@ -161,8 +161,8 @@ impl Connection {
         Ok(Some(received))
     }
 
-    /// Asks a chip that has started since its model was asked for whether that is still the one: a loaded model that cannot
-    /// be read any more is replaced by the program's own.
+    /// Checks the model of a chip that has restarted since its model was read: a loaded model that cannot be read any more
+    /// is replaced by the program's own.
     fn check_model(&mut self, boot: u32) -> Result<()> {
         let Some((known, of)) = self.model else { return Ok(()) };
         if of == boot {

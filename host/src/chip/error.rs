@@ -68,13 +68,13 @@ pub enum ChipProblem {
     /// The line to a chip has no message for a row of features.
     #[error("the model is over rows of features, and the line to a chip carries touches")]
     Rows,
-    /// The chip does not do what it was told to.
+    /// The chip does not obey a command.
     #[error("the chip refuses: {0}")]
     Refused(Refusal),
     /// The chip refuses a model, and keeps the one it had.
     #[error("the chip refuses the model: {0}")]
     ModelRefused(Refusal),
-    /// An answer or outcome does not belong to what was asked.
+    /// An answer or outcome does not belong to a question or command.
     #[error("the chip's answer does not match the question")]
     UnexpectedAnswer,
     /// The chip's model is not the one that its verdicts shall be compared with.

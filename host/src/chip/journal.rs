@@ -30,7 +30,7 @@ pub enum Entry {
         /// Its name, where it is known.
         name: Option<String>,
     },
-    /// A touch, and what is known after it.
+    /// A touch, and the state after it.
     Touch {
         /// Microseconds after the first contact, null where it is missing.
         times: [Option<u32>; 3],

@@ -120,7 +120,7 @@ pub fn record(
     Ok(summary)
 }
 
-/// Asks the chip what it is.
+/// Asks the chip for its program's name and version.
 fn greet(
     connection: &mut Connection,
     recording: &mut Recording,

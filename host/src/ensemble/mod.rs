@@ -16,7 +16,7 @@ pub use palpate_trees::ensemble::*;
 use crate::error::Result;
 use std::path::Path;
 
-/// Reads an ensemble, over touches or over rows, and checks what it states of its touches.
+/// Reads an ensemble, over touches or over rows, and checks its statements about touches.
 ///
 /// # Errors
 /// As [`Ensemble::load`]; [`EnsembleProblem::Attribute`] for statements that this
@@ -26,7 +26,7 @@ pub fn load(path: impl AsRef<Path>) -> Result<Ensemble> {
     checked(path, Ensemble::load(path)?)
 }
 
-/// An ensemble that was read from `path`, if what it states of its touches can be read.
+/// An ensemble that was read from `path`, if its statements about touches can be read.
 pub(crate) fn checked(path: &Path, ensemble: Ensemble) -> Result<Ensemble> {
     TouchOrigin::of(&ensemble.origin).map_err(|problem| crate::Error::from(problem).in_file(path))?;
     Ok(ensemble)

@@ -15,7 +15,7 @@ const MISSED: f64 = 0.08;
 const NOISE: f64 = 2.5;
 /// The most noise in milliseconds of which it is measured that training for it costs little.
 const MUCH_NOISE: f64 = 5.0;
-/// No recording is asked to be longer than this many times what is there.
+/// Largest proposed length of a recording, as a multiple of the present one.
 const MOST: f64 = 30.0;
 
 pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {

@@ -10,7 +10,7 @@ pub(super) struct Candidate {
     pub(super) factor: f64,
     /// Delay of each finger; 0 for the first.
     pub(super) late: [f64; 3],
-    /// Standard deviation of each contact time, with what the timer adds.
+    /// Standard deviation of each contact time, including the timer's.
     pub(super) noise: f64,
     /// The share of contacts that each finger misses.
     pub(super) missed: [f64; 3],

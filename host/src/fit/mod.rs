@@ -106,7 +106,7 @@ impl Default for Settings {
 /// The fewest recorded touches with two or three contacts from which a probe is fitted.
 pub const LEAST: usize = 20;
 
-/// Recordings and simulated touches: what a candidate is compared with.
+/// Recordings and simulated touches, with which a candidate is compared.
 struct Evidence<'a> {
     recordings: &'a [Recording<'a>],
     /// Simulated touches of all objects.
@@ -170,7 +170,7 @@ pub fn fit(
     fit_to(&simulated, stroke, recorded, plate, settings, progress)
 }
 
-/// For each recording what it is of, if there are enough touches.
+/// The object or placement of each recording, if there are enough touches.
 fn useful(recorded: &Dataset, touched: &[Touched], plate: Option<&[Touch]>) -> Result<Vec<usize>> {
     let place = |own: &ObjectTouches| place(&own.name, touched.iter().map(|touched| touched.name.as_str()));
     let of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
@@ -227,7 +227,7 @@ fn fit_to(
     Ok(fit)
 }
 
-/// The place of what a recording of this name is of.
+/// The index of the object or placement of a recording with this name.
 fn place<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Result<usize> {
     let problem = || FitProblem::NotRecorded { name: name.into(), known: known.clone().map(str::to_owned).collect() };
     touched::place(name, known.clone()).ok_or_else(|| problem().into())

@@ -7,7 +7,7 @@ use super::search::{Best, Likelihood};
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
-/// Numbers of a candidate, and what is one for each pair of them.
+/// Numbers of a candidate, and values for each pair of them.
 type Numbers = SVector<f64, NUMBERS>;
 type Pairs = SMatrix<f64, NUMBERS, NUMBERS>;
 

@@ -158,7 +158,7 @@ struct Found {
 }
 
 impl Found {
-    /// Wrong names come first: they make the fit wrong, and with it what is said about the probe of the others.
+    /// Wrong names come first: they make the fit wrong, and with it any statement about the probe of the others.
     fn rank(&self) -> (bool, f64) {
         (matches!(self.suspect, Suspect::OtherObject { .. } | Suspect::TwoObjects { .. }), self.nats)
     }

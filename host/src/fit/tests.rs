@@ -65,7 +65,7 @@ fn other(name: &str) -> Object {
     OBJECTS.iter().find(|object| object.name == name).unwrap().clone()
 }
 
-/// Approaches to an object, with what is wrong with the probe.
+/// Approaches to an object, by a probe with deviations.
 fn approaches(object: &Object, count: usize, seed: u64, probe: &Crooked) -> Vec<Touch> {
     approaches_of(object, count, seed, probe, Noise::default())
 }

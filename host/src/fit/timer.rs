@@ -16,7 +16,7 @@ const LEAST: usize = 24;
 pub(super) enum Timer {
     /// Its resolution in microseconds.
     Found(f64),
-    /// Finer than what is looked for.
+    /// A resolution finer than those searched.
     Fine,
     /// There are too few times to tell.
     Unknown,
@@ -92,7 +92,7 @@ fn closeness(times: &[f64], resolution: f64) -> f64 {
     f64::hypot(cos, sin) / times.len().max(1) as f64
 }
 
-/// The nearest number of two digits, if it is within what the search can tell.
+/// The nearest number of two digits, if it is within the resolution of the search.
 fn usual(resolution: f64) -> f64 {
     let power = 10.0_f64.powf(resolution.log10().floor() - 1.0);
     let rounded = (resolution / power).round() * power;

@@ -279,7 +279,7 @@ fn gain(given: &[Held], held: &[Held]) -> [f64; 2] {
     [mean, variance.sqrt()]
 }
 
-/// The ensemble with what is added to the values of the recorded objects.
+/// The ensemble with the additions to the values of the recorded objects.
 fn changed(
     ensemble: &Ensemble,
     recorded: &Dataset,

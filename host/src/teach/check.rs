@@ -28,7 +28,7 @@ pub(super) fn check(
     Ok(descriptor)
 }
 
-/// Refuses what a model cannot be adjusted to, all of it before the work begins.
+/// Rejects recordings that a model cannot be adjusted to, before the work begins.
 pub(super) fn adjustable(
     ensemble: &Ensemble,
     known: &Dataset,

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// The meshes that an object was touched as.
+/// The meshes of a touched object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Meshes {
     /// The [checksum](crate::mesh::Mesh::checksum) of each instance's mesh, as it was read, in hexadecimal digits.

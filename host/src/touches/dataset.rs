@@ -305,7 +305,7 @@ impl Dataset {
     }
 }
 
-/// Reads an object's file, and compares it with what the listing states.
+/// Reads an object's file, and compares it with the listing.
 fn read_listed(entry: &Entry, format: Format, path: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
     let wrong = |problem| Error::at(Place::file(path), problem);
     if !path.exists() {
@@ -337,7 +337,7 @@ struct Found {
     file: PathBuf,
 }
 
-/// Contents of logs by object, one log after the other, and what was skipped.
+/// Contents of logs by object, one log after the other, and the skipped channels.
 fn found_in(logs: &[PathBuf]) -> Result<(BTreeMap<String, Found>, Vec<Warning>)> {
     let (mut objects, mut warnings) = (BTreeMap::<String, Found>::new(), Vec::new());
     for file in logs {

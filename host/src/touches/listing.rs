@@ -1,4 +1,4 @@
-//! `dataset.json`: what a data set holds, how it was made, and whether it is complete.
+//! `dataset.json`: the content and origin of a data set, and whether it is complete.
 
 use super::{Format, Meshes, ObjectTouches, Origin, Recorded, Source};
 use crate::error::{Error, Place, Result, TouchesProblem};
@@ -159,7 +159,7 @@ impl Listing {
         Ok(listing)
     }
 
-    /// Writes the listing, whole or not at all, and replaces what is there.
+    /// Writes the listing, whole or not at all, over an existing one.
     ///
     /// # Errors
     /// When it cannot be written.

@@ -131,7 +131,7 @@ impl Log {
         &self.channels
     }
 
-    /// Warning about what was skipped.
+    /// Warning about skipped channels.
     pub fn skipped(&self) -> Option<Warning> {
         let channels = &self.channels.others;
         (!channels.is_empty()).then(|| Warning::SkippedChannels { path: self.path.clone(), channels: channels.clone() })

@@ -182,7 +182,7 @@ mod tests {
         [instances, recordings].map(|objects| Dataset { origin: Some(origin.clone()), ..Dataset::new(objects.into()) })
     }
 
-    /// For each object what the touches of each source are, whatever their order.
+    /// A key of each source's touches, for each object, regardless of their order.
     fn by_source(dataset: &Dataset) -> Vec<(String, Vec<palpate_shared::Touch>)> {
         let mut all = Vec::new();
         for object in &dataset.objects {

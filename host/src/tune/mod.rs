@@ -94,7 +94,7 @@ pub struct Recipe {
     pub different_leaves: Option<usize>,
 }
 
-/// A compiled model of the family, and what it achieves on held-out touches.
+/// A compiled model of the family, and its results on held-out touches.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Training settings of its ensemble.
@@ -303,7 +303,7 @@ fn unless_unfit(compiled: Result<Compiled>) -> Result<Option<Compiled>> {
     }
 }
 
-/// Bytes of the model with what a calibration adds.
+/// Bytes of the model including those that a calibration adds.
 fn bytes(compiled: &Compiled, settings: &Settings) -> usize {
     compiled.bytes.len() + calibrate::added_bytes(&settings.noise)
 }
@@ -331,7 +331,7 @@ fn measure(
     })
 }
 
-/// `error_rate` as [`evaluate::Settings::error_rate`].
+/// Evaluation settings with `error_rate` as [`evaluate::Settings::error_rate`].
 fn evaluated(
     candidate: Candidate<'_>,
     touches: &Dataset,

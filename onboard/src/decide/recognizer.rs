@@ -313,7 +313,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         &mut self.state
     }
 
-    /// Takes in a touch by its evidence: its margins, or what the model's table makes of them.
+    /// Takes in a touch by its evidence: its margins, or their evidence by the model's table.
     pub(super) fn add(&mut self, margins: &[i32]) -> Verdict {
         match self.state.decided {
             Decided::Fresh => {
@@ -461,7 +461,7 @@ impl<const N: usize> State<N> {
     }
 }
 
-/// Sets evidence to what it is before any touch.
+/// Sets evidence to its value before any touch.
 fn start(model: &Model<'_>, evidence: &mut [i64]) {
     for (evidence, prior) in evidence.iter_mut().zip(model.priors()) {
         *evidence = i32::from_le_bytes(*prior).into();

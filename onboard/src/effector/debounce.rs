@@ -64,7 +64,7 @@ impl Debounce {
         if self.settled { None } else { self.left }
     }
 
-    /// The clock starts here: what was before happened now.
+    /// The clock starts here: earlier edges happened now.
     pub(super) const fn start(&mut self, now: u32) {
         (self.since, self.closed_since) = (now, now);
         if self.left.is_some() {

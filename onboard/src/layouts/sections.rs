@@ -88,7 +88,7 @@ impl<'a> Sections<'a> {
         (axes.as_chunks().0, cuts)
     }
 
-    /// The offset in the model at which a section, or what is left of one, starts.
+    /// The offset in the model at which a section, or the rest of one, starts.
     pub(crate) fn offset(&self, section: &[u8]) -> usize {
         section.as_ptr().addr().saturating_sub(self.bytes.as_ptr().addr())
     }

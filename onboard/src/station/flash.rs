@@ -214,7 +214,7 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
         self.flash.bytes().get(from..to).is_some_and(|bytes| bytes.iter().all(|&byte| byte == self.erased))
     }
 
-    /// Erases whole sectors, and returns what the driver says of it.
+    /// Erases whole sectors, and returns the driver's answer.
     fn erase_once(&mut self, start: usize, end: usize) -> bool {
         self.flash.before_erase();
         let (Ok(from), Ok(to)) = (u32::try_from(start), u32::try_from(end)) else { return false };

@@ -1,4 +1,4 @@
-//! Evidence of rows: what a margin counts for, and how much rows count together.
+//! Evidence of rows: the weight of a margin, and of rows together.
 
 /// Evidence of a row for each object, by its margin: a table of values at equal distances, between which it is linear; it
 /// stays the same below the first and from just before the last. For models whose margins are no log-probabilities, such as shares of votes.

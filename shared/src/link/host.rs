@@ -445,7 +445,7 @@ impl HostEnd {
                 self.phase = Phase::Open;
             }
             (Phase::Open, answer) => incoming(Incoming::Answer(answer)),
-            // No answer to what was asked: begin again.
+            // No answer: begin again.
             (Phase::Asking | Phase::Opening, _) => {
                 self.phase = Phase::Asking;
                 self.put_question(Query::Hello, now, send);
@@ -507,7 +507,7 @@ impl HostEnd {
         sequence.wrapping_sub(self.oldest) < self.next.wrapping_sub(self.oldest)
     }
 
-    /// Sends again what has been without an answer for too long. Call it often.
+    /// Sends again everything that has been without an answer for too long. Call it often.
     ///
     /// # Errors
     /// [`LinkError`] when the session cannot go on: [`HostEnd::connect`] begins another.

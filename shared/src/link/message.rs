@@ -353,7 +353,7 @@ fn pose_of([a, b, c, d, e, f, g, h, i, j, k, l]: [u8; 12]) -> Pose {
     }
 }
 
-/// A verdict, and what it is based on.
+/// A verdict, and its basis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VerdictMessage {

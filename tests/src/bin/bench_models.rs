@@ -1,4 +1,4 @@
-//! Writes what the firmware's benchmarks and its test of bit-identity are built with:
+//! Writes the inputs of the firmware's benchmarks and of its test of bit-identity:
 //!
 //! ```text
 //! cargo run --release -- run ../shared/objects -o RUN

@@ -133,7 +133,7 @@ class DataSet:
     @property
     def warnings(self, /) -> list[str]:
         """
-        Warnings from reading the data set; what they name may be intended.
+        Warnings from reading the data set, which may be about something intended.
         """
 
 @final
@@ -165,7 +165,7 @@ class Ensemble:
     @staticmethod
     def from_bytes(content: SupportsGetItem[int, SupportsIndex], names: SupportsGetItem[int, str] | None = None, *, all_trees: bool = False, missing: SupportsFloat | SupportsIndex | None = None, notes: SupportsGetItem[int, str] = ...) -> Ensemble:
         """
-        The same from the bytes of such a file. `notes` are what to know about it beyond what it says itself.
+        Reads the bytes of such a file. `notes` are what to know about it beyond what it says itself.
         """
     @staticmethod
     def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ..., link: str = "identity", last_of_ties: bool = False, targets: bool = False) -> Ensemble:
@@ -290,7 +290,7 @@ class Model:
     @property
     def notes(self, /) -> list[str]:
         """
-        Facts about what the model was compiled from, each a sentence; none of a model that was loaded.
+        Facts about the model's source, each a sentence; none for a loaded model.
         """
     @property
     def objects(self, /) -> list[str]:

@@ -101,7 +101,7 @@ pub enum MeshProblem {
         /// Number of vertices.
         vertices: u64,
     },
-    /// A file is not what a file of its kind must be.
+    /// A file breaks the rules of its kind.
     #[error("the {format} file is damaged: {what}")]
     Damaged {
         /// The kind of file: `STL`.

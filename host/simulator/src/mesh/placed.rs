@@ -1,4 +1,4 @@
-//! Meshes that a file places by transforms, some of them several times: what the readers of scenes share.
+//! Meshes that a file places by transforms, some of them several times: common code of the readers of scenes.
 
 use super::Mesh;
 use super::exact::Moved;

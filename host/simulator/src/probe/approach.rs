@@ -260,7 +260,7 @@ impl Approach {
     }
 }
 
-/// A direction cosine as the nearest Q15 number; what is beyond ±1 becomes ±1.
+/// A direction cosine as the nearest Q15 number; values beyond ±1 become ±1.
 pub fn to_q15(cosine: f64) -> i16 {
     let one = f64::from(Q15_ONE);
     (cosine * one).round().clamp(-one, one) as i16

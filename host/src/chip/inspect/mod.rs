@@ -191,7 +191,7 @@ pub fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>) -> Result<OnChip
         Core::M4F => Chip::M4F,
         Core::M0Plus => Chip::M0Plus,
     };
-    // The image makes touches of what it is given; a model over rows of features cannot be measured with it.
+    // The image expects touches; a model over rows of features cannot be measured with it.
     let measured = match model.descriptor() {
         Some(_) if emulated.is_there() => Some(emulated.measure(model.bytes(), &spread_touches(model))?),
         _ => None,
@@ -214,7 +214,7 @@ pub fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>) -> Result<OnChip
     })
 }
 
-/// Touches that spread evenly over what the model's probe can give, the same every time.
+/// Touches that spread evenly over the range of the model's probe, the same every time.
 fn spread_touches(model: &Model<'_>) -> Vec<Touch> {
     // Most contacts come within a twentieth of the longest time.
     let range = compile::longest_time(model) * 1e6 / 20.0;

@@ -25,7 +25,7 @@ pub struct Defaults {
     pub max_touches: u32,
 }
 
-/// A promise, and what it rests on.
+/// A promise, and its basis.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Promised {
     /// The promised share of wrong names.

@@ -74,7 +74,7 @@ pub enum EnsembleProblem {
         /// A value in Python that it could have.
         example: &'static str,
     },
-    /// An attribute does not hold what it should.
+    /// An attribute has an invalid value.
     #[error("{name} is not {expected}: {detail}")]
     Attribute {
         /// Its name.
@@ -209,7 +209,7 @@ pub enum EnsembleProblem {
         /// The descriptor.
         descriptor: Descriptor,
     },
-    /// The trainer refused what it was given, or failed.
+    /// The trainer rejected its input, or failed.
     #[error("the trainer {trainer} refused the touches: {detail}")]
     Trainer {
         /// Its name.

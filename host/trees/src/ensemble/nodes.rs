@@ -52,7 +52,7 @@ impl Threshold {
 /// The threshold c with which `x < c` is `x <= threshold` for every f32 x: the f32 after the largest one that is not
 /// above the threshold.
 fn after(threshold: f64) -> f32 {
-    // `as` rounds to nearest, and to infinity what is beyond.
+    // `as` rounds to nearest, and values beyond the range to infinity.
     let near = threshold as f32;
     let below = if f64::from(near) > threshold { near.next_down() } else { near };
     below.next_up()

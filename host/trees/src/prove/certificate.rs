@@ -1,4 +1,4 @@
-//! Certificates: what a proof found, as a text that is checked in another way.
+//! Certificates: the results of a proof, as a text that is checked in another way.
 
 use super::ProofProblem;
 use crate::error::{Error, Place, Result};

@@ -93,7 +93,7 @@ pub enum ProofProblem {
     /// The model has one output.
     #[error("the model has one output, and no class that could change")]
     NoClass,
-    /// Bytes that are accepted as a model are not what the format says.
+    /// Bytes that are accepted as a model break the format.
     #[error("the model does not follow its format: {what}")]
     Format {
         /// The fault.

@@ -50,11 +50,11 @@ pub struct Proof {
     /// The largest difference of a margin: in any cell between thresholds, of a table or where [`prove`] can go through
     /// them; otherwise a bound, the sum of the trees' largest differences, without what the library loses by adding in f32.
     pub margin_error: f64,
-    /// The difference that the model states, which has what the library loses by adding in f32.
+    /// The difference that the model states, including the library's loss by adding in f32.
     pub stated: f64,
     /// For each output its name, and bounds of its margin.
     pub ranges: Vec<(String, f64, f64)>,
-    /// For each output the least and the largest margin of a row that a search found: what a bound is worth.
+    /// For each output the least and the largest margin of a row that a search found, to judge a bound.
     pub found: Vec<(f64, f64)>,
     /// The most splits that a row passes: the sum of each tree's longest way; 0 for a table.
     pub splits: usize,
@@ -65,7 +65,7 @@ pub struct Proof {
     /// The most instructions for a layout of data, estimated: see [`Instructions`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimated: Option<Instructions>,
-    /// The links of the model and of the ensemble, where `export --link` set another one: what is proved are margins.
+    /// The links of the model and of the ensemble, if `export --link` set another one: the proof is about margins.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other_link: Option<[&'static str; 2]>,
 }

@@ -175,7 +175,7 @@ pub enum RowsProblem {
         /// The first tree that differs.
         tree: Option<String>,
     },
-    /// The library's margins are something else.
+    /// The library's margins look like probabilities.
     #[error("the library's numbers look like probabilities, and margins are needed")]
     Probabilities,
     /// Classes are others than the library's.

@@ -4,7 +4,7 @@
 //! values are queued in row order, a full queue becomes a summary, and summaries of one level are merged and pruned into one
 //! of the next (Greenwald and Khanna, 2001; Chen and Guestrin, 2016, appendix). Ranks are f32, as there.
 
-/// A value of a summary, with what is known about its rank.
+/// A value of a summary, with bounds on its rank.
 #[derive(Clone, Copy)]
 struct Entry {
     /// The least weight of all smaller values.

@@ -48,7 +48,7 @@ pub struct Verified {
     /// Number of these that the model's stated rounding does not explain: the library's margins of the two classes are
     /// farther apart, or equal although nothing that decides between the two was rounded.
     pub library_class_unexplained: Option<usize>,
-    /// The largest difference of a value to what the library predicts; `None` without its predictions, or for classes.
+    /// The largest difference of a value to the library's prediction; `None` without its predictions, or for classes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub library_max_value_error: Option<f64>,
     /// Given rows that the library predicts another class for, or a value farther away than the rounding of margins that the

@@ -36,7 +36,7 @@ impl<'a> Reference<'a> {
         is_each && self.ensemble.objects.len() > 1 && self.ensemble.prediction().scale != 1.0
     }
 
-    /// The margins of what the model gets.
+    /// The margins of the model's input.
     pub(super) fn margins(&self, row: &[f64], encoded: &[i32]) -> Vec<f32> {
         match &self.encoder {
             Encoder::Real => self.ensemble.margins_of_features(&singles(row)),

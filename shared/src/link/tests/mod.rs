@@ -114,7 +114,7 @@ struct Faults {
 
 const CLEAN: Faults = Faults { byte_lost: 0.0, byte_changed: 0.0, frame_lost: 0.0, frame_doubled: 0.0, delay: 0 };
 
-/// One direction of a line: what was sent and when it arrives.
+/// One direction of a line: the bytes sent, and their time of arrival.
 struct Line {
     faults: Faults,
     rng: ChaCha8Rng,
@@ -507,7 +507,7 @@ impl Rig {
         self.step().unwrap();
     }
 
-    /// The chip's own fingers touch; what it says of that arrives, or the power goes before.
+    /// The chip's own fingers touch; its report arrives, or the power goes before.
     fn touch_itself(&mut self, touches: u32, arrives: bool) {
         let Self { up, now, chip, notebook, .. } = self;
         let send = |frame: &[u8]| {

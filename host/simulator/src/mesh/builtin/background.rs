@@ -1,4 +1,4 @@
-//! Shapes of no kind: what a background column is trained on.
+//! Shapes of no kind, for training a background column.
 //!
 //! Each is drawn from one of ten families (lumps, carved lumps, turned solids, vessels, wires, rings, plates, bars with
 //! a head, combs, stars) with random parts, lengths and angles. Together they should be as varied as the objects that a

@@ -220,7 +220,7 @@ impl<'a, 'input> Scene<'a, 'input> {
         Ok(())
     }
 
-    /// Puts what is in a node on the stack of what waits, the first on top.
+    /// Pushes the content of a node onto the stack, the first on top.
     fn wait(
         &mut self,
         parent: Node<'a, 'input>,

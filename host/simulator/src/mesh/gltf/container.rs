@@ -57,7 +57,7 @@ pub(super) fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>> {
     Ok(Parts { json, start, binary })
 }
 
-/// Bytes of the document's buffers, as many as it states; none for a buffer that cannot be read from anywhere.
+/// Bytes of the document's buffers, as many as it states; none for a buffer without a source.
 pub(super) fn buffers<'a>(
     document: &Document,
     parts: &Parts<'a>,
@@ -75,7 +75,7 @@ pub(super) fn buffers<'a>(
     document.buffers.iter().enumerate().map(load).collect()
 }
 
-/// A buffer without what is beyond its stated length.
+/// A buffer, cut to its stated length.
 fn cut<'a>(bytes: Cow<'a, [u8]>, index: usize, buffer: &Buffer, path: &Path) -> Result<Cow<'a, [u8]>> {
     let (length, stated) = (bytes.len(), buffer.byte_length);
     let stated = usize::try_from(stated).ok().filter(|&stated| stated <= length);

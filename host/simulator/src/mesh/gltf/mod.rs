@@ -61,7 +61,7 @@ fn offset(text: &[u8], line: usize, column: usize) -> u64 {
 }
 
 fn check(document: &Document) -> Result<(), MeshProblem> {
-    // A file of a later 2.x says in `minVersion` what a reader must know; 2.0 is what is known here.
+    // A file of a later 2.x states in `minVersion` which version a reader must know; this one knows 2.0.
     let version = document.asset.min_version.as_ref().unwrap_or(&document.asset.version);
     let is_known = match document.asset.min_version {
         Some(_) => version == "2.0",
@@ -136,7 +136,7 @@ impl Scene<'_> {
         self.placed.into_mesh()
     }
 
-    /// Refuses what would place or bend a node's mesh in another way than its transform.
+    /// Rejects features that would place or bend a node's mesh in another way than its transform.
     fn check_node(&self, node: &Node) -> Result<(), MeshProblem> {
         let instancing = "EXT_mesh_gpu_instancing";
         if node.extensions.as_ref().is_some_and(|extensions| extensions.contains_key(instancing)) {

@@ -171,7 +171,7 @@ impl Placements {
         self.placements.iter().chain(&self.left_out).map(|placement| placement.name.clone())
     }
 
-    /// Keeps those that have one of these weights, with that weight.
+    /// Keeps the placements that `weights` names, with these weights.
     fn weigh(&mut self, weights: &[(String, f64)]) {
         let weight = |placement: &Placement| {
             let stated = weights.iter().find(|(name, _)| *name == placement.name);

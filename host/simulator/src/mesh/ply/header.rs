@@ -138,7 +138,7 @@ impl Property {
 }
 
 impl Element {
-    /// Refuses elements whose rows have no end, and vertices and faces without what they need.
+    /// Rejects elements whose rows have no end, and vertices and faces without their required properties.
     fn check(&self) -> Result<(), String> {
         let Self { name, properties, count, .. } = self;
         if properties.is_empty() {

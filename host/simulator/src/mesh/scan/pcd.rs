@@ -263,7 +263,7 @@ fn value(bytes: &[u8], kind: u8) -> f64 {
     }
 }
 
-/// Unpacks LZF: runs of literal bytes, and copies of what was unpacked before.
+/// Unpacks LZF: runs of literal bytes, and copies of bytes unpacked before.
 ///
 /// # Errors
 /// The byte at which the data are damaged.

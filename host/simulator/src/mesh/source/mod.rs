@@ -50,7 +50,7 @@ pub struct Search {
     pub skips_bad: bool,
 }
 
-/// Objects that were found and read, and what a user should know about that.
+/// Objects that were found and read, with remarks for the user.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Loaded {
@@ -190,7 +190,7 @@ impl Source {
         object.ok_or_else(|| MeshProblem::NoMeshes.into())
     }
 
-    /// The object with those of its meshes that can be read, and what is wrong with the others.
+    /// The object with its readable meshes, and the errors of the others.
     fn read_each(self) -> (Option<Object>, Vec<Error>) {
         let whole = |read: Result<Object>| match read {
             Ok(object) => (Some(object), Vec::new()),
@@ -276,7 +276,7 @@ pub fn objects_of_instances(sources: &[String]) -> Result<Vec<Object>> {
 /// The objects of all `sources` as [`objects`](fn@objects) finds them, neither made nor read; sorted by name.
 ///
 /// # Errors
-/// As [`objects`](fn@objects), except for what is wrong inside a file.
+/// Those of [`objects`](fn@objects), except for errors inside a file.
 pub fn files(sources: &[String]) -> Result<Vec<Source>> {
     found(sources, Search::default()).map(|(found, _)| found)
 }

@@ -33,7 +33,7 @@ fn bytes_of(count: u32) -> u64 {
     HEADER as u64 + TRIANGLE as u64 * u64::from(count)
 }
 
-/// Reads the mesh of an STL file of `length` bytes, with notes on what is odd about the file; errors name `path`.
+/// Reads the mesh of an STL file of `length` bytes, with remarks on the file; errors name `path`.
 ///
 /// # Errors
 /// Where the number of triangles is not the one that the file states, a word or a number of a text is not what must stand

@@ -46,7 +46,7 @@ pub(super) struct Tree {
 
 /// Classes of the sphere's size relative to the packs, which decide the tests before a box is opened.
 pub(super) mod scale {
-    /// The sphere is small: it hardly touches a box without touching what is inside, so boxes alone do.
+    /// The sphere is small: it hardly touches a box without touching its content, so boxes alone do.
     pub(in super::super) const COARSE: u8 = 0;
     /// The sphere is about as large as the packs: the corners of boxes that it is too round to touch are left out.
     pub(in super::super) const MIDDLE: u8 = 1;

@@ -137,7 +137,7 @@ fn blocks(text: &str) -> Result<(Block<'_>, Vec<Block<'_>>)> {
     Err(damaged(text.lines().count() as u64, "it ends before the line \"end of trees\"".into()))
 }
 
-/// The first tree's object: 1 for a binary model. Says what is unusual about the objective; `rounds` are averaged.
+/// The first tree's object: 1 for a binary model. Notes peculiarities of the objective; `rounds` are averaged.
 fn objective(text: Option<&str>, outputs: usize, rounds: usize, draft: &mut Draft) -> Result<usize> {
     let text = text.unwrap_or("custom");
     let mut words = text.split_ascii_whitespace();
@@ -292,7 +292,7 @@ fn check_structure(block: &Block<'_>, splits: &[Split], leaves: usize) -> Result
     Ok(())
 }
 
-/// Copies a tree, writing splits that LightGBM has and other trees do not as several.
+/// Copies a tree, and writes splits that only LightGBM has as several splits.
 struct Grower<'a> {
     splits: &'a [Split],
     values: &'a [f64],

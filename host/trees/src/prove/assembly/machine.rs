@@ -1,4 +1,4 @@
-//! A machine that executes the instructions of generated assembly: on numbers, and on what is known of others.
+//! A machine that executes the instructions of generated assembly on known numbers and partly known values.
 
 use super::super::ProofProblem;
 use super::text::{Instruction, Text, problem};
