@@ -170,7 +170,7 @@ pub fn stream(
             Some(Received::Outcome(outcome)) => run.take(outcome, chip).map_err(|problem| connection.wrong(problem))?,
         };
         busy.set(!run.under_way.is_empty(), Instant::now());
-                // A verdict ends the object: the next touch is of another one.
+        // A verdict ends the object: the next touch is of another one.
         let is_open = match &update {
             Update::Touch { verdict, .. } => verdict.decision == Decision::Undecided,
             Update::Refused { .. } => !run.decided,

@@ -272,7 +272,7 @@ impl StatedProbe {
         let own = Self::of(dataset).map(|own| own.trained());
         let is_simulated = own.is_some() && !dataset.is_recorded();
         if let Some((probe, own)) = probe.zip(own) {
-    // Nor do recordings state a scene.
+            // Nor do recordings state a scene.
             let unstated = |own: TrainedProbe| TrainedProbe {
                 stroke: own.stroke.or(probe.stroke),
                 cone: if own.cone == 0 { probe.cone } else { own.cone },

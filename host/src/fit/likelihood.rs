@@ -107,7 +107,7 @@ impl<'a> Explained<'a> {
             Some(stroke) if observed.contacts() < 2 => stroke.shares,
             _ => self.shares,
         };
-    // The object may have more placements than were recorded.
+        // The object may have more placements than were recorded.
         let mut density = 0.0;
         for touched in (0..8).filter(|touched| touched & fingers == fingers) {
             let share = shares[usize::from(touched)] * self.product(touched, fingers);

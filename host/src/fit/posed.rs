@@ -95,7 +95,7 @@ fn order(shares: &[f64]) -> Vec<usize> {
 
 /// Half the way to the third neighbor with the same contacts; 0 where there are not as many.
 fn gap(one: &Simulated, all: &[Simulated]) -> f32 {
-        // Times of fingers that did not touch are 0, and so is their contribution here.
+    // Times of fingers that did not touch are 0, and so is their contribution here.
     let away = |other: &Simulated| {
         let [a, b, c]: [f32; 3] = std::array::from_fn(|finger| other.times[finger] - one.times[finger]);
         let touched = |fingers: u8| one.touched & fingers == fingers;

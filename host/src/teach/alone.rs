@@ -110,7 +110,7 @@ pub fn alone(
         let taught = Taught { approaches, objects: objects.collect(), others: None, promise };
         progress.begin("training", None);
         let mut ensemble = fitted(jitter, &|_| true)?;
-    // The statement is about the recordings, not their copies.
+        // The statement is about the recordings, not their copies.
         let trained = ensemble.origin.trained;
         ensemble.origin = TouchOrigin::new(recorded, training.probe).origin(trained);
         Ok((ensemble, taught))

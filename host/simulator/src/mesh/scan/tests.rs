@@ -435,7 +435,7 @@ fn a_pcd_gives_one_surface_as_text_binary_and_compressed() {
     assert_eq!(text.format, file::Format::Pcd);
     assert_sound(&text.mesh);
     for other in [&binary, &compressed] {
-    // The content decides a file's kind.
+        // The content decides a file's kind.
         assert_eq!(read(other, "sphere.dat").mesh.checksum(), text.mesh.checksum());
     }
     let error = refusal(&binary[..binary.len() - 1], "sphere.pcd");

@@ -56,7 +56,7 @@ impl<'c> Growth<'c> {
             depth: settings.depth,
             eta: settings.eta,
             min_child_weight: settings.min_child_weight,
-    // A gain is twice the decrease of the loss of all touches.
+            // A gain is twice the decrease of the loss of all touches.
             price: 2.0 * threshold_cost * cases.total(),
             used: cases.thresholds.iter().map(|thresholds| vec![false; thresholds.len()]).collect(),
             margins: vec![0.0; cases.counts.len()],
