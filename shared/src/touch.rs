@@ -44,7 +44,7 @@ pub struct Pose {
     pub alignment: [i16; 3],
 }
 
-/// The result of an approach: three contact times, any of which may be missing, and the probe's pose where it is known.
+/// The result of an approach: three contact times, any of which may be missing, and the probe's pose, if known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Touch {
@@ -80,7 +80,7 @@ impl Touch {
         self.times
     }
 
-    /// The probe's pose, where it is known.
+    /// The probe's pose, if known.
     pub const fn pose(&self) -> Option<Pose> {
         self.pose
     }

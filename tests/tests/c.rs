@@ -222,7 +222,7 @@ impl<'m> Batch<'m> {
 #[test]
 fn damaged_models_are_taken_or_refused_alike_at_the_same_place_and_give_the_same_answers() {
     let directory = tempfile::tempdir().unwrap();
-    // The crate is built with every layout, code among them, which is none of the header's defaults.
+    // The crate is built with every layout, code among them, which is not one of the header's defaults.
     let layouts = "-DPALPATE_LAYOUTS=95";
     let sanitizers = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", layouts];
     let program = here(&sanitizers, directory.path()).unwrap_or_else(|error| {

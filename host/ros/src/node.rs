@@ -33,7 +33,7 @@ const RESULT_TIMEOUT: Duration = Duration::from_secs(10);
 /// Something for the node to do.
 enum Happened {
     Touch(Touch, MessageInfo),
-    /// A message that is none of the type that was agreed on.
+    /// A message of another type than agreed on.
     Malformed(String),
     Reset(RmwRequestId, Expected),
     Goal(NewGoalHandle<Expected>),

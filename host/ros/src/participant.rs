@@ -13,7 +13,7 @@ const NUMBERS: usize = 120;
 /// A participant of a domain that has both ports of its number.
 ///
 /// # Errors
-/// Why there is none, such as that all numbers are taken.
+/// Reason for a failure, such as that all numbers are taken.
 pub(crate) fn join(domain: u16) -> Result<DomainParticipant, String> {
     // Numbers of which another process has one port: held, so that the next participant takes another number.
     let mut held = Vec::new();

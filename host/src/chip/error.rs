@@ -28,7 +28,7 @@ pub enum ChipProblem {
     CannotOpen {
         /// The operating system's message.
         reason: String,
-        /// The serial ports that there are.
+        /// The available serial ports.
         ports: Vec<String>,
     },
     /// Nobody answers at a TCP address.

@@ -27,7 +27,7 @@ pub enum Entry {
     },
     /// Another object begins.
     Object {
-        /// Its name, where it is known.
+        /// Its name, if known.
         name: Option<String>,
     },
     /// A touch, and the state after it.
@@ -40,7 +40,7 @@ pub enum Entry {
         best: String,
         /// Touches of this object so far.
         touches: u32,
-        /// The posterior of each object, where it is known.
+        /// The posterior of each object, if known.
         posteriors: Option<Vec<f64>>,
         /// Seconds since the beginning.
         at: f64,

@@ -17,7 +17,7 @@ const RETRY: Duration = Duration::from_millis(500);
 pub enum Heard<'a> {
     /// The chip answers, for the first time or after the line broke.
     Connected {
-        /// Its program, where it says so.
+        /// Its program, if it says so.
         program: Option<&'a str>,
         /// Its model, if it has one.
         model: Option<&'a ChipModel>,
@@ -71,7 +71,7 @@ pub struct RecordSummary {
     pub faults: u64,
     /// Times that the line broke.
     pub lost: u64,
-    /// Name and version of the chip's program, where it says so.
+    /// Name and version of the chip's program, if it says so.
     pub firmware: Option<String>,
 }
 

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 /// Something new from the chip.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Update {
-    /// Another object begins, with its name where it is known.
+    /// Another object begins, with its name, if known.
     Object(Option<String>),
     /// A touch, and the state after it.
     Touch {

@@ -64,7 +64,7 @@ impl Transport {
         &self.name
     }
 
-    /// Resets the emulated chip, as a power cut would whose RAM is battery-backed.
+    /// Resets the emulated chip, like a power cut of a chip with battery-backed RAM.
     ///
     /// # Errors
     /// When this is no emulator, or it does not listen.

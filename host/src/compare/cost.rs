@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 /// Numbers of approaches after which accuracy is given.
 const AT: [usize; 5] = [5, 10, 20, 30, 60];
-/// Approaches whose accuracy on simulated touches is asked for on recorded ones.
+/// Number of approaches whose accuracy on simulated touches must be reached on recorded ones.
 const COST_AT: usize = 20;
 /// The least rise of the share of a confusion that is listed.
 const MORE: f64 = 0.05;

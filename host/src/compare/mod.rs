@@ -80,7 +80,7 @@ const NEARLY: f64 = 0.02;
 const ENOUGH: usize = 60;
 /// The part of a loss that pairs of objects make for it to be theirs.
 const MOSTLY: f64 = 0.5;
-/// Loss of accuracy from which on something is wrong with the simulation.
+/// Loss of accuracy that shows a fault of the simulation.
 const STRONGLY: f64 = 0.1;
 
 /// Comparison of recorded and simulated touches.

@@ -23,7 +23,7 @@ pub struct TouchOrigin {
     pub touches: BTreeMap<String, u64>,
     /// Fingerprints of recorded touches that the ensemble was adjusted to.
     pub adjusted: BTreeMap<String, u64>,
-    /// The capture that made them, where that is known.
+    /// The capture that made them, if known.
     pub captured: Option<Captured>,
     /// For outputs that are placements of objects, called `object/placement`: the weight of each among those of its object.
     pub placements: BTreeMap<String, f64>,
@@ -252,7 +252,7 @@ impl StatedProbe {
     }
 }
 
-/// Latest contacts of touches of which nothing states the stroke, compared with that of a model.
+/// Latest contacts of touches without a stated stroke, compared with the stroke of a model.
 impl StatedProbe {
     /// Compares a probe, such as a model's, with that of a data set, as [`compare`](Self::compare) does. Recorded touches may
     /// not state their stroke; it is then compared with their latest contacts: none may be later than the stroke of `probe`, by

@@ -27,7 +27,7 @@ impl Candidate {
         [self.factor.ln() / 0.03, middle, third, self.noise.ln() / 0.3, a / 0.1, b / 0.1, c / 0.1]
     }
 
-    /// The reverse. Noise that no table exists for becomes the nearest that there is.
+    /// The reverse. Noise without a table becomes the nearest one with a table.
     pub(super) fn of(numbers: &[f64; NUMBERS]) -> Self {
         let [factor, middle, third, noise, a, b, c] = *numbers;
         Self {

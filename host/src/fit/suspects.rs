@@ -41,7 +41,7 @@ const UNLIKE: f64 = 7.0;
 pub enum Suspect {
     /// It is of another object.
     OtherObject {
-        /// The object by whose name it goes.
+        /// The object that the recording is named after.
         object: String,
         /// The object whose touches they look like.
         looks_like: String,

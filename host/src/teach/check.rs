@@ -10,7 +10,7 @@ use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 
-/// Refuses what cannot be taught, all of it before the work begins.
+/// Rejects recordings that cannot be taught, before the work begins.
 pub(super) fn check(
     ensemble: &Ensemble,
     known: &Dataset,

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 pub struct Dataset {
     /// The objects, sorted by name.
     pub objects: Vec<ObjectTouches>,
-    /// Origin of the touches, where that is known: a directory without `dataset.json` does not say.
+    /// Origin of the touches, if known: a directory without `dataset.json` does not say.
     pub origin: Option<Origin>,
     /// Warnings from reading the data set: things that look wrong, but may be meant.
     pub warnings: Vec<Warning>,
@@ -221,7 +221,7 @@ impl Dataset {
         Ok(Self { objects, origin: Some(listing.origin), warnings })
     }
 
-    /// Every file of touches that there is.
+    /// Every file of touches.
     fn found(directory: &Path) -> Result<Self> {
         let files = files(directory)?;
         if let Some([first, second]) = files.windows(2).find(|pair| pair[0].0 == pair[1].0) {
@@ -254,12 +254,12 @@ impl Dataset {
         Ok(Self { warnings, ..Self::new(objects_of(objects)) })
     }
 
-    /// The probe that made the touches, where that is known.
+    /// The probe that made the touches, if known.
     pub fn probe(&self) -> Option<&Probe> {
         self.origin.as_ref().map(|origin| &origin.probe)
     }
 
-    /// True if every approach is kept, also those that were not full touches: what the origin says or, without one,
+    /// True if every approach is kept, including those that were not full touches: what the origin says or, without one,
     /// whether any touch is partial.
     pub fn holds_approaches(&self) -> bool {
         let any_partial = || self.touches().any(|touch| !touch.is_full());

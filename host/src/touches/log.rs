@@ -44,7 +44,7 @@ pub fn begins_log(bytes: &[u8]) -> bool {
     bytes.first() == Some(&FIRST)
 }
 
-/// True if the file at `path` is a log, by how it begins; a file that cannot be read is none.
+/// True if the file at `path` is a log, by its first byte; false for a file that cannot be read.
 pub fn is_log(path: &Path) -> bool {
     let mut first = [0];
     path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut first)).is_ok() && begins_log(&first)

@@ -60,7 +60,7 @@ pub struct ObjectTouches {
     source_of: Vec<u32>,
     /// For each touch the number of the robot that made it; empty if robots do not differ.
     robot_of: Vec<u32>,
-    /// Meshes that were touched, as far as they are known.
+    /// Meshes that were touched, if known.
     meshes: Option<Meshes>,
     /// The stroke of the probe that made them as a time in microseconds: also with noise that is added, a later contact is
     /// missing.
@@ -399,7 +399,7 @@ impl ObjectTouches {
         Self { name: name.into(), ..self }
     }
 
-    /// The touches at these positions, in this order. A position that there is not gives none.
+    /// The touches at these positions, in this order. Positions out of range give none.
     #[must_use]
     pub fn select(&self, positions: impl IntoIterator<Item = usize>) -> Self {
         let positions: Vec<usize> = positions.into_iter().filter(|position| *position < self.len()).collect();

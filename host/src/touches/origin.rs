@@ -71,7 +71,7 @@ impl Origin {
         Self { touches: 0, seed: 0, probe, unit, pose, approaches: true, ..Self::default() }
     }
 
-    /// Refuses what no touches can be made by.
+    /// Rejects settings that no touches can be made with.
     ///
     /// # Errors
     /// [`Setting`](crate::error::Setting) naming the field.

@@ -141,7 +141,7 @@ pub struct Tuned {
     pub chosen: usize,
     /// Calibration of its thresholds, on touches that neither trained nor chose it; null if there is none.
     pub calibration: Option<Calibrated>,
-    /// Reason why there is none.
+    /// Reason for the lack of a calibration.
     pub uncalibrated: Option<String>,
     /// Its figures on touches that neither trained, calibrated nor chose it.
     pub test: Evaluation,
@@ -205,7 +205,7 @@ pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> 
     Ok(Tuned { unlimited, rows, chosen, calibration: calibration.ok(), uncalibrated, test, model, ensemble })
 }
 
-/// The model with thresholds that keep the error rate; or why there are none.
+/// The model with thresholds that keep the error rate, or the reason for their lack.
 fn calibrated(
     model: &[u8],
     fresh: Dataset,

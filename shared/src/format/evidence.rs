@@ -56,7 +56,7 @@ impl<'a> RowEvidence<'a> {
     }
 
     /// Reads a section; `None` if it is too short, has fewer than two values or too many, values that fall, shifts or a
-    /// start that are too large. Bytes after those that are known are ignored.
+    /// start that are too large. Bytes after the known ones are ignored.
     ///
     /// Cost: a few instructions for each value.
     pub fn from_bytes(bytes: &'a [u8]) -> Option<Self> {

@@ -60,7 +60,7 @@ impl Prediction {
     }
 
     /// Reads a section; `None` for a link that does not exist, a scale that is not positive and finite, a division by 0, or
-    /// too few bytes. Bytes after those that are known are ignored.
+    /// too few bytes. Bytes after the known ones are ignored.
     ///
     /// Cost: a few instructions. Cannot fail otherwise.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {

@@ -225,7 +225,7 @@ impl Temperature {
         self.sharpness.to_le_bytes()
     }
 
-    /// Reads a section; `None` if it is too short or out of range. Bytes after those that are known are ignored.
+    /// Reads a section; `None` if it is too short or out of range. Bytes after the known ones are ignored.
     ///
     /// Cost: a few instructions.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {

@@ -85,7 +85,7 @@ impl<'a> Strangers<'a> {
     }
 
     /// Reads a section of a model with this many objects, the background included; `None` if there are too few bytes or a
-    /// number makes no sense. Bytes after those that are known are ignored.
+    /// number makes no sense. Bytes after the known ones are ignored.
     ///
     /// Cost: that of reading the terms, and with a test some instructions for each object. Cannot fail otherwise.
     pub fn from_bytes(bytes: &'a [u8], objects: usize) -> Option<Self> {

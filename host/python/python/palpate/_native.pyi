@@ -43,7 +43,7 @@ class DataSet:
     @property
     def approaches(self, /) -> list[int] | None:
         """
-        The number of approaches to each object, where it is known.
+        The number of approaches to each object, if known.
         """
     @property
     def counts(self, /) -> list[int]:
@@ -73,7 +73,7 @@ class DataSet:
     @property
     def holds_approaches(self, /) -> bool:
         """
-        True if every approach is kept, also those in which not all three fingers touched.
+        True if every approach is kept, including those in which not all three fingers touched.
         """
     @property
     def instances(self, /) -> NDArray[int16]:
@@ -98,7 +98,7 @@ class DataSet:
     @property
     def probe(self, /) -> Probe | None:
         """
-        The probe that made the touches, where that is known.
+        The probe that made the touches, if known.
         """
     @staticmethod
     def read(directory: str | PathLike[str]) -> DataSet:
@@ -118,7 +118,7 @@ class DataSet:
         """
     def to_pandas(self, /) -> DataFrame:
         """
-        The touches as a table: object (a category), t1, t2 and t3, and where it is known direction and alignment.
+        The touches as a table: object (a category), t1, t2 and t3, and, if known, direction and alignment.
         The columns are those of the arrays, without copies. Needs pandas.
         """
     def to_parquet(self, /, directory: str | PathLike[str]) -> None:

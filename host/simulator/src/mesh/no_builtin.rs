@@ -1,4 +1,4 @@
-//! In place of the built-in objects where the feature `objects` is off: there are none.
+//! Stands in for the built-in objects if the feature `objects` is off: there are none.
 
 use crate::error::{Error, Result};
 use crate::mesh::Object;

@@ -39,7 +39,7 @@ pub struct Recorded {
     pub began: String,
     /// Source of the touches: a port or a file.
     pub source: String,
-    /// Name and version of the chip's program, where it says so.
+    /// Name and version of the chip's program, if it says so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub firmware: Option<String>,
     /// The checksum of the chip's model, which says how long the chip waits for a finger; none without a model.

@@ -99,7 +99,7 @@ pub enum ProofProblem {
         /// The fault.
         what: &'static str,
     },
-    /// A line of a certificate is none.
+    /// A line of a certificate is invalid.
     #[error("not a line of a certificate: {line:?}")]
     Line {
         /// The line.

@@ -38,7 +38,7 @@ pub enum RowsProblem {
         /// The columns of the library's rows, where the model has only some of them.
         all: Option<usize>,
     },
-    /// Features and columns have names, and some feature is none of the columns.
+    /// Features and columns have names, and some feature is not one of the columns.
     #[error("no column is named {}; its columns are {}", some(missing), some(header))]
     Unmatched {
         /// The features that no column is named after.
@@ -189,7 +189,7 @@ pub enum RowsProblem {
         /// The first of them.
         first: ClassDiffers,
     },
-    /// A label is none of the model's classes.
+    /// A label is not one of the model's classes.
     #[error("the label {label:?} in row {row} is none of the model's classes: {}", known.join(", "))]
     Label {
         /// The label.

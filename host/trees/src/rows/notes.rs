@@ -1,4 +1,4 @@
-//! Facts about an ensemble that whoever compiles it should know.
+//! Remarks about an ensemble for its user.
 
 use super::scales::{self, Effect};
 use crate::ensemble::Ensemble;

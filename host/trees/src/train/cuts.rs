@@ -182,7 +182,7 @@ fn ascending(summary: &mut [Entry]) {
     }
 }
 
-/// The ends of `bins` bins. The least value is none of them.
+/// The ends of `bins` bins. The least value is not one of them.
 fn ends(summary: &[Entry], bins: usize) -> Vec<f32> {
     let (Some(first), Some(last)) = (summary.first(), summary.last()) else {
         return vec![1e-5];

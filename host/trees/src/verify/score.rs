@@ -47,7 +47,7 @@ pub struct Regression {
 /// Compares a model's answers with the rows' labels: names of classes or their numbers, or for one output numbers.
 ///
 /// # Errors
-/// [`RowsProblem`] for a model over touches, rows of another number of features, and labels that are none.
+/// [`RowsProblem`] for a model over touches, rows of another number of features, and invalid labels.
 pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvaluation> {
     let (features, names) = match candidate {
         Candidate::Full(ensemble) => (ensemble.inputs.count(), ensemble.objects.clone()),

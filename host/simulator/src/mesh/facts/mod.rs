@@ -231,7 +231,7 @@ impl Facts {
     }
 }
 
-/// The first three of `count` places, and that there are more.
+/// The first three of `count` places, and a remark if there are more.
 fn places(places: impl Iterator<Item = String>, count: usize) -> String {
     const SHOWN: usize = 3;
     let mut text = places.take(SHOWN).collect::<Vec<_>>().join("; ");

@@ -2,7 +2,7 @@
 //!
 //! `serde_json` reads the document; every accessor is checked and read here. Coordinates are taken as they stand: glTF
 //! says that y is up, but files disagree. What would change the surface and is not read (Draco, meshopt, quantization,
-//! skins, morphs) is refused by name; materials, textures, cameras and animations are skipped.
+//! skins, morphs) is rejected by name; materials, textures, cameras and animations are skipped.
 
 mod accessor;
 mod container;

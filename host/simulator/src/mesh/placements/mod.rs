@@ -166,7 +166,7 @@ pub fn of_object(object: &Object) -> Result<Vec<Placements>> {
 }
 
 impl Placements {
-    /// The names of all, also of those that are left out.
+    /// The names of all, including those that are left out.
     pub fn names(&self) -> impl Iterator<Item = String> + '_ {
         self.placements.iter().chain(&self.left_out).map(|placement| placement.name.clone())
     }

@@ -1,4 +1,4 @@
-//! The field of which the surface is a level: Poisson's equation on a grid, solved by multigrid.
+//! Scalar field whose level set is the surface: Poisson's equation on a grid, solved by multigrid.
 
 use super::smooth::Smoothed;
 use glam::DVec3;

@@ -54,7 +54,7 @@ pub(super) struct Finder {
     /// True if files that may state their unit are taken before others of the same name.
     pub(super) prefers_units: bool,
     pub(super) found: Vec<Found>,
-    /// Files of formats that are not read, whose names no mesh has that is read.
+    /// Files of formats that are not read, unless a mesh that is read has their name.
     pub(super) unread: Vec<PathBuf>,
 }
 

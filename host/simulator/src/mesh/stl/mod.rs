@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use std::io::{BufRead, ErrorKind};
 use std::path::Path;
 
-/// The bytes of a binary file before its triangles, the last four of which are their number.
+/// The bytes of a binary file before its triangles; the last four are their number.
 const HEADER: usize = 84;
 /// The bytes of a triangle: normal, three corners, two bytes of attributes.
 const TRIANGLE: usize = 50;

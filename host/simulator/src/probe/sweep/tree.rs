@@ -54,10 +54,10 @@ pub(super) mod scale {
     pub(in super::super) const FINE: u8 = 2;
 }
 
-/// The sphere's radius, as a multiple of the packs' size, from which on a mesh is not coarse.
+/// The least radius of a sphere, as a multiple of the packs' size, for which a mesh is not coarse.
 const MIDDLE_FROM: f32 = 0.6;
 
-/// Ratio from which on it is fine.
+/// Least ratio for which it is fine.
 const FINE_FROM: f32 = 2.0;
 
 /// A triangle, as the builder takes it.

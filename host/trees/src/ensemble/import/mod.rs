@@ -14,7 +14,7 @@
 //! in [`Imported::thresholds`](super::Imported::thresholds), for rows of whole numbers that f32 does not hold. How far
 //! margins can be from the library's own is computed from the leaves and stated in
 //! [`Imported::rounding`](super::Imported::rounding). Splits by sets of categories become splits by thresholds. What cannot be
-//! taken over exactly is refused by name, such as linear leaves and statistics of the target.
+//! taken over exactly is rejected by name, such as linear leaves and statistics of the target.
 
 mod catboost;
 mod city;
