@@ -15,7 +15,7 @@ mod files;
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// A chunk of 64 MiB, as much for how far back it refers, and both once more while they grow.
+/// A chunk of 64 MiB, as much for the window of its compression, and both once more while they grow.
 const MOST: usize = 256 << 20;
 
 fuzz_target!(|bytes: &[u8]| {

@@ -23,7 +23,7 @@ const CHECKPOINT: Duration = Duration::from_millis(500);
 pub(super) struct Store {
     directory: PathBuf,
     listing: Listing,
-    /// Indices in the listing of this capture's objects; when objects are added there are others.
+    /// Indices in the listing of this capture's objects; the listing may have others.
     positions: Vec<usize>,
     samples: u64,
     /// The object that is being written.

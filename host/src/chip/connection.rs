@@ -264,8 +264,8 @@ impl Connection {
         Ok(ChipModel { info, names })
     }
 
-    /// Name and version of the chip's program; none if it does not say, as programs before version 0.3, for which this
-    /// waits ten seconds.
+    /// Name and version of the chip's program; none if it does not say. A chip that does not know the question takes ten
+    /// seconds.
     ///
     /// # Errors
     /// When the line broke or the chip is silent.
@@ -305,7 +305,7 @@ impl Connection {
         Ok(posteriors)
     }
 
-    /// The approach that the chip proposes, of those in any pose. A chip whose program is older than version 0.3 does not
+    /// The approach that the chip proposes, of those in any pose. A chip that does not know the question does not
     /// answer.
     ///
     /// # Errors

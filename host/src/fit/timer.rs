@@ -56,8 +56,8 @@ const CLUSTERED: f64 = 0.5;
 const MANY: usize = 100;
 const FROM: f64 = 3.0;
 
-/// The time between readings of the contacts in microseconds, if they come so seldom that contact times cluster about its
-/// multiples, though they jitter; none where the timer itself is as coarse.
+/// The time between readings of the contacts in microseconds, if they are so rare that contact times cluster about its
+/// multiples despite jitter; none if the timer itself is as coarse.
 pub(super) fn readings<'a>(touches: impl IntoIterator<Item = &'a Touch>, timer: Timer) -> Option<f64> {
     let ticks = match timer {
         Timer::Found(micros) => micros,

@@ -20,7 +20,7 @@ pub struct Origin {
     /// Seed of all random numbers.
     pub seed: u64,
     /// Unit of the probe's lengths: units, with every object scaled to `length`, or millimeters, with objects at their
-    /// true size. Before version 0.3.0, always units.
+    /// true size; units if it is not stated.
     #[serde(default = "unit::tenth", with = "unit")]
     pub unit: Length,
     /// The longest side of an object's bounding box, in units; of no meaning at true size.

@@ -12,8 +12,8 @@ use palpate_shared::link::{
     VerdictMessage, checksum,
 };
 
-/// Room for a snapshot of `N` objects, where an array's length cannot be computed from `N`: for each object what one
-/// object alone would take.
+/// Room for a snapshot of `N` objects, where an array's length cannot be computed from `N`: room for a snapshot of
+/// one object, `N` times.
 type SnapshotBuffer<const N: usize> = [[u8; SNAPSHOT_LENGTH + 10]; N];
 
 /// Default name of programs on the link: this crate and its version.

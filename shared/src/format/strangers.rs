@@ -29,9 +29,9 @@ pub struct MisfitTerms {
     pub held: Held,
     /// Rivals of each object: 1 to [`MisfitTest::MOST_RIVALS`].
     pub rivals: u8,
-    /// Touches from which on the test is made; no name is given before.
+    /// First touch with a test; no name is given before.
     pub first: u32,
-    /// Touches from which on names are given; at least `first`.
+    /// First touch with names; at least `first`.
     pub least: u32,
     /// The misfit above which an object is a stranger, after many touches; in 2^-16 nats, as the next two.
     pub threshold: i32,

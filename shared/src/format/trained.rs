@@ -236,8 +236,8 @@ impl TrainedNoise {
         bytes
     }
 
-    /// Reads a section; `None` if it is too short or its largest noise is less than its least. Bytes after those that
-    /// are known are ignored.
+    /// Reads a section; `None` if it is too short or its largest noise is less than its least. Bytes after the known
+    /// ones are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let (numbers, _) = bytes.as_chunks::<4>().0.split_first_chunk::<4>()?;
         let [least, largest, timer, pose] = numbers.map(u32::from_le_bytes);

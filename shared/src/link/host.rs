@@ -123,7 +123,7 @@ enum Phase {
 /// Starts of chips that a host remembers: an event may be late by half as many.
 const BOOTS: usize = 16;
 
-/// From the number of a session that could not be opened to the next; odd, so that none comes again soon.
+/// Step from the number of a session that could not be opened to the next one; odd, so that none returns soon.
 const SESSION_STEP: u32 = 0x9e37_79b9;
 
 /// A frame in flight.

@@ -204,7 +204,7 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
     }
 }
 
-/// Makes an ensemble whose outputs are placements state their weights; without any it stays as it is.
+/// States the weights of placements in an ensemble whose outputs are placements; without weights it stays as it is.
 pub(crate) fn state_placements(ensemble: &mut Ensemble, shares: &BTreeMap<String, f64>) -> Result<()> {
     if !shares.is_empty() {
         let stated = TouchOrigin { placements: shares.clone(), ..TouchOrigin::of(&ensemble.origin)? };

@@ -69,8 +69,8 @@ pub(super) fn read(text: &str, stated: &Stated<'_>) -> Result<Code, ProofProblem
     reader.run(start)
 }
 
-/// The checksum at the end of a function's name, after what the function is; `Some(None)` where there is none, as in files of
-/// earlier releases, and `None` for the name of another function.
+/// The checksum at the end of a function's name, after the function's kind; `Some(None)` if the name has none,
+/// and `None` for the name of another function.
 fn stated_checksum(label: &str, function: &str) -> Option<Option<u32>> {
     if label.starts_with('.') {
         return None;
@@ -393,7 +393,7 @@ struct Ways<'w, 'r> {
     /// Instructions of the longest way.
     longest: usize,
     nodes: Vec<Step>,
-    /// The state that is the same after each of them.
+    /// The state after each way, which must be the same.
     after: Option<State>,
 }
 
