@@ -113,7 +113,7 @@ pub struct ObjectSummary {
     pub approaches_now: u64,
     /// Contacts of each finger in this run that came later than the stroke, and are missing; see [`Drawn::late`].
     pub late: [u64; FINGERS],
-    /// Number of approaches in this run in which a finger touched; where only full touches are kept, those.
+    /// Number of approaches in this run in which a finger touched; if only full touches are kept, of full touches.
     pub touching: u64,
     /// Number of approaches in this run that ended before the first contact, at the end of the travel.
     pub turned_back: u64,

@@ -77,7 +77,7 @@ pub enum ChipProblem {
     /// An answer or outcome does not belong to a question or command.
     #[error("the chip's answer does not match the question")]
     UnexpectedAnswer,
-    /// The chip's model is not the one that its verdicts shall be compared with.
+    /// The chip's model is not the one that its verdicts are compared with.
     #[error("the chip's model is not the one to compare with: checksum {chip:08x} instead of {expected:08x}")]
     OtherModel {
         /// The checksum of the chip's model.

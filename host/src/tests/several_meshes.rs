@@ -71,7 +71,7 @@ impl Share {
     }
 }
 
-/// The cases that groups of `length` of `touches` touches make: as many as do not share any.
+/// Number of disjoint groups of `length` among `touches` touches.
 fn cases(groups: usize, touches: usize, length: f64) -> f64 {
     (groups as f64).min(touches as f64 / length)
 }

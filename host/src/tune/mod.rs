@@ -246,8 +246,8 @@ fn why(problem: &CalibrateProblem, fewest: usize) -> String {
 
 type Measured<'e> = (Row, &'e Ensemble, Compiled);
 
-/// The ensemble in every leaf width and layout; a layout changes no margin unless it is a table, so trees are measured
-/// once for all of theirs.
+/// The ensemble in every leaf width and layout. A layout changes no margin unless it is a table, so trees are measured
+/// once for all layouts.
 fn compiled_models<'e>(
     recipe: &Recipe,
     ensemble: &'e Ensemble,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshProblem {
-    /// A source is nothing that exists, and not the name of a built-in object.
+    /// A source does not exist, and is not the name of a built-in object.
     #[error("cannot read the mesh: this is neither a file, a directory nor a built-in object")]
     NoSuchSource {
         /// The names of the built-in objects.
