@@ -71,7 +71,7 @@ impl Share {
     }
 }
 
-/// Number of disjoint groups of `length` among `touches` touches.
+/// Number of cases that `groups` groups of `length` make: at most as many as are disjoint.
 fn cases(groups: usize, touches: usize, length: f64) -> f64 {
     (groups as f64).min(touches as f64 / length)
 }

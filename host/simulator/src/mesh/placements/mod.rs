@@ -220,7 +220,7 @@ fn facets(mesh: &Mesh, at: &[DVec3]) -> Vec<hull::Facet> {
     })
 }
 
-/// The stable facets: the upward direction on each, and the weight with which the object ends on it. `corners` are
+/// The stable facets: the upward direction on each, and the weight with which the object ends on it. `corners` are about the
 /// center of mass.
 fn settled(facets: &[hull::Facet], corners: &[[DVec3; 3]]) -> Vec<(DVec3, f64)> {
     let normals: Vec<DVec3> = corners.iter().map(|&[a, b, c]| (b - a).cross(c - a).normalize_or(DVec3::Z)).collect();
