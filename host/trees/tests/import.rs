@@ -689,7 +689,7 @@ fn every_model_is_proved_with_every_leaf_in_every_layout_and_in_whole_units() {
     }
 }
 
-/// LightGBM's text of a tree over so many columns, two of which it splits on, with these names or none.
+/// LightGBM's text of a tree over so many columns, of which it splits on two, with these names or none.
 fn many_columns(columns: usize, name: impl Fn(usize) -> String) -> String {
     let names: Vec<String> = (0..columns).map(name).collect();
     format!(
