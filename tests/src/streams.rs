@@ -39,7 +39,7 @@ pub struct Stream {
 /// A model of each kind, calibrated to at most 10 % of wrong names, and so many rows.
 ///
 /// # Panics
-/// If a file is none, or a calibration fails.
+/// If a file is not an ensemble, or a calibration fails.
 pub fn streams(rows: usize) -> Vec<Stream> {
     let of = |(number, (kind, file, replaced)): (usize, (&'static str, &str, Option<[&str; 2]>))| {
         let path = Path::new(IMPORT).join(file);

@@ -246,7 +246,7 @@ impl DataSet {
         Ok(Output(made.bind(py).clone()))
     }
 
-    /// The instance, recording or log that each touch is of, from 0: a sequence is of touches of one.
+    /// Number of the instance, recording or log of each touch, from 0: all touches of a sequence are from one.
     #[getter]
     fn instances<'py>(&self, py: Python<'py>) -> PyResult<Output<'py, i16, Ix1>> {
         let made = self.instances.get_or_try_init(py, || {

@@ -61,7 +61,7 @@ impl Ensemble {
         Ok(Self { ensemble: Arc::new(ensemble) })
     }
 
-    /// Reads the bytes of such a file. `notes` are what to know about it beyond what it says itself.
+    /// Reads the bytes of such a file. `notes` are facts about it that it does not state.
     #[staticmethod]
     #[pyo3(signature = (content, names=None, *, all_trees=false, missing=None, notes=Vec::new()))]
     fn from_bytes(

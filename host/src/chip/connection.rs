@@ -53,7 +53,7 @@ pub struct Connection {
     heard: VecDeque<(Received, u32)>,
     reply: Option<Reply>,
     open: bool,
-    /// The checksum of the model that [`Connection::model`] described, and the boot number of the start that it is of.
+    /// Checksum of the model that [`Connection::model`] described, and the boot number of the chip at that time.
     model: Option<(u32, u32)>,
 }
 

@@ -92,7 +92,7 @@ pub enum ChipProblem {
         differences: u64,
         /// Touches that were compared.
         compared: u64,
-        /// The first that differs.
+        /// The first difference.
         first: String,
     },
     /// A line of a journal is wrong.

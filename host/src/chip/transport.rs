@@ -53,7 +53,7 @@ impl Transport {
         self
     }
 
-    /// The same over a bad line.
+    /// Makes the line bad.
     pub fn with_faults(mut self, faults: Faults, seed: u64) -> Self {
         self.bad = Some((BadLine::new(faults, seed), BadLine::new(faults, !seed)));
         self

@@ -1,13 +1,13 @@
 //! Distance between recorded and simulated touches, feature by feature and as a whole.
 //!
-//! The one figure is how often a classifier tells a recorded touch of an object from a simulated one: trees are trained to
-//! do just that, and tested on touches that they were not trained on (cross-validation). Half of the time is guessing. It
-//! is a test of two samples by a classifier: Lopez-Paz and Oquab, Revisiting Classifier Two-Sample Tests, 1610.06545. Each
-//! feature is compared by itself too, by the largest difference of its two distributions (Kolmogorov and Smirnov).
+//! The one figure is the accuracy of a classifier that divides an object's touches into recorded and simulated ones: trees
+//! are trained for just that, and tested on touches that they were not trained on (cross-validation). Guessing is right half
+//! of the time. This is a classifier two-sample test: Lopez-Paz and Oquab, Revisiting Classifier Two-Sample Tests,
+//! 1610.06545. Each feature is also compared alone, by the largest difference of its distributions (Kolmogorov, Smirnov).
 //!
-//! What it costs that they are apart is measured with a model trained on simulated touches: how often it is right on
-//! recorded ones, how many more approaches it takes there to be right as often as on simulated ones, and whether a promise
-//! that simulated touches support is kept.
+//! The cost of the difference is measured with a model trained on simulated touches: how often it is right on recorded
+//! ones, how many more approaches it takes there to be right as often as on simulated ones, and whether a promise that
+//! simulated touches support is kept.
 
 mod cost;
 mod features;

@@ -384,7 +384,7 @@ fn a_fit_is_the_same_on_any_number_of_threads_and_read_back_as_written() {
     }
 }
 
-/// The same touches of a hand that stops this many milliseconds after the first contact.
+/// Touches of a hand that stops this many milliseconds after the first contact.
 fn stopped(recorded: &Dataset, after: u32) -> Dataset {
     recorded.each(|own| own.changed(|touch| crate::probe::hand::within(touch, Some(1_000 * after))))
 }

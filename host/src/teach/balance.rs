@@ -102,7 +102,7 @@ impl Groups {
         Named { right: shares(own), wrong: others.map(shares).sum() }
     }
 
-    /// The share of groups that are recognized, of all objects that were not taught.
+    /// The share of recognized groups of an object, in the mean of all objects that were not taught.
     pub(super) fn others(&self, constants: &[f64]) -> f64 {
         let is_other = |object: &usize| !self.taught.contains(object) && Some(*object) != self.background;
         let others: Vec<usize> = (0..self.of.len()).filter(is_other).collect();

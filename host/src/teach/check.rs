@@ -94,7 +94,7 @@ fn names(ensemble: &Ensemble, recorded: &Dataset) -> Result<()> {
     Ok(())
 }
 
-/// The same probe, where both sides state one, and the same stroke.
+/// Checks that both sides have the same probe, if they state one, and the same stroke.
 fn same_probe(stated: Option<StatedProbe>, longest: u32, recorded: &Dataset) -> Result<()> {
     let stated = stated.as_ref().map(StatedProbe::trained);
     Ok(StatedProbe::compare_with(["the simulation", "the recording"], stated, longest, recorded)?)

@@ -44,7 +44,7 @@ impl Dataset {
         Self { objects, origin: self.origin.clone(), warnings: Vec::new() }
     }
 
-    /// The same touches, with each placement of an object as an object of its own, called `object/placement`: what a model with
+    /// This data set, with each placement of an object as an object of its own, called `object/placement`: for a model with
     /// an output for each placement is trained on. Objects without placements stay as they are.
     #[must_use]
     pub fn by_placement(&self) -> Self {
@@ -64,7 +64,7 @@ impl Dataset {
         Self { objects: self.objects.into_iter().flat_map(of).collect(), ..self }
     }
 
-    /// The same touches without the contacts that are later than `window` microseconds, such as by the stroke of the probe that a
+    /// This data set without the contacts that are later than `window` microseconds, such as by the stroke of the probe that a
     /// model is for: what an effector takes for missing.
     pub fn within(&self, window: Option<u32>) -> Cow<'_, Self> {
         match self.touches().any(|touch| hand::late(touch, window).contains(&true)) {
@@ -123,8 +123,8 @@ impl Dataset {
         all
     }
 
-    /// Number of instances, recordings or logs of the objects that have several, by name: a sequence is of touches of
-    /// one.
+    /// Number of instances, recordings or logs of the objects that have several, by name: all touches of a sequence are
+    /// from one.
     pub fn several(&self) -> BTreeMap<String, usize> {
         let several = self.objects.iter().filter(|object| object.sources().len() > 1);
         several.map(|object| (object.name.clone(), object.sources().len())).collect()

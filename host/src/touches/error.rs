@@ -287,14 +287,14 @@ pub enum TouchesProblem {
         /// The settings that differ, with both values.
         differences: String,
     },
-    /// The same lines were recorded before.
+    /// These lines were recorded before.
     #[error("the same {touches} touches of {object} were recorded before, on {began}")]
     RecordedBefore {
         /// The object.
         object: String,
         /// Number of touches.
         touches: u64,
-        /// When they were recorded.
+        /// Time at which they were recorded.
         began: String,
     },
     /// A touch has no pose, but the data set is recorded with one.

@@ -29,7 +29,7 @@ pub struct Log {
 /// A touch in a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Logged {
-    /// When it was logged, in nanoseconds on the log's clock.
+    /// Time of logging, in nanoseconds on the log's clock.
     pub time: u64,
     /// The touch.
     pub touch: Touch,

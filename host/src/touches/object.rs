@@ -232,7 +232,7 @@ impl ObjectTouches {
         Self { meshes, ..self }
     }
 
-    /// The same touches, of a probe with this stroke as a time in microseconds ([`Probe::window`](crate::probe::Probe::window)).
+    /// These touches as of a probe with this stroke, a time in microseconds ([`Probe::window`](crate::probe::Probe::window)).
     #[must_use]
     pub fn of_stroke(self, window: Option<u32>) -> Self {
         Self { window, ..self }
@@ -393,7 +393,7 @@ impl ObjectTouches {
         !self.robot_of.is_empty()
     }
 
-    /// The same touches under another name.
+    /// These touches under another name.
     #[must_use]
     pub fn renamed(self, name: impl Into<String>) -> Self {
         Self { name: name.into(), ..self }
@@ -432,7 +432,7 @@ impl ObjectTouches {
         self.select(chosen)
     }
 
-    /// The same touches, each changed.
+    /// These touches, each changed.
     #[must_use]
     pub fn changed(&self, change: impl FnMut(&Touch) -> Touch) -> Self {
         Self { touches: self.touches.iter().map(change).collect(), ..self.clone() }

@@ -309,7 +309,7 @@ impl Effector {
         self.contacts.iter().flatten().copied().reduce(|a, b| if is_past(a, b) { a } else { b })
     }
 
-    /// When the touch in progress times out.
+    /// Time at which the touch in progress times out.
     fn deadline(&self) -> Option<u32> {
         self.origin().map(|origin| origin.wrapping_add(self.settings.timeout))
     }

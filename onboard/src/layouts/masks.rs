@@ -234,7 +234,7 @@ const fn low(number: usize) -> u32 {
     u32::from_le_bytes([a, b, c, d])
 }
 
-/// As many bits, up to 63.
+/// This number of one bits, up to 63.
 const fn ones(count: usize) -> u64 {
     (1_u64 << (count & 63)).wrapping_sub(1)
 }

@@ -220,7 +220,7 @@ fn search<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32 + Copy) -> 
     rank
 }
 
-/// The same among 63 to 255 thresholds, written out: a load, a comparison and an addition for each step. `None` for fewer.
+/// Search among 63 to 255 thresholds, written out: a load, a comparison and an addition for each step. `None` for fewer.
 #[inline(always)]
 fn search_many<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32 + Copy) -> Option<u8> {
     // 63 thresholds among which or at an end of which the rank is: after each 64 that are passed.

@@ -199,7 +199,7 @@ pub struct Temperature {
 impl Temperature {
     /// Bytes of the section.
     pub const LENGTH: usize = 4;
-    /// Posteriors as the evidence says.
+    /// A temperature of 1: it changes no posterior.
     pub const ONE: Self = Self { sharpness: 1 << 16 };
     /// The least and the largest [`sharpness`](Temperature::sharpness): those of temperatures of 16 and 1/16.
     const RANGE: core::ops::RangeInclusive<u32> = 1 << 12..=1 << 20;

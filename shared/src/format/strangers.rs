@@ -228,8 +228,8 @@ impl ObjectMisfit<'_> {
         self.numbers.get(index).map_or(0, |bytes| i16::from_le_bytes(*bytes))
     }
 
-    /// Hands the bytes of a record to `put`: of its shifts, constant and rivals, and of as many means, as many slopes, and
-    /// the rows of the triangle. Other numbers of them give a record that cannot be read.
+    /// Hands the bytes of a record to `put`: its shifts, constant and rivals, and as `numbers` the means, as many slopes, and
+    /// the rows of the triangle. Any other count of numbers gives a record that cannot be read.
     pub fn write(
         [mean_shift, weight_shift, slope_shift]: [u8; 3],
         constant: i32,

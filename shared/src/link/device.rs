@@ -81,7 +81,7 @@ pub struct Progress {
     session: u32,
     next: u32,
     outcomes: [Option<Outcome>; WINDOW],
-    /// The chip's own event that is stored with this, to be told after that.
+    /// The chip's own event that is stored with this, to be sent once this is stored.
     untold: Option<Untold>,
 }
 
@@ -359,7 +359,7 @@ fn answer<'b>(
     }
 }
 
-/// As much of a text as fits into a frame.
+/// The beginning of a text: as much of it as fits into a frame.
 fn short(text: &str) -> &str {
     text.get(..text.floor_char_boundary(CHUNK)).unwrap_or_default()
 }

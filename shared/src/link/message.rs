@@ -400,7 +400,7 @@ impl ApproachMessage {
         Self { pose, score, middle: pose_bytes(middle) }
     }
 
-    /// Where to come from: the direction, and the row's alignment.
+    /// Pose to come from: a direction, and the row's alignment.
     pub fn middle(&self) -> Pose {
         pose_of(self.middle)
     }

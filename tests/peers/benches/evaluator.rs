@@ -253,7 +253,7 @@ fn random(settings: &train::Settings) -> Ensemble {
     }
 }
 
-/// The same margins from trees with one value a leaf.
+/// An ensemble with the same margins, from trees with one value a leaf.
 fn taken_apart(ensemble: &Ensemble) -> Ensemble {
     let objects = ensemble.objects.len();
     let mut trees = Vec::new();

@@ -247,7 +247,7 @@ fn sections(text: &mut String) {
     }
 }
 
-/// The same trees over this many features of rows.
+/// An ensemble's trees over this many features of rows.
 fn imported(mut ensemble: Ensemble, features: usize) -> Ensemble {
     ensemble.inputs = Inputs::unnamed(features);
     for (number, tree) in ensemble.trees.iter_mut().enumerate() {

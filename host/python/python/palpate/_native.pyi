@@ -78,7 +78,7 @@ class DataSet:
     @property
     def instances(self, /) -> NDArray[int16]:
         """
-        The instance, recording or log that each touch is of, from 0: a sequence is of touches of one.
+        Number of the instance, recording or log of each touch, from 0: all touches of a sequence are from one.
         """
     @property
     def names(self, /) -> list[str]:
@@ -165,7 +165,7 @@ class Ensemble:
     @staticmethod
     def from_bytes(content: SupportsGetItem[int, SupportsIndex], names: SupportsGetItem[int, str] | None = None, *, all_trees: bool = False, missing: SupportsFloat | SupportsIndex | None = None, notes: SupportsGetItem[int, str] = ...) -> Ensemble:
         """
-        Reads the bytes of such a file. `notes` are what to know about it beyond what it says itself.
+        Reads the bytes of such a file. `notes` are facts about it that it does not state.
         """
     @staticmethod
     def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ..., link: str = "identity", last_of_ties: bool = False, targets: bool = False) -> Ensemble:
@@ -322,7 +322,7 @@ class Recognizer:
     """
     Recognizes objects by touch, by the code that runs on the chip.
 
-    It stops where the model says so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`.
+    It stops when the model says so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`.
 
     >>> import palpate
     >>> model = palpate.compile(palpate.train(palpate.capture(["bowl", "mouse"], touches=1000)))
@@ -399,7 +399,7 @@ class Surface:
         """
     def first_contact(self, /, origins: ArrayLike, directions: ArrayLike, radius: SupportsFloat | SupportsIndex) -> NDArray[float64]:
         """
-        When a sphere that starts at each origin and moves along its direction first touches: the t at which its center is
+        First contact of a sphere that starts at each origin and moves along its direction: the t at which its center is
         at origin + t * direction; 0 if it starts in contact, NaN if it never touches. One row of `directions` serves all.
         """
     @property

@@ -169,7 +169,7 @@ pub enum MeshProblem {
     Cameras {
         /// Percentage of points that another image sees.
         now: f64,
-        /// The same if the mistake is undone.
+        /// This percentage if the mistake is undone.
         then: f64,
         /// The mistake.
         cause: String,

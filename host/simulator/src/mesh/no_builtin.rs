@@ -13,7 +13,7 @@ pub(super) fn one(name: &str) -> Result<Object> {
     Err(absent(name))
 }
 
-/// As many as make no difference.
+/// Any number: there are no shapes.
 pub(super) const BACKGROUND_SHAPES: usize = 200;
 
 /// No shapes.

@@ -221,7 +221,7 @@ impl Approach {
         self.above_table(distances, scene, probe)
     }
 
-    /// The same if all three fingers touch, else none: as soon as one finger misses, no other is cast.
+    /// Distances at which all three fingers touch, or none: as soon as one finger misses, no other is cast.
     pub fn full_distances(&self, scene: &Scene, probe: &Probe) -> Option<[f64; FINGERS]> {
         let distances = scene.all_contacts(self.fingers(probe.spacing), self.direction, probe.radius)?;
         let end = self.end_at_table(scene, probe);

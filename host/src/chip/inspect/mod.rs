@@ -63,7 +63,7 @@ pub struct Inspected<'a> {
     pub unit: f32,
     /// The largest rounding error of a margin, in nats.
     pub margin_error: f32,
-    /// When recognizers stop unless told otherwise.
+    /// Default end of recognizers' sequences.
     pub stopping: Defaults,
     /// Promise of the model; null if it was not calibrated.
     pub promise: Option<Promised>,

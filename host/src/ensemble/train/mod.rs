@@ -243,9 +243,9 @@ fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Or
     TouchOrigin { noise, ..TouchOrigin::new(dataset, settings.probe) }.origin(Some(trained))
 }
 
-/// Trains an ensemble with a background column: one more object, of the touches of all objects of `background` together,
-/// which should be as many and as different shapes as possible, none of them one of `dataset`'s. It stands for what the
-/// ensemble does not know, and is called [`BACKGROUND`].
+/// Trains an ensemble with a background column: one more object, with the touches of all objects of `background` together.
+/// These should be of as many and as different shapes as possible, and none may be one of `dataset`'s. It stands for
+/// objects that the ensemble does not know, and is called [`BACKGROUND`].
 ///
 /// # Errors
 /// As [`train`]; [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if the data sets were captured with

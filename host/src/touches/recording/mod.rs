@@ -35,7 +35,7 @@ pub struct Recorded {
     pub placement: Option<String>,
     /// Number of touches that the recording added.
     pub touches: u64,
-    /// When it began, in UTC: `2026-11-22T11:00:00Z`.
+    /// Time at which it began, in UTC: `2026-11-22T11:00:00Z`.
     pub began: String,
     /// Source of the touches: a port or a file.
     pub source: String,

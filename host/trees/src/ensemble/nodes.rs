@@ -13,12 +13,12 @@ pub struct Threshold {
 }
 
 impl Threshold {
-    /// That of `x <= value`.
+    /// The test `x <= value`.
     pub const fn at_or_below(value: f64) -> Self {
         Self { value, inclusive: true }
     }
 
-    /// That of `x < value`.
+    /// The test `x < value`.
     pub const fn below(value: f64) -> Self {
         Self { value, inclusive: false }
     }

@@ -16,7 +16,7 @@ pub struct Origin {
     pub background: bool,
     /// The file of another library that it was read from, if it was.
     pub imported: Option<Imported>,
-    /// Further statements of whoever trained it, by name: attributes of the file that this crate does not read, kept as they
+    /// Further statements about its training, by name: attributes of the file that this crate does not read, kept as they
     /// are. The crate `palpate` states the probe and the touches so.
     pub attributes: BTreeMap<String, String>,
 }

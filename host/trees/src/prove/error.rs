@@ -112,7 +112,7 @@ pub enum ProofProblem {
         what: &'static str,
         /// Its checksum in the certificate.
         stated: u64,
-        /// That of the file.
+        /// Checksum of the file.
         found: u64,
     },
     /// The certificate states less than there is.

@@ -573,7 +573,7 @@ fn a_host_that_has_just_come_sees_that_an_event_is_of_a_start_before() {
     assert_eq!(events.take(), [(Event::Started, 4)]);
 }
 
-/// Lets a host and a chip talk without delay; the outcomes that the host took.
+/// Lets a host and a chip talk without delay, and returns the number of outcomes that the host took.
 fn talk(host: &mut HostEnd, sent: &mut Vec<Vec<u8>>, chip: &mut DeviceEnd, notebook: &mut Notebook) -> usize {
     let mut outcomes = 0;
     while !sent.is_empty() {

@@ -228,7 +228,7 @@ enum Faces {
 }
 
 impl Faces {
-    /// That of a primitive's mode; none for points and lines, which are no surface.
+    /// Pattern of a primitive's mode; none for points and lines, which are no surface.
     fn of(mode: Option<u32>) -> Result<Option<Self>, MeshProblem> {
         match mode {
             None | Some(4) => Ok(Some(Self::Each)),

@@ -92,7 +92,7 @@ pub(super) fn smoothed(cloud: Cloud) -> Option<Smoothed> {
 /// surface only in part.
 const SEEN: f64 = 0.6;
 
-/// And of normals.
+/// Least cosine between the normals of neighbors.
 const SAME: f64 = 0.5;
 
 struct Plane {
