@@ -135,7 +135,7 @@ pub fn section(tag: u16, content: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A snapshot with this content, whatever it says.
+/// A snapshot with this content, valid or not.
 pub fn snapshot(model: &Model<'_>, touches: u32, verdict: u8, object: u8, evidence: &[i64]) -> Vec<u8> {
     let head =
         postcard::to_slice(&(model.checksum(), touches, verdict, object), &mut [0; 32]).map(|head| head.to_vec());
@@ -525,7 +525,7 @@ pub fn cuts() -> Vec<(String, Vec<u8>, Vec<Cut>)> {
     all
 }
 
-/// A section's tag, its content, and what it has at least to be read: nothing, of what no verdict depends on.
+/// A section's tag, its content, and the fewest bytes of it that can be read: 0 if no verdict depends on it.
 type Whole = (u16, Vec<u8>, usize);
 
 /// Puts sections in, and cuts each.

@@ -257,7 +257,7 @@ fn resealed(bytes: &mut [u8]) {
     }
 }
 
-/// Changes, moves, cuts or puts in some bytes, wherever they are; length and checksum are nearly always right afterwards.
+/// Changes, moves, cuts or puts in some bytes, anywhere; length and checksum are nearly always right afterwards.
 fn damage_anywhere(bytes: &mut Vec<u8>, rng: &mut SmallRng) {
     for _ in 0..rng.random_range(1..5) {
         let at = match rng.random_range(0..4) {

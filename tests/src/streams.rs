@@ -36,7 +36,7 @@ pub struct Stream {
     pub rows: Vec<Vec<i32>>,
 }
 
-/// A model of each kind, calibrated to at most 10 % of wrong names, and so many rows.
+/// A model of each kind, calibrated to at most 10 % of wrong names, and this many rows.
 ///
 /// # Panics
 /// If a file is not an ensemble, or a calibration fails.

@@ -406,7 +406,7 @@ fn program_of(
     compile(&compiler, flags, directory.join("program.c").to_str().unwrap(), &program).map(|()| program)
 }
 
-/// Calls with less room than there are objects, then with enough; the answer is 0 if all of them said what they should.
+/// Calls with less room than there are objects, then with enough; returns 0 if all of them answered rightly.
 const CALLS: &str = r#"#define PALPATE_EARLY 1
 #include "m.h"
 
@@ -489,7 +489,7 @@ fn a_model_that_is_too_long_for_an_array_of_an_avr_says_so_there_and_what_to_do(
     let household = std::fs::read(Path::new(ROOT).join("models/household.palpate")).unwrap();
     let model = Model::new(&household).unwrap();
     let source = "#include \"household.h\"\nint main(void)\n{\n    return household_model[0] != 80;\n}\n";
-    // As an AVR's compiler reads it; what it includes there is not.
+    // As an AVR's compiler reads it; the header that it would include is missing.
     let error = program_of(directory.path(), "household", &model, source, &["-D__AVR__", "-w"]).unwrap_err();
     assert!(error.contains("model HOUSEHOLD has 44336 bytes") && error.contains("at most 32767"), "{error}");
     assert!(program_of(directory.path(), "household", &model, source, &["-Wno-unused"]).is_ok());

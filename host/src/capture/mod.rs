@@ -62,7 +62,7 @@ pub struct Settings {
     pub resume: bool,
     /// Add objects to the data set in the directory, which must have been made in the same way.
     pub add: bool,
-    /// Replace the data set in the directory, whatever it holds. Takes precedence over `resume` and `add`.
+    /// Replace the data set in the directory, regardless of its content. Takes precedence over `resume` and `add`.
     pub force: bool,
     /// Number of threads to use, at most 256; by default as many as the machine has.
     pub threads: Option<usize>,

@@ -2,7 +2,7 @@
 //!
 //! The chunks of all objects form one sequence. Producer p of n computes chunks p, p + n, p + 2n, … and sends them down
 //! its own channel; the writer takes one from each channel in turn, which is the sequence again. A producer that is
-//! ahead waits, so at most a few chunks are in memory whatever the number of touches.
+//! ahead waits, so at most a few chunks are in memory regardless of the number of touches.
 
 use super::store::Store;
 use super::{ObjectSummary, Sampler, Settings};

@@ -2,7 +2,7 @@
 //!
 //! Touches of an object are appended to `<object>.part`, which becomes `<object>.txt` when it is complete, or is
 //! converted to `<object>.parquet`. Twice a second the part is flushed to the disk, then the listing is written, which
-//! says how much of it counts: whatever an interruption leaves behind that is cut off when the capture is resumed.
+//! says how much of it counts: bytes behind that, left by an interruption, are cut off when the capture is resumed.
 //!
 //! Touches are only deleted after a listing that says `"complete": false` was written: at no moment does a complete
 //! listing name files that are gone.

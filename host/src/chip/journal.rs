@@ -79,7 +79,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Begins a journal. A journal of this name is replaced, not emptied: whoever still follows it can read the rest of it.
+    /// Begins a journal. A journal of this name is replaced, not emptied: its other readers can still read the rest of it.
     ///
     /// # Errors
     /// When the file cannot be written, and [`Foreign`](crate::error::Foreign) if one is there that is no journal.

@@ -46,7 +46,7 @@ pub enum Heard<'a> {
         /// 0, 1 or 2 along the row; 255 if it is not the fault of one finger.
         finger: u8,
     },
-    /// The chip reported so many things that were lost on the way.
+    /// The chip reported this number of things lost on the way.
     Missed(u32),
     /// Nothing has happened for a while.
     Idle,

@@ -162,7 +162,7 @@ impl Entry {
         own.unwrap_or(f64::from(u8::from(self.name == name)))
     }
 
-    /// The object that it is, whatever its placement.
+    /// The true object, regardless of its placement.
     fn object(&self, has_placements: bool) -> &str {
         if has_placements && self.outputs.len() == 1 { object_of(&self.name) } else { &self.name }
     }

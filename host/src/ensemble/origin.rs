@@ -197,8 +197,8 @@ impl StatedProbe {
         dataset.origin.as_ref().map(Self::from)
     }
 
-    /// Statements of a compiled model about it. Units are made tenths of the longest side, whatever side objects were
-    /// scaled to.
+    /// Statements of a compiled model about it. Units are made tenths of the longest side, regardless of the length
+    /// that objects were scaled to.
     pub fn trained(&self) -> TrainedProbe {
         let scale = match self.unit {
             Length::Tenth => 10.0 / self.length,

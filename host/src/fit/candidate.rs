@@ -41,7 +41,7 @@ impl Candidate {
 
 /// Prior of the probe's faults: standard deviations of the logarithm of the factor, of offsets in milliseconds, and of
 /// the logarithm of the noise about [`USUAL_NOISE`]. Of candidates that explain touches equally well the usual one is
-/// taken; a few dozen touches outweigh it wherever they say something.
+/// taken; a few dozen touches outweigh it if they say anything.
 const USUAL: [f64; 3] = [0.15, 8.0, 1.0];
 /// In milliseconds.
 const USUAL_NOISE: f64 = 2.0;

@@ -157,7 +157,7 @@ pub(super) fn log_density(explained: &Explained<'_>, observed: &Observed, in_pos
     most + (TRUSTED * (posed - most).exp() + (1.0 - TRUSTED) * (all - most).exp()).ln()
 }
 
-/// The density among the approaches in its pose; none if none of them says anything.
+/// The density among the approaches in its pose; none if they all say nothing.
 fn density(explained: &Explained<'_>, observed: &Observed, InPose(approaches): &InPose) -> Option<f64> {
     let (Candidate { factor, late, noise, missed }, kept) = (explained.candidate(), explained.kept());
     let (mut sum, mut weights) = (0.0, 0.0);

@@ -75,7 +75,7 @@ pub enum Suspect {
         /// The parameters of the probe by the other recordings and by this one, in words.
         what: String,
     },
-    /// Its touches look like those of none of the objects.
+    /// Its touches are unlike those of any object.
     Unlike {
         /// The object by whose name it goes.
         object: String,
@@ -413,7 +413,7 @@ mod tests {
     use crate::tests::repetitions::{assert_rare, repetitions};
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Log-densities of so many touches of the right object, whose densities are known: as another's, which gives numbers
+    /// Log-densities of this many touches of the right object, whose densities are known: as another's, which gives numbers
     /// that are larger by `apart`, and as its own.
     fn densities(count: usize, apart: f64, run: u64) -> [Vec<f64>; 2] {
         let mut random = generator(run, Purpose::Synthetic, "suspects", 0);

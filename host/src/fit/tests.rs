@@ -132,7 +132,7 @@ fn finely(recorded: &Dataset, plate: &[Touch]) -> Fit {
     rigid(&MANY, recorded, Some(plate))
 }
 
-/// The fit of a probe of which nothing is known.
+/// The fit of an unknown probe.
 fn layered(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
     fit(recorded, &objects(), plate, &Settings { approaches: 12_000, ..settings() }, &()).unwrap()
 }

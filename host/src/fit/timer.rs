@@ -4,7 +4,7 @@ use palpate_shared::Touch;
 
 /// Resolutions that are looked for, in microseconds.
 const RANGE: [f64; 2] = [20.0, 60_000.0];
-/// Times are used up to so many ticks: the farther, the more exactly must the resolution be known.
+/// Times are used up to this many ticks: the farther, the more exactly must the resolution be known.
 const TICKS: f64 = 40.0;
 /// Mean resultant length of the times' phases within a tick, above which there is a timer.
 const CLOSE: f64 = 0.93;
@@ -22,7 +22,7 @@ pub(super) enum Timer {
     Unknown,
 }
 
-/// The largest resolution of which nearly all times are multiples. Rayleigh's test: on whole ticks the unit vectors at
+/// The largest resolution that divides nearly all times. Rayleigh's test: on whole ticks the unit vectors at
 /// 2π · time / resolution all point the same way.
 pub(super) fn timer<'a>(touches: impl IntoIterator<Item = &'a Touch>) -> Timer {
     let times = touches.into_iter().flat_map(|touch| touch.times()).filter_map(|time| time.micros());
@@ -52,7 +52,7 @@ const READINGS: f64 = 5_000.0;
 /// Mean resultant length above which times cluster: readings that come up to 3 of 10 ms late have .73, and the recordings of 5 robots
 /// that are read every millisecond or two at most .24.
 const CLUSTERED: f64 = 0.5;
-/// Times that it takes, each of so many readings: fewer are near each other by the objects' shapes.
+/// Least number of times, and of readings in each: fewer are near each other by the objects' shapes.
 const MANY: usize = 100;
 const FROM: f64 = 3.0;
 

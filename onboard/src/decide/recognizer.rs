@@ -433,7 +433,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Weights of all other objects, relative to one that was recognized with this evidence of so many touches.
+    /// Weights of all other objects, relative to one that was recognized with this evidence of this many touches.
     pub(crate) fn rivals(model: &Model<'_>, evidence: &[i64; N], object: usize, covered: u32) -> Option<Rivals> {
         let evidence = evidence.get(..model.object_count())?;
         if let Some(outputs) = model.outputs() {
@@ -473,7 +473,7 @@ pub(super) fn unit(model: &Model<'_>) -> Unit {
     Unit { bits: header.unit_bits(), shift: header.unit_shift(), sharpness: SHARPNESS }
 }
 
-/// The unit of evidence of so many touches.
+/// The unit of evidence of this many touches.
 fn unit_of(model: &Model<'_>, touches: u32) -> Unit {
     unit(model).weighed(model.weight_of(touches))
 }

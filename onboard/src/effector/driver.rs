@@ -33,7 +33,7 @@ const LATEST: u32 = 1 << 15;
 /// What comes out depends on the edges and their times alone, not on how often [`Effector::poll`] is called; but a touch
 /// with a missing finger, and faults, are only seen at the first call after they are due.
 ///
-/// Cannot fail or panic, whatever the edges.
+/// Cannot fail or panic with any edges.
 #[derive(Clone, Debug)]
 pub struct Effector {
     settings: Settings,

@@ -2,7 +2,7 @@
 
 use palpate_shared::format::{Axis, Header, Layout, LeafType};
 
-/// Sections of a model. A layout has checked what it reads from them.
+/// Sections of a model. A layout has checked the ones that it reads.
 ///
 /// Short enough for a model to be copied in a few instructions; a call to copy it would bring in a routine that most programs
 /// have no other use for. So neighbors that are rarely used apart are one slice.

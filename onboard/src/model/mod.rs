@@ -217,7 +217,7 @@ impl<'a> Model<'a> {
         SharedLeaves::from_bytes(optional::find(self.optional(), Tag::SharedLeaves))
     }
 
-    /// The features that stand for a missing value, if the model states some: they are taken as missing wherever they are.
+    /// The features that stand for a missing value, if the model states some: they are taken as missing in any feature.
     ///
     /// Cost: next to none if there are none, otherwise a few instructions for each optional section. Cannot fail.
     pub fn sentinel(&self) -> Option<Sentinel> {
@@ -248,7 +248,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// The weight of the evidence of so many touches or rows where it is compared with a threshold, in Q16: 65,536, which is 1,
+    /// Weight of the evidence of this many touches or rows when it is compared with a threshold, in Q16: 65,536, which is 1,
     /// unless the model states [others](Weights).
     ///
     /// Cost: next to none if it states none, otherwise leading zeros, and a search among the optional sections.

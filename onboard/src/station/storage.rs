@@ -1,4 +1,4 @@
-//! State that a station keeps through resets and power cuts, wherever that is.
+//! State that a station keeps through resets and power cuts, in any kind of memory.
 
 use palpate_shared::link::NotStored;
 

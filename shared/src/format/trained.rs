@@ -270,7 +270,7 @@ impl PatternShares {
     }
 }
 
-/// Kind of touches that a model was trained on, for whoever tests it on others: 12 bytes, and 2 for each object; 2 more if it was
+/// Kind of touches that a model was trained on, to test it on others: 12 bytes, and 2 for each object; 2 more if it was
 /// adjusted to recordings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrainedCapture<'a> {
@@ -289,7 +289,7 @@ impl<'a> TrainedCapture<'a> {
     /// Bytes of the section before the objects.
     pub const LENGTH: usize = CAPTURE;
 
-    /// The section's content before the objects, of each of which a `u16` follows.
+    /// The section's content before the objects; a `u16` for each object follows.
     pub fn head(settings: u16, samples: Range<u32>) -> [u8; CAPTURE] {
         let ([a, b], [c, d, e, f]) = (settings.to_le_bytes(), samples.start.to_le_bytes());
         let [g, h, i, j] = samples.end.to_le_bytes();

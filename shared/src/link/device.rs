@@ -160,7 +160,7 @@ impl DeviceEnd {
 
     /// Takes bytes from the line, in any portions, does what they say, and hands every frame to be sent to `send`.
     ///
-    /// Cannot fail or panic, whatever the bytes.
+    /// Cannot fail or panic with any bytes.
     pub fn receive(&mut self, bytes: &[u8], device: &mut impl Device, mut send: impl FnMut(&[u8])) {
         let Self { decoder, progress, statistics, boot, events } = self;
         for &byte in bytes {

@@ -403,7 +403,7 @@ impl HostEnd {
         self.put_question(Query::Hello, now, send);
     }
 
-    /// A chip that answers is not silent, whatever was lost: attempts are counted again from here.
+    /// A chip that answers is not silent, even if answers were lost: attempts are counted again from here.
     fn is_alive(&mut self, message: &Message<'_>) {
         if !matches!(message, Message::Answer { .. } | Message::Outcome { .. } | Message::Expected { .. }) {
             return;

@@ -151,7 +151,7 @@ pub(super) enum Keys {
     Whole,
     /// Keys of f32 values.
     Real,
-    /// Whole numbers of units, so many in 1.
+    /// Whole numbers of units, this many in 1.
     Scaled(Vec<f32>),
 }
 

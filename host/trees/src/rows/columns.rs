@@ -165,7 +165,7 @@ fn found<T: PartialEq>(wanted: impl Iterator<Item = T>, header: &[T]) -> Option<
     wanted.map(|name| header.iter().position(|column| *column == name)).collect()
 }
 
-/// The numbers of columns without names, if none of them has one.
+/// The numbers of columns, if no column has a name.
 fn numbers<'n>(names: impl Iterator<Item = &'n str>) -> Option<Vec<usize>> {
     let numbers: Option<Vec<usize>> = names.map(number).collect();
     numbers.filter(|numbers| !numbers.is_empty() && numbers.iter().collect::<HashSet<_>>().len() == numbers.len())

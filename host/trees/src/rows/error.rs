@@ -322,7 +322,7 @@ impl Problem for RowsProblem {
     }
 }
 
-/// A row of which the library predicts another value.
+/// A row for which the library predicts another value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ValueDiffers {
     /// The row, counted from 1.

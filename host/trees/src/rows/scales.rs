@@ -20,7 +20,7 @@ pub struct Effect {
     /// nothing where each threshold lies right between two whole units.
     pub largest_step: f64,
     /// True if every value of the rows that the scales were fitted to is a whole number of units, up to the digits of
-    /// f32, so that none of them goes another way; `None` without such rows.
+    /// f32, so that no row goes another way; `None` without such rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub values_are_whole: Option<bool>,
 }
@@ -77,7 +77,7 @@ fn thresholds(ensemble: &Ensemble, feature: usize) -> Vec<(Threshold, f32)> {
     thresholds
 }
 
-/// The features of which thresholds become the same in f32: values between those go another way than in the library.
+/// The features with thresholds that become the same in f32: values between those go another way than in the library.
 pub fn merged(ensemble: &Ensemble) -> Vec<Merged> {
     let names = ensemble.inputs.names();
     let of_feature = names.into_iter().enumerate().map(|(feature, name)| {

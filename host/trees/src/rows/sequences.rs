@@ -68,7 +68,7 @@ pub struct SequencesBuilder {
 }
 
 impl SequencesBuilder {
-    /// For rows of so many features, and these classes.
+    /// For rows of this many features, and these classes.
     pub fn new(features: usize, classes: &[String]) -> Self {
         Self { classes: classes.to_vec(), built: Sequences { features, ..Sequences::default() }, ..Self::default() }
     }

@@ -70,7 +70,7 @@ pub struct Verified {
     /// True if the library's margins look like probabilities.
     #[serde(skip)]
     pub are_probabilities: bool,
-    /// The first tree of which another leaf is added, where margins differ by more than is stated.
+    /// The first tree that adds another leaf, if margins differ by more than is stated.
     #[serde(skip)]
     pub first_tree: Option<String>,
     /// Given rows that, measured in whole numbers of the features' units, reach another leaf than with their own values:

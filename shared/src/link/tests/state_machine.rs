@@ -83,7 +83,7 @@ impl Device for Notebook {
     fn touch(&mut self, touch: &Touch, _: bool) -> Outcome {
         let number = touch.times()[1].micros().expect("a number");
         self.counted.push(number);
-        // The outcome says of which touch it is.
+        // The outcome identifies its touch.
         Outcome::Verdict(VerdictMessage { decision: Decision::Undecided, best: 0, touches: number, detail: None })
     }
 
@@ -146,7 +146,7 @@ struct Host {
     connected: bool,
     /// Touches of this session, in order.
     given: Vec<u32>,
-    /// Number of them that have an outcome.
+    /// Number of these that have an outcome.
     answered: usize,
     /// The number of the name or approach that was asked for.
     asked: Option<u8>,

@@ -101,7 +101,7 @@ fn lumps(dice: &mut Dice) -> (Shape, f32) {
     (shape, 0.6)
 }
 
-/// A solid out of which others were cut.
+/// A solid from which others were cut.
 fn carved(dice: &mut Dice) -> (Shape, f32) {
     let half = dice.sizes(1.5, 4.5);
     let mut shape = if dice.half_the_time() { cuboid(half, 0.3) } else { ellipsoid(half) };

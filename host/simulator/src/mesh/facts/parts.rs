@@ -31,7 +31,7 @@ impl Part {
         Self::place_of(self.triangles, self.low, self.high)
     }
 
-    /// Location of so many triangles in a box, in words: "96 triangles around (1.20, 0, -3.00)".
+    /// Number and location of triangles in a box, in words: "96 triangles around (1.20, 0, -3.00)".
     pub(super) fn place_of(triangles: usize, low: Vec3, high: Vec3) -> String {
         let plural = if triangles == 1 { "" } else { "s" };
         let [x, y, z] = ((low.as_dvec3() + high.as_dvec3()) / 2.0).to_array().map(super::short);

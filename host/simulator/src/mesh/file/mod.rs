@@ -112,7 +112,7 @@ const MOST_OF_A_PIPE: u64 = 1 << 30;
 /// point.
 ///
 /// Memory: at most 256 bytes for each byte of the file (and of those that a glTF file names), and 1 MB. The surface of a scan
-/// is made on a grid, which takes some 100 MB whatever the file's size.
+/// is made on a grid, which takes some 100 MB regardless of the file's size.
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; a [`MeshProblem`] with its line or byte where the file is damaged, or uses

@@ -1,4 +1,4 @@
-//! The parts of a glTF file: its JSON, and the bytes of its buffers, wherever they are.
+//! The parts of a glTF file: its JSON, and the bytes of its buffers, in this file or in others.
 
 use super::damaged;
 use super::document::{Buffer, Document};

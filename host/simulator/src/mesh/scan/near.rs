@@ -257,7 +257,7 @@ fn divide(points: &mut [(DVec3, u32)], node: usize, splits: &mut [(usize, f64)])
     let low = points.iter().fold(DVec3::INFINITY, |low, (place, _)| low.min(*place));
     let high = points.iter().fold(DVec3::NEG_INFINITY, |high, (place, _)| high.max(*place));
     let axis = (high - low).max_position();
-    // As `midpoint` of the first and the end, whatever the first is.
+    // As `midpoint` of the first and the end, regardless of the first.
     let middle = points.len() / 2;
     points.select_nth_unstable_by(middle, |(a, i), (b, j)| a[axis].total_cmp(&b[axis]).then(i.cmp(j)));
     if let Some(split) = splits.get_mut(node) {

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use rand_distr::{Distribution, Normal, UnitSphere};
 use std::path::Path;
 
-/// Points of a sphere of 50 about the origin, with its normals: 4,000, with Gaussian noise of so much along each axis.
+/// Points of a sphere of 50 about the origin, with its normals: 4,000, with Gaussian noise of this size along each axis.
 fn sphere(noise: f64, is_kept: impl Fn(DVec3) -> bool) -> Vec<(DVec3, DVec3)> {
     let mut rng = random::generator(1, Purpose::View, "sphere", 0);
     let normal = Normal::new(0.0, noise).unwrap();
