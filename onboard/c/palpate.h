@@ -227,7 +227,7 @@ typedef struct {
     uint8_t object;       /* the one that was recognized */
     uint32_t forgotten;   /* of the touches, the first ones that are no longer part of the evidence: of some snapshots */
 #if PALPATE_ROW_EVIDENCE
-    uint32_t unit_, from_, span_; /* bits in a unit of evidence of this number of touches, and of so many numbers */
+    uint32_t unit_, from_, span_; /* bits in a unit of evidence of this number of touches, and of this many numbers */
 #endif
     int64_t evidence[PALPATE_MAX_OBJECTS];
 } palpate_recognizer;
@@ -388,7 +388,7 @@ static inline int palpate_trained_(palpate_model *model, const uint8_t *content)
     return 1;
 }
 
-/* Bytes of an object's record in a misfit test with so many rivals. */
+/* Bytes of an object's record in a misfit test with this many rivals. */
 static inline uint32_t palpate_record_(uint32_t rivals)
 {
     return (8 + rivals + (rivals & 1) + 4 * rivals + rivals * (rivals + 1) + 3) & ~PALPATE_AS_(uint32_t, 3);
@@ -490,7 +490,7 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
     uint32_t last = 0;
     while (p != end) {
         const uint8_t *content = p + 8;
-        /* Least content: so many bytes, and so many pieces. */
+        /* Least content: numbers of bytes and pieces. */
         uint32_t length, tag, least = 0, pieces = 0, piece = 0;
         palpate_wrong_(model, PALPATE_OK, p);
         if (!palpate_is_section_(p, end)) {
@@ -1140,7 +1140,7 @@ PALPATE_APART_ void palpate_add_leaf_(const palpate_model *model, uint32_t *sums
     }
 }
 
-/* The number of the leaf that is reached in a complete tree of so many slots. */
+/* The number of the leaf that is reached in a complete tree of this many slots. */
 PALPATE_APART_ size_t palpate_walk_complete_(const uint8_t *ranks, const uint8_t *columns, const uint8_t *thresholds, size_t slots)
 {
     size_t slot = 1;
@@ -1516,7 +1516,7 @@ PALPATE_API uint64_t palpate_exp2(uint64_t u)
     return PALPATE_AS_(uint64_t, power) << 25 >> whole;
 }
 
-/* Bits in a unit of the evidence of so many touches, where it is compared with a threshold: less than the model's if it states
+/* Bits in a unit of the evidence of this many touches, when it is compared with a threshold: less than the model's if it states
  * weights of rows that resemble each other. They are the same for `span` numbers of touches, from `from` on. */
 static inline uint32_t palpate_bits_(const palpate_model *model, uint32_t touches, uint32_t *from, uint32_t *span)
 {
@@ -1800,7 +1800,7 @@ static inline uint32_t palpate_sharpness_(const palpate_model *model)
     return sharpness;
 }
 
-/* A weight at this sharpness, of so many bits behind. */
+/* A weight at this sharpness, for evidence this many bits behind. */
 static inline uint64_t palpate_sharp_(uint64_t bits, uint32_t sharpness)
 {
     const uint64_t most = PALPATE_AS_(uint64_t, 1) << 42; /* where a weight is 0 at any temperature */

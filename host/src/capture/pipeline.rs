@@ -21,7 +21,7 @@ const CHUNK: u64 = 256;
 /// Number of chunks that a producer may be ahead.
 const AHEAD: usize = 8;
 
-/// The most producers, however many are asked for: what they may be ahead together stays a few megabytes.
+/// The most producers, even if more are asked for: together they are ahead by a few megabytes at most.
 const MOST_THREADS: usize = 256;
 
 /// Samples that a producer hands to the writer.

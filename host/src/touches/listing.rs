@@ -104,7 +104,7 @@ impl Listing {
     /// The file's name.
     pub const FILE: &str = "dataset.json";
 
-    /// A listing of objects of which there is no touch yet.
+    /// A listing of objects without touches so far.
     pub fn new(origin: &Origin, names: impl IntoIterator<Item = String>) -> Self {
         Self {
             palpate: env!("CARGO_PKG_VERSION").into(),

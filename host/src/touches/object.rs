@@ -48,7 +48,7 @@ impl From<String> for Source {
 }
 
 /// The touches of one object. Each keeps the source that it is of, and the robot that made it, through everything that is
-/// done with them: there is no way to make such touches without saying what they are of.
+/// done with them: there is no way to make such touches without stating their object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectTouches {
     /// The object's name.

@@ -6,7 +6,7 @@
 and the same with XGBoost 1.6.2, 1.7.6, 3.0.5, 3.2.0 and (Python 3.12) 3.4.0, then, each with the packages that it imports,
 `make.py lightgbm`, `make.py catboost`, `make.py onnx` (scikit-learn, skl2onnx, onnx, onnxruntime) and `make.py onnxmltools`
 (onnxmltools, xgboost, lightgbm). `make.py predictions`, with all of these packages, opens the models that have no
-NAME.predictions.csv yet with the library at hand, and asks it. Every model gets three files beside it:
+NAME.predictions.csv yet with the installed library, and asks it. Every model gets three files beside it:
 
 NAME.rows.csv     a header with the features' names, then 20 rows like the training's, 20 with values that equal thresholds
                   of the model, the numbers beside them or zero, and 20 with missing values (empty)

@@ -127,7 +127,7 @@ def measure(ensemble, name, exporter, scratch):
         source = exporter(ensemble, directory)
     except Refused as refused:
         return None if str(refused) == "see touches" else f"refused: {refused}"
-    except Exception as error:  # whatever an exporter fails with is a result
+    except Exception as error:  # any failure of an exporter is a result
         return f"fails: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
     cells, seconds = [], [0.0, 0.0]
     for chip in CHIPS:

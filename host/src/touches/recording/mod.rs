@@ -1,7 +1,7 @@
 //! Touches of a real probe on their way to the disk.
 //!
 //! Each touch is a line appended to `<object>.txt` and flushed to the disk before the next one is waited for, so that
-//! whatever ends a recording (a pulled cable, Ctrl-C, a power cut) costs at most the touch that is being written. The
+//! any end of a recording (a pulled cable, Ctrl-C, a power cut) costs at most the touch that is being written. The
 //! listing follows twice a second and at the end; until then a file may hold more than is listed. Readers count what the
 //! file holds, up to the last whole line, and the next recording cuts off what is behind it.
 

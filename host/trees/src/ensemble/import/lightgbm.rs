@@ -296,7 +296,7 @@ fn check_structure(block: &Block<'_>, splits: &[Split], leaves: usize) -> Result
 struct Grower<'a> {
     splits: &'a [Split],
     values: &'a [f64],
-    /// True if zeros are missing wherever they are, so that no split has to distinguish them.
+    /// True if zeros are missing in every feature, so that no split has to distinguish them.
     zero_is_missing: bool,
     nodes: Vec<DraftNode>,
 }
