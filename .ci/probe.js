@@ -24,7 +24,7 @@
         if (box.left < whole.left - 1 || box.right > whole.right + 1 || box.top < whole.top - 1 || box.bottom > whole.bottom + 1) {
           note(`figure ${name}: "${said}" is cut off`);
         }
-        // Shown at the size that it has on a screen of so many pixels.
+        // Shown at the size that it has on a screen of this many pixels.
         const size = parseFloat(getComputedStyle(text).fontSize) * whole.width / drawing.viewBox.baseVal.width;
         if (size < 11) note(`figure ${name}: "${said}" is only ${size.toFixed(1)} pixels high`);
         // Boxes are as high as the font wants, which some do generously: three pixels are no letters.

@@ -16,7 +16,7 @@ fuzz_target!(|bytes: &[u8]| {
     while let Some((&length, after)) = rest.split_first() {
         let (message, after) = after.split_at((usize::from(length) % 64).min(after.len()));
         rest = after;
-        // The session that the chip is in, which is none.
+        // The chip is in no session.
         let mut plain = [&[VERSION, 0, 0, 0, 0], message].concat();
         plain.extend(checksum(&plain).to_le_bytes());
         line.extend(cobs(&plain));

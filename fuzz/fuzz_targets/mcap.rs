@@ -15,11 +15,11 @@ mod files;
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// A chunk of 64 MiB, as much for how far back it refers, and both once more while they grow.
+/// A chunk of 64 MiB, as much for the window of its compression, and both once more while they grow.
 const MOST: usize = 256 << 20;
 
 fuzz_target!(|bytes: &[u8]| {
-    // The first byte chooses what the others are.
+    // The first byte chooses the kind of the others.
     let Some((&first, bytes)) = bytes.split_first() else { return };
     let ros2 = |name: &str, definition: &str| {
         let records = [

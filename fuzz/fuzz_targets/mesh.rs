@@ -25,7 +25,7 @@ fuzz_target!(|bytes: &[u8]| {
     MEMORY.reset_peak_usage();
     let parsed = file::parse(bytes, Path::new(&name));
     let taken = MEMORY.peak_usage() - before;
-    // The surface of a scan takes a grid, whatever the number of its points, also one in which no surface is found then.
+    // The surface of a scan takes a grid, regardless of the number of its points, also one in which no surface is found then.
     let is_scan = match &parsed {
         Ok(contents) => !contents.points.is_empty(),
         Err(_) => matches!(

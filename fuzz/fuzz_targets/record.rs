@@ -1,4 +1,4 @@
-//! Any bytes where a chip keeps records and models, in RAM and in flash: it starts, and stores what comes next.
+//! Any bytes where a chip keeps records and models, in RAM and in flash: it starts, and stores the next records.
 #![no_main]
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
@@ -71,7 +71,7 @@ fuzz_target!(|bytes: &[u8]| {
     }
 });
 
-/// Starts, touches, stores; what was stored is there.
+/// Starts, touches, stores; stored records are there.
 fn start(storage: impl Storage) {
     let Ok((mut station, progress, starts)) = Station::<16, _>::open(MODEL, storage) else {
         panic!("records are long enough")

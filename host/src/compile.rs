@@ -1,4 +1,4 @@
-//! From an ensemble to the bytes that the chip reads: `palpate_trees::compile`, with what an ensemble states of its touches.
+//! From an ensemble to the bytes that the chip reads: `palpate_trees::compile`, with the ensemble's statements about touches.
 
 #[cfg(test)]
 mod tests;
@@ -39,7 +39,7 @@ pub fn compile_within(ensemble: &Ensemble, settings: &Settings, most: usize) -> 
     trees::compile_within(ensemble, &stated(ensemble, settings)?, most)
 }
 
-/// The settings, with what the ensemble states of its touches.
+/// The settings, with the ensemble's statements about touches.
 fn stated(ensemble: &Ensemble, settings: &Settings) -> Result<Settings> {
     let origin = TouchOrigin::of(&ensemble.origin)?;
     let mut stated = origin.stated(&ensemble.objects);

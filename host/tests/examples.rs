@@ -2,7 +2,7 @@
 
 use std::process::{Command, Stdio};
 
-/// Runs an example, which `cargo test` has built beside the tests, and returns what it printed.
+/// Runs an example, which `cargo test` has built beside the tests, and returns its output.
 #[track_caller]
 fn run(name: &str) -> String {
     let mut path = std::env::current_exe().unwrap();

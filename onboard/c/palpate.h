@@ -16,19 +16,19 @@
  *
  * Rows of features have a class or a value in one call: palpate_predict_class, palpate_predict_value.
  *
- * Every function is `static inline`: include it in the one file that recognizes, and only what is called takes flash.
+ * Every function is `static inline`: include it in the one file that recognizes; only called functions take flash.
  *
- * Before the #include may be defined:
- *   PALPATE_LAYOUTS      which layouts are read, as PALPATE_COMPACT | PALPATE_COMPLETE; all of them by default
- *   PALPATE_LEAVES       which types of leaves are read, as PALPATE_I8; all of them by default
- *   PALPATE_SHARED       0: a model whose equal leaves stand once, in a table, is refused
- *   PALPATE_SENTINEL     0: a model over rows in which a number stands for a missing value is refused
- *   PALPATE_ROW_EVIDENCE 0: a model that states what a row adds to the evidence, or how much rows count together, is refused
- *   PALPATE_EARLY        1: palpate_class_of is there, which gives a class without walking all trees
- *   PALPATE_OUTPUTS      1: models of which several outputs belong to one object are read, which are refused by default
- *   PALPATE_STRANGERS    0: a model with a test for objects that it does not know, or with a background, is refused
- *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256: 32 by default; each takes state and stack
- *   PALPATE_BYTE(p)      how the byte of a model at `p` is read: *(p) by default, pgm_read_byte(p) for an AVR's flash
+ * Macros that may be defined before the #include:
+ *   PALPATE_LAYOUTS      layouts to read, such as PALPATE_COMPACT | PALPATE_COMPLETE; all by default
+ *   PALPATE_LEAVES       types of leaves to read, such as PALPATE_I8; all by default
+ *   PALPATE_SHARED       0: rejects models that store equal leaves once, in a table
+ *   PALPATE_SENTINEL     0: rejects models over rows in which a number stands for a missing value
+ *   PALPATE_ROW_EVIDENCE 0: rejects models that state what a row adds to the evidence, or how much rows count together
+ *   PALPATE_EARLY        1: adds palpate_class_of, which gives a class without walking all trees
+ *   PALPATE_OUTPUTS      1: reads models in which several outputs belong to one object; rejected by default
+ *   PALPATE_STRANGERS    0: rejects models with a test for unknown objects, or with a background
+ *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256; 32 by default; each object takes state and stack
+ *   PALPATE_BYTE(p)      reads the byte of a model at `p`: *(p) by default, pgm_read_byte(p) for an AVR's flash
  *   PALPATE_API          instead of `static inline`
  */
 #ifndef PALPATE_H
@@ -89,8 +89,8 @@
 #define PALPATE_NEAR_ static inline
 #define PALPATE_APART_ static inline
 #endif
-/* A number as one of another type, and the same bytes as other numbers: C++ has a way of its own, with which -Wold-style-cast is
- * silent. */
+/* Converts a number to another type, or reinterprets its bytes. C++ has casts of its own, without a warning by
+ * -Wold-style-cast. */
 #if defined(__cplusplus)
 #define PALPATE_AS_(type, value) static_cast<type>(value)
 #define PALPATE_AT_(type, place) reinterpret_cast<type>(place)
@@ -125,16 +125,16 @@
 #define PALPATE_MISSING UINT32_MAX
 /* A feature that is missing. */
 #define PALPATE_MISSING_FEATURE INT32_MIN
-/* A class that is none, where there was no room for margins. */
+/* No class, for lack of room for margins. */
 #define PALPATE_NO_CLASS UINT16_MAX
 /* The most features of a touch. */
 #define PALPATE_TOUCH_FEATURES 10
 /* 1 as a posterior. */
 #define PALPATE_ONE (PALPATE_AS_(uint64_t, 1) << 56)
-/* Bytes that are enough for a snapshot. */
+/* Largest length of a snapshot in bytes. */
 #define PALPATE_SNAPSHOT_LENGTH(objects) (21 + 10 * (objects))
 
-/* Reasons why bytes are no model, or a model is not used. The place of the fault is in `wrong` of the model. */
+/* Reasons to reject bytes or a model. `wrong` of the model is the place of the error. */
 typedef enum {
     PALPATE_OK = 0,
     PALPATE_LENGTH,          /* fewer bytes than the model has, or more */
@@ -150,7 +150,7 @@ typedef enum {
     PALPATE_NEEDS_CODE       /* its trees are a function, which palpate_open_code takes */
 } palpate_error;
 
-/* Reasons why a touch or a row is no evidence. The input was not counted, and nothing has changed. */
+/* Reasons not to count a touch or a row. Nothing has changed. */
 typedef enum {
     PALPATE_COUNTED = 0,
     PALPATE_REFUSED_PATTERN, /* the model was not trained on touches with these contacts */
@@ -186,11 +186,11 @@ typedef struct {
     const uint8_t *part_[8]; /* starts of text, sections, margins, axes, groups, splits, leaves, checksum */
     const uint8_t *cuts_;    /* thresholds of the axes */
     const uint8_t *odds_;    /* thresholds by object, or NULL */
-    const uint8_t *strangers_; /* what it states of objects that it does not know, or NULL */
+    const uint8_t *strangers_; /* its section on unknown objects, or NULL */
     const uint8_t *table_; /* values of the leaves that are shared, or NULL; before them the length of their numbers */
     const uint8_t *sentinel_; /* features that stand for a missing value, or NULL */
     const uint8_t *weights_; /* weights of evidence by the number of touches or rows, or NULL */
-    const uint8_t *row_; /* what a row's margins add to the evidence, or NULL: the margins */
+    const uint8_t *row_; /* table from a row's margins to evidence; NULL: the margins */
     int32_t row_start_;  /* the margin of that table's first value */
     uint32_t row_most_;  /* beyond it, up to the last one */
 #if PALPATE_OUTPUTS
@@ -200,11 +200,11 @@ typedef struct {
     const uint8_t *exits_; /* places in the walk where a class may be known, 8 bytes each, up to `exits_end_` */
     const uint8_t *exits_end_;
 #endif
-    uint32_t wrong;          /* the place of what is wrong, in bytes from the start */
+    uint32_t wrong;          /* the place of the error, in bytes from the start */
     uint32_t largest_spread; /* of touches that count, in microseconds */
-    uint16_t objects;        /* that there are margins for, 1 to 256 */
-    uint16_t known;          /* that can be named: all, or all but the last, a background */
-    uint16_t features;       /* of a row, 1 to 256 */
+    uint16_t objects;        /* number of objects with margins, 1 to 256 */
+    uint16_t known;          /* number that can be named: all, or all but the last, a background */
+    uint16_t features;       /* number in a row, 1 to 256 */
     uint8_t layout_;
     uint8_t leaf_;
     uint8_t descriptor; /* 255: rows of features */
@@ -219,7 +219,7 @@ typedef struct {
 /* State of recognition of the object that is touched. */
 typedef struct {
     const palpate_model *model;
-    uint64_t odds;        /* threshold: what the others may weigh, in Q56; of objects without one of their own */
+    uint64_t odds;        /* threshold: largest weight of the others, in Q56; for objects without their own */
     uint32_t max_touches; /* limit */
     uint32_t touches;     /* counted so far */
     uint8_t by_object;    /* 1: the model's thresholds by object come before `odds` */
@@ -227,7 +227,7 @@ typedef struct {
     uint8_t object;       /* the one that was recognized */
     uint32_t forgotten;   /* of the touches, the first ones that are no longer part of the evidence: of some snapshots */
 #if PALPATE_ROW_EVIDENCE
-    uint32_t unit_, from_, span_; /* bits in a unit of evidence of this number of touches, and of so many numbers */
+    uint32_t unit_, from_, span_; /* bits in a unit of evidence of this number of touches, and of this many numbers */
 #endif
     int64_t evidence[PALPATE_MAX_OBJECTS];
 } palpate_recognizer;
@@ -266,7 +266,7 @@ enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPAT
 /* Bytes between two places. */
 static inline uint32_t palpate_between_(const uint8_t *start, const uint8_t *end)
 {
-    /* As a size first: where pointers have 16 bits, a difference above 32,767 is negative. */
+    /* Cast to a size first: with pointers of 16 bits, a difference above 32,767 is negative. */
     const size_t length = PALPATE_AS_(size_t, end - start);
     return PALPATE_AS_(uint32_t, length);
 }
@@ -388,7 +388,7 @@ static inline int palpate_trained_(palpate_model *model, const uint8_t *content)
     return 1;
 }
 
-/* Bytes of an object's record in a misfit test with so many rivals. */
+/* Bytes of an object's record in a misfit test with this many rivals. */
 static inline uint32_t palpate_record_(uint32_t rivals)
 {
     return (8 + rivals + (rivals & 1) + 4 * rivals + rivals * (rivals + 1) + 3) & ~PALPATE_AS_(uint32_t, 3);
@@ -490,7 +490,7 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
     uint32_t last = 0;
     while (p != end) {
         const uint8_t *content = p + 8;
-        /* What the content has at least: so many bytes, and so many pieces. */
+        /* Least content: numbers of bytes and pieces. */
         uint32_t length, tag, least = 0, pieces = 0, piece = 0;
         palpate_wrong_(model, PALPATE_OK, p);
         if (!palpate_is_section_(p, end)) {
@@ -1015,7 +1015,7 @@ static inline palpate_answer palpate_accepts_(const palpate_model *model, const 
     return model->needs_pose != 0 && touch->has_pose == 0 ? PALPATE_REFUSED_NO_POSE : PALPATE_COUNTED;
 }
 
-/* The features of a touch, of which there are `model->features`; of a model over touches. */
+/* The `model->features` features of a touch, for a model over touches. */
 static inline void palpate_features_(const palpate_model *model, const palpate_touch *touch, const uint32_t *times, int32_t *features)
 {
     const int32_t none = PALPATE_MISSING_FEATURE;
@@ -1140,7 +1140,7 @@ PALPATE_APART_ void palpate_add_leaf_(const palpate_model *model, uint32_t *sums
     }
 }
 
-/* The number of the leaf that is reached in a complete tree of so many slots. */
+/* The number of the leaf that is reached in a complete tree of this many slots. */
 PALPATE_APART_ size_t palpate_walk_complete_(const uint8_t *ranks, const uint8_t *columns, const uint8_t *thresholds, size_t slots)
 {
     size_t slot = 1;
@@ -1172,7 +1172,7 @@ PALPATE_APART_ uint32_t palpate_walk_compact_(const uint8_t *ranks, const uint8_
     return leaf;
 }
 
-/* The same of a wide tree. */
+/* Walk through a wide tree, as above. */
 PALPATE_APART_ uint32_t palpate_walk_wide_(const palpate_model *model, const int32_t *features, uint16_t count, const uint8_t *split,
                                            uint32_t below)
 {
@@ -1202,7 +1202,7 @@ PALPATE_APART_ uint32_t palpate_walk_wide_(const palpate_model *model, const int
     return leaf;
 }
 
-/* Where the `length` bytes of a leaf's values are. */
+/* Start of the `length` bytes of a leaf's values. */
 static inline const uint8_t *palpate_values_(const palpate_model *model, const uint8_t *leaf, size_t length)
 {
     return PALPATE_IS_SHARED_(model) ? model->table_ + palpate_number_(model, leaf) * length : leaf;
@@ -1281,7 +1281,7 @@ static inline uint_fast16_t palpate_sum_until_(const palpate_model *model, const
         /* f32 values are added from the base on; to a table's nothing is, which -0 does not change. */
         sums[i] = !PALPATE_IS_F32_(model) ? 0 : table ? 0x80000000u : palpate_u32_(base + 4 * PALPATE_AS_(size_t, i));
     }
-    /* Columns beyond those that there are have rank 0. */
+    /* Columns beyond the last have rank 0. */
     for (i = 0; i < 64; i += 4) {
         words[i] = 0;
         words[i + 1] = 0;
@@ -1516,7 +1516,7 @@ PALPATE_API uint64_t palpate_exp2(uint64_t u)
     return PALPATE_AS_(uint64_t, power) << 25 >> whole;
 }
 
-/* Bits in a unit of the evidence of so many touches, where it is compared with a threshold: less than the model's if it states
+/* Bits in a unit of the evidence of this many touches, when it is compared with a threshold: less than the model's if it states
  * weights of rows that resemble each other. They are the same for `span` numbers of touches, from `from` on. */
 static inline uint32_t palpate_bits_(const palpate_model *model, uint32_t touches, uint32_t *from, uint32_t *span)
 {
@@ -1540,7 +1540,7 @@ static inline uint32_t palpate_bits_(const palpate_model *model, uint32_t touche
     return (bits >> 16) * at + ((bits & 0xffff) * at >> 16);
 }
 
-/* The same of the evidence so far; next to no cost while it stays. */
+/* Bits in a unit of the evidence so far; next to no cost while it stays. */
 static inline uint32_t palpate_unit_(palpate_recognizer *recognizer)
 {
 #if PALPATE_ROW_EVIDENCE
@@ -1565,7 +1565,7 @@ static inline uint64_t palpate_behind_(const palpate_recognizer *recognizer, uin
     return units * bits >> (PALPATE_BYTE(recognizer->model->bytes + 40) & 63);
 }
 
-/* Of the first objects, the one with the most evidence; the first of several. */
+/* Object with the most evidence among the first `count`; the first of several. */
 static inline uint_fast16_t palpate_leader_(const palpate_recognizer *recognizer, uint_fast16_t count)
 {
     uint_fast16_t best = 0, i;
@@ -1592,8 +1592,8 @@ static inline int64_t palpate_add_(int64_t a, int64_t b)
     return a < INT64_MIN - b ? INT64_MIN : a + b;
 }
 
-/* Forgets all touches, for the next object. Whoever expects some objects more often than others can set `evidence`
- * afterwards: the logarithm of how often, in units of a margin, up to a constant. */
+/* Forgets all touches, for the next object. To expect some objects more often than others, set `evidence` afterwards: the
+ * logarithm of each frequency, in units of a margin, up to a constant. */
 PALPATE_API void palpate_reset(palpate_recognizer *recognizer)
 {
     const palpate_model *model = recognizer->model;
@@ -1654,7 +1654,7 @@ static inline int32_t palpate_i16_(const uint8_t *p)
     return number;
 }
 
-/* The evidence for an object without its prior; `is_there` becomes 0 for one that cannot be there, of which nothing is
+/* Evidence for an object without its prior; `is_there` becomes 0 for an object that cannot be there, about which nothing is
  * known. */
 static inline int64_t palpate_own_(const palpate_recognizer *recognizer, uint_fast16_t object, int *is_there)
 {
@@ -1706,7 +1706,7 @@ static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint
     return palpate_subtract_(slope, PALPATE_AS_(int64_t, palpate_i32_(record + 4)) * touches);
 }
 
-/* Whether the leader may be named by the model's misfit test: PALPATE_RECOGNIZED, PALPATE_UNDECIDED or PALPATE_UNKNOWN. */
+/* Answer of the model's misfit test for the leader: PALPATE_RECOGNIZED, PALPATE_UNDECIDED or PALPATE_UNKNOWN. */
 static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
 {
     const palpate_model *model = recognizer->model;
@@ -1739,7 +1739,7 @@ static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recog
     return PALPATE_RECOGNIZED;
 }
 
-/* Evidence of a row by its margins, of which it takes the place: by the model's table from margins to evidence. */
+/* Replaces the margins of a row by its evidence, by the model's table from margins to evidence. */
 static inline void palpate_evidence_of_(const palpate_model *model, int32_t *margins)
 {
     const uint8_t *row = model->row_;
@@ -1800,7 +1800,7 @@ static inline uint32_t palpate_sharpness_(const palpate_model *model)
     return sharpness;
 }
 
-/* A weight at this sharpness, of so many bits behind. */
+/* A weight at this sharpness, for evidence this many bits behind. */
 static inline uint64_t palpate_sharp_(uint64_t bits, uint32_t sharpness)
 {
     const uint64_t most = PALPATE_AS_(uint64_t, 1) << 42; /* where a weight is 0 at any temperature */
@@ -1819,8 +1819,8 @@ static inline uint64_t palpate_plus_(uint64_t a, uint64_t b)
     return a > UINT64_MAX - b ? UINT64_MAX : a + b;
 }
 
-/* Whether no object can be recognized, by one exponential: the strongest output of another object than the strongest output's
- * weighs more than the loosest threshold times the most outputs of an object. */
+/* True if no object can be recognized, by one exponential: the strongest output of an object other than the leader's weighs
+ * more than the loosest threshold times the most outputs of an object. */
 static inline int palpate_undecided_(const palpate_recognizer *recognizer, uint64_t loosest, uint32_t bits)
 {
     const palpate_model *model = recognizer->model;
@@ -1882,8 +1882,8 @@ static inline uint_fast16_t palpate_together_(const palpate_recognizer *recogniz
     return leader;
 }
 
-/* The posterior of the object that an output belongs to, in Q56, and the share of it that is the output's: how likely the object
- * lies as this placement says, if it is the object. Of the evidence divided by the model's temperature; 0 for an output that the model does
+/* The posterior of the object that an output belongs to, in Q56, and the output's share of it: the probability of this
+ * placement, given the object. The evidence is divided by the model's temperature. 0 for an output that the model does
  * not have. Cost: an exponential for each output, and two long divisions. */
 PALPATE_API uint64_t palpate_posterior_together(const palpate_recognizer *recognizer, uint16_t output, uint64_t *share)
 {
@@ -1910,8 +1910,8 @@ PALPATE_API uint64_t palpate_posterior_together(const palpate_recognizer *recogn
 }
 #endif
 
-/* Of the objects that can be named, the one with the most evidence; the first of several. Of an object with several outputs, whose
- * weights add up, the output with the most evidence. */
+/* Object with the most evidence among those that can be named; the first of several. If the object has several outputs,
+ * whose weights add up, it is the output with the most evidence. */
 PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
 {
 #if PALPATE_OUTPUTS
@@ -2032,7 +2032,7 @@ PALPATE_API palpate_answer palpate_push_features(palpate_recognizer *recognizer,
     return PALPATE_COUNTED;
 }
 
-/* The posterior of an object in Q56 (PALPATE_ONE is 1), of the evidence divided by the model's temperature; 0 for an object
+/* The posterior of an object in Q56 (PALPATE_ONE is 1), from the evidence divided by the model's temperature; 0 for an object
  * that the model does not know. Cost: an exponential for each object, and a long division. */
 PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uint16_t object)
 {
@@ -2092,7 +2092,7 @@ static inline uint16_t palpate_best_of_(const palpate_model *model, const int32_
     return PALPATE_AS_(uint16_t, best);
 }
 
-/* The class that palpate_predict_class gives, ties and all, from no more trees than it takes, if `palpate export --early-exit`
+/* The class that palpate_predict_class gives, ties and all, from as few trees as possible, if `palpate export --early-exit`
  * wrote the model. `numbers` has room for `room` of them, and holds no margins afterwards. PALPATE_NO_CLASS, and nothing written,
  * if there are more objects than room. */
 PALPATE_API uint16_t palpate_class_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *numbers, size_t room)
@@ -2146,8 +2146,8 @@ static inline float palpate_float_(uint32_t bits)
 }
 
 /* The value of a row of `count` features before the inverse link: the margin of a model with one output, times the scale
- * that the model states; of a model with several outputs 0. The same bits as of the crate where the compiler computes in
- * f32 (no excess precision). */
+ * that the model states; 0 for a model with several outputs. The bits are the crate's if the compiler computes in f32
+ * (no excess precision). */
 PALPATE_API float palpate_predict_raw(const palpate_model *model, const int32_t *features, uint16_t count)
 {
     const uint8_t *prediction = palpate_prediction_(model);
@@ -2212,7 +2212,7 @@ static inline float palpate_ln_1p_(float e)
     return 2.0f * s * sum;
 }
 
-/* The library's prediction for a margin, by the model's inverse link, of averaged trees that of their mean. Error, relative to
+/* The library's prediction for a margin, by the model's inverse link; for averaged trees that of their mean. Error, relative to
  * the result: at most 5e-7. */
 PALPATE_API float palpate_inverse_link(const palpate_model *model, float margin)
 {
@@ -2282,7 +2282,7 @@ static inline uint64_t palpate_take_(const uint8_t *buffer, size_t *at, size_t l
     return 0;
 }
 
-/* Writes what is known to the start of `buffer`, and returns the bytes that it took: at most
+/* Writes the state to the start of `buffer`, and returns its length: at most
  * PALPATE_SNAPSHOT_LENGTH(objects). Returns 0 if there is less room. */
 PALPATE_API size_t palpate_snapshot(const palpate_recognizer *recognizer, uint8_t *buffer, size_t room)
 {
@@ -2316,7 +2316,7 @@ PALPATE_API size_t palpate_snapshot(const palpate_recognizer *recognizer, uint8_
     return length;
 }
 
-/* Takes over a snapshot; what was touched before is forgotten. Unless it is PALPATE_RESTORED, nothing changes. */
+/* Takes over a snapshot, and forgets earlier touches. Unless the answer is PALPATE_RESTORED, nothing changes. */
 PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, const uint8_t *snapshot, size_t length)
 {
     const palpate_model *model = recognizer->model;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 fn main() -> io::Result<()> {
-    // Not called memory.x, which the linker would take from here whatever it is told.
+    // Not called memory.x, which the linker would take from here in any case.
     image::link("mps2.x")?;
     image::build_in("../../models/household.palpate")?;
     let out = PathBuf::from(env::var_os("OUT_DIR").ok_or(io::ErrorKind::NotFound)?);

@@ -21,7 +21,7 @@ const SIXTEENTHS: [u32; 16] = [
 ];
 
 /// 1 − x · (`LINEAR` − x · (`QUADRATIC` − x · `CUBIC`)), all in Q32, is the cubic closest to 2^-(x/16) for x from 0 to 1
-/// among those that are 1 at 0; it is off by 1.5e-9 at most.
+/// among those that are 1 at 0; it is off by at most 1.5e-9.
 const LINEAR: u32 = 186_065_157;
 const QUADRATIC: u32 = 4_029_616;
 const CUBIC: u32 = 56_985;

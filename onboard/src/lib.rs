@@ -53,7 +53,7 @@
 //! | `sentinel` | models over rows in which a number stands for a missing value |
 //! | `row-evidence` | models that state what a row adds to the evidence, and how much rows count together |
 //! | `strangers` | models with a background, or a test for objects that they do not know |
-//! | `outputs` | models of which several outputs belong to one object |
+//! | `outputs` | models with several outputs for one object |
 //! | `rows` | many rows at once, for hosts (`Model::margins_of_rows`) |
 //! | `defmt` | touches, verdicts, refusals and faults can be logged; off by default |
 //!

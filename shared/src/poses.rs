@@ -5,7 +5,7 @@ use crate::touch::{Pose, Q15_ONE};
 /// Directions of motion: from the center of a cube to its 8 corners, 12 edges and 6 faces.
 pub const DIRECTIONS: u16 = 26;
 
-/// The most poses that there are: four rolls for each direction.
+/// Largest number of poses: four rolls for each direction.
 pub const MOST_POSES: usize = 104;
 
 /// A numbering of poses: 26 directions, each with one, two or four rolls.

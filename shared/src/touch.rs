@@ -2,7 +2,7 @@
 
 use crate::pattern::ContactPattern;
 
-/// When a finger first touched: whole microseconds after the first finger did, or missing when it never did.
+/// Time of a finger's first contact: whole microseconds after the first finger's, or missing when it never touched.
 ///
 /// Four bytes; every bit pattern is valid, so a touch can be read from a stream without a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -44,7 +44,7 @@ pub struct Pose {
     pub alignment: [i16; 3],
 }
 
-/// The result of an approach: three contact times, any of which may be missing, and the probe's pose where it is known.
+/// The result of an approach: three contact times, any of which may be missing, and the probe's pose, if known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Touch {
@@ -69,7 +69,7 @@ impl Touch {
         Self::new(micros.map(ContactTime::from_micros))
     }
 
-    /// The same touch with the probe's pose.
+    /// This touch with the probe's pose.
     pub const fn with_pose(mut self, pose: Pose) -> Self {
         self.pose = Some(pose);
         self
@@ -80,7 +80,7 @@ impl Touch {
         self.times
     }
 
-    /// The probe's pose, where it is known.
+    /// The probe's pose, if known.
     pub const fn pose(&self) -> Option<Pose> {
         self.pose
     }
@@ -108,7 +108,7 @@ impl Touch {
         self.times.iter().all(|t| t.is_missing())
     }
 
-    /// The same physical touch with the fingers counted from the other end.
+    /// This physical touch with the fingers counted from the other end.
     pub fn mirrored(&self) -> Self {
         let [a, b, c] = self.times;
         Self {

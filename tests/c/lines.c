@@ -1,4 +1,4 @@
-/* What the examples in Lines call of their frameworks, on this machine: the console is standard input and output. */
+/* Stubs of the frameworks for the examples in Lines, on this machine: the console is standard input and output. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -142,7 +142,7 @@ static uint16_t replay_row(void)
     return count;
 }
 
-/* What came of a touch or row with these features. */
+/* Results of a touch or row with these features. */
 static void replay_known(palpate_answer answer, uint16_t count)
 {
     const uint16_t objects = replay_model.objects;
@@ -165,7 +165,7 @@ static void replay_known(palpate_answer answer, uint16_t count)
         if (palpate_f32_margins_of(&replay_model, replay_features, count, both.sums, PALPATE_MAX_OBJECTS)) {
             replay_text("sums");
             for (i = 0; i < objects; i++) {
-                /* Which of the NaNs it is, is up to the machine. */
+                /* The machine chooses among NaNs. */
                 replay_i64((both.bits[i] & 0x7fffffffu) > 0x7f800000u ? -1 : (int64_t)both.bits[i]);
             }
             replay_put('\n');

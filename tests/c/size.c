@@ -1,4 +1,4 @@
-/* What a program calls that recognizes: its size is what recognition takes. -DROWS: rows of features instead of touches;
+/* Calls of a program that recognizes: its size is what recognition takes. -DROWS: rows of features instead of touches;
  * -DEVERYTHING: posteriors, snapshots and names as well. */
 #include "palpate.h"
 

@@ -20,7 +20,7 @@ pub struct Abuse {
     pub name: String,
     /// The kind of error, see [`kind`].
     pub kind: &'static str,
-    /// Where it is, in bytes from the start.
+    /// Offset, in bytes from the start.
     pub offset: usize,
     /// The bytes.
     pub bytes: Vec<u8>,
@@ -84,7 +84,7 @@ fn longer(model: &[u8], more: &[u8]) -> Vec<u8> {
     sealed(bytes)
 }
 
-/// Where the parts of a model start: optional sections, base margins, axes, thresholds, groups, splits, leaves, checksum.
+/// Offsets of the parts of a model: optional sections, base margins, axes, thresholds, groups, splits, leaves, checksum.
 pub fn places(model: &[u8]) -> [usize; 8] {
     let (header, _) = Header::split(model).expect("a model");
     let objects = usize::from(header.last_object()) + 1;
@@ -135,7 +135,7 @@ pub fn section(tag: u16, content: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A snapshot with this content, whatever it says.
+/// A snapshot with this content, valid or not.
 pub fn snapshot(model: &Model<'_>, touches: u32, verdict: u8, object: u8, evidence: &[i64]) -> Vec<u8> {
     let head =
         postcard::to_slice(&(model.checksum(), touches, verdict, object), &mut [0; 32]).map(|head| head.to_vec());
@@ -348,7 +348,7 @@ fn axes(put: Put<'_>) {
     put("a threshold of wide trees that is cut", "section", cuts, longer(&bytes, &[]));
 }
 
-/// Groups and what they count for.
+/// Groups and their contributions.
 fn groups(put: Put<'_>) {
     for (layout, name) in [(Layout::Compact, "compact"), (Layout::Complete, "complete"), (Layout::Wide, "wide")] {
         let good = model(layout, Leaf::I8, true);
@@ -505,7 +505,7 @@ fn shared_leaves(put: Put<'_>) {
     }
 }
 
-/// Where a model's splits start.
+/// Offset of a model's splits.
 fn splits_of(model: &[u8]) -> usize {
     let [.., splits, _, _] = places(model);
     splits
@@ -525,7 +525,7 @@ pub fn cuts() -> Vec<(String, Vec<u8>, Vec<Cut>)> {
     all
 }
 
-/// A section's tag, its content, and what it has at least to be read: nothing, of what no verdict depends on.
+/// A section's tag, its content, and the fewest bytes of it that can be read: 0 if no verdict depends on it.
 type Whole = (u16, Vec<u8>, usize);
 
 /// Puts sections in, and cuts each.

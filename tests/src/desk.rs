@@ -52,7 +52,7 @@ pub struct Desk {
     pub script: VecDeque<Step>,
     /// Bytes on the line.
     pub to_chip: VecDeque<u8>,
-    /// Of all commands, in order.
+    /// Outcomes of all commands, in order.
     pub outcomes: Vec<Outcome>,
     /// To all questions, in order.
     pub answers: Vec<String>,
@@ -60,7 +60,7 @@ pub struct Desk {
     pub open: bool,
     /// Microseconds.
     pub now: u64,
-    /// Splits what is sent, and cuts the power.
+    /// Splits sent bytes, and cuts the power.
     pub rng: ChaCha8Rng,
     /// Writes per power cut, on average; 0 for no cuts.
     pub cut_every: u32,

@@ -62,7 +62,7 @@ pub struct Cells {
     pub bytes: Vec<u8>,
     /// The value of erased bytes.
     pub erased_to: u8,
-    /// A copy of `bytes`, for whoever looks while a driver has them.
+    /// A copy of `bytes`, to look at while a driver has them.
     pub mirror: Rc<RefCell<Vec<u8>>>,
     /// Erases of each sector.
     pub erases: Vec<u32>,
@@ -74,7 +74,7 @@ pub struct Cells {
     pub faults: Vec<(u64, Fault)>,
     /// True if words can be written; if not, they stay as they are, and nothing errs.
     pub programs: Rc<Cell<bool>>,
-    /// Erases of all sectors, for whoever looks while a driver has the cells.
+    /// Erases of all sectors, to look at while a driver has the cells.
     pub erased: Rc<Cell<u32>>,
     /// Reads so far.
     pub reads: Cell<u64>,

@@ -6,7 +6,7 @@ use palpate_shared::format::{HEADER_LENGTH, Layout, MUST_UNDERSTAND, VERSION};
 use rand::RngExt;
 use rand::rngs::SmallRng;
 
-/// Names of the parts that are not optional, and what the pieces of each are long.
+/// Names of the parts that are not optional, and the lengths of their pieces.
 const PARTS: [(&str, usize); 7] = [
     ("the text", 1),
     ("the margins", 8),
@@ -17,7 +17,7 @@ const PARTS: [(&str, usize); 7] = [
     ("the leaves", 1),
 ];
 
-/// Limits that `FORMAT.md` has for bytes, and what is just beyond.
+/// Limits that `FORMAT.md` has for bytes, and the values just beyond.
 const EDGES: [u8; 26] =
     [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 15, 16, 17, 22, 23, 24, 25, 26, 27, 40, 41, 64, 65, 128, 129, 255];
 
@@ -257,7 +257,7 @@ fn resealed(bytes: &mut [u8]) {
     }
 }
 
-/// Changes, moves, cuts or puts in some bytes, wherever they are; length and checksum are nearly always right afterwards.
+/// Changes, moves, cuts or puts in some bytes, anywhere; length and checksum are nearly always right afterwards.
 fn damage_anywhere(bytes: &mut Vec<u8>, rng: &mut SmallRng) {
     for _ in 0..rng.random_range(1..5) {
         let at = match rng.random_range(0..4) {
@@ -347,7 +347,7 @@ pub fn sweep(models: &[Parts], rng: &mut SmallRng) -> Vec<(Vec<u8>, String)> {
     all
 }
 
-/// A damaged model, and what was done to it.
+/// A damaged model, and the damage.
 pub fn mutant(models: &[Parts], rng: &mut SmallRng) -> (Vec<u8>, String) {
     let number = rng.random_range(0..models.len());
     let mut parts = models[number].clone();

@@ -25,7 +25,7 @@ struct Group {
     trees: usize,
 }
 
-/// A model, and what is known under it.
+/// A model, and the state of recognition under it.
 pub struct Plain<'a> {
     layout: u8,
     leaf: u8,
@@ -52,7 +52,7 @@ pub struct Plain<'a> {
     /// Bytes of a leaf's number, and the values of all leaves, if the model shares them.
     sentinel: Option<(i32, i32)>,
     shared: Option<(usize, &'a [u8])>,
-    /// Weights by the number of touches, and what a row's margins become, if the model has them.
+    /// Weights by the number of touches, and the evidence of a row's margins, if the model has them.
     weights: Vec<u64>,
     row: Option<&'a [u8]>,
     /// Places where a class may be known: the groups before, and the lead.

@@ -54,7 +54,7 @@ pub fn ensemble(shape: Shape, seed: u64) -> Ensemble {
     Ensemble { inputs: inputs(shape.descriptor), objects, base_margins, trees, origin: Origin::default() }
 }
 
-/// The trees with at most so many of their different leaves.
+/// The trees with at most this many of their different leaves.
 pub fn with_few_leaves(mut ensemble: Ensemble, most: usize) -> Ensemble {
     let nodes = ensemble.trees.iter().flat_map(|tree| &tree.nodes);
     let leaves: Vec<Vec<f32>> =

@@ -1,4 +1,4 @@
-//! Commands for the C header's test program (`tests/c/replay.h`), and what it has to say to each: what the crate gives.
+//! Commands for the C header's test program (`tests/c/replay.h`), and its required answer to each: the crate's.
 
 use crate::abuse::places;
 use palpate_onboard::{Model, ModelError, Recognizer, Refused, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};

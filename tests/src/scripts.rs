@@ -89,7 +89,7 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
         write_section(Tag::RowEvidence, true, &row_evidence(rng), &mut put);
     }
     if rng.random_bool(0.5) {
-        // Of any leads, so that not all are those of the largest sum.
+        // Of any leads, so that not all belong to the largest sum.
         let groups = model.header().groups();
         let exits = (1..groups.max(1)).filter(|_| rng.random_bool(0.5)).collect::<Vec<u16>>();
         let exits = exits.into_iter().map(|groups| EarlyExit { groups, bound: 1 << rng.random_range(0..24) });
@@ -247,7 +247,7 @@ pub fn sealed(bytes: &mut [u8]) {
     }
 }
 
-/// Models, and together so many touches and rows.
+/// Models, and this many touches and rows in all.
 ///
 /// # Panics
 /// If a model is none.

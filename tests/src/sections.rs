@@ -19,7 +19,7 @@ pub fn with_sections(model: &[u8], sections: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The model, with what it was trained for.
+/// The model, with statements about its training.
 ///
 /// # Panics
 /// As [`with_sections`].

@@ -23,7 +23,7 @@ impl Readme {
         Self { path, text, wrong: Vec::new() }
     }
 
-    /// Holds the first number in a cell of a table against a measurement, which may differ by so many percent. `row` is the first
+    /// Compares the first number in a cell of a table with a measurement, which may differ by this many percent. `row` is the first
     /// cell, as it stands there; `column` is counted from 0, that cell.
     ///
     /// # Panics
@@ -68,7 +68,7 @@ impl Readme {
         }
     }
 
-    /// Fails unless all numbers held: what is stated, or was changed, is right.
+    /// Fails unless all numbers held, as stated or after the change.
     ///
     /// # Panics
     /// If one did not, or the file cannot be written.

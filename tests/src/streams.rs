@@ -12,7 +12,7 @@ const IMPORT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/import");
 /// Rows of a sequence.
 const LENGTH: usize = 12;
 
-/// The kinds: the file of each, and what is replaced in it.
+/// The kinds: the file of each, and the text replaced in it.
 const KINDS: [(&str, &str, Option<[&str; 2]>); 5] = [
     ("softmax", "xgboost-3.4-softprob.ubj", None),
     ("binary", "xgboost-3.4-binary.json", None),
@@ -35,10 +35,10 @@ pub struct Stream {
     pub rows: Vec<Vec<i32>>,
 }
 
-/// A model of each kind, calibrated to at most 10 % of wrong names, and so many rows.
+/// A model of each kind, calibrated to at most 10 % of wrong names, and this many rows.
 ///
 /// # Panics
-/// If a file is none, or a calibration fails.
+/// If a file is not an ensemble, or a calibration fails.
 pub fn streams(rows: usize) -> Vec<Stream> {
     let of = |(number, (kind, file, replaced)): (usize, (&'static str, &str, Option<[&str; 2]>))| {
         let path = Path::new(IMPORT).join(file);

@@ -1,4 +1,4 @@
-//! Where to touch next, and what recent touches say against the evidence.
+//! Proposals of the next approach, and the weight of recent touches against the evidence.
 
 use palpate::compile::{Leaf, Restated, Settings, compile, restate};
 use palpate_onboard::station::{NoStorage, Station, serve};

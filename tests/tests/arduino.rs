@@ -1,4 +1,4 @@
-//! The Arduino sketch on this machine, over a stub of what it calls: the crate's touches and verdicts from the same edges.
+//! The Arduino sketch on this machine, over stubs: it finds the crate's touches and verdicts in the same edges.
 
 use palpate_onboard::effector::{Edge, Effector, Fault, Finger, Scale, Settings};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
@@ -121,7 +121,7 @@ fn compare(program: &Path, model: &Model<'_>, start: u32, moves: &Moves) -> (Vec
     (touches, text)
 }
 
-/// Moves of the effector's own tests, from a second after power-up on; what they are, and how many contacts each touch has.
+/// Moves of the effector's own tests, from a second after power-up on; their names, and how many contacts each touch has.
 fn cases() -> Vec<(&'static str, Moves, Vec<usize>)> {
     let all = |closed: bool, at: u32| (0..3).map(move |finger| (finger, closed, at));
     let bouncing = (0..20).map(|i| (1, i % 2 == 0, 70_000 + i * 2_000));

@@ -43,7 +43,7 @@ fn here(flags: &[&str], directory: &Path) -> Result<PathBuf, String> {
     compile(&compiler, flags, "host.c", &program).map(|()| program)
 }
 
-/// Output of the program, or what it said when it failed.
+/// Output of the program, or its error.
 fn answers(program: &mut Command, commands: &[u8]) -> Result<String, String> {
     program.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = program.spawn().map_err(|error| format!("{program:?}: {error}"))?;
@@ -65,7 +65,7 @@ fn run(program: &mut Command, commands: &[u8]) -> String {
     answers(program, commands).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// That it wrote what it has to; otherwise the first line that differs.
+/// Asserts that it wrote the expected output; otherwise reports the first line that differs.
 fn compare(found: &str, script: &Script<'_>) {
     let mut model = 0;
     for (number, (found, expected)) in found.lines().zip(script.expected.lines()).enumerate() {
@@ -222,7 +222,7 @@ impl<'m> Batch<'m> {
 #[test]
 fn damaged_models_are_taken_or_refused_alike_at_the_same_place_and_give_the_same_answers() {
     let directory = tempfile::tempdir().unwrap();
-    // The crate is built with every layout, code among them, which is none of the header's defaults.
+    // The crate is built with every layout, code among them, which is not one of the header's defaults.
     let layouts = "-DPALPATE_LAYOUTS=95";
     let sanitizers = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", layouts];
     let program = here(&sanitizers, directory.path()).unwrap_or_else(|error| {
@@ -406,7 +406,7 @@ fn program_of(
     compile(&compiler, flags, directory.join("program.c").to_str().unwrap(), &program).map(|()| program)
 }
 
-/// Calls with less room than there are objects, then with enough; the answer is 0 if all of them said what they should.
+/// Calls with less room than there are objects, then with enough; returns 0 if all of them answered rightly.
 const CALLS: &str = r#"#define PALPATE_EARLY 1
 #include "m.h"
 
@@ -489,7 +489,7 @@ fn a_model_that_is_too_long_for_an_array_of_an_avr_says_so_there_and_what_to_do(
     let household = std::fs::read(Path::new(ROOT).join("models/household.palpate")).unwrap();
     let model = Model::new(&household).unwrap();
     let source = "#include \"household.h\"\nint main(void)\n{\n    return household_model[0] != 80;\n}\n";
-    // As an AVR's compiler reads it; what it includes there is not.
+    // As an AVR's compiler reads it; the header that it would include is missing.
     let error = program_of(directory.path(), "household", &model, source, &["-D__AVR__", "-w"]).unwrap_err();
     assert!(error.contains("model HOUSEHOLD has 44336 bytes") && error.contains("at most 32767"), "{error}");
     assert!(program_of(directory.path(), "household", &model, source, &["-Wno-unused"]).is_ok());

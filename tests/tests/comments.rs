@@ -113,7 +113,7 @@ fn the_crates_table_of_features_has_all_that_there_are_and_says_which_are_off() 
     let all: BTreeSet<&str> = features.keys().copied().filter(|name| *name != "default").collect();
     assert_eq!(stated, all);
     assert_eq!(off, all.iter().copied().filter(|name| !on.contains(name)).collect());
-    // The documentation says nothing else of what is on.
+    // The documentation mentions no other defaults.
     let text: String = ONBOARD.lines().take_while(|line| line.starts_with("//!")).collect();
     assert_eq!(text.matches("by default").count(), off.len());
 }

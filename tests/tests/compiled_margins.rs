@@ -43,7 +43,7 @@ fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
     plain.chain(shared).filter_map(|settings| compile(ensemble, &settings).ok()).collect()
 }
 
-/// The same trees over this many f32 features, as an imported model has them.
+/// An ensemble's trees over this many f32 features, as an imported model has them.
 fn imported(mut ensemble: Ensemble, features: usize) -> Ensemble {
     for (number, tree) in ensemble.trees.iter_mut().enumerate() {
         for (index, node) in tree.nodes.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! Records and models in flash: whatever single step fails or loses its power, no touch is lost, doubled or changed.
+//! Records and models in flash: whichever single step fails or loses its power, no touch is lost, doubled or changed.
 //!
 //! A step is one word written or one sector erased; every one of a session is tried with every fault, and every read with
 //! every misreading.
@@ -142,7 +142,7 @@ fn records(cells: &mut Cells, faults: &str) -> u32 {
         found
     };
     let mut number = 0;
-    // Two lives that go around the log, one of which begins in the midst of it.
+    // Two lives that go around the log; one begins in the midst of it.
     for end in [11, 24] {
         cells.power.set(true);
         let power = cells.power.clone();

@@ -40,7 +40,7 @@ fn captured(pose: bool) -> &'static Dataset {
 static PUBLISHED: LazyLock<Ensemble> =
     LazyLock::new(|| train(captured(false), &train::Settings::paper(), &()).unwrap());
 
-/// Touches, partial ones among them, spread far beyond what was trained on.
+/// Touches, including partial ones, spread far beyond those of the training.
 fn spread(dataset: &Dataset, count: usize) -> Dataset {
     let touches = random::touches(count, 4);
     let share = count / dataset.objects.len();

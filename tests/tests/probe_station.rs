@@ -1,4 +1,4 @@
-//! A board with fingers of its own, at the end of a link: touches, poses and verdicts, whatever host and power do meanwhile.
+//! A board with its own fingers, at the end of a link: touches, poses and verdicts, through losses of host and power.
 
 use palpate_onboard::effector::{Edge, Finger, Sensed};
 use palpate_onboard::station::{

@@ -31,7 +31,7 @@ fn shapes() -> impl Strategy<Value = Shape> {
     )
 }
 
-/// The same trees over rows of this many features, with fractions as thresholds.
+/// An ensemble's trees over rows of this many features, with fractions as thresholds.
 fn over_rows(mut ensemble: Ensemble, features: usize) -> Ensemble {
     for (number, tree) in ensemble.trees.iter_mut().enumerate() {
         for (index, node) in tree.nodes.iter_mut().enumerate() {

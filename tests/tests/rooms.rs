@@ -88,8 +88,8 @@ fn uses(source: &Path) -> BTreeMap<String, BTreeSet<String>> {
     uses
 }
 
-/// Rooms that use each other in a circle, and those that use them: the rest after rooms that use no other have been removed,
-/// one after the other.
+/// Rooms that use each other in a circle, and those that use them: those left after rooms that use no other have been
+/// removed one by one.
 fn circle(mut uses: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTreeSet<String>> {
     while let Some(free) = uses.iter().find(|(_, others)| others.is_empty()).map(|(room, _)| room.clone()) {
         uses.remove(&free);

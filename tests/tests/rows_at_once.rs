@@ -82,7 +82,7 @@ fn compare(model: &Model<'_>, features: &[i32], batch: &mut Batch) -> Result<(),
     Ok(())
 }
 
-/// The same trees over this many features.
+/// An ensemble's trees over this many features.
 fn spread(mut ensemble: Ensemble, features: usize) -> Ensemble {
     for (number, tree) in ensemble.trees.iter_mut().enumerate() {
         for (index, node) in tree.nodes.iter_mut().enumerate() {

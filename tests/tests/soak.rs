@@ -42,7 +42,7 @@ impl embedded_io::Write for Wire {
     }
 }
 
-/// Passes on what it gets, until either end is gone.
+/// Passes on everything that it gets, until either end is gone.
 fn pass(mut from: TcpStream, mut to: TcpStream) {
     let _ = std::io::copy(&mut from, &mut to);
     let _ = to.shutdown(std::net::Shutdown::Both);

@@ -146,7 +146,7 @@ fn the_crates_readme_states_what_exponentials_and_state_cost() {
     let lines = printed("evaluator", M4F);
     let state = numbers(&lines, "state:", 0);
     readme.cell("state for ten objects", 1, state[0], 0);
-    readme.after("bytes, of which ", state[1], 0);
+    readme.after("bytes, including ", state[1], 0);
     readme.finish();
 }
 
@@ -190,7 +190,7 @@ const CHIPS: [(usize, &str, &str); 4] = [
     (4, "avr", "-mmcu=atmega2560"),
 ];
 
-/// The rows of that table, and what is defined for them.
+/// The rows of that table, and the macros defined for them.
 const C_ROWS: [(&str, &str); 5] = [
     (
         "rows, one layout (complete), i8 leaves",

@@ -285,7 +285,7 @@ impl embedded_io::Error for Garbled {
     }
 }
 
-/// A UART that hands out byte by byte what a desk sends, and errors.
+/// A UART that hands out the bytes of a desk one by one, with errors.
 struct Uart<'d, F> {
     desk: &'d mut Desk,
     /// True if this read, or this frame to be sent, is an error.

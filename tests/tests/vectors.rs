@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 const VECTORS: &str = include_str!("../../shared/vectors/vectors.txt");
 const FORMAT: &str = include_str!("../../shared/FORMAT.md");
 
-/// A recognizer and the other one, and what they said last.
+/// A recognizer and the other one, with their last answers.
 struct Both<'m> {
     model: Model<'m>,
     recognizer: Recognizer<'m, 256>,

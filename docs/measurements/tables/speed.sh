@@ -1,5 +1,5 @@
 #!/bin/sh
-# Remakes the tables of docs/measurements/speed.md: speed against error of whatever precision or approximation can be chosen.
+# Remakes the tables of docs/measurements/speed.md: speed against error, for each precision or approximation that can be chosen.
 #
 #   docs/measurements/tables/speed.sh DIR         about fifteen minutes; reports are left in DIR
 #   docs/measurements/tables/speed.sh             without the reports: about two minutes

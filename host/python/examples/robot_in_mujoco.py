@@ -254,7 +254,7 @@ def touch(options, surface, approaches, rng):
 
 
 def seeded(options, name):
-    """A generator for an object's approaches: the same whatever else is touched."""
+    """A generator for an object's approaches: the same regardless of other objects."""
     return np.random.default_rng([options.seed, zlib.crc32(name.encode())])
 
 

@@ -188,25 +188,25 @@ impl DataSet {
         self.dataset.objects.iter().map(|object| object.len()).collect()
     }
 
-    /// The number of approaches to each object, where it is known.
+    /// The number of approaches to each object, if known.
     #[getter]
     fn approaches(&self) -> Option<Vec<u64>> {
         self.approaches.clone()
     }
 
-    /// True if every approach is kept, also those in which not all three fingers touched.
+    /// True if every approach is kept, including those in which not all three fingers touched.
     #[getter]
     fn holds_approaches(&self) -> bool {
         self.dataset.holds_approaches()
     }
 
-    /// The probe that made the touches, where that is known.
+    /// The probe that made the touches, if known.
     #[getter]
     fn probe(&self) -> Option<Probe> {
         self.dataset.probe().copied().map(Probe)
     }
 
-    /// Warnings from reading the data set; what they name may be intended.
+    /// Warnings from reading the data set, which may be about something intended.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.dataset.warnings.iter().map(ToString::to_string).collect()
@@ -246,7 +246,7 @@ impl DataSet {
         Ok(Output(made.bind(py).clone()))
     }
 
-    /// The instance, recording or log that each touch is of, from 0: a sequence is of touches of one.
+    /// Number of the instance, recording or log of each touch, from 0: all touches of a sequence are from one.
     #[getter]
     fn instances<'py>(&self, py: Python<'py>) -> PyResult<Output<'py, i16, Ix1>> {
         let made = self.instances.get_or_try_init(py, || {
@@ -303,7 +303,7 @@ impl DataSet {
         Ok(Self::new(noisy, self.approaches.clone()))
     }
 
-    /// The touches as a table: object (a category), t1, t2 and t3, and where it is known direction and alignment.
+    /// The touches as a table: object (a category), t1, t2 and t3, and, if known, direction and alignment.
     /// The columns are those of the arrays, without copies. Needs pandas.
     fn to_pandas<'py>(slf: Bound<'py, Self>) -> PyResult<DataFrame<'py>> {
         let frames = slf.py().import("palpate._frames")?;

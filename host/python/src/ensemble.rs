@@ -61,7 +61,7 @@ impl Ensemble {
         Ok(Self { ensemble: Arc::new(ensemble) })
     }
 
-    /// The same from the bytes of such a file. `notes` are what to know about it beyond what it says itself.
+    /// Reads the bytes of such a file. `notes` are facts about it that it does not state.
     #[staticmethod]
     #[pyo3(signature = (content, names=None, *, all_trees=false, missing=None, notes=Vec::new()))]
     fn from_bytes(
@@ -204,7 +204,7 @@ impl Ensemble {
 /// Trains an ensemble on a data set: gradient boosting with XGBoost's algorithm and parameters.
 ///
 /// `preset` is "compact" (30 trees with one leaf value per object, on curvature and slope) or "paper" (the published
-/// method); whatever else is given replaces a part of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
+/// method); other arguments replace parts of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
 /// `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
 /// approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
 /// Of objects on a table each placement is an output, or with `outputs` "objects" each object.

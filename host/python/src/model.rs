@@ -42,7 +42,7 @@ pub(crate) struct Model {
     pub(crate) encoder: Encoder,
     /// Its features among the columns of tables and arrays.
     pub(crate) features: Features,
-    /// Facts about what it was compiled from.
+    /// Facts about its source.
     notes: Vec<String>,
 }
 
@@ -180,7 +180,7 @@ impl Model {
         library::names(self.model())
     }
 
-    /// Facts about what the model was compiled from, each a sentence; none of a model that was loaded.
+    /// Facts about the model's source, each a sentence; none for a loaded model.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.notes.clone()

@@ -56,7 +56,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for TouchInput {
 
 /// Recognizes objects by touch, by the code that runs on the chip.
 ///
-/// It stops where the model says so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`.
+/// It stops when the model says so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`.
 ///
 /// >>> import palpate
 /// >>> model = palpate.compile(palpate.train(palpate.capture(["bowl", "mouse"], touches=1000)))

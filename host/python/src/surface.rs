@@ -41,7 +41,7 @@ impl Surface {
         Ok(Self { scene: Arc::new(scene) })
     }
 
-    /// When a sphere that starts at each origin and moves along its direction first touches: the t at which its center is
+    /// First contact of a sphere that starts at each origin and moves along its direction: the t at which its center is
     /// at origin + t * direction; 0 if it starts in contact, NaN if it never touches. One row of `directions` serves all.
     fn first_contact<'py>(
         &self,

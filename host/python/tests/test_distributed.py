@@ -1,4 +1,4 @@
-"""Captures over a cluster: the bytes of one machine's, whatever dies on the way."""
+"""Captures over a cluster: the bytes of one machine's, even if workers die on the way."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def files(directory: Path) -> dict[str, bytes]:
 
 
 def once(act: Callable[[], None], after: int) -> palpate.Progress:
-    """Acts when so many shards are done."""
+    """Acts when this many shards are done."""
     acted = False
 
     def progress(stage: str, done: int, total: int | None) -> None:

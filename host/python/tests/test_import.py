@@ -105,7 +105,7 @@ def test_trees_after_the_best_round_are_left_out_unless_all_are_asked_for(kind: 
         said = f"Training stopped early: the {taken * per_round} trees up to the best iteration, {taken - 1}, are used"
         assert any(note.startswith(said) for note in full.notes)
         model = palpate.compile(source, leaf="f32")
-        # Of dart the estimator, which takes no DMatrix, adds in another order.
+        # For dart, the estimator, which takes no DMatrix, adds in another order.
         found = model.margins(TEST)
         expected = booster.predict(xgboost.DMatrix(TEST), output_margin=True, iteration_range=(0, taken))
         np.testing.assert_array_equal(found, expected)
@@ -201,7 +201,7 @@ ESTIMATORS = [
 
 
 def test_every_estimator_that_is_taken_is_tested() -> None:
-    # What is no classifier or regressor of its own has tests of its own.
+    # Wrappers around other estimators have tests of their own.
     others = ["CalibratedClassifierCV", "IsolationForest"]
     tested = [type(estimator).__name__ for estimator in ESTIMATORS] + others
     assert sorted(tested) == sorted(palpate._sklearn.KNOWN)

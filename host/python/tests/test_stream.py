@@ -113,7 +113,7 @@ def test_a_second_fit_with_the_same_estimator_trains_a_clone_again_and_calibrate
     models = [first.model_.checksum]
     assert not hasattr(own, "classes_") and hasattr(first.estimator_, "classes_")
     sequences = [first.calibrated_.sequences]
-    # What a cell that is run twice does, and a loop over rates.
+    # Like a cell that is run twice, and a loop over rates.
     again = recognizer.set_params(error_rate=0.1).fit(X, y, sequence=sequence)
     models.append(again.model_.checksum)
     sequences.append(again.calibrated_.sequences)

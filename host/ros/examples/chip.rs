@@ -1,4 +1,4 @@
-//! A chip with the household model at a TCP port, to try the node without one: its fingers touch what is typed.
+//! A chip with the household model at a TCP port, to try the node without one: its fingers touch as typed.
 //!
 //! ```text
 //! cargo run --example chip ../../models/household.palpate 127.0.0.1:4000

@@ -1,4 +1,4 @@
-//! A chip that recognizes by itself, behind a thread: orders in, what it says out.
+//! A chip that recognizes by itself, behind a thread: orders in, reports out.
 
 use crate::decide::{Step, UNDECIDED, behind, with_best};
 use crate::wire::{Approach, Evidence, Verdict, unit_vectors};
@@ -110,7 +110,7 @@ impl Line {
         (self.under_way, self.decided, self.unasked) = (0, false, false);
         let mut model = self.model(connection)?;
         loop {
-            // One touch at a time: what the chip is asked about it has to be of this one.
+        // One touch at a time: questions to the chip must be about this one.
             if self.under_way == 0 {
                 match orders.try_recv() {
                     Ok(Order::Touch(touch)) => {
@@ -207,7 +207,7 @@ impl Line {
         Ok(())
     }
 
-    /// Tells what the chip says before the next touch. How many touches it has kept it does not say.
+    /// Reports the chip's state before the next touch. The chip does not say how many touches it has kept.
     fn tell_before(&mut self, connection: &mut Connection, names: &[String]) -> Result<()> {
         let nothing = VerdictMessage { decision: Decision::Undecided, best: 0, touches: 0, detail: None };
         let step = self.step(connection, names, &nothing)?;

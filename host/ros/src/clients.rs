@@ -50,7 +50,7 @@ impl<'n> Clients<'n> {
         Self { context, requests, responses, known: RefCell::default() }
     }
 
-    /// Waits until a response reaches whoever may have asked: each participant that writes requests has a reader of responses.
+    /// Waits until responses reach every client: each participant that writes requests needs a reader of responses.
     /// Takes a second at most, and a participant that has none by then is not waited for again.
     pub(crate) async fn wait_until_listening(&self) {
         let mut looks = 0;

@@ -17,7 +17,7 @@ self_cell::self_cell!(
     }
 );
 
-/// When to stop; 0 stands for what the model states.
+/// Stopping thresholds; 0 stands for the model's own.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Thresholds {
     /// The posterior has to exceed 1 less this.
@@ -27,7 +27,7 @@ pub(crate) struct Thresholds {
 }
 
 impl Thresholds {
-    /// The same for a recognizer of `model`.
+    /// Stopping rule for a recognizer of `model`.
     ///
     /// # Errors
     /// The number that is out of range, and the range.
@@ -52,7 +52,7 @@ pub(crate) struct Step {
     pub(crate) verdict: Verdict,
     /// None where a chip cannot be asked about it any more.
     pub(crate) evidence: Option<Evidence>,
-    /// Of a model with a plan, while nothing is decided.
+    /// Next approach, for a model with a plan, while nothing is decided.
     pub(crate) approach: Option<Approach>,
 }
 
@@ -71,9 +71,9 @@ pub(crate) const UNDECIDED: &str = "undecided";
 /// Another object begins after a verdict, when the name in the messages changes, and when [`Decider::reset`] is called.
 pub(crate) struct Decider {
     opened: Opened,
-    /// Of the last reset, for all objects until the next.
+    /// Weights of the last reset, for all objects until the next.
     expected: Option<Vec<u32>>,
-    /// As the last message named it.
+    /// Object named by the last message.
     object: String,
 }
 
@@ -91,7 +91,7 @@ impl Decider {
         Ok(Self { opened, expected: None, object: String::new() })
     }
 
-    /// The same model under other thresholds, which begins again; priors of the last reset stay.
+    /// This model under other thresholds, without touches; priors of the last reset stay.
     ///
     /// # Errors
     /// The threshold that cannot be used.
@@ -133,7 +133,7 @@ impl Decider {
         }
     }
 
-    /// Forgets all touches, for another object, of which it is `expected` what it is.
+    /// Forgets all touches, for another object, which is one of `expected`.
     ///
     /// # Errors
     /// Why not; nothing changes then.

@@ -1,4 +1,4 @@
-//! The node while it runs: what happens on its topics, and what it says then.
+//! The running node: its topics, and its answers on them.
 
 use crate::chip::{self, Heard, Order};
 use crate::clients::{AllClients, Clients};
@@ -33,7 +33,7 @@ const RESULT_TIMEOUT: Duration = Duration::from_secs(10);
 /// Something for the node to do.
 enum Happened {
     Touch(Touch, MessageInfo),
-    /// A message that is none of the type that was agreed on.
+    /// A message of another type than agreed on.
     Malformed(String),
     Reset(RmwRequestId, Expected),
     Goal(NewGoalHandle<Expected>),

@@ -27,7 +27,7 @@ pub(crate) struct Options {
     pub(crate) name: String,
     pub(crate) namespace: String,
     pub(crate) domain: u16,
-    /// Also hear publishers that do not repeat what was lost.
+    /// Also hear publishers that do not repeat lost messages.
     pub(crate) best_effort: bool,
     pub(crate) services: ServiceMapping,
     pub(crate) model: Option<Arc<CompiledModel>>,

@@ -1,7 +1,7 @@
 //! A participant whose ports are those that it announces.
 //!
 //! RustDDS 0.15.1 takes another port for its data where the one of its number is taken, but announces its publishers with the
-//! taken port: subscribers acknowledge to some other process, and what they miss is never sent again. This happens where
+//! taken port: subscribers acknowledge to some other process, and messages lost there are never sent again. This happens where
 //! programs of different middlewares start at the same time on one machine, as with `ros2 launch`.
 
 use ros2_client::dds::rustdds::DomainParticipant;
@@ -13,9 +13,9 @@ const NUMBERS: usize = 120;
 /// A participant of a domain that has both ports of its number.
 ///
 /// # Errors
-/// Why there is none, such as that all numbers are taken.
+/// Reason for a failure, such as that all numbers are taken.
 pub(crate) fn join(domain: u16) -> Result<DomainParticipant, String> {
-    // Numbers of which another process has one port: held, so that the next participant takes another number.
+    // Numbers with a port that another process took: held, so that the next participant takes another number.
     let mut held = Vec::new();
     for _ in 0..NUMBERS {
         let participant = DomainParticipant::new(domain).map_err(|error| error.to_string())?;

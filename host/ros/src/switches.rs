@@ -58,7 +58,7 @@ impl Switches {
     }
 }
 
-/// Keeps what an effector returned; whether there was anything.
+/// Keeps the outcomes of an effector; true if there were any.
 fn keep(outcome: Result<Option<Touch>, Fault>, found: &mut Vec<Result<Touch, Fault>>) -> bool {
     let outcome = outcome.transpose();
     let is_something = outcome.is_some();

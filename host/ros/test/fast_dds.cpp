@@ -1,4 +1,4 @@
-// A participant of Fast DDS, the default of ROS 2, driven by lines: the messages are made and read by whoever writes these.
+// A participant of Fast DDS, the default of ROS 2, driven by lines: the writer of the lines makes and reads the messages.
 //
 //   reader TOPIC TYPE LATCHED     an id is answered, as to the next line; LATCHED is 0 or 1
 //   writer TOPIC TYPE

@@ -1,4 +1,4 @@
-//! Random numbers that depend on a seed and on what they are for, and on nothing else.
+//! Random numbers that depend on a seed and on their purpose only.
 //!
 //! The touches of a capture have a generator of their own (`palpate::capture::Sampler`).
 
@@ -31,7 +31,7 @@ pub enum Purpose {
     Calibration,
     /// Approaches that an evaluation draws from those in a pose.
     Active,
-    /// When objects are exchanged, and for which.
+    /// Times at which objects are exchanged, and their successors.
     Switch,
     /// The order in which touches are used to calibrate a misfit test.
     Misfit,

@@ -1,4 +1,4 @@
-//! Admission of a capture to a directory, given what is there.
+//! Admission of a capture to a directory, given its content.
 
 use super::Settings;
 use crate::error::{CaptureProblem, Error, Place, Result};
@@ -26,7 +26,7 @@ pub(super) fn own_files(directory: &Path, name: &str) -> impl Iterator<Item = Pa
     done.into_iter().chain(unfinished)
 }
 
-/// Compares what is in a directory with what a capture would write, and refuses what would be lost.
+/// Compares the content of a directory with the planned capture, and rejects losses.
 pub(super) fn admit(directory: &Path, settings: &Settings, objects: &[Entry]) -> Result<Admission> {
     let names: Vec<String> = objects.iter().map(|entry| entry.name.clone()).collect();
     let refuse = |problem| Err(Error::at(Place::file(directory), problem));

@@ -97,7 +97,7 @@ pub enum CaptureProblem {
     /// The capture to resume was started by another version.
     #[error("cannot resume: started by version {found}, this is {}", env!("CARGO_PKG_VERSION"))]
     ResumesOtherVersion {
-        /// That version.
+        /// Version that captured it.
         found: String,
     },
     /// The capture to resume was started with other settings.
@@ -112,7 +112,7 @@ pub enum CaptureProblem {
         /// Its objects.
         objects: Vec<String>,
     },
-    /// A part lost what was checkpointed.
+    /// A part lost checkpointed touches.
     #[error("shorter than the {bytes} bytes that dataset.json states")]
     Shorter {
         /// Stated size in bytes.

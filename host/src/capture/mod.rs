@@ -53,7 +53,7 @@ use std::time::Instant;
 pub use memory::in_memory;
 pub use sample::{Drawn, MOST_ATTEMPTS, Sampler};
 
-/// Settings of a capture, and how it treats what is already there.
+/// Settings of a capture, and its treatment of existing files.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Settings {
     /// Origin of the touches.
@@ -62,7 +62,7 @@ pub struct Settings {
     pub resume: bool,
     /// Add objects to the data set in the directory, which must have been made in the same way.
     pub add: bool,
-    /// Replace the data set in the directory, whatever it holds. Takes precedence over `resume` and `add`.
+    /// Replace the data set in the directory, regardless of its content. Takes precedence over `resume` and `add`.
     pub force: bool,
     /// Number of threads to use, at most 256; by default as many as the machine has.
     pub threads: Option<usize>,
@@ -113,7 +113,7 @@ pub struct ObjectSummary {
     pub approaches_now: u64,
     /// Contacts of each finger in this run that came later than the stroke, and are missing; see [`Drawn::late`].
     pub late: [u64; FINGERS],
-    /// Number of approaches in this run in which a finger touched; where only full touches are kept, those.
+    /// Number of approaches in this run in which a finger touched; if only full touches are kept, of full touches.
     pub touching: u64,
     /// Number of approaches in this run that ended before the first contact, at the end of the travel.
     pub turned_back: u64,

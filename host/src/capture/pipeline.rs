@@ -2,7 +2,7 @@
 //!
 //! The chunks of all objects form one sequence. Producer p of n computes chunks p, p + n, p + 2n, … and sends them down
 //! its own channel; the writer takes one from each channel in turn, which is the sequence again. A producer that is
-//! ahead waits, so at most a few chunks are in memory whatever the number of touches.
+//! ahead waits, so at most a few chunks are in memory regardless of the number of touches.
 
 use super::store::Store;
 use super::{ObjectSummary, Sampler, Settings};
@@ -21,7 +21,7 @@ const CHUNK: u64 = 256;
 /// Number of chunks that a producer may be ahead.
 const AHEAD: usize = 8;
 
-/// The most producers, however many are asked for: what they may be ahead together stays a few megabytes.
+/// The most producers, even if more are asked for: together they are ahead by a few megabytes at most.
 const MOST_THREADS: usize = 256;
 
 /// Samples that a producer hands to the writer.

@@ -23,7 +23,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 /// Real objects need 2 to 36; a wire as thin as a hundredth of the fingers needs a few thousand.
 pub const MOST_ATTEMPTS: u64 = 1 << 22;
 
-/// A sample, and what it took.
+/// A sample, and the number of approaches for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drawn {
     /// The touch.
@@ -74,7 +74,7 @@ impl<'a> Sampler<'a> {
         self.drawn(index).map(|drawn| (drawn.touch, drawn.approaches))
     }
 
-    /// The same, with the contacts that the hand did not reach.
+    /// Sample `index`, with the contacts that the hand did not reach.
     ///
     /// # Errors
     /// As [`sample`](Self::sample).

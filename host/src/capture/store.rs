@@ -2,7 +2,7 @@
 //!
 //! Touches of an object are appended to `<object>.part`, which becomes `<object>.txt` when it is complete, or is
 //! converted to `<object>.parquet`. Twice a second the part is flushed to the disk, then the listing is written, which
-//! says how much of it counts: whatever an interruption leaves behind that is cut off when the capture is resumed.
+//! says how much of it counts: bytes behind that, left by an interruption, are cut off when the capture is resumed.
 //!
 //! Touches are only deleted after a listing that says `"complete": false` was written: at no moment does a complete
 //! listing name files that are gone.
@@ -23,7 +23,7 @@ const CHECKPOINT: Duration = Duration::from_millis(500);
 pub(super) struct Store {
     directory: PathBuf,
     listing: Listing,
-    /// Where in the listing the objects of this capture stand; when objects are added there are others.
+    /// Indices in the listing of this capture's objects; the listing may have others.
     positions: Vec<usize>,
     samples: u64,
     /// The object that is being written.
@@ -135,7 +135,7 @@ impl Store {
         self.write_listing()
     }
 
-    /// The object's part, cut to what the listing states when it is opened.
+    /// The object's part, cut to the listed length when it is opened.
     fn part_file(&mut self, object: usize) -> Result<&mut File> {
         let path = self.part(object);
         let io = |error| stopped(&path, &error);

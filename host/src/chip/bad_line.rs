@@ -48,7 +48,7 @@ pub struct BadLine {
 }
 
 impl BadLine {
-    /// A line. The same seed does the same to the same bytes, except for what the delay changes.
+    /// A line. The same seed does the same to the same bytes, except for effects of the delay.
     pub fn new(faults: Faults, seed: u64) -> Self {
         Self { faults, rng: ChaCha8Rng::seed_from_u64(seed), under_way: VecDeque::new() }
     }

@@ -53,7 +53,7 @@ pub struct Connection {
     heard: VecDeque<(Received, u32)>,
     reply: Option<Reply>,
     open: bool,
-    /// The checksum of the model that [`Connection::model`] described, and the boot number of the start that it is of.
+    /// Checksum of the model that [`Connection::model`] described, and the boot number of the chip at that time.
     model: Option<(u32, u32)>,
 }
 
@@ -161,8 +161,8 @@ impl Connection {
         Ok(Some(received))
     }
 
-    /// Asks a chip that has started since its model was asked for whether that is still the one: a loaded model that cannot
-    /// be read any more is replaced by the program's own.
+    /// Checks the model of a chip that has restarted since its model was read: a loaded model that cannot be read any more
+    /// is replaced by the program's own.
     fn check_model(&mut self, boot: u32) -> Result<()> {
         let Some((known, of)) = self.model else { return Ok(()) };
         if of == boot {
@@ -264,8 +264,8 @@ impl Connection {
         Ok(ChipModel { info, names })
     }
 
-    /// Name and version of the chip's program; none if it does not say, as programs before version 0.3, for which this
-    /// waits ten seconds.
+    /// Name and version of the chip's program; none if it does not say. A chip that does not know the question takes ten
+    /// seconds.
     ///
     /// # Errors
     /// When the line broke or the chip is silent.
@@ -305,7 +305,7 @@ impl Connection {
         Ok(posteriors)
     }
 
-    /// The approach that the chip proposes, of those in any pose. A chip whose program is older than version 0.3 does not
+    /// The approach that the chip proposes, of those in any pose. A chip that does not know the question does not
     /// answer.
     ///
     /// # Errors

@@ -28,7 +28,7 @@ pub enum ChipProblem {
     CannotOpen {
         /// The operating system's message.
         reason: String,
-        /// The serial ports that there are.
+        /// The available serial ports.
         ports: Vec<String>,
     },
     /// Nobody answers at a TCP address.
@@ -68,16 +68,16 @@ pub enum ChipProblem {
     /// The line to a chip has no message for a row of features.
     #[error("the model is over rows of features, and the line to a chip carries touches")]
     Rows,
-    /// The chip does not do what it was told to.
+    /// The chip does not obey a command.
     #[error("the chip refuses: {0}")]
     Refused(Refusal),
     /// The chip refuses a model, and keeps the one it had.
     #[error("the chip refuses the model: {0}")]
     ModelRefused(Refusal),
-    /// An answer or outcome does not belong to what was asked.
+    /// An answer or outcome does not belong to a question or command.
     #[error("the chip's answer does not match the question")]
     UnexpectedAnswer,
-    /// The chip's model is not the one that its verdicts shall be compared with.
+    /// The chip's model is not the one that its verdicts are compared with.
     #[error("the chip's model is not the one to compare with: checksum {chip:08x} instead of {expected:08x}")]
     OtherModel {
         /// The checksum of the chip's model.
@@ -92,7 +92,7 @@ pub enum ChipProblem {
         differences: u64,
         /// Touches that were compared.
         compared: u64,
-        /// The first that differs.
+        /// The first difference.
         first: String,
     },
     /// A line of a journal is wrong.
@@ -107,7 +107,7 @@ pub enum ChipProblem {
     /// A firmware image has not been built.
     #[error("the firmware image {} does not exist", path.display())]
     NoImage {
-        /// Where it should be.
+        /// Expected path.
         path: PathBuf,
     },
     /// The emulator ended by itself.

@@ -65,7 +65,7 @@ impl Chip {
     /// Runs the model on the first [`TOUCHES`] of these touches. Takes some tenths of a second.
     ///
     /// # Errors
-    /// When the emulator is not installed, the image has not been built, or the image says what is wrong.
+    /// When the emulator is not installed, the image has not been built, or the image reports an error.
     pub fn measure(self, model: &[u8], touches: &[Touch]) -> Result<Cost> {
         let machine = match self {
             Self::M4F => "mps2-an386",
@@ -100,7 +100,7 @@ fn loaded(model: &[u8], touches: &[Touch]) -> Vec<u8> {
     bytes
 }
 
-/// Reads what the image prints, which QEMU passes on to its standard error.
+/// Reads the output of the image, which QEMU passes on to its standard error.
 fn read_cost(text: &str) -> Result<Cost> {
     let after = |name: &str| text.split_whitespace().skip_while(|&word| word != name).nth(1)?.parse().ok();
     match (after("margins"), after("push")) {

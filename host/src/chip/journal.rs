@@ -27,10 +27,10 @@ pub enum Entry {
     },
     /// Another object begins.
     Object {
-        /// Its name, where it is known.
+        /// Its name, if known.
         name: Option<String>,
     },
-    /// A touch, and what is known after it.
+    /// A touch, and the state after it.
     Touch {
         /// Microseconds after the first contact, null where it is missing.
         times: [Option<u32>; 3],
@@ -40,7 +40,7 @@ pub enum Entry {
         best: String,
         /// Touches of this object so far.
         touches: u32,
-        /// The posterior of each object, where it is known.
+        /// The posterior of each object, if known.
         posteriors: Option<Vec<f64>>,
         /// Seconds since the beginning.
         at: f64,
@@ -79,7 +79,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Begins a journal. A journal of this name is replaced, not emptied: whoever still follows it can read the rest of it.
+    /// Begins a journal. A journal of this name is replaced, not emptied: its other readers can still read the rest of it.
     ///
     /// # Errors
     /// When the file cannot be written, and [`Foreign`](crate::error::Foreign) if one is there that is no journal.

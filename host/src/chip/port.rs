@@ -13,7 +13,7 @@ use std::time::Duration;
 pub enum Port {
     /// A serial port, by the operating system's name: `/dev/ttyACM0`, `COM3`.
     Serial(String),
-    /// `tcp://host:port`: whatever passes bytes on, such as a serial server or an emulator elsewhere.
+    /// `tcp://host:port`: anything that passes bytes on, such as a serial server or an emulator elsewhere.
     Tcp(String),
     /// `emulator`: an emulator that is started for this.
     Emulator,

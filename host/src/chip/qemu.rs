@@ -93,7 +93,7 @@ impl Drop for Qemu {
     }
 }
 
-/// Runs `command` to its end, and returns what it wrote to both standard output and standard error.
+/// Runs `command` to its end, and returns its standard output and standard error.
 ///
 /// # Errors
 /// When it cannot be started, or has not ended after `patience`.

@@ -17,7 +17,7 @@ const RETRY: Duration = Duration::from_millis(500);
 pub enum Heard<'a> {
     /// The chip answers, for the first time or after the line broke.
     Connected {
-        /// Its program, where it says so.
+        /// Its program, if it says so.
         program: Option<&'a str>,
         /// Its model, if it has one.
         model: Option<&'a ChipModel>,
@@ -46,7 +46,7 @@ pub enum Heard<'a> {
         /// 0, 1 or 2 along the row; 255 if it is not the fault of one finger.
         finger: u8,
     },
-    /// The chip reported so many things that were lost on the way.
+    /// The chip reported this number of things lost on the way.
     Missed(u32),
     /// Nothing has happened for a while.
     Idle,
@@ -71,7 +71,7 @@ pub struct RecordSummary {
     pub faults: u64,
     /// Times that the line broke.
     pub lost: u64,
-    /// Name and version of the chip's program, where it says so.
+    /// Name and version of the chip's program, if it says so.
     pub firmware: Option<String>,
 }
 
@@ -120,7 +120,7 @@ pub fn record(
     Ok(summary)
 }
 
-/// Asks the chip what it is.
+/// Asks the chip for its program's name and version.
 fn greet(
     connection: &mut Connection,
     recording: &mut Recording,

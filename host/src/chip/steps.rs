@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Something to tell the chip.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
-    /// The next object begins: forget the touches so far. With its name, where it is known.
+    /// The next object begins: forget the touches so far. With its name, if known.
     Object(Option<String>),
     /// A touch.
     Touch(Touch),
@@ -72,7 +72,7 @@ impl Steps {
         Self::Logged(steps.into_iter())
     }
 
-    /// Number of touches there will be, where that is known.
+    /// Number of touches there will be, if known.
     pub fn count(&self) -> Option<u64> {
         match self {
             Self::Sequences { left, .. } => Some(*left),

@@ -16,9 +16,9 @@ use std::time::{Duration, Instant};
 /// Something new from the chip.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Update {
-    /// Another object begins, with its name where it is known.
+    /// Another object begins, with its name, if known.
     Object(Option<String>),
-    /// A touch, and what is known after it.
+    /// A touch, and the state after it.
     Touch {
         /// The touch.
         touch: Touch,
@@ -170,7 +170,7 @@ pub fn stream(
             Some(Received::Outcome(outcome)) => run.take(outcome, chip).map_err(|problem| connection.wrong(problem))?,
         };
         busy.set(!run.under_way.is_empty(), Instant::now());
-        // A verdict ends the object: what comes next is another one.
+        // A verdict ends the object: the next touch is of another one.
         let is_open = match &update {
             Update::Touch { verdict, .. } => verdict.decision == Decision::Undecided,
             Update::Refused { .. } => !run.decided,

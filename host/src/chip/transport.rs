@@ -53,7 +53,7 @@ impl Transport {
         self
     }
 
-    /// The same over a bad line.
+    /// Makes the line bad.
     pub fn with_faults(mut self, faults: Faults, seed: u64) -> Self {
         self.bad = Some((BadLine::new(faults, seed), BadLine::new(faults, !seed)));
         self
@@ -64,7 +64,7 @@ impl Transport {
         &self.name
     }
 
-    /// Resets the emulated chip, as a power cut would whose RAM is battery-backed.
+    /// Resets the emulated chip, like a power cut of a chip with battery-backed RAM.
     ///
     /// # Errors
     /// When this is no emulator, or it does not listen.

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 /// Numbers of approaches after which accuracy is given.
 const AT: [usize; 5] = [5, 10, 20, 30, 60];
-/// Approaches whose accuracy on simulated touches is asked for on recorded ones.
+/// Number of approaches whose accuracy on simulated touches must be reached on recorded ones.
 const COST_AT: usize = 20;
 /// The least rise of the share of a confusion that is listed.
 const MORE: f64 = 0.05;
@@ -24,7 +24,7 @@ pub struct Cost {
     pub known: usize,
     /// Accuracy after a number of approaches, on simulated touches that the model was not trained on.
     pub simulated: BTreeMap<usize, Share>,
-    /// The same on recorded touches of the same objects.
+    /// Accuracy on recorded touches of the same objects.
     pub recorded: BTreeMap<usize, Share>,
     /// Number of approaches behind the accuracy on simulated touches.
     pub after: usize,
@@ -50,7 +50,7 @@ pub struct Confused {
     pub touches: usize,
     /// The share of the groups of touches for which it was, on simulated touches.
     pub simulated: f64,
-    /// The same on recorded ones.
+    /// This share on recorded ones.
     pub recorded: f64,
 }
 
@@ -162,7 +162,7 @@ impl Entry {
         own.unwrap_or(f64::from(u8::from(self.name == name)))
     }
 
-    /// The object that it is, whatever its placement.
+    /// The true object, regardless of its placement.
     fn object(&self, has_placements: bool) -> &str {
         if has_placements && self.outputs.len() == 1 { object_of(&self.name) } else { &self.name }
     }

@@ -12,7 +12,7 @@ pub struct FeatureComparison {
     pub feature: String,
     /// Its 5th, 25th, 50th, 75th and 95th percentiles among recorded touches: microseconds for times, Q15 for cosines.
     pub recorded: [f64; 5],
-    /// The same among simulated touches.
+    /// These percentiles among simulated touches.
     pub simulated: [f64; 5],
     /// The largest difference between the shares of touches below a value: 0 to 1.
     pub apart: f64,

@@ -1,13 +1,13 @@
 //! Distance between recorded and simulated touches, feature by feature and as a whole.
 //!
-//! The one figure is how often a classifier tells a recorded touch of an object from a simulated one: trees are trained to
-//! do just that, and tested on touches that they were not trained on (cross-validation). Half of the time is guessing. It
-//! is a test of two samples by a classifier: Lopez-Paz and Oquab, Revisiting Classifier Two-Sample Tests, 1610.06545. Each
-//! feature is compared by itself too, by the largest difference of its two distributions (Kolmogorov and Smirnov).
+//! The one figure is the accuracy of a classifier that divides an object's touches into recorded and simulated ones: trees
+//! are trained for just that, and tested on touches that they were not trained on (cross-validation). Guessing is right half
+//! of the time. This is a classifier two-sample test: Lopez-Paz and Oquab, Revisiting Classifier Two-Sample Tests,
+//! 1610.06545. Each feature is also compared alone, by the largest difference of its distributions (Kolmogorov, Smirnov).
 //!
-//! What it costs that they are apart is measured with a model trained on simulated touches: how often it is right on
-//! recorded ones, how many more approaches it takes there to be right as often as on simulated ones, and whether a promise
-//! that simulated touches support is kept.
+//! The cost of the difference is measured with a model trained on simulated touches: how often it is right on recorded
+//! ones, how many more approaches it takes there to be right as often as on simulated ones, and whether a promise that
+//! simulated touches support is kept.
 
 mod cost;
 mod features;
@@ -80,7 +80,7 @@ const NEARLY: f64 = 0.02;
 const ENOUGH: usize = 60;
 /// The part of a loss that pairs of objects make for it to be theirs.
 const MOSTLY: f64 = 0.5;
-/// Loss of accuracy from which on something is wrong with the simulation.
+/// Loss of accuracy that shows a fault of the simulation.
 const STRONGLY: f64 = 0.1;
 
 /// Comparison of recorded and simulated touches.
@@ -459,7 +459,7 @@ mod tests {
         assert_eq!(said(false, 0.6), format!("{lost} Fit the probe to recorded touches, or record more of them."));
         let fitted = said(true, 0.6);
         assert!(fitted.starts_with(lost) && fitted.contains("most of the loss is scissors as hammer"), "{fitted}");
-        // A ninth of 5 points is no explanation of 3.9.
+        // A ninth of 5 points does not explain 3.9.
         let elsewhere = said(true, 0.13);
         assert!(elsewhere.contains("check the meshes and their sizes") && !elsewhere.contains("Fit"), "{elsewhere}");
     }

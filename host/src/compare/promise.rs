@@ -25,12 +25,12 @@ pub struct Promised {
     pub rate: f64,
     /// Share of the names given to the same objects that are wrong on simulated touches; none if no name was given.
     pub simulated: Option<f64>,
-    /// The same on recorded touches, of the names given in several orders of them.
+    /// Share on recorded touches, of the names given in several orders of them.
     pub recorded: Option<f64>,
     /// Names given on recorded touches in sequences that share no touch, on average over the same orders.
     pub names: f64,
-    /// Comparison of the recorded share with the promised rate, or with the simulated share where that is larger, since these
-    /// objects may be harder than the average that the rate is promised of.
+    /// Comparison of the recorded share with the promised rate, or with the simulated share if that is larger, since these
+    /// objects may be harder than the average for which the rate is promised.
     pub finding: Finding,
 }
 

@@ -22,7 +22,7 @@ use crate::error::Result;
 use import::Options;
 use std::path::Path;
 
-/// Reads an ensemble, over touches or over rows, and checks what it states of its touches.
+/// Reads an ensemble, over touches or over rows, and checks its statements about touches.
 ///
 /// # Errors
 /// As [`Ensemble::load`]; [`EnsembleProblem::Attribute`] for statements that this

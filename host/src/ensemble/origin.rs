@@ -21,7 +21,7 @@ pub struct TouchOrigin {
     pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
-    /// The same of recorded touches that the ensemble was adjusted to.
+    /// Fingerprints of recorded touches that the ensemble was adjusted to.
     pub adjusted: BTreeMap<String, u64>,
     /// Kind of touches, and so which ones are evidence.
     pub trained: Option<Trained>,
@@ -220,8 +220,8 @@ impl StatedProbe {
         dataset.origin.as_ref().map(Self::from)
     }
 
-    /// Statements of a compiled model about it. Units are made tenths of the longest side, whatever side objects were
-    /// scaled to.
+    /// Statements of a compiled model about it. Units are made tenths of the longest side, regardless of the length
+    /// that objects were scaled to.
     pub fn trained(&self) -> TrainedProbe {
         let scale = match self.unit {
             Length::Tenth => 10.0 / self.length,
@@ -275,7 +275,7 @@ impl StatedProbe {
     }
 }
 
-/// Latest contacts of touches of which nothing states the stroke, compared with that of a model.
+/// Latest contacts of touches without a stated stroke, compared with the stroke of a model.
 impl StatedProbe {
     /// Compares a probe, such as a model's, with that of a data set, as [`compare`](Self::compare) does. Recorded touches may
     /// not state their stroke; it is then compared with their latest contacts: none may be later than the stroke of `probe`, by
@@ -295,7 +295,7 @@ impl StatedProbe {
         let own = Self::of(dataset).map(|own| own.trained());
         let is_simulated = own.is_some() && !dataset.is_recorded();
         if let Some((probe, own)) = probe.zip(own) {
-            // Nor do recordings state what the objects lay on.
+            // Nor do recordings state a scene.
             let unstated = |own: TrainedProbe| TrainedProbe {
                 stroke: own.stroke.or(probe.stroke),
                 cone: if own.cone == 0 { probe.cone } else { own.cone },
@@ -360,7 +360,7 @@ fn scene(cone: u16) -> String {
 
 /// Contacts that end before this share of the longest time between them were ended by a stroke.
 const ENDED: f64 = 0.75;
-/// The same of a stated stroke, at which contacts end at once in any case.
+/// This share for a stated stroke, at which contacts end at once in any case.
 const STATED: f64 = 1.2;
 
 /// The latest contacts of touches.
@@ -397,14 +397,14 @@ impl From<&touches::Origin> for StatedProbe {
 /// A fingerprint is made of this many touches at most.
 const FINGERPRINTED: usize = 16;
 
-/// The objects whose touches in `dataset` a compiled model was trained on, as far as it states that: what it does on them
-/// says nothing about others. Of other touches, one object in 65,536 is taken for one of these.
+/// The objects whose touches in `dataset` a compiled model was trained on, if it states that: results on them say nothing
+/// about others. One in 65,536 other objects is taken for one of these.
 pub fn compiled_trained_on<'d>(compiled: &CompiledModel, dataset: &'d Dataset) -> Vec<&'d str> {
     let (model, names) = (compiled.model(), compiled.names());
     let Some(stated) = model.trained_capture() else { return Vec::new() };
     let captured = Captured::of(dataset);
     let is_near = captured.as_ref().is_some_and(|captured| captured.is_near(&stated));
-    // A capture of another seed has other touches; what is not captured is identified by its first touches.
+    // A capture with another seed has other touches; recordings are identified by their first touches.
     let fingerprints = if captured.is_none() || stated.settings == 0 { fingerprints(dataset) } else { BTreeMap::new() };
     let same = |name: &&str| {
         let object = names.iter().position(|own| own == name).and_then(|object| stated.object(object));

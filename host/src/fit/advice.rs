@@ -13,9 +13,9 @@ const MISSED: f64 = 0.08;
 /// much too little loses half a point after 60 approaches, and one that is trained for too much loses a tenth
 /// (`docs/measurements/fit.md`).
 const NOISE: f64 = 2.5;
-/// The most noise in milliseconds of which it is measured that training for it costs little.
+/// Largest noise in milliseconds for which training was measured to cost little.
 const MUCH_NOISE: f64 = 5.0;
-/// No recording is asked to be longer than this many times what is there.
+/// Largest proposed length of a recording, as a multiple of the present one.
 const MOST: f64 = 30.0;
 
 pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {

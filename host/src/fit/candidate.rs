@@ -10,7 +10,7 @@ pub(super) struct Candidate {
     pub(super) factor: f64,
     /// Delay of each finger; 0 for the first.
     pub(super) late: [f64; 3],
-    /// Standard deviation of each contact time, with what the timer adds.
+    /// Standard deviation of each contact time, including the timer's.
     pub(super) noise: f64,
     /// The share of contacts that each finger misses.
     pub(super) missed: [f64; 3],
@@ -27,7 +27,7 @@ impl Candidate {
         [self.factor.ln() / 0.03, middle, third, self.noise.ln() / 0.3, a / 0.1, b / 0.1, c / 0.1]
     }
 
-    /// The reverse. Noise that no table exists for becomes the nearest that there is.
+    /// The reverse. Noise without a table becomes the nearest one with a table.
     pub(super) fn of(numbers: &[f64; NUMBERS]) -> Self {
         let [factor, middle, third, noise, a, b, c] = *numbers;
         Self {
@@ -41,7 +41,7 @@ impl Candidate {
 
 /// Prior of the probe's faults: standard deviations of the logarithm of the factor, of offsets in milliseconds, and of
 /// the logarithm of the noise about [`USUAL_NOISE`]. Of candidates that explain touches equally well the usual one is
-/// taken; a few dozen touches outweigh it wherever they say something.
+/// taken; a few dozen touches outweigh it if they say anything.
 const USUAL: [f64; 3] = [0.15, 8.0, 1.0];
 /// In milliseconds.
 const USUAL_NOISE: f64 = 2.0;

@@ -115,7 +115,7 @@ impl Densities {
             match observed.fingers {
                 FULL => {
                     full.push([first as f32, second as f32]);
-                    // κ is the sum, the slope the difference of what the outer fingers are later than the middle one.
+                    // κ is the sum, the slope the difference, of the outer fingers' delays after the middle one.
                     neighbors[1].extend([(first + second) / -2.0, (first - second) / -2.0].map(|late| late as f32));
                     outer[1].extend([second as f32, -second as f32]);
                 }

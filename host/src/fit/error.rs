@@ -11,7 +11,7 @@ pub enum FitProblem {
     NotRecorded {
         /// The recorded object.
         name: String,
-        /// The objects that there are.
+        /// The known objects.
         known: Vec<String>,
     },
     /// There are too few recorded touches to fit a probe to.

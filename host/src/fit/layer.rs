@@ -29,9 +29,9 @@ use rayon::prelude::*;
 
 /// Simulated approaches to each object.
 const APPROACHES: u64 = 20_000;
-/// Gain of log-likelihood from which fingers bend: a fit to touches of rigid ones finds a little of it by chance.
+/// Least gain of log-likelihood for bending fingers: a fit to touches of rigid ones finds a little of it by chance.
 const CERTAIN: f64 = 4.0;
-/// Gain from which they may bend: the probe's intervals allow for it.
+/// Gain at which they may bend: the probe's intervals allow for it.
 const POSSIBLE: f64 = 1.0;
 
 /// Approaches to an object, and what rigid fingers would touch.

@@ -15,7 +15,7 @@ pub(super) struct Explained<'a> {
     candidate: Candidate,
     smoothed: super::density::Smoothed<'a>,
     shares: [f64; 8],
-    /// The stroke: the recorded one as a time, and what the simulated approaches come to with it.
+    /// The stroke: the recorded one as a time, and its effect on the simulated approaches.
     stroke: Option<Stroke>,
     /// The logarithm of the share of approaches that were recorded.
     recorded: f64,
@@ -107,7 +107,7 @@ impl<'a> Explained<'a> {
             Some(stroke) if observed.contacts() < 2 => stroke.shares,
             _ => self.shares,
         };
-        // What was touched may be more than what was recorded.
+        // The object may have more placements than were recorded.
         let mut density = 0.0;
         for touched in (0..8).filter(|touched| touched & fingers == fingers) {
             let share = shares[usize::from(touched)] * self.product(touched, fingers);

@@ -106,7 +106,7 @@ impl Default for Settings {
 /// The fewest recorded touches with two or three contacts from which a probe is fitted.
 pub const LEAST: usize = 20;
 
-/// Recordings and simulated touches: what a candidate is compared with.
+/// Recordings and simulated touches, with which a candidate is compared.
 struct Evidence<'a> {
     recordings: &'a [Recording<'a>],
     /// Simulated touches of all objects.
@@ -170,7 +170,7 @@ pub fn fit(
     fit_to(&simulated, stroke, recorded, plate, settings, progress)
 }
 
-/// For each recording what it is of, if there are enough touches.
+/// The object or placement of each recording, if there are enough touches.
 fn useful(recorded: &Dataset, touched: &[Touched], plate: Option<&[Touch]>) -> Result<Vec<usize>> {
     let place = |own: &ObjectTouches| place(&own.name, touched.iter().map(|touched| touched.name.as_str()));
     let of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
@@ -182,7 +182,7 @@ fn useful(recorded: &Dataset, touched: &[Touched], plate: Option<&[Touch]>) -> R
     Ok(of)
 }
 
-/// As [`fit`], to simulated touches.
+/// Like [`fit`], to simulated touches.
 fn fit_to(
     simulated: &Simulated,
     stroke: Stroke,
@@ -227,7 +227,7 @@ fn fit_to(
     Ok(fit)
 }
 
-/// The place of what a recording of this name is of.
+/// The index of the object or placement of a recording with this name.
 fn place<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Result<usize> {
     let problem = || FitProblem::NotRecorded { name: name.into(), known: known.clone().map(str::to_owned).collect() };
     touched::place(name, known.clone()).ok_or_else(|| problem().into())
@@ -253,7 +253,7 @@ fn scenes(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> R
     capture::scenes(&objects.iter().collect::<Vec<_>>(), &origin, progress)
 }
 
-/// Each object, touched by the probe as it should be whose hand goes on past it, but for fingers that bend.
+/// Each object, touched by the nominal probe, with a hand that goes on past it; fingers may bend.
 struct Simulated {
     touches: Vec<ObjectTouches>,
     touched: Vec<Touched>,

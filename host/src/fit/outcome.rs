@@ -52,7 +52,7 @@ pub struct Fit {
     pub speed_factor: Estimate,
     /// Delay of the second and the third finger, relative to the first.
     pub late: [Estimate; 2],
-    /// Standard deviation of each contact time, without what the timer adds.
+    /// Standard deviation of each contact time, without the timer's.
     pub noise: Estimate,
     /// The share of contacts that each finger misses; none where only full touches were recorded.
     pub missed: Option<[Estimate; FINGERS]>,
@@ -68,25 +68,25 @@ pub struct Fit {
     pub readings: Option<f64>,
     /// Recorded touches and approaches.
     pub recorded: usize,
-    /// Those of them with three contacts, and with two.
+    /// Number of these with three contacts, and with two.
     pub contacts: [usize; 2],
     /// Presses on a flat plate.
     pub presses: usize,
     /// Names of the recorded objects, or placements.
     pub objects: Vec<String>,
-    /// Those of them that state no placement on a table, and were not checked for other objects.
+    /// Names of these without a placement on a table, which were not checked for other objects.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unchecked: Vec<String>,
     /// Surroundings of the objects.
     #[serde(skip_serializing_if = "Surroundings::is_floating")]
     pub scene: Surroundings,
-    /// Warnings about what the recordings cannot determine, and what to record next.
+    /// Warnings about numbers that the recordings cannot determine, and proposals for the next recording.
     pub warnings: Vec<Warning>,
     /// Recordings that look wrong.
     pub suspects: Vec<Suspect>,
 }
 
-/// Gathers what was found; warnings are still to come.
+/// Gathers results; warnings are still to come.
 pub(super) fn outcome(
     evidence: &Evidence<'_>,
     best: &Best,
@@ -107,7 +107,7 @@ pub(super) fn outcome(
         // An end that falls short of the value, by rounding, is the value.
         Estimate { value, low: low.map(|low| low.min(value)), high: high.map(|high| high.max(value)) }
     };
-    // A time that is rounded down to ticks of a clock of any phase is off by as much as a uniform number.
+    // A time rounded down to ticks of a clock with any phase has the variance of a uniform number.
     let ticks = resolution.unwrap_or(0.0) / 12.0_f64.sqrt();
     let noise = |candidate: &Candidate| (candidate.noise.powi(2) - ticks.powi(2)).max(0.0).sqrt();
     let only_full = evidence.plate.is_none() && evidence.recordings.iter().all(|own| own.kept == Kept::Full);

@@ -95,7 +95,7 @@ fn order(shares: &[f64]) -> Vec<usize> {
 
 /// Half the way to the third neighbor with the same contacts; 0 where there are not as many.
 fn gap(one: &Simulated, all: &[Simulated]) -> f32 {
-    // Times of fingers that did not touch are 0, and so are what they add here.
+    // Times of fingers that did not touch are 0, and so is their contribution here.
     let away = |other: &Simulated| {
         let [a, b, c]: [f32; 3] = std::array::from_fn(|finger| other.times[finger] - one.times[finger]);
         let touched = |fingers: u8| one.touched & fingers == fingers;
@@ -157,7 +157,7 @@ pub(super) fn log_density(explained: &Explained<'_>, observed: &Observed, in_pos
     most + (TRUSTED * (posed - most).exp() + (1.0 - TRUSTED) * (all - most).exp()).ln()
 }
 
-/// The density among the approaches in its pose; none if none of them says anything.
+/// The density among the approaches in its pose; none if they all say nothing.
 fn density(explained: &Explained<'_>, observed: &Observed, InPose(approaches): &InPose) -> Option<f64> {
     let (Candidate { factor, late, noise, missed }, kept) = (explained.candidate(), explained.kept());
     let (mut sum, mut weights) = (0.0, 0.0);

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 const SET: usize = 75;
 const PRESSES: usize = 20;
 
-/// The recorded approaches in a directory, of each file those in this range, with their poses or without.
+/// The recorded approaches in a directory, those in this range of each file, with their poses or without.
 fn read(directory: &Path, range: std::ops::Range<usize>, has_poses: bool) -> Dataset {
     let mut files: Vec<PathBuf> = std::fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();

@@ -1,4 +1,4 @@
-//! A quick climb to a near maximum of the likelihood, by slopes: for comparing layers, each of which has tables of its own.
+//! A quick climb to a near maximum of the likelihood, by slopes: for comparing layers, which have tables of their own.
 //!
 //! It stops at the nearest maximum. The probe itself is found by the slower search of [`search`](super::search).
 
@@ -7,7 +7,7 @@ use super::search::{Best, Likelihood};
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
-/// Numbers of a candidate, and what is one for each pair of them.
+/// Numbers of a candidate, and values for each pair of them.
 type Numbers = SVector<f64, NUMBERS>;
 type Pairs = SMatrix<f64, NUMBERS, NUMBERS>;
 

@@ -1,7 +1,7 @@
 //! The stroke of the hand that made recorded touches: stated, or estimated from the recordings.
 //!
-//! Where the simulated objects would be touched later and no recorded contact is, the hand had stopped, at or behind the latest
-//! contact: by about as far as it takes for one contact more, as often as the simulated ones come there.
+//! If the simulated objects would be touched later and no recorded contact is, the hand had stopped at the latest contact or
+//! after it: by about the time of one more contact, at the rate of the simulated ones there.
 
 use super::words::Estimate;
 use super::{FitProblem, Kept};
@@ -21,9 +21,9 @@ const BEHIND: [f64; 2] = [1.0, 3.0];
 /// The stroke of the recordings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Stroke {
-    /// As a time in milliseconds; none if the hand goes on past the objects.
+    /// Duration in milliseconds; none if the hand goes on past the objects.
     pub(super) window: Option<f64>,
-    /// Where it is not stated, but estimated: in units, with its interval.
+    /// Estimate if it is not stated: in units, with its interval.
     pub(super) estimated: Option<Estimate>,
 }
 

@@ -42,7 +42,7 @@ const UNLIKE: f64 = 7.0;
 pub enum Suspect {
     /// It is of another object.
     OtherObject {
-        /// The object by whose name it goes.
+        /// The object that the recording is named after.
         object: String,
         /// The object whose touches they look like.
         looks_like: String,
@@ -76,7 +76,7 @@ pub enum Suspect {
         /// The parameters of the probe by the other recordings and by this one, in words.
         what: String,
     },
-    /// Its touches look like those of none of the objects.
+    /// Its touches are unlike those of any object.
     Unlike {
         /// The object by whose name it goes.
         object: String,
@@ -159,7 +159,7 @@ struct Found {
 }
 
 impl Found {
-    /// Wrong names come first: they make the fit wrong, and with it what is said about the probe of the others.
+    /// Wrong names come first: they make the fit wrong, and with it any statement about the probe of the others.
     fn rank(&self) -> (bool, f64) {
         (matches!(self.suspect, Suspect::OtherObject { .. } | Suspect::TwoObjects { .. }), self.nats)
     }
@@ -417,7 +417,7 @@ mod tests {
     use crate::tests::repetitions::{assert_rare, repetitions};
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Log-densities of so many touches of the right object, whose densities are known: as another's, which gives numbers
+    /// Log-densities of this many touches of the right object, whose densities are known: as another's, which gives numbers
     /// that are larger by `apart`, and as its own.
     fn densities(count: usize, apart: f64, run: u64) -> [Vec<f64>; 2] {
         let mut random = generator(run, Purpose::Synthetic, "suspects", 0);

@@ -65,12 +65,12 @@ fn other(name: &str) -> Object {
     OBJECTS.iter().find(|object| object.name == name).unwrap().clone()
 }
 
-/// Approaches to an object, with what is wrong with the probe.
+/// Approaches to an object, by a probe with deviations.
 fn approaches(object: &Object, count: usize, seed: u64, probe: &Crooked) -> Vec<Touch> {
     approaches_of(object, count, seed, probe, Noise::default())
 }
 
-/// The same with fingers that bend.
+/// Like [`approaches`], with fingers that bend.
 fn approaches_of(object: &Object, count: usize, seed: u64, probe: &Crooked, real: Noise) -> Vec<Touch> {
     let origin = Origin { approaches: true, seed: 1_000 + seed, real, ..Origin::default() };
     let scenes = capture::scenes(&[object], &origin, &()).unwrap();
@@ -132,12 +132,12 @@ fn finely(recorded: &Dataset, plate: &[Touch]) -> Fit {
     rigid(&MANY, recorded, Some(plate))
 }
 
-/// The fit of a probe of which nothing is known.
+/// The fit of an unknown probe.
 fn layered(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
     fit(recorded, &objects(), plate, &Settings { approaches: 12_000, ..settings() }, &()).unwrap()
 }
 
-/// That the values are near those of the probe, and the intervals hold them but for an error of the simulation.
+/// Asserts that the values are near the probe's, and within the intervals except for an error of the simulation.
 fn near(fit: &Fit, probe: &Crooked, [factor, offset, noise]: [f64; 3]) {
     let told = format!("{:?} {:?} {:?} {:?}", fit.speed_factor, fit.late, fit.noise, fit.missed);
     assert!((fit.speed_factor.value * probe.longer - 1.0).abs() < factor, "{told}");
@@ -384,7 +384,7 @@ fn a_fit_is_the_same_on_any_number_of_threads_and_read_back_as_written() {
     }
 }
 
-/// The same touches of a hand that stops this many milliseconds after the first contact.
+/// Touches of a hand that stops this many milliseconds after the first contact.
 fn stopped(recorded: &Dataset, after: u32) -> Dataset {
     recorded.each(|own| own.changed(|touch| crate::probe::hand::within(touch, Some(1_000 * after))))
 }

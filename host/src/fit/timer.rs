@@ -4,7 +4,7 @@ use palpate_shared::Touch;
 
 /// Resolutions that are looked for, in microseconds.
 const RANGE: [f64; 2] = [20.0, 60_000.0];
-/// Times are used up to so many ticks: the farther, the more exactly must the resolution be known.
+/// Times are used up to this many ticks: the farther, the more exactly must the resolution be known.
 const TICKS: f64 = 40.0;
 /// Mean resultant length of the times' phases within a tick, above which there is a timer.
 const CLOSE: f64 = 0.93;
@@ -16,13 +16,13 @@ const LEAST: usize = 24;
 pub(super) enum Timer {
     /// Its resolution in microseconds.
     Found(f64),
-    /// Finer than what is looked for.
+    /// A resolution finer than those searched.
     Fine,
     /// There are too few times to tell.
     Unknown,
 }
 
-/// The largest resolution of which nearly all times are multiples. Rayleigh's test: on whole ticks the unit vectors at
+/// The largest resolution that divides nearly all times. Rayleigh's test: on whole ticks the unit vectors at
 /// 2π · time / resolution all point the same way.
 pub(super) fn timer<'a>(touches: impl IntoIterator<Item = &'a Touch>) -> Timer {
     let times = touches.into_iter().flat_map(|touch| touch.times()).filter_map(|time| time.micros());
@@ -52,12 +52,12 @@ const READINGS: f64 = 5_000.0;
 /// Mean resultant length above which times cluster: readings that come up to 3 of 10 ms late have .73, and the recordings of 5 robots
 /// that are read every millisecond or two at most .24.
 const CLUSTERED: f64 = 0.5;
-/// Times that it takes, each of so many readings: fewer are near each other by the objects' shapes.
+/// Least number of times, and of readings in each: fewer are near each other by the objects' shapes.
 const MANY: usize = 100;
 const FROM: f64 = 3.0;
 
-/// The time between readings of the contacts in microseconds, if they come so seldom that contact times cluster about its
-/// multiples, though they jitter; none where the timer itself is as coarse.
+/// The time between readings of the contacts in microseconds, if they are so rare that contact times cluster about its
+/// multiples despite jitter; none if the timer itself is as coarse.
 pub(super) fn readings<'a>(touches: impl IntoIterator<Item = &'a Touch>, timer: Timer) -> Option<f64> {
     let ticks = match timer {
         Timer::Found(micros) => micros,
@@ -92,7 +92,7 @@ fn closeness(times: &[f64], resolution: f64) -> f64 {
     f64::hypot(cos, sin) / times.len().max(1) as f64
 }
 
-/// The nearest number of two digits, if it is within what the search can tell.
+/// The nearest number of two digits, if it is within the resolution of the search.
 fn usual(resolution: f64) -> f64 {
     let power = 10.0_f64.powf(resolution.log10().floor() - 1.0);
     let rounded = (resolution / power).round() * power;

@@ -11,7 +11,7 @@ pub(super) struct Touched {
     pub(super) name: String,
     /// One for each instance, or placement of each.
     pub(super) scenes: Vec<Scene>,
-    /// How often each is touched, compared with the others.
+    /// Relative frequencies of touching each.
     pub(super) weights: Vec<f64>,
 }
 
@@ -70,7 +70,7 @@ pub(super) fn touched(objects: &[Object], scenes: Vec<Vec<Scene>>, recorded: &Da
     all
 }
 
-/// The place of what a recording of this name is of: an object, its placement, or the object of a placement.
+/// The index of the subject of a recording with this name: an object, its placement, or the object of a placement.
 pub(super) fn place<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Option<usize> {
     let whole = name.rsplit_once('/').map(|(whole, _)| whole);
     let find = |name: &str| known.clone().position(|own| own == name);

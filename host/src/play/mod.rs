@@ -81,7 +81,7 @@ pub struct Player<'m> {
     refused: Option<Refused>,
 }
 
-/// One approach, and what came of it.
+/// One approach, and its result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Approached {
     /// The probe's approach.
@@ -92,7 +92,7 @@ pub struct Approached {
     pub unreached: [Option<Unreached>; FINGERS],
     /// The touch as it was.
     pub exact: Touch,
-    /// The touch as the sensor reports it, with noise: what the models see.
+    /// The touch as the sensor reports it, with noise, for the models.
     pub touch: Touch,
 }
 
@@ -125,7 +125,7 @@ impl<'m> Game<'m> {
         Ok(self.models.len() - 1)
     }
 
-    /// Sets what is added to touches from the next on.
+    /// Sets the noise of touches from the next one on.
     ///
     /// # Errors
     /// As [`Noise::check`]; nothing changes then.
@@ -270,7 +270,7 @@ impl<'m> Player<'m> {
         &self.recognizer
     }
 
-    /// Approaches up to its verdict, also those that are no evidence to it.
+    /// Approaches up to its verdict, including those that are no evidence to it.
     pub fn approaches(&self) -> u32 {
         self.approaches
     }

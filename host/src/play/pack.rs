@@ -28,7 +28,7 @@ pub fn decompress(bytes: &[u8]) -> Option<Vec<u8>> {
 /// Packs vertices, as whole numbers of steps, and the triangles between them. Vertices that no triangle uses are left out.
 ///
 /// # Panics
-/// If a triangle names a vertex that there is not.
+/// If a triangle names a vertex that does not exist.
 pub fn pack(vertices: &[[u16; 3]], triangles: &[[u32; 3]]) -> Vec<u8> {
     let mut number = vec![u32::MAX; vertices.len()];
     let mut used: Vec<[u16; 3]> = Vec::new();

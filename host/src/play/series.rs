@@ -1,4 +1,4 @@
-//! Many rounds, one after the other: what a model costs on average.
+//! Many rounds, one after the other: the average cost of a model.
 
 use super::{Game, Player, Round};
 use palpate_onboard::Verdict;

@@ -35,7 +35,7 @@ const BALANCED: usize = 20;
 pub struct Adjusted {
     /// The objects that were recorded.
     pub objects: Vec<AdjustedObject>,
-    /// The prior of what is added to a leaf's value, in touches of the object; none where leaves stay as they are.
+    /// The prior of the additions to a leaf's value, in touches of the object; none where leaves stay as they are.
     pub prior: Option<f64>,
     /// The share of the balancing constants that is added; 0 for none.
     pub share: f64,
@@ -56,7 +56,7 @@ pub struct AdjustedObject {
     pub name: String,
     /// Approaches that were recorded.
     pub approaches: usize,
-    /// Those of them that are evidence.
+    /// Number of these that are evidence.
     pub touches: usize,
     /// Constant that is added to its margin with every touch, in nats.
     pub constant: f64,
@@ -279,7 +279,7 @@ fn gain(given: &[Held], held: &[Held]) -> [f64; 2] {
     [mean, variance.sqrt()]
 }
 
-/// The ensemble with what is added to the values of the recorded objects.
+/// The ensemble with the additions to the values of the recorded objects.
 fn changed(
     ensemble: &Ensemble,
     recorded: &Dataset,

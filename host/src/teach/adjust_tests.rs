@@ -13,7 +13,7 @@ fn few_groups() -> Settings {
     Settings { approaches: 30, groups: 100, ..Settings::default() }
 }
 
-/// Touches as a robot makes them of which the simulation knows nothing: it is faster, and its contacts are noisy.
+/// Touches of a robot that the simulation knows nothing about: it is faster, and its contacts are noisy.
 fn of_robot(counts: &[usize], seed: u64) -> Dataset {
     let mut dataset = synthetic::dataset(counts, seed);
     dataset.add_noise(&Noise { speed: 1.5, ..Noise::gaussian(15_000.0) }, seed, 1);

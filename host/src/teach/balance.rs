@@ -1,6 +1,6 @@
 //! The constant that is added to a taught object's margin with every touch.
 //!
-//! An object of which there are few touches is too unsure of itself where it has not been seen. The constant is chosen so
+//! A model is too unsure of an object with few touches where it has not been touched. The constant is chosen so
 //! that errors balance: over groups of approaches, each object touched equally often, a taught object is missed as often
 //! as its name is given to others.
 //!
@@ -31,7 +31,7 @@ struct Group {
     touches: f64,
 }
 
-/// In how many parts the approaches to each object are divided, so that those of a part judge what others chose.
+/// Number of parts that the approaches to each object are divided into, so that those of a part judge what others chose.
 const PARTS: usize = 3;
 
 /// Groups of approaches to each object, by the object's index.
@@ -102,7 +102,7 @@ impl Groups {
         Named { right: shares(own), wrong: others.map(shares).sum() }
     }
 
-    /// The share of groups that are recognized, of all objects that were not taught.
+    /// The share of recognized groups of an object, in the mean of all objects that were not taught.
     pub(super) fn others(&self, constants: &[f64]) -> f64 {
         let is_other = |object: &usize| !self.taught.contains(object) && Some(*object) != self.background;
         let others: Vec<usize> = (0..self.of.len()).filter(is_other).collect();
@@ -228,7 +228,7 @@ impl Judged {
     }
 }
 
-/// Approaches of a group at most, where the fewest of an object are so many: those of a part make one.
+/// Most approaches of a group if each object has at least `fewest`: a part then makes one group.
 pub(super) fn most_approaches(fewest: usize) -> usize {
     (fewest / PARTS).max(1)
 }

@@ -10,7 +10,7 @@ use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 
-/// Refuses what cannot be taught, all of it before the work begins.
+/// Rejects recordings that cannot be taught, before the work begins.
 pub(super) fn check(
     ensemble: &Ensemble,
     known: &Dataset,
@@ -28,7 +28,7 @@ pub(super) fn check(
     Ok(descriptor)
 }
 
-/// Refuses what a model cannot be adjusted to, all of it before the work begins.
+/// Rejects recordings that a model cannot be adjusted to, before the work begins.
 pub(super) fn adjustable(
     ensemble: &Ensemble,
     known: &Dataset,
@@ -94,7 +94,7 @@ fn names(ensemble: &Ensemble, recorded: &Dataset) -> Result<()> {
     Ok(())
 }
 
-/// The same probe, where both sides state one, and the same stroke.
+/// Checks that both sides have the same probe, if they state one, and the same stroke.
 fn same_probe(stated: Option<StatedProbe>, longest: u32, recorded: &Dataset) -> Result<()> {
     let stated = stated.as_ref().map(StatedProbe::trained);
     Ok(StatedProbe::compare_with(["the simulation", "the recording"], stated, longest, recorded)?)

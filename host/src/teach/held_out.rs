@@ -21,7 +21,7 @@ const MOST_COPIES: usize = 64;
 
 /// A recorded object.
 pub(super) struct Recorded {
-    /// As they were recorded.
+    /// The touches as recorded.
     plain: Rows,
     /// Repeated under jitter, for each of [`super::JITTERS`].
     jittered: Vec<Rows>,
@@ -85,7 +85,7 @@ pub(super) fn places(name: &str, count: usize, seed: u64) -> Vec<f64> {
     places
 }
 
-/// Where a touch of an object that the trees know is: spread evenly, by the golden ratio.
+/// Place of a touch of an object that the trees know: spread evenly, by the golden ratio.
 pub(super) fn known_place(source: u32) -> f64 {
     (f64::from(source) * 0.618_033_988_749_894_9).fract()
 }

@@ -1,4 +1,4 @@
-//! Objects that are learned from recorded touches, since there is no mesh of them.
+//! Objects that are learned from recorded touches, because they have no mesh.
 //!
 //! [`teach`] adds such objects to an ensemble that knows others: its trees stay as they are, and each leaf gets a value
 //! more. A few hundred touches suffice where new trees would need thousands, and the values of the other objects do not
@@ -77,7 +77,7 @@ pub struct Settings {
     pub seed: u64,
     /// Threads, or all of the machine's; the ensemble is the same for any number.
     pub threads: Option<usize>,
-    /// As [`crate::ensemble::train::Settings::leaf_bits`].
+    /// See [`crate::ensemble::train::Settings::leaf_bits`].
     pub leaf_bits: Option<u32>,
     /// Noise added to the touches of the known objects; `None` takes what the ensemble states, less what they have
     /// already.
@@ -127,7 +127,7 @@ pub struct TaughtObject {
     pub name: String,
     /// Approaches that were recorded.
     pub approaches: usize,
-    /// Those of them that are evidence.
+    /// Number of these that are evidence.
     pub touches: usize,
     /// Their smoothing.
     pub smoothing: Smoothing,
@@ -227,7 +227,7 @@ fn by_output<'d>(ensemble: &Ensemble, dataset: &'d Dataset) -> Cow<'d, Dataset> 
     if is_of_placements { Cow::Owned(dataset.by_placement()) } else { Cow::Borrowed(dataset) }
 }
 
-/// Runs on so many threads.
+/// Runs on this many threads.
 fn on_threads<T: Send>(threads: Option<usize>, run: impl FnOnce() -> Result<T> + Send) -> Result<T> {
     let Some(threads) = threads else { return run() };
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
@@ -315,14 +315,14 @@ fn with(ensemble: &Ensemble, mut trained: TrainedTouches, recorded: &[ObjectTouc
     }
     let has_stroke = TouchOrigin::of(&ensemble.origin)
         .is_ok_and(|stated| stated.probe.is_some_and(|stated| stated.probe.stroke.is_some()));
-    // With a stroke it is that of the hand, whatever a recording's clock says.
+    // With a stroke it is that of the hand, regardless of a recording's clock.
     if has_stroke {
         trained.largest_spread = largest_spread;
     }
     trained
 }
 
-/// The mean of two means, of so many objects each.
+/// The mean of two means, each of this many objects.
 fn mean(known: [f64; 6], recorded: [f64; 6], (first, second): (usize, usize)) -> [f64; 6] {
     let all = (first + second).max(1) as f64;
     std::array::from_fn(|index| (known[index] * first as f64 + recorded[index] * second as f64) / all)

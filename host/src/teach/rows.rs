@@ -1,4 +1,4 @@
-//! Touches as the leaves that they reach: what a column's values are fitted on, and read off.
+//! Touches as the leaves that they reach, for fitting a column's values, and reading them.
 
 use crate::ensemble::{Ensemble, Node, OverTouches, feature_row};
 use palpate_onboard::Refused;

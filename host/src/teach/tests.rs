@@ -24,7 +24,7 @@ fn few_groups() -> Settings {
     Settings { approaches: 30, groups: 100, ..Settings::default() }
 }
 
-/// Two objects to train on and one that is recorded, with so many touches; all three with other touches, to test on.
+/// Two objects to train on and one that is recorded, with this many touches; all three with other touches, to test on.
 fn setting(recorded: usize) -> [Dataset; 3] {
     let mut known = synthetic::dataset(&[3_000, 3_000, recorded], 1);
     let taught = known.objects.split_off(2);
@@ -229,7 +229,7 @@ fn the_constant_lets_an_object_be_missed_as_often_as_others_are_taken_for_it() {
     assert!((drawn.balanced()[0] + 0.15).abs() < 0.01);
 }
 
-/// Margins of so many touches of two objects, the second taught: normal, the right one ahead by `ahead` on average.
+/// Margins of this many touches of two objects, the second taught: normal, the right one ahead by `ahead` on average.
 fn normal(count: usize, ahead: f64, run: u64) -> [Held; 2] {
     let mut random = crate::random::generator(run, crate::random::Purpose::Synthetic, "teach", 0);
     [[1.0, 0.0], [0.0, 1.0]].map(|right| {

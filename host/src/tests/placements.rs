@@ -172,7 +172,7 @@ fn a_taught_object_has_one_output_unless_its_recordings_name_placements() {
     }
 }
 
-/// The same touches as a robot's recordings: of each placement one that states it, or of each object one that states none, in
+/// Touches as a robot's recordings: of each placement one that states it, or of each object one that states none, in
 /// which placements have their shares.
 fn recorded(dataset: &Dataset, is_stated: bool) -> Dataset {
     let one = |own: &ObjectTouches| {

@@ -33,7 +33,7 @@ fn touches(count: usize, seed: u64) -> Dataset {
     synthetic::of_instances(&KINDS, count, seed)
 }
 
-/// The same touches as if all of an object were of one mesh.
+/// Touches as if all of an object were of one mesh.
 fn forgotten(dataset: &Dataset) -> Dataset {
     dataset.each(|object| ObjectTouches::new(&object.name, object.touches().to_vec(), Source::Object))
 }
@@ -64,14 +64,14 @@ impl Share {
         Self(value, (spread * (1.0 - spread) / cases).sqrt())
     }
 
-    /// That of another one within three standard errors of the difference.
+    /// Checks that another one's share is within three standard errors of the difference.
     fn agrees(self, what: &str, measured: Self) {
         let error = self.1.hypot(measured.1);
         assert!((self.0 - measured.0).abs() <= 3.0 * error, "{what}: {self:?} stated, {measured:?} measured");
     }
 }
 
-/// The cases that groups of `length` of `touches` touches make: as many as do not share any.
+/// Number of cases that `groups` groups of `length` make: at most as many as are disjoint.
 fn cases(groups: usize, touches: usize, length: f64) -> f64 {
     (groups as f64).min(touches as f64 / length)
 }

@@ -1,4 +1,4 @@
-//! A stroke from the probe through the model to touches that are recorded: what is the same passes, what differs is refused
+//! A stroke from the probe through the model to recorded touches: equal strokes pass, and different ones are refused
 //! with both values.
 
 use crate::calibrate;
@@ -23,13 +23,13 @@ fn captured(stroke: Option<f64>, seed: u64) -> Dataset {
     in_memory(&objects, &origin.into(), &()).unwrap().0
 }
 
-/// The same touches from lines that state nothing.
+/// Touches as from lines that state nothing.
 fn lines(dataset: &Dataset) -> Dataset {
     let bare = |own: &ObjectTouches| ObjectTouches::new(&own.name, own.touches().to_vec(), Source::Object);
     Dataset::new(dataset.objects.iter().map(bare).collect())
 }
 
-/// The same touches as a recording, whose probe states its stroke or none.
+/// Touches as a recording, whose probe states its stroke or none.
 fn recorded(dataset: &Dataset, stroke: Option<f64>) -> Dataset {
     let one = |own: &ObjectTouches| {
         let source = Source::Recording(Recorded { object: own.name.clone(), ..Recorded::default() });
@@ -104,7 +104,7 @@ fn a_recorded_contact_a_little_after_the_stroke_is_missing_as_on_the_chip() {
     assert_eq!(accuracy(&late), accuracy(&cut));
 }
 
-/// The same touch on a clock that is 1.5 % slow.
+/// A touch on a clock that is 1.5 % slow.
 fn stretched(touch: &palpate_shared::Touch) -> palpate_shared::Touch {
     let slow = |micros: u32| palpate_shared::ContactTime::from_micros(micros + micros * 3 / 200);
     palpate_shared::Touch::new(touch.times().map(|time| time.micros().map_or(time, slow)))

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// The meshes that an object was touched as.
+/// The meshes of a touched object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Meshes {
     /// The [checksum](crate::mesh::Mesh::checksum) of each instance's mesh, as it was read, in hexadecimal digits.
@@ -50,7 +50,7 @@ impl Captured {
         (!objects.is_empty()).then(|| Self { settings: settings(origin), samples: origin.samples(), objects })
     }
 
-    /// The objects of which `other` has touches that these have too.
+    /// The objects with touches that `other` has, too.
     pub fn shared<'o>(&self, other: &'o Self) -> Vec<&'o str> {
         let is_near = self.settings == other.settings && overlap(&self.samples, &other.samples);
         let is_same = |(name, own): &(&String, &u64)| is_near && self.objects.get(*name) == Some(*own);

@@ -26,7 +26,7 @@ impl<R> Checked<R> {
         Self { inner, digest: CRC.digest() }
     }
 
-    /// The checksum of what has been read.
+    /// The checksum of the bytes read so far.
     pub(super) fn checksum(self) -> u32 {
         self.digest.finalize()
     }

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 pub struct Dataset {
     /// The objects, sorted by name.
     pub objects: Vec<ObjectTouches>,
-    /// Origin of the touches, where that is known: a directory without `dataset.json` does not say.
+    /// Origin of the touches, if known: a directory without `dataset.json` does not say.
     pub origin: Option<Origin>,
     /// Warnings from reading the data set: things that look wrong, but may be meant.
     pub warnings: Vec<Warning>,
@@ -44,7 +44,7 @@ impl Dataset {
         Self { objects, origin: self.origin.clone(), warnings: Vec::new() }
     }
 
-    /// The same touches, with each placement of an object as an object of its own, called `object/placement`: what a model with
+    /// This data set, with each placement of an object as an object of its own, called `object/placement`: for a model with
     /// an output for each placement is trained on. Objects without placements stay as they are.
     #[must_use]
     pub fn by_placement(&self) -> Self {
@@ -52,7 +52,7 @@ impl Dataset {
         Self { objects, origin: self.origin.clone(), warnings: Vec::new() }
     }
 
-    /// The same for a model with outputs of these names: each object that has placements among them is divided into its own.
+    /// Divides objects for a model with outputs of these names: each object that has placements among them into its own.
     /// Others stay as they are, such as recordings that state no placement, which are of all outputs of their object.
     #[must_use]
     pub fn matching(self, outputs: &[String]) -> Self {
@@ -64,7 +64,7 @@ impl Dataset {
         Self { objects: self.objects.into_iter().flat_map(of).collect(), ..self }
     }
 
-    /// The same touches without the contacts that are later than `window` microseconds, such as by the stroke of the probe that a
+    /// This data set without the contacts that are later than `window` microseconds, such as by the stroke of the probe that a
     /// model is for: what an effector takes for missing.
     pub fn within(&self, window: Option<u32>) -> Cow<'_, Self> {
         match self.touches().any(|touch| hand::late(touch, window).contains(&true)) {
@@ -73,7 +73,7 @@ impl Dataset {
         }
     }
 
-    /// The same by the stroke of a probe, if a hand with this stroke explains all contacts; otherwise as they are.
+    /// Removes contacts by the stroke of a probe, if a hand with this stroke explains all of them; else changes nothing.
     pub fn delivered_by(&self, probe: &Probe) -> Cow<'_, Self> {
         let is_explained = |latest: f64| self.touches().all(|touch| f64::from(touch.spread()) <= latest);
         self.within(probe.window().filter(|_| probe.latest().is_some_and(is_explained)))
@@ -123,8 +123,8 @@ impl Dataset {
         all
     }
 
-    /// Number of instances, recordings or logs of the objects that have several, by name: a sequence is of touches of
-    /// one.
+    /// Number of instances, recordings or logs of the objects that have several, by name: all touches of a sequence are
+    /// from one.
     pub fn several(&self) -> BTreeMap<String, usize> {
         let several = self.objects.iter().filter(|object| object.sources().len() > 1);
         several.map(|object| (object.name.clone(), object.sources().len())).collect()
@@ -160,10 +160,10 @@ impl Dataset {
         }
     }
 
-    /// The same for a data set that may hold a single object: a background, or a stranger.
+    /// Reads a data set that may hold a single object: a background, or a stranger.
     ///
     /// # Errors
-    /// As [`read`](Self::read), but for the number of objects: at least one.
+    /// Those of [`read`](Self::read), except that one object is enough.
     pub fn read_any(directory: &Path) -> Result<Self> {
         let dataset = match is_log(directory) {
             true => {
@@ -221,7 +221,7 @@ impl Dataset {
         Ok(Self { objects, origin: Some(listing.origin), warnings })
     }
 
-    /// Every file of touches that there is.
+    /// Every file of touches.
     fn found(directory: &Path) -> Result<Self> {
         let files = files(directory)?;
         if let Some([first, second]) = files.windows(2).find(|pair| pair[0].0 == pair[1].0) {
@@ -254,12 +254,12 @@ impl Dataset {
         Ok(Self { warnings, ..Self::new(objects_of(objects)) })
     }
 
-    /// The probe that made the touches, where that is known.
+    /// The probe that made the touches, if known.
     pub fn probe(&self) -> Option<&Probe> {
         self.origin.as_ref().map(|origin| &origin.probe)
     }
 
-    /// True if every approach is kept, also those that were not full touches: what the origin says or, without one,
+    /// True if every approach is kept, including those that were not full touches: what the origin says or, without one,
     /// whether any touch is partial.
     pub fn holds_approaches(&self) -> bool {
         let any_partial = || self.touches().any(|touch| !touch.is_full());
@@ -305,7 +305,7 @@ impl Dataset {
     }
 }
 
-/// Reads an object's file, and compares it with what the listing states.
+/// Reads an object's file, and compares it with the listing.
 fn read_listed(entry: &Entry, format: Format, path: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
     let wrong = |problem| Error::at(Place::file(path), problem);
     if !path.exists() {
@@ -337,7 +337,7 @@ struct Found {
     file: PathBuf,
 }
 
-/// Contents of logs by object, one log after the other, and what was skipped.
+/// Contents of logs by object, one log after the other, and the skipped channels.
 fn found_in(logs: &[PathBuf]) -> Result<(BTreeMap<String, Found>, Vec<Warning>)> {
     let (mut objects, mut warnings) = (BTreeMap::<String, Found>::new(), Vec::new());
     for file in logs {

@@ -31,7 +31,7 @@ pub enum TouchesProblem {
         /// The time.
         seconds: f64,
     },
-    /// A contact time is beyond what a touch can hold.
+    /// A contact time is beyond the range of a touch.
     #[error("the time {seconds} is longer than the 4294 s that a touch can hold")]
     LongTime {
         /// The time.
@@ -84,7 +84,7 @@ pub enum TouchesProblem {
         /// The column.
         name: &'static str,
     },
-    /// A column of a Parquet file does not hold what it should.
+    /// A column of a Parquet file has another type than required.
     #[error("column {name}: {message}")]
     Column {
         /// The column.
@@ -110,7 +110,7 @@ pub enum TouchesProblem {
     /// A log, for a build without MCAP.
     #[error("this program was built without MCAP")]
     NoMcap,
-    /// Something in a log is larger than what is read.
+    /// Something in a log exceeds a limit.
     #[error("{what} of {bytes} bytes, where at most {most} are read")]
     TooLarge {
         /// The thing that is too large: "a record".
@@ -287,14 +287,14 @@ pub enum TouchesProblem {
         /// The settings that differ, with both values.
         differences: String,
     },
-    /// The same lines were recorded before.
+    /// These lines were recorded before.
     #[error("the same {touches} touches of {object} were recorded before, on {began}")]
     RecordedBefore {
         /// The object.
         object: String,
         /// Number of touches.
         touches: u64,
-        /// When they were recorded.
+        /// Time at which they were recorded.
         began: String,
     },
     /// A touch has no pose, but the data set is recorded with one.
@@ -326,7 +326,7 @@ pub enum TouchesProblem {
         /// The files' names.
         files: Vec<String>,
     },
-    /// A file whose name does not say what it holds.
+    /// A file whose name does not reveal its format.
     #[error("not a file of touches by its name")]
     NoFormat,
     /// An object was recorded in two places.
@@ -335,7 +335,7 @@ pub enum TouchesProblem {
         /// The object.
         name: String,
     },
-    /// A check of a data set found what would make training wrong.
+    /// A check of a data set found errors that would make training wrong.
     #[error("training on these touches would be wrong, for {count} reason{}", if *count == 1 { "" } else { "s" })]
     WouldTrainWrong {
         /// Number of reasons.

@@ -4,7 +4,7 @@ use super::Format;
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// The objects' names and files in a directory, sorted by name, whatever a listing says.
+/// The objects' names and files in a directory, sorted by name, regardless of any listing.
 pub fn files(directory: &Path) -> Result<Vec<(String, PathBuf, Format)>> {
     let io = |source| Error::io(directory, "read the data set", source);
     let mut files = Vec::new();

@@ -47,7 +47,7 @@ pub fn fold(dataset: &Dataset, fold: usize, folds: usize, seed: u64) -> Result<S
 pub struct Split {
     /// Touches to train on.
     pub train: Dataset,
-    /// Touches to test on, none of which is in `train`.
+    /// Touches to test on; none is in `train`.
     pub test: Dataset,
 }
 
@@ -93,7 +93,7 @@ mod tests {
     use crate::touches::{Origin, Source};
     use palpate_shared::Touch;
 
-    /// Objects of which each touch is identified by its own time.
+    /// Objects whose touches are each identified by their own time.
     fn dataset(counts: &[u32]) -> Dataset {
         let object = |(index, &count): (usize, &u32)| {
             let touches = (0..count).map(|i| Touch::from_micros([0, i, 9])).collect();

@@ -1,4 +1,4 @@
-//! `dataset.json`: what a data set holds, how it was made, and whether it is complete.
+//! `dataset.json`: the content and origin of a data set, and whether it is complete.
 
 use super::{Format, Meshes, ObjectTouches, Origin, Recorded, Source};
 use crate::error::{Error, Place, Result, TouchesProblem};
@@ -104,7 +104,7 @@ impl Listing {
     /// The file's name.
     pub const FILE: &str = "dataset.json";
 
-    /// A listing of objects of which there is no touch yet.
+    /// A listing of objects without touches so far.
     pub fn new(origin: &Origin, names: impl IntoIterator<Item = String>) -> Self {
         Self {
             palpate: env!("CARGO_PKG_VERSION").into(),
@@ -121,7 +121,7 @@ impl Listing {
         !self.recorded.is_empty()
     }
 
-    /// Where the listing of a directory is.
+    /// Path of a directory's listing.
     pub fn path(directory: &Path) -> PathBuf {
         directory.join(Self::FILE)
     }
@@ -159,7 +159,7 @@ impl Listing {
         Ok(listing)
     }
 
-    /// Writes the listing, whole or not at all, and replaces what is there.
+    /// Writes the listing, whole or not at all, over an existing one.
     ///
     /// # Errors
     /// When it cannot be written.

@@ -29,11 +29,11 @@ pub struct Log {
 /// A touch in a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Logged {
-    /// When it was logged, in nanoseconds on the log's clock.
+    /// Time of logging, in nanoseconds on the log's clock.
     pub time: u64,
     /// The touch.
     pub touch: Touch,
-    /// Where in the file it stands: the byte at which its message, or the chunk with it, begins.
+    /// Offset in the file: the byte at which its message, or the chunk with it, begins.
     pub offset: u64,
     /// The object's number among the log's.
     object: Option<u32>,
@@ -44,7 +44,7 @@ pub fn begins_log(bytes: &[u8]) -> bool {
     bytes.first() == Some(&FIRST)
 }
 
-/// True if the file at `path` is a log, by how it begins; a file that cannot be read is none.
+/// True if the file at `path` is a log, by its first byte; false for a file that cannot be read.
 pub fn is_log(path: &Path) -> bool {
     let mut first = [0];
     path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut first)).is_ok() && begins_log(&first)
@@ -131,7 +131,7 @@ impl Log {
         &self.channels
     }
 
-    /// Warning about what was skipped.
+    /// Warning about skipped channels.
     pub fn skipped(&self) -> Option<Warning> {
         let channels = &self.channels.others;
         (!channels.is_empty()).then(|| Warning::SkippedChannels { path: self.path.clone(), channels: channels.clone() })

@@ -16,7 +16,7 @@ pub struct Channels {
 /// A message of a log that was understood.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Message {
-    /// When it was logged, in nanoseconds on the log's clock.
+    /// Time of logging, in nanoseconds on the log's clock.
     pub time: u64,
     /// The byte at which the message, or the chunk with it, begins.
     pub offset: u64,

@@ -13,7 +13,7 @@ pub(super) fn read(_: impl Read, path: &Path, _: impl FnMut(Message) -> Result<(
     Err(Error::at(Place::file(path), TouchesProblem::NoMcap))
 }
 
-/// There is none.
+/// There is no writer.
 pub(super) struct Writer<W> {
     never: Infallible,
     _out: PhantomData<W>,

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// a robot touches one cup until it knows it, not several cups in turn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The object, of which nothing says that it has several instances or recordings.
+    /// The object, not known to have several instances or recordings.
     Object,
     /// One of its instances, by name.
     Instance(String),
@@ -48,7 +48,7 @@ impl From<String> for Source {
 }
 
 /// The touches of one object. Each keeps the source that it is of, and the robot that made it, through everything that is
-/// done with them: there is no way to make such touches without saying what they are of.
+/// done with them: there is no way to make such touches without stating their object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectTouches {
     /// The object's name.
@@ -60,7 +60,7 @@ pub struct ObjectTouches {
     source_of: Vec<u32>,
     /// For each touch the number of the robot that made it; empty if robots do not differ.
     robot_of: Vec<u32>,
-    /// Meshes that were touched, as far as they are known.
+    /// Meshes that were touched, if known.
     meshes: Option<Meshes>,
     /// The stroke of the probe that made them as a time in microseconds: also with noise that is added, a later contact is
     /// missing.
@@ -226,13 +226,13 @@ impl ObjectTouches {
         self
     }
 
-    /// The same touches, of which it is known what was touched.
+    /// These touches, with the meshes that were touched.
     #[must_use]
     pub fn of_meshes(self, meshes: Option<Meshes>) -> Self {
         Self { meshes, ..self }
     }
 
-    /// The same touches, of a probe with this stroke as a time in microseconds ([`Probe::window`](crate::probe::Probe::window)).
+    /// These touches as of a probe with this stroke, a time in microseconds ([`Probe::window`](crate::probe::Probe::window)).
     #[must_use]
     pub fn of_stroke(self, window: Option<u32>) -> Self {
         Self { window, ..self }
@@ -246,7 +246,7 @@ impl ObjectTouches {
         touches
     }
 
-    /// The meshes that the object was touched as, as far as that is known.
+    /// The meshes that were touched, if they are known.
     pub fn meshes(&self) -> Option<&Meshes> {
         self.meshes.as_ref()
     }
@@ -337,8 +337,8 @@ impl ObjectTouches {
         weights.into_iter().map(of).collect()
     }
 
-    /// The same touches, of which each placement has as many as its weight says, compared with the others: as an object that is
-    /// put down at random is touched. All of them without placements, and of recordings, whose shares are those of the robot.
+    /// These touches, with a number of each placement in proportion to its weight: as an object that is put down at random is
+    /// touched. All of them without placements, and for recordings, whose shares are those of the robot.
     #[must_use]
     pub fn as_often_as_placed(&self) -> Self {
         let is_recorded = self.sources.iter().any(|source| matches!(source, Source::Recording(_)));
@@ -393,13 +393,13 @@ impl ObjectTouches {
         !self.robot_of.is_empty()
     }
 
-    /// The same touches under another name.
+    /// These touches under another name.
     #[must_use]
     pub fn renamed(self, name: impl Into<String>) -> Self {
         Self { name: name.into(), ..self }
     }
 
-    /// The touches at these positions, in this order. A position that there is not gives none.
+    /// The touches at these positions, in this order. Positions out of range give none.
     #[must_use]
     pub fn select(&self, positions: impl IntoIterator<Item = usize>) -> Self {
         let positions: Vec<usize> = positions.into_iter().filter(|position| *position < self.len()).collect();
@@ -432,7 +432,7 @@ impl ObjectTouches {
         self.select(chosen)
     }
 
-    /// The same touches, each changed.
+    /// These touches, each changed.
     #[must_use]
     pub fn changed(&self, change: impl FnMut(&Touch) -> Touch) -> Self {
         Self { touches: self.touches.iter().map(change).collect(), ..self.clone() }

@@ -20,14 +20,14 @@ pub struct Origin {
     /// Seed of all random numbers.
     pub seed: u64,
     /// Unit of the probe's lengths: units, with every object scaled to `length`, or millimeters, with objects at their
-    /// true size. Before version 0.3.0, always units.
+    /// true size; units if it is not stated.
     #[serde(default = "unit::tenth", with = "unit")]
     pub unit: Length,
     /// The longest side of an object's bounding box, in units; of no meaning at true size.
     pub length: f64,
     /// The probe's measures.
     pub probe: Probe,
-    /// Where approaches aim.
+    /// Target of approaches.
     #[serde(default, skip_serializing_if = "Aim::is_box")]
     pub aim: Aim,
     /// Surroundings of the objects: floating, or on a table.
@@ -71,7 +71,7 @@ impl Origin {
         Self { touches: 0, seed: 0, probe, unit, pose, approaches: true, ..Self::default() }
     }
 
-    /// Refuses what no touches can be made by.
+    /// Rejects settings that no touches can be made with.
     ///
     /// # Errors
     /// [`Setting`](crate::error::Setting) naming the field.

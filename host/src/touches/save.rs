@@ -14,7 +14,7 @@ impl Dataset {
     /// Touches of instances that are not in turn, such as a part of a capture, are written one instance after the other,
     /// those of recordings one recording after the other.
     ///
-    /// `approaches` says how many approaches each object took, where that is known: it is written down as 0 where it is
+    /// `approaches` says how many approaches each object took, if known: it is written down as 0 where it is
     /// not, such as for a part of a capture.
     ///
     /// # Errors
@@ -182,7 +182,7 @@ mod tests {
         [instances, recordings].map(|objects| Dataset { origin: Some(origin.clone()), ..Dataset::new(objects.into()) })
     }
 
-    /// For each object what the touches of each source are, whatever their order.
+    /// A key of each source's touches, for each object, regardless of their order.
     fn by_source(dataset: &Dataset) -> Vec<(String, Vec<palpate_shared::Touch>)> {
         let mut all = Vec::new();
         for object in &dataset.objects {

@@ -5,11 +5,11 @@ use crate::error::TouchesProblem;
 use palpate_shared::{ContactTime, Pose, Touch};
 
 /// The touch of three contact times in seconds on any common clock, none for a finger that never touched, and the probe's
-/// direction and alignment (unit vectors) where they are known: rounded and checked as [a line of text](super::parse_touch)
-/// is.
+/// direction and alignment (unit vectors) if they are known. They are rounded and checked like
+/// [a line of text](super::parse_touch).
 ///
 /// # Errors
-/// What is wrong with a number, or that one of direction and alignment is there and the other is not.
+/// Describes the wrong number, or says that only one of direction and alignment is there.
 pub fn touch_of_seconds(
     times: [Option<f64>; 3],
     direction: Option<[f64; 3]>,

@@ -19,7 +19,7 @@ pub enum Surroundings {
 }
 
 impl Surroundings {
-    /// The cone of a table of which nothing else is said.
+    /// The default cone of a table.
     pub const CONE: f64 = 60.0;
 
     /// True if the object floats, which files leave out.

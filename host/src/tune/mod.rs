@@ -94,7 +94,7 @@ pub struct Recipe {
     pub different_leaves: Option<usize>,
 }
 
-/// A compiled model of the family, and what it achieves on held-out touches.
+/// A compiled model of the family, and its results on held-out touches.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Training settings of its ensemble.
@@ -141,7 +141,7 @@ pub struct Tuned {
     pub chosen: usize,
     /// Calibration of its thresholds, on touches that neither trained nor chose it; null if there is none.
     pub calibration: Option<Calibrated>,
-    /// Reason why there is none.
+    /// Reason for the lack of a calibration.
     pub uncalibrated: Option<String>,
     /// Its figures on touches that neither trained, calibrated nor chose it.
     pub test: Evaluation,
@@ -205,7 +205,7 @@ pub fn tune(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> 
     Ok(Tuned { unlimited, rows, chosen, calibration: calibration.ok(), uncalibrated, test, model, ensemble })
 }
 
-/// The model with thresholds that keep the error rate; or why there are none.
+/// The model with thresholds that keep the error rate, or the reason for their lack.
 fn calibrated(
     model: &[u8],
     fresh: Dataset,
@@ -246,8 +246,8 @@ fn why(problem: &CalibrateProblem, fewest: usize) -> String {
 
 type Measured<'e> = (Row, &'e Ensemble, Compiled);
 
-/// The ensemble in every leaf width and layout; a layout changes no margin unless it is a table, so trees are measured
-/// once for all of theirs.
+/// The ensemble in every leaf width and layout. A layout changes no margin unless it is a table, so trees are measured
+/// once for all layouts.
 fn compiled_models<'e>(
     recipe: &Recipe,
     ensemble: &'e Ensemble,
@@ -303,7 +303,7 @@ fn unless_unfit(compiled: Result<Compiled>) -> Result<Option<Compiled>> {
     }
 }
 
-/// Bytes of the model with what a calibration adds.
+/// Bytes of the model including those that a calibration adds.
 fn bytes(compiled: &Compiled, settings: &Settings) -> usize {
     compiled.bytes.len() + calibrate::added_bytes(&settings.noise)
 }
@@ -331,7 +331,7 @@ fn measure(
     })
 }
 
-/// `error_rate` as [`evaluate::Settings::error_rate`].
+/// Evaluation settings with `error_rate` as [`evaluate::Settings::error_rate`].
 fn evaluated(
     candidate: Candidate<'_>,
     touches: &Dataset,

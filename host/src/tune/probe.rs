@@ -66,7 +66,7 @@ pub struct Settings {
     /// Strokes of the hand: the best probe is searched with the longest, and every one is tried with it. None: it is searched
     /// for a hand that goes on past the object, and strokes of 0.5 to 5 units are tried with it.
     pub stroke: Option<RangeInclusive<f64>>,
-    /// Where approaches may aim, at least one.
+    /// Aims that approaches may have, at least one.
     pub aims: Vec<Aim>,
     /// The probe's speed, per second.
     pub speed: f64,
@@ -172,7 +172,7 @@ pub fn median_length(objects: &[Object]) -> Option<f64> {
     lengths.get(lengths.len() / 2).copied()
 }
 
-/// The same probe where what was a unit is `unit`; lengths are rounded to hundredths.
+/// The probe scaled so that a unit becomes `unit`; lengths are rounded to hundredths.
 pub fn scaled_probe(probe: &Probe, unit: f64) -> Probe {
     let scaled = |length: f64| hundredths(length * unit);
     let Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance } = *probe;
@@ -183,13 +183,13 @@ pub fn scaled_probe(probe: &Probe, unit: f64) -> Probe {
     Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance }
 }
 
-/// A probe that was tried, and what it achieved.
+/// A probe that was tried, and its results.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trial {
     /// The probe's measures.
     #[serde(flatten)]
     pub probe: Probe,
-    /// Where its approaches aimed.
+    /// Aim of its approaches.
     pub aim: Aim,
     /// Approaches per object that a model was trained on; it was tested on as many others.
     pub trained_on: u64,
@@ -289,7 +289,7 @@ pub fn design(objects: &[Object], settings: &Settings, progress: &dyn Progress) 
     let names = sorted.iter().map(|object| object.name.clone());
     let search = Search { objects: names.zip(scenes).collect(), settings, progress };
     let coarse = search.coarse();
-    // The second round has what was kept, and at most two neighbors in each of three directions; the third the spacings.
+    // The second round has the kept ones, and at most two neighbors in each of three directions; the third the spacings.
     progress.begin("trying probes", Some((coarse.len() + 2 * KEPT + SPACINGS + STROKES) as u64));
     let first = search.try_all(coarse, settings.approaches / 4)?;
     let second = search.try_all(search.finer(&first), settings.approaches / 2)?;

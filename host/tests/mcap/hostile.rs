@@ -13,7 +13,7 @@ use std::path::Path;
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// The memory that reading these bytes takes, and what it comes to.
+/// The memory that reading these bytes takes, and the result.
 fn taken(bytes: &[u8]) -> (usize, Result<usize, String>) {
     let before = MEMORY.current_usage();
     MEMORY.reset_peak_usage();
@@ -129,6 +129,6 @@ fn mutants_neither_panic_nor_take_much() {
             }
         }
     }
-    // Checksums leave only what is in the summary, which is not read.
+    // Checksums leave only the summary, which is not read.
     assert!(refused > 1_500 && read > 20, "{read} read, {refused} refused");
 }

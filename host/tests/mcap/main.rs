@@ -1,4 +1,4 @@
-//! Robots' logs: what is read out of them, what is refused and how, and what is written.
+//! Robots' logs: reading, rejected logs with their errors, and writing.
 
 mod files;
 

@@ -592,7 +592,7 @@ fn categories_as_whole_numbers_of_a_scaled_model_go_where_the_library_sends_them
         let encoder = palpate_trees::rows::Encoder::of(&model);
         let mut whole = 0;
         for mut row in rows {
-            // Away from thresholds of the other features, which fall together; what is no whole number is rounded.
+            // Away from thresholds of the other features, which fall together; a fraction would be rounded.
             for feature in [0, 1, 3] {
                 row[feature] = (row[feature] * 7.0).round() / 7.0 + 0.013;
             }

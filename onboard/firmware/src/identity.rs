@@ -30,7 +30,7 @@ pub fn record(model: &Model<'_>, recognizer: &mut Recognizer<'_, 10>, touch: &To
     bytes
 }
 
-/// A number that depends on every bit of what the model makes of a thousand touches, full and partial.
+/// A number that depends on every bit of the model's answers to a thousand touches, full and partial.
 pub fn digest(model: &Model<'_>) -> u32 {
     let Ok(mut recognizer) = Recognizer::<10>::new(model, Stopping::from_model(model)) else { return 0 };
     let (mut random, mut digest) = (1_u32, 0_u32);

@@ -84,7 +84,7 @@ impl Meter {
         (all.saturating_sub(walk) + count / 2) / count
     }
 
-    /// Ticks that `repeats` calls take. The dynamic call keeps the loop the same whatever is called.
+    /// Ticks that `repeats` calls take. The dynamic call keeps the loop the same for any function.
     #[inline(never)]
     fn ticks(&mut self, repeats: u32, f: &mut dyn FnMut()) -> u64 {
         self.timer.clear_current();

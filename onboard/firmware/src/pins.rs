@@ -25,7 +25,7 @@ static EDGE: AtomicBool = AtomicBool::new(false);
 const OVER: u8 = 5;
 /// True once that signal has changed, until the main loop has looked.
 static SIGNALED: AtomicBool = AtomicBool::new(false);
-/// When the main loop last found that nothing more had happened.
+/// Time at which the main loop last found that nothing more had happened.
 static SEEN: AtomicU32 = AtomicU32::new(u32::MAX);
 
 /// A pin of the emulated port.

@@ -6,7 +6,7 @@
 #[repr(align(4))]
 pub struct Aligned<T: ?Sized>(pub T);
 
-/// A value that starts at a multiple of eight, as evidence does: all is cleared by one routine of the compiler's then,
+/// A value that starts at a multiple of eight, as evidence does: one of the compiler's routines then clears all of it,
 /// instead of one for each alignment.
 #[repr(align(8))]
 pub(crate) struct AlignedTo8<T>(pub(crate) T);

@@ -1,4 +1,4 @@
-//! Reading bytes without a way to panic, where chips read them fastest, and why bytes are not a model.
+//! Fast reading of bytes without a way to panic, and reasons why bytes are not a model.
 
 mod aligned;
 mod error;

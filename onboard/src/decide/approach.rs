@@ -1,4 +1,4 @@
-//! Where to touch next.
+//! The next approach.
 
 use super::evidence::{Unit, best};
 use super::recognizer::{Recognizer, State, unit};

@@ -70,7 +70,7 @@ pub(crate) struct Unit {
     pub(crate) sharpness: u32,
 }
 
-/// That of a temperature of 1.
+/// Sharpness at a temperature of 1.
 pub(crate) const SHARPNESS: u32 = 1 << 16;
 /// The most bits that are multiplied, in Q32: there a weight is 0 at any sharpness, which is 2^12 to 2^20.
 const MOST_BITS: u64 = 1 << 42;

@@ -6,7 +6,7 @@ use core::fmt;
 /// The evidence for an object that cannot be there: no number of touches makes it the best, and its weight is 0.
 pub(crate) const IMPOSSIBLE: i64 = i64::MIN;
 
-/// True unless the evidence for an object began as [`IMPOSSIBLE`], whatever was touched.
+/// True unless the evidence for an object began as [`IMPOSSIBLE`], regardless of touches since.
 pub(crate) const fn is_possible(evidence: i64) -> bool {
     evidence > IMPOSSIBLE / 2
 }

@@ -52,7 +52,7 @@ impl<const N: usize> Forgetting<N> {
         self.restarts
     }
 
-    /// Forgets what it knows of recent touches: when another object comes, as [`Recognizer::reset`].
+    /// Forgets recent touches, when another object comes, like [`Recognizer::reset`].
     pub fn reset(&mut self) {
         self.against = [0; N];
         self.touches = 0;
@@ -126,7 +126,7 @@ impl<const N: usize> Recognizer<'_, N> {
         self.add_forgetting(&evidence, forgetting)
     }
 
-    /// Takes in evidence, and forgets: margins, or what the model's table makes of them.
+    /// Takes in evidence, and forgets: margins, or their evidence by the model's table.
     fn add_forgetting(&mut self, margins: &[i32; N], forgetting: &mut Forgetting<N>) -> Verdict {
         if self.verdict() != Verdict::Undecided {
             return self.verdict();

@@ -313,7 +313,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         &mut self.state
     }
 
-    /// Takes in a touch by its evidence: its margins, or what the model's table makes of them.
+    /// Takes in a touch by its evidence: its margins, or their evidence by the model's table.
     pub(super) fn add(&mut self, margins: &[i32]) -> Verdict {
         match self.state.decided {
             Decided::Fresh => {
@@ -433,7 +433,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Weights of all other objects, relative to one that was recognized with this evidence of so many touches.
+    /// Weights of all other objects, relative to one that was recognized with this evidence of this many touches.
     pub(crate) fn rivals(model: &Model<'_>, evidence: &[i64; N], object: usize, covered: u32) -> Option<Rivals> {
         let evidence = evidence.get(..model.object_count())?;
         if let Some(outputs) = model.outputs() {
@@ -461,7 +461,7 @@ impl<const N: usize> State<N> {
     }
 }
 
-/// Sets evidence to what it is before any touch.
+/// Sets evidence to its value before any touch.
 fn start(model: &Model<'_>, evidence: &mut [i64]) {
     for (evidence, prior) in evidence.iter_mut().zip(model.priors()) {
         *evidence = i32::from_le_bytes(*prior).into();
@@ -473,7 +473,7 @@ pub(super) fn unit(model: &Model<'_>) -> Unit {
     Unit { bits: header.unit_bits(), shift: header.unit_shift(), sharpness: SHARPNESS }
 }
 
-/// The unit of evidence of so many touches.
+/// The unit of evidence of this many touches.
 fn unit_of(model: &Model<'_>, touches: u32) -> Unit {
     unit(model).weighed(model.weight_of(touches))
 }

@@ -53,7 +53,7 @@ impl<const N: usize> Recognizer<'_, N> {
         self.state().snapshot(self.model(), buffer)
     }
 
-    /// Takes over the state of a snapshot; what was touched before is forgotten. On an error nothing changes.
+    /// Takes over the state of a snapshot, and forgets the touches before. On an error nothing changes.
     ///
     /// Cost: some instructions for each byte. Cannot panic.
     ///

@@ -1,8 +1,8 @@
-//! When enough has been touched.
+//! The end of a sequence of touches.
 
 use crate::model::Model;
 
-/// When a recognizer stops: once the posterior of the best object exceeds 1 − error rate, or after a number of touches.
+/// Stopping rule of a recognizer: once the posterior of the best object exceeds 1 − error rate, or after a number of touches.
 /// The posterior is that of the evidence as it is, without the model's temperature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stopping {
@@ -41,7 +41,7 @@ impl Stopping {
         Self { odds: header.odds(), max_touches: header.max_touches(), by_object: true }
     }
 
-    /// The same threshold with another limit of touches; 0 counts as 1.
+    /// This threshold with another limit of touches; 0 counts as 1.
     pub const fn with_max_touches(self, max_touches: u32) -> Self {
         Self { odds: self.odds, max_touches: if max_touches == 0 { 1 } else { max_touches }, by_object: self.by_object }
     }

@@ -7,7 +7,7 @@ use super::Settings;
 pub(super) struct Debounce {
     settled: bool,
     level: bool,
-    /// When `level` was last changed.
+    /// Time at which `level` last changed.
     since: u32,
     /// The first edge away from the settled level, while the switch has not settled again.
     left: Option<u32>,
@@ -59,12 +59,12 @@ impl Debounce {
         self.level
     }
 
-    /// When a closing that is not settled yet began.
+    /// Time at which a closing that is not settled yet began.
     pub(super) const fn closing_since(&self) -> Option<u32> {
         if self.settled { None } else { self.left }
     }
 
-    /// The clock starts here: what was before happened now.
+    /// The clock starts here: earlier edges happened now.
     pub(super) const fn start(&mut self, now: u32) {
         (self.since, self.closed_since) = (now, now);
         if self.left.is_some() {

@@ -4,7 +4,7 @@ use super::debounce::{Change, Debounce, after};
 use super::{Edge, Fault, Finger, Settings};
 use palpate_shared::{ContactTime, Touch};
 
-/// Where the effector is in a touch.
+/// State of the effector within a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
@@ -33,7 +33,7 @@ const LATEST: u32 = 1 << 15;
 /// What comes out depends on the edges and their times alone, not on how often [`Effector::poll`] is called; but a touch
 /// with a missing finger, and faults, are only seen at the first call after they are due.
 ///
-/// Cannot fail or panic, whatever the edges.
+/// Cannot fail or panic with any edges.
 #[derive(Clone, Debug)]
 pub struct Effector {
     settings: Settings,
@@ -88,7 +88,7 @@ impl Faults {
 }
 
 impl Effector {
-    /// A driver whose fingers are open, as far as it knows.
+    /// A driver that takes its fingers for open.
     pub fn new(settings: Settings) -> Self {
         Self {
             settings: settings.in_range(),
@@ -116,7 +116,7 @@ impl Effector {
         self.until_timer(now)
     }
 
-    /// Where the effector is in a touch, as of the last call.
+    /// State of the effector within a touch, at the last call.
     pub const fn state(&self) -> State {
         self.state
     }
@@ -309,7 +309,7 @@ impl Effector {
         self.contacts.iter().flatten().copied().reduce(|a, b| if is_past(a, b) { a } else { b })
     }
 
-    /// When the touch in progress times out.
+    /// Time at which the touch in progress times out.
     fn deadline(&self) -> Option<u32> {
         self.origin().map(|origin| origin.wrapping_add(self.settings.timeout))
     }

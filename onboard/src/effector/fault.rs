@@ -39,7 +39,7 @@ impl Fault {
     }
 }
 
-/// As the link reports it.
+/// Converts to the link's message.
 #[cfg(feature = "link")]
 impl From<Fault> for Event {
     fn from(fault: Fault) -> Self {

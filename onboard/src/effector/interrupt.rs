@@ -44,7 +44,7 @@ impl<A: InputPin, B: InputPin, C: InputPin, const EDGES: usize> Watcher<A, B, C,
         self.fingers.pins()
     }
 
-    /// The level of each pin when it was last read, for whoever waits for another: true is high.
+    /// The level of each pin when it was last read, to wait for another level: true is high.
     pub const fn is_high(&self) -> [bool; 3] {
         self.fingers.is_high()
     }

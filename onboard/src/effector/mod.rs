@@ -92,7 +92,7 @@ pub struct Edge {
     pub finger: Finger,
     /// Closed (contact) or open.
     pub closed: bool,
-    /// When, on the [`Clock`], in microseconds.
+    /// Time on the [`Clock`], in microseconds.
     pub at: u32,
     /// True if edges before this one were lost because the queue was full, or the interrupt was held off too long.
     pub after_loss: bool,

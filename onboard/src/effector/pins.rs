@@ -12,7 +12,7 @@ pub enum Active {
     Low,
 }
 
-/// Three pins and what is known of their levels.
+/// Three pins and their known levels.
 #[derive(Debug)]
 pub struct Fingers<A, B, C> {
     first: A,

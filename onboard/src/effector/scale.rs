@@ -17,7 +17,7 @@ pub struct Geometry {
     pub speed: u32,
 }
 
-/// Turns the touches of one probe into those that another would have made.
+/// Converts the touches of one probe to those of another.
 ///
 /// Times scale exactly with speed. The time differences of two fingers scale with their distance where the surface is
 /// flat, and the curvature with its square where it is a parabola: with another spacing the result is as good as these

@@ -32,7 +32,7 @@ fn play(start: u32, edges: &[(Finger, bool, u32)], polls: &[u32], end: u32) -> (
     play_after(SETTINGS.release, start, edges, polls, end)
 }
 
-/// The same with power-up `rested` before `start`.
+/// Like [`play`], with power-up `rested` before `start`.
 fn play_after(rested: u32, start: u32, edges: &[(Finger, bool, u32)], polls: &[u32], end: u32) -> (Outcomes, Effector) {
     let mut effector = Effector::new(SETTINGS);
     let mut outcomes = Outcomes::new();
@@ -658,7 +658,7 @@ fn every_fault_says_what_to_do() {
     }
 }
 
-/// Touches half a second apart, polled each millisecond, by a counter of so many bits that starts at `start`.
+/// Touches half a second apart, polled each millisecond, by a counter of this many bits that starts at `start`.
 fn by_counter(bits: u32, start: u64, touches: u64) -> Outcomes {
     let (mut effector, mut outcomes) = (Effector::new(SETTINGS), Outcomes::new());
     for at in (0..touches * 500_000).step_by(1_000) {

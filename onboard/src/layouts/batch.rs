@@ -12,7 +12,7 @@ use super::{Sections, built_in};
 use crate::bytes::at;
 use palpate_shared::format::{Group, Layout, LeafType};
 
-/// Blocks with fewer rows are not worth what is made ready for a tree.
+/// Blocks with fewer rows do not repay the preparation for a tree.
 const ENOUGH: usize = 128;
 
 /// The most values of a leaf that is made ready.

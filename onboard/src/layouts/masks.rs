@@ -1,4 +1,4 @@
-//! Many rows at one tree: what they compare is looked up, not walked.
+//! Many rows at one tree: comparisons are looked up, not walked.
 //!
 //! A row that goes right at a split never reaches the leaves on the left. So all the splits of one column together leave a
 //! set of leaves for each rank, one bit each; of the leaves that all columns leave, a row reaches the first. The sets are made
@@ -234,7 +234,7 @@ const fn low(number: usize) -> u32 {
     u32::from_le_bytes([a, b, c, d])
 }
 
-/// As many bits, up to 63.
+/// This number of one bits, up to 63.
 const fn ones(count: usize) -> u64 {
     (1_u64 << (count & 63)).wrapping_sub(1)
 }

@@ -108,7 +108,7 @@ pub(crate) fn rank_rows(model: &Sections<'_>, features: &[i32], width: usize, st
     }
 }
 
-/// Values whose ranks are searched in step: a search takes the same steps for every value, none of them a branch, and none
+/// Values whose ranks are searched in step: a search takes the same steps for every value, without a branch, and none
 /// waits for another's loads.
 #[cfg(feature = "rows")]
 const ABREAST: usize = 8;
@@ -220,10 +220,10 @@ fn search<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32 + Copy) -> 
     rank
 }
 
-/// The same among 63 to 255 thresholds, written out: a load, a comparison and an addition for each step. `None` for fewer.
+/// Search among 63 to 255 thresholds, written out: a load, a comparison and an addition for each step. `None` for fewer.
 #[inline(always)]
 fn search_many<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32 + Copy) -> Option<u8> {
-    // 63 thresholds among which or at an end of which the rank is: after each 64 that are passed.
+    // The 63 thresholds that the rank is among, or at an end of: after each 64 that are passed.
     let last = cuts.len().checked_sub(63)?;
     let mut start = 0;
     while cuts.get(start + 63).is_some_and(|cut| number(*cut) <= value) {

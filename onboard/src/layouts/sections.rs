@@ -2,7 +2,7 @@
 
 use palpate_shared::format::{Axis, Header, Layout, LeafType};
 
-/// Sections of a model. A layout has checked what it reads from them.
+/// Sections of a model. A layout has checked the ones that it reads.
 ///
 /// Short enough for a model to be copied in a few instructions; a call to copy it would bring in a routine that most programs
 /// have no other use for. So neighbors that are rarely used apart are one slice.
@@ -88,7 +88,7 @@ impl<'a> Sections<'a> {
         (axes.as_chunks().0, cuts)
     }
 
-    /// The offset in the model at which a section, or what is left of one, starts.
+    /// The offset in the model at which a section, or the rest of one, starts.
     pub(crate) fn offset(&self, section: &[u8]) -> usize {
         section.as_ptr().addr().saturating_sub(self.bytes.as_ptr().addr())
     }

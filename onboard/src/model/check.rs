@@ -22,7 +22,7 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
         return Err(Wrong::Field(offset));
     }
     let built_in = built_in::layout(model.layout);
-    // Of code the type of leaves says only what they were rounded to.
+    // For code, the type of leaves states only their rounding.
     let is_code = built_in::layout(Layout::Code) && model.layout == Layout::Code;
     if is_code && model.leaf == LeafType::F32 {
         return Err(Wrong::Field(7));

@@ -46,7 +46,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// The same for a row that has to be made, of up to `N` features.
+    /// Calls it for a row of up to `N` features that has to be made.
     // Apart: only such a model takes the room on the stack.
     #[inline(never)]
     fn call_in<const N: usize>(&self, code: Code, features: &[i32], margins: &mut [i32]) {

@@ -86,7 +86,7 @@ impl Model<'_> {
         }
     }
 
-    /// Sums the margins of features, some of which stand for a missing value.
+    /// Sums the margins of features, including ones that stand for a missing value.
     // Apart: only such a model takes the room for its features on the stack.
     #[inline(never)]
     fn sum_without(&self, sentinel: Sentinel, features: &[i32], margins: &mut [i32]) {

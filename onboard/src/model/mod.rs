@@ -49,7 +49,7 @@ pub(crate) struct Stated {
     counted: Counted,
     needs_pose: bool,
     largest_spread: u32,
-    /// Where thresholds by object stand; 0 if there are none. The six highest bits: whether there are
+    /// Offset of thresholds by object; 0 if there are none. The six highest bits are flags of
     /// sections about strangers, of shared leaves, of features that stand for a missing value, of weights by the number of
     /// touches, of the evidence of a row, and of outputs that belong together.
     by_object: u32,
@@ -57,15 +57,15 @@ pub(crate) struct Stated {
 
 /// See [`Stated::by_object`]: no model is as long.
 const HAS_STRANGERS: u32 = 1 << 31;
-/// The same.
+/// Flag of shared leaves, as above.
 const HAS_SHARED_LEAVES: u32 = 1 << 30;
-/// The same.
+/// Flag of features that stand for a missing value.
 const HAS_SENTINEL: u32 = 1 << 29;
-/// The same.
+/// Flag of weights by the number of touches.
 const HAS_WEIGHTS: u32 = 1 << 28;
-/// The same.
+/// Flag of the evidence of a row.
 const HAS_ROW_EVIDENCE: u32 = 1 << 27;
-/// The same.
+/// Flag of outputs that belong together.
 const HAS_OUTPUTS: u32 = 1 << 26;
 /// Flags that are not a place in [`Stated::by_object`].
 const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_SENTINEL | HAS_WEIGHTS | HAS_ROW_EVIDENCE | HAS_OUTPUTS;
@@ -90,7 +90,7 @@ impl Stated {
     }
 }
 
-/// Where the parts of an opened model are: what a [`Model`] is without its bytes. For whoever keeps the bytes somewhere
+/// Offsets of the parts of an opened model: a [`Model`] without its bytes. For callers that keep the bytes somewhere
 /// that can also be written, and so cannot keep a reference to them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Opened {
@@ -107,7 +107,7 @@ impl Opened {
 }
 
 impl<'a> Model<'a> {
-    /// Where its parts are.
+    /// Offsets of its parts.
     pub(crate) fn opened(&self) -> Opened {
         Opened { places: self.sections.places(), stated: self.stated }
     }
@@ -217,7 +217,7 @@ impl<'a> Model<'a> {
         SharedLeaves::from_bytes(optional::find(self.optional(), Tag::SharedLeaves))
     }
 
-    /// The features that stand for a missing value, if the model states some: they are taken as missing wherever they are.
+    /// The features that stand for a missing value, if the model states some: they are taken as missing in any feature.
     ///
     /// Cost: next to none if there are none, otherwise a few instructions for each optional section. Cannot fail.
     pub fn sentinel(&self) -> Option<Sentinel> {
@@ -248,7 +248,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// The weight of the evidence of so many touches or rows where it is compared with a threshold, in Q16: 65,536, which is 1,
+    /// Weight of the evidence of this many touches or rows when it is compared with a threshold, in Q16: 65,536, which is 1,
     /// unless the model states [others](Weights).
     ///
     /// Cost: next to none if it states none, otherwise leading zeros, and a search among the optional sections.

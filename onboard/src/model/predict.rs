@@ -74,7 +74,7 @@ impl Model<'_> {
         true
     }
 
-    /// The same as the library predicts them: [`Model::predict_raw_each`] after the model's inverse link.
+    /// Predicted values, as the library gives them: [`Model::predict_raw_each`] after the model's inverse link.
     pub fn predict_each(&self, features: &[i32], room: &mut [i32], values: &mut [f32]) -> bool {
         let prediction = self.prediction();
         let is_long = self.predict_raw_each(features, room, values);
@@ -161,7 +161,7 @@ fn exp(x: f32) -> f32 {
     // From 2^23 to 2^24, which f32 holds exactly.
     let power = (exp2_negative(fraction) + (1 << 31)) >> 32;
     let power = u32::try_from(power).unwrap_or(0) as f32;
-    // In two steps, of which the first is exact.
+    // In two steps; the first is exact.
     let half = (whole - 24) / 2;
     power * power_of_two(half) * power_of_two(whole - 24 - half)
 }

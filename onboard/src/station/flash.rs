@@ -84,10 +84,10 @@ pub struct FlashStorage<F, const RECORD: usize> {
     log: usize,
     /// The value of erased bytes.
     erased: u8,
-    /// Where the newest record is.
+    /// Offset of the newest record.
     newest: Option<usize>,
     counter: u32,
-    /// Where the next record goes: behind the newest.
+    /// Offset of the next record, after the newest.
     next: usize,
     /// The sector that was tried last.
     tried: usize,
@@ -111,7 +111,7 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
     /// Uses a flash: the first `log` bytes for records, the rest for two models. Finds the newest record.
     ///
     /// Cost: the checksums of the first record in each sector and of all in two, byte by byte. No erased
-    /// flash is needed: what is no record, read twice, counts as nothing. Without a record in the log a sector is erased.
+    /// flash is needed: bytes that are not a record, read twice, are ignored. Without a record in the log a sector is erased.
     ///
     /// # Errors
     /// [`FlashError`].
@@ -214,7 +214,7 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
         self.flash.bytes().get(from..to).is_some_and(|bytes| bytes.iter().all(|&byte| byte == self.erased))
     }
 
-    /// Erases whole sectors, and returns what the driver says of it.
+    /// Erases whole sectors, and returns the driver's answer.
     fn erase_once(&mut self, start: usize, end: usize) -> bool {
         self.flash.before_erase();
         let (Ok(from), Ok(to)) = (u32::try_from(start), u32::try_from(end)) else { return false };
@@ -239,7 +239,7 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
         written.is_some()
     }
 
-    /// Where a place for models starts.
+    /// Offset of a place for models.
     fn start(&self, place: Place) -> usize {
         match place {
             Place::First => self.log,

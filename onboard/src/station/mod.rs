@@ -15,8 +15,8 @@
 //!
 //! After every command, and every touch of its own, the [`Station`] stores a record (evidence, progress of the link, which
 //! model is in use), and only then says what came of it. Whenever the power goes, the chip continues from the newest
-//! record: the host repeats what is not in it, and the link ensures that nothing is counted twice. What cannot be
-//! stored is executed and reported. The last touch of its own is in the record too, and is told again at each start until
+//! record: the host repeats all that it lacks, and the link ensures that nothing is counted twice. Commands that cannot be
+//! stored are executed and reported. The last touch of its own is in the record too, and is told again at each start until
 //! another record follows: a host takes what it has heard before for a copy.
 //!
 //! | storage | where |

@@ -262,7 +262,7 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
         self.station.model()
     }
 
-    /// Where the probe is in a touch.
+    /// State of the probe within a touch.
     pub const fn state(&self) -> State {
         self.effector.state()
     }
@@ -330,7 +330,7 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
         self.tell(touch, announced, line)
     }
 
-    /// An approach without a contact. Its pose may be older than that of a touch, by as much as the probe takes to pass an
+    /// An approach without a contact. Its pose may be older than that of a touch, by the time in which the probe passes an
     /// object.
     fn missed<B: Board>(&mut self, line: &mut Line<'_, B>) -> Happened {
         let lasts = self.settings.pose_lasts.saturating_add(self.settings.effector.timeout);

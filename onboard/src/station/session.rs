@@ -12,14 +12,14 @@ use palpate_shared::link::{
     VerdictMessage, checksum,
 };
 
-/// Room for a snapshot of `N` objects, where an array's length cannot be computed from `N`: for each object what one
-/// object alone would take.
+/// Room for a snapshot of `N` objects, where an array's length cannot be computed from `N`: room for a snapshot of
+/// one object, `N` times.
 type SnapshotBuffer<const N: usize> = [[u8; SNAPSHOT_LENGTH + 10]; N];
 
 /// Default name of programs on the link: this crate and its version.
 pub const PROGRAM: &str = concat!("palpate-onboard ", env!("CARGO_PKG_VERSION"));
 
-/// A storage whose records are too short for what a station has to keep.
+/// A storage whose records are too short for a station.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordsTooShort {
     /// Bytes that a record needs: [`record_length`].
@@ -42,7 +42,7 @@ impl core::error::Error for RecordsTooShort {}
 pub struct Station<'m, const N: usize, S = NoStorage> {
     built_in: &'m [u8],
     storage: S,
-    /// The model in use, and what is known under it.
+    /// The model in use, and the state of recognition under it.
     opened: Option<Opened>,
     state: Option<State<N>>,
     source: Source,
@@ -136,7 +136,7 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
         });
     }
 
-    /// Says what the chip's program is called on the link: name and version. [`PROGRAM`] if this is not said.
+    /// Sets the name and version of the chip's program on the link; [`PROGRAM`] by default.
     pub const fn set_program(&mut self, program: &'static str) {
         self.program = program;
     }
@@ -206,13 +206,13 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
         self.storage
     }
 
-    /// Where the next model goes: not over the one in use, nor over the one that a power cut would bring back.
+    /// Place of the next model: neither the one in use, nor the one that a power cut would bring back.
     fn next_place(&self) -> Option<Place> {
         let free = |place: &Place| !self.source.is_in(*place) && !self.kept.is_in(*place);
         [Place::First, Place::Second].into_iter().find(free)
     }
 
-    /// Puts what has arrived into use.
+    /// Puts the arrived data into use.
     fn accept(&mut self, staged: Staged) -> Result<(), Refusal> {
         let place = self.next_place().ok_or(Refusal::Unwritable)?;
         let length = usize::try_from(staged.length).unwrap_or(usize::MAX);
@@ -242,7 +242,7 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
         }
     }
 
-    /// Takes the next part of what is arriving.
+    /// Takes the next part of the arriving data.
     fn take(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
         let staged = self.staged.filter(|staged| staged.received == offset).ok_or(Refusal::OutOfOrder)?;
         let start = usize::try_from(offset).map_err(|_| Refusal::TooLong)?;
@@ -255,7 +255,7 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
     }
 }
 
-/// As the link reports it.
+/// Converts to the link's message.
 const fn refusal(refused: Refused) -> Refusal {
     match refused {
         Refused::Pattern(_) => Refusal::Pattern,

@@ -1,4 +1,4 @@
-//! State that a station keeps through resets and power cuts, wherever that is.
+//! State that a station keeps through resets and power cuts, in any kind of memory.
 
 use palpate_shared::link::NotStored;
 
@@ -27,7 +27,7 @@ pub trait Storage {
     /// bytes; the last part that came may come again after a power cut.
     ///
     /// # Errors
-    /// [`NotStored`]: what is there now is not what was given. Nobody asks for it then.
+    /// [`NotStored`]: the storage then holds something else, which nobody asks for.
     fn write_model(&mut self, place: Place, offset: usize, bytes: &[u8]) -> Result<(), NotStored>;
 
     /// The most bytes of a record, see [`record_length`](super::record_length); 0 where nothing is kept.

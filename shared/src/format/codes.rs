@@ -1,4 +1,4 @@
-//! The codes of what a model may be made of.
+//! The codes of a model's parts.
 
 use crate::pattern::Patterns;
 

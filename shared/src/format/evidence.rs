@@ -1,4 +1,4 @@
-//! Evidence of rows: what a margin counts for, and how much rows count together.
+//! Evidence of rows: the weight of a margin, and of rows together.
 
 /// Evidence of a row for each object, by its margin: a table of values at equal distances, between which it is linear; it
 /// stays the same below the first and from just before the last. For models whose margins are no log-probabilities, such as shares of votes.
@@ -56,7 +56,7 @@ impl<'a> RowEvidence<'a> {
     }
 
     /// Reads a section; `None` if it is too short, has fewer than two values or too many, values that fall, shifts or a
-    /// start that are too large. Bytes after those that are known are ignored.
+    /// start that are too large. Bytes after the known ones are ignored.
     ///
     /// Cost: a few instructions for each value.
     pub fn from_bytes(bytes: &'a [u8]) -> Option<Self> {

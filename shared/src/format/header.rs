@@ -9,7 +9,7 @@ pub const VERSION: u16 = 2;
 /// The version without optional sections, which is what a model without any is still written as.
 pub const VERSION_WITHOUT_SECTIONS: u16 = 1;
 
-/// The header's bytes, wherever they stand; every field is read from its place when asked for.
+/// The header's bytes, at any address; every field is read from its place when asked for.
 ///
 /// Cost: a few instructions for each field. Cannot fail: every bit pattern has a value; whether it makes sense is checked
 /// when a model is opened.

@@ -30,7 +30,7 @@ impl<'a> Plan<'a> {
     }
 
     /// Reads a section of a model with this many objects; `None` if there are fewer than two, if the poses are counted in
-    /// another way than this crate knows, or if there are too few bytes. Bytes after those that are known are ignored.
+    /// another way than this crate knows, or if there are too few bytes. Bytes after the known ones are ignored.
     ///
     /// Cost: a few instructions. Cannot fail otherwise.
     pub fn from_bytes(bytes: &'a [u8], objects: usize) -> Option<Self> {

@@ -31,8 +31,8 @@ pub struct Prediction {
     pub scale: f32,
     /// True if each output is a target with a value of its own, and none is a class.
     pub targets: bool,
-    /// Number that a scaled margin is divided by before the link: of trees whose mean is predicted, how many were added; 1
-    /// for all others, and never 0.
+    /// Divisor of a scaled margin before the link: the number of trees added if their mean is predicted, otherwise 1; never
+    /// 0.
     pub average: u32,
 }
 
@@ -60,7 +60,7 @@ impl Prediction {
     }
 
     /// Reads a section; `None` for a link that does not exist, a scale that is not positive and finite, a division by 0, or
-    /// too few bytes. Bytes after those that are known are ignored.
+    /// too few bytes. Bytes after the known ones are ignored.
     ///
     /// Cost: a few instructions. Cannot fail otherwise.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {

@@ -3,7 +3,7 @@
 use super::codes::Per;
 use super::trained::TrainedNoise;
 
-/// A billion: rates and shares are in its parts, so that a decimal number stays one.
+/// A billion, the unit of rates and shares, so that decimal fractions are exact.
 const BILLION: f64 = 1e9;
 
 /// Stopping thresholds by object: 4 bytes for each object, in their order.
@@ -144,8 +144,8 @@ impl Promise {
     }
 
     /// Reads a section; `None` if it is too short, promises nothing (a rate or a confidence that is not between 0 and 1,
-    /// more names than sequences, more wrong names than names) or has a code that does not exist. Bytes after those that
-    /// are known are ignored.
+    /// more names than sequences, more wrong names than names) or has a code that does not exist. Bytes after the known
+    /// ones are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let words = bytes.as_chunks::<4>().0;
         let (head, rest) = words.split_first_chunk::<12>()?;
@@ -199,7 +199,7 @@ pub struct Temperature {
 impl Temperature {
     /// Bytes of the section.
     pub const LENGTH: usize = 4;
-    /// Posteriors as the evidence says.
+    /// A temperature of 1: it changes no posterior.
     pub const ONE: Self = Self { sharpness: 1 << 16 };
     /// The least and the largest [`sharpness`](Temperature::sharpness): those of temperatures of 16 and 1/16.
     const RANGE: core::ops::RangeInclusive<u32> = 1 << 12..=1 << 20;
@@ -225,7 +225,7 @@ impl Temperature {
         self.sharpness.to_le_bytes()
     }
 
-    /// Reads a section; `None` if it is too short or out of range. Bytes after those that are known are ignored.
+    /// Reads a section; `None` if it is too short or out of range. Bytes after the known ones are ignored.
     ///
     /// Cost: a few instructions.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {

@@ -29,9 +29,9 @@ pub struct MisfitTerms {
     pub held: Held,
     /// Rivals of each object: 1 to [`MisfitTest::MOST_RIVALS`].
     pub rivals: u8,
-    /// Touches from which on the test is made; no name is given before.
+    /// First touch with a test; no name is given before.
     pub first: u32,
-    /// Touches from which on names are given; at least `first`.
+    /// First touch with names; at least `first`.
     pub least: u32,
     /// The misfit above which an object is a stranger, after many touches; in 2^-16 nats, as the next two.
     pub threshold: i32,
@@ -85,7 +85,7 @@ impl<'a> Strangers<'a> {
     }
 
     /// Reads a section of a model with this many objects, the background included; `None` if there are too few bytes or a
-    /// number makes no sense. Bytes after those that are known are ignored.
+    /// number makes no sense. Bytes after the known ones are ignored.
     ///
     /// Cost: that of reading the terms, and with a test some instructions for each object. Cannot fail otherwise.
     pub fn from_bytes(bytes: &'a [u8], objects: usize) -> Option<Self> {
@@ -228,8 +228,8 @@ impl ObjectMisfit<'_> {
         self.numbers.get(index).map_or(0, |bytes| i16::from_le_bytes(*bytes))
     }
 
-    /// Hands the bytes of a record to `put`: of its shifts, constant and rivals, and of as many means, as many slopes, and
-    /// the rows of the triangle. Other numbers of them give a record that cannot be read.
+    /// Hands the bytes of a record to `put`: its shifts, constant and rivals, and as `numbers` the means, as many slopes, and
+    /// the rows of the triangle. Any other count of numbers gives a record that cannot be read.
     pub fn write(
         [mean_shift, weight_shift, slope_shift]: [u8; 3],
         constant: i32,

@@ -82,8 +82,8 @@ pub const MUST_UNDERSTAND: u16 = 1 << 15;
 /// Bytes before a section's content: tag, two zeros, length.
 pub const SECTION_HEADER_LENGTH: usize = 8;
 
-/// The probe that a model was trained for: 16 bytes, 24 where it states how far the hand goes, 28 where it also states how
-/// well the stroke is known.
+/// The probe that a model was trained for: 16 bytes, 24 if it states stroke and travel, 28 if it also states the
+/// stroke's tolerance.
 ///
 /// The header's `spacing` and `speed` are those of the simulated training; here they are as the user stated them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,7 +143,7 @@ impl TrainedProbe {
     }
 
     /// Reads a section; `None` if a number is not positive and finite (stroke, travel and tolerance may be 0, or not there), the unit of
-    /// length does not exist, or the cone is above 90 degrees. Bytes after those that are known are ignored.
+    /// length does not exist, or the cone is above 90 degrees. Bytes after the known ones are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let ([radius, spacing, speed, [length, _, low, high]], rest) =
             bytes.as_chunks::<4>().0.split_first_chunk::<4>()?;
@@ -200,7 +200,7 @@ impl TrainedTouches {
     }
 
     /// Reads a section; `None` if there is no pattern, one that does not exist or one that does not count, or if a code
-    /// does not exist. Bytes after those that are known are ignored.
+    /// does not exist. Bytes after the known ones are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let (&[patterns, counted, pose, _, a, b, c, d], _) = bytes.split_first_chunk()?;
         let (patterns, counted) = (Patterns::from_bits(patterns)?, Counted::from_code(counted)?);
@@ -236,8 +236,8 @@ impl TrainedNoise {
         bytes
     }
 
-    /// Reads a section; `None` if it is too short or its largest noise is less than its least. Bytes after those that
-    /// are known are ignored.
+    /// Reads a section; `None` if it is too short or its largest noise is less than its least. Bytes after the known
+    /// ones are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let (numbers, _) = bytes.as_chunks::<4>().0.split_first_chunk::<4>()?;
         let [least, largest, timer, pose] = numbers.map(u32::from_le_bytes);
@@ -263,14 +263,14 @@ impl PatternShares {
         bytes
     }
 
-    /// Reads a section; `None` if it is too short. Bytes after those that are known are ignored.
+    /// Reads a section; `None` if it is too short. Bytes after the known ones are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let (shares, _) = bytes.as_chunks::<2>().0.split_first_chunk::<6>()?;
         Some(Self(shares.map(u16::from_le_bytes)))
     }
 }
 
-/// Kind of touches that a model was trained on, for whoever tests it on others: 12 bytes, and 2 for each object; 2 more if it was
+/// Kind of touches that a model was trained on, to test it on others: 12 bytes, and 2 for each object; 2 more if it was
 /// adjusted to recordings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrainedCapture<'a> {
@@ -289,14 +289,14 @@ impl<'a> TrainedCapture<'a> {
     /// Bytes of the section before the objects.
     pub const LENGTH: usize = CAPTURE;
 
-    /// The section's content before the objects, of each of which a `u16` follows.
+    /// The section's content before the objects; a `u16` for each object follows.
     pub fn head(settings: u16, samples: Range<u32>) -> [u8; CAPTURE] {
         let ([a, b], [c, d, e, f]) = (settings.to_le_bytes(), samples.start.to_le_bytes());
         let [g, h, i, j] = samples.end.to_le_bytes();
         [a, b, 0, 0, c, d, e, f, g, h, i, j]
     }
 
-    /// Reads a section; `None` if it is too short for this many objects. Bytes after those that are known are ignored.
+    /// Reads a section; `None` if it is too short for this many objects. Bytes after the known ones are ignored.
     ///
     /// Cost: a few instructions.
     pub fn from_bytes(bytes: &'a [u8], objects: usize) -> Option<Self> {
@@ -385,7 +385,7 @@ impl Trained {
             write_section(Tag::Probe, false, bytes.get(..probe.length()).unwrap_or(&bytes), &mut put);
         }
         if let Some(touches) = self.touches {
-            // Whoever does not know it would take as evidence what is none.
+            // A reader that does not know it would take other touches for evidence.
             write_section(Tag::Touches, true, &touches.to_bytes(), &mut put);
         }
         if let Some(noise) = self.noise {
@@ -498,7 +498,7 @@ mod tests {
             let probe = TrainedProbe { stroke, travel, ..PROBE };
             assert_eq!(probe.length(), 24);
             assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), Some(probe));
-            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()[..23]), Some(PROBE), "as far as it is whole");
+            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()[..23]), Some(PROBE), "whole fields only");
         }
     }
 

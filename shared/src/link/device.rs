@@ -81,7 +81,7 @@ pub struct Progress {
     session: u32,
     next: u32,
     outcomes: [Option<Outcome>; WINDOW],
-    /// The chip's own event that is stored with this, to be told after that.
+    /// The chip's own event that is stored with this, to be sent once this is stored.
     untold: Option<Untold>,
 }
 
@@ -107,7 +107,7 @@ impl Progress {
         self.next
     }
 
-    /// Where a command's outcome is kept.
+    /// Slot of a command's outcome.
     fn slot(&mut self, sequence: u32) -> Option<&mut Option<Outcome>> {
         // WINDOW fits any integer, and divides 2³², so that slots stay in order when the sequence wraps.
         let window = u32::try_from(WINDOW).unwrap_or(1);
@@ -160,7 +160,7 @@ impl DeviceEnd {
 
     /// Takes bytes from the line, in any portions, does what they say, and hands every frame to be sent to `send`.
     ///
-    /// Cannot fail or panic, whatever the bytes.
+    /// Cannot fail or panic with any bytes.
     pub fn receive(&mut self, bytes: &[u8], device: &mut impl Device, mut send: impl FnMut(&[u8])) {
         let Self { decoder, progress, statistics, boot, events } = self;
         for &byte in bytes {
@@ -359,7 +359,7 @@ fn answer<'b>(
     }
 }
 
-/// As much of a text as fits into a frame.
+/// The beginning of a text: as much of it as fits into a frame.
 fn short(text: &str) -> &str {
     text.get(..text.floor_char_boundary(CHUNK)).unwrap_or_default()
 }

@@ -37,7 +37,7 @@ pub enum FrameError {
     TooLong,
     /// The frame is whole, but of another version of this format.
     Version(u8),
-    /// The frame is whole, but its message is none of this version.
+    /// The frame is whole, but its message is not of this version.
     Message,
 }
 

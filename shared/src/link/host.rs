@@ -123,7 +123,7 @@ enum Phase {
 /// Starts of chips that a host remembers: an event may be late by half as many.
 const BOOTS: usize = 16;
 
-/// From the number of a session that could not be opened to the next; odd, so that none comes again soon.
+/// Step from the number of a session that could not be opened to the next one; odd, so that none returns soon.
 const SESSION_STEP: u32 = 0x9e37_79b9;
 
 /// A frame in flight.
@@ -403,7 +403,7 @@ impl HostEnd {
         self.put_question(Query::Hello, now, send);
     }
 
-    /// A chip that answers is not silent, whatever was lost: attempts are counted again from here.
+    /// A chip that answers is not silent, even if answers were lost: attempts are counted again from here.
     fn is_alive(&mut self, message: &Message<'_>) {
         if !matches!(message, Message::Answer { .. } | Message::Outcome { .. } | Message::Expected { .. }) {
             return;
@@ -445,7 +445,7 @@ impl HostEnd {
                 self.phase = Phase::Open;
             }
             (Phase::Open, answer) => incoming(Incoming::Answer(answer)),
-            // No answer to what was asked: begin again.
+            // No answer: begin again.
             (Phase::Asking | Phase::Opening, _) => {
                 self.phase = Phase::Asking;
                 self.put_question(Query::Hello, now, send);
@@ -507,7 +507,7 @@ impl HostEnd {
         sequence.wrapping_sub(self.oldest) < self.next.wrapping_sub(self.oldest)
     }
 
-    /// Sends again what has been without an answer for too long. Call it often.
+    /// Sends again everything that has been without an answer for too long. Call it often.
     ///
     /// # Errors
     /// [`LinkError`] when the session cannot go on: [`HostEnd::connect`] begins another.

@@ -91,7 +91,7 @@ pub enum Query {
         /// From this byte on.
         offset: u32,
     },
-    /// In which pose should the next approach be? A chip whose program is older than this question does not answer it.
+    /// Asks for the pose of the next approach. A chip whose program is older than this question does not answer it.
     NextApproach {
         /// Poses that the robot cannot reach: pose n is bit n % 8 of byte n / 8. Zeros: it can reach all.
         without: [u8; POSE_BYTES],
@@ -158,7 +158,7 @@ pub enum Command<'a> {
     },
     /// Part of it; chunks come in order.
     Chunk {
-        /// Where it belongs.
+        /// Offset of the part.
         offset: u32,
         /// At most [`CHUNK`](super::CHUNK) bytes.
         bytes: &'a [u8],
@@ -181,9 +181,9 @@ pub enum Payload {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Outcome {
-    /// Of anything but a touch: it is done.
+    /// The command is done; for commands without a touch.
     Done,
-    /// Of a touch.
+    /// Verdict after a touch.
     Verdict(VerdictMessage),
     /// It was not done.
     Refused(Refusal),
@@ -353,7 +353,7 @@ fn pose_of([a, b, c, d, e, f, g, h, i, j, k, l]: [u8; 12]) -> Pose {
     }
 }
 
-/// A verdict, and what it is based on.
+/// A verdict, and its basis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VerdictMessage {
@@ -400,7 +400,7 @@ impl ApproachMessage {
         Self { pose, score, middle: pose_bytes(middle) }
     }
 
-    /// Where to come from: the direction, and the row's alignment.
+    /// Pose to come from: a direction, and the row's alignment.
     pub fn middle(&self) -> Pose {
         pose_of(self.middle)
     }

@@ -6,7 +6,7 @@
 and the same with XGBoost 1.6.2, 1.7.6, 3.0.5, 3.2.0 and (Python 3.12) 3.4.0, then, each with the packages that it imports,
 `make.py lightgbm`, `make.py catboost`, `make.py onnx` (scikit-learn, skl2onnx, onnx, onnxruntime) and `make.py onnxmltools`
 (onnxmltools, xgboost, lightgbm). `make.py predictions`, with all of these packages, opens the models that have no
-NAME.predictions.csv yet with the library at hand, and asks it. Every model gets three files beside it:
+NAME.predictions.csv yet with the installed library, and asks it. Every model gets three files beside it:
 
 NAME.rows.csv     a header with the features' names, then 20 rows like the training's, 20 with values that equal thresholds
                   of the model, the numbers beside them or zero, and 20 with missing values (empty)
@@ -200,7 +200,7 @@ def make_xgboost():
         save("poisson", "json", 0, {"objective": "count:poisson", "base_score": 2.5}, label=amount)
         save("logitraw", "ubj", 2, {**binary, "objective": "binary:logitraw"})
     if release == (3, 2):
-        # What the file does not say: the estimator's missing value, and that it predicts with the trees up to the best round.
+        # Not in the file: the estimator's missing value, and that it predicts with the trees up to the best round.
         x, y = data(2, rows=800)
         x[np.random.default_rng(5).uniform(size=x.shape) < 0.3] = 0
         small = {"n_estimators": 3, "max_depth": 2, "random_state": 1}
@@ -300,7 +300,7 @@ def make_lightgbm():
 
     amount = lambda x, y: np.abs(x[:, 0]) * 3 + y
     often_missing = lambda x: np.where(np.random.default_rng(9).uniform(size=x.shape) < 0.3, np.nan, x)
-    # What is missing says most: splits of missing values against all others, whose threshold is infinite.
+    # Missing values carry most of the information: splits of them against all others, whose threshold is infinite.
     save("missing-alone", 2, {"objective": "binary", "num_leaves": 6}, change=often_missing,
          label=lambda x, y: np.isnan(x[:, 0]) ^ (np.isnan(x[:, 3]) & (y == 1)))
     for objective in ["poisson", "gamma", "cross_entropy", "cross_entropy_lambda"]:
@@ -308,7 +308,7 @@ def make_lightgbm():
         save(objective, 0, {"objective": objective}, predict=True,
              label=(lambda x, y: y * 0.8 + 0.1) if share else (lambda x, y: amount(x, y) + 0.1))
     save("sqrt", 0, {"objective": "regression", "reg_sqrt": True}, label=lambda x, y: amount(x, y) - 4, predict=True)
-    # Objectives that are derived from it: all of them may learn roots, but for huber, which then says that it does not.
+    # Objectives that are derived from it: all of them may learn roots, except huber, which then says that it does not.
     positive = lambda x, y: amount(x, y) + 0.1
     for objective in ["regression_l1", "huber", "fair", "quantile", "mape"]:
         save(objective, 0, {"objective": objective}, label=positive, predict=True)
@@ -397,7 +397,7 @@ def make_catboost():
         x = kinds(with_missing(x), 12)
         # Alone the category decides, so that it is split on however it is counted.
         y = ((0 if alone else y) + (x[:, KIND] % 3 == 1)) % 2
-        # Of CatBoost, categories are whole numbers.
+        # CatBoost's categories are whole numbers.
         known = [number for number in STRANGE if number == int(0 if np.isnan(number) else number) and abs(number) < 2**24]
         test = kind_rows([[]] * 4, 12, known)
         word = lambda number: f"k{number:.0f}" if strings else int(number)

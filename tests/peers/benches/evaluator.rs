@@ -27,7 +27,7 @@ use std::time::Instant;
 /// Rows that are timed.
 const ROWS: usize = 2000;
 
-/// Runs of which the fastest counts: the others were disturbed.
+/// Number of runs; the fastest one counts, since the others were disturbed.
 static RUNS: LazyLock<usize> = LazyLock::new(|| if *QUICK { 1 } else { 7 });
 
 fn main() {
@@ -253,7 +253,7 @@ fn random(settings: &train::Settings) -> Ensemble {
     }
 }
 
-/// The same margins from trees with one value a leaf.
+/// An ensemble with the same margins, from trees with one value a leaf.
 fn taken_apart(ensemble: &Ensemble) -> Ensemble {
     let objects = ensemble.objects.len();
     let mut trees = Vec::new();

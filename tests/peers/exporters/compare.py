@@ -127,7 +127,7 @@ def measure(ensemble, name, exporter, scratch):
         source = exporter(ensemble, directory)
     except Refused as refused:
         return None if str(refused) == "see touches" else f"refused: {refused}"
-    except Exception as error:  # whatever an exporter fails with is a result
+    except Exception as error:  # any failure of an exporter is a result
         return f"fails: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
     cells, seconds = [], [0.0, 0.0]
     for chip in CHIPS:
@@ -152,7 +152,8 @@ def measure(ensemble, name, exporter, scratch):
         others = [on_risc_v(ensemble, directory, source)]
     by_clang = f", clang {seconds[1]:.1f}" if source.clang else ""
     by_gcc = "–" if source.library else f"{seconds[0]:.1f}{by_clang}"
-    return " | ".join([*cells, " / ".join(wrong), "; ".join([by_gcc, *others])])
+    all_wrong = " / ".join(wrong) if any(part != "0" for part in wrong) else "none"
+    return " | ".join([*cells, all_wrong, "; ".join([by_gcc, *others])])
 
 
 def main():

@@ -155,7 +155,7 @@ def emlearn(ensemble, directory, method, dtype="int16_t", leaf_bits=8):
     import emlearn as exporter
 
     if not ensemble.is_forest:
-        # Of all its variants the first one says so.
+        # The first of its variants says so.
         raise Refused("no boosted trees" if method == "loadable" else "see touches")
     converted = exporter.convert(ensemble.model, method=method, dtype=dtype, leaf_bits=leaf_bits)
     converted.save(file=directory / "model.h", name="model", include_proba=False)

@@ -21,7 +21,7 @@ pub fn clock() -> f64 {
 pub struct Paired {
     /// Seconds per item: the median of each contestant's rounds.
     pub seconds: Vec<f64>,
-    /// Time of each contestant, relative to the first: the median over the rounds, in each of which all take turns.
+    /// Time of each contestant, relative to the first: the median over the rounds; all take turns in each.
     /// A disturbance of a round affects all of them.
     pub ratios: Vec<f64>,
 }

@@ -1,4 +1,4 @@
-//! Writes what the firmware's benchmarks and its test of bit-identity are built with:
+//! Writes the inputs of the firmware's benchmarks and of its test of bit-identity:
 //!
 //! ```text
 //! cargo run --release -- run ../shared/objects -o RUN
@@ -165,7 +165,7 @@ fn by_object(ensemble: &Ensemble) -> Vec<&palpate::ensemble::Tree> {
     trees
 }
 
-/// The same trees in irithyll-core's format, an ensemble per object, each after its length as u32. It goes right where a
+/// An ensemble's trees in irithyll-core's format, an ensemble per object, each after its length as u32. It goes right where a
 /// feature is greater than the threshold, so thresholds are the next smaller f32.
 fn irithyll(ensemble: &Ensemble) -> Vec<u8> {
     let mut bytes = Vec::new();

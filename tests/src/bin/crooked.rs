@@ -5,7 +5,7 @@
 //! ```
 //!
 //! What is wrong with the probe stands in [`CROOKED`]. None of this is shared with what fits a probe: it goes from the
-//! simulated contact times to those of the probe by its own few lines.
+//! simulated contact times to the probe's by its own few lines.
 
 use palpate::capture;
 use palpate::mesh::{builtin, obj};

@@ -84,7 +84,7 @@ fn touches(count: usize, seed: u64) -> Vec<Touch> {
     random::touches(count, seed).into_iter().chain(limits).collect()
 }
 
-/// A model, and what it makes of touches. After a decision one more touch, then a reset.
+/// A model, and its results for touches. After a decision one more touch, then a reset.
 fn play(text: &mut String, name: &str, bytes: &[u8], touches: &[Touch]) {
     let model = Model::new(bytes).expect("a model");
     *text += &format!("model {} {name}\n", hex(bytes));
@@ -215,7 +215,7 @@ fn descriptors(text: &mut String) {
     }
 }
 
-/// Statements of models, and what they refuse.
+/// Statements of models, and the touches that they reject.
 fn sections(text: &mut String) {
     let plain = |descriptor| compiled(Shape { descriptor, ..SHAPE }, 13, Leaf::I16, Layout::Compact);
     let contacts = plain(Descriptor::ContactsCurvature);
@@ -247,7 +247,7 @@ fn sections(text: &mut String) {
     }
 }
 
-/// The same trees over this many features of rows.
+/// An ensemble's trees over this many features of rows.
 fn imported(mut ensemble: Ensemble, features: usize) -> Ensemble {
     ensemble.inputs = Inputs::unnamed(features);
     for (number, tree) in ensemble.trees.iter_mut().enumerate() {

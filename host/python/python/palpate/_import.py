@@ -139,7 +139,7 @@ def _classes(model: object) -> list[str] | None:
     if classes is None:
         return None
     names = [str(name) for name in classes]
-    # Of one class, 0, XGBoost and LightGBM have a margin for the other one as well.
+    # For a single class, 0, XGBoost and LightGBM have a margin for the other one as well.
     if len(names) == 1 and names != ["0"]:
         raise InputError(f"the {type(model).__name__} knows one class, {names[0]}, and nothing to distinguish. Train on two or more.")
     return names if len(names) > 1 else None

@@ -43,7 +43,7 @@ class DataSet:
     @property
     def approaches(self, /) -> list[int] | None:
         """
-        The number of approaches to each object, where it is known.
+        The number of approaches to each object, if known.
         """
     @property
     def counts(self, /) -> list[int]:
@@ -73,12 +73,12 @@ class DataSet:
     @property
     def holds_approaches(self, /) -> bool:
         """
-        True if every approach is kept, also those in which not all three fingers touched.
+        True if every approach is kept, including those in which not all three fingers touched.
         """
     @property
     def instances(self, /) -> NDArray[int16]:
         """
-        The instance, recording or log that each touch is of, from 0: a sequence is of touches of one.
+        Number of the instance, recording or log of each touch, from 0: all touches of a sequence are from one.
         """
     @property
     def names(self, /) -> list[str]:
@@ -98,7 +98,7 @@ class DataSet:
     @property
     def probe(self, /) -> Probe | None:
         """
-        The probe that made the touches, where that is known.
+        The probe that made the touches, if known.
         """
     @staticmethod
     def read(directory: str | PathLike[str]) -> DataSet:
@@ -118,7 +118,7 @@ class DataSet:
         """
     def to_pandas(self, /) -> DataFrame:
         """
-        The touches as a table: object (a category), t1, t2 and t3, and where it is known direction and alignment.
+        The touches as a table: object (a category), t1, t2 and t3, and, if known, direction and alignment.
         The columns are those of the arrays, without copies. Needs pandas.
         """
     def to_parquet(self, /, directory: str | PathLike[str]) -> None:
@@ -133,7 +133,7 @@ class DataSet:
     @property
     def warnings(self, /) -> list[str]:
         """
-        Warnings from reading the data set; what they name may be intended.
+        Warnings from reading the data set, which may be about something intended.
         """
 
 @final
@@ -165,7 +165,7 @@ class Ensemble:
     @staticmethod
     def from_bytes(content: SupportsGetItem[int, SupportsIndex], names: SupportsGetItem[int, str] | None = None, *, all_trees: bool = False, missing: SupportsFloat | SupportsIndex | None = None, notes: SupportsGetItem[int, str] = ...) -> Ensemble:
         """
-        The same from the bytes of such a file. `notes` are what to know about it beyond what it says itself.
+        Reads the bytes of such a file. `notes` are facts about it that it does not state.
         """
     @staticmethod
     def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ..., link: str = "identity", last_of_ties: bool = False, targets: bool = False) -> Ensemble:
@@ -290,7 +290,7 @@ class Model:
     @property
     def notes(self, /) -> list[str]:
         """
-        Facts about what the model was compiled from, each a sentence; none of a model that was loaded.
+        Facts about the model's source, each a sentence; none for a loaded model.
         """
     @property
     def objects(self, /) -> list[str]:
@@ -322,7 +322,7 @@ class Recognizer:
     """
     Recognizes objects by touch, by the code that runs on the chip.
 
-    It stops where the model says so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`.
+    It stops when the model says so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`.
 
     >>> import palpate
     >>> model = palpate.compile(palpate.train(palpate.capture(["bowl", "mouse"], touches=1000)))
@@ -399,7 +399,7 @@ class Surface:
         """
     def first_contact(self, /, origins: ArrayLike, directions: ArrayLike, radius: SupportsFloat | SupportsIndex) -> NDArray[float64]:
         """
-        When a sphere that starts at each origin and moves along its direction first touches: the t at which its center is
+        First contact of a sphere that starts at each origin and moves along its direction: the t at which its center is
         at origin + t * direction; 0 if it starts in contact, NaN if it never touches. One row of `directions` serves all.
         """
     @property
@@ -489,7 +489,7 @@ def train(data: DataSet, *, preset: str = "compact", descriptor: str | None = No
     Trains an ensemble on a data set: gradient boosting with XGBoost's algorithm and parameters.
 
     `preset` is "compact" (30 trees with one leaf value per object, on curvature and slope) or "paper" (the published
-    method); whatever else is given replaces a part of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
+    method); other arguments replace parts of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
     `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
     approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
     Of objects on a table each placement is an output, or with `outputs` "objects" each object.

@@ -39,7 +39,7 @@ def row_of(owner: _Named, row: Any) -> npt.NDArray[np.float64]:
 
 
 def names_of(rows: Any) -> list[str] | None:
-    """The names of a table's columns; `None` for what is no table."""
+    """The names of a table's columns; `None` for anything but a table."""
     for attribute in ("column_names", "columns"):
         names = getattr(rows, attribute, None)
         if names is not None and not callable(names):
@@ -82,7 +82,7 @@ def _numbers(column: Any, name: str) -> npt.NDArray[np.float64]:
 
 
 def _number(value: Any, name: str, row: int) -> float:
-    # What pandas has in place of a missing value is neither equal to anything nor a number.
+    # In pandas, a missing value is neither equal to anything nor a number.
     if value is None or type(value).__name__ in ("NAType", "NaTType"):
         return np.nan
     try:

@@ -121,7 +121,7 @@ def _calibrated(model: Any) -> _Parts:
     """The margins that a calibrator makes of those of one estimator: a multiple of them and a constant."""
     if len(model.calibrated_classifiers_) != 1:
         raise InputError(
-            f"the CalibratedClassifierCV averages {len(model.calibrated_classifiers_)} calibrated models, which is no sum of "
+            f"the CalibratedClassifierCV averages {len(model.calibrated_classifiers_)} calibrated models, which is not a sum of "
             "trees. Train with ensemble=False, or calibrate a fitted model (sklearn.frozen.FrozenEstimator)."
         )
     (own,) = model.calibrated_classifiers_
@@ -205,7 +205,7 @@ def _gradient(model: Any) -> _Parts:
         for output, estimator in enumerate(stage)
     ]
     base = ([0.0] if is_binary else []) + [scale * float(value) for value in first]
-    # Of two classes the second one is that of a score of exactly 0.
+    # With two classes, a score of exactly 0 means the second one.
     return _Parts(base, trees, notes, last_of_ties=is_binary)
 
 

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshProblem {
-    /// A source is nothing that exists, and not the name of a built-in object.
+    /// A source does not exist, and is not the name of a built-in object.
     #[error("cannot read the mesh: this is neither a file, a directory nor a built-in object")]
     NoSuchSource {
         /// The names of the built-in objects.
@@ -24,12 +24,12 @@ pub enum MeshProblem {
         /// The files, and what reads them.
         files: String,
     },
-    /// Of several files, some cannot be read.
+    /// Some of several files cannot be read.
     #[error("{} of {count} meshes cannot be read:\n  {}", errors.len(), errors.join("\n  "))]
     Unread {
         /// Number of files.
         count: usize,
-        /// What is wrong with each of those that cannot be read, with its name.
+        /// Error of each unreadable one, with its name.
         errors: Vec<String>,
     },
     /// Git LFS left a pointer in the place of a file.
@@ -46,9 +46,9 @@ pub enum MeshProblem {
     SameName {
         /// The name.
         name: String,
-        /// Where the first comes from: a file, or `builtin`.
+        /// Source of the first: a file, or `builtin`.
         first: PathBuf,
-        /// Where the second comes from.
+        /// Source of the second.
         second: PathBuf,
     },
     /// A vertex line has fewer than three coordinates.
@@ -101,7 +101,7 @@ pub enum MeshProblem {
         /// Number of vertices.
         vertices: u64,
     },
-    /// A file is not what a file of its kind must be.
+    /// A file breaks the rules of its kind.
     #[error("the {format} file is damaged: {what}")]
     Damaged {
         /// The kind of file: `STL`.
@@ -109,7 +109,7 @@ pub enum MeshProblem {
         /// Description of the fault.
         what: String,
     },
-    /// A file uses what is not read and would change the surface.
+    /// A file uses a feature that is not read and would change the surface.
     #[error("{what} is not read")]
     Unsupported {
         /// Name of the feature.
@@ -169,11 +169,11 @@ pub enum MeshProblem {
     Cameras {
         /// Percentage of points that another image sees.
         now: f64,
-        /// The same if the mistake is undone.
+        /// This percentage if the mistake is undone.
         then: f64,
         /// The mistake.
         cause: String,
-        /// What undoes it.
+        /// Correction of the mistake.
         remedy: String,
     },
     /// Masks of depth images do not match the images, or each other.

@@ -6,7 +6,7 @@
 use super::Mesh;
 use glam::DVec3;
 
-/// A mesh as it was read, and what was subtracted from its coordinates.
+/// A mesh as read, and the offset subtracted from its coordinates.
 pub(super) type Moved = (Mesh, [f64; 3]);
 
 /// Largest distance of a mesh's center from the origin, along an axis and in longest sides, at which its coordinates

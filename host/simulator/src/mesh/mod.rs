@@ -78,7 +78,7 @@ const MOST_GUESSED: f64 = 0.2;
 pub struct Object {
     /// Its name: the label of its touches and of its output in a model, and the stem of its files.
     pub name: String,
-    /// Number of millimeters in a unit of its meshes, where that is known: what touching it at its true size needs.
+    /// Number of millimeters in a unit of its meshes, if known: needed to touch it at its true size.
     pub millimeters: Option<f64>,
     /// Weights of its placements on a table that replace those of their solid angles, by name: a placement that is not among
     /// them is left out. Empty: solid angles.

@@ -1,4 +1,4 @@
-//! In place of the built-in objects where the feature `objects` is off: there are none.
+//! Stands in for the built-in objects if the feature `objects` is off: there are none.
 
 use crate::error::{Error, Result};
 use crate::mesh::Object;
@@ -13,7 +13,7 @@ pub(super) fn one(name: &str) -> Result<Object> {
     Err(absent(name))
 }
 
-/// As many as make no difference.
+/// Any number: there are no shapes.
 pub(super) const BACKGROUND_SHAPES: usize = 200;
 
 /// No shapes.

@@ -40,7 +40,7 @@ pub fn parse(text: impl BufRead, path: &Path) -> Result<Mesh> {
     parse_moved(text, path).map(|(mesh, _)| mesh)
 }
 
-/// The same, with what was subtracted from the coordinates.
+/// Parses a mesh, and returns the offset subtracted from its coordinates.
 pub(super) fn parse_moved(text: impl BufRead, path: &Path) -> Result<Moved> {
     let mut filter = FacesOnly::new(text, path);
     let loaded = tobj::load_obj_buf(&mut filter, &tobj::LoadOptions::default(), |_| Ok(Default::default()));

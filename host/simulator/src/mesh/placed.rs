@@ -1,4 +1,4 @@
-//! Meshes that a file places by transforms, some of them several times: what the readers of scenes share.
+//! Meshes that a file places by transforms, some of them several times: common code of the readers of scenes.
 
 use super::Mesh;
 use super::exact::Moved;
@@ -22,7 +22,7 @@ impl Placed {
         Self { vertices: Vec::new(), triangles: Vec::new(), limit: (3 << 16) + 48 * length }
     }
 
-    /// Refuses a mesh of so many vertices and triangles that the scene would become too large.
+    /// Refuses a mesh if its vertices or triangles would make the scene too large.
     pub(super) fn check(&self, vertices: usize, triangles: usize) -> Result<(), MeshProblem> {
         let sum = |own: usize, more: usize| own as u64 + more as u64;
         let bytes = 24 * sum(self.vertices.len(), vertices) + 12 * sum(self.triangles.len(), triangles);

@@ -2,7 +2,7 @@
 
 use super::stl;
 
-/// How a text is written.
+/// Encoding of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Written {
     /// In UTF-16, the lower byte first or last, as redirection in a Windows shell writes it.
@@ -12,7 +12,7 @@ pub(super) enum Written {
 }
 
 impl Written {
-    /// How a text that starts with `head` is written; none if it can be read as it stands, or is none.
+    /// Encoding of a text that starts with `head`; none if it can be read as it stands, or is not text.
     pub(super) fn of(head: &[u8], length: u64) -> Option<Self> {
         if stl::is_binary(head, length) {
             return None;

@@ -23,7 +23,7 @@ impl Mesh {
         corners.map(|v| [v, v]).reduce(|[low, high], [v, _]| [low.min(v), high.max(v)]).unwrap_or([Vec3::ZERO; 2])
     }
 
-    /// A checksum (CRC-64 XZ) of vertices and triangles: which mesh was touched, whatever files it was read from.
+    /// A checksum (CRC-64 XZ) of vertices and triangles: it identifies the mesh regardless of the files it was read from.
     pub fn checksum(&self) -> u64 {
         const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
         let mut digest = CRC.digest();

@@ -65,7 +65,7 @@ impl Places {
             return None;
         }
         let inside = (at - at.floor()).to_array();
-        // A place in the neighboring cell is near only to what is at the edge of its own.
+        // A place in the neighboring cell is near only to places at the edge of its own.
         let steps = inside.map(|inside| {
             if inside * CELL <= 1.0 {
                 [0, -1]

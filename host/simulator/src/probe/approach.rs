@@ -93,7 +93,7 @@ impl Probe {
     }
 }
 
-/// Where approaches aim: what a robot must know about an object before it touches it.
+/// Target of approaches: what a robot must know about an object before it touches it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Aim {
@@ -142,10 +142,10 @@ impl Aim {
     }
 }
 
-/// Where the probe starts, in which direction it moves, and how its row of fingers is turned.
+/// Start of the probe, its direction of motion, and the roll of its row of fingers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Approach {
-    /// Where the middle finger starts, in units.
+    /// Start of the middle finger, in units.
     pub start: DVec3,
     /// Unit vector of the motion.
     pub direction: DVec3,
@@ -162,7 +162,7 @@ impl Approach {
         Self::draw_at(rng, bounds, bounds, tilt, CLEARANCE)
     }
 
-    /// The same with the aim uniform in another box, such as [`Aim::target`] gives, and another clearance than
+    /// Like [`Self::draw`], with the aim uniform in another box, such as [`Aim::target`] gives, and another clearance than
     /// [`CLEARANCE`].
     pub fn draw_at(rng: &mut impl Rng, [low, high]: [DVec3; 2], target: [DVec3; 2], tilt: f64, clearance: f64) -> Self {
         let (center, side) = ((low + high) / 2.0, high - low);
@@ -208,7 +208,7 @@ impl Approach {
         Self { start: aim - direction * back, direction, alignment }
     }
 
-    /// Where the fingers start, first to third, in units.
+    /// Starts of the fingers, first to third, in units.
     pub fn fingers(&self, spacing: f64) -> [DVec3; FINGERS] {
         [-1.0, 0.0, 1.0].map(|place| self.start + self.alignment * (place * spacing))
     }
@@ -221,7 +221,7 @@ impl Approach {
         self.above_table(distances, scene, probe)
     }
 
-    /// The same if all three fingers touch, else none: as soon as one finger misses, no other is cast.
+    /// Distances at which all three fingers touch, or none: as soon as one finger misses, no other is cast.
     pub fn full_distances(&self, scene: &Scene, probe: &Probe) -> Option<[f64; FINGERS]> {
         let distances = scene.all_contacts(self.fingers(probe.spacing), self.direction, probe.radius)?;
         let end = self.end_at_table(scene, probe);
@@ -260,7 +260,7 @@ impl Approach {
     }
 }
 
-/// A direction cosine as the nearest Q15 number; what is beyond ±1 becomes ±1.
+/// A direction cosine as the nearest Q15 number; values beyond ±1 become ±1.
 pub fn to_q15(cosine: f64) -> i16 {
     let one = f64::from(Q15_ONE);
     (cosine * one).round().clamp(-one, one) as i16

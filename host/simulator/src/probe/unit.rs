@@ -19,7 +19,7 @@ pub fn serialize<S: Serializer>(unit: &Length, serializer: S) -> Result<S::Ok, S
 /// Reads the name, for serde.
 ///
 /// # Errors
-/// If it is none of the names.
+/// If it is not one of the names.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Length, D::Error> {
     let name = std::borrow::Cow::<str>::deserialize(deserializer)?;
     let named = Length::ALL.iter().copied().find(|unit| unit.name() == name);

@@ -29,7 +29,7 @@ pub struct Inspected<'a> {
     pub descriptor: &'static str,
     /// Number of features.
     pub features: usize,
-    /// Of a model over rows: each feature's name, and how many units make up 1 (null where f32 values are compared).
+    /// For a model over rows: each feature's name, and how many units make up 1 (null where f32 values are compared).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feature_names: Option<Vec<Feature>>,
     /// Numbers of the columns of the library's rows, for a model over some of them.
@@ -37,7 +37,7 @@ pub struct Inspected<'a> {
     pub columns: Option<SomeColumns>,
     /// The objects' names.
     pub objects: Vec<&'a str>,
-    /// Of a model over rows: what it predicts.
+    /// Predictions of a model over rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub predicts: Option<Predicts>,
     /// The layout's name.
@@ -63,7 +63,7 @@ pub struct Inspected<'a> {
     pub unit: f32,
     /// The largest rounding error of a margin, in nats.
     pub margin_error: f32,
-    /// When recognizers stop unless told otherwise.
+    /// Default end of recognizers' sequences.
     pub stopping: Defaults,
     /// Promise of the model; null if it was not calibrated.
     pub promise: Option<Promised>,
@@ -191,7 +191,7 @@ pub fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>) -> Result<OnChip
         Core::M4F => Chip::M4F,
         Core::M0Plus => Chip::M0Plus,
     };
-    // The image makes touches of what it is given; a model over rows of features cannot be measured with it.
+    // The image expects touches; a model over rows of features cannot be measured with it.
     let measured = match model.descriptor() {
         Some(_) if emulated.is_there() => Some(emulated.measure(model.bytes(), &spread_touches(model))?),
         _ => None,
@@ -214,7 +214,7 @@ pub fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>) -> Result<OnChip
     })
 }
 
-/// Touches that spread evenly over what the model's probe can give, the same every time.
+/// Touches that spread evenly over the range of the model's probe, the same every time.
 fn spread_touches(model: &Model<'_>) -> Vec<Touch> {
     // Most contacts come within a twentieth of the longest time.
     let range = compile::longest_time(model) * 1e6 / 20.0;

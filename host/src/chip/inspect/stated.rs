@@ -16,7 +16,7 @@ pub struct Feature {
     pub scale: Option<f32>,
 }
 
-/// When recognizers stop.
+/// Default end of recognizers' sequences.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Defaults {
     /// The error rate at which recognizers stop.
@@ -25,7 +25,7 @@ pub struct Defaults {
     pub max_touches: u32,
 }
 
-/// A promise, and what it rests on.
+/// A promise, and its basis.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Promised {
     /// The promised share of wrong names.
@@ -131,7 +131,7 @@ pub struct Touches {
 /// The noise in a training.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Noise {
-    /// Standard deviations of contact times in microseconds.
+    /// The least standard deviation of contact times in microseconds.
     pub least: u32,
     /// The largest standard deviation.
     pub largest: u32,

@@ -56,7 +56,7 @@ impl Follow {
         Ok(Some(entry))
     }
 
-    /// True if the path now names another file, or the file is shorter than what was read of it.
+    /// True if the path now names another file, or the file is shorter than the part already read.
     fn is_replaced(&mut self) -> Result<bool> {
         let io = |source| Error::io(&self.path, "read the journal", source);
         // Between the old file and the new one there may be none.

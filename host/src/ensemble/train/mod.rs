@@ -206,7 +206,7 @@ pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) ->
     }
 }
 
-/// Makes an ensemble whose outputs are placements state their weights; without any it stays as it is.
+/// States the weights of placements in an ensemble whose outputs are placements; without weights it stays as it is.
 pub(crate) fn state_placements(ensemble: &mut Ensemble, shares: &BTreeMap<String, f64>) -> Result<()> {
     if !shares.is_empty() {
         let stated = TouchOrigin { placements: shares.clone(), ..TouchOrigin::of(&ensemble.origin)? };
@@ -245,9 +245,9 @@ fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Or
     TouchOrigin { noise, trained: Some(trained), ..TouchOrigin::new(dataset, settings.probe) }.origin()
 }
 
-/// Trains an ensemble with a background column: one more object, of the touches of all objects of `background` together,
-/// which should be as many and as different shapes as possible, none of them one of `dataset`'s. It stands for what the
-/// ensemble does not know, and is called [`BACKGROUND`].
+/// Trains an ensemble with a background column: one more object, with the touches of all objects of `background` together.
+/// These should be of as many and as different shapes as possible, and none may be one of `dataset`'s. It stands for
+/// objects that the ensemble does not know, and is called [`BACKGROUND`].
 ///
 /// # Errors
 /// As [`train`]; [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if the data sets were captured with

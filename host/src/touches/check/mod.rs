@@ -35,7 +35,7 @@ pub struct Check {
 pub struct Finding {
     /// True if training would be wrong, or fail; otherwise it may be meant.
     pub is_wrong: bool,
-    /// Where and what, as a line without a full stop: `data/fork.txt:3: the time -1 is negative`.
+    /// Place and problem, as a line without a full stop: `data/fork.txt:3: the time -1 is negative`.
     pub what: String,
     /// Remedy, as a sentence.
     pub fix: String,
@@ -43,7 +43,7 @@ pub struct Finding {
 
 /// Largest number of wrong lines of a file that are shown; the others are counted.
 const MOST_LINES: usize = 20;
-/// So many touches must be there before something is said about their sum.
+/// Least number of touches for findings about their sum.
 const ENOUGH: usize = 20;
 
 impl Check {

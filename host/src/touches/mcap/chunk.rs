@@ -58,7 +58,7 @@ fn lz4(data: &[u8], size: u64) -> Result<Vec<u8>, String> {
     Ok(records)
 }
 
-/// Reads on, up to one byte more than `size`; memory grows with what comes.
+/// Reads on, up to one byte more than `size`; memory grows with the bytes that arrive.
 fn unpack(mut from: impl Read, records: &mut Vec<u8>, size: u64) -> Result<(), String> {
     loop {
         let left = (size + 1).saturating_sub(records.len() as u64);

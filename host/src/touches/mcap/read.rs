@@ -63,7 +63,7 @@ pub fn read(mut bytes: impl Read, path: &Path, each: impl FnMut(Message) -> Resu
                 reader.notify_read(count);
             }
             Some(Ok(LinearReadEvent::Record { opcode, data })) => {
-                // What follows is a summary of what was read.
+                // A summary of the records above follows.
                 in_data &= opcode != op::DATA_END;
                 if in_data {
                     log.record(opcode, data, offset)?;

@@ -216,7 +216,7 @@ fn check_ranges(metadata: &ParquetMetaData, length: u64) -> Result<(), TouchesPr
     Ok(())
 }
 
-/// A file of which no more is asked than it has, whatever it says of itself: the reader reserves memory first.
+/// A file that is asked for no more than it has, regardless of its own statements: the reader reserves memory first.
 struct Bounded {
     file: File,
     length: u64,

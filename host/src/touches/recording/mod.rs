@@ -1,7 +1,7 @@
 //! Touches of a real probe on their way to the disk.
 //!
 //! Each touch is a line appended to `<object>.txt` and flushed to the disk before the next one is waited for, so that
-//! whatever ends a recording (a pulled cable, Ctrl-C, a power cut) costs at most the touch that is being written. The
+//! any end of a recording (a pulled cable, Ctrl-C, a power cut) costs at most the touch that is being written. The
 //! listing follows twice a second and at the end; until then a file may hold more than is listed. Readers count what the
 //! file holds, up to the last whole line, and the next recording cuts off what is behind it.
 
@@ -35,11 +35,11 @@ pub struct Recorded {
     pub placement: Option<String>,
     /// Number of touches that the recording added.
     pub touches: u64,
-    /// When it began, in UTC: `2026-11-22T11:00:00Z`.
+    /// Time at which it began, in UTC: `2026-11-22T11:00:00Z`.
     pub began: String,
-    /// Where the touches came from: a port or a file.
+    /// Source of the touches: a port or a file.
     pub source: String,
-    /// Name and version of the chip's program, where it says so.
+    /// Name and version of the chip's program, if it says so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub firmware: Option<String>,
     /// The checksum of the chip's model, which says how long the chip waits for a finger; none without a model.

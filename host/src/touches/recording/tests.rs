@@ -93,7 +93,7 @@ fn every_touch_counts_although_the_recorder_was_killed_after_it() {
     let listing = Listing::read(directory.path()).unwrap().unwrap();
     assert!(listing.objects[0].touches < 5, "this test needs a listing that lags behind");
     assert_eq!(read(directory.path()).objects[0].touches(), touches(0..5));
-    // The next recording lists them as what they are.
+    // The next recording lists them as they are.
     whole(directory.path(), "fork", 5..7);
     let dataset = read(directory.path());
     assert_eq!(dataset.objects[0].touches(), touches(0..7));

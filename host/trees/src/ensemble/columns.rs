@@ -20,7 +20,7 @@ pub(super) fn check_count(columns: usize) -> Result<(), EnsembleProblem> {
     })
 }
 
-/// The features of trees that split on columns with these names, of which an empty one is none. Where there are more columns
+/// The features of trees that split on columns with these names; empty names are none. If there are more columns
 /// than a model can have features, the trees are numbered again by those that they use.
 pub(super) fn features(
     names: Vec<String>,
@@ -80,8 +80,8 @@ fn splits(tree: &mut Tree) -> impl Iterator<Item = &mut usize> {
     })
 }
 
-/// Names that a model can hold, with default ones for those that there are not. A name that it cannot hold is changed as
-/// [`holdable`] does, unless it would be another one's then.
+/// Names that a model can hold, with defaults for missing ones. A name that it cannot hold is changed as
+/// [`holdable`] does, unless it would equal another one then.
 fn held(mut names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
     let all: BTreeSet<String> = names.iter().cloned().collect();
     let mut changed = BTreeSet::new();

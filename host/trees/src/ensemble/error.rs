@@ -74,7 +74,7 @@ pub enum EnsembleProblem {
         /// A value in Python that it could have.
         example: &'static str,
     },
-    /// An attribute does not hold what it should.
+    /// An attribute has an invalid value.
     #[error("{name} is not {expected}: {detail}")]
     Attribute {
         /// Its name.

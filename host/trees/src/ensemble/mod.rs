@@ -68,7 +68,7 @@ pub enum Node {
         feature: usize,
         /// The threshold.
         threshold: f32,
-        /// Where a missing value goes.
+        /// True if a missing value goes left.
         missing_left: bool,
         /// Index of the left child.
         left: usize,

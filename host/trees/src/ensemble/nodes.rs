@@ -13,12 +13,12 @@ pub struct Threshold {
 }
 
 impl Threshold {
-    /// That of `x <= value`.
+    /// The test `x <= value`.
     pub const fn at_or_below(value: f64) -> Self {
         Self { value, inclusive: true }
     }
 
-    /// That of `x < value`.
+    /// The test `x < value`.
     pub const fn below(value: f64) -> Self {
         Self { value, inclusive: false }
     }
@@ -42,7 +42,7 @@ impl Threshold {
     /// The least whole number of units that goes right, where `scale` units make up 1.
     pub fn units(self, scale: f32) -> f64 {
         let units = self.value * f64::from(scale);
-        // A product that is a whole number but for its rounding is that number.
+        // A product within rounding of a whole number is that number.
         let whole = units.round();
         let units = if (units - whole).abs() <= 2.0 * f64::EPSILON * units.abs() { whole } else { units };
         if self.inclusive { units.floor() + 1.0 } else { units.ceil() }
@@ -52,7 +52,7 @@ impl Threshold {
 /// The threshold c with which `x < c` is `x <= threshold` for every f32 x: the f32 after the largest one that is not
 /// above the threshold.
 fn after(threshold: f64) -> f32 {
-    // `as` rounds to nearest, and to infinity what is beyond.
+    // `as` rounds to nearest, and values beyond the range to infinity.
     let near = threshold as f32;
     let below = if f64::from(near) > threshold { near.next_down() } else { near };
     below.next_up()

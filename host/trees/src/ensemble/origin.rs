@@ -1,4 +1,4 @@
-//! Origin of an ensemble, as far as it is known.
+//! Origin of an ensemble, if it is known.
 
 use super::nodes::Threshold;
 use palpate_shared::format::Prediction;

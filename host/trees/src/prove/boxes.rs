@@ -75,7 +75,7 @@ pub(super) fn sides<E>(
 /// Handler of a leaf's values, and of the rows that reach it.
 pub(super) type See<'s, E> = dyn FnMut(&[f64], &mut Rows) -> Result<(), E> + 's;
 
-/// A tree whose leaves have values in nats, or what the library's margins are in.
+/// A tree whose leaves have values in nats, or in the unit of the library's margins.
 #[derive(Debug)]
 pub(super) struct Tree {
     pub(super) nodes: Vec<Step>,
@@ -126,7 +126,7 @@ impl Tree {
         deepest
     }
 
-    /// Calls `see` on each leaf that some of `rows` reach, with these.
+    /// Calls `see` on each leaf that some of `rows` reach, with these rows.
     pub(super) fn leaves<E>(&self, rows: &mut Rows, see: &mut See<'_, E>) -> Result<(), E> {
         self.below(0, rows, see)
     }
@@ -151,7 +151,7 @@ pub(super) enum Keys {
     Whole,
     /// Keys of f32 values.
     Real,
-    /// Whole numbers of units, so many in 1.
+    /// Whole numbers of units, this many in 1.
     Scaled(Vec<f32>),
 }
 

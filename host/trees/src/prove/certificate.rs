@@ -1,4 +1,4 @@
-//! Certificates: what a proof found, as a text that is checked in another way.
+//! Certificates: the results of a proof, as a text that is checked in another way.
 
 use super::ProofProblem;
 use crate::error::{Error, Place, Result};
@@ -72,7 +72,7 @@ impl Certificate {
     /// Reads a certificate.
     ///
     /// # Errors
-    /// [`Error::Io`], and [`ProofProblem::Line`] for a line that is none of a certificate's.
+    /// [`Error::Io`], and [`ProofProblem::Line`] for a line that does not belong in a certificate.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, "read the certificate", source))?;

@@ -93,13 +93,13 @@ pub enum ProofProblem {
     /// The model has one output.
     #[error("the model has one output, and no class that could change")]
     NoClass,
-    /// Bytes that are accepted as a model are not what the format says.
+    /// Bytes that are accepted as a model break the format.
     #[error("the model does not follow its format: {what}")]
     Format {
         /// The fault.
         what: &'static str,
     },
-    /// A line of a certificate is none.
+    /// A line of a certificate is invalid.
     #[error("not a line of a certificate: {line:?}")]
     Line {
         /// The line.
@@ -112,7 +112,7 @@ pub enum ProofProblem {
         what: &'static str,
         /// Its checksum in the certificate.
         stated: u64,
-        /// That of the file.
+        /// Checksum of the file.
         found: u64,
     },
     /// The certificate states less than there is.

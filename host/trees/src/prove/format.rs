@@ -43,7 +43,7 @@ pub(super) struct Exit {
     pub(super) trees: usize,
     /// The most that those after it change the difference between two margins.
     pub(super) bound: f64,
-    /// For each output, what is added after it beside trees; empty where nothing is.
+    /// Additions to each output, after it and beside trees; empty if there are none.
     pub(super) later: Vec<f64>,
 }
 

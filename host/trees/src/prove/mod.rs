@@ -9,7 +9,7 @@
 //! model's leaves to the ensemble's, with a reader of its own that is written from the format's description, and holds what
 //! it finds against a [`Certificate`].
 //!
-//! Not proved: what is not the ensemble's, such as priors and thresholds for stopping; and that the chip executes its code.
+//! Not proved: anything outside the ensemble, such as priors and thresholds for stopping; and that the chip executes its code.
 
 mod assembly;
 mod boxes;
@@ -50,11 +50,11 @@ pub struct Proof {
     /// The largest difference of a margin: in any cell between thresholds, of a table or where [`prove`] can go through
     /// them; otherwise a bound, the sum of the trees' largest differences, without what the library loses by adding in f32.
     pub margin_error: f64,
-    /// The difference that the model states, which has what the library loses by adding in f32.
+    /// The difference that the model states, including the library's loss by adding in f32.
     pub stated: f64,
     /// For each output its name, and bounds of its margin.
     pub ranges: Vec<(String, f64, f64)>,
-    /// For each output the least and the largest margin of a row that a search found: what a bound is worth.
+    /// For each output the least and the largest margin of a row that a search found, to judge a bound.
     pub found: Vec<(f64, f64)>,
     /// The most splits that a row passes: the sum of each tree's longest way; 0 for a table.
     pub splits: usize,
@@ -62,10 +62,10 @@ pub struct Proof {
     /// assembly.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instructions: Option<usize>,
-    /// The same of a layout of data, estimated: see [`Instructions`].
+    /// The most instructions for a layout of data, estimated: see [`Instructions`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimated: Option<Instructions>,
-    /// The links of the model and of the ensemble, where `export --link` set another one: what is proved are margins.
+    /// The links of the model and of the ensemble, if `export --link` set another one: the proof is about margins.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other_link: Option<[&'static str; 2]>,
 }
@@ -115,10 +115,10 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
     Ok((proof, Certificate { model: checksum(bytes), ensemble: checksum(file), code: None, trees, table, outputs }))
 }
 
-/// The same of a model of the layout code, whose trees are assembly that [`emit_code`](compile::emit_code) wrote.
+/// Proves a model of the layout code, whose trees are assembly that [`emit_code`](compile::emit_code) wrote.
 ///
 /// # Errors
-/// As [`prove`]; [`ProofProblem::Assembly`] for what is not understood.
+/// Those of [`prove`]; [`ProofProblem::Assembly`] for assembly that is not understood.
 pub fn prove_code(bytes: &[u8], code: &str, ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, Certificate)> {
     let model = compile::open_with_code(bytes)?;
     let (plain, read) = with_code(bytes, code)?;

@@ -11,7 +11,7 @@ const STARTS: u64 = 2;
 /// A feature of a row; `None` where it is missing.
 type Key = Option<i64>;
 
-/// For each output, the least and the largest margin that a search found. Of a table, those of its cells.
+/// For each output, the least and the largest margin that a search found: among the cells, for a table.
 pub(super) fn found(plain: &Plain) -> Vec<(f64, f64)> {
     if let Some(cells) = &plain.cells {
         let of = |output: usize| {

@@ -1,10 +1,10 @@
-//! Numbers that leaves of the ensemble add for some rows, and what a model may round them to.
+//! Numbers that leaves of the ensemble add for some rows, and their possible roundings in a model.
 
 use super::boxes::{Rows, Tree};
 use super::format;
 
-/// Values that leaves of the ensemble add for some rows: from the least to the most, and the numbers of whole steps, from
-/// the first to the second, that each of them may be rounded to.
+/// Values that leaves of the ensemble add for some rows: the least and the largest, and the first and last number of whole
+/// steps to which each may be rounded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Span {
     pub(super) low: f64,

@@ -23,7 +23,7 @@ struct Pair<'p> {
     values: usize,
 }
 
-/// Handler of a leaf of the model, of what the ensemble adds there, and of the rows that reach both.
+/// Handler of a leaf of the model, of the ensemble's addition there, and of the rows that reach both.
 type Visit<'v> = dyn FnMut(&[f64], &[Span], &Rows) -> Result<(), ProofProblem> + 'v;
 
 impl Pair<'_> {
@@ -61,7 +61,7 @@ impl Pair<'_> {
         spans(&self.trees, self.values, Span::whole(-f64::from(self.stands_for.offset), self.step), self.step, rows)
     }
 
-    /// Compares a leaf with what the ensemble adds.
+    /// Compares a leaf with the ensemble's addition.
     fn compare(
         &self,
         leaf: &[f64],
@@ -296,7 +296,7 @@ struct Sums {
     error: f64,
     least: f64,
     most: f64,
-    /// The base margin that the ensemble's is, with what is folded into it.
+    /// The base margin equivalent to the ensemble's, with everything that is folded into it.
     base: f64,
     /// The sums in whole units, to which each part was rounded.
     units: [f64; 2],

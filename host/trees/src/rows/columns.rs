@@ -82,7 +82,7 @@ impl Features {
         self.names.iter().map(String::as_str)
     }
 
-    /// The features among the columns of a table with this header, of which `others` are none.
+    /// The features among the columns of a table with this header, except for the columns `others`.
     ///
     /// Where both have names, each feature has to be one of the columns; there may be more of them, in any order. Names are
     /// equal also where one has `_` for the other one's blanks, brackets and control characters, as LightGBM writes them.
@@ -165,7 +165,7 @@ fn found<T: PartialEq>(wanted: impl Iterator<Item = T>, header: &[T]) -> Option<
     wanted.map(|name| header.iter().position(|column| *column == name)).collect()
 }
 
-/// The numbers of columns without names, if none of them has one.
+/// The numbers of columns, if no column has a name.
 fn numbers<'n>(names: impl Iterator<Item = &'n str>) -> Option<Vec<usize>> {
     let numbers: Option<Vec<usize>> = names.map(number).collect();
     numbers.filter(|numbers| !numbers.is_empty() && numbers.iter().collect::<HashSet<_>>().len() == numbers.len())

@@ -38,7 +38,7 @@ pub enum RowsProblem {
         /// The columns of the library's rows, where the model has only some of them.
         all: Option<usize>,
     },
-    /// Features and columns have names, and some feature is none of the columns.
+    /// Features and columns have names, and some feature is not one of the columns.
     #[error("no column is named {}; its columns are {}", some(missing), some(header))]
     Unmatched {
         /// The features that no column is named after.
@@ -160,7 +160,7 @@ pub enum RowsProblem {
     OtherModel {
         /// Features, outputs and trees of the model.
         model: [usize; 3],
-        /// Those of the ensemble.
+        /// Numbers of the ensemble.
         ensemble: [usize; 3],
     },
     /// Margins are farther apart than the model states.
@@ -175,7 +175,7 @@ pub enum RowsProblem {
         /// The first tree that differs.
         tree: Option<String>,
     },
-    /// The library's margins are something else.
+    /// The library's margins look like probabilities.
     #[error("the library's numbers look like probabilities, and margins are needed")]
     Probabilities,
     /// Classes are others than the library's.
@@ -189,7 +189,7 @@ pub enum RowsProblem {
         /// The first of them.
         first: ClassDiffers,
     },
-    /// A label is none of the model's classes.
+    /// A label is not one of the model's classes.
     #[error("the label {label:?} in row {row} is none of the model's classes: {}", known.join(", "))]
     Label {
         /// The label.
@@ -246,7 +246,7 @@ pub enum RowsProblem {
     },
 }
 
-/// The first names of many, `?` for what is no text.
+/// The first names of many, `?` for those that are not text.
 fn some(names: &[String]) -> String {
     let plain = |name: &String| name.chars().map(|own| if own.is_control() { '?' } else { own }).collect::<String>();
     let names: Vec<String> = names.iter().map(plain).collect();
@@ -322,7 +322,7 @@ impl Problem for RowsProblem {
     }
 }
 
-/// A row of which the library predicts another value.
+/// A row for which the library predicts another value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ValueDiffers {
     /// The row, counted from 1.

@@ -1,4 +1,4 @@
-//! Rows of features, for models that other libraries trained: CSV files, sequences, and what a chip gets of a row.
+//! Rows of features, for models that other libraries trained: CSV files, sequences, and the chip's form of a row.
 
 mod columns;
 mod error;

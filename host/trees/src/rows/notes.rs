@@ -1,10 +1,10 @@
-//! Facts about an ensemble that whoever compiles it should know.
+//! Remarks about an ensemble for its user.
 
 use super::scales::{self, Effect};
 use crate::ensemble::Ensemble;
 
-/// Notes for the user, each a sentence: those of the file that it was read from; and the features of which thresholds fall
-/// together, in f32 or in whole numbers of units where it is compiled with `scales`.
+/// Notes for the user, each a sentence: those of the file that it was read from, and the features with thresholds that
+/// become equal, in f32 or in whole numbers of units if it is compiled with `scales`.
 pub fn notes(ensemble: &Ensemble, scales: Option<&[f32]>) -> Vec<String> {
     let imported = ensemble.origin.imported.as_ref();
     let mut notes = imported.map(|imported| imported.notes.clone()).unwrap_or_default();

@@ -14,13 +14,13 @@ pub struct Effect {
     pub scale: f32,
     /// Its different thresholds.
     pub thresholds: usize,
-    /// Those that stay different in whole units.
+    /// Number of these that stay different in whole units.
     pub different: usize,
     /// The farthest that a value can be from a threshold and still go the other way: half a unit for its rounding, and
     /// nothing where each threshold lies right between two whole units.
     pub largest_step: f64,
-    /// True if every value of the rows that the scales were fitted to is a whole number of units, but for the digits of
-    /// f32, so that none of them goes another way; `None` without such rows.
+    /// True if every value of the rows that the scales were fitted to is a whole number of units, up to the digits of
+    /// f32, so that no row goes another way; `None` without such rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub values_are_whole: Option<bool>,
 }
@@ -32,7 +32,7 @@ pub struct Merged {
     pub feature: String,
     /// Its different thresholds in the file.
     pub thresholds: usize,
-    /// Those that stay different in f32.
+    /// Number of these that stay different in f32.
     pub different: usize,
 }
 
@@ -77,7 +77,7 @@ fn thresholds(ensemble: &Ensemble, feature: usize) -> Vec<(Threshold, f32)> {
     thresholds
 }
 
-/// The features of which thresholds become the same in f32: values between those go another way than in the library.
+/// The features with thresholds that become the same in f32: values between those go another way than in the library.
 pub fn merged(ensemble: &Ensemble) -> Vec<Merged> {
     let names = ensemble.inputs.names();
     let of_feature = names.into_iter().enumerate().map(|(feature, name)| {
@@ -119,8 +119,8 @@ pub fn effects(ensemble: &Ensemble, scales: &[f32], rows: Option<&Rows>) -> Vec<
     all.filter(|effect| effect.thresholds > 0).collect()
 }
 
-/// True if a value is a whole number of units, but for the digits of f32, in which decimals are not exact. What is
-/// missing or infinite is one.
+/// True if a value is a whole number of units, up to the digits of f32, in which decimals are not exact. Missing and
+/// infinite values are.
 fn is_whole(value: f64, scale: f64) -> bool {
     let units = value * scale;
     !units.is_finite() || (units - units.round()).abs() <= units.abs().max(1.0) * 2.0 * f64::from(f32::EPSILON)

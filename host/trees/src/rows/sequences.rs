@@ -63,12 +63,12 @@ pub struct SequencesBuilder {
     /// The positions of sequences and groups, by name.
     seen: HashMap<String, usize>,
     groups: HashMap<String, usize>,
-    /// Of the last sequence.
+    /// Name and label of the last sequence.
     last: Option<[String; 2]>,
 }
 
 impl SequencesBuilder {
-    /// For rows of so many features, and these classes.
+    /// For rows of this many features, and these classes.
     pub fn new(features: usize, classes: &[String]) -> Self {
         Self { classes: classes.to_vec(), built: Sequences { features, ..Sequences::default() }, ..Self::default() }
     }
@@ -162,11 +162,11 @@ impl Sequences {
         Self::from_table(&header, records, features, names, classes, |line| Place::line(path, line))
     }
 
-    /// Sequences of the rows of a table of any kind: its header, and its records with their numbers, of which `place` says
-    /// where they are. Line 1 is the header's.
+    /// Sequences of the rows of a table of any kind: its header, and its records with their numbers; `place` gives the place of
+    /// a number. Line 1 is the header's.
     ///
     /// # Errors
-    /// As [`Sequences::read`], and what the records end with.
+    /// Those of [`Sequences::read`], and of the records.
     pub fn from_table(
         header: &[&str],
         records: impl Iterator<Item = Result<(u64, Vec<String>)>>,
@@ -252,7 +252,7 @@ mod tests {
                 ":2: the label \"pan\" in row 1 is none of the model's classes: cup, jug",
             ),
             ("id,a,x,y,kind\n1,1,2,3,cup\n", &own, ":1: no column is named b; its columns are id, a, x, y, kind"),
-            // As many columns as features, of which one is missing.
+            // As many columns as features, one of them missing.
             ("id,a,x,kind\n1,1,2,cup\n", &own, ":1: no column is named b; its columns are id, a, x, kind"),
             ("id;a;b;kind\n1;1;2;cup\n", &own, ":1: its cells are separated by \";\""),
             ("id,a,b,kind\n\n1,1,2,cup\n", &own, ":2: the line is empty"),

@@ -17,7 +17,7 @@ impl Table {
     /// Reads a file; its first line is a header.
     ///
     /// # Errors
-    /// [`Error::Io`], and [`RowsProblem`] for what is no text.
+    /// [`Error::Io`], and [`RowsProblem`] if it is not text.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let mut table = Self::without_header(path, "read the rows")?;
         table.has_header = true;

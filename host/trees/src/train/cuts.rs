@@ -4,7 +4,7 @@
 //! values are queued in row order, a full queue becomes a summary, and summaries of one level are merged and pruned into one
 //! of the next (Greenwald and Khanna, 2001; Chen and Guestrin, 2016, appendix). Ranks are f32, as there.
 
-/// A value of a summary, with what is known about its rank.
+/// A value of a summary, with bounds on its rank.
 #[derive(Clone, Copy)]
 struct Entry {
     /// The least weight of all smaller values.
@@ -182,7 +182,7 @@ fn ascending(summary: &mut [Entry]) {
     }
 }
 
-/// The ends of `bins` bins. The least value is none of them.
+/// The ends of `bins` bins. The least value is not one of them.
 fn ends(summary: &[Entry], bins: usize) -> Vec<f32> {
     let (Some(first), Some(last)) = (summary.first(), summary.last()) else {
         return vec![1e-5];

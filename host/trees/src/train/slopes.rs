@@ -66,7 +66,7 @@ pub(super) fn slope(share: f32, own: bool, weight: f32) -> [f32; 2] {
     [first * weight, (2.0 * share * (1.0 - share) * weight).max(LEAST)]
 }
 
-/// The largest margin, and the least positive number where all are below.
+/// The largest margin; the least positive number if all are below it.
 fn most(margins: &[f32]) -> f32 {
     margins.iter().copied().fold(f32::MIN_POSITIVE, f32::max)
 }

@@ -200,7 +200,7 @@ fn cuts_are_all_values_where_there_are_few_and_quantiles_where_there_are_many() 
     for (cut, expected) in quarters.iter().zip([2_502.0, 5_003.0, 7_505.0, 20_012.0]) {
         assert!((cut - expected).abs() < 100.0, "{quarters:?}");
     }
-    // Weights count as so many values.
+    // A weight counts as that many values.
     let heavy = cuts::of_column(shuffled.iter().map(|&value| (value, if value < 100.0 { 1e4 } else { 1.0 })), 4);
     assert!(heavy[1] < 100.0, "{heavy:?}");
 }

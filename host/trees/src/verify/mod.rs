@@ -45,10 +45,10 @@ pub struct Verified {
     pub library_max_margin_error: Option<f64>,
     /// Given rows that the library puts into another class by its margins; `None` without these.
     pub library_class_differs: Option<usize>,
-    /// Those of them that the rounding that the model states does not explain: the library's margins of the two classes are
-    /// farther apart, or equal where nothing that decides between the two was rounded.
+    /// Number of these that the model's stated rounding does not explain: the library's margins of the two classes are
+    /// farther apart, or equal although nothing that decides between the two was rounded.
     pub library_class_unexplained: Option<usize>,
-    /// The largest difference of a value to what the library predicts; `None` without its predictions, or for classes.
+    /// The largest difference of a value to the library's prediction; `None` without its predictions, or for classes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub library_max_value_error: Option<f64>,
     /// Given rows that the library predicts another class for, or a value farther away than the rounding of margins that the
@@ -70,7 +70,7 @@ pub struct Verified {
     /// True if the library's margins look like probabilities.
     #[serde(skip)]
     pub are_probabilities: bool,
-    /// The first tree of which another leaf is added, where margins differ by more than is stated.
+    /// The first tree that adds another leaf, if margins differ by more than is stated.
     #[serde(skip)]
     pub first_tree: Option<String>,
     /// Given rows that, measured in whole numbers of the features' units, reach another leaf than with their own values:

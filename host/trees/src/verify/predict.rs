@@ -24,7 +24,7 @@ pub fn class_of(margins: &[f64], last_of_ties: bool) -> usize {
     (1..margins.len()).fold(0, |best, class| if better(class, best) { class } else { best })
 }
 
-/// The class by a model's own rule; 0 where outputs are targets, of which none is a class.
+/// The class by a model's own rule; 0 where outputs are targets, which are not classes.
 pub(super) fn class_by(margins: &[f64], prediction: &Prediction) -> usize {
     if prediction.targets { 0 } else { class_of(margins, prediction.last_of_ties) }
 }

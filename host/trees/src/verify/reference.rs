@@ -36,7 +36,7 @@ impl<'a> Reference<'a> {
         is_each && self.ensemble.objects.len() > 1 && self.ensemble.prediction().scale != 1.0
     }
 
-    /// The margins of what the model gets.
+    /// The margins of the model's input.
     pub(super) fn margins(&self, row: &[f64], encoded: &[i32]) -> Vec<f32> {
         match &self.encoder {
             Encoder::Real => self.ensemble.margins_of_features(&singles(row)),
@@ -94,7 +94,7 @@ impl Rounding {
         Self { largest: if is_f32 { of_import } else { stated }, ties_are_exact }
     }
 
-    /// True if it explains another class than the library's, of which the margins are this far apart.
+    /// True if it explains another class than the library's, if their margins are this far apart.
     pub(super) fn explains(self, gap: f64) -> bool {
         self.largest > 0.0 && gap <= 2.0 * self.largest && !(gap == 0.0 && self.ties_are_exact)
     }

@@ -27,7 +27,7 @@ pub struct Classes {
     pub accuracy: f64,
     /// Its standard error.
     pub accuracy_standard_error: f64,
-    /// The same for the rows of each class that there are.
+    /// This share for the rows of each class present.
     pub per_class: BTreeMap<String, f64>,
     /// The classes, in the model's order.
     pub names: Vec<String>,

@@ -1,4 +1,4 @@
-//! A model's classes and values compared with what the library's own `predict` says.
+//! A model's classes and values compared with the output of the library's own `predict`.
 
 use super::reference::{Reference, Rounding, bound, margins};
 use crate::error::{Result, RowsProblem};

@@ -1,4 +1,4 @@
-//! Following a chip over the link: which questions are asked, and what the answers and events say.
+//! Following a chip over the link: the questions to ask, and the answers and events.
 
 use palpate_shared::Touch;
 use palpate_shared::link::{

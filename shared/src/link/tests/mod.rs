@@ -114,7 +114,7 @@ struct Faults {
 
 const CLEAN: Faults = Faults { byte_lost: 0.0, byte_changed: 0.0, frame_lost: 0.0, frame_doubled: 0.0, delay: 0 };
 
-/// One direction of a line: what was sent and when it arrives.
+/// One direction of a line: the bytes sent, and their time of arrival.
 struct Line {
     faults: Faults,
     rng: ChaCha8Rng,
@@ -507,7 +507,7 @@ impl Rig {
         self.step().unwrap();
     }
 
-    /// The chip's own fingers touch; what it says of that arrives, or the power goes before.
+    /// The chip's own fingers touch; its report arrives, or the power goes before.
     fn touch_itself(&mut self, touches: u32, arrives: bool) {
         let Self { up, now, chip, notebook, .. } = self;
         let send = |frame: &[u8]| {
@@ -573,7 +573,7 @@ fn a_host_that_has_just_come_sees_that_an_event_is_of_a_start_before() {
     assert_eq!(events.take(), [(Event::Started, 4)]);
 }
 
-/// Lets a host and a chip talk without delay; the outcomes that the host took.
+/// Lets a host and a chip talk without delay, and returns the number of outcomes that the host took.
 fn talk(host: &mut HostEnd, sent: &mut Vec<Vec<u8>>, chip: &mut DeviceEnd, notebook: &mut Notebook) -> usize {
     let mut outcomes = 0;
     while !sent.is_empty() {

@@ -41,7 +41,7 @@ enum Action {
     Cut(usize, bool),
     /// A chip's own fingers touch.
     Touch(usize),
-    /// Time passes: what is due is sent again.
+    /// Time passes: due messages are sent again.
     Wait(u32),
 }
 
@@ -62,7 +62,7 @@ fn action() -> impl Strategy<Value = Action> {
     ]
 }
 
-/// A chip, and what it was told in this life.
+/// A chip, and everything that it was told in this life.
 struct Chip {
     end: DeviceEnd,
     notebook: Notebook,
@@ -83,7 +83,7 @@ impl Device for Notebook {
     fn touch(&mut self, touch: &Touch, _: bool) -> Outcome {
         let number = touch.times()[1].micros().expect("a number");
         self.counted.push(number);
-        // The outcome says of which touch it is.
+        // The outcome identifies its touch.
         Outcome::Verdict(VerdictMessage { decision: Decision::Undecided, best: 0, touches: number, detail: None })
     }
 
@@ -146,7 +146,7 @@ struct Host {
     connected: bool,
     /// Touches of this session, in order.
     given: Vec<u32>,
-    /// Number of them that have an outcome.
+    /// Number of these that have an outcome.
     answered: usize,
     /// The number of the name or approach that was asked for.
     asked: Option<u8>,
@@ -306,7 +306,7 @@ impl World {
         }
     }
 
-    /// A chip starts, with what it has kept.
+    /// A chip starts, with its stored state.
     fn start(&mut self, chip: usize, progress: Progress, notebook: Notebook) {
         self.resets += 1;
         // No line holds frames for longer than that.
@@ -322,7 +322,7 @@ impl World {
         self.up(chip, frames);
     }
 
-    /// A chip's own fingers touch; what it then says.
+    /// A chip's own fingers touch; returns its report.
     fn touch(&mut self, chip: usize) -> Vec<Vec<u8>> {
         let Chip { end, notebook, life, touches, touched, .. } = &mut self.chips[chip];
         (*touches, *touched) = (*touches + 1, self.resets);

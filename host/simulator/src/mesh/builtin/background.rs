@@ -1,4 +1,4 @@
-//! Shapes of no kind: what a background column is trained on.
+//! Shapes of no kind, for training a background column.
 //!
 //! Each is drawn from one of ten families (lumps, carved lumps, turned solids, vessels, wires, rings, plates, bars with
 //! a head, combs, stars) with random parts, lengths and angles. Together they should be as varied as the objects that a
@@ -101,7 +101,7 @@ fn lumps(dice: &mut Dice) -> (Shape, f32) {
     (shape, 0.6)
 }
 
-/// A solid out of which others were cut.
+/// A solid from which others were cut.
 fn carved(dice: &mut Dice) -> (Shape, f32) {
     let half = dice.sizes(1.5, 4.5);
     let mut shape = if dice.half_the_time() { cuboid(half, 0.3) } else { ellipsoid(half) };

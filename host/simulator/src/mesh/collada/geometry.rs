@@ -58,7 +58,7 @@ impl Geometry {
         Ok(read)
     }
 
-    /// Appends the positions of `<vertices>`; where they start, and how many they are.
+    /// Appends the positions of `<vertices>`; returns their start and number.
     fn add_vertices<'a, 'input>(
         &mut self,
         vertices: Node<'a, 'input>,

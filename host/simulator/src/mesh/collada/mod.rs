@@ -2,7 +2,7 @@
 //!
 //! `roxmltree` parses. Nodes may be nested, and instances of other nodes. The unit is not applied, but stated with the
 //! mesh; where the file states its upward axis, the mesh is turned so that z is up. What would change the surface and is
-//! not read (skins, morphs, splines, skew, polygons with holes) is refused by name; materials, lights, cameras, animations
+//! not read (skins, morphs, splines, skew, polygons with holes) is rejected by name; materials, lights, cameras, animations
 //! and physics are skipped.
 
 mod geometry;
@@ -55,7 +55,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>)> {
     Ok((scene.placed.into_mesh().map_err(here)?, millimeters))
 }
 
-/// The file's text. Names in it may be in Latin-1, where it says so: numbers are ASCII in either.
+/// The file's text. Names in it may be in Latin-1, if it says so: numbers are ASCII in either.
 fn text(bytes: &[u8], path: &Path) -> Result<String> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     match std::str::from_utf8(bytes) {
@@ -220,7 +220,7 @@ impl<'a, 'input> Scene<'a, 'input> {
         Ok(())
     }
 
-    /// Puts what is in a node on the stack of what waits, the first on top.
+    /// Pushes the content of a node onto the stack, the first on top.
     fn wait(
         &mut self,
         parent: Node<'a, 'input>,

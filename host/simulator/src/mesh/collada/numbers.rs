@@ -25,7 +25,7 @@ impl Number for u32 {
     }
 }
 
-/// All numbers in an element, also those after comments in it.
+/// All numbers in an element, including those after comments in it.
 pub(super) fn numbers<T: Number>(node: Node<'_, '_>) -> Result<Vec<T>, Wrong> {
     let mut numbers = Vec::new();
     for text in node.children().filter(|child| child.is_text()) {

@@ -39,7 +39,7 @@ pub(super) fn of(node: Node<'_, '_>) -> Result<DAffine3, Wrong> {
     Ok(whole)
 }
 
-/// A rotation about an axis of length 1; exact where it is by quarters of a turn about one of the coordinates' axes.
+/// A rotation about an axis of length 1; exact for quarter turns about a coordinate axis.
 fn rotation(axis: DVec3, degrees: f64) -> DAffine3 {
     let quarters = degrees / 90.0;
     let (sine, cosine) = if quarters == libm::trunc(quarters) {

@@ -83,7 +83,7 @@ impl Facts {
         self.parts.iter().filter(|part| part.is_inside_out)
     }
 
-    /// Says in words if the mesh is closed: "yes", or what is not.
+    /// Says in words if the mesh is closed: "yes", or its open parts.
     pub fn closed(&self) -> String {
         match (self.open_edges, self.branching_edges) {
             (0, 0) => "yes".into(),
@@ -95,7 +95,7 @@ impl Facts {
         }
     }
 
-    /// Says in words if the mesh is right side out: "yes", or what is not.
+    /// Says in words if the mesh is right side out: "yes", or the parts that are not.
     pub fn side(&self) -> String {
         let turned = self.inside_out().count();
         if turned > 0 && turned == self.parts.len() {
@@ -231,7 +231,7 @@ impl Facts {
     }
 }
 
-/// The first three of `count` places, and that there are more.
+/// The first three of `count` places, and a remark if there are more.
 fn places(places: impl Iterator<Item = String>, count: usize) -> String {
     const SHOWN: usize = 3;
     let mut text = places.take(SHOWN).collect::<Vec<_>>().join("; ");

@@ -31,7 +31,7 @@ impl Part {
         Self::place_of(self.triangles, self.low, self.high)
     }
 
-    /// Location of so many triangles in a box, in words: "96 triangles around (1.20, 0, -3.00)".
+    /// Number and location of triangles in a box, in words: "96 triangles around (1.20, 0, -3.00)".
     pub(super) fn place_of(triangles: usize, low: Vec3, high: Vec3) -> String {
         let plural = if triangles == 1 { "" } else { "s" };
         let [x, y, z] = ((low.as_dvec3() + high.as_dvec3()) / 2.0).to_array().map(super::short);
@@ -155,7 +155,7 @@ fn samples(number: usize, numbers: &[usize], mesh: &Mesh) -> Vec<DVec3> {
 
 /// True if a point is inside a closed part: a ray leaves it more often than it enters it.
 fn is_inside(point: DVec3, part: usize, numbers: &[usize], mesh: &Mesh) -> bool {
-    // A direction in which no one models.
+    // A direction in which nobody models.
     let direction = DVec3::new(0.836_516_303_737_8, 0.482_962_913_144_5, 0.258_819_045_102_5);
     let mut crossings = 0;
     for (triangle, _) in mesh.triangles.iter().zip(numbers).filter(|(_, own)| **own == part) {

@@ -93,7 +93,7 @@ pub(super) fn pieces(mesh: &Mesh) -> Vec<Piece> {
 const EMPTY: u32 = u32::MAX;
 const FULL: u32 = u32::MAX - 1;
 
-/// Gives full cells that touch each other, be it at a corner, one number; how many numbers there are.
+/// Gives full cells that touch each other, even at a corner, one number; returns how many numbers there are.
 fn flood(cells: &mut [u32], number: &impl Fn(IVec3) -> usize) -> u32 {
     let mut count = 0;
     let mut waiting = Vec::new();

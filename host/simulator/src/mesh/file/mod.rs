@@ -28,7 +28,7 @@ pub enum Format {
     Pcd,
     /// XYZ: points, as text.
     Xyz,
-    /// Depth images with poses, of which `scene_camera.json` is the list, as in the BOP benchmark.
+    /// Depth images with poses, listed by `scene_camera.json`, as in the BOP benchmark.
     Depth,
 }
 
@@ -48,7 +48,7 @@ impl Format {
         }
     }
 
-    /// The same of text as it is usually written.
+    /// Kind of text as it is usually written.
     fn of_usual(head: &[u8], length: u64, extension: Option<&str>) -> Self {
         if stl::is_binary(head, length) {
             return Self::Stl;
@@ -98,25 +98,25 @@ pub struct Contents {
     pub format: Format,
     /// The points that the mesh was made of, in its coordinates; none if the file holds triangles.
     pub points: Vec<[f32; 3]>,
-    /// What is odd about the file. Of points: what was left out, how noisy they are, how large the holes were that are closed.
+    /// Remarks on the file. For points: those left out, their noise, and the sizes of closed holes.
     pub notes: Vec<String>,
-    /// Of points: the share of the surface that is a guess, since it closes holes; without the flat underside of what stood on
+    /// For points, the share of the surface that is a guess, since it closes holes; without the flat underside of an object on
     /// a table.
     pub guessed: f64,
 }
 
-/// The most bytes that are taken from what is no regular file, such as a pipe: 1 GiB.
+/// Read limit for pipes and other files that are not regular: 1 GiB.
 const MOST_OF_A_PIPE: u64 = 1 << 30;
 
 /// Reads a mesh file of any kind: all its meshes together, polygons cut into triangles, without faces that are a single
 /// point.
 ///
 /// Memory: at most 256 bytes for each byte of the file (and of those that a glTF file names), and 1 MB. The surface of a scan
-/// is made on a grid, which takes some 100 MB whatever the file's size.
+/// is made on a grid, which takes some 100 MB regardless of the file's size.
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; a [`MeshProblem`] with its line or byte where the file is damaged, or uses
-/// what is not read, and with the file when there is no face or each is a single point.
+/// unsupported features, and with the file when there is no face or each is a single point.
 pub fn read(path: &Path) -> Result<Contents> {
     let io = |source| Error::io(path, "read the mesh", source);
     let file = File::open(opened(path)).map_err(io)?;

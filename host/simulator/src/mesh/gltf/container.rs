@@ -1,4 +1,4 @@
-//! The parts of a glTF file: its JSON, and the bytes of its buffers, wherever they are.
+//! The parts of a glTF file: its JSON, and the bytes of its buffers, in this file or in others.
 
 use super::damaged;
 use super::document::{Buffer, Document};
@@ -57,7 +57,7 @@ pub(super) fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>> {
     Ok(Parts { json, start, binary })
 }
 
-/// The bytes of the document's buffers, as many as it states; none where a buffer has no place to be read from.
+/// Bytes of the document's buffers, as many as it states; none for a buffer without a source.
 pub(super) fn buffers<'a>(
     document: &Document,
     parts: &Parts<'a>,
@@ -75,7 +75,7 @@ pub(super) fn buffers<'a>(
     document.buffers.iter().enumerate().map(load).collect()
 }
 
-/// A buffer without what is beyond its stated length.
+/// A buffer, cut to its stated length.
 fn cut<'a>(bytes: Cow<'a, [u8]>, index: usize, buffer: &Buffer, path: &Path) -> Result<Cow<'a, [u8]>> {
     let (length, stated) = (bytes.len(), buffer.byte_length);
     let stated = usize::try_from(stated).ok().filter(|&stated| stated <= length);
@@ -137,7 +137,7 @@ fn short(uri: &str) -> String {
     uri.chars().take(80).collect()
 }
 
-/// A URI's `%20` and the like as the characters that they stand for; what is no such escape stays.
+/// Decodes a URI's `%20` and the like; invalid escapes stay.
 fn unescaped(uri: &str) -> String {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();

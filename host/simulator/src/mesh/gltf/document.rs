@@ -27,7 +27,7 @@ pub(super) struct Document {
     pub(super) extensions_required: Vec<String>,
 }
 
-/// What a document of glTF 1.0 has: there, meshes and accessors have names instead of numbers.
+/// Content of a document of glTF 1.0: there, meshes and accessors have names instead of numbers.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 #[expect(dead_code, reason = "they are only read")]

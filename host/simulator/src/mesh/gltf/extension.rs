@@ -4,7 +4,7 @@ use crate::error::MeshProblem;
 
 pub(super) const QUANTIZED: &str = "KHR_mesh_quantization";
 
-/// Those that put the numbers of a mesh elsewhere.
+/// Extensions that put the numbers of a mesh elsewhere.
 pub(super) const COMPRESSED: [&str; 3] =
     ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 

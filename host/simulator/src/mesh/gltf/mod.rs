@@ -2,7 +2,7 @@
 //!
 //! `serde_json` reads the document; every accessor is checked and read here. Coordinates are taken as they stand: glTF
 //! says that y is up, but files disagree. What would change the surface and is not read (Draco, meshopt, quantization,
-//! skins, morphs) is refused by name; materials, textures, cameras and animations are skipped.
+//! skins, morphs) is rejected by name; materials, textures, cameras and animations are skipped.
 
 mod accessor;
 mod container;
@@ -21,8 +21,8 @@ use std::path::Path;
 /// Reads the mesh of a glTF file; errors name `path`. Files that it names are looked for in `folder`.
 ///
 /// # Errors
-/// Where the JSON is none, a number that it states is impossible, a file beside it cannot be read, it uses what is not
-/// read, or no face is left.
+/// If the JSON is invalid, a number that it states is impossible, a file beside it cannot be read, it uses an unsupported
+/// feature, or no face is left.
 pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<Moved> {
     let parts = container::parts(bytes, path)?;
     let document: Document = serde_json::from_slice(parts.json).map_err(|error| {
@@ -54,14 +54,14 @@ fn damaged(path: &Path, what: String) -> Error {
     Error::at(Place::file(path), accessor::damaged(what))
 }
 
-/// Where a line and a column (both from 1) are in a text.
+/// Offset of a line and a column (both from 1) in a text.
 fn offset(text: &[u8], line: usize, column: usize) -> u64 {
     let before: usize = text.split_inclusive(|&byte| byte == b'\n').take(line.saturating_sub(1)).map(<[u8]>::len).sum();
     (before + column.saturating_sub(1)).min(text.len()) as u64
 }
 
 fn check(document: &Document) -> Result<(), MeshProblem> {
-    // A file of a later 2.x says in `minVersion` what a reader must know; 2.0 is what is known here.
+    // A file of a later 2.x states in `minVersion` which version a reader must know; this one knows 2.0.
     let version = document.asset.min_version.as_ref().unwrap_or(&document.asset.version);
     let is_known = match document.asset.min_version {
         Some(_) => version == "2.0",
@@ -136,7 +136,7 @@ impl Scene<'_> {
         self.placed.into_mesh()
     }
 
-    /// Refuses what would place or bend a node's mesh in another way than its transform.
+    /// Rejects features that would place or bend a node's mesh in another way than its transform.
     fn check_node(&self, node: &Node) -> Result<(), MeshProblem> {
         let instancing = "EXT_mesh_gpu_instancing";
         if node.extensions.as_ref().is_some_and(|extensions| extensions.contains_key(instancing)) {
@@ -228,7 +228,7 @@ enum Faces {
 }
 
 impl Faces {
-    /// That of a primitive's mode; none for points and lines, which are no surface.
+    /// Pattern of a primitive's mode; none for points and lines, which are no surface.
     fn of(mode: Option<u32>) -> Result<Option<Self>, MeshProblem> {
         match mode {
             None | Some(4) => Ok(Some(Self::Each)),
@@ -272,7 +272,7 @@ impl Faces {
     }
 }
 
-/// Where a node places its mesh, within its parent.
+/// Transform of a node's mesh, within its parent.
 fn transform(node: &Node, index: u32) -> Result<DAffine3, MeshProblem> {
     if let Some(matrix) = &node.matrix {
         let matrix = DMat4::from_cols_array(matrix);
@@ -287,7 +287,7 @@ fn transform(node: &Node, index: u32) -> Result<DAffine3, MeshProblem> {
         None => DQuat::IDENTITY,
         Some(&rotation) => {
             let rotation = DQuat::from_array(rotation);
-            // Exporters round; but what is no rotation at all would scale the mesh.
+            // Exporters round, but a quaternion far from length 1 would scale the mesh.
             if !(0.9..1.1).contains(&rotation.length()) {
                 return Err(accessor::damaged(format!("nodes[{index}] has a rotation of a length other than 1")));
             }

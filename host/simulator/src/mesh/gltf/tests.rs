@@ -97,7 +97,7 @@ fn what_would_change_the_surface_is_refused_by_name() {
         changed(|document| document["meshes"][0]["primitives"][0]["extensions"] = draco).unwrap().triangles.len(),
         2
     );
-    // Quantization of what is no position does not matter.
+    // Quantization of other attributes than positions does not matter.
     assert!(changed(|document| document["extensionsRequired"] = json!(["KHR_mesh_quantization"])).is_ok());
 }
 

@@ -1,5 +1,5 @@
-//! The convex hull of points on a grid of integers. All decisions are exact, so that no hull has a gap, whatever the points
-//! are.
+//! The convex hull of points on a grid of integers. All decisions are exact, so that no hull has a gap, regardless of
+//! the points.
 
 use glam::I64Vec3;
 use std::collections::BTreeMap;

@@ -37,7 +37,7 @@ pub const SAME: f64 = 10.0;
 /// Placements of less weight are left out, except the second of an object that would have only one.
 pub const LEAST: f64 = 0.03;
 
-/// The second placement of an object is left out if it has less weight than this, whatever others there are.
+/// The second placement of an object is left out if it has less weight than this, regardless of the others.
 pub const LEAST_OF_TWO: f64 = 0.01;
 
 /// Weights are whole multiples of one in this many, so that they are the same in every file.
@@ -166,12 +166,12 @@ pub fn of_object(object: &Object) -> Result<Vec<Placements>> {
 }
 
 impl Placements {
-    /// The names of all, also of those that are left out.
+    /// The names of all, including those that are left out.
     pub fn names(&self) -> impl Iterator<Item = String> + '_ {
         self.placements.iter().chain(&self.left_out).map(|placement| placement.name.clone())
     }
 
-    /// Keeps those that have one of these weights, with that weight.
+    /// Keeps the placements that `weights` names, with these weights.
     fn weigh(&mut self, weights: &[(String, f64)]) {
         let weight = |placement: &Placement| {
             let stated = weights.iter().find(|(name, _)| *name == placement.name);
@@ -220,7 +220,7 @@ fn facets(mesh: &Mesh, at: &[DVec3]) -> Vec<hull::Facet> {
     })
 }
 
-/// The stable facets: which direction points up on each, and with what weight the object ends on it. `corners` are about the
+/// The stable facets: the upward direction on each, and the weight with which the object ends on it. `corners` are about the
 /// center of mass.
 fn settled(facets: &[hull::Facet], corners: &[[DVec3; 3]]) -> Vec<(DVec3, f64)> {
     let normals: Vec<DVec3> = corners.iter().map(|&[a, b, c]| (b - a).cross(c - a).normalize_or(DVec3::Z)).collect();

@@ -30,7 +30,7 @@ struct Element {
 
 struct Property {
     name: String,
-    /// As it stands in the file: a kind of number, or a list of them.
+    /// Type as the file states it: a kind of number, or a list of them.
     kind: String,
     /// True if it is a list of whole numbers, false if of any.
     list: Option<bool>,
@@ -138,7 +138,7 @@ impl Property {
 }
 
 impl Element {
-    /// Refuses elements whose rows have no end, and vertices and faces without what they need.
+    /// Rejects elements whose rows have no end, and vertices and faces without their required properties.
     fn check(&self) -> Result<(), String> {
         let Self { name, properties, count, .. } = self;
         if properties.is_empty() {

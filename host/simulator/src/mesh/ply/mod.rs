@@ -89,7 +89,7 @@ pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Parsed> {
 trait Collect: Default {
     type Row: for<'de> Deserialize<'de>;
 
-    /// Takes a row; says what is wrong with it.
+    /// Takes a row, or returns the problem with it.
     fn take(&mut self, row: Self::Row) -> Result<(), String>;
 }
 

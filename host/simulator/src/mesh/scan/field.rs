@@ -1,4 +1,4 @@
-//! The field of which the surface is a level: Poisson's equation on a grid, solved by multigrid.
+//! Scalar field whose level set is the surface: Poisson's equation on a grid, solved by multigrid.
 
 use super::smooth::Smoothed;
 use glam::DVec3;
@@ -161,7 +161,7 @@ fn gathered(fine: Grid, coarse: Grid, node: usize, values: &[f32]) -> f32 {
     sum
 }
 
-/// Values for the nodes of a grid that are not at its border; zeros there.
+/// Values for the inner nodes of a grid; zeros at its border.
 fn map(grid: Grid, of: impl Fn(usize, [usize; 3]) -> f32 + Sync) -> Vec<f32> {
     let mut values = vec![0.0; grid.size()];
     let [width, height, depth] = grid.0;

@@ -108,7 +108,7 @@ impl Holes {
     }
 }
 
-/// What shows that an object stood on a table.
+/// Evidence that an object stood on a table.
 struct Stand<'a> {
     places: &'a [DVec3],
     /// The longest side of the object's box.

@@ -49,7 +49,7 @@ pub(super) struct Point {
     pub(super) viewpoint: Option<[f64; 3]>,
 }
 
-/// What the places of sensors are worth.
+/// Reliability of the places of sensors.
 #[derive(Clone, Copy, Default, PartialEq)]
 pub(super) enum Sensors {
     /// Each point states one; 0 0 0 in all of them is a default.

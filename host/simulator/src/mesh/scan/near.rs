@@ -13,7 +13,7 @@ pub(super) type Neighbor = (f64, u32);
 pub(super) struct Near {
     places: Vec<DVec3>,
     numbers: Vec<u32>,
-    /// Of a node above its two halves, 2 n and 2 n + 1: the axis along which they are divided, and where.
+    /// For a node above its two halves, 2 n and 2 n + 1: the axis along which they are divided, and the coordinate.
     splits: Vec<(usize, f64)>,
 }
 
@@ -120,8 +120,8 @@ impl Near {
         blocks
     }
 
-    /// What `of` makes of each point and its neighbors, itself among them and in no order: the `count` nearest that
-    /// `is_kept` takes for it, of the `among` times as many that are nearest.
+    /// Results of `of` for each point and its neighbors, including itself, in no order: the `count` nearest that
+    /// `is_kept` accepts, from the `among` times as many that are nearest.
     pub(super) fn each<T: Send>(
         &self,
         count: usize,
@@ -142,7 +142,7 @@ impl Near {
         all.into_iter().map(|(_, made)| made).collect()
     }
 
-    /// As [`each`](Self::each), for the points that are chosen, in no order.
+    /// Like [`each`](Self::each), for chosen points, in no order.
     pub(super) fn some<T: Send>(
         &self,
         is_chosen: impl Fn(usize) -> bool + Sync + Send,
@@ -257,7 +257,7 @@ fn divide(points: &mut [(DVec3, u32)], node: usize, splits: &mut [(usize, f64)])
     let low = points.iter().fold(DVec3::INFINITY, |low, (place, _)| low.min(*place));
     let high = points.iter().fold(DVec3::NEG_INFINITY, |high, (place, _)| high.max(*place));
     let axis = (high - low).max_position();
-    // As `midpoint` of the first and the end, whatever the first is.
+    // As `midpoint` of the first and the end, regardless of the first.
     let middle = points.len() / 2;
     points.select_nth_unstable_by(middle, |(a, i), (b, j)| a[axis].total_cmp(&b[axis]).then(i.cmp(j)));
     if let Some(split) = splits.get_mut(node) {

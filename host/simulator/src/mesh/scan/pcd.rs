@@ -117,7 +117,7 @@ pub(in crate::mesh) fn parse(mut reader: impl BufRead, length: u64, path: &Path)
     Ok(points)
 }
 
-/// What writers that do not know the sensor's place put there.
+/// Viewpoint written by software that does not know the sensor's place.
 const DEFAULT_VIEWPOINT: [f64; 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
 /// The fields that are read.
@@ -235,7 +235,7 @@ impl Header {
             _ => false,
         };
         if let Some(field) = fields.iter().find(|field| !is_known(field) || field.count > 1 << 16) {
-            return Err(wrong(&format!("the field {} is no number of a known kind", field.name)));
+            return Err(wrong(&format!("the field {} is not a number of a known kind", field.name)));
         }
         Ok(Self { fields, points, viewpoint, data, bytes, lines })
     }
@@ -263,7 +263,7 @@ fn value(bytes: &[u8], kind: u8) -> f64 {
     }
 }
 
-/// Unpacks LZF: runs of literal bytes, and copies of what was unpacked before.
+/// Unpacks LZF: runs of literal bytes, and copies of bytes unpacked before.
 ///
 /// # Errors
 /// The byte at which the data are damaged.

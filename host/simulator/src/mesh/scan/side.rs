@@ -34,7 +34,7 @@ const WINDING: f64 = 0.15;
 /// Largest length of the sum of all normals, in the area, of a surface that closes.
 const CLOSED: f64 = 0.25;
 
-/// Least length of it, of a surface that was seen from one side.
+/// Least such length of a surface that was seen from one side.
 const OPEN: f64 = 0.5;
 
 /// Largest share of points behind others, as seen from the sensor: those at edges and on steep sides.
@@ -190,7 +190,7 @@ struct ByNeighbors {
     judged: Judged,
 }
 
-/// What outward directions are worth.
+/// Quality of outward directions.
 struct Judged {
     winding: f64,
     openness: f64,
@@ -497,7 +497,7 @@ impl Signs {
         (at, is_turned)
     }
 
-    /// Joins the sets of two nodes, which are turned against each other or not; false if they are in one set.
+    /// Joins the sets of two nodes, turned against each other or not; false if they are in one set already.
     fn join(&mut self, one: u32, two: u32, is_turned: bool) -> bool {
         let [(one, first), (two, second)] = [one, two].map(|node| self.first(node));
         if one != two {

@@ -88,11 +88,11 @@ pub(super) fn smoothed(cloud: Cloud) -> Option<Smoothed> {
     Some(Smoothed { places: kept, normals, areas, reach: median(reach)?, noise })
 }
 
-/// Least cosine between the outward directions of neighbors: of directions to viewpoints, of which neighboring views share
-/// a surface only in part.
+/// Least cosine between the outward directions of neighbors, for directions to viewpoints: neighboring views share a
+/// surface only in part.
 const SEEN: f64 = 0.6;
 
-/// And of normals.
+/// Least cosine between the normals of neighbors.
 const SAME: f64 = 0.5;
 
 struct Plane {
@@ -183,7 +183,7 @@ pub(super) fn least_axis(matrix: DMat3) -> (f64, DVec3) {
     (least, longest.and_then(DVec3::try_normalize).unwrap_or(DVec3::Z))
 }
 
-/// Which points are kept: not those whose neighbors are far away, which a sensor makes up at edges.
+/// Flags of points to keep: not those whose neighbors are far away, which a sensor makes up at edges.
 pub(super) fn near_others(places: &[DVec3]) -> Vec<bool> {
     let near = Near::new(places);
     let distance = |_, near: &[Neighbor]| near.iter().map(|(squared, _)| squared.sqrt()).sum::<f64>() / FEWEST as f64;

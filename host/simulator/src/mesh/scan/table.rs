@@ -19,7 +19,7 @@ const SHARE: f64 = 0.15;
 /// Directions along the plane in which it must extend beyond everything else.
 const DIRECTIONS: usize = 16;
 
-/// Leaves out a plane of points that extends beyond all points on the side of the sensors, and what is below it.
+/// Leaves out a plane of points that extends beyond all points on the side of the sensors, and everything below it.
 pub(super) fn leave_out(points: &mut Points) {
     let step = points.measured.len().div_ceil(SAMPLE).max(1);
     let sample: Vec<(DVec3, DVec3)> = points

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use rand_distr::{Distribution, Normal, UnitSphere};
 use std::path::Path;
 
-/// Points of a sphere of 50 about the origin, with its normals: 4,000, with Gaussian noise of so much along each axis.
+/// Points of a sphere of 50 about the origin, with its normals: 4,000, with Gaussian noise of this size along each axis.
 fn sphere(noise: f64, is_kept: impl Fn(DVec3) -> bool) -> Vec<(DVec3, DVec3)> {
     let mut rng = random::generator(1, Purpose::View, "sphere", 0);
     let normal = Normal::new(0.0, noise).unwrap();
@@ -435,7 +435,7 @@ fn a_pcd_gives_one_surface_as_text_binary_and_compressed() {
     assert_eq!(text.format, file::Format::Pcd);
     assert_sound(&text.mesh);
     for other in [&binary, &compressed] {
-        // The content decides what a file is.
+        // The content decides a file's kind.
         assert_eq!(read(other, "sphere.dat").mesh.checksum(), text.mesh.checksum());
     }
     let error = refusal(&binary[..binary.len() - 1], "sphere.pcd");
@@ -529,7 +529,7 @@ fn write_gray(path: &Path, pixels: &[u16], is_depth: bool) {
 
 const WIDTH: usize = 120;
 
-/// Distance along a ray of what it meets: from a place, in a direction of any length.
+/// Distance along a ray to the first surface: from a place, in a direction of any length.
 type Scene<'a> = &'a dyn Fn(DVec3, DVec3) -> Option<f64>;
 
 /// A camera's pose: the rows of its rotation and its translation.

@@ -88,7 +88,7 @@ enum Pose {
     Columns,
 }
 
-/// What may have been meant.
+/// Conventions that may have been meant.
 #[derive(Clone, Copy)]
 struct Meant {
     pose: Pose,
@@ -120,7 +120,7 @@ impl Meant {
         view
     }
 
-    /// What is wrong, and what to do.
+    /// The problem, and what to do.
     fn said(self, views: &[View]) -> [String; 2] {
         let (mut causes, mut remedies) = (Vec::new(), Vec::new());
         let mut add = |cause: &str, remedy: &str| {

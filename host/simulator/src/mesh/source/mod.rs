@@ -1,4 +1,4 @@
-//! Where objects come from: built in, a mesh file, a directory of mesh files.
+//! Sources of objects: built in, a mesh file, a directory of mesh files.
 
 mod layout;
 mod search;
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 ///   extensions of [`file::EXTENSIONS`], subdirectories included; where a folder holds a name with several extensions, the
 ///   first of them is taken, and the object's notes say so;
 /// - a scene of depth images with the number of the object that is chosen: `scene@3`;
-/// - the name of a built-in object, if there is no file of that name.
+/// - the name of a built-in object, unless a file has that name.
 ///
 /// An object is named after its file, except in the layouts of
 ///
@@ -39,7 +39,7 @@ pub fn objects(sources: &[String]) -> Result<Vec<Object>> {
     load(sources, Search::default()).map(|loaded| loaded.objects)
 }
 
-/// How directories are searched and meshes are read.
+/// Settings for searching directories and reading meshes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Search {
     /// True to take a directory inside a directory as one object, with each mesh in it as an instance.
@@ -50,13 +50,13 @@ pub struct Search {
     pub skips_bad: bool,
 }
 
-/// Objects that were found and read, and what a user should know about that.
+/// Objects that were found and read, with remarks for the user.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Loaded {
     /// The objects, sorted by name.
     pub objects: Vec<Object>,
-    /// What was left out, and objects with the same mesh. Each object has its own notes besides.
+    /// Sources left out, and objects with the same mesh. Each object has its own notes besides.
     pub notes: Vec<String>,
 }
 
@@ -190,7 +190,7 @@ impl Source {
         object.ok_or_else(|| MeshProblem::NoMeshes.into())
     }
 
-    /// The object with those of its meshes that can be read, and what is wrong with the others.
+    /// The object with its readable meshes, and the errors of the others.
     fn read_each(self) -> (Option<Object>, Vec<Error>) {
         let whole = |read: Result<Object>| match read {
             Ok(object) => (Some(object), Vec::new()),
@@ -246,8 +246,8 @@ fn moved(path: &Path, by: [f64; 3]) -> Option<String> {
     })
 }
 
-/// The unit of an object's instances in millimeters, of which each may state its own: those that differ are scaled to the
-/// first. Where only some state one, there is none, and a note that says so.
+/// The unit of an object's instances in millimeters. Each instance may state its own: those that differ are scaled to the
+/// first. If only some state one, there is none, and a note that says so.
 fn one_unit(instances: &mut [Instance], units: &[Option<f64>]) -> (Option<f64>, Option<String>) {
     let Some(&Some(first)) = units.iter().find(|unit| unit.is_some()) else { return (None, None) };
     if units.contains(&None) {
@@ -276,7 +276,7 @@ pub fn objects_of_instances(sources: &[String]) -> Result<Vec<Object>> {
 /// The objects of all `sources` as [`objects`](fn@objects) finds them, neither made nor read; sorted by name.
 ///
 /// # Errors
-/// As [`objects`](fn@objects), except for what is wrong inside a file.
+/// Those of [`objects`](fn@objects), except for errors inside a file.
 pub fn files(sources: &[String]) -> Result<Vec<Source>> {
     found(sources, Search::default()).map(|(found, _)| found)
 }

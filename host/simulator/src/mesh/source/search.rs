@@ -54,7 +54,7 @@ pub(super) struct Finder {
     /// True if files that may state their unit are taken before others of the same name.
     pub(super) prefers_units: bool,
     pub(super) found: Vec<Found>,
-    /// Files of formats that are not read, whose names no mesh has that is read.
+    /// Files of formats that are not read, unless a mesh that is read has their name.
     pub(super) unread: Vec<PathBuf>,
 }
 
@@ -104,7 +104,7 @@ impl Finder {
     }
 }
 
-/// What is in a directory, without what is hidden, and without the copies of that which archives of a Mac hold.
+/// Content of a directory, without hidden entries and `__MACOSX`, the copies that archives of a Mac hold.
 pub(super) fn entries(directory: &Path) -> Result<Vec<PathBuf>> {
     let io = |error| Error::io(directory, "read the directory", error);
     let mut entries = std::fs::read_dir(directory).map_err(io)?.collect::<std::io::Result<Vec<_>>>().map_err(io)?;

@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use std::io::{BufRead, ErrorKind};
 use std::path::Path;
 
-/// The bytes of a binary file before its triangles, the last four of which are their number.
+/// The bytes of a binary file before its triangles; the last four are their number.
 const HEADER: usize = 84;
 /// The bytes of a triangle: normal, three corners, two bytes of attributes.
 const TRIANGLE: usize = 50;
@@ -33,7 +33,7 @@ fn bytes_of(count: u32) -> u64 {
     HEADER as u64 + TRIANGLE as u64 * u64::from(count)
 }
 
-/// Reads the mesh of an STL file of `length` bytes, with notes on what is odd about the file; errors name `path`.
+/// Reads the mesh of an STL file of `length` bytes, with remarks on the file; errors name `path`.
 ///
 /// # Errors
 /// Where the number of triangles is not the one that the file states, a word or a number of a text is not what must stand
@@ -60,7 +60,7 @@ fn is_text(head: &[u8]) -> bool {
     !head.is_empty() && !start.contains(&0) && (is_solid || start.is_ascii())
 }
 
-/// What was read, and a note on what is odd about the file.
+/// Content of a file, and a remark on it.
 type Noted = (Welder, Option<String>);
 
 fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Noted> {
@@ -131,7 +131,7 @@ impl Welder {
     }
 }
 
-/// Where a text stands: after which word.
+/// Position in a text: after which word.
 #[derive(Clone, Copy, PartialEq)]
 enum State {
     /// Outside of solids.
@@ -166,7 +166,7 @@ struct Text<'a, R> {
     path: &'a Path,
     line: u64,
     raw: Vec<u8>,
-    /// Where in `raw` the next word is looked for.
+    /// Position in `raw` from which the next word is searched.
     next: usize,
 }
 

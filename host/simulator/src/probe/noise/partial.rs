@@ -216,7 +216,7 @@ impl FromStr for PartialNoise {
     }
 }
 
-/// The text of which reading gives the same, to the last bit.
+/// A text that, when read, gives the same value to the last bit.
 impl fmt::Display for PartialNoise {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let nothing = Noise::default();

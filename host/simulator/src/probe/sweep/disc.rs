@@ -64,7 +64,7 @@ impl Discs {
         self.spread[child] = spread.sqrt() as f32;
     }
 
-    /// When the sphere may touch the discs, given that it does not before `near`.
+    /// Bounds of the sphere's contact with the discs, given that it does not touch them before `near`.
     #[inline]
     pub(super) fn contact_bounds(&self, center: &[Vec4; 3], ray: &Ray, near: Vec4) -> ContactBounds {
         let direction = ray.direction().to_array().map(Vec4::splat);

@@ -27,7 +27,7 @@ pub struct Surface {
     /// Number of the mesh's units in one unit in the frame of the casts, where the box's longest side is between 1 and
     /// 2. A power of two, so that scaling is exact; it keeps meshes of any size in the range of f32.
     unit: f64,
-    /// One over it, which is exact, too.
+    /// One over `unit`, also exact.
     per_unit: f64,
     /// Half the box's sides, in the frame of the casts.
     half: DVec3,

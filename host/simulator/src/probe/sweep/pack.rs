@@ -79,7 +79,7 @@ impl Earliest {
         self.left != 0
     }
 
-    /// Leaves out what the other excludes, which was made with a lower limit.
+    /// Leaves out everything that the other excludes, which was made with a lower limit.
     #[inline]
     pub(super) fn retain(&mut self, other: &Self) {
         self.left &= other.left;

@@ -46,7 +46,7 @@ pub(super) struct Tree {
 
 /// Classes of the sphere's size relative to the packs, which decide the tests before a box is opened.
 pub(super) mod scale {
-    /// The sphere is small: it hardly touches a box without touching what is inside, so boxes alone do.
+    /// The sphere is small: it hardly touches a box without touching its content, so boxes alone do.
     pub(in super::super) const COARSE: u8 = 0;
     /// The sphere is about as large as the packs: the corners of boxes that it is too round to touch are left out.
     pub(in super::super) const MIDDLE: u8 = 1;
@@ -54,10 +54,10 @@ pub(super) mod scale {
     pub(in super::super) const FINE: u8 = 2;
 }
 
-/// The sphere's radius, as a multiple of the packs' size, from which on a mesh is not coarse.
+/// The least radius of a sphere, as a multiple of the packs' size, for which a mesh is not coarse.
 const MIDDLE_FROM: f32 = 0.6;
 
-/// Ratio from which on it is fine.
+/// Least ratio for which it is fine.
 const FINE_FROM: f32 = 2.0;
 
 /// A triangle, as the builder takes it.

@@ -7,7 +7,7 @@ use super::cases::Cases;
 use crate::ensemble::Node;
 use rayon::prelude::*;
 
-/// `lambda`: what is added to a sum of second derivatives.
+/// `lambda`: addition to a sum of second derivatives.
 const LAMBDA: f64 = 1.0;
 /// The least gain of a split.
 const LEAST: f64 = 1e-3;
@@ -56,7 +56,7 @@ impl<'c> Growth<'c> {
             depth: settings.depth,
             eta: settings.eta,
             min_child_weight: settings.min_child_weight,
-            // A gain is twice what the loss of all touches decreases by.
+            // A gain is twice the decrease of the loss of all touches.
             price: 2.0 * threshold_cost * cases.total(),
             used: cases.thresholds.iter().map(|thresholds| vec![false; thresholds.len()]).collect(),
             margins: vec![0.0; cases.counts.len()],
@@ -65,7 +65,7 @@ impl<'c> Growth<'c> {
         }
     }
 
-    /// Grows one more tree on what the others leave over.
+    /// Grows one more tree on the residuals of the others.
     pub(super) fn add_tree(&mut self) {
         let (objects, cases) = (self.cases.objects, self.cases);
         let margins = self.margins.par_chunks(objects).zip(cases.counts.par_chunks(objects));
@@ -186,7 +186,7 @@ fn add(sums: &mut [[f64; 2]], slopes: &[[f64; 2]]) {
     }
 }
 
-/// Twice what the loss decreases by with the best values.
+/// Twice the decrease of the loss with the best values.
 fn score(sums: impl Iterator<Item = [f64; 2]>) -> f64 {
     sums.map(|[first, second]| first * first / (second + LAMBDA)).sum()
 }

@@ -22,7 +22,7 @@ const SWEEPS: usize = 4;
 const WORK: usize = 3_000_000;
 /// Rounds of k-means.
 const MEANS: usize = 20;
-/// As many touches hold each value at 0.
+/// Number of touches that hold each value at 0.
 const RIDGE: f64 = 5.0;
 /// The largest step of a value, in nats.
 const LARGEST: f64 = 0.5;

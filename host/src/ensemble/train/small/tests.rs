@@ -135,7 +135,7 @@ fn objects_with_fewer_touches_count_as_much() {
             let weights = ensemble.margins(touch).into_iter().map(f32::exp).collect::<Vec<f32>>();
             f64::from(weights[1] / weights.iter().sum::<f32>())
         });
-        // A third of the fresh touches are its own; few touches, each of which weighs ten, miss some of that. The prior,
+        // A third of the fresh touches are its own; few touches, each weighing ten, miss some of that. The prior,
         // had it been counted, would make it a twentieth.
         let mean = shares.sum::<f64>() / fresh.len() as f64;
         assert!((0.15..0.45).contains(&mean), "{mean}");

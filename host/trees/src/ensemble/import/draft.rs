@@ -178,7 +178,7 @@ impl DraftTree {
     }
 
     /// A tree of leaves that name their targets. A leaf has one value, if all leaves of the tree are for the same
-    /// target, or else one for each, of which those that it does not name are 0.
+    /// target, or else one for each; those that it does not name are 0.
     pub(super) fn of_targets(nodes: Vec<Targeted>, outputs: usize) -> Self {
         let mut targets = nodes.iter().filter_map(|node| match node {
             Targeted::Leaf(values) => Some(values.iter().map(|(target, _)| *target)),

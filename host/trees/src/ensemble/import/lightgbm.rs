@@ -137,7 +137,7 @@ fn blocks(text: &str) -> Result<(Block<'_>, Vec<Block<'_>>)> {
     Err(damaged(text.lines().count() as u64, "it ends before the line \"end of trees\"".into()))
 }
 
-/// The first tree's object: 1 for a binary model. Says what is unusual about the objective; `rounds` are averaged.
+/// The first tree's object: 1 for a binary model. Notes peculiarities of the objective; `rounds` are averaged.
 fn objective(text: Option<&str>, outputs: usize, rounds: usize, draft: &mut Draft) -> Result<usize> {
     let text = text.unwrap_or("custom");
     let mut words = text.split_ascii_whitespace();
@@ -292,11 +292,11 @@ fn check_structure(block: &Block<'_>, splits: &[Split], leaves: usize) -> Result
     Ok(())
 }
 
-/// Copies a tree, writing splits that LightGBM has and other trees do not as several.
+/// Copies a tree, and writes splits that only LightGBM has as several splits.
 struct Grower<'a> {
     splits: &'a [Split],
     values: &'a [f64],
-    /// True if zeros are missing wherever they are, so that no split has to distinguish them.
+    /// True if zeros are missing in every feature, so that no split has to distinguish them.
     zero_is_missing: bool,
     nodes: Vec<DraftNode>,
 }
@@ -381,7 +381,7 @@ impl Grower<'_> {
                 let (above, zero_or_above) = (self.reserve(), self.reserve());
                 let side = |goes_left: bool| if goes_left { left } else { right };
                 let (below, over) = if zero_is_left {
-                    // All of what is below zero goes left.
+                    // Everything below zero goes left.
                     (left, Side::At(above))
                 } else {
                     (Side::At(above), right)

@@ -8,7 +8,7 @@ use crate::error::EnsembleProblem;
 pub struct Options<'a> {
     /// Other names for the objects: one for each class, or for the one output of a regression.
     pub names: Option<&'a [String]>,
-    /// True to take all trees where the file says that training stopped early, and not those up to the best iteration.
+    /// True to take all trees even if training stopped early, instead of those up to the best iteration.
     pub all_trees: bool,
     /// The number that stood for a missing value in training, beside NaN: XGBoost's `missing`, which no file holds. NaN if
     /// there was none.

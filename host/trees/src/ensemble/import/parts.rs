@@ -49,7 +49,7 @@ impl Parts {
     ///
     /// # Errors
     /// [`EnsembleProblem`] for columns of unequal length, children and features out of range, a node that is reached
-    /// twice, and whatever [`Ensemble::check`] refuses.
+    /// twice, and everything that [`Ensemble::check`] refuses.
     pub fn into_ensemble(self, names: Option<&[String]>) -> Result<Ensemble, EnsembleProblem> {
         let Self { kind, features, names: own, base, trees, notes, prediction } = self;
         let outputs = base.len();

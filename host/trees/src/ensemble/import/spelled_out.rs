@@ -68,7 +68,7 @@ pub(in crate::ensemble) fn spelled_out(
     Ok(writer.nodes)
 }
 
-/// The threshold between two runs of which the second one begins here. Between -1 and [`BELOW_ZERO`] there is no f32, and
+/// The threshold between two runs, the second of which begins here. Between -1 and [`BELOW_ZERO`] there is no f32, and
 /// at a threshold in whole numbers of units "at or below -1" is what was meant.
 fn threshold(begin: f64) -> Threshold {
     if begin == BELOW_ZERO { Threshold::at_or_below(-1.0) } else { Threshold::below(begin) }

@@ -134,7 +134,7 @@ impl Ensemble {
     /// [loaded](Self::load) again.
     ///
     /// XGBoost predicts the same margins with it, bit for bit, for every input that it takes (it refuses infinite
-    /// values). Over rows, one output is a regression, and two of which the first one's margin is 0 are
+    /// values). Over rows, one output is a regression, and two outputs, the first one's margin being 0, are
     /// `binary:logistic`, or `binary:logitraw` where no probability in f32 stands for the base margin.
     ///
     /// # Errors

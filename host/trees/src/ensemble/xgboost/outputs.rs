@@ -18,7 +18,7 @@ pub(super) struct Outputs {
 }
 
 impl Outputs {
-    /// A regression for one output; a binary model for two if the first one's margin is 0; else a group for each.
+    /// A regression for one output; a binary model for two outputs if the first one's margin is 0; else a group per output.
     pub(super) fn of(ensemble: &Ensemble) -> Self {
         let margins = &ensemble.base_margins;
         let is_binary = ensemble.schema().is_none()

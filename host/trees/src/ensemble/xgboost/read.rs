@@ -169,7 +169,7 @@ pub(super) struct StatedRows {
     pub(super) link: String,
     pub(super) last_of_ties: bool,
     pub(super) scale: f32,
-    /// As text, since JSON has no infinities.
+    /// Text, since JSON has no infinities.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) sentinel: Option<[String; 2]>,
     /// Divisor of a margin before the link.

@@ -32,7 +32,7 @@ pub(super) struct GradientBooster {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) model: Option<Forest>,
     pub(super) name: String,
-    /// Of dart up to 3.2, the booster that holds the trees.
+    /// The booster that holds the trees, for dart up to 3.2.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) gbtree: Option<Box<GradientBooster>>,
     /// Weights of dart up to 3.3; later versions have them in the model.

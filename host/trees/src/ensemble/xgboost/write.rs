@@ -113,7 +113,7 @@ fn trees_of_one_kind(ensemble: &Ensemble) -> Cow<'_, [Tree]> {
     ensemble.trees.iter().map(widened).collect()
 }
 
-/// Where each boosting round's trees begin and end: one tree for each group in order, or one tree for all.
+/// Begins and ends of boosting rounds among the trees: one tree for each group in order, or one tree for all.
 fn rounds(trees: &[Tree], outputs: &Outputs) -> Vec<u64> {
     let groups = u64::try_from(outputs.groups).unwrap_or(1);
     let in_order =

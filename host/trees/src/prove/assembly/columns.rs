@@ -12,7 +12,7 @@ pub(super) struct Column {
     pub(super) feature: usize,
     /// Number of a missing feature.
     missing: u8,
-    /// The keys from which on there are larger numbers, and these: ascending.
+    /// Ascending keys at which the number grows, each with the new number.
     steps: Vec<(i64, u8)>,
 }
 

@@ -1,4 +1,4 @@
-//! A machine that executes the instructions of generated assembly: on numbers, and on what is known of others.
+//! A machine that executes the instructions of generated assembly on known numbers and partly known values.
 
 use super::super::ProofProblem;
 use super::text::{Instruction, Text, problem};
@@ -21,7 +21,7 @@ pub(super) enum Value {
     Column(usize),
     /// A feature as it is in memory.
     Feature,
-    /// The same without its highest bit, times 2.
+    /// The value without its highest bit, times 2.
     Twice,
     /// The key of a feature that is not missing, from the bits of a negative one.
     Key,

@@ -70,8 +70,8 @@ pub(super) fn read(text: &str, stated: &Stated<'_>) -> Result<Code, ProofProblem
     reader.run(start)
 }
 
-/// The checksum at the end of a function's name, after what the function is; `Some(None)` where there is none, as in files of
-/// earlier releases, and `None` for the name of another function.
+/// The checksum at the end of a function's name, after the function's kind; `Some(None)` if the name has none,
+/// and `None` for the name of another function.
 fn stated_checksum(label: &str, function: &str) -> Option<Option<u32>> {
     if label.starts_with('.') {
         return None;
@@ -84,7 +84,7 @@ fn stated_checksum(label: &str, function: &str) -> Option<Option<u32>> {
     }
 }
 
-/// Where a row's margins begin, and the number that says whether the walk may end early, if it may.
+/// Start of the code for a row's margins, and the number that says whether the walk may end early, if it may.
 fn start(text: &Text, checksum: u32) -> Result<(usize, Option<i32>), ProofProblem> {
     let find = |function: &str| {
         let mut labels = text.labels();
@@ -119,7 +119,7 @@ struct Reader<'r> {
     /// Trees of the object whose margin comes next.
     pending: Vec<Vec<Step>>,
     exits: Vec<(usize, u32, Vec<i64>)>,
-    /// Where walks that end early go on.
+    /// Targets of walks that end early.
     ends: Vec<usize>,
     base: Vec<Option<i64>>,
     /// Instructions so far, along the longest ways.
@@ -155,7 +155,7 @@ impl Reader<'_> {
                         at = if is_true(condition, a, b) { to } else { at + 1 }
                     }
                     Some((Value::Stack(a), Value::Stack(b))) => at = if is_true(condition, a, b) { to } else { at + 1 },
-                    _ => return Err(problem(line, "a branch on what is not known")),
+                    _ => return Err(problem(line, "a branch on an unknown value")),
                 },
                 Flow::Call(to) if early.is_some() && self.is_compare(&state, to) => {
                     let Value::Number(bound) = state.registers[3] else {
@@ -306,7 +306,7 @@ impl Reader<'_> {
             && branches.iter().all(is_branch)
     }
 
-    /// Where a routine that compares leads, if the walk ends.
+    /// Target of a routine that compares, if the walk ends.
     fn end_of(&self, at: usize) -> Option<usize> {
         let last = self.text.instructions[at..].iter().filter(|own| own.text() == "pop {r4, r5, r6}").nth(1)?;
         let after = self.text.instructions.iter().position(|own| own.line == last.line)? + 1;
@@ -395,7 +395,7 @@ struct Ways<'w, 'r> {
     /// Instructions of the longest way.
     longest: usize,
     nodes: Vec<Step>,
-    /// The state that is the same after each of them.
+    /// The state after each way, which must be the same.
     after: Option<State>,
 }
 
@@ -411,7 +411,7 @@ impl Ways<'_, '_> {
             count += 1;
             let line = text.instructions.get(at).map_or(0, |own| own.line);
             if self.reader.feature(&state, at).is_some() || depth > DEEPEST {
-                return Err(problem(line, "it is no part of a tree"));
+                return Err(problem(line, "it is not part of a tree"));
             }
             match state.step(text, at)? {
                 Flow::Next => at += 1,
@@ -442,7 +442,7 @@ impl Ways<'_, '_> {
                     Some((Value::Number(a), Value::Number(b))) => {
                         at = if is_true(condition, a, b) { to } else { at + 1 }
                     }
-                    _ => return Err(problem(line, "a branch on what is not known")),
+                    _ => return Err(problem(line, "a branch on an unknown value")),
                 },
                 Flow::Call(to) if self.votes && self.reader.is_list(to) => {
                     let taken;
@@ -470,7 +470,7 @@ impl Ways<'_, '_> {
                     Some((Value::Number(a), Value::Number(b))) => {
                         at = if is_true(condition, a, b) { to } else { at + 1 }
                     }
-                    _ => return Err(problem(line, "a branch on what is not known")),
+                    _ => return Err(problem(line, "a branch on an unknown value")),
                 },
                 Flow::Return => return Ok((state, count)),
                 Flow::Jump(_) | Flow::Call(_) => return Err(problem(line, "it leaves a list")),

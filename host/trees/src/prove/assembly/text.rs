@@ -14,7 +14,7 @@ pub(super) struct Instruction {
 /// A file of assembly.
 pub(super) struct Text {
     pub(super) instructions: Vec<Instruction>,
-    /// Where labels are: which instruction comes next, and the address of the data there.
+    /// Positions of labels: the index of the next instruction, and the address of the data there.
     labels: HashMap<String, (usize, u32)>,
     /// Data in their order; an instruction takes no room.
     data: Vec<u8>,
@@ -93,7 +93,7 @@ impl Text {
         Ok(self.load(line, address as i32, 4)?.cast_signed())
     }
 
-    /// A number of so many bytes in the data.
+    /// A number of this many bytes in the data.
     pub(super) fn load(&self, line: usize, address: i32, length: usize) -> Result<u32, ProofProblem> {
         let at = (address as u32).checked_sub(FIRST).map_or(usize::MAX, |at| at as usize);
         let bytes = at.checked_add(length).and_then(|end| self.data.get(at..end));

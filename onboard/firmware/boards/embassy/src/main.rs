@@ -93,7 +93,7 @@ async fn watch(mut pins: [Input<'static>; 3]) {
 struct Pico {
     /// GP5, low while no approach is under way: from the robot's controller, or a button to ground.
     over: Input<'static>,
-    /// That signal as the station has last seen it.
+    /// Last state of that signal that the station has seen.
     was_over: bool,
     uart: BufferedUart,
     /// Bytes from the host that the station has not taken yet.

@@ -76,7 +76,7 @@ struct Weights {
     of: HashMap<(i64, i64), Vec<(usize, f64)>>,
     /// True if leaves hold shares of votes for the second of two classes.
     votes: bool,
-    /// Sum of a tree's votes for both classes, where leaves are to have those for the first one too.
+    /// Sum of a tree's votes for both classes, if leaves are to have those for the first one too.
     all: Option<f64>,
 }
 
@@ -167,9 +167,9 @@ impl Weights {
 enum Map {
     /// The one that it names.
     Same,
-    /// Of two classes, whose file has one number: log-odds of the second.
+    /// Log-odds of the second of two classes, for which the file has one number.
     Second,
-    /// The same, but the number is the share of votes for the second.
+    /// Share of votes for the second of two classes.
     Votes,
 }
 

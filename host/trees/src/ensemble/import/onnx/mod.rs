@@ -165,7 +165,7 @@ fn divisor(aggregate: &str, trees: usize) -> Result<f64> {
     }
 }
 
-/// Adds a tree: from `root` on, `read` says what a node is, with its children's numbers; each may be reached once.
+/// Adds a tree from `root` on: `read` gives each node, with its children's numbers; each may be reached once.
 fn add_tree(
     draft: &mut Draft,
     root: usize,

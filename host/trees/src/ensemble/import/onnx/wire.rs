@@ -123,7 +123,7 @@ pub(super) struct Attribute<'a> {
     pub(super) texts: Vec<&'a str>,
 }
 
-/// The graph: its operations, and its inputs with the number of their columns, where it is stated.
+/// The graph: its operations, and its inputs with the number of their columns, if stated.
 #[derive(Default)]
 pub(super) struct Graph<'a> {
     pub(super) nodes: Vec<Node<'a>>,
