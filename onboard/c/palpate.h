@@ -1,8 +1,9 @@
 /* palpate.h: recognize objects by touch, or classify rows of features, with a model that `palpate export` wrote.
  *
- * One header in C99 (also C++11). No allocation, no library, no floating point unless a model has f32 leaves, no undefined
- * behavior for any bytes. It reads shared/FORMAT.md of Palpate, and gives the same margins, evidence, verdicts, posteriors
- * and snapshots as the crate palpate-onboard, bit for bit. Licensed as Palpate: MIT or Apache-2.0.
+ * One header in C99, also C++11 where unions are read as GCC, Clang and MSVC define it. No allocation, no library, no
+ * floating point unless a model has f32 leaves, no undefined behavior for any bytes. It reads shared/FORMAT.md of Palpate,
+ * and gives the same margins, evidence, verdicts, posteriors and snapshots as the crate palpate-onboard, bit for bit.
+ * Licensed as Palpate: MIT or Apache-2.0.
  *
  *     palpate_model model;
  *     palpate_recognizer recognizer;

@@ -104,3 +104,7 @@ def test_control_c_stops_a_long_call_and_other_threads_run_meanwhile() -> None:
         running = False
         counter.join()
     assert counted > 1
+
+
+def test_the_package_states_its_version() -> None:
+    assert palpate.__version__.count(".") == 2

@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
     directory: PathBuf,
     #[command(flatten)]
     sequences_of_rows: SequenceArguments,
-    /// Write a page about the results; for sequences of rows
+    /// Also write a page of the results; for sequences of rows
     #[arg(long, value_name = "FILE", requires = "sequence_column")]
     page: Option<PathBuf>,
     /// Touches of objects that the model does not know: how many are detected

@@ -378,7 +378,9 @@ fn places(arguments: &Arguments) -> Result<Vec<(Emitted, PathBuf)>> {
     for &emitted in &arguments.emit {
         for extension in emitted.extensions() {
             let path = output.with_extension(extension);
-            let taken = path == *output || path.file_name().is_some_and(|name| name == HEADER);
+            // A name such as .palpate has no stem, and what is beside it would be hidden.
+            let is_hidden = output.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
+            let taken = is_hidden || path == *output || path.file_name().is_some_and(|name| name == HEADER);
             if output::is_stdout(output) || taken {
                 return Err(Error::setting(
                     "output",

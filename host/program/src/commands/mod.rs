@@ -124,7 +124,7 @@ pub(crate) struct Cli {
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Global options")]
 pub(crate) struct Global {
-    /// Print the result as JSON
+    /// Print the result, or the error, as JSON
     #[arg(long, global = true)]
     json: bool,
     /// Threads [default: all]; results do not depend on them
@@ -136,7 +136,7 @@ pub(crate) struct Global {
     /// Print neither progress nor remarks
     #[arg(long, global = true)]
     quiet: bool,
-    /// Write all the same; over whatever is there
+    /// Replace existing files; also those that Palpate did not write
     #[arg(long, global = true)]
     force: bool,
 }
@@ -210,11 +210,11 @@ fn overview(cli: &clap::Command) -> String {
     text.trim_start().to_owned()
         + "
 Global options:
-  --json         Print the result as JSON
+  --json         Print the result, or the error, as JSON
   --threads <N>  Threads; results do not depend on them
   --seed <N>     Seed of all that is random
   --quiet        Print neither progress nor remarks
-  --force        Write all the same, over what is there
+  --force        Replace existing files, also those of others
   --help         Print help; `palpate help capture`, with examples
   --version      Print the version
 
@@ -292,7 +292,12 @@ pub fn main() -> ExitCode {
         Err(error) => {
             if !matches!(error, Error::Closed) {
                 let command = matches.subcommand_name().unwrap_or_default();
-                eprintln!("palpate: {}", message(&error, command));
+                let text = message(&error, command);
+                if cli.global.json {
+                    // Programs that read results find the error there too.
+                    println!("{}", serde_json::json!({ "error": text }));
+                }
+                eprintln!("palpate: {text}");
                 if let Some(hint) = hint(&error, command) {
                     eprintln!("{hint}");
                 }

@@ -144,7 +144,7 @@ fn calibration(summary: &Summary) -> String {
     let ours = &summary.ours;
     let promise = match (&ours.calibration, &ours.uncalibrated) {
         (Some(calibrated), _) => format!(
-            "The model keeps its promise with a probability of {}; its thresholds were found on {} sequences of {} captured \
+            "The model keeps its promise with a confidence of {}; its thresholds were found on {} sequences of {} captured \
              for that.",
             rate(calibrated.confidence),
             count(calibrated.sequences),

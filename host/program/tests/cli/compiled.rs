@@ -455,7 +455,7 @@ fn export_emits_sources_beside_the_model_and_refuses_a_name_that_leaves_no_room_
     // The file that it is made of stays.
     let own = ("ensemble.palpate", "json");
     for (output, language) in
-        [("model.h", "c"), ("palpate.palpate", "c"), ("-", "rust"), own, ("model.palpate", "cobol")]
+        [("model.h", "c"), ("palpate.palpate", "c"), (".palpate", "c"), ("-", "rust"), own, ("model.palpate", "cobol")]
     {
         let output = if output == "-" { output.to_owned() } else { place.text(output) };
         let (code, message) = refusal(&["export", &ensemble, "-o", &output, "--emit", language]);

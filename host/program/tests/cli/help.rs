@@ -150,3 +150,12 @@ fn quiet_prints_no_remark_and_still_results_and_errors() {
     let quiet = here(&["evaluate", "m.palpate", "data", "--quiet"]);
     assert!(quiet.stderr.is_empty() && !stdout(quiet).is_empty());
 }
+
+#[test]
+fn an_error_is_json_on_standard_output_where_results_would_be() {
+    let output = run(["inspect", "no-such-file", "--json"]);
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let error = stderr(output, 1);
+    let text = found["error"].as_str().unwrap();
+    assert!(text.contains("no-such-file") && error.contains(text), "{found}, {error}");
+}

@@ -12,12 +12,16 @@ microcontroller (`compile`), whose code also runs here (`Recognizer`, `Model.mar
 True
 """
 
+from importlib.metadata import version as _version
+
 from ._errors import FileError, InputError, ModelWarning, PalpateError, SettingError
 from ._evaluate import Evaluation, Parity, Sequential, evaluate, parity
 from ._import import compile, to_ensemble
 from ._native import DataSet, Ensemble, Model, Recognizer, Surface, capture, train
 from ._stream import Calibrated, Ends, SequenceRecognizer, calibrate, evaluate_sequences
 from ._types import Meshes, Probe, Progress, Touch, Verdict
+
+__version__ = _version("palpate")
 
 __all__ = [
     "Calibrated",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from . import _native
@@ -52,7 +52,7 @@ class Evaluation:
     """The same counted in approaches."""
     patterns: dict[str, float]
     """Share of each contact pattern among the touches."""
-    raw: dict[str, object]
+    raw: dict[str, object] = field(repr=False)
     """All figures, as `palpate evaluate --json` prints them."""
 
 

@@ -8,7 +8,7 @@ import importlib.util
 import json
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -40,7 +40,7 @@ class Calibrated:
     """Sequences that the promise rests on."""
     groups: int | None
     """Groups that the promise rests on, and is for."""
-    raw: dict[str, Any]
+    raw: dict[str, Any] = field(repr=False)
     """All figures, as `palpate calibrate --json` prints them."""
 
 
@@ -58,7 +58,7 @@ class Ends:
     """Rows used on average."""
     fixed_rows: float | None
     """The least fixed number of rows with which no more names are wrong; `None` if all rows are not enough."""
-    raw: dict[str, Any]
+    raw: dict[str, Any] = field(repr=False)
     """All figures, as `palpate evaluate --json` prints them."""
 
 

@@ -156,11 +156,8 @@ pub fn check_code(
     statements(&plain, ensemble)?;
     let sources = of_ensemble(ensemble, &plain.keys)?;
     let subject = Subject { plain: &plain, sources: &sources, ensemble };
-    let order: Vec<Source> = certificate
-        .trees
-        .iter()
-        .map(|tree| Source { trees: tree.sources.clone(), offset: tree.offset })
-        .collect();
+    let order: Vec<Source> =
+        certificate.trees.iter().map(|tree| Source { trees: tree.sources.clone(), offset: tree.offset }).collect();
     let found = trees::of_code(subject, &order, false)?;
     holds(certificate, &found, ensemble)?;
     Ok(Proof { instructions: Some(read.instructions), ..subject.proof(&found) })

@@ -211,7 +211,7 @@ impl Facts {
         match millimeters {
             Some(unit) if SIZES.contains(&(length * unit)) => None,
             Some(unit) => Some(format!(
-                "The mesh has an implausible size: its longest side is {} mm, by the unit that it states.",
+                "The mesh has an implausible size: its longest side is {} mm in its unit.",
                 short(length * unit)
             )),
             None if SIZES.contains(&length) || SIZES.contains(&(length * 1_000.0)) => None,
