@@ -87,7 +87,7 @@ impl Default for Settings {
             test_share: 0.1,
             groups: 1000,
             error_rate: 0.01,
-            sequences: 10_000,
+            sequences: 4_000,
             command: "palpate run".into(),
         }
     }
