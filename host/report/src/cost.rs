@@ -348,7 +348,7 @@ mod tests {
             objects: vec!["a".into(), "b".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],
-            origin: palpate::ensemble::Origin::default(),
+            origin: palpate::ensemble::Provenance::default(),
         }
     }
 

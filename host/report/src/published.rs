@@ -344,7 +344,7 @@ mod tests {
             objects: (0..10).map(|k| k.to_string()).collect(),
             base_margins: vec![0.0; 10],
             trees: vec![Tree { nodes: vec![Node::Leaf(vec![0.5; 10])], output: Output::Each }; trees],
-            origin: ensemble::Origin::default(),
+            origin: ensemble::Provenance::default(),
         };
         let quick = method(&of(500), 50);
         assert!(

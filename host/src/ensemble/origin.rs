@@ -1,6 +1,6 @@
 //! Where the touches that an ensemble was trained on came from.
 
-use super::{Origin, Trained};
+use super::{Provenance, Trained};
 use crate::error::{EnsembleProblem, ProbeProblem, Result};
 use crate::probe::approach::Probe;
 use crate::probe::hand;
@@ -46,7 +46,7 @@ impl TouchOrigin {
     ///
     /// # Errors
     /// [`EnsembleProblem::Attribute`] for an attribute that is not what this crate writes.
-    pub fn of(origin: &Origin) -> Result<Self, EnsembleProblem> {
+    pub fn of(origin: &Provenance) -> Result<Self, EnsembleProblem> {
         let attributes = &origin.attributes;
         let numbers = |name: &'static str| -> Result<BTreeMap<String, u64>, EnsembleProblem> {
             let expected = "a JSON object of hexadecimal numbers";
@@ -68,7 +68,7 @@ impl TouchOrigin {
     }
 
     /// Makes `origin` state this.
-    pub fn state(&self, origin: &mut Origin) {
+    pub fn state(&self, origin: &mut Provenance) {
         let hexadecimal = |touches: &BTreeMap<String, u64>| {
             let numbers = touches.iter().map(|(name, fingerprint)| (name, format!("{fingerprint:016x}")));
             let numbers = Some(numbers.collect::<BTreeMap<_, _>>()).filter(|touches| !touches.is_empty());
@@ -93,8 +93,8 @@ impl TouchOrigin {
     }
 
     /// The same as [`state`](Self::state), of an ensemble that states nothing else but which touches are evidence.
-    pub fn origin(&self, trained: Option<Trained>) -> Origin {
-        let mut origin = Origin { trained, ..Origin::default() };
+    pub fn origin(&self, trained: Option<Trained>) -> Provenance {
+        let mut origin = Provenance { trained, ..Provenance::default() };
         self.state(&mut origin);
         origin
     }

@@ -9,7 +9,7 @@
 //!
 //! ```
 //! use palpate_trees::compile::{self, compile};
-//! use palpate_trees::ensemble::{Ensemble, Node, Origin, Output, Tree};
+//! use palpate_trees::ensemble::{Ensemble, Node, Provenance, Output, Tree};
 //! use palpate_shared::{Descriptor, Touch};
 //!
 //! # fn main() -> palpate_trees::Result<()> {
@@ -24,7 +24,7 @@
 //!     objects: vec!["bowl".into(), "fork".into()],
 //!     base_margins: vec![0.0; 2],
 //!     trees: vec![Tree { nodes, output: Output::Each }],
-//!     origin: Origin::default(),
+//!     origin: Provenance::default(),
 //! };
 //! let compiled = compile(&ensemble, &compile::Settings::default())?;
 //! let model = compile::open(&compiled.bytes)?;

@@ -142,7 +142,7 @@ pub fn check_names(names: &[String]) -> Result<(), EnsembleProblem> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ensemble::Origin;
+    use crate::ensemble::Provenance;
     use palpate_shared::Descriptor;
 
     fn ensemble() -> Ensemble {
@@ -153,7 +153,7 @@ mod tests {
             objects: vec!["bowl".into(), "fork".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],
-            origin: Origin::default(),
+            origin: Provenance::default(),
         }
     }
 

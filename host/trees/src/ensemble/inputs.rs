@@ -18,7 +18,7 @@ impl Inputs {
     }
 
     /// The name of a feature that has none of its own.
-    pub fn default_name(index: usize) -> String {
+    pub(crate) fn default_name(index: usize) -> String {
         format!("f{index}")
     }
 
@@ -47,7 +47,7 @@ impl Inputs {
     }
 
     /// True if features have names.
-    pub fn are_named(&self) -> bool {
+    pub(crate) fn are_named(&self) -> bool {
         match self {
             Self::Touches(_) => true,
             Self::Rows(names) => Self::has_names(names),

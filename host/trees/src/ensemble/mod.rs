@@ -18,7 +18,7 @@ pub use check::{MAX_FEATURES, MAX_OBJECTS, check_names};
 pub use error::{EnsembleProblem, NameProblem, TreeProblem};
 pub use inputs::Inputs;
 pub use nodes::Threshold;
-pub use origin::{Columns, Imported, Origin, Trained};
+pub use origin::{Columns, Imported, Provenance, Trained};
 
 use palpate_shared::format::{Prediction, TrainedTouches};
 use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
@@ -37,7 +37,7 @@ pub struct Ensemble {
     /// The trees, in the order in which their leaves are added.
     pub trees: Vec<Tree>,
     /// Facts about the touches that it was trained on; changes no margin.
-    pub origin: Origin,
+    pub origin: Provenance,
 }
 
 /// One tree; its root is node 0.
@@ -138,7 +138,7 @@ impl Ensemble {
     }
 
     /// The features with NaN for those that stand for a missing value.
-    pub fn known_features<'f>(&self, features: &'f [f32]) -> Cow<'f, [f32]> {
+    pub(crate) fn known_features<'f>(&self, features: &'f [f32]) -> Cow<'f, [f32]> {
         let Some([low, high]) = self.origin.imported.as_ref().and_then(|imported| imported.sentinel) else {
             return Cow::Borrowed(features);
         };

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 /// Statements of an ensemble about its training. Empty for ensembles from elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Origin {
+pub struct Provenance {
     /// Kind of touches it was trained on, and so which ones are evidence; of no meaning over rows.
     pub trained: Option<Trained>,
     /// The last object is a background: many other shapes, which stand for everything that the ensemble does not know.

@@ -5,7 +5,7 @@ use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
 use super::trees::{Shape, has_sets, tree};
 use crate::ensemble::check::check_names;
 use crate::ensemble::import::options::{CATEGORIES, MISSING_UNKNOWN, Options, default_names, named, one_class};
-use crate::ensemble::{Ensemble, Imported, Inputs, Node, Origin, Tree, columns};
+use crate::ensemble::{Ensemble, Imported, Inputs, Node, Provenance, Tree, columns};
 use crate::error::EnsembleProblem;
 use palpate_shared::Descriptor;
 use palpate_shared::format::{Link as Inverse, Prediction};
@@ -266,7 +266,7 @@ fn object_names(attributes: &Attributes) -> Result<Option<Vec<String>>, Ensemble
 }
 
 /// Facts about the training touches from the optional attributes.
-fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
+fn origin(attributes: &Attributes) -> Result<Provenance, EnsembleProblem> {
     let trained = attributes.get("palpate_trained").map(|text| {
         let expected = "a JSON object of counted, patterns, needs_pose and largest_spread";
         parsed("palpate_trained", expected, text)
@@ -278,7 +278,7 @@ fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
     // What the crate that trained it states, and this one does not read.
     let is_read = |name: &str| READ.contains(&name) || !name.starts_with("palpate_");
     let others = attributes.iter().filter(|(name, _)| !is_read(name));
-    Ok(Origin {
+    Ok(Provenance {
         background: background.transpose()?.unwrap_or_default(),
         trained: trained.transpose()?,
         imported: None,
