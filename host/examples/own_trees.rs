@@ -8,7 +8,7 @@
 //! (κ = t1 − 2·t2 + t3, and the slope |t3 − t1|, both in microseconds). XGBoost's JSON is read by `ensemble::load`.
 
 use palpate::compile::{self, compile};
-use palpate::ensemble::{Ensemble, Node, Origin, Output, OverTouches, Tree, feature_row, inputs};
+use palpate::ensemble::{Ensemble, Node, Output, OverTouches, Provenance, Tree, feature_row, inputs};
 use palpate::onboard::Model;
 use palpate::shared::{Descriptor, Touch};
 use std::error::Error;
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 output: Output::One(1),
             },
         ],
-        origin: Origin::default(),
+        origin: Provenance::default(),
     };
     let compiled = compile(&ensemble, &compile::Settings::default())?;
     println!("{} bytes, margins within {} nats", compiled.bytes.len(), compiled.margin_error);

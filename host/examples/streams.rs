@@ -7,7 +7,7 @@
 //! ```
 
 use palpate::compile::{self, Settings, compile};
-use palpate::ensemble::{Ensemble, Inputs, Origin, Output};
+use palpate::ensemble::{Ensemble, Inputs, Output, Provenance};
 use palpate::rows::{RowSequence, SequenceColumns, Sequences};
 use palpate::stream::{self, Wanted};
 use palpate::trees::train::{Parameters, Rows, train};
@@ -95,7 +95,8 @@ fn report(name: &str, all: &Sequences, names: &[String], rate: f64) -> Result<()
     let (base_margins, trees) = train(rows, names.len(), &parameters, None, &|| ControlFlow::Continue(()))?;
     debug_assert!(trees.iter().all(|tree| tree.output == Output::Each));
     let objects = names.to_vec();
-    let ensemble = Ensemble { inputs: Inputs::unnamed(width), objects, base_margins, trees, origin: Origin::default() };
+    let ensemble =
+        Ensemble { inputs: Inputs::unnamed(width), objects, base_margins, trees, origin: Provenance::default() };
     let bytes = compile(&ensemble, &Settings::default())?.bytes;
     let settings = stream::Settings { rate, ..stream::Settings::default() };
     let found = stream::calibrate(&compile::open(&bytes)?, &calibrated, &settings, &())?;

@@ -1,6 +1,6 @@
 //! Random ensembles and the touches that could distinguish them.
 
-use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree, inputs};
+use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
 use palpate_shared::{ContactTime, Descriptor, Pose, Touch};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
@@ -51,7 +51,7 @@ pub fn ensemble(shape: Shape, seed: u64) -> Ensemble {
     let trees = trees.collect();
     let objects = (0..shape.objects).map(|object| format!("object {object}")).collect();
     let base_margins = (0..shape.objects).map(|_| rng.random_range(-0.5..=0.5)).collect();
-    Ensemble { inputs: inputs(shape.descriptor), objects, base_margins, trees, origin: Origin::default() }
+    Ensemble { inputs: inputs(shape.descriptor), objects, base_margins, trees, origin: Provenance::default() }
 }
 
 /// The trees with at most this many of their different leaves.

@@ -1,7 +1,7 @@
 //! Hard cases of evidence and stopping.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree, inputs};
+use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
 use palpate_onboard::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
 use palpate_shared::{Descriptor, Touch};
 use palpate_tests::abuse::snapshot;
@@ -27,7 +27,7 @@ fn steps(steps: &[f32], margins: &[&[f32]]) -> Ensemble {
         objects: (0..objects).map(|object| object.to_string()).collect(),
         base_margins: vec![0.0; objects],
         trees: vec![Tree { nodes, output: Output::Each }],
-        origin: Origin::default(),
+        origin: Provenance::default(),
     }
 }
 

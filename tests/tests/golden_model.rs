@@ -1,7 +1,7 @@
 //! Pins the model format: these bytes are what version 1 means (`shared/FORMAT.md`).
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree, inputs};
+use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::{ContactTime, Descriptor, Touch};
 
@@ -23,7 +23,7 @@ fn ensemble() -> Ensemble {
         objects: vec!["ab".into(), "c".into()],
         base_margins: vec![0.5, -0.5],
         trees: [first, second].into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
-        origin: Origin::default(),
+        origin: Provenance::default(),
     }
 }
 

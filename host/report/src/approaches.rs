@@ -130,7 +130,7 @@ pub(super) fn measure(context: &Context) -> Result<ByApproach> {
 }
 
 /// Approaches to train on, and a third as many to test on.
-pub(super) fn approaches(context: &Context, scenes: &[Vec<Scene>], origin: &Origin) -> Result<[Dataset; 2]> {
+fn approaches(context: &Context, scenes: &[Vec<Scene>], origin: &Origin) -> Result<[Dataset; 2]> {
     let count = context.settings.approaches;
     let touched = |samples: Range<u64>| -> Result<Dataset> {
         let of = |(object, scenes): (&Object, &Vec<Scene>)| {
@@ -148,7 +148,7 @@ fn way(context: &Context, ensemble: &Ensemble, test: &Dataset) -> Result<Way> {
     let compiled = compiled(ensemble)?;
     let model = compile::open(&compiled.bytes)?;
     let margins = Margins::new(Candidate::Compiled(&model), test)?;
-    let sequences = if context.settings.quick { 300 } else { 1_000 };
+    let sequences = context.settings.sequences;
     let at: Vec<usize> = AT.into_iter().filter(|&at| at <= margins.fewest_approaches()).collect();
     let settings =
         SequentialSettings { error_rate: Some(ERROR_RATE), max_touches: None, sequences, seed: context.settings.seed };

@@ -63,7 +63,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Calibration> {
     let sections = vec![(Tag::Temperature, Some((false, stated.to_bytes().to_vec())))];
     let tempered = restate(&ours, &Restated { sections, ..Restated::default() })?;
     let tempered = compile::open(&tempered)?;
-    let groups = if settings.quick { 500 } else { 2_000 };
+    let groups = settings.reliability_groups;
     let mut result = Calibration { groups, temperature, bins: Vec::new(), error: Vec::new() };
     for candidate in [&paper, &ours, &tempered].map(Candidate::Compiled) {
         context.check()?;

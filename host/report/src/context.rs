@@ -9,7 +9,6 @@ use palpate::ensemble::{self, Ensemble};
 use palpate::error::Result;
 use palpate::in_order::in_order;
 use palpate::mesh::Object;
-use palpate::mesh::builtin;
 use palpate::probe::scene::Scene;
 use palpate::progress::{self, Progress};
 use palpate::touches::folds::{self, Split};
@@ -30,7 +29,6 @@ pub(super) struct Context<'a> {
     captured: OnceCell<Captured>,
     first: OnceCell<Split>,
     models: OnceCell<Models>,
-    kinds: OnceCell<Vec<Vec<Object>>>,
 }
 
 /// The touches that folds are made of, and what they took.
@@ -59,8 +57,8 @@ impl<'a> Context<'a> {
         progress: &'a dyn Progress,
     ) -> Result<Self> {
         let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &settings.capture, progress)?;
-        let (captured, first, models, kinds) = Default::default();
-        Ok(Self { settings, objects, cache, progress, scenes, captured, first, models, kinds })
+        let (captured, first, models) = Default::default();
+        Ok(Self { settings, objects, cache, progress, scenes, captured, first, models })
     }
 
     /// The touches that folds are made of.
@@ -117,34 +115,6 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// Instances of the ten built-in kinds, each sorted by name: the canonical ones first, then others with varied
-    /// proportions, as many as generalization needs.
-    pub(super) fn kinds(&self) -> Result<&[Vec<Object>]> {
-        let settings = self.settings;
-        let trained = settings.instances.iter().copied().max().unwrap_or(0);
-        let count = trained + settings.test_instances;
-        get_or_try(&self.kinds, || {
-            let mut names = builtin::names();
-            names.sort_unstable();
-            let is_builtin = self.settings.sources == ["builtin"];
-            let jobs: Vec<(usize, usize)> =
-                (0..count).flat_map(|k| (0..names.len()).map(move |kind| (k, kind))).collect();
-            self.progress.begin("making objects", Some(jobs.len() as u64));
-            let made = jobs.into_par_iter().map(|(instance, kind)| -> Result<Object> {
-                let object = match instance {
-                    0 if is_builtin => self.objects[kind].clone(),
-                    0 => builtin::one(names[kind])?,
-                    _ => builtin::varied(names[kind], 2_000 + instance as u64)?,
-                };
-                progress::advance(self.progress, 1)?;
-                Ok(object)
-            });
-            let made = in_order(made)?;
-            Ok(made.chunks(names.len()).map(<[Object]>::to_vec).collect())
-        })
-        .map(Vec::as_slice)
-    }
-
     /// Trains an ensemble; the context's progress is told, and may cancel it.
     pub(super) fn train(&self, data: &Dataset, settings: &train::Settings) -> Result<Ensemble> {
         train::train(data, settings, self.progress)
@@ -175,11 +145,6 @@ impl<'a> Context<'a> {
         &self.scenes
     }
 
-    /// The objects, ready to be touched; of each its first instance.
-    pub(super) fn scenes(&self) -> Vec<&Scene> {
-        self.scenes.iter().filter_map(|scenes| scenes.first()).collect()
-    }
-
     /// The objects' names.
     pub(super) fn names(&self) -> Vec<String> {
         self.objects.iter().map(|object| object.name.clone()).collect()
@@ -193,7 +158,7 @@ const CHUNK: usize = 1_000;
 ///
 /// # Errors
 /// If the object cannot be touched with three fingers, or the report was cancelled.
-pub(super) fn touch(
+fn touch(
     scenes: &[Scene],
     name: &str,
     count: usize,

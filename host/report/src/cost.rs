@@ -52,6 +52,10 @@ pub(super) struct Member {
 const FAMILY: [(usize, usize, usize); 8] =
     [(120, 6, 256), (60, 6, 256), (40, 5, 256), (30, 5, 64), (30, 4, 64), (20, 4, 32), (12, 4, 32), (8, 3, 16)];
 
+/// Layouts that each model of the family is compiled into.
+pub(super) const LAYOUTS: [compile::Layout; 3] =
+    [compile::Layout::Compact, compile::Layout::Complete, compile::Layout::Grid];
+
 /// Trains, compiles and measures the family.
 pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
     let settings = context.settings;
@@ -86,11 +90,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
         }
         let ensemble = context.train(&first.train, &family)?;
         let name = format!("{rounds} trees, depth {depth}, {bins} bins");
-        let layouts: &[_] = if settings.quick {
-            &[None]
-        } else {
-            &[Some(compile::Layout::Compact), Some(compile::Layout::Complete), Some(compile::Layout::Grid)]
-        };
+        let layouts: &[_] = if settings.all_layouts { &LAYOUTS.map(Some) } else { &[None] };
         add(&name, &ensemble, &[Leaf::I8, Leaf::I16], layouts)?;
     }
     Ok(members)
@@ -127,7 +127,7 @@ fn member(
     let settings = context.settings;
     let model = compile::open(&compiled.bytes)?;
     let margins = Margins::new(Candidate::Compiled(&model), &large.test)?;
-    let groups = if settings.quick { 500 } else { 1_500 };
+    let groups = settings.cost_groups;
     let all: Vec<&Touch> = touches.iter().collect();
     let curve = margins.curve(100.min(margins.fewest_touches()), groups, settings.seed)?;
     Ok(Member {
@@ -348,7 +348,7 @@ mod tests {
             objects: vec!["a".into(), "b".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],
-            origin: palpate::ensemble::Origin::default(),
+            origin: palpate::ensemble::Provenance::default(),
         }
     }
 

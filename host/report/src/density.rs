@@ -8,7 +8,7 @@
 //! The result is written as an [`Ensemble`] of a single tree with one leaf per cell, so that it is evaluated like any other model.
 
 use crate::error::ReportProblem;
-use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree, feature_row, inputs};
+use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, feature_row, inputs};
 use palpate::error::Result;
 use palpate::touches::Dataset;
 use palpate_shared::Descriptor;
@@ -44,7 +44,13 @@ pub(super) fn density_model(descriptor: Descriptor, train: &Dataset, held_out: &
     let tree = tree(&edges, &logs);
     let base_margins = vec![0.0; objects.len()];
     Ok((
-        Ensemble { inputs: inputs(descriptor), objects, base_margins, trees: vec![tree], origin: Origin::default() },
+        Ensemble {
+            inputs: inputs(descriptor),
+            objects,
+            base_margins,
+            trees: vec![tree],
+            origin: Provenance::default(),
+        },
         best,
     ))
 }

@@ -1,6 +1,6 @@
 //! The evaluation: what is measured and shown, one section per module, written as one page with the files behind it.
 //!
-//! [`report`] measures every stage, or takes it from an interrupted report, and writes the page. [`view`] makes the page
+//! [`report`] measures the chosen parts, or takes them from an interrupted report, and writes the page. [`view`] makes the page
 //! that shows an object and its touches, [`play`] the one on which objects can be touched, [`watch`] the one that watches a
 //! chip. The page of the program's main job is also drawn here, and [`page`] draws what all of them consist of.
 
@@ -14,14 +14,11 @@ mod cross_validation;
 mod density;
 pub mod design;
 pub mod error;
-mod generalization;
-mod growth;
 mod instructions;
 mod limit;
 mod noise;
 mod objects;
 pub mod page;
-mod plan;
 pub mod play;
 mod promises;
 mod published;
@@ -30,17 +27,14 @@ pub mod results;
 pub mod run_page;
 mod sequential;
 mod settings;
-mod simulator;
 #[cfg(test)]
 mod small;
 mod stages;
 pub mod statistics;
-mod strangers;
 pub mod stream;
-mod table;
 pub mod teach;
 pub mod view;
 pub mod watch;
 
-pub use settings::Settings;
-pub use stages::{Existing, Report, report, report_on};
+pub use settings::{Part, Settings};
+pub use stages::{Existing, Report, report};

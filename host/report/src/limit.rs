@@ -2,6 +2,7 @@
 
 use super::context::{Context, compiled, compiled_f32};
 use super::density::{CELLS, density_model};
+use super::settings::Settings;
 use super::statistics::z95;
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Shape, Stroke};
@@ -32,8 +33,6 @@ const DEPTH: usize = 7;
 pub(super) struct Limit {
     /// Full touches captured of each object.
     pub(super) captured: usize,
-    /// Of these, tested on.
-    pub(super) tested: usize,
     /// Groups per object.
     pub(super) groups: usize,
     /// Kernel width of the density estimate, in cells.
@@ -83,6 +82,11 @@ pub(super) fn large(context: &Context) -> Result<Large> {
     Ok(Large { train: part(0..train), held: part(train..held), test: part(held..all) })
 }
 
+/// Touches of each object of the large capture that are tested on.
+pub(super) fn tested(settings: &Settings) -> usize {
+    settings.limit_touches - settings.limit_touches * (PARTS[0] + PARTS[1]) / 100
+}
+
 /// The first half of each object's touches.
 fn half(data: &Dataset) -> Dataset {
     data.each(|object| object.select(0..object.len() / 2))
@@ -107,7 +111,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
     let bytes = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes];
     let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
 
-    let groups = if settings.quick { 1_000 } else { 3_000 };
+    let groups = settings.limit_groups;
     let measured = |name: &str, candidate: Candidate| -> Result<Measured> {
         let margins = Margins::new(candidate, &large.test)?;
         let curve = margins.curve(MOST, groups, settings.seed)?;
@@ -130,8 +134,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
     let at_10 = |index: usize| candidates[index].curve[9];
     let better = |a: usize, b: usize| if at_10(b) > at_10(a) { b } else { a };
     let best = better(better(ENSEMBLE, DENSITY), OURS);
-    let tested = large.test.objects.iter().map(|object| object.len()).min().unwrap_or(0);
-    Ok(Limit { captured: settings.limit_touches, tested, groups, width, candidates, best })
+    Ok(Limit { captured: settings.limit_touches, groups, width, candidates, best })
 }
 
 impl Limit {

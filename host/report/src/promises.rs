@@ -148,7 +148,7 @@ fn sequences(context: &Context, model: &Model<'_>, seed: u64, kept: &mut calibra
         names.iter().map(String::as_str).zip(context.all_scenes().iter().map(Vec::as_slice)).collect();
     let settings = calibrate::Settings {
         rate: RATES[RATES.len() - 1],
-        sequences: if context.settings.quick { 4_000 } else { 100_000 },
+        sequences: context.settings.promise_sequences,
         max_touches: Some(MAX_TOUCHES),
         seed,
         ..calibrate::Settings::default()

@@ -17,10 +17,9 @@ use std::path::Path;
 /// Differences of shares of contact patterns above which these are named.
 const DIFFERENT: f64 = 0.02;
 
-/// Compares the recorded touches, if there are any, with as many approaches as other sections make, by the probe of the
+/// Compares the recorded touches with as many approaches as other sections make, by the probe of the
 /// report with what a real one adds.
-pub(super) fn measure(context: &Context) -> Result<Option<Comparison>> {
-    let Some(directory) = &context.settings.recorded else { return Ok(None) };
+pub(super) fn measure(context: &Context, directory: &Path) -> Result<Comparison> {
     let recorded = Dataset::read_any(directory)?;
     let settings = context.settings;
     let origin = Origin { approaches: true, real: settings.real, ..settings.capture.clone() };
@@ -36,9 +35,9 @@ pub(super) fn measure(context: &Context) -> Result<Option<Comparison>> {
         let detail = format!("{} was recorded and is none of the report's objects", unknown.name);
         return Err(palpate::Error::from(EvaluateProblem::Incomparable { detail }).in_file(directory));
     }
-    let groups = if settings.quick { 300 } else { 1_000 };
+    let groups = settings.sequences;
     let compared = compare::Settings { groups, seed: settings.seed, ..Default::default() };
-    compare::compare(&recorded, &simulated, &compared, context.progress).map(Some)
+    compare::compare(&recorded, &simulated, &compared, context.progress)
 }
 
 /// A checksum of the recorded touches' files: a report that is resumed with others starts again.
@@ -46,9 +45,8 @@ pub(super) fn fingerprint(directory: &Path) -> Result<Vec<u32>> {
     files(directory)?.iter().map(|(_, path, _)| checksum(path)).collect()
 }
 
-/// The section; none without recorded touches.
-pub(super) fn section(context: &Context, compared: Option<&Comparison>) -> Result<Option<Section>> {
-    let Some(compared) = compared else { return Ok(None) };
+/// The section.
+pub(super) fn section(context: &Context, compared: &Comparison) -> Result<Section> {
     let mut section = Section::new("recorded", "Accuracy of the simulation");
     let told = &compared.told_apart;
     section.text(compared.verdict());
@@ -72,7 +70,7 @@ pub(super) fn section(context: &Context, compared: Option<&Comparison>) -> Resul
     section.figure(told_figure(context, compared)?);
     section.figure(features_figure(context, compared)?);
     section.table(words(context, compared));
-    Ok(Some(section))
+    Ok(section)
 }
 
 fn with_interval(share: &Share) -> String {

@@ -69,7 +69,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Sequences> {
     let models = context.models()?;
     let bytes = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes];
     let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
-    let count = if settings.quick { 300 } else { 1_000 };
+    let count = settings.sequences;
     let mut result = Sequences { count, most: MOST, methods: Vec::new(), used: Vec::new() };
     for candidate in [Candidate::Compiled(&paper), Candidate::Compiled(&ours)] {
         let margins = Margins::new(candidate, &large.test)?;

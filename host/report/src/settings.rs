@@ -1,12 +1,88 @@
 //! Extent of a report's measurements.
 
-use palpate::mesh::builtin::BACKGROUND_SHAPES;
+use super::cost::LAYOUTS;
 use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Settings of a report. A change of any of these but the command starts it from the beginning.
+/// A section of the report that can be chosen, with what it measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Part {
+    /// Objects, what was captured, and densities of curvature: the paper's figures 5 and 6.
+    Objects,
+    /// Accuracy and confusion by cross-validation: figures 8 and 9.
+    Accuracy,
+    /// Approaches to a verdict.
+    Approaches,
+    /// Noise on contact times: figures 10 to 13.
+    Noise,
+    /// The best accuracy that any classifier could reach.
+    Limit,
+    /// Touches until a posterior is high enough.
+    Stopping,
+    /// Reliability of posteriors.
+    Calibration,
+    /// Promised error rates, kept or broken.
+    Promises,
+    /// Speed and bytes against error.
+    Cost,
+}
+
+impl Part {
+    /// All of them, in the order of the page.
+    pub const ALL: [Self; 9] = [
+        Self::Objects,
+        Self::Accuracy,
+        Self::Approaches,
+        Self::Noise,
+        Self::Limit,
+        Self::Stopping,
+        Self::Calibration,
+        Self::Promises,
+        Self::Cost,
+    ];
+
+    /// Its name, which is also that of its stage.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Objects => "objects",
+            Self::Accuracy => "accuracy",
+            Self::Approaches => "approaches",
+            Self::Noise => "noise",
+            Self::Limit => "limit",
+            Self::Stopping => "stopping",
+            Self::Calibration => "calibration",
+            Self::Promises => "promises",
+            Self::Cost => "cost",
+        }
+    }
+}
+
+/// Numbers that a quick report may shorten: the name of each, the parts that depend on it, and its value.
+type Extent = (&'static str, &'static [Part], fn(&Settings) -> usize);
+
+const LARGE: &[Part] = &[Part::Limit, Part::Stopping, Part::Calibration, Part::Promises, Part::Cost];
+const EXTENTS: [Extent; 15] = [
+    ("full touches of each object", &Part::ALL, |of| of.touches),
+    ("folds", &[Part::Accuracy], |of| of.folds_used),
+    ("rounds of the paper's method", &Part::ALL, |of| of.paper_rounds),
+    ("numbers of touches looked at", &[Part::Accuracy], |of| of.levels),
+    ("groups of each object and fold", &[Part::Accuracy, Part::Noise], |of| of.many_groups),
+    ("noise levels", &[Part::Noise], |of| of.noise_levels),
+    ("folds with noise", &[Part::Noise], |of| of.noise_folds),
+    ("approaches to each object", &[Part::Approaches], |of| of.approaches as usize),
+    ("touches of each object in the large capture", LARGE, |of| of.limit_touches),
+    ("rounds of the large ensemble", &[Part::Limit], |of| of.limit_rounds),
+    ("groups of each object for the limit", &[Part::Limit], |of| of.limit_groups),
+    ("sequences of each object", &[Part::Approaches, Part::Stopping], |of| of.sequences),
+    ("groups of each object for reliability", &[Part::Calibration], |of| of.reliability_groups),
+    ("sequences for promises", &[Part::Promises], |of| of.promise_sequences),
+    ("groups of each object for each model of the family", &[Part::Cost], |of| of.cost_groups),
+];
+
+/// Settings of a report. A change of any of these but the command and the parts starts it from the beginning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Where the objects come from: see [`palpate::mesh::source::objects`].
@@ -17,9 +93,10 @@ pub struct Settings {
     pub seed: u64,
     /// Fewer folds, levels, touches and trees; the same figures.
     pub quick: bool,
+    /// Sections to measure and show.
+    pub parts: Vec<Part>,
     /// Origin of the touches: the probe, and the unit of its lengths. The settings beside it state the number of
-    /// touches and the seed. Growth and generalization use the
-    /// published probe.
+    /// touches and the seed.
     pub capture: Origin,
     /// Noise that a real probe adds to simulated touches where they are compared with recorded ones.
     #[serde(default)]
@@ -53,36 +130,29 @@ pub struct Settings {
     pub limit_touches: usize,
     /// Boosting rounds of the ensemble that estimates the limit.
     pub limit_rounds: usize,
-    /// Shapes that a background column is trained on.
-    pub background_shapes: usize,
-    /// Other shapes, which the test of whether touches fit any object learns from.
-    pub other_shapes: usize,
-    /// True to measure growth and generalization, which use built-in objects no matter what the sources are.
-    pub growth: bool,
-    /// Numbers of objects in the growth figures.
-    pub growth_objects: Vec<usize>,
-    /// Numbers of triangles in the growth figures.
-    pub growth_triangles: Vec<usize>,
-    /// Approaches to each object in the growth figures; a quarter as many more test.
-    pub growth_approaches: u64,
-    /// Numbers of instances of each kind that are trained on, to see how well others are recognized.
-    pub instances: Vec<usize>,
-    /// Instances of each kind that are tested on.
-    pub test_instances: usize,
-    /// Touches of each kind in training, and of each instance in testing.
-    pub instance_touches: usize,
+    /// Groups of each object's touches of the large capture that estimate the limit.
+    pub limit_groups: usize,
+    /// Sequences of each object that stop when sure.
+    pub sequences: usize,
+    /// Groups of each object for the reliability of posteriors.
+    pub reliability_groups: usize,
+    /// Sequences of all objects together that promises rest on.
+    pub promise_sequences: usize,
+    /// Groups of each object that each model of the family is tested on.
+    pub cost_groups: usize,
+    /// True to compile each model of the family into every layout, not only into the best.
+    pub all_layouts: bool,
 }
 
 impl Settings {
-    /// Everything the paper did, and a capture large enough for the limit. Growth and generalization are measured only
-    /// for the source `builtin`, since they say nothing about other objects.
+    /// Everything the paper did, and a capture large enough for the limit.
     pub fn full(sources: Vec<String>, seed: u64) -> Self {
         Self {
-            growth: sources == ["builtin"],
             sources,
             command: String::new(),
             seed,
             quick: false,
+            parts: Part::ALL.into(),
             capture: Origin::default(),
             real: Noise::default(),
             recorded: None,
@@ -99,18 +169,16 @@ impl Settings {
             approaches: 60_000,
             limit_touches: 300_000,
             limit_rounds: 80,
-            background_shapes: BACKGROUND_SHAPES,
-            other_shapes: BACKGROUND_SHAPES,
-            growth_objects: vec![2, 5, 10, 20, 50, 100, 256],
-            growth_triangles: vec![1_000, 10_000, 100_000, 1_000_000],
-            growth_approaches: 4_000,
-            instances: vec![1, 2, 4, 8],
-            test_instances: 3,
-            instance_touches: 12_000,
+            limit_groups: 3_000,
+            sequences: 1_000,
+            reliability_groups: 2_000,
+            promise_sequences: 100_000,
+            cost_groups: 1_500,
+            all_layouts: true,
         }
     }
 
-    /// The same figures in a minute or two.
+    /// The same figures in less than a minute.
     pub fn quick(sources: Vec<String>, seed: u64) -> Self {
         Self {
             quick: true,
@@ -124,16 +192,24 @@ impl Settings {
             approaches: 8_000,
             limit_touches: 30_000,
             limit_rounds: 60,
-            background_shapes: BACKGROUND_SHAPES / 5,
-            other_shapes: BACKGROUND_SHAPES / 5,
-            growth_objects: vec![2, 5, 10, 20],
-            growth_triangles: vec![1_000, 10_000, 100_000],
-            growth_approaches: 1_200,
-            instances: vec![1, 2],
-            test_instances: 1,
-            instance_touches: 2_000,
+            limit_groups: 1_000,
+            sequences: 300,
+            reliability_groups: 500,
+            promise_sequences: 4_000,
+            cost_groups: 500,
+            all_layouts: false,
             ..Self::full(sources, seed)
         }
+    }
+
+    /// Numbers in which the chosen parts differ from those of a full report: the name of each, here and there.
+    pub(super) fn shortened(&self) -> Vec<(&'static str, usize, usize)> {
+        let full = Self::full(Vec::new(), self.seed);
+        let layouts: Extent =
+            ("layouts of each model of the family", &[Part::Cost], |of| if of.all_layouts { LAYOUTS.len() } else { 1 });
+        let chosen = |extent: &Extent| extent.1.iter().any(|part| self.parts.contains(part));
+        let numbers = |(name, _, of): Extent| (name, of(self), of(&full));
+        EXTENTS.into_iter().chain([layouts]).filter(chosen).map(numbers).filter(|own| own.1 != own.2).collect()
     }
 
     /// The numbers of touches at which cross-validation looks: log-spaced from 10 to 120, rounded, without repeats.
@@ -167,9 +243,14 @@ mod tests {
     }
 
     #[test]
-    fn a_report_on_own_meshes_measures_nothing_on_built_in_ones_unless_asked() {
-        assert!(Settings::full(vec!["builtin".into()], 1).growth);
-        assert!(!Settings::full(vec!["meshes".into()], 1).growth);
-        assert!(!Settings::quick(vec!["builtin".into(), "mug.obj".into()], 1).growth);
+    fn a_quick_report_says_what_it_shortens_of_the_parts_that_it_has() {
+        let names = |parts: &[Part]| -> Vec<&str> {
+            let settings = Settings { parts: parts.into(), ..Settings::quick(vec!["meshes".into()], 1) };
+            settings.shortened().into_iter().map(|own| own.0).collect()
+        };
+        assert_eq!(names(&Part::ALL).len(), EXTENTS.len() + 1, "a number is not shortened, or not listed");
+        assert!(names(&[Part::Noise]).contains(&"noise levels") && !names(&[Part::Limit]).contains(&"noise levels"));
+        assert!(Settings::full(vec!["builtin".into()], 1).shortened().is_empty());
+        assert!(Settings::quick(vec!["a".into()], 1).shortened().contains(&("folds", 2, 10)));
     }
 }

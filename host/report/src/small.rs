@@ -16,7 +16,7 @@ pub(crate) fn model(names: [&str; 2]) -> CompiledModel {
         objects: names.map(String::from).into(),
         base_margins: vec![0.0; 2],
         trees: vec![Tree { nodes, output: Output::Each }],
-        origin: ensemble::Origin::default(),
+        origin: ensemble::Provenance::default(),
     };
     let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
     CompiledModel::from_bytes(bytes).unwrap()

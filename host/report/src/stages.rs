@@ -2,19 +2,20 @@
 
 use super::cache::{self, Cache};
 use super::context::{Context, get_or_try};
-use super::settings::Settings;
+use super::settings::{Part, Settings};
 use super::{
-    approaches, calibration, cost, cross_validation, generalization, growth, limit, noise, objects, plan, promises,
-    published, recorded, results, sequential, simulator, strangers, table,
+    approaches, calibration, cost, cross_validation, limit, noise, objects, promises, published, recorded, results,
+    sequential,
 };
 use crate::error::ReportProblem;
 use crate::page::document::{Page, Section};
+use crate::page::table::{Cell, Records, Table};
 use palpate::capture;
 use palpate::compare::Comparison;
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
-use palpate::mesh::{Object, source};
+use palpate::mesh::Object;
 use palpate::output::{refuse_foreign, write_json};
 use palpate::progress::{self, Progress};
 use palpate::wording::count;
@@ -79,6 +80,7 @@ impl Progress for Named<'_> {
 
 /// Stages that are measured, or were before.
 struct Stages<'a> {
+    parts: &'a [Part],
     cache: &'a Cache,
     progress: &'a Named<'a>,
     /// Names and seconds of those that are there.
@@ -86,6 +88,18 @@ struct Stages<'a> {
 }
 
 impl Stages<'_> {
+    /// The result of the part, if it is to be measured.
+    fn part<T: Serialize + DeserializeOwned>(
+        &mut self,
+        part: Part,
+        measure: impl FnOnce() -> Result<T>,
+    ) -> Result<Option<T>> {
+        if !self.parts.contains(&part) {
+            return Ok(None);
+        }
+        self.stage(part.name(), measure).map(Some)
+    }
+
     /// The result of the stage; progress is told its name before it begins.
     fn stage<T: Serialize + DeserializeOwned>(&mut self, name: &str, measure: impl FnOnce() -> Result<T>) -> Result<T> {
         progress::check(self.progress)?;
@@ -96,23 +110,15 @@ impl Stages<'_> {
     }
 }
 
-/// Measures everything and writes `directory/index.html`, the figures' and tables' files and `summary.json`. A report
-/// that was interrupted, or cancelled through `progress`, can be resumed with [`Existing::resume`].
+/// Measures the chosen parts on the objects that `objects` gives, sorted by name, and writes `directory/index.html`, the
+/// figures' and tables' files and `summary.json`. A report that was interrupted, or cancelled through `progress`, can be
+/// resumed with [`Existing::resume`].
 ///
 /// # Errors
-/// What reading the sources, measuring and writing return; [`ReportProblem::OneObject`] for fewer than two objects;
+/// What `objects`, measuring and writing return; [`ReportProblem::OneObject`] for fewer than two objects;
 /// [`ReportProblem::OtherResults`] for a directory that holds other results, unless [`Existing::replace`];
 /// [`Error::Cancelled`](palpate::Error::Cancelled).
-pub fn report(settings: &Settings, directory: &Path, existing: Existing, progress: &dyn Progress) -> Result<Report> {
-    report_on(&|| source::objects(&settings.sources), settings, directory, existing, progress)
-}
-
-/// The same on the objects that `objects` gives, whatever the settings' sources are, such as objects with several
-/// instances or at their true size. They must be sorted by name.
-///
-/// # Errors
-/// As [`report`] and `objects`.
-pub fn report_on(
+pub fn report(
     objects: &dyn Fn() -> Result<Vec<Object>>,
     settings: &Settings,
     directory: &Path,
@@ -138,16 +144,17 @@ pub fn report_on(
         compile::Settings::default()
     );
     let recorded = settings.recorded.as_deref().map(recorded::fingerprint).transpose()?;
-    let cache = Cache::open(directory, &(&made_from, presets, recorded), &objects, existing.resume)?;
+    // Nor do the parts make a difference to each other's results.
+    let measured_with = Settings { command: String::new(), parts: Vec::new(), ..settings.clone() };
+    let cache = Cache::open(directory, &(measured_with, presets, recorded), &objects, existing.resume)?;
     let progress = &Named { progress, stage: Mutex::new("objects".into()) };
     let context = Context::new(settings, &objects, &cache, progress)?;
-    let mut stages = Stages { cache: &cache, progress, seconds: Vec::new() };
+    let mut stages = Stages { parts: &settings.parts, cache: &cache, progress, seconds: Vec::new() };
     let measured = measured(&context, &mut stages)?;
     let stages = stages.seconds;
     progress.enter("drawing");
 
-    let Measured { folds, noisy, limit, sequences, .. } = &measured;
-    let summary = published::summary(&context, folds, noisy, limit, sequences);
+    let summary = published::summary(&context, &measured);
     let sections = sections(&context, &measured, &summary)?;
     let sentence = published::sentence(&summary);
     let page = Page {
@@ -173,69 +180,37 @@ pub fn report_on(
     Ok(Report { files, stages, sentence, summary })
 }
 
-/// Results that the sections show.
-struct Measured {
-    folds: Vec<cross_validation::Fold>,
-    noisy: Vec<noise::Fold>,
-    limit: limit::Limit,
-    sequences: sequential::Sequences,
-    calibration: calibration::Calibration,
-    promises: promises::Promises,
-    members: Vec<cost::Member>,
-    approaches: approaches::ByApproach,
-    plans: plan::Plans,
-    table: table::Measured,
-    strangers: strangers::Measured,
+/// Results that the sections show; none of a part that was not chosen.
+pub(super) struct Measured {
+    pub(super) folds: Option<Vec<cross_validation::Fold>>,
+    pub(super) noisy: Option<Vec<noise::Fold>>,
+    pub(super) limit: Option<limit::Limit>,
+    pub(super) sequences: Option<sequential::Sequences>,
+    calibration: Option<calibration::Calibration>,
+    promises: Option<promises::Promises>,
+    members: Option<Vec<cost::Member>>,
+    approaches: Option<approaches::ByApproach>,
     recorded: Option<Comparison>,
-    engines: Vec<simulator::Engine>,
-    /// None if the settings leave it out.
-    growth: Option<(growth::Growth, Vec<generalization::Instances>)>,
 }
 
-/// Measures all stages.
+/// Measures the chosen parts.
 fn measured(context: &Context, stages: &mut Stages<'_>) -> Result<Measured> {
-    let folds = stages.stage("cross-validation", || cross_validation::measure(context))?;
-    let noisy = stages.stage("noise", || noise::measure(context))?;
+    let folds = stages.part(Part::Accuracy, || cross_validation::measure(context))?;
+    let noisy = stages.part(Part::Noise, || noise::measure(context))?;
     // The large capture is needed by five stages, and by none if all were measured before.
     let large = OnceCell::new();
     let get_large = || get_or_try(&large, || limit::large(context));
-    let limit = stages.stage("limit", || limit::measure(context, get_large()?))?;
-    let sequences = stages.stage("sequential", || sequential::measure(context, get_large()?))?;
-    let calibration = stages.stage("calibration", || calibration::measure(context, get_large()?))?;
-    let promises = stages.stage("promises", || promises::measure(context, get_large()?))?;
-    let members = stages.stage("cost", || cost::measure(context, get_large()?))?;
+    let limit = stages.part(Part::Limit, || limit::measure(context, get_large()?))?;
+    let sequences = stages.part(Part::Stopping, || sequential::measure(context, get_large()?))?;
+    let calibration = stages.part(Part::Calibration, || calibration::measure(context, get_large()?))?;
+    let promises = stages.part(Part::Promises, || promises::measure(context, get_large()?))?;
+    let members = stages.part(Part::Cost, || cost::measure(context, get_large()?))?;
     drop(large);
-    let approaches = stages.stage("approaches", || approaches::measure(context))?;
-    let plans = stages.stage("plan", || plan::measure(context))?;
-    let table = stages.stage("table", || table::measure(context))?;
-    let strangers = stages.stage("strangers", || strangers::measure(context))?;
-    let recorded = match context.settings.recorded {
-        Some(_) => stages.stage("recorded", || recorded::measure(context))?,
-        None => None,
-    };
-    let engines = stages.stage("simulator", || simulator::measure(context))?;
-    let growth = if context.settings.growth {
-        let growth = stages.stage("growth", || growth::measure(context))?;
-        Some((growth, stages.stage("generalization", || generalization::measure(context))?))
-    } else {
-        None
-    };
-    Ok(Measured {
-        folds,
-        noisy,
-        limit,
-        sequences,
-        calibration,
-        promises,
-        members,
-        approaches,
-        plans,
-        table,
-        strangers,
-        recorded,
-        engines,
-        growth,
-    })
+    let approaches = stages.part(Part::Approaches, || approaches::measure(context))?;
+    let recorded = context.settings.recorded.as_deref();
+    let recorded = recorded.map(|directory| stages.stage("recorded", || recorded::measure(context, directory)));
+    let recorded = recorded.transpose()?;
+    Ok(Measured { folds, noisy, limit, sequences, calibration, promises, members, approaches, recorded })
 }
 
 /// The page's sections, in order.
@@ -243,38 +218,51 @@ fn sections(context: &Context, measured: &Measured, summary: &published::Summary
     let mut first = Section::new("summary", "The paper's numbers compared with ours");
     let damaged = objects::to_repair(context);
     if !damaged.is_empty() {
-        first.warning(format!(
-            "the figures are of meshes that should be repaired first: {}. The section on the objects says why.",
-            damaged.join(", ")
-        ));
+        let chosen = context.settings.parts.contains(&Part::Objects);
+        let why = if chosen { " The section on the objects says why." } else { "" };
+        first.warning(format!("the figures are of meshes that should be repaired first: {}.{why}", damaged.join(", ")));
     }
-    first.table(published::table(context, summary, &measured.noisy)?);
-    first.table(published::large(context, summary, &measured.limit, &measured.sequences));
-    let mut costs = cost::section(context, &measured.members)?;
-    simulator::add(context, &measured.engines, &mut costs)?;
-    let mut sections = vec![
-        first,
-        objects::section(context)?,
-        cross_validation::section(context, &measured.folds)?,
-        approaches::section(context, &measured.approaches)?,
-        plan::section(context, &measured.plans)?,
-        table::section(context, &measured.table),
-        noise::section(context, &measured.noisy)?,
-        limit::section(context, &measured.limit)?,
-        sequential::section(context, &measured.sequences)?,
-        calibration::section(context, &measured.calibration)?,
-        promises::section(context, &measured.promises)?,
-        strangers::section(context, &measured.strangers)?,
-        costs,
+    for table in [published::table(context, summary, measured)?, published::large(context, summary, measured)] {
+        table.map(|table| first.table(table));
+    }
+    shortened(context.settings).map(|table| first.table(table));
+    let mut sections = vec![first];
+    sections.retain(|section| !section.blocks.is_empty());
+    if context.settings.parts.contains(&Part::Objects) {
+        sections.push(objects::section(context)?);
+    }
+    fn shown<T>(of: &Option<T>, section: impl FnOnce(&T) -> Result<Section>) -> Result<Option<Section>> {
+        of.as_ref().map(section).transpose()
+    }
+    let all = [
+        shown(&measured.folds, |of| cross_validation::section(context, of))?,
+        shown(&measured.approaches, |of| approaches::section(context, of))?,
+        shown(&measured.noisy, |of| noise::section(context, of))?,
+        shown(&measured.limit, |of| limit::section(context, of))?,
+        shown(&measured.sequences, |of| sequential::section(context, of))?,
+        shown(&measured.calibration, |of| calibration::section(context, of))?,
+        shown(&measured.promises, |of| promises::section(context, of))?,
+        shown(&measured.members, |of| cost::section(context, of))?,
+        shown(&measured.recorded, |of| recorded::section(context, of))?,
     ];
-    sections.extend(recorded::section(context, measured.recorded.as_ref())?);
-    match &measured.growth {
-        Some((growth, instances)) => {
-            sections.extend([growth::section(context, growth)?, generalization::section(context, instances)?]);
-        }
-        None => sections.push(growth::left_out()),
-    }
+    sections.extend(all.into_iter().flatten());
     Ok(sections)
+}
+
+/// Numbers that a quick report shortens; none of a full one.
+fn shortened(settings: &Settings) -> Option<Table> {
+    let numbers = settings.shortened();
+    let mut data = Records::new(["number", "here", "in a full report"]);
+    for &(name, here, full) in &numbers {
+        data.push([name.into(), Cell::count(here), Cell::count(full)]);
+    }
+    (!numbers.is_empty()).then(|| Table {
+        id: "shortened".into(),
+        title: "What `--quick` shortens".into(),
+        caption: "All other numbers are those of a full report.".into(),
+        command: settings.command.clone(),
+        data,
+    })
 }
 
 /// Contents of `summary.json`.
@@ -308,8 +296,7 @@ fn facts(settings: &Settings, stages: &[(String, f64)], seconds: f64) -> Vec<(St
 mod tests {
     use super::*;
 
-    use palpate::mesh::Mesh;
-    use palpate::mesh::obj;
+    use palpate::mesh::{Mesh, obj, source};
     use palpate::output::write_whole;
     use palpate::probe::approach::Probe;
     use palpate::touches::Origin;
@@ -325,6 +312,10 @@ mod tests {
         vec![directory.to_str().unwrap().to_string()]
     }
 
+    fn report(settings: &Settings, directory: &Path, existing: Existing, progress: &dyn Progress) -> Result<Report> {
+        super::report(&|| source::objects(&settings.sources), settings, directory, existing, progress)
+    }
+
     const RESUME: Existing = Existing { resume: true, replace: false };
 
     fn tiny(sources: Vec<String>) -> Settings {
@@ -338,15 +329,6 @@ mod tests {
             approaches: 900,
             limit_touches: 1_000,
             limit_rounds: 3,
-            background_shapes: 10,
-            other_shapes: 20,
-            growth: true,
-            growth_objects: vec![2, 3],
-            growth_triangles: vec![100, 1_000],
-            growth_approaches: 400,
-            instances: vec![1],
-            test_instances: 1,
-            instance_touches: 200,
             ..Settings::quick(sources, 1)
         }
     }
@@ -366,7 +348,6 @@ mod tests {
             "accuracy",
             "accuracy-objects",
             "approaches-accuracy",
-            "plan-errors",
             "confusion",
             "signal-to-noise",
             "noise",
@@ -380,10 +361,6 @@ mod tests {
             "cost-bytes",
             "cost-time",
             "cost-work",
-            "simulator-figure",
-            "growth-objects-figure",
-            "growth-triangles",
-            "generalization",
         ] {
             assert!(html.contains(&format!("<figure id=\"{figure}\">")), "{figure}");
             for extension in ["svg", "csv"] {
@@ -391,7 +368,7 @@ mod tests {
             }
         }
         let figures = html.matches("<figure id=").count();
-        assert_eq!(figures, 22, "a figure is not in the list above");
+        assert_eq!(figures, 17, "a figure is not in the list above");
         let mut ids: Vec<&str> = html.split(" id=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
         let count = ids.len();
         ids.sort_unstable();
@@ -405,7 +382,9 @@ mod tests {
             let lines = std::fs::read_to_string(file).unwrap().lines().count();
             assert!(lines > 1, "{} has no row", file.display());
         }
-        assert!(!html.contains("NaN"), "a number is none");
+        // Pictures are in base64, where it may be any three letters.
+        let is_number = |at: usize| !html[..at].ends_with(|c: char| c.is_ascii_alphanumeric() || c == '+' || c == '/');
+        assert!(!html.match_indices("NaN").any(|(at, _)| is_number(at)), "a number is none");
         assert_eq!(html.matches("<img ").count(), 3);
 
         // Stages are taken as they are, their times too; a cut-off stage is measured again, and nothing else.
@@ -415,14 +394,14 @@ mod tests {
             let stages = std::fs::read_dir(directory.join(".stages")).unwrap().map(|entry| entry.unwrap().path());
             stages.into_iter().find(|path| path.file_name().unwrap().to_string_lossy().starts_with(name)).unwrap()
         };
-        std::fs::remove_file(kept("growth-")).unwrap();
+        std::fs::remove_file(kept("calibration-")).unwrap();
         let cut = report(&settings, &directory, RESUME, &()).unwrap();
         let differ = written.stages.iter().zip(&cut.stages).filter(|(a, b)| a != b).map(|(a, _)| a.0.as_str());
-        assert_eq!(differ.collect::<Vec<_>>(), ["growth"]);
+        assert_eq!(differ.collect::<Vec<_>>(), ["calibration"]);
     }
 
     #[test]
-    fn a_cancelled_report_resumes_where_it_was_and_one_on_own_meshes_leaves_out_built_in_ones() {
+    fn a_cancelled_report_resumes_where_it_was() {
         /// Cancels as soon as the stage begins.
         struct CancelAt(&'static str, AtomicBool, Mutex<Vec<String>>);
         impl Progress for CancelAt {
@@ -439,7 +418,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let probe = Probe { radius: 0.1, spacing: 1.25, speed: 20.0, tilt: 5.0, ..Probe::default() };
         let capture = Origin { probe, ..Origin::default() };
-        let settings = Settings { growth: false, capture, ..tiny(meshes(&place.path().join("meshes"))) };
+        let settings = Settings { capture, ..tiny(meshes(&place.path().join("meshes"))) };
         let directory = place.path().join("report");
         let cancel = CancelAt("noise", AtomicBool::new(false), Mutex::default());
         let error = report(&settings, &directory, Existing::default(), &cancel).unwrap_err();
@@ -448,17 +427,15 @@ mod tests {
         // What is long is named with its stage.
         let named = cancel.2.into_inner().unwrap();
         let is_of = |name: &&String, stage: &str| name.split(": ").next() == Some(stage);
-        let stages = ["objects", "cross-validation", "noise"];
+        let stages = ["objects", "accuracy", "noise"];
         assert!(named.iter().all(|name| stages.iter().any(|stage| is_of(&name, stage))), "{named:?}");
-        assert!(named.iter().any(|name| name.starts_with("cross-validation: train")), "{named:?}");
+        assert!(named.iter().any(|name| name.starts_with("accuracy: train")), "{named:?}");
         let kept = std::fs::read_dir(directory.join(".stages")).unwrap().map(|entry| entry.unwrap().path());
-        let kept = kept.into_iter().find(|path| path.to_string_lossy().contains("cross-validation-")).unwrap();
+        let kept = kept.into_iter().find(|path| path.to_string_lossy().contains("accuracy-")).unwrap();
         let kept: serde_json::Value = serde_json::from_slice(&std::fs::read(kept).unwrap()).unwrap();
         let resumed = report(&settings, &directory, RESUME, &()).unwrap();
-        assert_eq!(resumed.stages[0], ("cross-validation".into(), kept["seconds"].as_f64().unwrap()));
-        assert!(!resumed.stages.iter().any(|(name, _)| name == "growth" || name == "generalization"));
+        assert_eq!(resumed.stages[0], ("accuracy".into(), kept["seconds"].as_f64().unwrap()));
         let html = std::fs::read_to_string(directory.join("index.html")).unwrap();
-        assert!(!html.contains("<figure id=\"generalization\">") && html.contains("leaves them out unless"));
 
         // Captions state this probe and these settings, and not the published or the usual ones.
         for said in [
@@ -471,11 +448,50 @@ mod tests {
         ] {
             assert!(html.contains(said), "{said}");
         }
-        for other in
-            ["0.15", "1.5 apart", "10 units per second", "1000 trees", "eleven", "kilobytes", "a fork", "80 rounds"]
-        {
+        for other in [
+            "0.15 units",
+            "1.5 apart",
+            "10 units per second",
+            "1000 trees",
+            "eleven",
+            "kilobytes",
+            "a fork",
+            "80 rounds",
+        ] {
             assert!(!html.contains(other), "{other}");
         }
+    }
+
+    #[test]
+    fn a_report_measures_the_chosen_parts_alone_and_takes_them_from_one_with_others() {
+        let place = tempfile::tempdir().unwrap();
+        let directory = place.path().join("report");
+        let with = |parts: &[Part]| Settings { parts: parts.into(), ..tiny(meshes(&place.path().join("meshes"))) };
+        let read = || std::fs::read_to_string(directory.join("index.html")).unwrap();
+        let names = |report: &Report| report.stages.iter().map(|stage| stage.0.clone()).collect::<Vec<_>>();
+        let noise = report(&with(&[Part::Noise]), &directory, Existing::default(), &()).unwrap();
+        assert_eq!(names(&noise), ["noise"]);
+        let html = read();
+        assert!(html.contains("<figure id=\"noise\">") && html.contains("noise levels"));
+        for other in ["curvature", "accuracy", "limit-curves", "cost-bytes"] {
+            assert!(!html.contains(&format!("<figure id=\"{other}\">")), "{other}");
+        }
+        assert!(!html.contains("After ten touches") && !html.contains("touches until sure"), "{}", noise.sentence);
+        let paper = &noise.summary["summary"]["paper"];
+        assert!(paper["at_10_with_5_ms"].is_array() && paper.get("at_10").is_none(), "{paper}");
+        assert!(noise.summary["summary"].get("limit_at_10").is_none());
+
+        // Its sections would be lost, so it is asked for; then what was measured is taken.
+        let both = with(&[Part::Objects, Part::Noise, Part::Limit]);
+        let error = report(&both, &directory, RESUME, &()).unwrap_err();
+        assert!(error.to_string().contains("settings: parts was"), "{error}");
+        let both = report(&both, &directory, Existing { resume: true, replace: true }, &()).unwrap();
+        assert_eq!((names(&both), &both.stages[0]), (vec!["noise".into(), "limit".into()], &noise.stages[0]));
+        assert!(read().contains("<figure id=\"limit-curves\">") && both.summary["summary"]["limit_at_10"].is_number());
+
+        let objects = with(&[Part::Objects]);
+        let only = report(&objects, &directory, Existing { resume: true, replace: true }, &()).unwrap();
+        assert_eq!((only.stages, read().contains("<figure id=\"curvature\">")), (vec![], true));
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub(crate) enum Order {
 }
 
 /// Message of a chip.
-pub(crate) enum Heard {
+pub(crate) enum ChipEvent {
     /// It answers, and has these objects.
     Connected(Vec<String>),
     /// A touch was counted: with the touch if its own fingers felt it.
@@ -45,7 +45,7 @@ pub(crate) enum Heard {
 
 /// Starts a thread that talks with the chip at `port`, which is to use the model `load`, if there is one, until nobody gives
 /// orders any more.
-pub(crate) fn start(port: Port, baud: u32, load: Option<Arc<CompiledModel>>) -> (Sender<Order>, Receiver<Heard>) {
+pub(crate) fn start(port: Port, baud: u32, load: Option<Arc<CompiledModel>>) -> (Sender<Order>, Receiver<ChipEvent>) {
     let (orders, taken) = async_channel::unbounded();
     let (said, heard) = async_channel::unbounded();
     std::thread::spawn(move || {
@@ -59,7 +59,7 @@ pub(crate) fn start(port: Port, baud: u32, load: Option<Arc<CompiledModel>>) -> 
                     // Once, however often it is tried.
                     let error = error.to_string();
                     if line.answered || told.as_ref() != Some(&error) {
-                        line.tell(Heard::Lost(error.clone()));
+                        line.tell(ChipEvent::Lost(error.clone()));
                     }
                     (line.answered, told) = (false, Some(error));
                 }
@@ -73,7 +73,7 @@ pub(crate) fn start(port: Port, baud: u32, load: Option<Arc<CompiledModel>>) -> 
 struct Line {
     port: Port,
     baud: u32,
-    said: Sender<Heard>,
+    said: Sender<ChipEvent>,
     /// The model that the chip has to have.
     load: Option<Arc<CompiledModel>>,
     /// True unless the chip has said that its model has no plan.
@@ -89,7 +89,7 @@ struct Line {
 }
 
 impl Line {
-    fn tell(&self, heard: Heard) {
+    fn tell(&self, heard: ChipEvent) {
         // The node has ended where nobody listens, and so does the thread.
         let _ = self.said.send_blocking(heard);
     }
@@ -154,7 +154,7 @@ impl Line {
         }
         let model = connection.model()?;
         (self.plans, self.answered) = (true, true);
-        self.tell(Heard::Connected(model.names.clone()));
+        self.tell(ChipEvent::Connected(model.names.clone()));
         self.tell_before(connection, &model.names)?;
         Ok(model)
     }
@@ -167,15 +167,15 @@ impl Line {
             Received::Outcome(Outcome::Verdict(verdict)) => {
                 let step = self.step(connection, names, &verdict)?;
                 self.decided = step.is_decided();
-                self.tell(Heard::Step(None, step.into()));
+                self.tell(ChipEvent::Step(None, step.into()));
             }
-            Received::Outcome(Outcome::Refused(refusal)) => self.tell(Heard::Refused(None, refusal.to_string())),
+            Received::Outcome(Outcome::Refused(refusal)) => self.tell(ChipEvent::Refused(None, refusal.to_string())),
             // Of a reset that nobody ordered: the verdict stays the last word until the next touch.
             Received::Outcome(_) if std::mem::take(&mut self.unasked) => {}
             Received::Outcome(_) => self.tell_before(connection, names)?,
             Received::Event(event, missed) => {
                 if missed > 0 {
-                    self.tell(Heard::Fault(format!("{missed} reports of the chip were lost on the way")));
+                    self.tell(ChipEvent::Fault(format!("{missed} reports of the chip were lost on the way")));
                 }
                 self.take_event(connection, names, event)?;
             }
@@ -191,17 +191,17 @@ impl Line {
                 // The chip has begun another object by itself, if one was decided.
                 self.decided = false;
                 let step = self.step_of_event(connection, names, &verdict)?;
-                self.tell(Heard::Step(Some((&touch).into()), step.into()));
+                self.tell(ChipEvent::Step(Some((&touch).into()), step.into()));
             }
             Event::Refused { touch, refusal } => {
-                self.tell(Heard::Refused(Some((&touch).into()), refusal.to_string()));
+                self.tell(ChipEvent::Refused(Some((&touch).into()), refusal.to_string()));
             }
             Event::Fault { kind, finger } => {
                 let finger = usize::from(finger);
                 let finger = ["first finger", "middle finger", "last finger"].get(finger).copied().unwrap_or("probe");
-                self.tell(Heard::Fault(format!("{finger}: {kind}")));
+                self.tell(ChipEvent::Fault(format!("{finger}: {kind}")));
             }
-            Event::NotStored => self.tell(Heard::Fault("the chip cannot store what it has touched".into())),
+            Event::NotStored => self.tell(ChipEvent::Fault("the chip cannot store what it has touched".into())),
             _ => {}
         }
         Ok(())
@@ -211,7 +211,7 @@ impl Line {
     fn tell_before(&mut self, connection: &mut Connection, names: &[String]) -> Result<()> {
         let nothing = VerdictMessage { decision: Decision::Undecided, best: 0, touches: 0, detail: None };
         let step = self.step(connection, names, &nothing)?;
-        self.tell(Heard::Before(step.into()));
+        self.tell(ChipEvent::Before(step.into()));
         Ok(())
     }
 

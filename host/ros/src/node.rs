@@ -1,6 +1,6 @@
 //! The running node: its topics, and its answers on them.
 
-use crate::chip::{self, Heard, Order};
+use crate::chip::{self, ChipEvent, Order};
 use crate::clients::{AllClients, Clients};
 use crate::decide::{Decider, Step, Thresholds, UNDECIDED};
 use crate::open::{Actions, Change, Inputs, Options, Outputs, open, parameters, text};
@@ -39,7 +39,7 @@ enum Happened {
     Goal(NewGoalHandle<Expected>),
     Cancel(CancelHandle),
     Changed(Change),
-    Chip(Heard),
+    Chip(ChipEvent),
     LookAtSwitches,
     Diagnose,
     Signal(Signal),
@@ -431,25 +431,25 @@ impl Running<'_> {
         }
     }
 
-    async fn hear(&mut self, heard: Heard) {
+    async fn hear(&mut self, heard: ChipEvent) {
         let Recognizing::Chip { objects, trouble, .. } = &mut self.recognizing else { return };
-        *trouble = if let Heard::Lost(error) = &heard { Some(error.clone()) } else { None };
+        *trouble = if let ChipEvent::Lost(error) = &heard { Some(error.clone()) } else { None };
         match heard {
-            Heard::Connected(names) => {
+            ChipEvent::Connected(names) => {
                 *objects = names;
                 rosout!((*self.node), LogLevel::Info, "the chip answers");
             }
-            Heard::Step(touch, step) => {
+            ChipEvent::Step(touch, step) => {
                 self.measured(touch).await;
                 self.took(*step).await;
             }
-            Heard::Refused(touch, reason) => {
+            ChipEvent::Refused(touch, reason) => {
                 self.measured(touch).await;
                 self.took(refused(reason)).await;
             }
-            Heard::Before(step) => self.say(*step).await,
-            Heard::Fault(fault) => self.fault(format!("chip: {fault}")),
-            Heard::Lost(error) => self.problem(error),
+            ChipEvent::Before(step) => self.say(*step).await,
+            ChipEvent::Fault(fault) => self.fault(format!("chip: {fault}")),
+            ChipEvent::Lost(error) => self.problem(error),
         }
     }
 

@@ -4,7 +4,7 @@ use crate::capture::Sampler;
 use crate::error::Result;
 use crate::in_order::in_order;
 use crate::probe::hand;
-use crate::probe::noise::{ByPosition, Noise};
+use crate::probe::noise::{self, Noise};
 use palpate_shared::Touch;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -22,7 +22,7 @@ pub(super) struct Demand<'a> {
     window: Option<u32>,
     /// Without noise, for other models too.
     kept: &'a [OnceLock<Touch>],
-    noise: Option<ByPosition>,
+    noise: Option<noise::Stream>,
 }
 
 impl<'a> Demand<'a> {
@@ -39,7 +39,7 @@ impl<'a> Demand<'a> {
 
     /// Adds noise without a bias to each touch.
     pub(super) fn add_noise(&mut self, noise: &Noise, seed: u64) {
-        self.noise = (!noise.is_none()).then(|| noise.by_position(self.name(), self.kept.len(), seed));
+        self.noise = (!noise.is_none()).then(|| noise.stream(self.name(), self.kept.len(), seed));
     }
 
     /// The object's name.
@@ -81,7 +81,7 @@ impl<'a> Demand<'a> {
                 *kept.get_or_init(|| touch)
             }
         };
-        let noisy = |noise: &ByPosition| hand::within(&noise.add(&touch, position as usize), self.window);
-        Ok(self.noise.as_ref().map_or(touch, noisy))
+        let noisy = |noise: &noise::Stream| noise.add(&touch, position as usize, position.into());
+        Ok(self.noise.as_ref().map_or(touch, |noise| hand::within(&noisy(noise), self.window)))
     }
 }

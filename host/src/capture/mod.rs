@@ -51,7 +51,7 @@ use std::path::Path;
 use std::time::Instant;
 
 pub use memory::in_memory;
-pub use sample::{Drawn, MOST_ATTEMPTS, Sampler};
+pub use sample::{Drawn, Sampler};
 
 /// Settings of a capture, and its treatment of existing files.
 #[derive(Clone, Debug, Default, PartialEq)]

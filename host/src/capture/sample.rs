@@ -21,7 +21,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 
 /// After this many approaches without a full touch, an object counts as one that cannot be touched with three fingers.
 /// Real objects need 2 to 36; a wire as thin as a hundredth of the fingers needs a few thousand.
-pub const MOST_ATTEMPTS: u64 = 1 << 22;
+pub(crate) const MOST_ATTEMPTS: u64 = 1 << 22;
 
 /// A sample, and the number of approaches for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +69,7 @@ impl<'a> Sampler<'a> {
     /// approaches are drawn until one is a full touch; when every approach is kept, the first one is the sample.
     ///
     /// # Errors
-    /// [`CaptureProblem::Untouchable`] when [`MOST_ATTEMPTS`] approaches give no full touch.
+    /// [`CaptureProblem::Untouchable`] when 4 million approaches give no full touch.
     pub fn sample(&self, index: u64) -> Result<(Touch, u64)> {
         self.drawn(index).map(|drawn| (drawn.touch, drawn.approaches))
     }

@@ -29,7 +29,7 @@ pub use emulator::Emulator;
 pub use error::ChipProblem;
 pub use journal::{Entry, Journal};
 pub use port::Port;
-pub use record::{Heard, RecordSummary, record};
+pub use record::{RecordEvent, RecordSummary, record};
 pub use steps::{Step, Steps};
 pub use stream::{Summary, Update, probability, stream};
 pub use transport::Transport;

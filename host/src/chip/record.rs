@@ -14,7 +14,7 @@ const RETRY: Duration = Duration::from_millis(500);
 
 /// Something new while touches are recorded.
 #[derive(Debug)]
-pub enum Heard<'a> {
+pub enum RecordEvent<'a> {
     /// The chip answers, for the first time or after the line broke.
     Connected {
         /// Its program, if it says so.
@@ -88,7 +88,7 @@ pub fn record(
     mut reopen: impl FnMut() -> Result<Transport>,
     recording: &mut Recording,
     count: Option<u64>,
-    mut each: impl FnMut(&Heard<'_>) -> Result<ControlFlow<()>>,
+    mut each: impl FnMut(&RecordEvent<'_>) -> Result<ControlFlow<()>>,
 ) -> Result<RecordSummary> {
     let mut summary = RecordSummary { object: recording.object().into(), ..RecordSummary::default() };
     let mut connected = false;
@@ -125,7 +125,7 @@ fn greet(
     connection: &mut Connection,
     recording: &mut Recording,
     summary: &mut RecordSummary,
-    each: &mut impl FnMut(&Heard<'_>) -> Result<ControlFlow<()>>,
+    each: &mut impl FnMut(&RecordEvent<'_>) -> Result<ControlFlow<()>>,
 ) -> Result<ControlFlow<()>> {
     let program = connection.program()?;
     let model = match connection.model() {
@@ -134,7 +134,7 @@ fn greet(
         Err(error) => return Err(error),
     };
     let other = recording.made_by(program.clone(), model.as_ref().map(|model| model.info.checksum))?;
-    let heard = Heard::Connected { program: program.as_deref(), model: model.as_ref(), other: other.as_deref() };
+    let heard = RecordEvent::Connected { program: program.as_deref(), model: model.as_ref(), other: other.as_deref() };
     let flow = each(&heard);
     summary.firmware = program;
     flow
@@ -146,7 +146,7 @@ fn listen(
     recording: &mut Recording,
     count: Option<u64>,
     summary: &mut RecordSummary,
-    each: &mut impl FnMut(&Heard<'_>) -> Result<ControlFlow<()>>,
+    each: &mut impl FnMut(&RecordEvent<'_>) -> Result<ControlFlow<()>>,
 ) -> Result<ControlFlow<()>> {
     if count.is_some_and(|count| summary.touches >= count) {
         return Ok(ControlFlow::Break(()));
@@ -154,13 +154,13 @@ fn listen(
     let (event, missed) = match connection.hear(Duration::from_millis(50))? {
         Some(Received::Event(event, missed)) => (event, missed),
         Some(Received::Earlier(Event::Touch { touch, .. } | Event::Refused { touch, .. })) => {
-            return each(&Heard::Earlier(Touch::from(&touch)));
+            return each(&RecordEvent::Earlier(Touch::from(&touch)));
         }
-        _ => return each(&Heard::Idle),
+        _ => return each(&RecordEvent::Idle),
     };
     if missed > 0 {
         summary.missed += u64::from(missed);
-        if each(&Heard::Missed(missed))?.is_break() {
+        if each(&RecordEvent::Missed(missed))?.is_break() {
             return Ok(ControlFlow::Break(()));
         }
     }
@@ -169,13 +169,13 @@ fn listen(
         Event::Refused { touch, refusal } => (Touch::from(&touch), Err(refusal)),
         Event::Fault { kind, finger } => {
             summary.faults += 1;
-            return each(&Heard::Fault { kind, finger });
+            return each(&RecordEvent::Fault { kind, finger });
         }
         _ => return Ok(ControlFlow::Continue(())),
     };
     if recording.lacks_pose(&touch) {
         summary.without_pose += 1;
-        return each(&Heard::NoPose(touch));
+        return each(&RecordEvent::NoPose(touch));
     }
     recording.add(&touch)?;
     summary.touches += 1;
@@ -183,7 +183,7 @@ fn listen(
     if let Some(counted) = summary.contacts.get_mut(contacts) {
         *counted += 1;
     }
-    each(&Heard::Touch { touch, number: recording.all_touches(), verdict })
+    each(&RecordEvent::Touch { touch, number: recording.all_touches(), verdict })
 }
 
 /// Waits until the line is there again.
@@ -191,9 +191,9 @@ fn wait(
     connection: &mut Connection,
     error: &Error,
     reopen: &mut impl FnMut() -> Result<Transport>,
-    each: &mut impl FnMut(&Heard<'_>) -> Result<ControlFlow<()>>,
+    each: &mut impl FnMut(&RecordEvent<'_>) -> Result<ControlFlow<()>>,
 ) -> Result<ControlFlow<()>> {
-    if each(&Heard::Lost(error))?.is_break() {
+    if each(&RecordEvent::Lost(error))?.is_break() {
         return Ok(ControlFlow::Break(()));
     }
     loop {
@@ -202,7 +202,7 @@ fn wait(
             Err(error) if !is_lost(&error) && !is(&error, is_closed) => return Err(error),
             Err(_) => std::thread::sleep(RETRY),
         }
-        if each(&Heard::Idle)?.is_break() {
+        if each(&RecordEvent::Idle)?.is_break() {
             return Ok(ControlFlow::Break(()));
         }
     }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::ensemble::{Inputs, Node, Origin, Output, StatedProbe, Tree, inputs};
+use crate::ensemble::{Inputs, Node, Output, Provenance, StatedProbe, Tree, inputs};
 use crate::error::CompileProblem;
 use palpate_shared::{ContactTime, Descriptor, Touch};
 
@@ -18,7 +18,7 @@ fn ensemble(descriptor: Descriptor, trees: Vec<Vec<Node>>) -> Ensemble {
         objects: vec!["bowl".into(), "fork".into()],
         base_margins: vec![0.0; 2],
         trees: trees.into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
-        origin: Origin::default(),
+        origin: Provenance::default(),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Origin of the touches that an ensemble was trained on.
 
-use super::{Origin, Trained};
+use super::{Provenance, Trained};
 use crate::error::{EnsembleProblem, ProbeProblem, Result};
 use crate::probe::approach::Probe;
 use crate::probe::hand;
@@ -49,7 +49,7 @@ impl TouchOrigin {
     ///
     /// # Errors
     /// [`EnsembleProblem::Attribute`] for an attribute that is not what this crate writes.
-    pub fn of(origin: &Origin) -> Result<Self, EnsembleProblem> {
+    pub fn of(origin: &Provenance) -> Result<Self, EnsembleProblem> {
         let attributes = &origin.attributes;
         let numbers = |name: &'static str| -> Result<BTreeMap<String, u64>, EnsembleProblem> {
             let expected = "a JSON object of hexadecimal numbers";
@@ -72,7 +72,7 @@ impl TouchOrigin {
     }
 
     /// Makes `origin` state this.
-    pub fn state(&self, origin: &mut Origin) {
+    pub fn state(&self, origin: &mut Provenance) {
         let hexadecimal = |touches: &BTreeMap<String, u64>| {
             let numbers = touches.iter().map(|(name, fingerprint)| (name, format!("{fingerprint:016x}")));
             let numbers = Some(numbers.collect::<BTreeMap<_, _>>()).filter(|touches| !touches.is_empty());
@@ -97,9 +97,9 @@ impl TouchOrigin {
         }
     }
 
-    /// Origin of an ensemble that states this and nothing else.
-    pub fn origin(&self) -> Origin {
-        let mut origin = Origin::default();
+    /// Provenance of an ensemble that states this and nothing else.
+    pub fn origin(&self) -> Provenance {
+        let mut origin = Provenance::default();
         self.state(&mut origin);
         origin
     }
@@ -417,7 +417,7 @@ pub fn compiled_trained_on<'d>(compiled: &CompiledModel, dataset: &'d Dataset) -
 }
 
 /// The touches that an ensemble states to be trained on.
-pub(super) fn trained(origin: &Origin) -> Result<Option<Trained>, EnsembleProblem> {
+pub(super) fn trained(origin: &Provenance) -> Result<Option<Trained>, EnsembleProblem> {
     let expected = "a JSON object of counted, patterns, needs_pose and largest_spread";
     parsed(&origin.attributes, TouchOrigin::TRAINED, expected)
 }

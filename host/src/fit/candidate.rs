@@ -5,7 +5,7 @@ pub(super) const NOISE: [f64; 2] = [0.1, 25.0];
 
 /// A probe that may have made recorded touches. Times are in milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Candidate {
+pub(super) struct Hypothesis {
     /// Factor applied to contact times: one over the speed's factor.
     pub(super) factor: f64,
     /// Delay of each finger; 0 for the first.
@@ -19,7 +19,7 @@ pub(super) struct Candidate {
 /// Number of parameters of a candidate.
 pub(super) const NUMBERS: usize = 7;
 
-impl Candidate {
+impl Hypothesis {
     /// The candidate as numbers of about the same scale, for a search.
     pub(super) fn numbers(&self) -> [f64; NUMBERS] {
         let [_, middle, third] = self.late;
@@ -46,7 +46,7 @@ const USUAL: [f64; 3] = [0.15, 8.0, 1.0];
 /// In milliseconds.
 const USUAL_NOISE: f64 = 2.0;
 
-impl Candidate {
+impl Hypothesis {
     /// Logarithm of how usual it is, up to a constant.
     pub(super) fn usual(&self) -> f64 {
         let [factor, offset, noise] = USUAL;
@@ -56,15 +56,4 @@ impl Candidate {
         let own = (self.factor.ln() / factor).powi(2) + ((self.noise / USUAL_NOISE).ln() / noise).powi(2);
         -0.5 * (own + late)
     }
-}
-
-/// The approaches that were recorded: the condition of the probability of a touch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kept {
-    /// Every approach.
-    All,
-    /// Approaches with a contact.
-    Contacts,
-    /// Full touches.
-    Full,
 }

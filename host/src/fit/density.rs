@@ -9,12 +9,13 @@
 //! faces (κ = 0 except for noise) and the farthest edges. Tables are made for steps of σ as they are needed, and read with
 //! interpolation; what a candidate probe does to times (factor, offsets) is undone before a table is read.
 
-use super::candidate::{Candidate, Kept, NOISE};
+use super::candidate::{Hypothesis, NOISE};
 use super::late::Late;
 use super::line::{Axis, LEVELS, Line, RATIO, deviation_of};
 use super::observed::{FULL, OUTER, Observed, mirrored};
 use crate::random::{self, Purpose};
 use palpate_shared::Touch;
+use palpate_shared::format::Counted;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
@@ -140,9 +141,9 @@ impl Densities {
     }
 
     /// Touches as a candidate probe would record them, made of some of the simulated ones.
-    pub(super) fn redrawn(&self, candidate: &Candidate, kept: Kept) -> Vec<Observed> {
+    pub(super) fn redrawn(&self, candidate: &Hypothesis, kept: Counted) -> Vec<Observed> {
         let mut random = random::generator(1, Purpose::Fit, &self.name, 0);
-        let Candidate { factor, late, noise, missed } = *candidate;
+        let Hypothesis { factor, late, noise, missed } = *candidate;
         let again = |times: &[Option<f64>; 3]| {
             let times: [Option<f64>; 3] = std::array::from_fn(|finger| {
                 let (chance, normal): (f64, f64) = (random.random(), StandardNormal.sample(&mut random));
@@ -154,9 +155,9 @@ impl Densities {
             Observed::of_times(times.map(|time| time.filter(|time| *time <= end)))
         };
         let is_kept = |observed: &Observed| match kept {
-            Kept::All => true,
-            Kept::Contacts => observed.fingers != 0,
-            Kept::Full => observed.fingers == FULL,
+            Counted::All => true,
+            Counted::Contacts => observed.fingers != 0,
+            Counted::Full => observed.fingers == FULL,
         };
         self.some.iter().map(again).filter(is_kept).collect()
     }

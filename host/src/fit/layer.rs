@@ -4,7 +4,7 @@
 //! the same approaches with the same random numbers, so that candidates differ by nothing else. There are fewer of them than
 //! of the approaches that the rest of the fit uses.
 
-use super::candidate::{Candidate, NUMBERS};
+use super::candidate::{Hypothesis, NUMBERS};
 use super::density::Densities;
 use super::likelihood::Plate;
 use super::recording::Recording;
@@ -104,13 +104,13 @@ pub(super) struct Layer {
     /// The ends of the intervals; none where nothing bends.
     pub(super) ends: Option<[Noise; 2]>,
     /// The probe that explains the recordings best with them; none if nothing was searched.
-    pub(super) candidate: Option<Candidate>,
+    pub(super) candidate: Option<Hypothesis>,
     /// Widths that their uncertainty adds to the intervals of the probe's numbers: half widths, on the scale of a search.
     pub(super) adds: [f64; NUMBERS],
 }
 
 /// A search for the best probe near another one.
-type Climb = fn(search::Likelihood<'_>, &Candidate) -> Best;
+type Climb = fn(search::Likelihood<'_>, &Hypothesis) -> Best;
 
 /// Angle and bend as numbers of about the same scale.
 type Numbers = [f64; LAYER];
@@ -161,11 +161,11 @@ impl Layers<'_> {
     }
 
     /// The best probe with these numbers, near another one, by a quick climb or an exact one.
-    fn explained(&self, numbers: Numbers, from: &Candidate, climb: Climb) -> Result<Best> {
+    fn explained(&self, numbers: Numbers, from: &Hypothesis, climb: Climb) -> Result<Best> {
         progress::check(self.progress)?;
         let densities = self.densities(&real_of(numbers));
         let evidence = self.evidence(&densities);
-        Ok(climb(&|candidate: &Candidate| evidence.log_likelihood(candidate, |_| true), from))
+        Ok(climb(&|candidate: &Hypothesis| evidence.log_likelihood(candidate, |_| true), from))
     }
 
     /// Compass search: a step to either side of each number, and half of it where none is better.
@@ -248,7 +248,7 @@ pub(super) fn layer(
     let plain = {
         let densities = layers.densities(&Noise::default());
         let evidence = layers.evidence(&densities);
-        search::best(&|candidate: &Candidate| evidence.log_likelihood(candidate, |_| true), None)
+        search::best(&|candidate: &Hypothesis| evidence.log_likelihood(candidate, |_| true), None)
     };
     let (numbers, best) = layers.best(&plain)?;
     let gain = best.log_likelihood - plain.log_likelihood;

@@ -1,8 +1,9 @@
 //! Likelihood of recorded touches under a candidate probe.
 
-use super::candidate::{Candidate, Kept, NOISE};
+use super::candidate::{Hypothesis, NOISE};
 use super::density::Densities;
 use super::observed::{FULL, OUTER, Observed};
+use palpate_shared::format::Counted;
 use std::f64::consts::TAU;
 
 /// The share of touches that come from nowhere: so that one odd touch cannot decide a fit.
@@ -12,14 +13,14 @@ const ODD_SPREAD: f64 = 150.0;
 
 /// Likelihood of one object's touches under a candidate.
 pub(super) struct Explained<'a> {
-    candidate: Candidate,
+    candidate: Hypothesis,
     smoothed: super::density::Smoothed<'a>,
     shares: [f64; 8],
     /// The stroke: the recorded one as a time, and its effect on the simulated approaches.
     stroke: Option<Stroke>,
     /// The logarithm of the share of approaches that were recorded.
     recorded: f64,
-    kept: Kept,
+    kept: Counted,
     /// [`product`] of each two sets of fingers.
     products: [[f64; 8]; 8],
 }
@@ -34,7 +35,7 @@ struct Stroke {
 }
 
 impl<'a> Explained<'a> {
-    pub(super) fn new(candidate: &Candidate, object: &'a Densities, kept: Kept) -> Self {
+    pub(super) fn new(candidate: &Hypothesis, object: &'a Densities, kept: Counted) -> Self {
         let late = object.late.as_ref();
         let stroke =
             late.map(|late| Stroke { window: late.window(), shares: late.shares(late.window() / candidate.factor) });
@@ -45,8 +46,8 @@ impl<'a> Explained<'a> {
         let products: [[f64; 8]; 8] = std::array::from_fn(|touched| set(touched as u8));
         let nothing: f64 = (0..8).map(|fingers| touched(fingers) * products[usize::from(fingers)][0]).sum();
         let recorded = match kept {
-            Kept::All | Kept::Full => 0.0,
-            Kept::Contacts => (1.0 - nothing).max(1e-9).ln(),
+            Counted::All | Counted::Full => 0.0,
+            Counted::Contacts => (1.0 - nothing).max(1e-9).ln(),
         };
         Self {
             candidate: *candidate,
@@ -64,11 +65,11 @@ impl<'a> Explained<'a> {
         self.products[usize::from(touched & FULL)][usize::from(recorded & FULL)]
     }
 
-    pub(super) fn candidate(&self) -> &Candidate {
+    pub(super) fn candidate(&self) -> &Hypothesis {
         &self.candidate
     }
 
-    pub(super) fn kept(&self) -> Kept {
+    pub(super) fn kept(&self) -> Counted {
         self.kept
     }
 
@@ -84,7 +85,7 @@ impl<'a> Explained<'a> {
 
     /// The logarithm of the density of a touch in any pose.
     pub(super) fn log_density(&self, observed: &Observed) -> f64 {
-        let Candidate { factor, late: [first, middle, third], .. } = self.candidate;
+        let Hypothesis { factor, late: [first, middle, third], .. } = self.candidate;
         let Observed { fingers, first: x, second: y } = *observed;
         let (times, odd) = match fingers {
             FULL => {
@@ -98,7 +99,7 @@ impl<'a> Explained<'a> {
             _ => ([1.0; 2], 1.0),
         };
         let full = usize::from(FULL);
-        if self.kept == Kept::Full {
+        if self.kept == Counted::Full {
             let within = self.stroke.map_or(1.0, |stroke| stroke.shares[full] / self.shares[full].max(1e-9));
             return (times[1] / within.max(1e-9) * (1.0 - ODD) + ODD * odd).ln();
         }
@@ -178,7 +179,7 @@ impl Plate {
     }
 
     /// Their log-likelihood, at the slope of the plate and the noise that suit them best.
-    pub(super) fn log_likelihood(&self, candidate: &Candidate) -> f64 {
+    pub(super) fn log_likelihood(&self, candidate: &Hypothesis) -> f64 {
         let [first, middle, third] = candidate.late;
         let [curvature, slope] = [first - 2.0 * middle + third, third - first];
         let count = self.presses.len().max(1) as f64;

@@ -72,12 +72,13 @@ use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, ObjectTouches, Origin};
-use candidate::{Candidate, Kept};
+use candidate::Hypothesis;
 use density::Densities;
 use layer::Layer;
 use likelihood::{Explained, Plate};
 use observed::{FULL, Observed};
 use palpate_shared::Touch;
+use palpate_shared::format::Counted;
 use rayon::prelude::*;
 use recording::Recording;
 use search::Best;
@@ -119,7 +120,7 @@ struct Evidence<'a> {
 
 impl Evidence<'_> {
     /// The logarithm of the likelihood of the recordings `which` asks for, and of the plate, with how usual the candidate is.
-    fn log_likelihood(&self, candidate: &Candidate, which: impl Fn(usize) -> bool + Sync) -> f64 {
+    fn log_likelihood(&self, candidate: &Hypothesis, which: impl Fn(usize) -> bool + Sync) -> f64 {
         let of = |index: usize| {
             let recording = &self.recordings[index];
             let explained = Explained::new(candidate, &self.objects[self.of[index]], recording.kept);
@@ -235,12 +236,12 @@ fn place<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Result
 
 /// The approaches that were recorded, as far as the touches say: every one if some touched nothing, only full touches
 /// if there are no others.
-fn kept(recorded: &Dataset) -> Kept {
+fn kept(recorded: &Dataset) -> Counted {
     let any = |is: fn(&Touch) -> bool| recorded.touches().any(is);
     match (any(Touch::is_empty), any(|touch| !touch.is_full())) {
-        (true, _) => Kept::All,
-        (false, true) => Kept::Contacts,
-        (false, false) => Kept::Full,
+        (true, _) => Counted::All,
+        (false, true) => Counted::Contacts,
+        (false, false) => Counted::Full,
     }
 }
 
@@ -281,10 +282,10 @@ impl Simulated {
 /// The best candidate, and its intervals, number by number.
 fn searched(
     evidence: &Evidence<'_>,
-    near: Option<Candidate>,
+    near: Option<Hypothesis>,
     progress: &dyn Progress,
 ) -> Result<(Best, Vec<search::Ends>)> {
-    let likelihood = |candidate: &Candidate| match progress.is_cancelled() {
+    let likelihood = |candidate: &Hypothesis| match progress.is_cancelled() {
         // As bad as can be, and so soon over.
         true => f64::NEG_INFINITY,
         false => evidence.log_likelihood(candidate, |_| true),

@@ -1,6 +1,6 @@
 //! Results of a fit, and the probe file that states it.
 
-use super::candidate::{Candidate, Kept};
+use super::candidate::Hypothesis;
 use super::layer::{Layer, MOST_ANGLE};
 use super::search::{Best, Ends};
 use super::suspects::Suspect;
@@ -10,6 +10,7 @@ use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::hand;
 use crate::probe::noise::{Grazing, Noise};
 use crate::touches::Surroundings;
+use palpate_shared::format::Counted;
 use palpate_shared::format::Length;
 use serde::Serialize;
 use std::fmt::{self, Write as _};
@@ -101,7 +102,7 @@ pub(super) fn outcome(
         Timer::Fine | Timer::Unknown => None,
     };
     // The ends of the interval of a number, or of what falls where the number rises.
-    let estimate = |number: usize, falls: bool, of: &dyn Fn(&Candidate) -> f64| {
+    let estimate = |number: usize, falls: bool, of: &dyn Fn(&Hypothesis) -> f64| {
         let at = |end: usize| ends.get(number).and_then(|ends| ends.ends[end].as_ref()).map(of);
         let (value, [low, high]) = (of(&best.candidate), if falls { [at(1), at(0)] } else { [at(0), at(1)] });
         // An end that falls short of the value, by rounding, is the value.
@@ -109,10 +110,10 @@ pub(super) fn outcome(
     };
     // A time rounded down to ticks of a clock with any phase has the variance of a uniform number.
     let ticks = resolution.unwrap_or(0.0) / 12.0_f64.sqrt();
-    let noise = |candidate: &Candidate| (candidate.noise.powi(2) - ticks.powi(2)).max(0.0).sqrt();
-    let only_full = evidence.plate.is_none() && evidence.recordings.iter().all(|own| own.kept == Kept::Full);
+    let noise = |candidate: &Hypothesis| (candidate.noise.powi(2) - ticks.powi(2)).max(0.0).sqrt();
+    let only_full = evidence.plate.is_none() && evidence.recordings.iter().all(|own| own.kept == Counted::Full);
     let missed =
-        [0, 1, 2].map(|finger: usize| estimate(4 + finger, false, &|candidate: &Candidate| candidate.missed[finger]));
+        [0, 1, 2].map(|finger: usize| estimate(4 + finger, false, &|candidate: &Hypothesis| candidate.missed[finger]));
     let stroke = evidence.stroke.estimated;
     let written = |length: f64| (1e4 * length).round() / 1e4;
     let probe = Probe {
@@ -128,8 +129,8 @@ pub(super) fn outcome(
     Fit {
         probe,
         unit: settings.origin.unit,
-        speed_factor: estimate(0, true, &|candidate: &Candidate| 1.0 / candidate.factor),
-        late: [1, 2].map(|finger: usize| estimate(finger, false, &|candidate: &Candidate| candidate.late[finger])),
+        speed_factor: estimate(0, true, &|candidate: &Hypothesis| 1.0 / candidate.factor),
+        late: [1, 2].map(|finger: usize| estimate(finger, false, &|candidate: &Hypothesis| candidate.late[finger])),
         noise: estimate(3, false, &noise),
         missed: (!only_full).then_some(missed),
         stroke,

@@ -5,7 +5,7 @@
 //! so a share of the density stays that of all poses.
 
 use super::Settings;
-use super::candidate::{Candidate, Kept};
+use super::candidate::Hypothesis;
 use super::likelihood::{Explained, product};
 use super::observed::{FULL, Observed};
 use super::touched::Touched;
@@ -14,6 +14,7 @@ use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::random::{self, Purpose};
 use glam::{DMat3, DVec3};
+use palpate_shared::format::Counted;
 use palpate_shared::{Pose, Q15_ONE, Touch};
 use rand::{Rng, RngExt};
 use rayon::prelude::*;
@@ -159,12 +160,12 @@ pub(super) fn log_density(explained: &Explained<'_>, observed: &Observed, in_pos
 
 /// The density among the approaches in its pose; none if they all say nothing.
 fn density(explained: &Explained<'_>, observed: &Observed, InPose(approaches): &InPose) -> Option<f64> {
-    let (Candidate { factor, late, noise, missed }, kept) = (explained.candidate(), explained.kept());
+    let (Hypothesis { factor, late, noise, missed }, kept) = (explained.candidate(), explained.kept());
     let (mut sum, mut weights) = (0.0, 0.0);
     for Simulated { touched, times, gap } in approaches {
         let seen = |finger: usize| factor * f64::from(times[finger]) + late[finger];
         let weight = match (kept, explained.window()) {
-            (Kept::Full, _) => f64::from(u8::from(*touched == FULL)),
+            (Counted::Full, _) => f64::from(u8::from(*touched == FULL)),
             (_, None) => explained.product(*touched, observed.fingers),
             // A contact that is late, by what is known of its time, is missing.
             (_, Some(window)) => {
@@ -174,13 +175,13 @@ fn density(explained: &Explained<'_>, observed: &Observed, InPose(approaches): &
             }
         };
         weights += match (kept, explained.window()) {
-            (Kept::Full, Some(window)) => {
+            (Counted::Full, Some(window)) => {
                 let times = [seen(0), seen(1), seen(2)];
                 let [first, last] =
                     [times.iter().copied().fold(f64::INFINITY, f64::min), times.into_iter().fold(0.0, f64::max)];
                 weight * (1.0 - late_share(last - first, window, *noise))
             }
-            (Kept::Full, None) => weight,
+            (Counted::Full, None) => weight,
             _ => 1.0,
         };
         if touched & observed.fingers != observed.fingers || weight <= 0.0 {

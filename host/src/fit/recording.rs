@@ -1,10 +1,10 @@
 //! Recorded touches of one object, and how likely they are.
 
-use super::candidate::Kept;
 use super::likelihood::Explained;
 use super::observed::Observed;
 use super::posed::{self, InPose};
 use palpate_shared::Touch;
+use palpate_shared::format::Counted;
 
 /// Recorded touches of one object.
 #[derive(Debug)]
@@ -13,14 +13,14 @@ pub(super) struct Recording<'a> {
     pub(super) touches: Vec<Observed>,
     /// Simulated approaches in the pose of each touch; empty if no touch has one.
     pub(super) in_poses: Vec<Option<InPose>>,
-    pub(super) kept: Kept,
+    pub(super) kept: Counted,
     /// True if it may be of several placements: its touches are then not alike, but of one placement after the other.
     pub(super) is_mixed: bool,
 }
 
 impl<'a> Recording<'a> {
     /// The recording without its poses.
-    pub(super) fn without_poses(name: &'a str, touches: &[Touch], kept: Kept) -> Self {
+    pub(super) fn without_poses(name: &'a str, touches: &[Touch], kept: Counted) -> Self {
         Self { name, touches: touches.iter().map(Observed::of).collect(), in_poses: Vec::new(), kept, is_mixed: false }
     }
 

@@ -65,7 +65,7 @@ impl Bench {
             plate: plate.map(|touches| Plate::new(touches.iter().map(Observed::of))),
             stroke: Stroke::default(),
         };
-        let best = search::best(&|candidate: &Candidate| evidence.log_likelihood(candidate, |_| true), None);
+        let best = search::best(&|candidate: &Hypothesis| evidence.log_likelihood(candidate, |_| true), None);
         let suspects = suspects::suspects(&evidence, &best, &()).unwrap();
         let densities = |(own, object): (&ObjectTouches, usize)| {
             let explained = Explained::new(&best.candidate, &self.densities[object], kept);
@@ -107,7 +107,7 @@ fn honest_recordings_of_compliant_robots_are_not_refused_and_a_plate_makes_no_fi
             let (count, gain) = (gains.len() as f64, gains.iter().sum::<f64>());
             let error = (gains.iter().map(|own| (own - gain / count).powi(2)).sum::<f64>()).sqrt();
             for (name, (best, suspects, held)) in [("without", &without), ("with", &with)] {
-                let Candidate { factor, late, noise, .. } = best.candidate;
+                let Hypothesis { factor, late, noise, .. } = best.candidate;
                 let held = held.iter().sum::<f64>();
                 println!(
                     "robot-{robot}, set {set}, poses {has_poses}, {name} a plate: held-out {held:.1}, speed {:.3}, late {late:.2?}, \

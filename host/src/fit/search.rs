@@ -1,16 +1,16 @@
 //! The candidate that explains recorded touches best, and how far from it one still may be.
 
-use super::candidate::{Candidate, NUMBERS};
+use super::candidate::{Hypothesis, NUMBERS};
 use argmin::core::{CostFunction, Executor, State};
 use argmin::solver::neldermead::NelderMead;
 
 /// Objective of the search: the logarithm of the likelihood of a candidate.
-pub(super) type Likelihood<'a> = &'a (dyn Fn(&Candidate) -> f64 + Sync);
+pub(super) type Likelihood<'a> = &'a (dyn Fn(&Hypothesis) -> f64 + Sync);
 
 /// A candidate, and the logarithm of its likelihood.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Best {
-    pub(super) candidate: Candidate,
+    pub(super) candidate: Hypothesis,
     pub(super) log_likelihood: f64,
 }
 
@@ -51,14 +51,14 @@ impl CostFunction for Cost<'_> {
     type Output = f64;
 
     fn cost(&self, free: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        Ok(-(self.likelihood)(&Candidate::of(&self.numbers(free))))
+        Ok(-(self.likelihood)(&Hypothesis::of(&self.numbers(free))))
     }
 }
 
 /// Nelder–Mead from `start`, repeated from where it ended until that gains nothing; the number `fixed` keeps its value.
 fn climb(likelihood: Likelihood<'_>, start: [f64; NUMBERS], fixed: Option<usize>, size: f64) -> ([f64; NUMBERS], f64) {
     let fixed_number = fixed.map(|index| (index, start[index]));
-    let (mut best, mut value, mut size) = (start, likelihood(&Candidate::of(&start)), size);
+    let (mut best, mut value, mut size) = (start, likelihood(&Hypothesis::of(&start)), size);
     for _ in 0..6 {
         let cost = Cost { likelihood, fixed: fixed_number };
         let free = |numbers: &[f64; NUMBERS]| -> Vec<f64> {
@@ -77,7 +77,7 @@ fn climb(likelihood: Likelihood<'_>, start: [f64; NUMBERS], fixed: Option<usize>
         let Some(numbers) = found.state().get_best_param() else { break };
         let cost = Cost { likelihood, fixed: fixed_number };
         let numbers = cost.numbers(numbers);
-        let gained = likelihood(&Candidate::of(&numbers)) - value;
+        let gained = likelihood(&Hypothesis::of(&numbers)) - value;
         if gained > 0.0 {
             (best, value) = (numbers, value + gained);
         }
@@ -90,19 +90,19 @@ fn climb(likelihood: Likelihood<'_>, start: [f64; NUMBERS], fixed: Option<usize>
 }
 
 /// The best candidate near this one.
-pub(super) fn near(likelihood: Likelihood<'_>, start: &Candidate) -> Best {
+pub(super) fn near(likelihood: Likelihood<'_>, start: &Hypothesis) -> Best {
     let (numbers, log_likelihood) = climb(likelihood, start.numbers(), None, 0.7);
-    Best { candidate: Candidate::of(&numbers), log_likelihood }
+    Best { candidate: Hypothesis::of(&numbers), log_likelihood }
 }
 
 /// The best candidate, from the best points of a grid.
-pub(super) fn best(likelihood: Likelihood<'_>, more: Option<Candidate>) -> Best {
+pub(super) fn best(likelihood: Likelihood<'_>, more: Option<Hypothesis>) -> Best {
     let mut starts: Vec<([f64; NUMBERS], f64)> = Vec::new();
     for factor in [0.85, 0.93, 1.0, 1.08, 1.17] {
         for middle in [-6.0, -2.0, 2.0, 6.0] {
             for third in [-5.0, 0.0, 5.0] {
                 for noise in [1.5, 5.0] {
-                    let candidate = Candidate { factor, late: [0.0, middle, third], noise, missed: [0.01; 3] };
+                    let candidate = Hypothesis { factor, late: [0.0, middle, third], noise, missed: [0.01; 3] };
                     starts.push((candidate.numbers(), likelihood(&candidate)));
                 }
             }
@@ -113,14 +113,14 @@ pub(super) fn best(likelihood: Likelihood<'_>, more: Option<Candidate>) -> Best 
     starts.extend(more.map(|candidate| (candidate.numbers(), likelihood(&candidate))));
     let climbed = starts.into_iter().map(|(start, _)| climb(likelihood, start, None, 1.0));
     let (numbers, log_likelihood) = climbed.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(([0.0; NUMBERS], f64::NAN));
-    Best { candidate: Candidate::of(&numbers), log_likelihood }
+    Best { candidate: Hypothesis::of(&numbers), log_likelihood }
 }
 
 /// End of an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ends {
     /// The candidates at the lower and at the upper end; none where the likelihood does not say how far one may go.
-    pub(super) ends: [Option<Candidate>; 2],
+    pub(super) ends: [Option<Hypothesis>; 2],
     /// A better candidate than the best so far, if one was found on the way.
     pub(super) better: Option<Best>,
 }
@@ -137,7 +137,7 @@ impl Ends {
             if index >= 4 {
                 numbers[index] = numbers[index].max(0.0);
             }
-            *end = Candidate::of(&numbers);
+            *end = Hypothesis::of(&numbers);
         }
         self
     }
@@ -150,7 +150,7 @@ pub(super) fn interval(likelihood: Likelihood<'_>, best: &Best, index: usize) ->
     let center = best.candidate.numbers();
     let mut better: Option<Best> = None;
     let root = QUANTILE.sqrt();
-    let mut end = |sign: f64| -> Option<Candidate> {
+    let mut end = |sign: f64| -> Option<Hypothesis> {
         // A share of missed contacts cannot be below 0.
         let floor = (index >= 4 && sign < 0.0).then_some(0.0);
         let (mut step, mut from) = (0.3, center);
@@ -167,10 +167,10 @@ pub(super) fn interval(likelihood: Likelihood<'_>, best: &Best, index: usize) ->
             }
             let (numbers, value) = climb(likelihood, start, Some(index), 0.4);
             if value > best.log_likelihood + 0.05 {
-                better = Some(Best { candidate: Candidate::of(&numbers), log_likelihood: value });
+                better = Some(Best { candidate: Hypothesis::of(&numbers), log_likelihood: value });
             }
             let here = (2.0 * (best.log_likelihood - value)).max(0.0).sqrt();
-            candidate = Some(Candidate::of(&numbers));
+            candidate = Some(Hypothesis::of(&numbers));
             if (here - root).abs() < 0.08 || at_floor && here < root {
                 return candidate;
             }

@@ -2,7 +2,7 @@
 //!
 //! It stops at the nearest maximum. The probe itself is found by the slower search of [`search`](super::search).
 
-use super::candidate::{Candidate, NUMBERS};
+use super::candidate::{Hypothesis, NUMBERS};
 use super::search::{Best, Likelihood};
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
@@ -21,9 +21,9 @@ const LONGEST: f64 = 3.0;
 const SLOPE: f64 = 0.1;
 
 /// The best candidate near a start that is nearly the best.
-pub(super) fn again(likelihood: Likelihood<'_>, start: &Candidate) -> Best {
+pub(super) fn again(likelihood: Likelihood<'_>, start: &Hypothesis) -> Best {
     let (numbers, log_likelihood) = climb(likelihood, start.numbers().into());
-    Best { candidate: Candidate::of(&numbers.into()), log_likelihood }
+    Best { candidate: Hypothesis::of(&numbers.into()), log_likelihood }
 }
 
 /// The slope of the likelihood, by differences.
@@ -32,7 +32,7 @@ fn slope(likelihood: Likelihood<'_>, at: &Numbers) -> Numbers {
         let [low, high] = [-SLOPE, SLOPE].map(|way| {
             let mut there = *at;
             there[index] += way;
-            likelihood(&Candidate::of(&there.into()))
+            likelihood(&Hypothesis::of(&there.into()))
         });
         (high - low) / (2.0 * SLOPE)
     };
@@ -45,7 +45,7 @@ fn slope(likelihood: Likelihood<'_>, at: &Numbers) -> Numbers {
 /// Goldfarb and Shanno, with slopes by differences.
 fn climb(likelihood: Likelihood<'_>, start: Numbers) -> (Numbers, f64) {
     let unknown = 0.1 * Pairs::identity();
-    let value_at = |at: &Numbers| likelihood(&Candidate::of(&(*at).into()));
+    let value_at = |at: &Numbers| likelihood(&Hypothesis::of(&(*at).into()));
     let (mut at, mut value, mut inverse) = (start, value_at(&start), unknown);
     let mut rise = slope(likelihood, &at);
     let mut is_known = true;

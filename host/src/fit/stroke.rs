@@ -3,12 +3,13 @@
 //! If the simulated objects would be touched later and no recorded contact is, the hand had stopped at the latest contact or
 //! after it: by about the time of one more contact, at the rate of the simulated ones there.
 
+use super::FitProblem;
 use super::words::Estimate;
-use super::{FitProblem, Kept};
 use crate::error::Result;
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Touch;
+use palpate_shared::format::Counted;
 
 /// Contacts that must be expected behind the latest one. None of as many comes by chance with a probability of e⁻¹².
 const EXPECTED: f64 = 12.0;
@@ -35,7 +36,7 @@ pub(super) struct Stroke {
 pub(super) fn stroke(
     recorded: &Dataset,
     simulated: &[&[Touch]],
-    kept: Kept,
+    kept: Counted,
     probe: &Probe,
 ) -> Result<Stroke, FitProblem> {
     let stated = probe.window().map(f64::from);
@@ -55,9 +56,9 @@ pub(super) fn stroke(
     // Simulated contacts behind the latest recorded one, each with how often it would be expected among the recorded.
     let behind = |(own, simulated): (&ObjectTouches, &&[Touch])| -> Vec<(f64, f64)> {
         let is_kept = |touch: &&Touch| match kept {
-            Kept::All => true,
-            Kept::Contacts => !touch.is_empty(),
-            Kept::Full => touch.is_full(),
+            Counted::All => true,
+            Counted::Contacts => !touch.is_empty(),
+            Counted::Full => touch.is_full(),
         };
         let share = own.len() as f64 / simulated.iter().filter(is_kept).count().max(1) as f64;
         let later = simulated.iter().filter(is_kept).map(spread).filter(|micros| *micros > latest);

@@ -12,7 +12,7 @@
 //! can make it look wrong. The other thresholds ([`CERTAIN_PROBE`], [`UNLIKE`]) are by experience.
 
 use super::Evidence;
-use super::candidate::Candidate;
+use super::candidate::Hypothesis;
 use super::likelihood::Explained;
 use super::observed::Observed;
 use super::search::{self, Best};
@@ -139,14 +139,14 @@ impl Sound<'_> {
     }
 
     /// Log-likelihood of a candidate under all sound recordings but this one.
-    fn others(&self, candidate: &Candidate, index: usize) -> f64 {
+    fn others(&self, candidate: &Hypothesis, index: usize) -> f64 {
         self.evidence.log_likelihood(candidate, |other| other != index && self.is_sound[other])
     }
 
     /// Goes on without a recording.
     fn leave_out(&mut self, index: usize) {
         self.is_sound[index] = false;
-        let likelihood = |candidate: &Candidate| self.evidence.log_likelihood(candidate, |other| self.is_sound[other]);
+        let likelihood = |candidate: &Hypothesis| self.evidence.log_likelihood(candidate, |other| self.is_sound[other]);
         self.best = search::best(&likelihood, Some(self.best.candidate));
     }
 }
@@ -199,9 +199,9 @@ fn suspect(sound: &Sound<'_>, index: usize) -> Option<(Suspect, f64)> {
         return None;
     }
     let only = sound.is_only();
-    let others = |candidate: &Candidate| sound.others(candidate, index);
+    let others = |candidate: &Hypothesis| sound.others(candidate, index);
     let rest = if only { *best } else { search::near(&others, &best.candidate) };
-    let by = |candidate: &Candidate, object: usize| -> Vec<f64> {
+    let by = |candidate: &Hypothesis, object: usize| -> Vec<f64> {
         let explained = Explained::new(candidate, &evidence.objects[object], recording.kept);
         touches.iter().map(|touch| explained.log_density(touch)).collect()
     };
@@ -214,7 +214,7 @@ fn suspect(sound: &Sound<'_>, index: usize) -> Option<(Suspect, f64)> {
             if !only {
                 return (object, by(&rest.candidate, object));
             }
-            let likelihood = |candidate: &Candidate| {
+            let likelihood = |candidate: &Hypothesis| {
                 let explained = Explained::new(candidate, &evidence.objects[object], recording.kept);
                 explained.log_likelihood(touches) + candidate.usual()
             };
@@ -231,7 +231,7 @@ fn suspect(sound: &Sound<'_>, index: usize) -> Option<(Suspect, f64)> {
     // With few recordings the others may tell too little about the probe: the name is wrong only if all of them together
     // are likelier with the other one.
     let renamed = |other: usize| {
-        let likelihood = |candidate: &Candidate| {
+        let likelihood = |candidate: &Hypothesis| {
             let explained = Explained::new(candidate, &evidence.objects[other], recording.kept);
             others(candidate) + explained.log_likelihood(touches)
         };
@@ -330,9 +330,9 @@ fn changed(sound: &Sound<'_>, rest: &Best, index: usize) -> Option<(Suspect, f64
     let recording = &evidence.recordings[index];
     let (touches, name) = (&recording.touches, recording.name.to_owned());
     let explained =
-        |candidate: &Candidate| Explained::new(candidate, &evidence.objects[evidence.of[index]], recording.kept);
+        |candidate: &Hypothesis| Explained::new(candidate, &evidence.objects[evidence.of[index]], recording.kept);
     let fit = |part: &[Observed]| {
-        let likelihood = |candidate: &Candidate| explained(candidate).log_likelihood(part) + candidate.usual();
+        let likelihood = |candidate: &Hypothesis| explained(candidate).log_likelihood(part) + candidate.usual();
         search::near(&likelihood, &best.candidate)
     };
     let whole = fit(touches);
@@ -368,7 +368,7 @@ fn changed(sound: &Sound<'_>, rest: &Best, index: usize) -> Option<(Suspect, f64
 }
 
 /// Describes the change in words.
-fn difference(before: &Candidate, after: &Candidate) -> String {
+fn difference(before: &Hypothesis, after: &Hypothesis) -> String {
     let mut said = Vec::new();
     let mut say = |is_there: bool, text: String| said.extend(is_there.then_some(text));
     let [one, other] = [before, after].map(|probe| 1.0 / probe.factor);

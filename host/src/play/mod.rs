@@ -51,14 +51,14 @@ const MOST_DRAWN: u64 = 100_000;
 #[derive(Debug)]
 pub struct Game<'m> {
     origin: Origin,
-    objects: Vec<Thing>,
+    objects: Vec<Target>,
     models: Vec<Model<'m>>,
     noise: Noise,
 }
 
 /// An object to touch.
 #[derive(Debug)]
-struct Thing {
+struct Target {
     name: String,
     scene: Scene,
 }
@@ -109,7 +109,7 @@ impl<'m> Game<'m> {
     /// As [`Scene::new`], and as [`Probe::check`](crate::probe::Probe::check) for a probe that does not suit it.
     pub fn add_object(&mut self, name: &str, mesh: &Mesh, length: f64) -> Result<usize> {
         self.origin.probe.check(length)?;
-        self.objects.push(Thing { name: name.into(), scene: Scene::new(mesh, length)? });
+        self.objects.push(Target { name: name.into(), scene: Scene::new(mesh, length)? });
         Ok(self.objects.len() - 1)
     }
 
@@ -147,12 +147,12 @@ impl<'m> Game<'m> {
 
     /// An object's name.
     pub fn name(&self, object: usize) -> Option<&str> {
-        self.objects.get(object).map(|thing| thing.name.as_str())
+        self.objects.get(object).map(|target| target.name.as_str())
     }
 
     /// An object's surface.
     pub fn scene(&self, object: usize) -> Option<&Scene> {
-        self.objects.get(object).map(|thing| &thing.scene)
+        self.objects.get(object).map(|target| &target.scene)
     }
 
     /// Begins to touch an object; `None` if there is no such object. The seed determines all random numbers.
@@ -172,8 +172,8 @@ impl<'m> Game<'m> {
     /// # Panics
     /// If the round is one of another game, which has more objects.
     pub fn touch_at_random(&self, round: &mut Round<'m>) -> Approached {
-        let thing = &self.objects[round.object];
-        let approach = Sampler::new(&thing.scene, &thing.name, &round.origin).approach(&thing.scene, round.next);
+        let target = &self.objects[round.object];
+        let approach = Sampler::new(&target.scene, &target.name, &round.origin).approach(&target.scene, round.next);
         self.touch(round, approach)
     }
 
@@ -185,10 +185,10 @@ impl<'m> Game<'m> {
     pub fn touch_as_planned(&self, round: &mut Round<'m>, player: usize) -> Option<Approached> {
         let player = round.players.get(player)?;
         let (poses, proposal) = (player.recognizer.model().plan()?.poses(), player.proposal()?);
-        let thing = &self.objects[round.object];
-        let sampler = Sampler::new(&thing.scene, &thing.name, &round.origin);
+        let target = &self.objects[round.object];
+        let sampler = Sampler::new(&target.scene, &target.name, &round.origin);
         for sample in round.next..round.next.saturating_add(MOST_DRAWN) {
-            let approach = sampler.approach(&thing.scene, sample);
+            let approach = sampler.approach(&target.scene, sample);
             if poses.number_of(&approach.pose()) == proposal.pose {
                 round.next = sample;
                 return Some(self.touch(round, approach));
@@ -221,8 +221,8 @@ impl<'m> Game<'m> {
     }
 
     fn touch(&self, round: &mut Round<'m>, approach: Approach) -> Approached {
-        let (thing, probe) = (&self.objects[round.object], &self.origin.probe);
-        let way = approach.distances(&thing.scene, probe);
+        let (target, probe) = (&self.objects[round.object], &self.origin.probe);
+        let way = approach.distances(&target.scene, probe);
         let (distances, is_turned_back) = probe.within_travel(way);
         let window = probe.window();
         let whole = approach.touch(distances, probe);
@@ -230,7 +230,7 @@ impl<'m> Game<'m> {
         let exact = hand::within(&whole, window);
         // A seed for every approach: its noise does not depend on how many there were before.
         let seed = (round.origin.seed << 32).wrapping_add(round.next);
-        let noisy = if self.noise.is_none() { None } else { self.noise.add(&thing.name, &[exact], seed).pop() };
+        let noisy = if self.noise.is_none() { None } else { self.noise.add(&target.name, &[exact], seed).pop() };
         let touch = noisy.unwrap_or(exact);
         let [late, pushed] = [&whole, &touch].map(|touch| hand::late(touch, window));
         let unreached = std::array::from_fn(|finger| match way[finger] {

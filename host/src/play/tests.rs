@@ -17,7 +17,7 @@ fn model() -> Vec<u8> {
         objects: vec!["disc".into(), "globe".into()],
         base_margins: vec![0.0; 2],
         trees: vec![Tree { nodes, output: Output::Each }],
-        origin: ensemble::Origin::default(),
+        origin: ensemble::Provenance::default(),
     };
     compile(&ensemble, &compile::Settings::default()).unwrap().bytes
 }
@@ -134,7 +134,7 @@ fn what_cannot_be_played_with_is_refused() {
         objects: vec!["a".into(), "b".into()],
         base_margins: vec![0.0; 2],
         trees: vec![Tree { nodes: vec![Node::Leaf(vec![0.0, 0.5])], output: Output::Each }],
-        origin: ensemble::Origin::default(),
+        origin: ensemble::Provenance::default(),
     };
     let rows = compile(&rows, &compile::Settings::default()).unwrap().bytes;
     let error = Game::new(&Origin::default()).add_model(compile::open(&rows).unwrap()).unwrap_err();

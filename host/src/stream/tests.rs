@@ -4,7 +4,7 @@
 use super::*;
 use crate::calibrate::Per;
 use crate::compile::{self, Settings as Compilation, compile};
-use crate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
+use crate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
 use crate::error::CalibrateProblem;
 use crate::evaluate::Finding;
 use crate::random::{Purpose, generator};
@@ -43,7 +43,7 @@ fn ensemble() -> Ensemble {
         objects: ["a", "b", "c"].map(String::from).to_vec(),
         base_margins: vec![0.0; CLASSES],
         trees: vec![Tree { nodes, output: Output::Each }],
-        origin: Origin::default(),
+        origin: Provenance::default(),
     }
 }
 

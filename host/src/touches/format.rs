@@ -36,7 +36,7 @@ impl Format {
     }
 
     /// True if this build can read and write the format.
-    pub fn is_built_in(self) -> bool {
+    pub(crate) fn is_built_in(self) -> bool {
         self != Self::Parquet || cfg!(feature = "parquet")
     }
 

@@ -1,6 +1,6 @@
 //! Touches out of a robot's log, which is an MCAP file: `docs/reference/mcap.md` says what belongs in it.
 
-use super::logged::{Channels, LoggedVerdict, Message, Said};
+use super::logged::{Channels, Content, LoggedVerdict, Message};
 use super::{ObjectTouches, Source, Warning, mcap, text};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
@@ -82,8 +82,8 @@ impl Log {
     /// As [`read`](Self::read).
     pub fn of(bytes: impl Read, path: &Path) -> Result<Self> {
         let (mut touches, mut objects, mut numbers, mut size) = (Vec::new(), Vec::new(), HashMap::new(), 0);
-        let channels = mcap::read(bytes, path, |Message { time, offset, said }| {
-            let Said::Touch(touch, object) = said else { return Ok(()) };
+        let channels = mcap::read(bytes, path, |Message { time, offset, content }| {
+            let Content::Touch(touch, object) = content else { return Ok(()) };
             let wrong = |problem| Err(Error::at(Place::byte(path, offset), problem));
             if touches.len() == MOST {
                 return wrong(TouchesProblem::TooMany { most: MOST });

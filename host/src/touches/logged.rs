@@ -21,12 +21,12 @@ pub struct Message {
     /// The byte at which the message, or the chunk with it, begins.
     pub offset: u64,
     /// Its contents.
-    pub said: Said,
+    pub content: Content,
 }
 
 /// Contents of a message of a log.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Said {
+pub enum Content {
     /// A touch, and its object if that is known.
     Touch(Touch, Option<String>),
     /// A verdict.

@@ -129,7 +129,7 @@ impl ObjectTouches {
     }
 
     /// Touches of one source after the other: of each as many as are stated, of the last one all the rest.
-    pub fn in_runs(name: impl Into<String>, touches: Vec<Touch>, runs: Vec<(Source, u64)>) -> Self {
+    pub(crate) fn in_runs(name: impl Into<String>, touches: Vec<Touch>, runs: Vec<(Source, u64)>) -> Self {
         let last = runs.len().saturating_sub(1);
         let mut source_of = Vec::new();
         for (position, (_, count)) in (0_u32..).zip(&runs) {
@@ -228,13 +228,13 @@ impl ObjectTouches {
 
     /// These touches, with the meshes that were touched.
     #[must_use]
-    pub fn of_meshes(self, meshes: Option<Meshes>) -> Self {
+    pub(crate) fn of_meshes(self, meshes: Option<Meshes>) -> Self {
         Self { meshes, ..self }
     }
 
     /// These touches as of a probe with this stroke, a time in microseconds ([`Probe::window`](crate::probe::Probe::window)).
     #[must_use]
-    pub fn of_stroke(self, window: Option<u32>) -> Self {
+    pub(crate) fn of_stroke(self, window: Option<u32>) -> Self {
         Self { window, ..self }
     }
 
@@ -278,13 +278,13 @@ impl ObjectTouches {
 
     /// The placement of a source among [`sources`](Self::sources), by name; none if it is of none, or a recording that states
     /// none.
-    pub fn placement_of_source(&self, source: usize) -> Option<&str> {
+    pub(crate) fn placement_of_source(&self, source: usize) -> Option<&str> {
         self.sources.get(source)?.placement()
     }
 
     /// The share that each source has of the object: of placements their weights, each instance counting the same; equal shares
     /// of the placements that recordings state, and of other sources. They sum to 1.
-    pub fn source_weights(&self) -> Vec<f64> {
+    pub(crate) fn source_weights(&self) -> Vec<f64> {
         let like = |source: &Source| self.sources.iter().filter(|own| own.placement() == source.placement()).count();
         let weight = |source: &Source| match source {
             Source::Placement { millionths, .. } => f64::from(*millionths),
@@ -316,7 +316,7 @@ impl ObjectTouches {
 
     /// The touches of each placement as an object of its own, called `object/placement`, in the order of these names; the object
     /// itself without placements.
-    pub fn by_placement(&self) -> Vec<Self> {
+    pub(crate) fn by_placement(&self) -> Vec<Self> {
         let Some(mut weights) = self.placement_weights() else { return vec![self.clone()] };
         weights.sort_by(|a, b| a.0.cmp(&b.0));
         let of = |(placement, _): (String, f64)| {
@@ -340,7 +340,7 @@ impl ObjectTouches {
     /// These touches, with a number of each placement in proportion to its weight: as an object that is put down at random is
     /// touched. All of them without placements, and for recordings, whose shares are those of the robot.
     #[must_use]
-    pub fn as_often_as_placed(&self) -> Self {
+    pub(crate) fn as_often_as_placed(&self) -> Self {
         let is_recorded = self.sources.iter().any(|source| matches!(source, Source::Recording(_)));
         if is_recorded || self.placement_weights().is_none() {
             return self.clone();
@@ -358,7 +358,7 @@ impl ObjectTouches {
     }
 
     /// For each source its touches' positions, ascending.
-    pub fn by_source(&self) -> Vec<Vec<usize>> {
+    pub(crate) fn by_source(&self) -> Vec<Vec<usize>> {
         let mut by_source = vec![Vec::new(); self.sources.len()];
         (0..self.len()).for_each(|touch| by_source[self.source_of(touch)].push(touch));
         by_source
@@ -389,7 +389,7 @@ impl ObjectTouches {
     }
 
     /// True if every sequence must be of one robot's touches, since robots differ.
-    pub fn has_robots(&self) -> bool {
+    pub(crate) fn has_robots(&self) -> bool {
         !self.robot_of.is_empty()
     }
 
@@ -418,7 +418,7 @@ impl ObjectTouches {
 
     /// The touches that `keep` says.
     #[must_use]
-    pub fn filtered(&self, keep: impl Fn(&Touch) -> bool) -> Self {
+    pub(crate) fn filtered(&self, keep: impl Fn(&Touch) -> bool) -> Self {
         self.select((0..self.len()).filter(|&touch| keep(&self.touches[touch])))
     }
 
@@ -454,10 +454,10 @@ impl ObjectTouches {
                 robot as u32
             }));
         }
-        let robot =
-            |touch: u64| usize::try_from(touch).ok().and_then(|touch| robot_of.get(touch)).copied().unwrap_or(0);
-        let touches = noise.add_by(&self.name, &self.touches, seed, |touch| robot(touch).into());
-        Self { touches: self.within_stroke(touches), robot_of, ..self.clone() }
+        let stream = noise.stream(&self.name, self.len(), seed);
+        let robot = |touch: usize| robot_of.get(touch).copied().unwrap_or(0).into();
+        let noisy = self.touches.iter().enumerate().map(|(index, touch)| stream.add(touch, index, robot(index)));
+        Self { touches: self.within_stroke(noisy.collect()), robot_of, ..self.clone() }
     }
 }
 

@@ -8,7 +8,7 @@ use palpate::error::{Error, Place, Problem, TouchesProblem};
 use palpate::touches::check::Check;
 use palpate::touches::mcap::{self, TOUCH, VERDICT, Writer};
 use palpate::touches::{
-    Dataset, Log, LoggedVerdict, Message, Said, is_log, parse_touch, read_touches, touch_of_seconds,
+    Content, Dataset, Log, LoggedVerdict, Message, is_log, parse_touch, read_touches, touch_of_seconds,
 };
 use palpate_shared::Touch;
 use std::io::Cursor;
@@ -83,7 +83,7 @@ fn verdicts_of_a_robot_are_read_too() {
     let mut verdicts = Vec::new();
     let bytes = std::fs::read(python("ros2.mcap")).unwrap();
     mcap::read(bytes.as_slice(), Path::new("ros2.mcap"), |message| {
-        if let Message { said: Said::Verdict(verdict), .. } = message {
+        if let Message { content: Content::Verdict(verdict), .. } = message {
             verdicts.push(verdict);
         }
         Ok(())
@@ -424,20 +424,20 @@ fn what_is_written_is_read_back_and_the_same_to_the_byte_each_time() {
     let (mut said, mut times) = (Vec::new(), Vec::new());
     let channels = mcap::read(bytes.as_slice(), Path::new("robot.mcap"), |message| {
         times.push(message.time);
-        said.push(message.said);
+        said.push(message.content);
         Ok(())
     });
     assert!(times.is_sorted_by(|a, b| a < b), "{times:?}");
     assert_eq!((times[0], times[1]), (1_000_000_000, 1_000_001_000));
     assert_eq!(channels.unwrap().others.len(), 0);
-    let expected: Vec<Said> = expected(true)
+    let expected: Vec<Content> = expected(true)
         .into_iter()
         .take(10)
         .zip(0..)
         .flat_map(|((touch, name), i)| {
             let mut verdict = verdict(i);
             verdict.posteriors.sort_by(|a, b| a.0.cmp(&b.0));
-            [Said::Touch(touch, (i % 2 == 0).then(|| name.into())), Said::Verdict(verdict)]
+            [Content::Touch(touch, (i % 2 == 0).then(|| name.into())), Content::Verdict(verdict)]
         })
         .collect();
     assert_eq!(said, expected);

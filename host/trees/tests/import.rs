@@ -3,7 +3,7 @@
 use palpate_trees::compile::code::Form;
 use palpate_trees::compile::{self, Core, Goal, Instructions, Layout, Leaf, Settings};
 use palpate_trees::ensemble::import::{Options, read};
-use palpate_trees::ensemble::{Ensemble, Inputs, Node, Origin, Output, Schema, Tree};
+use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Schema, Tree};
 use palpate_trees::prove::{check, prove};
 use palpate_trees::rows::{Features, Rows, columns_of, read_margins, read_values, scales};
 use palpate_trees::shared::Descriptor;
@@ -710,7 +710,7 @@ fn trees_of_one_split_whose_thresholds_fall_together_in_whole_units_are_proved()
         objects: vec!["value".into()],
         base_margins: vec![0.0],
         trees: stumps.collect(),
-        origin: Origin::default(),
+        origin: Provenance::default(),
     };
     for scales in [None, Some(vec![10.0])] {
         let settings = Settings { layout: Some(Layout::Complete), scales, ..Settings::default() };
@@ -754,7 +754,7 @@ fn trained() -> Ensemble {
         planes: &[],
         is_tabled: false,
     };
-    Ensemble { inputs: schema.into(), objects, base_margins, trees, origin: Origin::default() }
+    Ensemble { inputs: schema.into(), objects, base_margins, trees, origin: Provenance::default() }
 }
 
 /// The candidate that a goal is for.

@@ -7,7 +7,7 @@ pub const MAGIC: [u8; 4] = *b"PLPT";
 /// The newest version of the format, with optional sections; this crate reads all versions up to it.
 pub const VERSION: u16 = 2;
 /// The version without optional sections, which is what a model without any is still written as.
-pub const VERSION_WITHOUT_SECTIONS: u16 = 1;
+pub(crate) const VERSION_WITHOUT_SECTIONS: u16 = 1;
 
 /// The header's bytes, at any address; every field is read from its place when asked for.
 ///

@@ -23,7 +23,7 @@ pub use crate::checksum::checksum;
 pub use codes::{Counted, Held, Key, Layout, LeafType, Length, Per, RAW_FEATURES};
 pub use early::EarlyExit;
 pub use evidence::{RowEvidence, Shifts, Weights};
-pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION, VERSION_WITHOUT_SECTIONS};
+pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION};
 pub use key::f32_key;
 pub use leaves::SharedLeaves;
 pub use outputs::Outputs;

@@ -104,9 +104,9 @@ impl Promise {
     /// Bytes of the section at least.
     pub const LENGTH: usize = 48;
     /// Bytes of the section with all noise.
-    pub const FULL_LENGTH: usize = 84;
+    pub(crate) const FULL_LENGTH: usize = 84;
     /// Bytes of the section with all noise, in which every finger misses another share of its contacts.
-    pub const FINGERS_LENGTH: usize = 92;
+    pub(crate) const FINGERS_LENGTH: usize = 92;
 
     /// Bytes of the section with this noise: one of the three lengths.
     pub fn length(noise: &PromisedNoise) -> usize {

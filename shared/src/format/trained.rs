@@ -110,16 +110,16 @@ pub struct TrainedProbe {
 
 impl TrainedProbe {
     /// The largest cone: directions from the upper half sphere.
-    pub const LARGEST_CONE: u16 = 9_000;
+    pub(crate) const LARGEST_CONE: u16 = 9_000;
 
     /// Bytes of the section without stroke and travel: the least that it has.
     pub const LENGTH: usize = 16;
 
     /// Bytes of the section with them.
-    pub const WITH_HAND: usize = 24;
+    pub(crate) const WITH_HAND: usize = 24;
 
     /// Bytes of the section with them and the tolerance of the stroke: the most that it has.
-    pub const WITH_TOLERANCE: usize = 28;
+    pub(crate) const WITH_TOLERANCE: usize = 28;
 
     /// The section's content: of these bytes the first [`length`](Self::length).
     pub fn to_bytes(self) -> [u8; Self::WITH_TOLERANCE] {

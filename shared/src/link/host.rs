@@ -251,7 +251,7 @@ impl HostEnd {
     }
 
     /// True if [`HostEnd::ask`] would take a question.
-    pub const fn can_ask(&self) -> bool {
+    pub(crate) const fn can_ask(&self) -> bool {
         matches!(self.phase, Phase::Open) && self.question.is_none()
     }
 

@@ -19,6 +19,7 @@ pub(crate) fn run(arguments: Arguments, _: &Global) -> Result<()> {
     let mut cli = super::cli();
     clap_complete::generate(arguments.shell, &mut cli, "palpate", &mut script);
     let script = String::from_utf8_lossy(&script);
+    let script = super::keys::completed(&script, arguments.shell);
     if arguments.shell != Shell::Fish {
         return print(&script);
     }

@@ -88,18 +88,18 @@ struct Search {
     speed: Option<f64>,
 }
 
+/// Keys of the option.
+pub(super) const KEYS: [&str; 6] = ["spacing", "radius", "tilt", "stroke", "aim", "speed"];
+
 impl FromStr for Search {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         let mut search = Self::default();
-        let mut seen = Vec::new();
-        for part in text.split(',').filter(|_| !text.is_empty()) {
-            let (key, value) = part.split_once('=').map_or((part, ""), |(key, value)| (key.trim(), value.trim()));
-            if seen.contains(&key) {
-                return Err(format!("{key} is given twice; use each key once"));
-            }
-            seen.push(key);
+        if text.is_empty() {
+            return Ok(search);
+        }
+        for (key, value) in super::keys::pairs(text, &KEYS, "a setting of the search", "spacing=1..2,radius=0.2")? {
             let said = |wanted: String| format!("{key} is {value:?}; {wanted}");
             match key {
                 "spacing" => search.spacing = Some(range(value).map_err(said)?),
@@ -110,14 +110,9 @@ impl FromStr for Search {
                     let aims = value.split('+').map(|aim| super::capture::aim(aim.trim())).collect::<Result<_, _>>();
                     search.aims = Some(aims.map_err(said)?);
                 }
-                "speed" => {
+                _ => {
                     let speed = value.parse::<f64>().ok().filter(|speed| speed.is_finite());
                     search.speed = Some(speed.ok_or_else(|| said("give a number".into()))?);
-                }
-                _ => {
-                    return Err(format!(
-                        "{part:?} is nothing to search; use spacing=1..2, radius, tilt, stroke, aim or speed"
-                    ));
                 }
             }
         }

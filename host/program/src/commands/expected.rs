@@ -7,7 +7,7 @@ use palpate::error::{Error, Result};
 pub(crate) struct ExpectedArguments {
     #[command(flatten)]
     prior: PriorArguments,
-    /// Only these objects; others cannot be there
+    /// Only these; other objects cannot be there
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
     only: Vec<String>,
 }

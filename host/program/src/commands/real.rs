@@ -1,8 +1,9 @@
 //! The option for what a real sensor, timer and robot add to touches.
 
+use super::keys::nearest;
 use palpate::error::{Place, ProbeProblem};
 use palpate::probe::file::ProbeFile;
-use palpate::probe::noise::{Noise, PartialNoise};
+use palpate::probe::noise::{BadNoise, Noise, PartialNoise};
 use palpate::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -62,9 +63,16 @@ fn real(text: &str) -> Result<Real, String> {
     let is_file = path.extension().is_some_and(|extension| extension == "toml") || path.is_file();
     let given = match is_file {
         true => Given::File(path.into()),
-        false => Given::Settings(text.parse().map_err(|problem: palpate::probe::noise::BadNoise| problem.to_string())?),
+        false => Given::Settings(text.parse().map_err(wrong)?),
     };
     Ok(Real { text: text.into(), given })
+}
+
+/// A problem with the settings, with the key that may have been meant.
+fn wrong(problem: BadNoise) -> String {
+    let key = problem.value.split('=').next().unwrap_or_default();
+    let nearest = if problem.key == "real" { nearest(key, &PartialNoise::KEYS) } else { String::new() };
+    format!("{problem}{nearest}")
 }
 
 #[cfg(test)]
@@ -110,5 +118,7 @@ mod tests {
             let error = Program::try_parse_from(["program", "--real", text]).err().unwrap().to_string();
             assert!(error.contains("such as") || error.contains("value is required"), "{error}");
         }
+        let error = Program::try_parse_from(["program", "--real", "timer=1ms,mised=2%"]).err().unwrap().to_string();
+        assert!(error.contains("Did you mean missed?"), "{error}");
     }
 }

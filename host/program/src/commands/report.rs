@@ -2,21 +2,24 @@ use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::real::RealArguments;
 use super::{Global, remark, shell};
+use clap::builder::TypedValueParser as _;
 use palpate::Result;
 use palpate::output::{print, print_json, refuse_stdout};
 use palpate::probe::noise::{Grazing, Noise};
 use palpate::touches::Origin;
-use palpate_report::{self, Existing, Settings};
+use palpate_report::{self, Existing, Part, Settings};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   palpate report                       the built-in objects
-  palpate report --quick -o quick      fewer touches, in a minute or two
+  palpate report --quick -o quick      fewer touches, in a minute or less
   palpate report meshes/ -o report     your own meshes
   palpate report meshes/ --true-size mm --probe probe.toml
                                        objects as large as they are, your probe
+  palpate report meshes/ --only accuracy,noise
+                                       two sections
   palpate report --real noise=0..10ms  our robust model trained for this noise
   palpate report meshes/ --recorded recorded --probe probe.toml
                                        is the simulation of your probe right?
@@ -31,9 +34,9 @@ pub(crate) struct Arguments {
     /// Fewer folds, levels, touches and trees; the same figures
     #[arg(long)]
     quick: bool,
-    /// Measure growth and generalization too, which use built-in objects; the default for `builtin` alone
-    #[arg(long)]
-    growth: bool,
+    /// Only these; other sections are left out
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = part())]
+    only: Vec<Part>,
     /// Recorded touches of the objects; simulated ones are compared with them by the probe of --probe, as it really is
     #[arg(long, value_name = "DIR")]
     recorded: Option<PathBuf>,
@@ -47,14 +50,14 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
-    let Arguments { sources, output, quick, growth, recorded, resume, size, real: given } = arguments;
+    let Arguments { sources, output, quick, only, recorded, resume, size, real: given } = arguments;
     let seed = global.seed();
     refuse_stdout(&output)?;
     let compared = recorded.iter().flat_map(|path| ["--recorded".to_owned(), path.to_string_lossy().into_owned()]);
     let compared: Vec<String> = compared.collect();
-    let command = command(&sources, seed, quick, growth, &[compared, size.words(), given.words()].concat());
+    let parts: Vec<Part> = Part::ALL.into_iter().filter(|part| only.is_empty() || only.contains(part)).collect();
+    let command = command(&sources, seed, quick, &only, &[compared, size.words(), given.words()].concat());
     let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
-    let growth = settings.growth || growth;
     refuse_unstated(&size)?;
     let capture = size.origin(Origin::default())?;
     let real = size.probe.read()?.map(|file| file.real).filter(|real| !real.is_none());
@@ -72,10 +75,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     };
     noise.check()?;
     let real = real.unwrap_or_default();
-    let settings = Settings { command, growth, noise, real, recorded, capture, ..settings };
+    let settings = Settings { command, parts, noise, real, recorded, capture, ..settings };
     let objects = || size.touchable(size.objects(&settings.sources, seed)?, &settings.capture);
     let existing = Existing { resume, replace: global.force };
-    let written = palpate_report::report_on(&objects, &settings, &output, existing, &Bar::new())?;
+    let written = palpate_report::report(&objects, &settings, &output, existing, &Bar::new())?;
     if global.json {
         return print_json(&written.summary);
     }
@@ -84,12 +87,20 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     print(&format!("{}\n\n{}\n{}\n", written.sentence, times.collect::<String>(), page.display()))
 }
 
+/// Sections by their names.
+fn part() -> impl clap::builder::TypedValueParser<Value = Part> {
+    let names = clap::builder::PossibleValuesParser::new(Part::ALL.map(Part::name));
+    names.try_map(|name| Part::ALL.into_iter().find(|part| part.name() == name).ok_or("not a section"))
+}
+
 /// The command that makes this report again, wherever it is written.
-fn command(sources: &[String], seed: u64, quick: bool, growth: bool, more: &[String]) -> String {
+fn command(sources: &[String], seed: u64, quick: bool, only: &[Part], more: &[String]) -> String {
     let seed = seed.to_string();
     let words = ["palpate", "report"].into_iter().chain(sources.iter().map(String::as_str)).chain(["--seed", &seed]);
-    let switches = quick.then_some("--quick").into_iter().chain(growth.then_some("--growth"));
-    shell::command(words.chain(switches).chain(more.iter().map(String::as_str)))
+    let only: Vec<&str> = only.iter().map(|part| part.name()).collect();
+    let only = (!only.is_empty()).then(|| ["--only".to_owned(), only.join(",")]);
+    let words = words.chain(quick.then_some("--quick")).chain(only.iter().flatten().map(String::as_str));
+    shell::command(words.chain(more.iter().map(String::as_str)))
 }
 
 #[cfg(test)]
@@ -98,16 +109,16 @@ mod tests {
 
     #[test]
     fn the_command_of_a_report_makes_it_again() {
-        assert_eq!(command(&["builtin".into()], 1, false, false, &[]), "palpate report builtin --seed 1");
+        assert_eq!(command(&["builtin".into()], 1, false, &[], &[]), "palpate report builtin --seed 1");
         assert_eq!(
             command(
                 &["my meshes".into(), "cup.obj".into()],
                 2,
                 true,
-                true,
+                &[Part::Noise, Part::Limit],
                 &["--real".into(), "noise=0ms..5ms".into()]
             ),
-            "palpate report 'my meshes' cup.obj --seed 2 --quick --growth --real noise=0ms..5ms"
+            "palpate report 'my meshes' cup.obj --seed 2 --quick --only noise,limit --real noise=0ms..5ms"
         );
     }
 }

@@ -34,27 +34,19 @@ const KEYS: [(&str, &str); 10] = [
     ("trainer", "palpate or xgboost"),
 ];
 
+/// The keys alone.
+pub(super) fn keys() -> impl Iterator<Item = &'static str> {
+    KEYS.into_iter().map(|(key, _)| key)
+}
+
 impl FromStr for Trees {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         let mut trees = Self::default();
-        let mut seen = Vec::new();
-        for part in text.split(',') {
-            let (key, value) =
-                part.split_once('=').map_or((part.trim(), ""), |(key, value)| (key.trim(), value.trim()));
-            let key = key.replace('-', "_");
-            let Some((key, wanted)) = KEYS.into_iter().find(|(known, _)| *known == key) else {
-                let keys: Vec<&str> = KEYS.iter().map(|(key, _)| *key).collect();
-                return Err(format!(
-                    "{part:?} is not a setting of trees; use rounds=30,depth=6 and the like: {}",
-                    keys.join(", ")
-                ));
-            };
-            if seen.contains(&key) {
-                return Err(format!("{key} is given twice; use each key once"));
-            }
-            seen.push(key);
+        let known: Vec<&str> = keys().collect();
+        for (key, value) in super::keys::pairs(text, &known, "a setting of trees", "rounds=30,depth=6")? {
+            let wanted = KEYS.iter().find(|own| own.0 == key).map_or("", |own| own.1);
             trees.set(key, value).ok_or_else(|| format!("{key} is {value:?}; use {wanted}"))?;
         }
         match trees.threshold_cost.is_some() && trees.different_leaves.is_none() {

@@ -1,6 +1,6 @@
 //! The commands around a compiled model, as a user calls them: export, inspect, parity, recognize.
 
-use palpate::ensemble::{Ensemble, Node, Origin, Output, Tree, inputs};
+use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
 use palpate_shared::Descriptor;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
@@ -33,7 +33,7 @@ pub(crate) fn ensemble() -> Ensemble {
         objects: vec!["bowl".into(), "fork".into()],
         base_margins: vec![0.0, 0.0],
         trees: vec![Tree { nodes, output: Output::Each }],
-        origin: Origin::default(),
+        origin: Provenance::default(),
     }
 }
 

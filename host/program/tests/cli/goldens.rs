@@ -2,7 +2,7 @@
 //! and layout. `PALPATE_GOLDENS=write` records them again, for a change that is meant to change them.
 
 use crate::{run, stdout};
-use palpate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
+use palpate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -128,7 +128,7 @@ fn ensemble() -> Ensemble {
         objects: ["a", "b", "c"].map(String::from).to_vec(),
         base_margins: vec![0.0; CENTERS.len()],
         trees: vec![Tree { nodes, output: Output::Each }],
-        origin: Origin::default(),
+        origin: Provenance::default(),
     }
 }
 

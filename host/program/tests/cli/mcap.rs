@@ -3,7 +3,7 @@
 use crate::compiled::Place;
 use crate::{command, json, run, stderr, stdout};
 use palpate::touches::mcap::{Writer, read};
-use palpate::touches::{Dataset, Log, Said, is_log, parse_touch};
+use palpate::touches::{Content, Dataset, Log, is_log, parse_touch};
 use std::io::{Cursor, Write};
 use std::path::Path;
 use std::process::{Output, Stdio};
@@ -77,9 +77,9 @@ fn touches_and_verdicts_become_a_log_that_is_recognized_again() {
     let (mut touches, mut verdicts, mut times) = (Vec::new(), Vec::new(), Vec::new());
     read(bytes.as_slice(), Path::new("verdicts.mcap"), |message| {
         times.push(message.time);
-        match message.said {
-            Said::Touch(touch, object) => touches.push((touch, object)),
-            Said::Verdict(verdict) => verdicts.push(verdict),
+        match message.content {
+            Content::Touch(touch, object) => touches.push((touch, object)),
+            Content::Verdict(verdict) => verdicts.push(verdict),
         }
         Ok(())
     })

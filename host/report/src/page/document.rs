@@ -10,7 +10,7 @@ use palpate::output;
 use std::path::{Path, PathBuf};
 
 /// The page's style.
-pub const STYLE: &str = include_str!("page.css");
+pub(crate) const STYLE: &str = include_str!("page.css");
 
 /// A figure: one or more drawings side by side, with the numbers behind them.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ pub struct Figure {
 
 impl Figure {
     /// All panels in one drawing on white, in rows of at most 1,160 pixels.
-    pub fn whole_svg(&self) -> Svg {
+    pub(crate) fn whole_svg(&self) -> Svg {
         let cell = |size: fn(&Svg) -> u32| self.panels.iter().map(size).max().unwrap_or(1);
         let (width, height) = (cell(|panel| panel.width), cell(|panel| panel.height));
         let columns = (1160 / width.max(1)).clamp(1, self.panels.len().max(1) as u32);

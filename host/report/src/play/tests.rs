@@ -168,7 +168,7 @@ fn models_of_one_name_are_told_apart_by_their_files() {
         objects: vec!["a".into(), "b".into()],
         base_margins: vec![0.0; 2],
         trees: vec![Tree { nodes: vec![Node::Leaf(vec![0.5, 0.0])], output: Output::Each }],
-        origin: ensemble::Origin::default(),
+        origin: ensemble::Provenance::default(),
     };
     let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
     let contender = || Contender::new(CompiledModel::from_bytes(bytes.clone()).unwrap(), None).unwrap();

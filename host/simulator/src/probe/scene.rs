@@ -73,7 +73,7 @@ impl Scene {
 
     /// Distance at which a sphere that moves from `origin` in a direction, a unit vector, reaches the table: 0 if it starts
     /// there, infinite if there is no table or the sphere does not come down to it.
-    pub fn reaches_table(&self, origin: DVec3, direction: DVec3, radius: f64) -> f64 {
+    pub(crate) fn reaches_table(&self, origin: DVec3, direction: DVec3, radius: f64) -> f64 {
         if self.table.is_none() {
             return f64::INFINITY;
         }
@@ -105,7 +105,7 @@ impl Scene {
 
     /// The center of mass of the surface, as if it were a shell of the same thickness everywhere. Cost: one pass over the
     /// triangles.
-    pub fn center_of_mass(&self) -> DVec3 {
+    pub(crate) fn center_of_mass(&self) -> DVec3 {
         let add = |(sum, area): (DVec3, f64), [a, b, c]: Triangle| {
             let twice = (b - a).cross(c - a).length();
             (sum + (a + b + c) * (twice / 3.0), area + twice)
@@ -127,7 +127,12 @@ impl Scene {
     }
 
     /// The [first contacts](Self::first_contact) of these origins if all of them touch; none as soon as one does not.
-    pub fn all_contacts<const N: usize>(&self, origins: [DVec3; N], direction: DVec3, radius: f64) -> Option<[f64; N]> {
+    pub(crate) fn all_contacts<const N: usize>(
+        &self,
+        origins: [DVec3; N],
+        direction: DVec3,
+        radius: f64,
+    ) -> Option<[f64; N]> {
         self.surface.all_contacts(origins, direction, radius)
     }
 }

@@ -9,7 +9,7 @@
 //! once per touch instead of once.
 
 use crate::ensemble::{
-    Ensemble, MAX_OBJECTS, Node, Origin, StatedProbe, TouchOrigin, Trained, check_names, feature_row, inputs,
+    Ensemble, MAX_OBJECTS, Node, Provenance, StatedProbe, TouchOrigin, Trained, check_names, feature_row, inputs,
 };
 use crate::error::{Error, Result};
 use crate::mesh::BACKGROUND;
@@ -239,7 +239,7 @@ fn train_outputs(dataset: &Dataset, settings: &Settings, progress: &dyn Progress
 }
 
 /// Origin stated by an ensemble that was trained so.
-fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Origin {
+fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Provenance {
     let trained = Trained { touches: evidence.trained(), shares: dataset.holds_approaches().then(|| dataset.shares()) };
     let noise = Some(dataset.real().and(&settings.noise)).filter(|noise| !noise.is_none());
     TouchOrigin { noise, trained: Some(trained), ..TouchOrigin::new(dataset, settings.probe) }.origin()
@@ -335,7 +335,7 @@ fn with_palpate(
         boost::Failure::Cancelled => Error::Cancelled,
         refused => TrainProblem::Trainer { trainer: "palpate", detail: refused.to_string() }.into(),
     })?;
-    Ok(Ensemble { inputs: inputs(settings.descriptor), objects, base_margins, trees, origin: Origin::default() })
+    Ok(Ensemble { inputs: inputs(settings.descriptor), objects, base_margins, trees, origin: Provenance::default() })
 }
 
 #[cfg(feature = "xgboost")]

@@ -191,7 +191,7 @@ fn overlaps(margins: &Margins<'_>, position: usize, by_pose: &ByPose) -> Vec<f64
 mod tests {
     use super::*;
     use crate::compile::compile;
-    use crate::ensemble::{Ensemble, Node, Origin, Output, Tree};
+    use crate::ensemble::{Ensemble, Node, Output, Provenance, Tree};
 
     use crate::touches::{self, ObjectTouches};
     use palpate_onboard::{Recognizer, Stopping};
@@ -213,7 +213,7 @@ mod tests {
             objects: vec!["bowl".into(), "fork".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],
-            origin: Origin::default(),
+            origin: Provenance::default(),
         }
     }
 

@@ -3,7 +3,7 @@
 use super::Kind;
 use crate::error::TouchesProblem;
 use crate::touches::listing::is_file_name;
-use crate::touches::logged::{LoggedVerdict, Said};
+use crate::touches::logged::{Content, LoggedVerdict};
 use crate::touches::touch_of_seconds;
 use byteorder::{BigEndian, LittleEndian};
 use palpate_shared::{Q15_ONE, Touch};
@@ -86,7 +86,7 @@ struct CdrVerdict {
 
 impl Encoding {
     /// Decodes a message.
-    pub(super) fn read(self, kind: Kind, data: &[u8]) -> Result<Said, TouchesProblem> {
+    pub(super) fn read(self, kind: Kind, data: &[u8]) -> Result<Content, TouchesProblem> {
         match (self, kind) {
             (Self::Json, Kind::Touch) => touch(json(data, "touch in JSON")?),
             (Self::Json, Kind::Verdict) => {
@@ -143,7 +143,7 @@ fn cdr<T: serde::de::DeserializeOwned>(data: &[u8], what: &'static str) -> Resul
 /// The longest time that a touch can hold, in seconds.
 const LONGEST: f64 = 4294.0;
 
-fn touch(JsonTouch { times, pose, object }: JsonTouch) -> Result<Said, TouchesProblem> {
+fn touch(JsonTouch { times, pose, object }: JsonTouch) -> Result<Content, TouchesProblem> {
     let object = object.filter(|object| !object.is_empty());
     if let Some(name) = object.as_ref().filter(|name| !is_file_name(name)) {
         return Err(TouchesProblem::BadName { name: name.clone() });
@@ -153,10 +153,10 @@ fn touch(JsonTouch { times, pose, object }: JsonTouch) -> Result<Said, TouchesPr
     let start = if first > LONGEST && first.is_finite() { first.floor() } else { 0.0 };
     let times = times.map(|time| time.map(|time| time - start));
     let (direction, alignment) = pose.map(|JsonPose { direction, alignment }| (direction, alignment)).unzip();
-    Ok(Said::Touch(touch_of_seconds(times, direction, alignment)?, object))
+    Ok(Content::Touch(touch_of_seconds(times, direction, alignment)?, object))
 }
 
-fn checked(verdict: LoggedVerdict) -> Result<Said, TouchesProblem> {
+fn checked(verdict: LoggedVerdict) -> Result<Content, TouchesProblem> {
     let wrong = |message: String| Err(TouchesProblem::BadMessage { what: "verdict", message });
     if !LoggedVerdict::VERDICTS.contains(&verdict.verdict.as_str()) {
         return wrong(format!("{:?}, where {} are known", verdict.verdict, LoggedVerdict::VERDICTS.join(", ")));
@@ -166,7 +166,7 @@ fn checked(verdict: LoggedVerdict) -> Result<Said, TouchesProblem> {
     {
         return wrong(format!("a posterior of {posterior}"));
     }
-    Ok(Said::Verdict(verdict))
+    Ok(Content::Verdict(verdict))
 }
 
 /// Essence of a definition in ROS 2: its lines without comments and needless spaces, up to those of other messages.

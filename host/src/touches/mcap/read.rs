@@ -205,15 +205,15 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
         };
         channel.messages += 1;
         let Some((kind, encoding)) = channel.reads else { return Ok(()) };
-        let said = match message.log_time {
+        let content = match message.log_time {
             ..=LATEST => encoding.read(kind, message.data),
             time => Err(TouchesProblem::BadMessage { what: "log time", message: format!("{time} ns, after 2262") }),
         };
-        let said = said.map_err(|problem| {
+        let content = content.map_err(|problem| {
             let (topic, number) = (channel.topic.clone(), channel.messages);
             wrong(TouchesProblem::Message { topic, number, problem: problem.into() })
         });
-        (self.each)(Message { time: message.log_time, offset, said: said? })
+        (self.each)(Message { time: message.log_time, offset, content: content? })
     }
 
     /// Takes memory for names.

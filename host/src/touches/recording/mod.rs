@@ -195,7 +195,7 @@ impl Recording {
     ///
     /// # Errors
     /// When the listing cannot be written.
-    pub fn made_by(&mut self, firmware: Option<String>, model: Option<u32>) -> Result<Option<String>> {
+    pub(crate) fn made_by(&mut self, firmware: Option<String>, model: Option<u32>) -> Result<Option<String>> {
         let newest = self.listing.recorded.iter().rev().find_map(|recorded| recorded.firmware.clone());
         let other = newest.filter(|other| firmware.as_ref().is_some_and(|own| own != other));
         let is_same = self.recorded.firmware == firmware && self.recorded.model == model;
@@ -210,7 +210,7 @@ impl Recording {
     }
 
     /// True if the touch lacks the pose that the touches of this data set are recorded with.
-    pub fn lacks_pose(&self, touch: &Touch) -> bool {
+    pub(crate) fn lacks_pose(&self, touch: &Touch) -> bool {
         self.listing.origin.pose && touch.pose().is_none()
     }
 

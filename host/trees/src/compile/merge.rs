@@ -194,7 +194,7 @@ fn balanced<'a>(cuts: &[i32], values: &[f32], feature: u8, missing_left: bool, o
 #[cfg(test)]
 mod tests {
     use super::super::{Leaf, Settings, compile, open};
-    use crate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
+    use crate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
     use palpate_shared::MISSING_FEATURE;
     use palpate_shared::format::f32_key;
 
@@ -240,7 +240,7 @@ mod tests {
             objects: ["a", "b", "c"].map(String::from).into(),
             base_margins: vec![0.5, -0.25, 0.0],
             trees: trees.collect(),
-            origin: Origin::default(),
+            origin: Provenance::default(),
         }
     }
 

@@ -10,7 +10,7 @@
 //!
 //! ```
 //! use palpate_trees::compile::{self, compile};
-//! use palpate_trees::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
+//! use palpate_trees::ensemble::{Ensemble, Inputs, Node, Provenance, Output, Tree};
 //! use palpate_trees::rows::Encoder;
 //!
 //! # fn main() -> palpate_trees::Result<()> {
@@ -25,7 +25,7 @@
 //!     objects: vec!["bowl".into(), "fork".into()],
 //!     base_margins: vec![0.0; 2],
 //!     trees: vec![Tree { nodes, output: Output::Each }],
-//!     origin: Origin::default(),
+//!     origin: Provenance::default(),
 //! };
 //! let compiled = compile(&ensemble, &compile::Settings::default())?;
 //! let model = compile::open(&compiled.bytes)?;

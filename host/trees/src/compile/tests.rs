@@ -1,5 +1,5 @@
 use super::*;
-use crate::ensemble::{Inputs, Node, Origin, Output, Tree, computed};
+use crate::ensemble::{Inputs, Node, Output, Provenance, Tree, computed};
 use crate::error::{Setting, TreeProblem};
 use palpate_onboard::ModelError;
 use palpate_shared::{Descriptor, MISSING_FEATURE};
@@ -19,7 +19,7 @@ fn ensemble(descriptor: Descriptor, trees: Vec<Vec<Node>>) -> Ensemble {
         objects: vec!["bowl".into(), "fork".into()],
         base_margins: vec![0.0; 2],
         trees: trees.into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
-        origin: Origin::default(),
+        origin: Provenance::default(),
     }
 }
 

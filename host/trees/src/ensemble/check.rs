@@ -143,7 +143,7 @@ pub fn check_names(names: &[String]) -> Result<(), EnsembleProblem> {
 mod tests {
     use super::*;
     use crate::ensemble::import::Options;
-    use crate::ensemble::{Origin, computed};
+    use crate::ensemble::{Provenance, computed};
     use palpate_shared::Descriptor;
 
     fn ensemble() -> Ensemble {
@@ -154,7 +154,7 @@ mod tests {
             objects: vec!["bowl".into(), "fork".into()],
             base_margins: vec![0.0; 2],
             trees: vec![Tree { nodes, output: Output::Each }],
-            origin: Origin::default(),
+            origin: Provenance::default(),
         }
     }
 

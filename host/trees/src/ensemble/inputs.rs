@@ -50,7 +50,7 @@ impl Inputs {
     }
 
     /// The name of a feature that has none of its own.
-    pub fn default_name(index: usize) -> String {
+    pub(crate) fn default_name(index: usize) -> String {
         format!("f{index}")
     }
 
@@ -79,7 +79,7 @@ impl Inputs {
     }
 
     /// True if features have names.
-    pub fn are_named(&self) -> bool {
+    pub(crate) fn are_named(&self) -> bool {
         match self {
             Self::Computed(_) => true,
             Self::Rows(names) => Self::has_names(names),

@@ -20,7 +20,7 @@ pub use error::{EnsembleProblem, NameProblem, TreeProblem};
 pub(crate) use inputs::computed;
 pub use inputs::{Inputs, Occurring, Schema};
 pub use nodes::Threshold;
-pub use origin::{Columns, Imported, Origin};
+pub use origin::{Columns, Imported, Provenance};
 
 use palpate_shared::format::Prediction;
 use std::borrow::Cow;
@@ -38,7 +38,7 @@ pub struct Ensemble {
     /// The trees, in the order in which their leaves are added.
     pub trees: Vec<Tree>,
     /// Facts about its training; changes no margin.
-    pub origin: Origin,
+    pub origin: Provenance,
 }
 
 /// One tree; its root is node 0.
@@ -139,7 +139,7 @@ impl Ensemble {
     }
 
     /// The features with NaN for those that stand for a missing value.
-    pub fn known_features<'f>(&self, features: &'f [f32]) -> Cow<'f, [f32]> {
+    pub(crate) fn known_features<'f>(&self, features: &'f [f32]) -> Cow<'f, [f32]> {
         let Some([low, high]) = self.origin.imported.as_ref().and_then(|imported| imported.sentinel) else {
             return Cow::Borrowed(features);
         };

@@ -1,4 +1,4 @@
-//! Origin of an ensemble, if it is known.
+//! Provenance of an ensemble, if it is known.
 
 use super::nodes::Threshold;
 use palpate_shared::format::Prediction;
@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 /// Statements of an ensemble about its training. Empty for ensembles from elsewhere.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Origin {
+pub struct Provenance {
     /// The last object is a background: many other shapes, which stand for everything that the ensemble does not know.
     /// It is a rival of the others, and never named.
     pub background: bool,

@@ -92,7 +92,7 @@ impl Bounds {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ensemble::{Inputs, Origin, Output, Tree};
+    use crate::ensemble::{Inputs, Output, Provenance, Tree};
 
     #[test]
     fn every_split_is_reached_and_decided_both_ways() {
@@ -115,7 +115,7 @@ mod tests {
             objects: vec!["value".into()],
             base_margins: vec![0.0],
             trees: vec![Tree { nodes, output: Output::One(0) }],
-            origin: Origin::default(),
+            origin: Provenance::default(),
         };
         let mut reached = std::collections::BTreeSet::new();
         let mut count = 0;

@@ -4,7 +4,7 @@ use super::LineOptions;
 use crate::commands::probe::ProbeArguments;
 use crate::commands::remark;
 use palpate::Result;
-use palpate::chip::{Heard, Port, RecordSummary, record};
+use palpate::chip::{Port, RecordEvent, RecordSummary, record};
 use palpate::output::{print, print_json};
 use palpate::touches::{Listing, Origin, Recording};
 use palpate_shared::Touch;
@@ -57,7 +57,7 @@ pub(crate) fn from_chip(
     let object = recording.object().to_owned();
     let summarized = record(&mut connection, reopen, &mut recording, count, |heard| {
         match heard {
-            Heard::Connected { program, model, other } => {
+            RecordEvent::Connected { program, model, other } => {
                 names = model.map(|model| model.names.clone()).unwrap_or_default();
                 if let (Some(program), Some(other)) = (program, other) {
                     remark(&format!("palpate: warning: {other} made the newest touches here, now it is {program}"));
@@ -67,19 +67,19 @@ pub(crate) fn from_chip(
                 let text = format!("recording {object} into {}: {program}; {until}\n", directory.display());
                 say(json, &text)?;
             }
-            Heard::Lost(error) => remark(&format!("palpate: {error} Waiting for it.")),
-            Heard::Touch { touch, number, verdict } => {
+            RecordEvent::Lost(error) => remark(&format!("palpate: {error} Waiting for it.")),
+            RecordEvent::Touch { touch, number, verdict } => {
                 say(json, &format!("{}\n", line(*number, touch, said(verdict, &names).as_deref())))?;
             }
-            Heard::Earlier(_) => {
+            RecordEvent::Earlier(_) => {
                 remark("palpate: warning: a touch from before this recording was told again, and not recorded");
             }
-            Heard::NoPose(_) => remark("palpate: warning: a touch without a pose was not recorded"),
-            Heard::Fault { kind, finger } => remark(&format!("palpate: warning: {}", fault(*kind, *finger))),
-            Heard::Missed(missed) => {
+            RecordEvent::NoPose(_) => remark("palpate: warning: a touch without a pose was not recorded"),
+            RecordEvent::Fault { kind, finger } => remark(&format!("palpate: warning: {}", fault(*kind, *finger))),
+            RecordEvent::Missed(missed) => {
                 remark(&format!("palpate: warning: {missed} reports of the chip were lost on the way"));
             }
-            Heard::Idle => {}
+            RecordEvent::Idle => {}
         }
         Ok(ControlFlow::Continue(()))
     })?;

@@ -33,7 +33,7 @@ pub enum Format {
 }
 
 /// The name of the list of a scan's depth images.
-pub const DEPTH_LIST: &str = "scene_camera.json";
+pub(crate) const DEPTH_LIST: &str = "scene_camera.json";
 
 /// The extensions of mesh files, in the order in which they are preferred where a folder holds one name with several.
 pub const EXTENSIONS: [&str; 8] = ["obj", "stl", "ply", "gltf", "glb", "dae", "pcd", "xyz"];

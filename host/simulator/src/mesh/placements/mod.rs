@@ -32,13 +32,13 @@ use alike::Shape;
 use glam::{DMat3, DVec3, I64Vec3, Vec3};
 
 /// Placements whose upward directions differ by at most this angle, in degrees, are one.
-pub const SAME: f64 = 10.0;
+pub(crate) const SAME: f64 = 10.0;
 
 /// Placements of less weight are left out, except the second of an object that would have only one.
 pub const LEAST: f64 = 0.03;
 
 /// The second placement of an object is left out if it has less weight than this, regardless of the others.
-pub const LEAST_OF_TWO: f64 = 0.01;
+pub(crate) const LEAST_OF_TWO: f64 = 0.01;
 
 /// Weights are whole multiples of one in this many, so that they are the same in every file.
 const PARTS: f64 = 1e6;

@@ -300,13 +300,15 @@ impl Noise {
     /// noise, seed, name, and each touch with its position. Noise that [`check`](Self::check) refuses gives touches
     /// without meaning.
     pub fn add(&self, name: &str, touches: &[Touch], seed: u64) -> Vec<Touch> {
-        self.add_by(name, touches, seed, |index| index)
+        let stream = self.stream(name, touches.len(), seed);
+        (0..).zip(touches).map(|(index, touch)| stream.add(touch, index, index as u64)).collect()
     }
 
-    /// The same with touches of `robots` robots in turn: touch i is made by robot i modulo `robots`, and a robot's bias
-    /// is the same for every object. 0 is taken as 1.
-    pub fn add_by_robots(&self, name: &str, touches: &[Touch], seed: u64, robots: usize) -> Vec<Touch> {
-        self.add_by(name, touches, seed, |index| index % robots.max(1) as u64)
+    /// The noise of the first `count` touches of the object `name`, in any order.
+    pub fn stream(&self, name: &str, count: usize, seed: u64) -> Stream {
+        let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);
+        let mut normal = || std::array::from_fn(|_| StandardNormal.sample(&mut gaussian));
+        Stream { noise: *self, name: name.into(), seed, normals: (0..count).map(|_| normal()).collect() }
     }
 
     /// A touch with this noise, whose random numbers come from `random`; made by a robot of its own. For touches that are
@@ -343,43 +345,6 @@ impl Noise {
         }
     }
 
-    /// The same with touch i made by robot `robot(i)`.
-    pub fn add_by(&self, name: &str, touches: &[Touch], seed: u64, robot: impl Fn(u64) -> u64) -> Vec<Touch> {
-        // Gaussian numbers have a stream of their own, three for each touch, so that no other setting changes the noise
-        // of one level.
-        let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);
-        let one = |(touch, index): (&Touch, u64)| {
-            let normal: [f64; FINGERS] = std::array::from_fn(|_| StandardNormal.sample(&mut gaussian));
-            self.at(touch, normal, (seed, name, index), || robot(index))
-        };
-        touches.iter().zip(0..).map(one).collect()
-    }
-
-    /// The same noise as [`add`](Self::add), for the first `count` touches of an object in any order. Only for noise without a
-    /// bias.
-    pub fn by_position(&self, name: &str, count: usize, seed: u64) -> ByPosition {
-        let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);
-        let mut normal = || std::array::from_fn(|_| StandardNormal.sample(&mut gaussian));
-        ByPosition { noise: *self, name: name.into(), seed, normals: (0..count).map(|_| normal()).collect() }
-    }
-
-    /// Adds it to touch `index` of the object `name`.
-    fn at(
-        &self,
-        touch: &Touch,
-        normal: [f64; FINGERS],
-        (seed, name, index): (u64, &str, u64),
-        robot: impl Fn() -> u64,
-    ) -> Touch {
-        if (Self { deviation: self.deviation.least.into(), ..Self::default() }) == *self {
-            return timed(touch, |finger, time| time + self.deviation.least * normal[finger]);
-        }
-        let mut sensor = random::generator(seed, Purpose::Sensor, name, index);
-        let own = Draw::new(&mut sensor);
-        let robot = self.has_bias().then(|| Draw::new(&mut random::generator(seed, Purpose::Robot, "", robot())));
-        self.one(touch, normal, &own, &robot.unwrap_or_default())
-    }
-
     fn one(&self, touch: &Touch, normal: [f64; FINGERS], own: &Draw, robot: &Draw) -> Touch {
         let Deviation { least, largest } = self.deviation;
         let deviation = least + (largest - least) * own.level * own.level.sqrt();
@@ -405,20 +370,29 @@ impl Noise {
     }
 }
 
-/// The noise of an object's touches, in any order.
+/// The noise of an object's touches: a pure function of noise, seed, the object's name and the position of each touch.
 #[derive(Debug)]
-pub struct ByPosition {
+pub struct Stream {
     noise: Noise,
     name: String,
     seed: u64,
-    /// For each touch its Gaussian numbers, which come from one stream.
+    /// For each touch its Gaussian numbers. They have a stream of their own, three for each touch, so that no other setting
+    /// changes the noise of one level.
     normals: Vec<[f64; FINGERS]>,
 }
 
-impl ByPosition {
-    /// Adds it to the touch at this position, below the count that it was made for.
-    pub fn add(&self, touch: &Touch, position: usize) -> Touch {
-        self.noise.at(touch, self.normals[position], (self.seed, &self.name, position as u64), || position as u64)
+impl Stream {
+    /// Adds it to the touch at this position, below the count that it was made for, made by this robot. A robot's bias
+    /// is the same for every object.
+    pub fn add(&self, touch: &Touch, position: usize, robot: u64) -> Touch {
+        let (noise, normal) = (&self.noise, self.normals[position]);
+        if *noise == (Noise { deviation: noise.deviation.least.into(), ..Noise::default() }) {
+            return timed(touch, |finger, time| time + noise.deviation.least * normal[finger]);
+        }
+        let mut sensor = random::generator(self.seed, Purpose::Sensor, &self.name, position as u64);
+        let own = Draw::new(&mut sensor);
+        let bias = || Draw::new(&mut random::generator(self.seed, Purpose::Robot, "", robot));
+        noise.one(touch, normal, &own, &noise.has_bias().then(bias).unwrap_or_default())
     }
 }
 
@@ -512,9 +486,4 @@ fn timed(touch: &Touch, change: impl Fn(usize, f64) -> f64) -> Touch {
     });
     let noisy = Touch::new(shifted);
     touch.pose().map_or(noisy, |pose| noisy.with_pose(pose))
-}
-
-/// `touches` with Gaussian noise of `deviation` microseconds: [`Noise::gaussian`].
-pub fn noisy(name: &str, touches: &[Touch], deviation: f64, seed: u64) -> Vec<Touch> {
-    Noise::gaussian(deviation).add(name, touches, seed)
 }

@@ -59,20 +59,6 @@ pub struct BadNoise {
     pub wanted: String,
 }
 
-/// All keys, in the order in which they are written.
-const KEYS: [&str; 10] = [
-    "noise",
-    "timer",
-    "debounce",
-    "missed",
-    "bent",
-    "speed_factor",
-    "speed_error",
-    "speed_bias",
-    "pose_noise",
-    "pose_bias",
-];
-
 impl From<Noise> for PartialNoise {
     fn from(noise: Noise) -> Self {
         Self {
@@ -91,6 +77,20 @@ impl From<Noise> for PartialNoise {
 }
 
 impl PartialNoise {
+    /// All keys, in the order in which they are written.
+    pub const KEYS: [&str; 10] = [
+        "noise",
+        "timer",
+        "debounce",
+        "missed",
+        "bent",
+        "speed_factor",
+        "speed_error",
+        "speed_bias",
+        "pose_noise",
+        "pose_bias",
+    ];
+
     /// The settings that are given, and `base` where they are open.
     #[must_use]
     pub fn over(&self, base: Noise) -> Noise {
@@ -111,7 +111,7 @@ impl PartialNoise {
 
     /// True if nothing is left open.
     fn is_whole(&self) -> bool {
-        KEYS.iter().all(|key| self.has(key))
+        Self::KEYS.iter().all(|key| self.has(key))
     }
 
     /// True if the setting of this key is given.
@@ -203,8 +203,8 @@ impl FromStr for PartialNoise {
                 return Err(whole(wanted));
             };
             let key = key.trim().replace('-', "_");
-            let Some(key) = KEYS.into_iter().find(|known| *known == key) else {
-                return Err(whole(format!("one of {}", KEYS.join(", "))));
+            let Some(key) = Self::KEYS.into_iter().find(|known| *known == key) else {
+                return Err(whole(format!("one of {}", Self::KEYS.join(", "))));
             };
             let earlier = text.split(',').take(index).filter_map(|part| part.split_once('='));
             if earlier.into_iter().any(|(earlier, _)| earlier.trim().replace('-', "_") == key) {
@@ -224,7 +224,7 @@ impl fmt::Display for PartialNoise {
         let is_whole = self.is_whole();
         let mut parts: Vec<String> = is_whole.then(|| "none".into()).into_iter().collect();
         let usual = Self::from(nothing);
-        for key in KEYS.into_iter().filter(|key| self.has(key)) {
+        for key in Self::KEYS.into_iter().filter(|key| self.has(key)) {
             let value = value_of(&noise, key);
             if !is_whole || value != value_of(&usual.over(nothing), key) {
                 parts.push(format!("{key}={value}"));

@@ -4,6 +4,17 @@ use crate::mesh::Mesh;
 use crate::probe::approach::{Approach, Probe};
 use crate::probe::scene::Scene;
 
+/// Touches with Gaussian noise of one deviation.
+fn noisy(name: &str, touches: &[Touch], deviation: f64, seed: u64) -> Vec<Touch> {
+    Noise::gaussian(deviation).add(name, touches, seed)
+}
+
+/// Touches of this number of robots in turn.
+fn by_robots(noise: Noise, name: &str, touches: &[Touch], seed: u64, robots: u64) -> Vec<Touch> {
+    let stream = noise.stream(name, touches.len(), seed);
+    (0..).zip(touches).map(|(index, touch)| stream.add(touch, index, index as u64 % robots)).collect()
+}
+
 fn touches(count: u32) -> Vec<Touch> {
     (0..count).map(|i| Touch::from_micros([i % 977, 500_000, 900_000 + i])).collect()
 }
@@ -117,11 +128,11 @@ fn a_bent_finger_is_early_and_a_fast_robot_has_short_times() {
 fn a_robots_bias_is_the_same_for_all_its_touches_and_objects() {
     let clean = vec![Touch::from_micros([0, 500_000, 1_000_000]); 30];
     let noise = Noise { speed_bias: 0.1, ..Noise::default() };
-    let fork = noise.add_by_robots("fork", &clean, 1, 3);
-    assert_eq!(fork, noise.add_by_robots("spoon", &clean, 1, 3));
+    let fork = by_robots(noise, "fork", &clean, 1, 3);
+    assert_eq!(fork, by_robots(noise, "spoon", &clean, 1, 3));
     assert!(fork.iter().zip(&fork[3..]).all(|(one, later)| one == later));
     assert!(fork[0] != fork[1] && fork[1] != fork[2]);
-    assert_ne!(fork, noise.add_by_robots("fork", &clean, 2, 3));
+    assert_ne!(fork, by_robots(noise, "fork", &clean, 2, 3));
     // In training every touch is made by another robot.
     let distinct: std::collections::HashSet<_> = noise.add("fork", &clean, 1).into_iter().collect();
     assert_eq!(distinct.len(), 30);
@@ -137,7 +148,7 @@ fn a_turned_pose_keeps_its_lengths_and_its_angle() {
     for (noise, robots) in
         [(Noise { pose: 5.0, ..Noise::default() }, 1), (Noise { pose_bias: 5.0, ..Noise::default() }, 2_000)]
     {
-        let poses = noise.add_by_robots("fork", &clean, 1, robots);
+        let poses = by_robots(noise, "fork", &clean, 1, robots);
         let poses: Vec<Pose> = poses.iter().map(|touch| touch.pose().unwrap()).collect();
         for Pose { direction, alignment } in &poses {
             assert!(dot(*direction, *alignment).abs() < 1e-4);

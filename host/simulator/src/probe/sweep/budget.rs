@@ -23,27 +23,27 @@ pub struct Allowance {
 }
 
 /// Boxes, and the eight-wide reject: rounding in f32, as a share of 1 + radius + distance of the start.
-pub const BOX: f64 = 4e-6;
+pub(crate) const BOX: f64 = 4e-6;
 /// Moving the start up to the mesh's box, where the start is near.
-pub const ENTRY: f64 = 1e-9;
+pub(crate) const ENTRY: f64 = 1e-9;
 /// Moving a start that is far away up to the box, as a share of its distance.
-pub const ENTRY_FAR: f64 = 1e-15;
+pub(crate) const ENTRY_FAR: f64 = 1e-15;
 /// A triangle narrower than this share of its length is treated as having no face.
-pub const FLAT: f64 = 1e-8;
+pub(crate) const FLAT: f64 = 1e-8;
 /// An edge closer to the direction of motion than this angle, in radians, is treated as having no cylinder.
-pub const PARALLEL: f64 = 1e-12;
+pub(crate) const PARALLEL: f64 = 1e-12;
 /// A contact up to this much before the start counts as one at the start.
-pub const EARLY: f64 = 1e-12;
+pub(crate) const EARLY: f64 = 1e-12;
 /// The time of contact with a triangle's plane, when it is used to skip the triangle.
-pub const PLANE: f64 = 1e-9;
+pub(crate) const PLANE: f64 = 1e-9;
 
 /// A triangle narrower than this share of its length has all its edges tested; one that is wider, only those that the
 /// center is outside of, or less than this share of the length inside of.
-pub const NARROW: f64 = 1e-6;
+pub(crate) const NARROW: f64 = 1e-6;
 /// Squared sine of an edge's angle with the motion below which both its ends are tested as well.
-pub const STEEP: f64 = 1e-6;
+pub(crate) const STEEP: f64 = 1e-6;
 /// A squared distance of this many times the squared radius is a miss, regardless of rounding.
-pub const CLEAR: f64 = 1.0 + 1e-12;
+pub(crate) const CLEAR: f64 = 1.0 + 1e-12;
 
 /// Every step of a cast that is not exact up to the last bits of an f64.
 pub const BUDGET: [Allowance; 8] = [

@@ -101,7 +101,12 @@ impl Surface {
 
     /// The [first contacts](Self::first_contact) of these origins if all of them touch; none as soon as one does not,
     /// which takes a part of the time.
-    pub fn all_contacts<const N: usize>(&self, origins: [DVec3; N], direction: DVec3, radius: f64) -> Option<[f64; N]> {
+    pub(crate) fn all_contacts<const N: usize>(
+        &self,
+        origins: [DVec3; N],
+        direction: DVec3,
+        radius: f64,
+    ) -> Option<[f64; N]> {
         let mut starts = [const { None }; N];
         for (start, origin) in starts.iter_mut().zip(origins) {
             *start = Some(self.start(origin, direction, radius)?);

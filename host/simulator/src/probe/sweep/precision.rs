@@ -59,13 +59,13 @@ mod single {
         pub type Real = f32;
         pub type Vector = glam::Vec3;
 
-        pub const EARLY: Real = 1e-6;
-        pub const FLAT: Real = 1e-4;
-        pub const PARALLEL: Real = 1e-6;
-        pub const PLANE: Real = 1e-5;
-        pub const NARROW: Real = 1e-3;
-        pub const STEEP: Real = 1e-3;
-        pub const CLEAR: Real = 1.0 + 1e-5;
+        pub(crate) const EARLY: Real = 1e-6;
+        pub(crate) const FLAT: Real = 1e-4;
+        pub(crate) const PARALLEL: Real = 1e-6;
+        pub(crate) const PLANE: Real = 1e-5;
+        pub(crate) const NARROW: Real = 1e-3;
+        pub(crate) const STEEP: Real = 1e-3;
+        pub(crate) const CLEAR: Real = 1.0 + 1e-5;
     }
 
     #[path = "narrow.rs"]

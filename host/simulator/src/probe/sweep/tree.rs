@@ -23,7 +23,7 @@ struct Node {
 const PACK: u32 = 1 << 31;
 
 /// A child that the sphere may touch.
-pub(super) struct Candidate {
+pub(super) struct Child {
     /// The sphere does not touch it before this.
     near: f32,
     /// When it is likely to be touched: the candidate where this is least is searched first.
@@ -108,10 +108,10 @@ impl Tree {
 
     /// The children of the root that the sphere may touch before `limit`.
     #[inline]
-    pub(super) fn candidates<const SCALE: u8>(&self, ray: &Ray, limit: f32) -> Vec<Candidate> {
+    pub(super) fn candidates<const SCALE: u8>(&self, ray: &Ray, limit: f32) -> Vec<Child> {
         // Every node on the way down leaves at most three siblings behind; obvhs trees are far less deep than this. A
         // kilobyte is also what allocators have at hand.
-        let mut stack = Vec::with_capacity(1024 / size_of::<Candidate>());
+        let mut stack = Vec::with_capacity(1024 / size_of::<Child>());
         self.visit::<SCALE>(0, ray, limit, &mut stack);
         stack
     }
@@ -121,10 +121,10 @@ impl Tree {
     #[inline]
     pub(super) fn resolve<const SCALE: u8>(
         &self,
-        &Candidate { near, link, place, .. }: &Candidate,
+        &Child { near, link, place, .. }: &Child,
         ray: &Ray,
         limit: f32,
-        stack: &mut Vec<Candidate>,
+        stack: &mut Vec<Child>,
     ) -> Option<&Pack> {
         // The limit may have become lower since the child was put there.
         if near > limit || self.passed::<SCALE>(place / WIDTH as u32, ray, limit) >> (place % WIDTH as u32) & 1 == 1 {
@@ -140,7 +140,7 @@ impl Tree {
     /// Puts the node's children that the sphere may touch before `limit` on the stack; the one that is expected to be
     /// touched first comes on top.
     #[inline]
-    fn visit<const SCALE: u8>(&self, index: u32, ray: &Ray, limit: f32, stack: &mut Vec<Candidate>) {
+    fn visit<const SCALE: u8>(&self, index: u32, ray: &Ray, limit: f32, stack: &mut Vec<Child>) {
         let node = &self.nodes[index as usize];
         let (mut near, mut met) = node.met::<SCALE>(ray, limit);
         let mut expected = near;
@@ -159,7 +159,7 @@ impl Tree {
             met &= met - 1;
             let (near, expected) = (near[child], expected[child]);
             let mut above = stack.len();
-            stack.push(Candidate {
+            stack.push(Child {
                 near,
                 expected,
                 link: node.children[child],
@@ -191,7 +191,7 @@ impl Tree {
 pub(super) struct Search {
     ray: Ray,
     scale: u8,
-    stack: Vec<Candidate>,
+    stack: Vec<Child>,
     /// Distance of the first contact so far.
     first: f64,
     /// The limit for boxes and packs.

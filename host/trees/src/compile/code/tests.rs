@@ -3,7 +3,7 @@
 use super::super::{Leaf, Settings, compile, emit_code, open};
 use super::{Chip, Form, Program};
 use crate::compile::{Compiled, EarlyExit, Language, Layout};
-use crate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree, computed};
+use crate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree, computed};
 use crate::rows::Rows;
 use palpate_shared::Descriptor;
 use palpate_shared::MISSING_FEATURE;
@@ -67,7 +67,7 @@ impl Random {
             inputs: self.inputs.clone(),
             objects: (0..self.objects).map(|object| format!("object {object}")).collect(),
             base_margins: (0..self.objects).map(|_| numbers.value(0.5)).collect(),
-            origin: Origin::default(),
+            origin: Provenance::default(),
         }
     }
 

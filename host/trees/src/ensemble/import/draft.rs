@@ -4,7 +4,7 @@ use super::draft_node::DraftNode;
 use super::options::{default_names, named};
 use super::spelled_out::spelled_out;
 use super::votes;
-use crate::ensemble::{Ensemble, Imported, Inputs, MAX_OBJECTS, Node, Origin, Output, Threshold, Tree, columns};
+use crate::ensemble::{Ensemble, Imported, Inputs, MAX_OBJECTS, Node, Output, Provenance, Threshold, Tree, columns};
 use crate::error::EnsembleProblem;
 use palpate_shared::format::Prediction;
 
@@ -82,7 +82,7 @@ impl Draft {
             thresholds,
             columns,
         };
-        let origin = Origin { imported: Some(imported), ..Origin::default() };
+        let origin = Provenance { imported: Some(imported), ..Provenance::default() };
         let ensemble = Ensemble { inputs: Inputs::Rows(features), objects, base_margins, trees, origin };
         ensemble.check()?;
         Ok(ensemble)

@@ -12,7 +12,7 @@
 //! | `palpate_objects` | a JSON array of the objects' names, in the order of the labels |
 //! | `palpate_background` | optional: `true` where the last object is a background, which is never named |
 //! | `palpate_prediction` | optional: what the library that trained an ensemble over rows makes of margins, and which numbers stand for a missing value there, a JSON object |
-//! | `palpate_…` | others are kept as they are: [`Origin::attributes`](super::Origin::attributes) |
+//! | `palpate_…` | others are kept as they are: [`Provenance::attributes`](super::Provenance::attributes) |
 //!
 //! What is read is checked as a whole before any of it is used: see [`Ensemble::load`]. UBJSON holds the same.
 
@@ -125,7 +125,7 @@ impl Ensemble {
         let path = Path::new("XGBoost's model");
         let mut document: Document =
             serde_json::from_slice(&without_literals(json)).map_err(|error| not_json(path, &error))?;
-        document.learner.attributes = write::attributes(&schema.into(), &objects, &super::Origin::default());
+        document.learner.attributes = write::attributes(&schema.into(), &objects, &super::Provenance::default());
         let options = Options { schemas: &[schema], ..Options::default() };
         document.into_ensemble(&options, "JSON").map_err(|problem| Error::at(Place::file(path), problem))
     }

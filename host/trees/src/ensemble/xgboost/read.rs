@@ -5,7 +5,7 @@ use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
 use super::trees::{Shape, has_sets, tree};
 use crate::ensemble::check::check_names;
 use crate::ensemble::import::options::{CATEGORIES, MISSING_UNKNOWN, Options, default_names, named, one_class};
-use crate::ensemble::{Ensemble, Imported, Inputs, Node, Origin, Schema, Tree, columns};
+use crate::ensemble::{Ensemble, Imported, Inputs, Node, Provenance, Schema, Tree, columns};
 use crate::error::EnsembleProblem;
 use palpate_shared::format::{Link as Inverse, Prediction};
 use std::collections::BTreeMap;
@@ -270,7 +270,7 @@ fn object_names(attributes: &Attributes) -> Result<Option<Vec<String>>, Ensemble
 }
 
 /// Facts about the training from the optional attributes.
-fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
+fn origin(attributes: &Attributes) -> Result<Provenance, EnsembleProblem> {
     let background = attributes.get("palpate_background").map(|text| {
         let expected = "true where the last object is a background, else false";
         parsed("palpate_background", expected, text)
@@ -278,7 +278,7 @@ fn origin(attributes: &Attributes) -> Result<Origin, EnsembleProblem> {
     // What the crate that trained it states, and this one does not read.
     let is_read = |name: &str| READ.contains(&name) || !name.starts_with("palpate_");
     let others = attributes.iter().filter(|(name, _)| !is_read(name));
-    Ok(Origin {
+    Ok(Provenance {
         background: background.transpose()?.unwrap_or_default(),
         imported: None,
         attributes: others.map(|(name, text)| (name.clone(), text.clone())).collect(),

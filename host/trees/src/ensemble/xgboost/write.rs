@@ -6,7 +6,7 @@ use super::schema::{
     Document, Flag, Forest, ForestParameters, GradientBooster, Learner, LearnerParameters, NO_CONDITION, NO_PARENT,
     TreeColumns, TreeParameters,
 };
-use crate::ensemble::{Ensemble, Imported, Inputs, Node, Origin, Output, Tree};
+use crate::ensemble::{Ensemble, Imported, Inputs, Node, Output, Provenance, Tree};
 use palpate_shared::format::Prediction;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -64,7 +64,7 @@ impl Document {
     }
 }
 
-pub(super) fn attributes(inputs: &Inputs, objects: &[String], origin: &Origin) -> BTreeMap<String, String> {
+pub(super) fn attributes(inputs: &Inputs, objects: &[String], origin: &Provenance) -> BTreeMap<String, String> {
     let names = serde_json::Value::from(objects.to_vec()).to_string();
     let mut attributes = BTreeMap::from([("palpate_objects".to_owned(), names)]);
     if let Some(schema) = inputs.schema() {
