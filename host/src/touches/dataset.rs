@@ -73,7 +73,7 @@ impl Dataset {
         }
     }
 
-    /// Removes contacts by the stroke of a probe, if a hand with this stroke explains all of them; else changes nothing.
+    /// The same by the stroke of a probe, if a hand with this stroke explains all contacts; otherwise as they are.
     pub fn delivered_by(&self, probe: &Probe) -> Cow<'_, Self> {
         let is_explained = |latest: f64| self.touches().all(|touch| f64::from(touch.spread()) <= latest);
         self.within(probe.window().filter(|_| probe.latest().is_some_and(is_explained)))

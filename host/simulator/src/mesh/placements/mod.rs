@@ -37,7 +37,7 @@ pub const SAME: f64 = 10.0;
 /// Placements of less weight are left out, except the second of an object that would have only one.
 pub const LEAST: f64 = 0.03;
 
-/// The second placement of an object is left out if it has less weight than this, regardless of the others.
+/// The second placement of an object is left out if it has less weight than this, whatever others there are.
 pub const LEAST_OF_TWO: f64 = 0.01;
 
 /// Weights are whole multiples of one in this many, so that they are the same in every file.

@@ -42,7 +42,7 @@ pub const PLANE: f64 = 1e-9;
 pub const NARROW: f64 = 1e-6;
 /// Squared sine of an edge's angle with the motion below which both its ends are tested as well.
 pub const STEEP: f64 = 1e-6;
-/// A squared distance of this many times the squared radius is a miss, regardless of rounding.
+/// A squared distance of this many times the squared radius is a miss, whatever rounding does.
 pub const CLEAR: f64 = 1.0 + 1e-12;
 
 /// Every step of a cast that is not exact up to the last bits of an f64.
