@@ -110,7 +110,7 @@ impl Tree {
     #[inline]
     pub(super) fn candidates<const SCALE: u8>(&self, ray: &Ray, limit: f32) -> Vec<Candidate> {
         // Every node on the way down leaves at most three siblings behind; obvhs trees are far less deep than this. A
-        // kilobyte is also a size that allocators keep ready.
+        // kilobyte is also what allocators have at hand.
         let mut stack = Vec::with_capacity(1024 / size_of::<Candidate>());
         self.visit::<SCALE>(0, ray, limit, &mut stack);
         stack
