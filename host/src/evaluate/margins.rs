@@ -48,9 +48,9 @@ pub(super) struct Tested<'m> {
     pub(super) touches: usize,
     /// For each touch of the data set its position among those that are evidence, if it is.
     pub(super) approaches: Vec<Option<u32>>,
-    /// Of each source and robot one: group i, and sequence i, is of pool i modulo their number.
+    /// One pool of each source and robot: group i, and sequence i, is of pool i modulo their number.
     pub(super) pools: Vec<TestedPool>,
-    /// Of the touches that are evidence.
+    /// Margins of the touches that are evidence.
     pub(super) values: Values<'m>,
 }
 
@@ -196,7 +196,7 @@ impl<'m> Margins<'m> {
         Ok(Self::with(candidate, descriptor, outputs, dataset))
     }
 
-    /// The same for objects that the model does not know: no verdict on them is right.
+    /// Like [`new`](Self::new), for objects that the model does not know: no verdict on them is right.
     ///
     /// # Errors
     /// As [`new`](Self::new), and [`EvaluateProblem::KnownObject`] if the model knows one.
@@ -248,7 +248,7 @@ impl<'m> Margins<'m> {
         }
     }
 
-    /// The same for a recognizer that is told how often each object is touched, which replaces the model's priors
+    /// Like [`new`](Self::new), for a recognizer told how often each object is touched, which replaces the model's priors
     /// ([`Recognizer::reset_to`]): `weights` are for the model's objects, in its order. Objects of weight 0 are not there:
     /// they cannot be recognized, and are not tested.
     ///
@@ -341,7 +341,7 @@ impl<'m> Margins<'m> {
         self.numbers.as_deref()
     }
 
-    /// Of the objects that can be named, the one with the most evidence; as the right output, if it is that of the tested
+    /// The object with the most evidence among those that can be named; as the right output, if it is that of the tested
     /// object.
     pub(super) fn best(&self, position: usize, evidence: &[f64]) -> usize {
         match self.numbers {
@@ -483,7 +483,7 @@ impl<'m> Margins<'m> {
     }
 }
 
-/// The pools of an object's touches, of which `approaches` says which are evidence.
+/// The pools of an object's touches; `approaches` says which are evidence.
 fn pools(touched: &ObjectTouches, approaches: &[Option<u32>]) -> Vec<TestedPool> {
     let pools = touched.pools();
     let evidence = |touches: &[u32]| -> Vec<u32> {
@@ -523,7 +523,7 @@ impl Tested<'_> {
     }
 }
 
-/// Where the margins of touch `touch` stand.
+/// Range of the margins of touch `touch`.
 pub(super) fn row(touch: usize, objects: usize) -> Range<usize> {
     touch * objects..(touch + 1) * objects
 }

@@ -7,12 +7,12 @@ use palpate_onboard::{Model, Stopping};
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
-/// Where sequences end.
+/// End of sequences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Until {
     /// After this number of touches.
     Touches(u32),
-    /// Where a name would be given at a threshold of misfit at this level, in nats; at the limit of touches at the latest.
+    /// When a threshold of misfit at this level, in nats, would give a name; at the limit of touches at the latest.
     Named { level: f64 },
 }
 

@@ -83,7 +83,7 @@ struct Trained<'m> {
     objects: usize,
     /// Touches of the data set.
     touches: usize,
-    /// Those of them that are evidence to the ensemble.
+    /// Number of these that are evidence to the ensemble.
     used: usize,
     counted: &'static str,
     trees: usize,

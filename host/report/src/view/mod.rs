@@ -172,14 +172,14 @@ fn captioned(placement: &Placement) -> String {
 /// One approach, for the page's script.
 #[derive(serde::Serialize)]
 struct Drawn {
-    /// Where each finger starts.
+    /// Start of each finger.
     starts: [[f64; 3]; FINGERS],
     direction: [f64; 3],
     /// Distance of each finger to its contact, in units; null if it misses.
     distances: [Option<f64>; FINGERS],
     /// When each finger touches, in seconds after the first; null if it misses.
     times: [Option<f64>; FINGERS],
-    /// Where the approach ends at the table; infinite if it floats.
+    /// End of the approach at the table; infinite if it floats.
     #[serde(skip)]
     end: f64,
 }
