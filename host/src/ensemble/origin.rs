@@ -92,7 +92,7 @@ impl TouchOrigin {
         }
     }
 
-    /// The same as [`state`](Self::state), of an ensemble that states nothing else but which touches are evidence.
+    /// Like [`state`](Self::state), for an ensemble that states nothing else but which touches are evidence.
     pub fn origin(&self, trained: Option<Trained>) -> Origin {
         let mut origin = Origin { trained, ..Origin::default() };
         self.state(&mut origin);
