@@ -30,7 +30,7 @@ pub struct Terms {
     pub rate: f64,
     /// The probability that the rate is kept.
     pub confidence: f64,
-    /// Cases for which the rate is promised.
+    /// Of what the rate is promised.
     pub per: Per,
 }
 
@@ -50,7 +50,7 @@ impl Way<'_> {
     }
 }
 
-/// So many starts, the first of them the strictest, in equal steps: for use without any hint of the best one.
+/// So many starts, the first of them the strictest, in equal steps: where nothing says which would do best.
 pub(super) fn spread(strictest: f64, count: usize, rate: f64) -> Vec<f64> {
     let beyond = strictest - ((1.0 - rate) / rate).ln();
     let step = beyond.max(SPREAD) / count.max(1) as f64;
@@ -64,9 +64,9 @@ pub struct Chosen {
     pub odds: Odds,
     /// Wrong names of those given: one tally for an average, one for each object otherwise.
     pub tallies: Vec<Tally>,
-    /// Wrong ones of the names given to each object, regardless of the promise's cases.
+    /// Of the names given to each object, those that were wrong, whatever the rate is promised of.
     pub touched: Vec<Tally>,
-    /// Wrong ones of the times that each object was named, regardless of the promise's cases.
+    /// Of the times that each object was named, those when another was touched, whatever the rate is promised of.
     pub named: Vec<Tally>,
     /// Sequences that were tested on; with thresholds by name, without those that these were learned on.
     pub sequences: usize,
@@ -109,7 +109,7 @@ pub(crate) fn share_tested(per: Per) -> f64 {
     if per == Per::Name { 1.0 - share } else { 1.0 }
 }
 
-/// Like [`choose`], along a given way, from sequences that used up the `supplied` touches, if they did.
+/// The same of sequences that used up what was `supplied`, if they did.
 pub(super) fn chosen(
     sequences: &[Sequence],
     objects: &[String],
@@ -151,7 +151,7 @@ fn kept<'s>(
     Ok((kept, tested))
 }
 
-/// Like [`choose`], from independent sequences that were not drawn from a supply; `objects` is the number of objects.
+/// The same as [`choose`] of independent sequences that were not drawn from a supply; `objects` is the number of objects.
 ///
 /// # Errors
 /// [`Stop`], if no threshold can be kept.

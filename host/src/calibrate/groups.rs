@@ -34,9 +34,9 @@ pub struct Grouped<'s> {
 /// Losses of the groups that have one.
 #[derive(Clone, Debug, Default)]
 struct Losses {
-    /// Mean of each group over its sequences.
+    /// Of each group: the mean over its sequences.
     of: Vec<f64>,
-    /// Share of each group's sequences that got a name.
+    /// Of each group: the share of its sequences that got a name.
     named: Vec<f64>,
 }
 

@@ -30,7 +30,7 @@ pub(crate) const STRICTEST: [f64; 2] = [2.5, 10.0];
 pub struct Settings {
     /// The error rate: wrong names of those that are given.
     pub rate: f64,
-    /// Cases for which the rate is promised.
+    /// Of what the rate is promised.
     pub per: Per,
     /// The probability that the rate is kept.
     pub confidence: f64,
@@ -183,7 +183,7 @@ pub fn calibrate(
     calibrate_from(model, dataset, settings, None, progress)
 }
 
-/// Start of a calibration that other touches suggest.
+/// Where a calibration begins that other touches say something of.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Start {
     /// The threshold at which the walk begins, as a margin in nats.
@@ -222,7 +222,7 @@ pub(crate) fn calibrate_from(
 /// loosest one at which it passes with nearly the greatest probability, up to where a calibration that knows nothing begins.
 ///
 /// # Errors
-/// Errors of [`calibrate`], except for a rate that is not kept.
+/// As [`calibrate`], but for a rate that is not kept.
 pub(crate) fn begin(
     model: &Model<'_>,
     mut part: Dataset,

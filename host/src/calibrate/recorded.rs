@@ -33,7 +33,7 @@ use palpate_onboard::{Model, Stopping};
 
 /// The probability with which a forecast number of approaches is enough, if the simulation is right.
 pub(super) const LIKELY: f64 = 0.8;
-/// Share of the greatest probability of passing: of the first thresholds that reach it, the strictest is taken.
+/// Of first thresholds that pass with nearly the same probability, to this share, the strictest is taken.
 const AS_LIKELY: f64 = 0.95;
 /// A probability below which recordings that make too few names are not tested at all.
 const HOPELESS: f64 = 0.01;
@@ -187,7 +187,7 @@ struct Foreseen {
 }
 
 impl Foreseen {
-    /// Forecast for recorded objects with these outputs.
+    /// Of recorded objects with these outputs.
     fn new(sequences: &[Sequence], steps: &[Odds], by: By, recorded: &Dataset, outputs: &[Vec<usize>]) -> Self {
         let all: Vec<&Sequence> = sequences.iter().collect();
         let object = |output: usize| outputs.iter().position(|own| own.contains(&output));
@@ -219,8 +219,8 @@ impl Foreseen {
         self.best(1.0, terms.rate, terms.confidence).1
     }
 
-    /// The threshold that the simulation would choose, if hardly any threshold can pass because the recordings make too few
-    /// names.
+    /// Where hardly any threshold can pass because the recordings make too few names, the threshold that the simulation would
+    /// choose.
     fn too_few(&self, terms: &Terms) -> Option<usize> {
         let chosen = self.steps.iter().rposition(|step| step.error() <= terms.rate).unwrap_or(0);
         let step = self.steps.get(chosen)?;

@@ -47,7 +47,7 @@ pub struct Kept<T> {
     pub tallies: Vec<Tally>,
 }
 
-/// Reason for a walk to end without a threshold that is kept.
+/// Where a walk ended without a threshold that is kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// This tally could not have passed without any error at any threshold; the cases that it had at most.

@@ -48,7 +48,7 @@ pub(super) struct Tested<'m> {
     pub(super) touches: usize,
     /// For each touch of the data set its position among those that are evidence, if it is.
     pub(super) approaches: Vec<Option<u32>>,
-    /// One pool of each source and robot: group i, and sequence i, is of pool i modulo their number.
+    /// Of each source and robot one: group i, and sequence i, is of pool i modulo their number.
     pub(super) pools: Vec<TestedPool>,
     /// Margins of the touches that are evidence.
     pub(super) values: Values<'m>,
@@ -196,7 +196,7 @@ impl<'m> Margins<'m> {
         Ok(Self::with(candidate, descriptor, outputs, dataset))
     }
 
-    /// Like [`new`](Self::new), for objects that the model does not know: no verdict on them is right.
+    /// The same for objects that the model does not know: no verdict on them is right.
     ///
     /// # Errors
     /// As [`new`](Self::new), and [`EvaluateProblem::KnownObject`] if the model knows one.
@@ -341,7 +341,7 @@ impl<'m> Margins<'m> {
         self.numbers.as_deref()
     }
 
-    /// The object with the most evidence among those that can be named; as the right output, if it is that of the tested
+    /// Of the objects that can be named, the one with the most evidence; as the right output, if it is that of the tested
     /// object.
     pub(super) fn best(&self, position: usize, evidence: &[f64]) -> usize {
         match self.numbers {
@@ -483,7 +483,7 @@ impl<'m> Margins<'m> {
     }
 }
 
-/// The pools of an object's touches; `approaches` says which are evidence.
+/// The pools of an object's touches, of which `approaches` says which are evidence.
 fn pools(touched: &ObjectTouches, approaches: &[Option<u32>]) -> Vec<TestedPool> {
     let pools = touched.pools();
     let evidence = |touches: &[u32]| -> Vec<u32> {

@@ -35,7 +35,7 @@ pub struct Sequential {
     pub error_rate: f64,
     /// The error rate that the model promises; none for thresholds that nothing was calibrated for.
     pub promised: Option<f64>,
-    /// Cases for which it is promised: "average", "name" or "object".
+    /// Of what it is promised: "average", "name" or "object".
     pub per: Option<&'static str>,
     /// Touches after which it gave up.
     pub max_touches: u32,

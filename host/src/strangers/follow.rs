@@ -12,7 +12,7 @@ use rayon::prelude::*;
 pub(super) enum Until {
     /// After this number of touches.
     Touches(u32),
-    /// When a threshold of misfit at this level, in nats, would give a name; at the limit of touches at the latest.
+    /// Where a name would be given at a threshold of misfit at this level, in nats; at the limit of touches at the latest.
     Named { level: f64 },
 }
 

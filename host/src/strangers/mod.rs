@@ -103,7 +103,7 @@ pub struct Calibrated {
     pub bytes: Vec<u8>,
     /// Terms that are the same for all objects.
     pub terms: MisfitTerms,
-    /// Number of the sequences that tested the threshold and ended as unknown.
+    /// Of the sequences that the threshold was tested on, those that ended as unknown.
     pub alarms: usize,
     /// Touches used on average in these sequences.
     pub mean_touches: f64,
@@ -165,9 +165,9 @@ pub fn calibrate(
     calibrate_on(model, dataset, None, shapes, settings)
 }
 
-/// Like [`calibrate`], with `recorded` touches of every object: half of them show, beside the simulated ones of `dataset`,
-/// what touches of each object give, and the other half tests the threshold too. The stricter threshold of both is taken.
-/// If recordings are too few for the share of `settings`, the model states the share that they support.
+/// The same, with `recorded` touches of every object: half of them say, beside the simulated ones of `dataset`, what touches
+/// of each object give, and the other half tests the threshold too. The stricter threshold of both is taken. Where the
+/// recordings are too few for the share of `settings`, the share that the model states is the one that they support.
 ///
 /// # Errors
 /// As [`calibrate`].
@@ -198,7 +198,7 @@ fn calibrate_on(
     calibrate_supplies(model, given, recorded, &of_shapes(model, shapes), settings)
 }
 
-/// Calibrates on margins: of each known object, recorded ones too if there are some, and the mean ones of other shapes.
+/// The same of margins: of each known object, recorded ones too if there are some, and the mean ones of other shapes.
 pub(crate) fn calibrate_supplies(
     model: &Model<'_>,
     given: Vec<Supply>,
@@ -382,7 +382,7 @@ fn supply(model: &Model<'_>, touched: &ObjectTouches, seed: u64) -> Supply {
     Supply { pools: (0..).zip(touched.pools()).map(pool).collect(), is_once, is_short: false }
 }
 
-/// The touches that the model takes as evidence.
+/// Those of the touches that the model takes as evidence.
 fn evidence<'d>(model: &Model<'_>, touches: impl Iterator<Item = &'d Touch>) -> impl Iterator<Item = &'d Touch> {
     let trained = model.trained_touches();
     touches.filter(move |touch| Refused::check(&trained, touch).is_ok())
