@@ -272,7 +272,7 @@ fn html(
                     div { dt { "Closed" } dd.warning[!facts.is_closed()] { (facts.closed()) } }
                     div { dt { "Right side out" } dd.warning[!facts.is_right_side_out()] { (facts.side()) } }
                     @if !object.points.is_empty() { div { dt { "Points" } dd {
-                        (count(object.points.len())) ", of which the surface was made"
+                        (count(object.points.len())) ", which the surface was made from"
                     } } }
                     @if facts.parts.len() > 1 { div { dt { "Parts" } dd { (count(facts.parts.len())) } } }
                     div { dt { "Size in the file" } dd {
