@@ -29,7 +29,7 @@ pub struct Parts {
     parts: [Vec<u8>; 7],
     /// Optional sections: their tags as they stand there, and their contents.
     sections: Vec<(u16, Vec<u8>)>,
-    /// Bytes after them that are no whole section.
+    /// Bytes after them that are not a whole section.
     tail: Vec<u8>,
 }
 
@@ -37,7 +37,7 @@ impl Parts {
     /// Takes a model apart.
     ///
     /// # Panics
-    /// If it is none.
+    /// If it is not a model.
     pub fn of(model: &[u8]) -> Self {
         let [optional, margins, axes, cuts, groups, splits, leaves, end] = places(model);
         let part = |start: usize, end: usize| model[start..end].to_vec();

@@ -90,7 +90,7 @@ impl<'a> Plain<'a> {
     /// Reads a model.
     ///
     /// # Panics
-    /// Anywhere, if the bytes are none.
+    /// Anywhere, if the bytes are not a model.
     pub fn new(bytes: &'a [u8]) -> Self {
         let field = |at: usize, length: usize| number(&bytes[at..at + length]);
         let (layout, leaf, descriptor, objects) = (bytes[6], bytes[7], bytes[12], usize::from(bytes[14]) + 1);

@@ -19,7 +19,7 @@ const VECTORS: &str = include_str!("../../shared/vectors/vectors.txt");
 /// The test vectors' models: every layout, type of leaf, and descriptor, and rows of features; and the real one.
 ///
 /// # Panics
-/// If a model is none.
+/// If a model is invalid.
 pub fn models() -> Vec<Vec<u8>> {
     let words = VECTORS.lines().filter_map(|line| line.strip_prefix("model "));
     let models = words.map(|words| vectors::bytes(words.split(' ').next().expect("bytes")));
@@ -202,7 +202,7 @@ fn row(features: usize, rng: &mut SmallRng) -> Vec<i32> {
 /// Touches, or rows, of a model that is open, and now and then what else there is to ask.
 ///
 /// # Panics
-/// If a model is none.
+/// If a model is invalid.
 pub fn play(script: &mut Script<'_>, count: usize, rng: &mut SmallRng) {
     let model = *script.recognizer().model();
     let objects = model.object_count();
@@ -250,7 +250,7 @@ pub fn sealed(bytes: &mut [u8]) {
 /// Models, and this many touches and rows in all.
 ///
 /// # Panics
-/// If a model is none.
+/// If a model is invalid.
 pub fn script<'m>(models: &'m [Vec<u8>], touches: usize, rows: usize, rng: &mut SmallRng) -> Script<'m> {
     let is_touches = |bytes: &&Vec<u8>| bytes[12] != 255;
     let of_touches = models.iter().filter(is_touches).count();
@@ -272,7 +272,7 @@ pub fn script<'m>(models: &'m [Vec<u8>], touches: usize, rows: usize, rng: &mut 
 /// Every model as it is and with all sections.
 ///
 /// # Panics
-/// If a model is none.
+/// If a model is invalid.
 pub fn all_models(rng: &mut SmallRng) -> Vec<Vec<u8>> {
     let models = models();
     let stated: Vec<Vec<u8>> = models.iter().map(|bytes| with_all_sections(bytes, rng)).collect();

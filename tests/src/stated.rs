@@ -16,7 +16,7 @@ impl Readme {
     /// Reads one, by its path in the repository.
     ///
     /// # Panics
-    /// If there is none.
+    /// If it cannot be read.
     pub fn open(path: &str) -> Self {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
         let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));

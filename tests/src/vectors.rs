@@ -13,7 +13,7 @@ pub fn hex(bytes: &[u8]) -> String {
 /// The bytes again.
 ///
 /// # Panics
-/// If they are none.
+/// If they are malformed.
 pub fn bytes(hex: &str) -> Vec<u8> {
     if hex == "-" {
         return Vec::new();
@@ -31,7 +31,7 @@ pub fn numbers(numbers: &[i32]) -> String {
 /// The numbers again.
 ///
 /// # Panics
-/// If they are none.
+/// If they are malformed.
 pub fn read_numbers(words: &str) -> Vec<i32> {
     let number = |word: &str| if word == "-" { MISSING_FEATURE } else { word.parse().expect("a number") };
     if words == "." { Vec::new() } else { words.split(' ').map(number).collect() }
@@ -49,7 +49,7 @@ pub fn touch_words(touch: &Touch) -> String {
 /// The touch again.
 ///
 /// # Panics
-/// If it is none.
+/// If it is malformed.
 pub fn read_touch(words: &str) -> Touch {
     let words: Vec<&str> = words.split(' ').collect();
     let time = |word: &str| match word {
@@ -95,7 +95,7 @@ impl Cut {
     /// Reads the words of a line.
     ///
     /// # Panics
-    /// If they are none.
+    /// If they are malformed.
     pub fn read(words: &str) -> Self {
         let words: Vec<&str> = words.split(' ').collect();
         let number = |word: &str| word.parse().expect("a number");

@@ -562,7 +562,7 @@ fn two_models_in_one_file_say_which_lines_make_room_for_both_and_compile_with_th
         put("program.c", &format!("{lines}{includes}{uses}"));
         compile(&compiler, &[], directory.path().join("program.c").to_str().unwrap(), &program)
     };
-    // As the messages say, line by line, until there is none.
+    // As the messages say, line by line, until there are no more messages.
     let mut lines = String::new();
     let mut said = 0;
     while let Err(message) = compiled(&lines) {

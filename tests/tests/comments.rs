@@ -11,7 +11,7 @@ const FOLDERS: [&str; 5] = ["shared", "onboard", "host", "tests", "fuzz"];
 /// Words that begin a question where the reader looks for the thing.
 const QUESTIONS: [&str; 5] = ["What", "How", "Whether", "Which", "Why"];
 
-/// Adds the sources under a folder; what a build or an interpreter leaves behind is none.
+/// Adds the sources under a folder; remains of a build or an interpreter do not count.
 fn add_sources(folder: &Path, sources: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
         let path = entry.unwrap().path();

@@ -357,7 +357,7 @@ fn run_gpio(
         let read = uart.read(&mut buffer).unwrap();
         assert!(read > 0, "the emulator has ended, or half an hour is over");
         for &byte in &buffer[..read] {
-            // A frame in which the power went is none.
+            // A frame in which the power went does not count.
             let Some(Ok(frame)) = decoder.feed(byte) else { continue };
             let Message::Event { boot, sequence, event } = frame.message else { continue };
             if each(boot, sequence, event).is_break() {

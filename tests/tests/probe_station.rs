@@ -343,7 +343,7 @@ fn a_pose_is_none_where_the_touch_was_over_before_anybody_looked_and_another_was
     bench.approach(start, [Some(0), Some(300_000), None], 500_000);
     let happened = run(&mut station, &mut bench, start + APPROACH);
     assert_eq!(posed(&happened), [(Some(POSES[1]), Some(0))]);
-    // An old one is none.
+    // An old one does not count.
     let start = bench.now;
     bench.poses = vec![(start - ProbeSettings::default().pose_lasts - 1, POSES[1])];
     bench.approach(start, [Some(0), Some(300_000), None], 500_000);

@@ -153,12 +153,12 @@ fn a_changed_byte_of_the_section_is_refused_or_can_be_walked() {
     }
 }
 
-/// Units of what a touch speaks for an object by: the largest power of two that is at most a nat.
+/// Units by which a touch speaks for an object: the largest power of two that is at most a nat.
 fn step(model: &Model<'_>) -> i32 {
     1 << ((1.0 / model.unit()) as i32).ilog2()
 }
 
-/// A model with a misfit test in which a touch of an object speaks by a step for it against each other one, and nothing else fits.
+/// A model with a misfit test that only touches fit which speak by a step for an object against each other one.
 fn strict() -> Vec<u8> {
     let bytes = model();
     let step = step(&Model::new(&bytes).unwrap());

@@ -32,7 +32,7 @@ use std::time::Instant;
 
 /// Numbers of touches after which accuracy is reported.
 const AT: [usize; 6] = [1, 5, 10, 20, 30, 60];
-/// Those of them that the table shows.
+/// Numbers of these that the table shows.
 const TABLE_AT: [usize; 2] = [10, 30];
 /// Numbers of approaches after which accuracy is reported.
 const AT_APPROACHES: [usize; 3] = [10, 20, 60];
@@ -53,7 +53,7 @@ const PLAY: &str = "play.html";
 /// Settings of a run.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// Where the objects come from; the results state it.
+    /// Sources of the objects; the results state them.
     pub sources: Vec<String>,
     /// True to replace another run's or a report's results.
     pub replace: bool,
@@ -112,7 +112,7 @@ pub struct Summary {
     pub approach_capture: capture::Summary,
     /// Full touches trained on and tested on, of all objects together.
     pub touches: Touches,
-    /// The same of approaches.
+    /// Approaches trained on and tested on, of all objects together.
     pub approaches: Touches,
     /// The published method: contact times of full touches.
     pub paper: Method,
@@ -544,7 +544,7 @@ mod tests {
             serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
         assert_eq!(written["full"]["sequential"]["undecided"], serde_json::json!(evaluation.sequential.undecided));
         assert_eq!(written["full"]["approaches"]["sequential"]["undecided"], serde_json::json!(undecided));
-        // Every stage is timed, and what is not in one is next to nothing.
+        // Every stage is timed, and the rest takes next to nothing.
         let stages = written["stages"].as_array().unwrap();
         assert_eq!(stages.len(), 3 + 3 * 5, "{stages:#?}");
         assert!(stages.iter().all(|stage| stage["seconds"].as_f64().unwrap() >= 0.0));

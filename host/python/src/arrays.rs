@@ -117,7 +117,7 @@ pub(crate) fn taken<'v, V: Copy>(
     Ok(values.chunks_exact(found).flat_map(|row| used.iter().filter_map(|&column| row.get(column).copied())).collect())
 }
 
-/// The positions of features among columns with these names, and what to know about that.
+/// The positions of features among columns with these names, and a note about them.
 pub(crate) fn columns(features: &Features, header: &[String]) -> palpate::Result<(Vec<usize>, Option<&'static str>)> {
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     let matched = features.among(&header, &[])?;

@@ -157,7 +157,7 @@ impl Ensemble {
         notes(&self.ensemble, None)
     }
 
-    /// The positions of the features among columns with these names, and what to know about that.
+    /// The positions of the features among columns with these names, and a note about them.
     fn _columns(&self, header: Vec<String>) -> Result<(Vec<usize>, Option<&'static str>), Failure> {
         Ok(columns(&Features::from(&*self.ensemble), &header)?)
     }

@@ -186,7 +186,7 @@ impl Model {
         self.notes.clone()
     }
 
-    /// The positions of the features among columns with these names, and what to know about that.
+    /// The positions of the features among columns with these names, and a note about them.
     fn _columns(&self, header: Vec<String>) -> Result<(Vec<usize>, Option<&'static str>), Failure> {
         Ok(columns(&self.features, &header)?)
     }

@@ -122,7 +122,7 @@ impl Recognizer {
         self.say(py, pushed)
     }
 
-    /// Takes in a row of features, for a model over those; NaN where one is missing. Of a series of pandas the features are
+    /// Takes in a row of features, for a model over those, with NaN for a missing one. The features of a pandas series are
     /// found by their names.
     #[pyo3(signature = (row))]
     fn push_row<'py>(slf: &Bound<'py, Self>, row: ArrayLike<'py>) -> Result<objects::Verdict<'py>, Failure> {
@@ -139,7 +139,7 @@ impl Recognizer {
         own.say(py, pushed)
     }
 
-    /// The positions of the features among columns with these names, and what to know about that.
+    /// The positions of the features among columns with these names, and a note about them.
     fn _columns(&self, header: Vec<String>) -> Result<(Vec<usize>, Option<&'static str>), Failure> {
         Ok(columns(&self.features, &header)?)
     }

@@ -207,8 +207,8 @@ def test_a_limit_of_no_rows_is_called_by_its_name() -> None:
 
 
 class PerRow(palpate.SequenceRecognizer):
-    """What scikit-learn's checks can call: they know no sequences, so that each row is one of its own. Their labels are drawn by
-    chance, of which nothing can be promised, so that here the first column says the class."""
+    """Callable by scikit-learn's checks: these know no sequences, so each row is one of its own. Their labels are random, so
+    nothing can be promised, and here the first column says the class."""
 
     def fit(self, X: Any, y: Any, *, sequence: Any = None, groups: Any = None) -> PerRow:
         if y is not None and np.ndim(X) == 2 and not hasattr(X, "toarray") and np.shape(X)[1] > 0:

@@ -27,7 +27,7 @@ use std::ops::Range;
 
 /// Numbers of approaches after which accuracy is shown.
 const AT: [usize; 9] = [5, 10, 20, 30, 40, 60, 90, 120, 200];
-/// Those of them that tables show.
+/// Numbers of approaches that tables show.
 const TABLE_AT: [usize; 3] = [10, 20, 60];
 /// The posterior that a recognizer waits for is 1 minus this.
 const ERROR_RATE: f64 = 0.01;
@@ -67,7 +67,7 @@ struct Way {
     accuracy: Vec<Option<(f64, f64)>>,
     /// Approaches to a verdict, and their standard error.
     approaches: (f64, f64),
-    /// The same for each object.
+    /// Accuracy for each object.
     per_object: Vec<f64>,
     wrong: f64,
     undecided: f64,

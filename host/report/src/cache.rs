@@ -16,7 +16,7 @@ use std::time::{Instant, SystemTime};
 
 const CHECKSUM: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
 
-/// Where a report keeps the results of its stages.
+/// Directory in which a report keeps the results of its stages.
 pub(super) const DIRECTORY: &str = ".stages";
 
 /// Results of stages, kept in a directory.
@@ -76,7 +76,7 @@ impl Cache {
         Ok(stage)
     }
 
-    /// Where the file of something that belongs to this report is kept.
+    /// Path of the file of something that belongs to this report.
     pub(super) fn path(&self, name: &str, extension: &str) -> PathBuf {
         self.directory.join(format!("{name}{}{extension}", self.suffix()))
     }
@@ -96,7 +96,7 @@ struct Surroundings {
 }
 
 impl Surroundings {
-    /// Those of this process. If the program's file cannot be read, nothing is reused. Where another
+    /// Versions of this process. If the program's file cannot be read, nothing is reused. Where another
     /// program loads this library, the library is identified by its version alone.
     fn here() -> Self {
         let mut program = CHECKSUM.digest();

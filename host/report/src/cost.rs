@@ -265,7 +265,7 @@ fn figure(
     })
 }
 
-/// Where the instructions on a Cortex-M4F and on a Cortex-M0+ come from.
+/// Sources of the instructions on a Cortex-M4F and on a Cortex-M0+.
 fn sources(members: &[Member]) -> [&'static str; 2] {
     members.first().map_or(["estimated"; 2], |member| {
         [member.instructions.m4f, member.instructions.m0_plus].map(|count| count.source())

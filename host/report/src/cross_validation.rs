@@ -42,7 +42,7 @@ pub(super) struct Fold {
 pub(super) struct MethodFold {
     /// Accuracy over the paper's few groups per object.
     pub(super) few: Vec<f64>,
-    /// The same for each object.
+    /// Accuracies for each object.
     pub(super) few_of_object: Vec<Vec<f64>>,
     /// Accuracy over many groups.
     pub(super) many: Vec<f64>,

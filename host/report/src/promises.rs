@@ -73,7 +73,7 @@ struct Stopped {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct OfObject {
     name: String,
-    /// Of a promise on average, and of one per name; none where there were too few sequences for it.
+    /// Meanings of a promise on average, and of one per name; none where there were too few sequences for it.
     promised: [Option<Meaning>; 2],
 }
 
@@ -181,7 +181,7 @@ fn stopped(sequences: &[Sequence], odds: &Odds) -> Stopped {
     Stopped { margin, touches: touches / all, error, low, high, undecided: 1.0 - given / all }
 }
 
-/// The same with the error of the worst of the groups that `of` (sequence, name given) divides the names into.
+/// Results with the error of the worst of the groups that `of` (sequence, name given) divides the names into.
 fn worst(sequences: &[Sequence], groups: usize, odds: &Odds, of: &dyn Fn(&Sequence, usize) -> usize) -> Stopped {
     let mut tallies = vec![(0.0, 0.0); groups];
     for sequence in sequences {

@@ -85,7 +85,7 @@ const EXTENTS: [Extent; 15] = [
 /// Settings of a report. A change of any of these but the command and the parts starts it from the beginning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// Where the objects come from: see [`palpate::mesh::source::objects`].
+    /// Sources of the objects: see [`palpate::mesh::source::objects`].
     pub sources: Vec<String>,
     /// The command that remakes the report, as its page shows it; may be empty.
     pub command: String,

@@ -91,7 +91,7 @@ struct Names {
     /// Those seen, each sequence of a group weighing as much, and the wrong ones.
     wrong: f64,
     given: f64,
-    /// Those that are expected where it is tested.
+    /// Names expected where it is tested.
     expected: f64,
 }
 

@@ -331,8 +331,8 @@ pub(super) fn learned(sequences: &[&Sequence], count: usize, strictest: f64, rat
     }
 }
 
-/// Thresholds by name about the learned ones, from strict to loose: all names' by as much. So many starts are in equal steps
-/// above the learned ones.
+/// Thresholds by name about the learned ones, from strict to loose: all names' by the same step. So many starts are in equal
+/// steps above the learned ones.
 fn around(learned: &[f64], strictest: f64, starts: usize) -> Steps {
     let [strict, loose] = AROUND;
     let step = STEP * NAMES_STEP as f64;

@@ -174,7 +174,7 @@ pub struct Remedy {
 }
 
 impl Remedy {
-    /// Of this tally of names, of sequences that used up what was `supplied`, or of `sequences` that did not.
+    /// Error for this tally of names, of sequences that used up the `supplied` touches, or of `sequences` that did not.
     pub(super) fn new(
         tally: Tally,
         &Terms { rate, confidence, .. }: &Terms,
@@ -252,7 +252,7 @@ pub struct Enough {
     pub all: u64,
     /// Approaches to the object that takes the fewest, and its name.
     pub least: (u64, String),
-    /// The same of the object that takes the most.
+    /// Touches of the object that takes the most.
     pub most: (u64, String),
 }
 

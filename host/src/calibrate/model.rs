@@ -192,7 +192,7 @@ pub(crate) struct Start {
     pub(crate) loosest: Option<Odds>,
 }
 
-/// The same from a start that is given, instead of one that a few sequences suggest.
+/// Like [`calibrate`], from a given start instead of one that a few sequences suggest.
 ///
 /// # Errors
 /// As [`calibrate`].

@@ -82,7 +82,7 @@ impl Journal {
     /// Begins a journal. A journal of this name is replaced, not emptied: its other readers can still read the rest of it.
     ///
     /// # Errors
-    /// When the file cannot be written, and [`Foreign`](crate::error::Foreign) if one is there that is no journal.
+    /// When the file cannot be written, and [`Foreign`](crate::error::Foreign) if a file there is not a journal.
     pub fn create(path: &Path) -> Result<Self> {
         output::refuse_foreign(path)?;
         let io = |source| Error::io(path, "write the journal", source);

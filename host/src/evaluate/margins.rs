@@ -50,7 +50,7 @@ pub(super) struct Tested<'m> {
     pub(super) approaches: Vec<Option<u32>>,
     /// Of each source and robot one: group i, and sequence i, is of pool i modulo their number.
     pub(super) pools: Vec<TestedPool>,
-    /// Of the touches that are evidence.
+    /// Margins of the touches that are evidence.
     pub(super) values: Values<'m>,
 }
 
@@ -266,7 +266,7 @@ impl<'m> Margins<'m> {
         }
     }
 
-    /// The same for a recognizer that is told how often each object is touched, which replaces the model's priors
+    /// Like [`new`](Self::new), for a recognizer told how often each object is touched, which replaces the model's priors
     /// ([`Recognizer::reset_to`]): `weights` are for the model's objects, in its order. Objects of weight 0 are not there:
     /// they cannot be recognized, and are not tested.
     ///
@@ -541,7 +541,7 @@ impl Tested<'_> {
     }
 }
 
-/// Where the margins of touch `touch` stand.
+/// Range of the margins of touch `touch`.
 pub(super) fn row(touch: usize, objects: usize) -> Range<usize> {
     touch * objects..(touch + 1) * objects
 }

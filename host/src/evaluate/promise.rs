@@ -17,7 +17,7 @@ pub enum Finding {
     /// The measured error rate is at most the promised one.
     Kept,
     /// It is above, but if the promise were just kept, more errors than these would be no surprise: their probability is
-    /// at least 1 % (binomial; divided by the number of names or objects, of which the worst is looked at).
+    /// at least 1 % (binomial; divided by the number of names or objects, since the worst is looked at).
     Unclear,
     /// It is above by more than that.
     Broken,

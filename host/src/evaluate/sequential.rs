@@ -59,7 +59,7 @@ pub struct Sequential {
     pub undecided_per_object: BTreeMap<String, f64>,
     /// Share of wrong names among those given; not a number if there are none.
     pub error_of_given: f64,
-    /// The same of those given to each object; without objects that never got a name.
+    /// Share of wrong names among those given to each object; without objects that never got a name.
     pub error_of_given_per_object: BTreeMap<String, f64>,
     /// Objects of whose names more are wrong than [`Sequential::error_rate`], by more than chance.
     pub above: Vec<String>,

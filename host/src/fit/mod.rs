@@ -1,26 +1,26 @@
-//! Fit of a probe to recorded touches: its speed, its fingers' offsets, its noise, what it misses, its timer; fingers that
-//! bend aside at flat angles.
+//! Fit of a probe to recorded touches: its speed, its fingers' offsets, its noise, the contacts that it misses, its timer,
+//! and fingers that bend aside at flat angles.
 //!
-//! The recorded touches are of objects whose meshes are known. Each object is touched in the simulator once, many
-//! times, with the probe as it should be; a candidate probe's distortion is then applied to the simulated touches'
-//! density, which is cheap, and the candidate under which the recorded touches are likeliest is the fit (maximum
-//! likelihood with a weak preference for probes with small errors, by Nelder–Mead from several starts). Full and
-//! partial touches count, and approaches that touched nothing; where the pose was recorded, each touch is compared with
-//! approaches in its pose. Intervals are those of 95 % by profile likelihood (Wilks' theorem), made wider by
-//! experience: the tables are simulated and smoothed. What the simulation does not know, such as a finger that is bent
-//! aside, is in no interval.
+//! The recorded touches are of objects with known meshes. Each object is touched in the simulator once, many times, with
+//! the nominal probe. The distortion of a candidate probe is then applied to the density of the simulated touches, which
+//! is cheap. The fit is the candidate under which the recorded touches are likeliest (maximum likelihood with a weak
+//! preference for probes with small errors, by Nelder–Mead from several starts). Full and partial touches count, and
+//! approaches that touched nothing; if the pose was recorded, each touch is compared with approaches in its pose.
+//! Intervals are those of 95 % by profile likelihood (Wilks' theorem), widened empirically, since the tables are simulated
+//! and smoothed. They do not cover deviations that the simulation does not know, such as a finger that is
+//! bent aside.
 //!
-//! Only differences of contact times are recorded, so an offset of all three fingers alike cannot be told, and changes
+//! Only differences of contact times are recorded, so an offset that all three fingers share cannot be found, and changes
 //! nothing: offsets are relative to the first finger's.
 //!
-//! A contact that came later than the hand's stroke is missing, and counts as such: the likelihood is that of censored
-//! times. Where the probe states no stroke, it is estimated from the recordings.
+//! A contact later than the hand's stroke is missing, and counts as such: the likelihood is that of censored times. If the
+//! probe states no stroke, it is estimated from the recordings.
 //!
-//! Presses on a flat plate, the probe rolled by half a turn after each, say more about offsets than touches of objects do: κ is
-//! 0 on a plate, and the slope changes its sign. They say nothing else: their noise and their misses are their own.
+//! Presses on a flat plate, with half a turn of the probe after each, say more about offsets than touches of objects: on a
+//! plate κ is 0, and the slope changes its sign. They say nothing else: their noise and their misses are their own.
 //!
-//! Recordings that look wrong ([`Suspect`]) are named: another object than their name says, two objects in one file, a
-//! probe that was changed on the way.
+//! Recordings that look wrong ([`Suspect`]) are named: of another object than their name says, of two objects in one
+//! file, or of a probe that was changed on the way.
 //!
 //! ```no_run
 //! use palpate::mesh::source;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// A value and its interval, which holds the true one in about 95 of 100 fits, if probe and objects are as they are
-/// simulated; an end is none where the recordings do not tell it.
+/// simulated; an end is none if the recordings do not determine it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Estimate {
     /// The likeliest value.

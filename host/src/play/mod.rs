@@ -270,7 +270,7 @@ impl<'m> Player<'m> {
         &self.recognizer
     }
 
-    /// Approaches up to its verdict, including those that are no evidence to it.
+    /// Approaches up to its verdict, including those that are not evidence to it.
     pub fn approaches(&self) -> u32 {
         self.approaches
     }

@@ -7,7 +7,7 @@ use palpate_onboard::{Model, Stopping};
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
-/// Where sequences end.
+/// End of sequences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Until {
     /// After this number of touches.

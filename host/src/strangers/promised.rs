@@ -84,7 +84,7 @@ pub fn calibrate_with_promise(
     let promised = promised.map_err(|error| {
         let Some(mut problem) = error.problem::<CalibrateProblem>().cloned() else { return error };
         if let CalibrateProblem::NotKept { remedy: Some(remedy), .. } = &mut problem {
-            // As many of all touches, of which a part makes the names of the promise.
+            // Touches in all, since only a part of them makes the names of the promise.
             remedy.touches = remedy.touches.map(|touches| two_digits(touches as f64 / PROMISED));
         }
         problem.into()

@@ -45,13 +45,13 @@ pub struct Evaluated {
     pub groups: Option<usize>,
     /// Rows of all sequences.
     pub rows: usize,
-    /// Of the names given, the share that was wrong: what a promise is about.
+    /// Share of wrong ones among the names given, which a promise is about.
     pub error: f64,
-    /// Of all sequences, the share that ended with a wrong name.
+    /// Share of all sequences that ended with a wrong name.
     pub wrong: f64,
-    /// Of all sequences, the share that ended without a verdict.
+    /// Share of all sequences that ended without a verdict.
     pub undecided: f64,
-    /// Of all sequences, the share that was called unknown.
+    /// Share of all sequences that ended as unknown.
     pub unknown: f64,
     /// Rows used on average.
     pub mean_rows: f64,
@@ -79,7 +79,7 @@ pub struct Evaluated {
 pub struct PromiseOfSequences {
     /// The promised error rate.
     pub promised: f64,
-    /// Of what: "average", "name" or "object".
+    /// Cases: "average", "name" or "object".
     pub per: &'static str,
     /// True if it is for new groups.
     pub groups: bool,
@@ -98,7 +98,7 @@ pub struct PromiseOfSequences {
 pub struct Point {
     /// Rows used on average.
     pub rows: f64,
-    /// Of the names given, the share that was wrong.
+    /// Share of wrong ones among the names given.
     pub error: f64,
     /// Share of the sequences that got a name.
     pub named: f64,
@@ -115,7 +115,7 @@ pub struct Comparison {
     pub vote: Vec<Point>,
     /// The least fixed number of rows with which no more names are wrong than by the model's verdicts.
     pub fixed_rows: Option<f64>,
-    /// The same of votes.
+    /// The least such number for votes.
     pub vote_rows: Option<f64>,
 }
 

@@ -66,7 +66,7 @@ impl<'s> Parts<'s> {
         if self.has_groups { groups.len() } else { self.tested.len() }
     }
 
-    /// A share of what is tested, and the parts without it: whole groups.
+    /// A share of the tested sequences, and the parts without it: whole groups.
     #[cfg(feature = "train")]
     pub(super) fn divided(self, share: f64) -> (Vec<&'s RowSequence>, Self) {
         let mut units: Vec<Option<usize>> = Vec::new();

@@ -16,7 +16,7 @@ use palpate_trees::rows::{RowSequence, Sequences};
 pub struct Settings {
     /// The error rate: wrong names of those that are given.
     pub rate: f64,
-    /// Of what the rate is promised.
+    /// Cases for which the rate is promised.
     pub per: Per,
     /// The probability that the rate is kept.
     pub confidence: f64,

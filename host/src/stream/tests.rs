@@ -17,7 +17,7 @@ use rand_distr::{Distribution, StandardNormal};
 use std::sync::LazyLock;
 
 const CLASSES: usize = 3;
-/// Where the classes' rows are, on a line each.
+/// Places of the classes' rows, on a line each.
 const PLACES: [f64; CLASSES] = [0.0, 1.2, 3.0];
 
 /// Trees that are exact for rows which are normal about the classes' places: steps of the log-density.

@@ -1,15 +1,15 @@
 //! Objects that are learned from recorded touches, because they have no mesh.
 //!
-//! [`teach`] adds such objects to an ensemble that knows others: its trees stay as they are, and each leaf gets a value
-//! more. A few hundred touches suffice where new trees would need thousands, and the values of the other objects do not
-//! change. [`alone`](fn@alone) trains an ensemble on recorded touches and nothing else.
+//! [`teach`] adds such objects to an ensemble that knows others: its trees stay the same, and each leaf gets another value.
+//! A few hundred touches suffice where new trees would need thousands, and the values of the other objects do not change.
+//! [`alone`](fn@alone) trains an ensemble on recorded touches only.
 //!
-//! [`adjust`](fn@adjust) changes the values of objects that an ensemble knows by recorded touches of them, as far as that helps.
+//! [`adjust`](fn@adjust) changes the values of objects that an ensemble knows by recorded touches of them, if that helps.
 //!
-//! Few touches have not shown everything that an object can do. So they are repeated under jitter, and the values of
-//! leaves are drawn towards 0 by a prior; how much of both is chosen for each object by cross-validation. Then a constant
-//! is added to the object's margin with every touch, so that errors balance: it is missed as often as its name is given
-//! to others. No touch, nor a copy of it, is ever fitted on and held out at once.
+//! Few touches do not show every way to touch an object. So they are repeated under jitter, and a prior draws the values
+//! of leaves towards 0; the strength of both is chosen for each object by cross-validation. Then a constant is added to the
+//! object's margin with every touch, so that errors balance: it is missed as often as others are mistaken for it. No touch
+//! is fitted on while it or a copy of it is held out.
 
 mod adjust;
 #[cfg(test)]

@@ -129,7 +129,7 @@ impl Listing {
     /// The listing of a directory; none if it has none, as data sets from elsewhere.
     ///
     /// # Errors
-    /// When the file cannot be read or is no listing, and when it names an object twice or by a name that is no file's.
+    /// When the file cannot be read or is not a listing, and when it names an object twice or by a name that no file can have.
     pub fn read(directory: &Path) -> Result<Option<Self>> {
         let path = Self::path(directory);
         match std::fs::read(&path) {

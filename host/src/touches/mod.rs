@@ -10,8 +10,8 @@
 //! [`Recording`] adds the touches of a real probe to such a directory, one by one as they come; its listing says when, from
 //! where and by which firmware ([`Recorded`]).
 //!
-//! [`check`] says what is wrong with a data set, line by line; [`noise`](crate::probe::noise) adds what a real sensor,
-//! timer and robot add; [`folds`] divides touches into some to train on and others to test on.
+//! [`check`] lists the faults of a data set, line by line; [`noise`](crate::probe::noise) adds the deviations of a real
+//! sensor, timer and robot; [`folds`] divides touches into some to train on and others to test on.
 //!
 //! ```
 //! use palpate::touches::{Dataset, folds};

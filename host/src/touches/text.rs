@@ -124,7 +124,7 @@ fn parse_unit(name: &'static str, fields: [&str; 3]) -> Result<[i16; 3], Touches
     unit_vector(name, [parse_number(x)?, parse_number(y)?, parse_number(z)?])
 }
 
-/// A unit vector in Q15. Vectors shorter or longer than 1 by more than 1 %, and such as are not finite, are refused.
+/// A unit vector in Q15. Vectors that are not finite, or whose length is off by more than 1 %, are refused.
 pub(super) fn unit_vector(name: &'static str, vector: [f64; 3]) -> Result<[i16; 3], TouchesProblem> {
     let length = vector.iter().map(|cosine| cosine * cosine).sum::<f64>().sqrt();
     if (length - 1.0).abs() <= 0.01 {

@@ -1,10 +1,10 @@
-//! Choosing a model: the best that fits a chip. And a probe: the one that needs the fewest approaches ([`probe`]).
+//! Searches for the best model that fits a chip, and for the probe that needs the fewest approaches ([`probe`]).
 //!
-//! A family of ensembles is trained (trees, depth, eta; for the table layout bins of each feature), each compiled with
+//! A family of ensembles is trained (trees, depth, eta; for the table layout, bins of each feature). Each is compiled with
 //! 8- and 16-bit leaves in every layout that fits, and measured on touches held out from training. Among them are trees for
-//! little flash ([`crate::ensemble::train::Small`]), with the 8-bit leaves that they share. Kept is the model
-//! that stops after the fewest touches at the wanted error rate, of those within the limits. It is calibrated to that rate
-//! on a third share of the touches, and its own figures come from a fourth.
+//! little flash ([`crate::ensemble::train::Small`]), with shared 8-bit leaves. Of the models within the limits, the one that
+//! stops after the fewest touches at the wanted error rate is kept. It is calibrated to that rate on another part of the
+//! touches, and its own figures come from yet another.
 //!
 //! Instructions per touch are the compiler's estimate ([`crate::compile::Instructions`]).
 //!

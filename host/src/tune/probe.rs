@@ -1,9 +1,10 @@
 //! Search for the best probe: the spacing, radius and tilt, and the aim of approaches, that need the fewest approaches.
 //!
-//! Every probe tried touches the objects in the simulator; a model is trained on these approaches and tested on
-//! others, with the stopping rule set so that the share of wrong verdicts is the one asked for. What counts is how many approaches that takes on average. The search narrows down: a coarse grid with a quarter of the approaches
-//! per object; the best of it and what lies between them with half; and, with all of them, every spacing at the best
-//! radius, tilt and aim, and a few strokes with the best probe: how far the hand must go on after the first contact.
+//! The simulator touches the objects with every probe that is tried. A model is trained on these approaches and tested on
+//! others, with the stopping rule set so that the share of wrong verdicts is the requested one; the figure is the mean
+//! number of approaches. The search narrows down: first a coarse grid with a quarter of the approaches per object; then the
+//! best of it and the points between them with half; then, with all of them, every spacing at the best radius, tilt and
+//! aim, and a few strokes with the best probe: how far the hand goes on after the first contact.
 //!
 //! The figures compare probes and promise nothing: the stopping threshold is set, and the best probe chosen, on the touches
 //! that are counted. The best of many looks somewhat better than it is.

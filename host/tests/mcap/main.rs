@@ -380,7 +380,7 @@ fn a_directory_holds_logs_beside_text_and_the_content_says_which_is_which() {
     assert!(said.contains("two files of the object mug: ") && said.contains("mug.txt and "), "{said}");
     assert!(said.contains("monday.mcap"), "{said}");
     assert!(Check::of(directory.path()).unwrap().findings.iter().any(|finding| finding.what.contains("two files of")));
-    // What is called a log and is none.
+    // A file that is called a log and is not one.
     std::fs::write(path("mug.txt"), "").unwrap();
     std::fs::write(path("monday.mcap"), "0 0 0\n").unwrap();
     std::fs::remove_file(path("mug.txt")).unwrap();

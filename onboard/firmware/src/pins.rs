@@ -4,7 +4,7 @@
 //!
 //! The host sends six bytes for each edge over the second UART: finger (0, 1, 2), level (0, 1), time in microseconds (u32,
 //! little endian). The time counts as the clock's, the level is put into the port register, and the pin interrupt is
-//! pended, as a port does. Finger 3 is no edge: time passes. Finger 4 is none either: the power goes, and comes back. Finger 5
+//! pended, as a port does. Finger 3 is not an edge: time passes. Nor is finger 4: the power goes, and comes back. Finger 5
 //! is the signal that no approach is under way.
 
 use crate::chip::{self, PIN_CHANGED, SWITCHES};

@@ -33,7 +33,7 @@ pub(crate) fn prior(weight: u32, most: u32, unit: Unit) -> i64 {
     }
     let bits = log2(most).saturating_sub(log2(weight));
     // The largest number of units that are at most that number of bits: at least 2^-24 nats each, so below 2^29. Found bit by
-    // bit, since a division of 64 bits is dear where there is none.
+    // bit, since a division of 64 bits is dear on chips without one.
     let mut units = 0_u64;
     for bit in (0..30).rev() {
         let more = units | 1 << bit;

@@ -14,7 +14,7 @@ pub enum Familiarity {
     Known,
     /// No name yet: too few touches, or touches that fit badly.
     Doubtful,
-    /// The touches do not fit the object with the most evidence: it is none that the model knows.
+    /// The touches do not fit the object with the most evidence: the model does not know the touched one.
     Stranger,
 }
 

@@ -10,7 +10,7 @@ use palpate_shared::format::{
     TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_section,
 };
 
-/// The content of the section with this tag; empty if there is none, which no section that is read is.
+/// The content of the section with this tag; empty if there is none; no section that is read is empty.
 pub(super) fn find(mut sections: &[u8], tag: Tag) -> &[u8] {
     while let Some(Section { tag: found, content, .. }) = take_section(&mut sections) {
         if found == tag.code() {

@@ -1,4 +1,4 @@
-//! A recognizer at the end of a link: everything that a chip's program needs but the chip itself.
+//! A recognizer at the end of a link: everything that a chip's program needs, except the chip itself.
 //!
 //! ```text
 //! transport ──► DeviceEnd ──► Station ──► Recognizer
@@ -13,11 +13,11 @@
 //!
 //! # Power cuts
 //!
-//! After every command, and every touch of its own, the [`Station`] stores a record (evidence, progress of the link, which
-//! model is in use), and only then says what came of it. Whenever the power goes, the chip continues from the newest
-//! record: the host repeats all that it lacks, and the link ensures that nothing is counted twice. Commands that cannot be
-//! stored are executed and reported. The last touch of its own is in the record too, and is told again at each start until
-//! another record follows: a host takes what it has heard before for a copy.
+//! After every command, and every touch of its own, the [`Station`] stores a record (evidence, progress of the link, the
+//! model in use), and only then reports the outcome. After a power cut the chip continues from the newest record: the host
+//! repeats all that it lacks, and the link ensures that nothing is counted twice. Commands that cannot be stored are
+//! executed and reported. The record also holds the last touch of its own, which is sent again at each start until another
+//! record follows; a host recognizes the copy.
 //!
 //! | storage | where |
 //! |---|---|

@@ -108,7 +108,7 @@ pub struct ProbeSettings {
     pub effector: Settings,
     /// From the probe that is there to the one that the model was trained for.
     pub scale: Scale,
-    /// A pose that was announced longer before the first contact, in microseconds, is none; nor is one that was announced
+    /// A pose that was announced longer before the first contact, in microseconds, does not count; nor does one announced
     /// more than [`Settings::release`] after it, which is that of the next approach.
     pub pose_lasts: u32,
     /// True if verdicts carry the numbers needed to compare them with another recognizer's: 12 bytes, and a posterior.
@@ -213,8 +213,8 @@ impl<B: Board> Line<'_, B> {
 /// Effector, recognizer, link and storage: call [`ProbeStation::step`] until nothing has happened, then sleep until an
 /// interrupt or for [`ProbeStation::wait`].
 ///
-/// Touches of its own fingers and touches from the host go into the same evidence. After each, what is known is stored, then
-/// told: a verdict that the host has heard survives a power cut, and one that was stored is told after it.
+/// Touches of its own fingers and touches from the host go into the same evidence. After each, the state is stored, then
+/// reported: a verdict that the host has heard survives a power cut, and one that was stored is reported after it.
 ///
 /// RAM: effector, link, recognition and the storage's. Stack: a few buffers for frames and records more than
 /// [`Recognizer::push`](crate::Recognizer::push). The README of the firmware states the size of both.

@@ -190,8 +190,8 @@ impl DeviceEnd {
         self.tell(Event::Started, send);
     }
 
-    /// Lets a device store what it knows and this event, then sends the event to the host: it is told, now or by
-    /// [`DeviceEnd::start`] after a power cut, if what it says is stored. The host is told if storing fails, once per start.
+    /// Lets a device store its state and this event, then sends the event to the host: it is sent, now or by
+    /// [`DeviceEnd::start`] after a power cut, if its content is stored. The host is told if storing fails, once per start.
     pub fn report(&mut self, event: Event, device: &mut impl Device, mut send: impl FnMut(&[u8])) {
         self.progress.untold = Some(Untold { boot: self.boot, sequence: self.events, event });
         let unstored = self.statistics.unstored;
@@ -207,7 +207,7 @@ impl DeviceEnd {
         announce(event, &self.progress, self.boot, &mut self.events, &mut send);
     }
 
-    /// Lets a device store what it knows, as after every command: for what it has done without one. The host is told if
+    /// Lets a device store its state, as after every command: for changes without a command. The host is told if
     /// that fails, once per start.
     pub fn store(&mut self, device: &mut impl Device, mut send: impl FnMut(&[u8])) {
         let unstored = self.statistics.unstored;

@@ -19,18 +19,18 @@
 //! | chip | [`Answer`] | |
 //! | chip | [`Event`]: its own touches, faults, power-up | numbered, so that the host knows how many it missed |
 //!
-//! A host opens a session, whose number is in every frame. Within it, commands are numbered from 0. The chip executes
-//! the command that it expects next and no other: one from before is a repetition (its outcome is sent again), one from
-//! after says that something was lost (the chip says which one it expects). The host keeps up to [`WINDOW`] commands under
-//! way and repeats those that stay without an outcome. So a command is executed once, whatever the line loses, duplicates,
-//! garbles or delays; and as the chip's [`Progress`] can be stored with its evidence, that holds through a power cut.
+//! A host opens a session, whose number is in every frame. Within it, commands are numbered from 0. The chip executes only
+//! the command that it expects next. An earlier one is a repetition, and its outcome is sent again; a later one shows that
+//! something was lost, and the chip says which one it expects. The host keeps up to [`WINDOW`] commands under way and
+//! repeats those that stay without an outcome. So a command is executed once, even if the line loses, duplicates, garbles
+//! or delays frames. As the chip's [`Progress`] can be stored with its evidence, that holds through a power cut.
 //!
 //! A session's number is a random number of the host's, so that two hosts never believe that the same session is theirs.
 //! Opening names the session that the host believes to be current and the chip's boot number, so that a late copy of an
 //! opening cannot open again. A boot number also comes with every event: events are counted from the chip's start, and
 //! the host notices a start even if the event that announces it was lost. The last event that was stored with the evidence
-//! is told again at each start, under the numbers that it had, until something else is stored: whenever the power goes, a
-//! host hears of what counts, and takes what it has heard before for a copy.
+//! is sent again at each start, with the same numbers, until something else is stored. So a host hears of everything that
+//! counts, even after power cuts, and recognizes a copy by its numbers.
 //!
 //! An answer names the session of the host that asked, so that several hosts may listen to one chip.
 //!

@@ -407,7 +407,7 @@ fn decisions(text: &mut String) {
     let settings = Settings { leaf: Leaf::I8, error_rate: 0.49, max_touches: 4, ..Settings::default() };
     let bytes = stated(&compile(&level, &settings).expect("it fits").bytes, ALL);
     play(text, "objects that are level", &bytes, &touches(6, 18));
-    // Sums that are no finite numbers, or beyond the range of margins.
+    // Sums that are not finite numbers, or beyond the range of margins.
     let f32_leaves = stated(&compiled(SHAPE, 19, Leaf::F32, Layout::Compact), ALL);
     let [.., leaves, _] = abuse::places(&f32_leaves);
     let mut wild = f32_leaves.clone();
@@ -469,7 +469,7 @@ fn shared_leaves(text: &mut String) {
     }
 }
 
-/// Bytes that are no model.
+/// Bytes that are not a model.
 fn refused(text: &mut String) {
     for abuse::Abuse { name, kind, offset, bytes } in abuse::cases() {
         *text += &format!("refuse {} {kind} {offset} {name}\n", hex(&bytes));

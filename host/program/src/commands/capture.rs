@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
     size: SizeArguments,
     #[command(flatten)]
     scene: SceneArguments,
-    /// Where approaches aim: box (the bounding box), middle or mass [default: box]
+    /// Aim of approaches: box (the bounding box), middle or mass [default: box]
     #[arg(long, value_name = "WHERE", value_parser = aim)]
     aim: Option<Aim>,
     /// With the probe's direction and alignment

@@ -99,9 +99,9 @@ impl LayoutChoice {
 /// Measure of a feature in whole numbers.
 #[derive(Clone)]
 enum Scale {
-    /// So many units of this feature make up 1.
+    /// Number of units of this feature that make up 1.
     Units(String, f32),
-    /// As the values of these rows need.
+    /// Scales that the values of these rows need.
     Rows(PathBuf),
 }
 
@@ -169,7 +169,7 @@ struct Exported {
     /// Effects of whole numbers on each feature.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     scales: Vec<Effect>,
-    /// Where walks for a class alone may end.
+    /// Early ends of walks for a class alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     early_exit: Option<EarlyExitFound>,
     /// Files with source code.
@@ -372,7 +372,7 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
     output::print_about(&arguments.output, &text)
 }
 
-/// Where the rest is to be written: beside the model, under its name.
+/// Places of the other files: beside the model, under its name.
 fn places(arguments: &Arguments) -> Result<Vec<(Emitted, PathBuf)>> {
     let (output, mut places) = (&arguments.output, Vec::new());
     for &emitted in &arguments.emit {
@@ -400,7 +400,7 @@ fn places(arguments: &Arguments) -> Result<Vec<(Emitted, PathBuf)>> {
     Ok(places)
 }
 
-/// Where using code is described.
+/// Guide to using code.
 const GUIDE: &str = "docs/guide/code.md";
 /// The header that reads models in C.
 const HEADER: &str = "palpate.h";

@@ -381,7 +381,7 @@ fn say(warning: &Warning) {
     }
 }
 
-/// Of fewer touches it is no surprise if all are full.
+/// Below this many touches, all of them full is unremarkable.
 const MANY: usize = 30;
 
 /// Warns where a model to which it is evidence which fingers touch gets full touches alone: those that were left out speak

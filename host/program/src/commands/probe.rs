@@ -186,7 +186,7 @@ impl UnitArguments {
         }
     }
 
-    /// One object, with its true size as far as it is known.
+    /// One object, with its true size, if known.
     pub(crate) fn object(&self, source: &str) -> Result<Object> {
         let mut object = [reading(|| source::object(source))?];
         tell(&object);
@@ -255,7 +255,7 @@ impl SizeArguments {
         self.units.objects(sources, seed)
     }
 
-    /// One object, with its true size as far as it is known.
+    /// One object, with its true size, if known.
     pub(crate) fn object(&self, source: &str) -> Result<Object> {
         self.units.object(source)
     }
@@ -345,9 +345,9 @@ const UNITS: [(&str, f64); 4] = [("mm", 1.0), ("cm", 10.0), ("m", 1_000.0), ("in
 enum MeshUnit {
     /// The unit that each mesh states.
     Stated,
-    /// Of meshes that state none, in millimeters.
+    /// Unit of meshes that state none, in millimeters.
     Unstated(f64),
-    /// Of the object of this name, whatever its mesh states, in millimeters.
+    /// Unit of the object of this name, regardless of its mesh, in millimeters.
     Of(String, f64),
 }
 

@@ -23,7 +23,7 @@ pub(super) struct Asked<'a> {
     pub(super) ensemble: &'a Path,
     /// Rows of which it is said how far one feature can move.
     pub(super) rows: Option<&'a Path>,
-    /// Where the certificate is written; standard output without it.
+    /// Path of the certificate; standard output without it.
     pub(super) written: Option<&'a Path>,
     /// A certificate to check instead.
     pub(super) certificate: Option<&'a Path>,

@@ -165,7 +165,7 @@ struct Stream<'m> {
     longest: f64,
     active: bool,
     json: bool,
-    /// Where touches and verdicts are written too.
+    /// Log to which touches and verdicts are also written.
     log: Option<LogWriter>,
     /// Number of touches, and whether a finger was missing in any of them.
     touches: usize,

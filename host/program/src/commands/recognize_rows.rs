@@ -31,7 +31,7 @@ struct Line<'a> {
     /// Prediction of a regression, after its inverse link.
     #[serde(skip_serializing_if = "Option::is_none")]
     value: Option<f32>,
-    /// The same of each target, where there are several.
+    /// Prediction of each target, if there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     values: Option<Vec<f32>>,
     /// The row's own, before any link.

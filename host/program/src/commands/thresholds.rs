@@ -4,7 +4,7 @@ use palpate::calibrate::{Per, Worse, of_what};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// What is promised, in what cases, and what the confidence is a share of.
+/// The promise in words: its rate, its cases, and the meaning of its confidence.
 pub(super) fn promised(rate: f64, per: Per, cases: &str, confidence: f64) -> String {
     format!(
         "Promised: at most {} % of {} wrong{cases}, with a confidence of {} %: of all calibrations, those included that promise \
@@ -16,8 +16,8 @@ pub(super) fn promised(rate: f64, per: Per, cases: &str, confidence: f64) -> Str
     )
 }
 
-/// Where names are given, and uncalibrated would be: in nats ahead of all others; with the share of wrong ones of each case that
-/// the rate is promised for, if it is of cases.
+/// Leads in nats at which names are given, and would be without calibration; with the share of wrong names of each case, if the
+/// rate is promised for cases.
 pub(super) fn text(margins: &BTreeMap<String, f64>, errors: &BTreeMap<String, f64>, uncalibrated: f64) -> String {
     if errors.is_empty() {
         let margin = margins.values().next().copied().unwrap_or(f64::NAN);

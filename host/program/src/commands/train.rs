@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
     /// Touches of many other shapes; they train a column for what the model does not know
     #[arg(long, value_name = "DIR")]
     background: Option<PathBuf>,
-    /// Where the settings start from: compact or paper
+    /// Preset that the settings start from: compact or paper
     #[arg(long, value_parser = preset, default_value = "compact", value_name = "NAME")]
     preset: Preset,
     /// Features of a touch: times, curvature, gravity or oriented [default: the preset's]
@@ -83,7 +83,7 @@ struct Trained<'m> {
     objects: usize,
     /// Touches of the data set.
     touches: usize,
-    /// Those of them that are evidence to the ensemble.
+    /// Number of these that are evidence to the ensemble.
     used: usize,
     counted: &'static str,
     trees: usize,

@@ -142,8 +142,8 @@ fn text(verified: &Verified) -> String {
                  margins that the model states explains\n"
             ),
             None => format!(
-                "The library predicts another class for {rows} rows, of which the rounding that the model states does not \
-                 explain {unexplained}\n"
+                "The library predicts another class for {rows} rows; the rounding that the model states does not explain \
+                 {unexplained}\n"
             ),
         };
     }

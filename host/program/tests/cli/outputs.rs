@@ -1,4 +1,4 @@
-//! What commands write: a file of Palpate's is replaced, and no other one, unless `--force` is given.
+//! Output of commands: a file of Palpate's is replaced, and no other one, unless `--force` is given.
 
 use crate::compiled::Place;
 use crate::{command, globe, listing, stderr, stdout};

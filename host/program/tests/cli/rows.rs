@@ -438,7 +438,7 @@ fn whole_numbers_in_the_users_units_split_as_the_values_do_and_say_what_they_cha
     let fitted = json(run(["export", &model, "-o", &path("m"), "--scale", &rows, "--json"]));
     assert!(fitted["scales"].as_array().unwrap().iter().any(|effect| effect["scale"].as_f64() > Some(1.0)), "{fitted}");
     json(run(["verify", &path("m"), &model, &rows, "--json"]));
-    // A feature with fractions, of which nothing was said, and one that there is not; units beyond 32 bits.
+    // A feature with fractions, unmentioned, and one that does not exist; units beyond 32 bits.
     for (scale, expected) in [
         ("width=100", "a scale for height too"),
         ("depth=100", "--scale is depth=100. Use a feature: width, height, count, angle"),

@@ -150,7 +150,7 @@ class Ensemble:
     def __repr__(self, /) -> str: ...
     def _columns(self, /, header: SupportsGetItem[int, str]) -> tuple[list[int], str | None]:
         """
-        The positions of the features among columns with these names, and what to know about that.
+        The positions of the features among columns with these names, and a note about them.
         """
     @property
     def descriptor(self, /) -> str | None:
@@ -240,7 +240,7 @@ class Model:
     def __repr__(self, /) -> str: ...
     def _columns(self, /, header: SupportsGetItem[int, str]) -> tuple[list[int], str | None]:
         """
-        The positions of the features among columns with these names, and what to know about that.
+        The positions of the features among columns with these names, and a note about them.
         """
     @property
     def checksum(self, /) -> int:
@@ -337,7 +337,7 @@ class Recognizer:
     def __new__(cls, /, model: Model, *, error_rate: SupportsFloat | SupportsIndex | None = None, max_touches: SupportsIndex | None = None) -> Recognizer: ...
     def _columns(self, /, header: SupportsGetItem[int, str]) -> tuple[list[int], str | None]:
         """
-        The positions of the features among columns with these names, and what to know about that.
+        The positions of the features among columns with these names, and a note about them.
         """
     @property
     def best(self, /) -> str:
@@ -357,7 +357,7 @@ class Recognizer:
         """
     def push_row(self, /, row: ArrayLike) -> Verdict:
         """
-        Takes in a row of features, for a model over those; NaN where one is missing. Of a series of pandas the features are
+        Takes in a row of features, for a model over those, with NaN for a missing one. The features of a pandas series are
         found by their names.
         """
     def reset(self, /, weights: SupportsGetItem[int, SupportsIndex] | None = None) -> None:

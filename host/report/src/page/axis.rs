@@ -14,7 +14,7 @@ pub(crate) struct Axis {
     pub(crate) ticks: Vec<(f64, String)>,
     /// True if lines are drawn across the chart at the ticks.
     pub(crate) grid: bool,
-    /// True if ticks are names, of which none may be left out.
+    /// True if ticks are names, all of which must be shown.
     pub(crate) is_names: bool,
 }
 
@@ -84,7 +84,7 @@ impl Axis {
         self
     }
 
-    /// The same with these ticks instead.
+    /// This axis with other ticks.
     pub(crate) fn with_ticks(mut self, ticks: Vec<(f64, String)>) -> Self {
         self.ticks = ticks;
         self
@@ -96,7 +96,7 @@ impl Axis {
         self
     }
 
-    /// Where `value` lies: 0 at the low end, 1 at the high end; clamped to the chart's surroundings.
+    /// Position of `value`: 0 at the low end, 1 at the high end; clamped to the chart's surroundings.
     pub(crate) fn place(&self, value: f64) -> f64 {
         let place = if self.logarithmic {
             (value.max(f64::MIN_POSITIVE) / self.low).ln() / (self.high / self.low).ln()

@@ -262,7 +262,7 @@ impl Page {
     }
 }
 
-/// A drawing, and beside it the same for a phone, of which the style shows one.
+/// A drawing, and another one for a phone; the style shows one of them.
 fn drawing(panel: &Svg, title: &str) -> Markup {
     html! {
         div.panel.wide[panel.width > 400] style={ "--width:" (panel.width) "px" } role="img" aria-label=(title) {

@@ -5,7 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Scripts that stand in the file.
 const SCRIPTS: &str = "script-src 'unsafe-inline'";
-/// The same, which may also compile WebAssembly that stands in the file.
+/// Scripts and WebAssembly that stand in the file.
 const SCRIPTS_AND_WASM: &str = "script-src 'unsafe-inline' 'wasm-unsafe-eval'";
 
 /// A whole HTML file. It holds everything itself: the `styles` are put into its head one after the other.
@@ -13,7 +13,7 @@ pub(crate) fn file(title: &str, styles: &[&str], body: &Markup) -> String {
     whole(title, styles, SCRIPTS, body)
 }
 
-/// The same for a page that computes in WebAssembly.
+/// A whole HTML file that computes in WebAssembly.
 pub(crate) fn file_with_wasm(title: &str, styles: &[&str], body: &Markup) -> String {
     whole(title, styles, SCRIPTS_AND_WASM, body)
 }

@@ -172,14 +172,14 @@ fn captioned(placement: &Placement) -> String {
 /// One approach, for the page's script.
 #[derive(serde::Serialize)]
 struct Drawn {
-    /// Where each finger starts.
+    /// Start of each finger.
     starts: [[f64; 3]; FINGERS],
     direction: [f64; 3],
     /// Distance of each finger to its contact, in units; null if it misses.
     distances: [Option<f64>; FINGERS],
     /// When each finger touches, in seconds after the first; null if it misses.
     times: [Option<f64>; FINGERS],
-    /// Where the approach ends at the table; infinite if it floats.
+    /// End of the approach at the table; infinite if it floats.
     #[serde(skip)]
     end: f64,
 }
@@ -272,7 +272,7 @@ fn html(
                     div { dt { "Closed" } dd.warning[!facts.is_closed()] { (facts.closed()) } }
                     div { dt { "Right side out" } dd.warning[!facts.is_right_side_out()] { (facts.side()) } }
                     @if !object.points.is_empty() { div { dt { "Points" } dd {
-                        (count(object.points.len())) ", of which the surface was made"
+                        (count(object.points.len())) ", which the surface was made from"
                     } } }
                     @if facts.parts.len() > 1 { div { dt { "Parts" } dd { (count(facts.parts.len())) } } }
                     div { dt { "Size in the file" } dd {

@@ -70,7 +70,7 @@ const FORMATS: [Unread; 17] = [
     Unread { name: "PTS or PTX", extensions: &["pts", "ptx"], begins: &[], instead: CLOUDCOMPARE },
 ];
 
-/// Files that are no mesh, by their first bytes: their names, and advice.
+/// Files that are not meshes, by their first bytes: their names, and advice.
 const OTHERS: [(&[u8], &str, &str); 5] = [
     (b"PK\x03\x04", "a ZIP archive", "Unpack it, then give what is in it"),
     (b"\x1f\x8b", "a file compressed by gzip", "Unpack it"),

@@ -1,7 +1,7 @@
 //! The end of an approach: how far the hand goes, and the contacts that it therefore never makes.
 //!
 //! A hand goes on after the first contact, while that finger gives way or is drawn back, until it has moved by its stroke.
-//! What another finger would touch later is never touched: its contact is missing, as one that does not exist. Without any
+//! Another finger's later contact never happens: it is missing, like one that does not exist. Without any
 //! contact the hand goes on for its travel, and the approach is a miss.
 //!
 //! The stroke counts at the nominal speed, so that it is a time on the clock of every part that measures contacts: of an

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 struct Counts {
     /// Sequences recognized after each number of touches.
     touches: Vec<usize>,
-    /// The same for approaches.
+    /// Sequences recognized after each number of approaches.
     approaches: Vec<usize>,
     /// Approaches made, and those that were evidence.
     made: [usize; 2],

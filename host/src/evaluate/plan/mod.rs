@@ -56,7 +56,7 @@ pub struct Hardest {
 ///
 /// For each pose and each two objects the separation is 1 − the mean of e^(−evidence/2) over the approaches to one object,
 /// evidence being for it against the other; the smaller of both orders. Unlike the mean evidence it counts what an
-/// approach can add to what is not certain yet: evidence beyond that does not raise it. An approach that is not evidence to
+/// approach can add to uncertain evidence: evidence beyond that does not raise it. An approach that is not evidence to
 /// the model counts as evidence of 0.
 ///
 /// # Errors

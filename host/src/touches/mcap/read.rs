@@ -127,7 +127,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
         Ok(())
     }
 
-    /// A record that is no chunk.
+    /// A record other than a chunk.
     fn plain(&mut self, opcode: u8, data: &[u8], offset: u64) -> Result<()> {
         let path = self.path;
         let wrong = |problem| Error::at(Place::byte(path, offset), problem);

@@ -136,7 +136,7 @@ pub fn read(path: &Path) -> Result<Vec<Touch>> {
 /// A table of any columns, as text, null where it is empty: its header and its rows, in their order.
 ///
 /// # Errors
-/// When the file cannot be read, or as `wrong` says for one that is no Parquet.
+/// When the file cannot be read, or as `wrong` says for one that is not Parquet.
 pub(crate) fn table(path: &Path, wrong: impl Fn(String) -> Error) -> Result<(Vec<String>, Vec<Vec<String>>)> {
     let io = |error| Error::io(path, "read the rows", error);
     let file = File::open(path).map_err(io)?;

@@ -336,8 +336,8 @@ fn check_thresholds(ensemble: &Ensemble, schema: &Schema) -> Result<()> {
     Ok(())
 }
 
-/// True if the threshold shows that values are no whole numbers: between those, trainers put thresholds at whole or
-/// half numbers, but for rounding in f32.
+/// True if the threshold shows that values are not whole numbers: between those, trainers put thresholds at whole or
+/// half numbers, up to rounding in f32.
 fn is_fraction(threshold: f32) -> bool {
     let from_whole = |number: f64| (number - number.round()).abs();
     let value = f64::from(threshold);

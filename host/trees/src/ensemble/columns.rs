@@ -20,7 +20,7 @@ pub(super) fn check_count(columns: usize) -> Result<(), EnsembleProblem> {
     })
 }
 
-/// The features of trees that split on columns with these names; empty names are none. If there are more columns
+/// The features of trees that split on columns with these names; empty names do not count. If there are more columns
 /// than a model can have features, the trees are numbered again by those that they use.
 pub(super) fn features(
     names: Vec<String>,

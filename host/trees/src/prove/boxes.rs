@@ -49,7 +49,7 @@ impl Rule {
 /// Rows: every combination of the values of each feature.
 pub(super) type Rows = [Values];
 
-/// Calls `see` with the rows that go left (0) and those that go right (1), unless there are none; `rows` are the same
+/// Calls `see` with the rows that go left (0) and those that go right (1), if there are any; `rows` are the same
 /// afterwards. Stops at the first error.
 pub(super) fn sides<E>(
     rows: &mut Rows,

@@ -6,8 +6,8 @@
 //! in proportion to the leaves. What the trees' worst leaves add up to bounds the error and the range of each margin.
 //!
 //! [`prove`] goes from the ensemble's leaves to the model's, which it reads as the chip does. [`check`] goes from the
-//! model's leaves to the ensemble's, with a reader of its own that is written from the format's description, and holds what
-//! it finds against a [`Certificate`].
+//! model's leaves to the ensemble's, with a reader of its own that is written from the format's description, and compares
+//! the result with a [`Certificate`].
 //!
 //! Not proved: anything outside the ensemble, such as priors and thresholds for stopping; and that the chip executes its code.
 

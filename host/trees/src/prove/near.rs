@@ -82,7 +82,7 @@ fn values(plain: &Plain) -> Vec<Vec<Key>> {
         let between: Vec<i64> = between.collect();
         let some = |index: usize| between[index * between.len() / VALUES.min(between.len())];
         let some = (0..VALUES.min(between.len())).map(some);
-        // What stands for a missing value is none.
+        // A key that stands for a missing value does not count.
         let known = |key: &i64| plain.sentinel.is_none_or(|[low, high]| !(low..=high).contains(key));
         some.filter(known).map(Some).chain([None]).collect()
     };

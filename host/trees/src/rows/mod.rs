@@ -52,7 +52,7 @@ impl Rows {
     ///
     /// # Errors
     /// [`Error::Io`]; [`RowsProblem`] naming the line: a file that is not such a table or has no rows, columns that cannot
-    /// be matched, a cell that is no number, an empty line.
+    /// be matched, a cell that is not a number, an empty line.
     pub fn read(path: &Path, features: impl Into<Features>, label: Option<&str>) -> Result<Self> {
         let features = features.into();
         let table = Table::read(path)?;

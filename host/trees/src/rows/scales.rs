@@ -88,8 +88,8 @@ pub fn merged(ensemble: &Ensemble) -> Vec<Merged> {
     of_feature.filter(|merged| merged.different < merged.thresholds).collect()
 }
 
-/// A threshold of a feature that is no whole number, if there is one: such a feature needs a scale. Halves, which trainers
-/// put between whole numbers, and the f32 after a whole number, which stands for "at or below", are none.
+/// A threshold of a feature that is not a whole number, if there is one: such a feature needs a scale. Halves, which trainers
+/// put between whole numbers, and the f32 after a whole number, which stands for "at or below", do not count.
 pub fn fraction(ensemble: &Ensemble, feature: usize) -> Option<f64> {
     let is_fraction = |threshold: f64| {
         let twice = 2.0 * threshold;

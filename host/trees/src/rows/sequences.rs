@@ -33,7 +33,7 @@ pub struct Sequences {
     pub by_position: bool,
 }
 
-/// Columns of a table of rows that are no features.
+/// Columns of a table of rows that are not features.
 #[derive(Clone, Copy, Debug)]
 pub struct SequenceColumns<'c> {
     /// The class of the row, by name or number: the same for all rows of a sequence. Without it all are of class 0.
@@ -76,8 +76,8 @@ impl SequencesBuilder {
     /// Takes in a row; `values` are as many as there are features.
     ///
     /// # Errors
-    /// [`RowsProblem`]: a sequence or group without a name, a label that is no class, another label or group than that of the rows
-    /// before in the same sequence, a sequence that comes back after another.
+    /// [`RowsProblem`]: a sequence or group without a name, a label that is not a class, another label or group than that
+    /// of the rows before in the same sequence, a sequence that comes back after another.
     pub fn push(&mut self, values: &[f64], row: RowOf<'_>) -> Result<(), RowsProblem> {
         for (what, name) in [("sequence", Some(row.sequence)), ("group", row.group)] {
             if name == Some("") {
@@ -141,7 +141,7 @@ impl Sequences {
     ///
     /// # Errors
     /// [`Error::Io`]; [`RowsProblem`] naming the line, as [`SequencesBuilder::push`], and for a column that is not there
-    /// or a cell that is no number.
+    /// or a cell that is not a number.
     pub fn read(
         path: &Path,
         features: impl Into<Features>,

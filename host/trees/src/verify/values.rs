@@ -73,7 +73,7 @@ fn classes(
     Ok(())
 }
 
-/// Distance of a value from the library's that is no fault, beside the rounding of margins: links are within 5e-7 of the value.
+/// Accepted distance of a value from the library's, beside the rounding of margins: links are within 5e-7 of the value.
 const LINK_ERROR: f64 = 2e-6;
 
 fn values(

@@ -1,6 +1,6 @@
 //! Two hosts and three chips against a simple specification, through everything that a line, resets and power cuts can do:
-//! each touch counts at most once, what a host believes to be counted is counted, or the host is told, and no host hears of a
-//! chip's own touch twice.
+//! each touch counts at most once; every touch that a host believes to be counted is counted, or the host is told; no host
+//! hears of a chip's own touch twice.
 //!
 //! Frames are delivered in any order, twice, late (also after resets), or not at all. Both hosts hear what a chip says that
 //! they are connected to. `PALPATE_LINK_STEPS=1000000` sets the number of steps; without it there are 60,000.

@@ -19,7 +19,7 @@ function drawScene(data, { hover, choose }) {
   const wires = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ color: 0x20242a, wireframe: true, transparent: true, opacity: 0.35 }));
   scene.add(view.body(geometry), wires);
 
-  // The points of which a scan's surface was made, as small cubes.
+  // The points that a scan's surface was made from, as small cubes.
   const cloud = decode(data.points || "", Float32Array);
   const grain = 0.003 * high.clone().sub(low).length();
   const points = new THREE.InstancedMesh(

@@ -57,7 +57,7 @@ pub(super) fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>> {
     Ok(Parts { json, start, binary })
 }
 
-/// Bytes of the document's buffers, as many as it states; none for a buffer without a source.
+/// Bytes of the document's buffers, in the stated number; none for a buffer without a source.
 pub(super) fn buffers<'a>(
     document: &Document,
     parts: &Parts<'a>,

@@ -99,7 +99,7 @@ impl Scene<'_> {
                 add(&scene.nodes, &DAffine3::IDENTITY, &mut waiting);
             }
             (None, Some(scene)) => add(&scene.nodes, &DAffine3::IDENTITY, &mut waiting),
-            // Without scenes, all nodes that are no one's child; without nodes, all meshes.
+            // Without scenes, all nodes without a parent; without nodes, all meshes.
             (None, None) => {
                 let mut is_root = vec![true; nodes.len()];
                 for &child in nodes.iter().flat_map(|node| &node.children) {

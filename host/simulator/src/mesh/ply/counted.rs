@@ -8,7 +8,7 @@ use std::io::{BufRead, Read, Result};
 pub(super) struct Counts {
     /// The byte after the last one that was read, from 0.
     pub(super) byte: Cell<u64>,
-    /// The line of the last byte that is no white space, from 1.
+    /// The line of the last byte that is not white space, from 1.
     pub(super) line: Cell<u64>,
     /// Ends of lines since that byte.
     ends: Cell<u64>,

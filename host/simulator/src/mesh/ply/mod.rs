@@ -27,7 +27,7 @@ use std::path::Path;
 /// Reads the mesh of a PLY file; errors name `path`.
 ///
 /// # Errors
-/// Where the header is none, the file ends too early or too late, a number is damaged or not finite, a face names a vertex
+/// If the header is invalid, the file ends too early or too late, a number is damaged or not finite, a face names a vertex
 /// that is not there, or no face is left.
 pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Parsed> {
     let Header { format, text, bytes, lines, is_cloud } = Header::read(&mut reader, path)?;
@@ -241,7 +241,7 @@ impl Corners {
         Ok(())
     }
 
-    /// Triangle strips: each vertex makes a triangle with the two before it, every second one turned; -1 begins anew.
+    /// Triangle strips: each vertex makes a triangle with the two before it, every second one turned; -1 begins another strip.
     fn cut_strips(&self, mesh: &mut Mesh) -> Result<(), MeshProblem> {
         let mut rest = self.indices.as_slice();
         for &arity in &self.arities {

@@ -29,7 +29,7 @@ impl Found {
 /// Number of levels of subdirectories that are searched.
 pub(super) const LEVELS: usize = 8;
 
-/// Position of a file's extension among those of meshes; none if it is no mesh's.
+/// Position of a file's extension among those of meshes; none for other files.
 pub(super) fn rank(path: &Path) -> Option<usize> {
     if path.file_name().is_some_and(|name| name == DEPTH_LIST) {
         return Some(EXTENSIONS.len());

@@ -61,7 +61,7 @@ pub struct Noise {
     pub speed_bias: f64,
     /// The standard deviation of the angle by which the pose of a touch is turned about a random axis.
     pub pose: f64,
-    /// The same for a robot: every pose of its touches is turned alike.
+    /// The standard deviation of the angle by which all poses of a robot are turned alike.
     pub pose_bias: f64,
     /// Fingers that bend aside at flat angles. Only a capture adds it: a data set does not hold the angles of contacts.
     #[serde(skip_serializing_if = "Grazing::is_none")]

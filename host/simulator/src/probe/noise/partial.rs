@@ -47,7 +47,7 @@ pub struct PartialNoise {
     pub pose_bias: Option<f64>,
 }
 
-/// A text that is no noise: the key, its value, and what to write instead.
+/// A text that is not noise: the key, its value, and what to write instead.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{key} is {value:?}; use {wanted}")]
 pub struct BadNoise {

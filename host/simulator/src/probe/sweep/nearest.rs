@@ -3,7 +3,7 @@
 use super::narrow::Triangle;
 use glam::DVec3 as Vector;
 
-/// The point of a triangle that is nearest to `point`. Where the triangle is none, a point of one of its edges. Method:
+/// The point of a triangle that is nearest to `point`. If the triangle has no area, a point of one of its edges. Method:
 /// Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
 pub(super) fn nearest_point([a, b, c]: &Triangle, point: Vector) -> Vector {
     let edges = [(*a, b - a), (*b, c - b), (*c, a - c)];

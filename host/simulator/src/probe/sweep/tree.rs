@@ -336,7 +336,7 @@ fn build(bounds: &[Bounded]) -> Bvh2 {
 /// Cost of a step down, relative to testing one triangle of a pack: high, so that packs are few and full.
 const STEP: f32 = 8.0;
 
-/// For each node of the binary tree how many triangles a pack of all that is below it has; 0 where that is no pack. Decided
+/// For each node of the binary tree the number of triangles of a pack of everything below it; 0 if that is not a pack. Decided
 /// from below by the surface area heuristic, as `obvhs::bvh2::leaf_collapser` does, but without making the tree again.
 fn packed(bvh: &Bvh2) -> Vec<u8> {
     let mut packed = vec![0; bvh.nodes.len()];

@@ -166,7 +166,7 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     for (index, name) in &all {
         let slot = features.get_mut(*index);
         let slot = slot.ok_or_else(|| damaged(format!("feature {index} of {}", all.len())))?;
-        // A name that is only the feature's number is none.
+        // A name that is only the feature's number does not count.
         *slot = if **name == index.to_string() { String::new() } else { name.to_string() };
     }
     let (scale, bias) = match document.scale_and_bias {

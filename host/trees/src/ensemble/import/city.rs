@@ -11,7 +11,7 @@ pub(super) fn numbers(hashes: &BTreeSet<u32>) -> BTreeMap<u32, Vec<i32>> {
     if hashes.is_empty() {
         return found;
     }
-    // One bit for each remainder: most numbers are none without a search.
+    // One bit for each remainder: most numbers are excluded without a search.
     let mut sieve = vec![false; 1 << 16];
     hashes.iter().for_each(|hash| sieve[(hash & 0xffff) as usize] = true);
     let mut text = Vec::with_capacity(8);

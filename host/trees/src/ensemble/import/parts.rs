@@ -28,7 +28,7 @@ pub struct Parts {
 /// A tree as columns, one entry for each node; node 0 is its root.
 #[derive(Clone, Debug, Default)]
 pub struct PartTree {
-    /// The output that its leaves are for, which have one value then; none if they have one for each.
+    /// Output of its leaves, if each has one value; none if each has one for every output.
     pub output: Option<usize>,
     /// The child where `x <= threshold`; negative for a leaf.
     pub left: Vec<i64>,

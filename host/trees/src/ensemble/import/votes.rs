@@ -6,7 +6,7 @@ const LIMIT: f64 = 4_194_304.0;
 /// Largest distance of a share from the fraction that it stands for: files hold shares in f32, divided by the number of
 /// trees.
 const SLACK: f64 = 2e-7;
-/// The largest denominator of a fraction that is told from others by a share in f32.
+/// The largest denominator of a fraction that a share in f32 identifies.
 const LARGEST: u64 = 1000;
 
 /// Turns shares into whole numbers of votes times a power of two if every leaf of every tree holds shares of the classes

@@ -29,7 +29,7 @@ fn whole(column: &'static str, found: usize, wanted: usize) -> Result<(), TreePr
     if found == wanted { Ok(()) } else { Err(TreeProblem::Column { column, found, wanted }) }
 }
 
-/// Categories from here on are none to XGBoost, nor are negative ones: they go left, or up to 1.6 as missing ones.
+/// XGBoost takes no categories from here on, nor negative ones: they go left, or up to 1.6 as missing ones.
 const OUT_OF_RANGE: u32 = 1 << 24;
 
 /// Reads the tree with this number.

@@ -162,7 +162,7 @@ impl Frame {
         out.ins(&format!("{what} sp, #{}", self.length), 2);
     }
 
-    /// Where the address of the margins is, from the stack pointer.
+    /// Offset of the address of the margins, from the stack pointer.
     pub(super) fn margins(&self, chip: Chip) -> usize {
         self.length + if chip == Chip::M0Plus { 16 } else { 0 }
     }

@@ -26,7 +26,7 @@ pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
         return Err(damaged("two nodes of a tree have the same number"));
     }
     let mut weights = Weights::read(node, draft)?;
-    // The root of a tree is the node that is no child.
+    // The root of a tree is the node without a parent.
     let mut roots: BTreeMap<i64, Vec<usize>> = BTreeMap::new();
     let is_leaf = |position: usize| modes[position] == "LEAF";
     let splits = (0..count).filter(|&position| !is_leaf(position));
@@ -131,7 +131,7 @@ impl Weights {
         Ok(Self { of, votes: matches!(map, Map::Votes), all: None })
     }
 
-    /// Gives leaves the votes for the first class as well. Where a tree's can be told, margins are shares of all trees'
+    /// Gives leaves the votes for the first class as well. If a tree's votes can be identified, margins are shares of all trees'
     /// votes from 0 on; otherwise those of the first class start from 1.
     fn complete(&mut self, draft: &mut Draft, trees: usize) {
         if !self.votes {
