@@ -141,7 +141,7 @@ fn objects_cost(context: &Context, touched: &[Touched]) -> Result<Objects> {
         bytes: compiled.bytes.len(),
         instructions: Instructions::new(&compiled, &touches)?,
         accuracy: AT.iter().map(|at| measured.accuracy.get(at).copied()).collect(),
-        approaches: measured.sequential.mean_approaches,
+        approaches: measured.sequential.mean().value,
         wrong: measured.sequential.error,
         undecided: measured.sequential.undecided,
     })

@@ -10,9 +10,7 @@ use crate::page::table::{Cell, Records, Table};
 use palpate::compile::{self, Leaf, compile};
 use palpate::ensemble::train;
 use palpate::error::{EvaluateProblem, Result};
-use palpate::evaluate::{
-    self, Active, ApproachSequential, Candidate, Evaluation, Margins, Rule, SequentialSettings, Switched,
-};
+use palpate::evaluate::{self, Active, Candidate, Evaluation, Margins, Rule, Sequential, SequentialSettings, Switched};
 use palpate::probe::noise::Noise;
 use palpate::touches::{Dataset, Origin};
 use palpate::wording::{self, list};
@@ -151,10 +149,10 @@ fn at_rates(context: &Context, bytes: &[u8], test: &Dataset, active: bool) -> Re
             Some(active) => evaluate::evaluate_active(&margins, active, &settings)?,
             None => evaluate::evaluate(&margins, &settings)?,
         };
-        let sequential: ApproachSequential = measured.approaches.ok_or(EvaluateProblem::NoApproaches)?.sequential;
+        let sequential: Sequential = measured.approaches.ok_or(EvaluateProblem::NoApproaches)?.sequential;
         Ok(Stopped {
-            approaches: sequential.mean_approaches,
-            approaches_error: sequential.mean_approaches_standard_error,
+            approaches: sequential.mean().value,
+            approaches_error: sequential.mean().standard_error,
             error: sequential.error + sequential.undecided,
             error_error: sequential.error_standard_error,
             per_object: sequential.per_object.values().copied().collect(),

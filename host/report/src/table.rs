@@ -166,7 +166,7 @@ fn row(
         bytes: bytes.len(),
         is_calibrated,
         approaches: found.mean_touches,
-        approaches_error: found.mean_touches_standard_error,
+        approaches_error: found.mean().standard_error,
         wrong: number(found.error_of_given),
         undecided: found.undecided,
         placement: found.placement.and_then(number),

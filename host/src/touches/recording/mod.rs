@@ -250,7 +250,8 @@ impl Recording {
         let is_late = |touch: &&Touch| latest.is_some_and(|latest| f64::from(touch.spread()) > latest);
         if let Some((touch, stroke)) = touches.iter().find(is_late).zip(probe.stroke) {
             let seconds = |micros: f64| format!("{:.3} s", micros / 1e6);
-            let [window, latest] = [probe.window().map(f64::from), latest].map(|micros| seconds(micros.unwrap_or_default()));
+            let [window, latest] =
+                [probe.window().map(f64::from), latest].map(|micros| seconds(micros.unwrap_or_default()));
             let stroke = format!("{stroke} ({window}), which explains contacts up to {latest}");
             return Err(TouchesProblem::LaterThanStroke { stroke, latest: seconds(touch.spread().into()) }.into());
         }
