@@ -6,6 +6,9 @@ use palpate::ensemble::{Ensemble, Inputs, Node, Origin, Output, Tree};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+/// Commands whose output holds times, which is left out.
+const TIMED: [&str; 2] = ["capture", "train"];
+
 /// Centers of the classes' rows.
 const CENTERS: [f64; 3] = [0.0, 1.2, 3.0];
 
@@ -29,12 +32,15 @@ impl Script {
         self.directory.path().join(name)
     }
 
-    /// Runs a command in the directory; adds its output, and the checksum of the file that it wrote, if one is named.
+    /// Runs a command in the directory; adds its output, unless it is one of [`TIMED`], and the checksum of the file that it wrote, if one is named.
     fn step(&mut self, line: &str) {
         let words: Vec<&str> = line.split_whitespace().collect();
         let output = crate::command(&words).current_dir(self.directory.path()).output().unwrap();
         let output = stdout(output);
-        writeln!(self.text, "$ palpate {line}\n{}", output.trim_end()).unwrap();
+        writeln!(self.text, "$ palpate {line}").unwrap();
+        if !TIMED.contains(&words[0]) {
+            writeln!(self.text, "{}", output.trim_end()).unwrap();
+        }
         let written = words.iter().position(|word| *word == "-o").map(|at| self.path(words[at + 1]));
         if let Some(bytes) = written.filter(|path| path.is_file()).map(|path| std::fs::read(path).unwrap()) {
             writeln!(self.text, "# {} bytes, {:016x}", bytes.len(), checksum(&bytes)).unwrap();
