@@ -188,7 +188,7 @@ impl Way {
             leaves: compiled.leaves,
             seconds: *seconds,
             accuracy: at.map(|at| measured.accuracy[&at]),
-            stops: sequential.mean_approaches,
+            stops: sequential.mean().value,
             wrong: sequential.error,
             undecided: sequential.undecided,
         })

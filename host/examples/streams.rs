@@ -103,7 +103,9 @@ fn report(name: &str, all: &Sequences, names: &[String], rate: f64) -> Result<()
     let sure = compile::open(&found.model)?;
     let evaluated = stream::evaluate(&sure, &unseen, &Wanted::default())?;
     println!("{name}: {} sequences of {} classes, {} rows", all.sequences.len(), names.len(), all.len());
-    println!("  table {:?}\n  weights {:?}", found.row_evidence, found.weights);
+    if let Some(shape) = &found.rows {
+        println!("  table {:?}\n  weights {:?}", shape.row_evidence, shape.weights);
+    }
     println!(
         "  promised {:.0} %; of {} unseen sequences {:.2} % of the names wrong, {:.1} % without one, {:.1} rows",
         100.0 * rate,

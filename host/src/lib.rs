@@ -106,6 +106,7 @@ pub mod ensemble;
 
 pub mod compile;
 pub mod evaluate;
+mod evidence;
 
 pub mod calibrate;
 #[cfg(feature = "train")]

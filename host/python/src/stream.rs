@@ -12,7 +12,7 @@ use palpate::error::{Error, RowsProblem};
 use palpate::rows::{Features, RowOf, Sequences, SequencesBuilder};
 use palpate::shared::format::Held;
 use palpate::strangers;
-use palpate::stream::{self, Settings, Strangers, Wanted};
+use palpate::stream::{self, Settings, StrangerTest, Wanted};
 use pyo3::prelude::*;
 
 /// Sequences of an array's rows.
@@ -86,7 +86,7 @@ pub(crate) fn calibrate(
         let strangers = held
             .map(|held| {
                 let test = strangers::Settings { held, confidence, seed, ..Default::default() };
-                Strangers::new(test, opened, others.as_ref())
+                StrangerTest::new(test, opened, others.as_ref())
             })
             .transpose()?;
         let settings = Settings { rate: error_rate, per, confidence, max_rows, strangers, seed, ..Settings::default() };

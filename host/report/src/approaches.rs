@@ -81,7 +81,7 @@ impl Way {
             bytes,
             used: measured.used,
             accuracy: AT.iter().map(accuracy).collect(),
-            approaches: (sequential.mean_approaches, sequential.mean_approaches_standard_error),
+            approaches: (sequential.mean().value, sequential.mean().standard_error),
             per_object: sequential.per_object.values().copied().collect(),
             wrong: sequential.error,
             undecided: sequential.undecided,

@@ -9,7 +9,7 @@ use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
-use palpate::calibrate::{self, Odds, Per, Sequence, Terms, Until, choose, follow, margin_of, odds_of};
+use palpate::calibrate::{self, Limit, Odds, Per, Sequence, Terms, choose, follow, margin_of, odds_of};
 use palpate::compile;
 use palpate::error::{CalibrateProblem, Result};
 use palpate::probe::scene::Scene;
@@ -158,8 +158,8 @@ fn sequences(context: &Context, model: &Model<'_>, seed: u64, kept: &mut calibra
     // The model's objects are the context's, in the same order.
     let mut supplies = captured.supplies(&(0..names.len()).collect::<Vec<_>>(), seed);
     let wanted = vec![settings.sequences / names.len().max(1); names.len()];
-    let until = Until { margin: strictest(), max_touches: MAX_TOUCHES };
-    follow(model, &mut supplies, &wanted, until, || |_: &calibrate::Moment<'_>| true, context.progress)
+    let limit = Limit { margin: strictest(), max_touches: MAX_TOUCHES };
+    follow(model, &mut supplies, &wanted, limit, context.progress)
 }
 
 /// Results of thresholds, all objects together.

@@ -89,7 +89,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Sequences> {
             stopped.push(Stopped {
                 rate,
                 touches: sequential.mean_touches,
-                touches_error: sequential.mean_touches_standard_error,
+                touches_error: sequential.mean().standard_error,
                 error,
                 undecided: sequential.undecided,
                 error_error: sequential.error_standard_error,

@@ -39,9 +39,6 @@ impl Feed<'_> {
     }
 }
 
-/// A touch and its margins; no margins if it is no evidence.
-type Next<'s> = (&'s Touch, Option<&'s [i32]>);
-
 /// The margins of the next touches of each of a supply's pools.
 pub(super) struct Ahead<'m> {
     model: &'m Model<'m>,
@@ -50,6 +47,8 @@ pub(super) struct Ahead<'m> {
     /// Number of touches drawn from a pool at once.
     size: usize,
     blocks: Vec<Block>,
+    /// Margins of a single touch.
+    single: Vec<i32>,
 }
 
 /// Touches of a pool, in its order.
@@ -57,7 +56,6 @@ pub(super) struct Ahead<'m> {
 struct Block {
     /// Position of the first one in the pool's order.
     first: usize,
-    touches: Vec<Touch>,
     /// For each touch the row of its margins; none if it is no evidence.
     rows: Vec<Option<usize>>,
     margins: Vec<i32>,
@@ -72,35 +70,38 @@ impl<'m> Ahead<'m> {
             together: Together::new(),
             size: if is_once { AT_ONCE_OF_A_ROBOT } else { AT_ONCE },
             blocks: vec![Block::default(); pools],
+            single: vec![0; model.object_count()],
         }
     }
 
-    /// The touch at position `next` of the order of pool `pool`, if there is one, and its margins, as [`Model::margins`];
-    /// none if it is no evidence to the model.
-    pub(super) fn next<'s>(
-        &'s mut self,
+    /// The margins of the touch at position `next` of the order of pool `pool`, if there is one, as [`Model::margins`]; nothing
+    /// if it is no evidence to the model.
+    pub(super) fn next(
+        &mut self,
         pool: usize,
         next: usize,
         order: &[u32],
-        feed: &'s Feed<'_>,
-    ) -> Result<Option<Next<'s>>> {
+        feed: &Feed<'_>,
+    ) -> Result<Option<Option<&[i32]>>> {
         let Some(block) = self.blocks.get_mut(pool) else { return Ok(None) };
         if !(block.first..block.first + block.rows.len()).contains(&next) {
             let Some(coming) = order.get(next..order.len().min(next + self.size)) else { return Ok(None) };
             let is_evidence = |touch: &&Touch| Refused::check(&self.trained, touch).is_ok();
             let mut row = 0..;
             block.first = next;
-            block.touches = feed.touches(coming)?;
-            block.rows =
-                block.touches.iter().map(|touch| if is_evidence(&touch) { row.next() } else { None }).collect();
-            let evidence: Vec<&Touch> = block.touches.iter().filter(is_evidence).collect();
+            let touches = feed.touches(coming)?;
+            block.rows = touches.iter().map(|touch| if is_evidence(&touch) { row.next() } else { None }).collect();
+            let evidence: Vec<&Touch> = touches.iter().filter(is_evidence).collect();
             block.margins.resize(evidence.len() * self.model.object_count(), 0);
             self.together.touches(self.model, &evidence, &mut block.margins);
         }
-        let given = order.get(next).and_then(|&position| feed.given(position));
-        let Some(touch) = given.or(block.touches.get(next - block.first)) else { return Ok(None) };
-        let row = block.rows.get(next - block.first).copied().flatten();
-        let margins = row.and_then(|row| block.margins.chunks_exact(self.model.object_count()).nth(row));
-        Ok(Some((touch, margins)))
+        let Some(row) = block.rows.get(next - block.first) else { return Ok(None) };
+        Ok(Some(row.and_then(|row| block.margins.chunks_exact(self.model.object_count()).nth(row))))
+    }
+
+    /// The margins of a touch; nothing if it is no evidence to the model.
+    pub(super) fn one(&mut self, touch: &Touch) -> Option<&[i32]> {
+        let is_evidence = Refused::check(&self.trained, touch).is_ok() && self.model.margins(touch, &mut self.single);
+        is_evidence.then_some(&self.single[..])
     }
 }

@@ -9,8 +9,8 @@
 //! other data). What is predicted here decides whether a promise can be made, and never whether it is kept.
 
 use super::choose::Terms;
-use super::sequence::{Odds, Sequence, odds_of};
 use super::walk::{allowed, needed, of_share};
+use crate::evidence::{Odds, Sequence, odds_of};
 use palpate_shared::format::Per;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -55,7 +55,7 @@ impl Begin {
         let one = passes(1);
         let near = || (0..seen.len()).filter(|&at| is_near(&one, at));
         let (Some(strictest), Some(loosest)) = (near().next(), near().next_back()) else {
-            let margin = (((1.0 - terms.rate) / terms.rate).ln() + BEYOND).min(most);
+            let margin = (terms.margin() + BEYOND).min(most);
             return Self { starts: vec![margin], loosest: margin };
         };
         let several = (2..=MOST_STARTS).rev().find_map(|count| {
@@ -192,8 +192,8 @@ fn beta_binomial(most: u64, all: u64, a: f64, b: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sequence::Look;
     use super::*;
+    use crate::evidence::Lead;
 
     #[test]
     fn a_flat_prior_makes_every_number_of_errors_as_probable() {
@@ -218,8 +218,8 @@ mod tests {
     fn begin(at: &[(f64, bool)], tested: usize, rate: f64) -> Begin {
         let sequence = |&(margin, right): &(f64, bool)| {
             let mut sequence = Sequence::new(0);
-            let look = Look { name: usize::from(!right), odds: odds_of(margin), touches: 1, approaches: 1 };
-            sequence.look(look, true);
+            let look = Lead { name: usize::from(!right), odds: odds_of(margin), touches: 1, approaches: 1 };
+            sequence.take(look, true);
             sequence
         };
         let followed: Vec<Sequence> = at.iter().map(sequence).collect();

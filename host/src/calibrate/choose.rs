@@ -1,9 +1,9 @@
 //! Thresholds that keep a promise, from sequences.
 
 use super::begin::Seen;
-use super::sequence::{Odds, Sequence, odds_of};
 use super::walk::{Kept, Stop, Tally, walk};
-use crate::error::{CalibrateProblem, Result, Supplied};
+use crate::error::{CalibrateProblem, Error, Result, Supplied};
+use crate::evidence::{Odds, Sequence, odds_of};
 use palpate_shared::format::Per;
 use rayon::prelude::*;
 
@@ -34,14 +34,32 @@ pub struct Terms {
     pub per: Per,
 }
 
+impl Terms {
+    /// Where an uncalibrated recognizer stops at this rate: the posterior's own margin, in nats.
+    pub(crate) fn margin(&self) -> f64 {
+        ((1.0 - self.rate) / self.rate).ln()
+    }
+
+    /// Refuses terms out of their ranges.
+    pub(crate) fn check(&self) -> Result<()> {
+        if !(1e-9..0.5).contains(&self.rate) {
+            return Err(Error::setting("error_rate", self.rate, "a number of at least 1e-9 and below 0.5"));
+        }
+        if !((0.5..=0.999_999).contains(&self.confidence)) {
+            return Err(Error::setting("confidence", self.confidence, "a number from 0.5 to 0.999999"));
+        }
+        Ok(())
+    }
+}
+
 /// Where walks over thresholds begin, and where they end at the latest.
 #[derive(Clone, Copy, Debug)]
-pub struct Way<'w> {
+pub(crate) struct Way<'w> {
     /// Margins, in nats, at which a walk may begin, from strict to loose. Sequences were followed to the first of them or
     /// to the limit of touches. Those that are tested had no part in the choice.
-    pub starts: &'w [f64],
+    pub(crate) starts: &'w [f64],
     /// Thresholds that those to be kept must be as strict as.
-    pub loosest: Option<&'w Odds>,
+    pub(crate) loosest: Option<&'w Odds>,
 }
 
 impl Way<'_> {
@@ -155,7 +173,7 @@ fn kept<'s>(
 ///
 /// # Errors
 /// [`Stop`], if no threshold can be kept.
-pub fn choose_independent(
+pub(crate) fn choose_independent(
     sequences: &[Sequence],
     objects: usize,
     way: &Way<'_>,

@@ -2,45 +2,22 @@
 
 use super::ahead::{Ahead, Feed};
 use super::demand::Demand;
-use super::sequence::{Sequence, odds_of};
-use crate::error::{EvaluateProblem, Result};
+use crate::error::{Error, EvaluateProblem, Result};
+use crate::evidence::Sequence;
+use crate::evidence::{self, Follower, Limit, Sequences, Supplier, chip};
 use crate::in_order::in_order;
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use crate::touches::ObjectTouches;
-use palpate_onboard::{Familiarity, Model, Recognizer, Stopping};
+use palpate_onboard::{Model, Stopping};
 use palpate_shared::Touch;
 use palpate_shared::format::Plan;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
-/// State after a touch that is evidence.
-#[derive(Clone, Copy, Debug)]
-pub struct Moment<'s> {
-    /// The touch.
-    pub touch: &'s Touch,
-    /// The evidence for each object, in units.
-    pub evidence: &'s [i64],
-    /// The object with the most.
-    pub best: usize,
-    /// Touches so far that are evidence.
-    pub touches: u32,
-    /// Approaches so far.
-    pub approaches: u32,
-}
-
-/// End of a sequence.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Until {
-    /// Once the leader has this much more evidence than all others together, in nats.
-    pub margin: f64,
-    /// After this number of touches that are evidence, if no sooner.
-    pub max_touches: u32,
-}
-
 /// The touches of one object that no sequence has used yet.
 #[derive(Debug)]
-pub struct Supply<'d> {
+pub struct TouchSupply<'d> {
     object: usize,
     feed: Feed<'d>,
     /// One for each source and robot: a sequence is of touches of one pool.
@@ -62,7 +39,7 @@ struct Pool {
     by_pose: Vec<Vec<u32>>,
 }
 
-impl<'d> Supply<'d> {
+impl<'d> TouchSupply<'d> {
     /// The touches of the object with this index in the model. A sequence is of touches of one source, such as an
     /// instance, by one robot. Where robots differ, every robot makes one sequence, so that the sequences' biases are
     /// independent.
@@ -91,7 +68,7 @@ impl<'d> Supply<'d> {
     }
 
     /// Splits off one in `parts` of the touches as a supply of its own; where there are robots, one in `parts` of them.
-    pub fn take_part(&mut self, parts: usize) -> Self {
+    pub(super) fn take_part(&mut self, parts: usize) -> Self {
         let part = |all: usize| all / parts.max(1);
         let pools = if self.is_once {
             self.pools.drain(..part(self.pools.len())).collect()
@@ -104,82 +81,66 @@ impl<'d> Supply<'d> {
         };
         Self { pools, candidates: Vec::new(), ..*self }
     }
-
-    /// Follows up to `wanted` sequences. One that the touches end in is left out; one that a robot's touches end in ends
-    /// there.
-    fn follow<const N: usize, G: FnMut(&Moment<'_>) -> bool>(
-        &mut self,
-        ahead: &mut Ahead<'_>,
-        model: &Model<'_>,
-        wanted: usize,
-        until: Until,
-        gate: impl Fn() -> G,
-        progress: &dyn Progress,
-    ) -> Result<Vec<Sequence>> {
-        // Models have at most 256 objects, and the caller makes room for as many.
-        let never = Stopping::from_odds(0, u32::MAX);
-        let Ok(mut recognizer) = Recognizer::<N>::new(model, never) else { return Ok(Vec::new()) };
-        let mut sequences = Vec::new();
-        while sequences.len() < wanted {
-            progress::advance(progress, 1)?;
-            let Some(pool) = self.pools.get_mut(self.next) else { break };
-            let mut order = Order {
-                feed: &self.feed,
-                candidates: &self.candidates,
-                ahead: &mut *ahead,
-                turn: self.next,
-                next: pool.used,
-                pool,
-            };
-            let (sequence, is_whole) = one(self.object, &mut recognizer, &mut order, until, gate())?;
-            if !is_whole && (!self.is_once || pool.order.is_empty()) {
-                break;
-            }
-            pool.used += sequence.approaches as usize;
-            sequences.push(sequence);
-            self.next += 1;
-            if !self.is_once {
-                self.next %= self.pools.len();
-            }
-        }
-        Ok(sequences)
-    }
 }
 
-/// A pool's touches, one after the other, as they are pushed.
-struct Order<'o, 'd, 'm> {
-    feed: &'o Feed<'d>,
-    candidates: &'o [u16],
-    ahead: &'o mut Ahead<'m>,
-    pool: &'o mut Pool,
-    /// Number of the pool.
-    turn: usize,
-    /// Position of the next touch in the pool's order.
+/// A supply's touches as a model takes them.
+pub(super) struct Drawn<'s, 'd, 'm> {
+    supply: &'s mut TouchSupply<'d>,
+    ahead: Ahead<'m>,
+    /// Position of the next touch in its pool's order.
     next: usize,
+    progress: &'s dyn Progress,
 }
 
-impl Order<'_, '_, '_> {
-    /// Pushes the next touch, if there is one; it, and whether it is evidence.
-    fn push<const N: usize>(&mut self, recognizer: &mut Recognizer<'_, N>) -> Result<Option<(&Touch, bool)>> {
-        if !self.pool.by_pose.is_empty() {
-            let Some(touch) = self.proposed(recognizer) else { return Ok(None) };
-            return Ok(Some((touch, recognizer.push(touch).is_ok())));
-        }
-        let Some((touch, margins)) = self.ahead.next(self.turn, self.next, &self.pool.order, self.feed)? else {
-            return Ok(None);
-        };
-        self.next += 1;
-        if let Some(margins) = margins {
-            recognizer.push_margins(margins);
-        }
-        Ok(Some((touch, margins.is_some())))
+impl<'s, 'd, 'm> Drawn<'s, 'd, 'm> {
+    pub(super) fn new(model: &'m Model<'m>, supply: &'s mut TouchSupply<'d>, progress: &'s dyn Progress) -> Self {
+        let ahead = Ahead::new(model, supply.pools.len(), supply.is_once);
+        Self { supply, ahead, next: 0, progress }
     }
 
-    /// The next touch in the pose that the recognizer proposes.
-    fn proposed<const N: usize>(&mut self, recognizer: &mut Recognizer<'_, N>) -> Option<&Touch> {
-        let pose = recognizer.next_approach(self.candidates.iter().copied())?.pose;
-        let position = self.pool.by_pose.get_mut(usize::from(pose))?.pop()?;
-        self.feed.given(position)
+    /// The position among the object's touches of the last one that was supplied in its pool's order.
+    #[cfg(all(test, feature = "train"))]
+    pub(super) fn last(&self) -> u32 {
+        self.supply.pools[self.supply.next].order[self.next - 1]
+    }
+}
+
+impl<F: Follower<Step = [i32]> + ?Sized> Supplier<F> for Drawn<'_, '_, '_> {
+    type Error = Error;
+
+    fn step(&mut self, follower: &F) -> Result<Option<Option<&[i32]>>> {
+        let TouchSupply { feed, pools, next, candidates, .. } = &mut *self.supply;
+        let Some(pool) = pools.get_mut(*next) else { return Ok(None) };
+        if !pool.by_pose.is_empty() {
+            // The next touch in the pose that the follower proposes.
+            let pose = follower.propose(&mut candidates.iter().copied());
+            let position = pose.and_then(|pose| pool.by_pose.get_mut(usize::from(pose))?.pop());
+            return Ok(position.and_then(|position| feed.given(position)).map(|touch| self.ahead.one(touch)));
+        }
+        let margins = self.ahead.next(*next, self.next, &pool.order, feed)?;
+        self.next += usize::from(margins.is_some());
+        Ok(margins)
+    }
+}
+
+impl<F: Follower<Step = [i32]> + ?Sized> Sequences<F> for Drawn<'_, '_, '_> {
+    fn begin(&mut self) -> Result<Option<Sequence>> {
+        progress::advance(self.progress, 1)?;
+        let Some(pool) = self.supply.pools.get(self.supply.next) else { return Ok(None) };
+        self.next = pool.used;
+        Ok(Some(Sequence::new(self.supply.object)))
+    }
+
+    /// A sequence that the touches end in is left out; one that a robot's touches end in ends there.
+    fn end(&mut self, steps: u32, is_whole: bool) -> bool {
+        let TouchSupply { pools, next, is_once, .. } = &mut *self.supply;
+        let count = pools.len();
+        let Some(pool) = pools.get_mut(*next).filter(|pool| is_whole || (*is_once && !pool.order.is_empty())) else {
+            return false;
+        };
+        pool.used += steps as usize;
+        *next = if *is_once { *next + 1 } else { (*next + 1) % count };
+        true
     }
 }
 
@@ -189,7 +150,7 @@ impl Order<'_, '_, '_> {
 ///
 /// # Errors
 /// [`EvaluateProblem::NoPoseOf`] for a touch without a pose.
-pub fn follow_plan(supplies: &mut [Supply<'_>], names: &[String], plan: &Plan<'_>) -> Result<()> {
+pub(super) fn follow_plan(supplies: &mut [TouchSupply<'_>], names: &[String], plan: &Plan<'_>) -> Result<()> {
     let poses = plan.poses();
     for supply in &mut *supplies {
         for pool in &mut supply.pools {
@@ -210,68 +171,33 @@ pub fn follow_plan(supplies: &mut [Supply<'_>], names: &[String], plan: &Plan<'_
     Ok(())
 }
 
-/// Follows one sequence; returns true if it ended before the touches did.
-fn one<const N: usize>(
-    object: usize,
-    recognizer: &mut Recognizer<'_, N>,
-    order: &mut Order<'_, '_, '_>,
-    until: Until,
-    mut gate: impl FnMut(&Moment<'_>) -> bool,
-) -> Result<(Sequence, bool)> {
-    let strictest = odds_of(until.margin);
-    let mut sequence = Sequence::new(object);
-    recognizer.reset();
-    for approaches in 1_u32.. {
-        let Some((touch, is_evidence)) = order.push(recognizer)? else { break };
-        if !is_evidence {
-            // No evidence: it cost an approach.
-            sequence.end(approaches);
-            continue;
-        }
-        let (evidence, best, touches) = (recognizer.evidence(), recognizer.best(), recognizer.touches());
-        // What the model's own test says, as on the chip: a name is held back, or there is none.
-        let familiarity = recognizer.familiarity();
-        let may_name =
-            gate(&Moment { touch, evidence, best, touches, approaches }) && familiarity == Familiarity::Known;
-        let odds = sequence.push(recognizer, approaches, may_name);
-        if (may_name && odds <= strictest) || familiarity == Familiarity::Stranger || touches >= until.max_touches {
-            return Ok((sequence, true));
-        }
-    }
-    Ok((sequence, false))
-}
-
 /// Parts of the sequences wanted, after each of which it is seen whether a supply has ended.
 const ROUNDS: u128 = 16;
 
-/// Follows sequences of all objects' touches, `wanted` of each supply's, in parallel; `gate` makes for each sequence what
-/// says after each touch whether a name may be given. Every supply then has as many sequences of those wanted as the one
-/// with the smallest share of them.
+/// Follows sequences of all objects' touches, `wanted` of each supply's, in parallel. Every supply then has as many sequences
+/// of those wanted as the one with the smallest share of them.
 ///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
-pub fn follow<G: FnMut(&Moment<'_>) -> bool>(
+pub fn follow(
     model: &Model<'_>,
-    supplies: &mut [Supply<'_>],
+    supplies: &mut [TouchSupply<'_>],
     wanted: &[usize],
-    until: Until,
-    gate: impl Fn() -> G + Sync,
+    limit: Limit,
     progress: &dyn Progress,
 ) -> Result<Vec<Sequence>> {
-    let of = |((supply, ahead), wanted): ((&mut Supply<'_>, &mut Ahead<'_>), usize)| match model.object_count() {
-        0..=16 => supply.follow::<16, G>(ahead, model, wanted, until, &gate, progress),
-        17..=64 => supply.follow::<64, G>(ahead, model, wanted, until, &gate, progress),
-        _ => supply.follow::<256, G>(ahead, model, wanted, until, &gate, progress),
+    let of = |(supply, wanted): (&mut Drawn<'_, '_, '_>, usize)| {
+        let mut follower = chip(model, Stopping::from_odds(0, u32::MAX), None, None);
+        evidence::sequences(supply, &mut *follower, wanted, limit)
     };
-    let ahead = |supply: &Supply<'_>| Ahead::new(model, supply.pools.len(), supply.is_once);
-    let mut ahead: Vec<Ahead<'_>> = supplies.iter().map(ahead).collect();
-    let mut found: Vec<Vec<Sequence>> = vec![Vec::new(); supplies.len()];
+    let mut drawn: Vec<Drawn<'_, '_, '_>> =
+        supplies.iter_mut().map(|supply| Drawn::new(model, supply, progress)).collect();
+    let mut found: Vec<Vec<Sequence>> = vec![Vec::new(); drawn.len()];
     // Side by side: once a supply has ended, what the others had beyond its share would be left out again.
     for round in 1..=ROUNDS {
         let goal = |wanted: usize| (wanted as u128 * round).div_ceil(ROUNDS) as usize;
         let wanted: Vec<usize> = found.iter().zip(wanted).map(|(found, &wanted)| goal(wanted) - found.len()).collect();
-        let more = supplies.par_iter_mut().zip(&mut ahead).zip(wanted.par_iter().copied()).map(of);
-        let more = in_order(more)?;
+        let more = in_order(drawn.par_iter_mut().zip(wanted.par_iter().copied()).map(of))?;
         let has_ended = more.iter().zip(&wanted).any(|(more, &wanted)| more.len() < wanted);
         found.iter_mut().zip(more).for_each(|(found, more)| found.extend(more));
         if has_ended {

@@ -1,8 +1,10 @@
 //! Calibrating on touches that are captured for it.
 
+use super::Limit;
+use super::calibrated::Calibrated;
 use super::demand::Demand;
-use super::draw::{Supply, Until, follow};
-use super::model::{Calibrated, Drawn, Settings, calibrate, calibrate_drawn, material, noise_seed};
+use super::draw::{TouchSupply, follow};
+use super::model::{Drawn, Settings, calibrate, calibrate_drawn, material, noise_seed};
 use super::temperature::temperature_on_demand;
 use crate::capture::{self, Sampler};
 use crate::error::Result;
@@ -64,8 +66,8 @@ pub struct Captured<'a> {
 
 impl Captured<'_> {
     /// The supplies of the objects' touches; `known` are the objects' indices in the model.
-    pub fn supplies(&self, known: &[usize], seed: u64) -> Vec<Supply<'_>> {
-        self.demands.iter().zip(known).map(|(demand, &object)| Supply::on_demand(object, demand, seed)).collect()
+    pub fn supplies(&self, known: &[usize], seed: u64) -> Vec<TouchSupply<'_>> {
+        self.demands.iter().zip(known).map(|(demand, &object)| TouchSupply::on_demand(object, demand, seed)).collect()
     }
 
     /// Captures all of them.
@@ -172,10 +174,10 @@ fn means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Ve
             return Ok(Lengths { longest: to_the_limit, pools });
         }
         let noisy = touched.noisy(&settings.noise, settings.seed, 1);
-        let margin = ((1.0 - settings.rate) / settings.rate).ln() + super::model::STRICTEST[0];
-        let mut supply = [Supply::new(object, &noisy, settings.seed)];
-        let until = Until { margin, max_touches };
-        let found = follow(model, &mut supply, &[usize::MAX], until, || |_: &super::Moment<'_>| true, &())?;
+        let margin = settings.terms().margin() + super::model::STRICTEST[0];
+        let mut supply = [TouchSupply::new(object, &noisy, settings.seed)];
+        let limit = Limit { margin, max_touches };
+        let found = follow(model, &mut supply, &[usize::MAX], limit, &())?;
         // Sequences are of the instances in turn.
         let mean = |pool: usize| {
             let own = || found.iter().skip(pool).step_by(pools);

@@ -14,22 +14,13 @@
 //! binomial tests are, from as many starts ([`walk`](super::walk())).
 
 use super::choose::{By, Steps, Way, grid, summary, tallies};
-use super::sequence::{Odds, Sequence, odds_of};
 use super::walk::{Level, Nearest, Stop, needed, of_share};
 use super::{Chosen, Terms};
+use crate::evidence::{Odds, Sequence, odds_of};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The most fractions that are tried.
 const FRACTIONS: u32 = 200;
-
-/// A sequence, and the group that it belongs to.
-#[derive(Clone, Copy, Debug)]
-pub struct Grouped<'s> {
-    /// The sequence.
-    pub sequence: &'s Sequence,
-    /// The group's number.
-    pub group: usize,
-}
 
 /// Losses of the groups that have one.
 #[derive(Clone, Debug, Default)]
@@ -47,11 +38,15 @@ impl Losses {
     }
 }
 
+fn group_of(sequence: &Sequence) -> usize {
+    sequence.group.unwrap_or(0)
+}
+
 /// The losses of each case.
-fn losses(sequences: &[Grouped<'_>], odds: &Odds, by: By, rate: f64) -> Vec<Losses> {
+fn losses(sequences: &[Sequence], odds: &Odds, by: By, rate: f64) -> Vec<Losses> {
     // Wrong names, names, sequences.
     let mut sums: BTreeMap<(usize, usize), (f64, f64, f64)> = BTreeMap::new();
-    for Grouped { sequence, group } in sequences {
+    for sequence in sequences {
         let look = sequence.given(odds);
         let case = match by {
             By::All => Some(0),
@@ -59,7 +54,7 @@ fn losses(sequences: &[Grouped<'_>], odds: &Odds, by: By, rate: f64) -> Vec<Loss
             By::Named(_) => look.map(|look| look.name),
         };
         let Some(case) = case.filter(|case| *case < by.count()) else { continue };
-        let sum = sums.entry((case, *group)).or_default();
+        let sum = sums.entry((case, group_of(sequence))).or_default();
         sum.0 += f64::from(u8::from(look.is_some_and(|look| look.name != sequence.object)));
         sum.1 += f64::from(u8::from(look.is_some()));
         sum.2 += 1.0;
@@ -99,8 +94,8 @@ fn fraction(losses: &[f64], groups: f64, rate: f64, confidence: f64) -> f64 {
 }
 
 /// The bets for each case, from groups that are not tested: at the loosest threshold at which they seem to keep the rate.
-fn bets(learned_on: &[Grouped<'_>], by: By, strictest: f64, groups: usize, terms: &Terms) -> Vec<f64> {
-    let learned: BTreeSet<usize> = learned_on.iter().map(|grouped| grouped.group).collect();
+fn bets(learned_on: &[Sequence], by: By, strictest: f64, groups: usize, terms: &Terms) -> Vec<f64> {
+    let learned: BTreeSet<usize> = learned_on.iter().map(group_of).collect();
     let mut seen = vec![Losses::default(); by.count()];
     for margin in grid(strictest, super::choose::LOOSEST).step_by(10) {
         let losses = losses(learned_on, &Odds::All(odds_of(margin)), by, terms.rate);
@@ -123,28 +118,28 @@ fn bets(learned_on: &[Grouped<'_>], by: By, strictest: f64, groups: usize, terms
 ///
 /// # Errors
 /// [`Stop`], if no threshold keeps the promise or too few groups are there to know.
-pub fn choose_groups(
-    learned_on: &[Grouped<'_>],
-    tested: &[Grouped<'_>],
+pub(crate) fn choose_groups(
+    learned_on: &[Sequence],
+    tested: &[Sequence],
     objects: usize,
     way: &Way<'_>,
     terms: &Terms,
 ) -> Result<Chosen, Stop> {
     let by = By::of(terms.per, objects);
-    let groups: BTreeSet<usize> = tested.iter().map(|grouped| grouped.group).collect();
+    let groups: BTreeSet<usize> = tested.iter().map(group_of).collect();
     // So that the share of one start is enough.
     let terms_of_start = Terms { confidence: of_share(terms.confidence, way.starts.len()), ..*terms };
     let bets = bets(learned_on, by, way.strictest(), groups.len(), &terms_of_start);
-    let own: Vec<&Sequence> = learned_on.iter().map(|grouped| grouped.sequence).collect();
+    let own: Vec<&Sequence> = learned_on.iter().collect();
     let odds = walk(tested, Steps::new(&own, objects, way, terms)?, by, &bets, terms)?;
-    let sequences: Vec<&Sequence> = tested.iter().map(|grouped| grouped.sequence).collect();
+    let sequences: Vec<&Sequence> = tested.iter().collect();
     let kept = tallies(&sequences, &odds, by);
     Ok(summary(odds, kept, &sequences, objects))
 }
 
 /// Fixed-sequence testing, as [`walk`](super::walk()) does for tallies. Thresholds at which no bet could be won with the share
 /// of one start even without an error are passed over: how many names there are decides that, not how many are errors.
-fn walk(tested: &[Grouped<'_>], steps: Steps, by: By, bets: &[f64], terms: &Terms) -> Result<Odds, Stop> {
+fn walk(tested: &[Sequence], steps: Steps, by: By, bets: &[f64], terms: &Terms) -> Result<Odds, Stop> {
     let mut level = Level::new(&steps.starts, terms.confidence);
     let share = of_share(terms.confidence, steps.starts.len());
     // Slack for the last bits of a sum.
@@ -172,7 +167,7 @@ fn walk(tested: &[Grouped<'_>], steps: Steps, by: By, bets: &[f64], terms: &Term
             None => kept = Some(odds),
             Some(position) => {
                 nearest.see(p_values[position], || {
-                    let sequences: Vec<&Sequence> = tested.iter().map(|grouped| grouped.sequence).collect();
+                    let sequences: Vec<&Sequence> = tested.iter().collect();
                     let tally = tallies(&sequences, &odds, by).get(position).copied().unwrap_or_default();
                     Stop::TooMany { position, tally, needed: None }
                 });
@@ -195,24 +190,22 @@ fn walk(tested: &[Grouped<'_>], steps: Steps, by: By, bets: &[f64], terms: &Term
 #[cfg(test)]
 mod tests {
     use super::super::Per;
-    use super::super::sequence::Look;
     use super::*;
+    use crate::evidence::Lead;
 
     /// Groups of sequences, each named at once, with so many wrong ones in each group.
-    fn grouped(wrong: &[usize], of: usize) -> Vec<(Sequence, usize)> {
-        let sequence = |name: usize| {
-            let mut sequence = Sequence::new(0);
-            sequence.look(Look { name, odds: odds_of(9.0), touches: 1, approaches: 1 }, true);
+    fn grouped(wrong: &[usize], of: usize) -> Vec<Sequence> {
+        let sequence = |name: usize, group: usize| {
+            let mut sequence = Sequence::new(0).of_group(Some(group));
+            sequence.take(Lead { name, odds: odds_of(9.0), touches: 1, approaches: 1 }, true);
             sequence
         };
         let groups = wrong.iter().enumerate();
-        groups.flat_map(|(group, &wrong)| (0..of).map(move |at| (sequence(usize::from(at < wrong)), group))).collect()
+        groups.flat_map(|(group, &wrong)| (0..of).map(move |at| sequence(usize::from(at < wrong), group))).collect()
     }
 
     fn chosen(wrong: &[usize], of: usize, rate: f64) -> Result<Chosen, Stop> {
-        let sequences = grouped(wrong, of);
-        let grouped: Vec<Grouped<'_>> =
-            sequences.iter().map(|(sequence, group)| Grouped { sequence, group: *group }).collect();
+        let grouped = grouped(wrong, of);
         // As if a fifth as many others had been learned from.
         let learned = &grouped[..grouped.len() / 5 / of * of];
         choose_groups(

@@ -34,37 +34,46 @@
 
 mod ahead;
 mod begin;
+mod calibrated;
 mod choose;
 mod demand;
 mod draw;
 mod error;
+mod found;
 mod fresh;
 mod groups;
 mod model;
 mod recorded;
 #[cfg(all(test, feature = "train"))]
 mod recorded_tests;
-mod sequence;
 mod temperature;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 mod unlike;
 mod walk;
 
+pub use crate::evidence::{Lead, Limit, Odds, Sequence, margin_of, odds_of};
 pub(crate) use begin::Begin;
+pub(crate) use calibrated::Stated;
+pub use calibrated::{Calibrated, Gain, OfObject, OfRows, Used, Worse};
 pub(crate) use choose::share_tested;
-pub use choose::{Chosen, Terms, Way, choose, choose_independent};
-pub use draw::{Moment, Supply, Until, follow, follow_plan};
+pub use choose::{Chosen, Terms, choose};
+pub(crate) use choose::{Way, choose_independent};
+#[cfg(all(test, feature = "train"))]
+use draw::Drawn;
+pub use draw::{TouchSupply, follow};
 pub use error::{CalibrateProblem, Enough, Forecast, Remedy, Supplied};
+pub use found::{Alarms, Found, OnRecordings};
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
-pub use groups::{Grouped, choose_groups};
-pub(crate) use model::worse;
-pub use model::{Calibrated, OfObject, OfRecorded, Settings, Worse, added_bytes, calibrate};
+pub(crate) use groups::choose_groups;
+#[cfg(feature = "train")]
+pub(crate) use model::added_bytes;
+pub use model::{OfRecorded, Settings, calibrate};
 #[cfg(feature = "train")]
 pub(crate) use model::{STRICTEST, Start, add_noise, begin, calibrate_from};
 pub use palpate_shared::format::Per;
 pub use recorded::calibrate_recorded;
-pub use sequence::{Look, Odds, Sequence, margin_of, odds_of};
+
 pub use temperature::temperature;
 pub use unlike::unlike_training;
 
@@ -77,4 +86,7 @@ pub fn of_what(per: Per) -> &'static str {
     }
 }
 
-pub use walk::{Kept, Stop, Tally, allowed, binomial_tail, enough, needed, walk};
+#[cfg(test)]
+pub(crate) use walk::enough;
+pub(crate) use walk::{Stop, allowed, binomial_tail};
+pub use walk::{Tally, needed};

@@ -1,24 +1,25 @@
 //! A model's thresholds, its promise and its temperature.
 
 use super::begin::{Begin, Seen};
+use super::calibrated::{Calibrated, OfObject, Stated};
 use super::choose::{Chosen, Terms, Way, chosen, share_tested, spread};
-use super::draw::{Moment, Supply, Until, follow, follow_plan};
+use super::draw::{TouchSupply, follow, follow_plan};
 use super::error::Remedy;
-use super::sequence::{Odds, Sequence, margin_of, odds_of};
 use super::temperature::temperature;
-use super::{Per, Tally, binomial_tail};
-use crate::compile::{self, Restated, restate};
+use super::{Limit, Per, Tally};
+use crate::compile;
 use crate::ensemble::StatedProbe;
 use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result, Supplied};
 use crate::evaluate::{Candidate, OfTouches};
+use crate::evidence::{Odds, Sequence, odds_of};
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Refused, Stopping};
-use palpate_shared::format::{OddsByObject, Promise, SECTION_HEADER_LENGTH, Tag, Temperature};
+use palpate_shared::format::{Promise, SECTION_HEADER_LENGTH, Tag, Temperature};
 use serde::Serialize;
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// One touch in this many serves the pilot alone, which says how strict to begin; its sequences are at most one in this many.
 const PILOT: usize = 30;
@@ -61,52 +62,6 @@ impl Default for Settings {
     }
 }
 
-/// A calibrated model, and what its calibration found.
-#[derive(Clone, Debug, Serialize)]
-pub struct Calibrated {
-    /// Bytes of the model, as the chip reads them.
-    #[serde(skip)]
-    pub model: Vec<u8>,
-    /// Its promise.
-    #[serde(skip)]
-    pub promise: Promise,
-    /// Its thresholds.
-    #[serde(skip)]
-    pub odds: Odds,
-    /// The promised error rate.
-    pub promised: f64,
-    /// Of what: "average", "name" or "object".
-    pub per: &'static str,
-    /// The probability that it is kept.
-    pub confidence: f64,
-    /// Unit of the counts: "touches" or "approaches".
-    pub counted: &'static str,
-    /// Sequences that the promise rests on.
-    pub sequences: usize,
-    /// Share of the names given in these that were wrong.
-    pub error: f64,
-    /// Share of these that ended without a name: undecided, or unknown to the model's test.
-    pub undecided: f64,
-    /// Touches used on average that were evidence.
-    pub mean_touches: f64,
-    /// Approaches used on average, where the data set holds those.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_approaches: Option<f64>,
-    /// Where an uncalibrated recognizer stops at this rate: nats of evidence ahead of all other objects.
-    pub uncalibrated_margin: f64,
-    /// Where this one stops: for each name.
-    pub margins: BTreeMap<String, f64>,
-    /// For each name, or object, that the rate is promised for: the share that was wrong. Empty for an average.
-    pub errors: BTreeMap<String, f64>,
-    /// Each object, whatever the rate is promised of.
-    pub objects: BTreeMap<String, OfObject>,
-    /// Divisor of the evidence before it is shown as a posterior.
-    pub temperature: f64,
-    /// Where the thresholds were tested on recordings.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub recorded: Option<OfRecorded>,
-}
-
 /// Facts about a promise that was tested on recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct OfRecorded {
@@ -117,52 +72,6 @@ pub struct OfRecorded {
     pub recordings: Option<usize>,
     /// Share of wrong names on simulated sequences at the thresholds that were kept.
     pub simulated_error: f64,
-}
-
-/// Figures of an object under the thresholds, in the sequences that the promise rests on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct OfObject {
-    /// Names given to it, right or wrong.
-    pub given: u64,
-    /// Wrong ones of these.
-    pub wrong: u64,
-    /// Times that its name was given, to whatever object.
-    pub named: u64,
-    /// Of these, the wrong ones.
-    pub named_wrongly: u64,
-}
-
-/// An object whose names are wrong more often than all names together may be, which their average does not show.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Worse {
-    /// The object.
-    pub object: String,
-    /// The share of wrong ones among the names given to it, if that is above the rate.
-    pub given: Option<f64>,
-    /// The share of wrong ones among the times that its name was given, if that is above the rate.
-    pub named: Option<f64>,
-}
-
-impl Calibrated {
-    /// The objects whose names are wrong more often than promised, though the promise is kept: one that is undecided
-    /// mostly has few names in an average. Shares that may be above the rate by chance (a binomial test at 1 %) are left
-    /// out.
-    pub fn worse(&self) -> Vec<Worse> {
-        worse(&self.objects, self.promised)
-    }
-}
-
-pub(crate) fn worse(objects: &BTreeMap<String, OfObject>, rate: f64) -> Vec<Worse> {
-    let above = |wrong: u64, all: u64| {
-        let below = wrong.checked_sub(1).map_or(0.0, |wrong| binomial_tail(Tally { wrong, all }, rate));
-        (all > 0 && below >= 0.99).then(|| wrong as f64 / all as f64)
-    };
-    let worse = objects.iter().map(|(object, of)| Worse {
-        object: object.clone(),
-        given: above(of.wrong, of.given),
-        named: above(of.named_wrongly, of.named),
-    });
-    worse.filter(|worse| worse.given.is_some() || worse.named.is_some()).collect()
 }
 
 /// Sets a model's thresholds so that it keeps a promised error rate and uses it up, on touches that nothing was trained
@@ -212,7 +121,7 @@ pub(crate) fn calibrate_from(
     let drawn = Drawn {
         dataset: &dataset,
         fewest: dataset.objects.iter().map(|object| object.len() as u64).min().unwrap_or(0),
-        supplies: touched.map(|(touched, &object)| Supply::new(object, touched, settings.seed)).collect(),
+        supplies: touched.map(|(touched, &object)| TouchSupply::new(object, touched, settings.seed)).collect(),
     };
     let temperature = || Ok(temperature(model, &dataset, &material.known));
     calibrate_drawn(model, &material, drawn, settings, start, temperature, progress)
@@ -232,19 +141,19 @@ pub(crate) fn begin(
 ) -> Result<f64> {
     let Material { names, known, outputs, max_touches } = material(model, &part, settings)?;
     add_noise(model, &mut part, &settings.noise, max_touches, noise_seed(settings));
-    let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
-    let naive = ((1.0 - settings.rate) / settings.rate).ln();
+    let terms = settings.terms();
+    let naive = terms.margin();
     let most = ((settings.sequences as f64 / times) as usize).max(1);
     let wanted = wanted(model, &outputs, settings.per, most);
     let followed = |beyond: f64| {
         let touched = part.objects.iter().zip(&known);
-        let mut supplies: Vec<Supply<'_>> =
-            touched.map(|(touched, &object)| Supply::new(object, touched, settings.seed)).collect();
+        let mut supplies: Vec<TouchSupply<'_>> =
+            touched.map(|(touched, &object)| TouchSupply::new(object, touched, settings.seed)).collect();
         if settings.active {
             follow_plan(&mut supplies, &names, &model.plan().ok_or(EvaluateProblem::NoPlan)?)?;
         }
-        let until = Until { margin: naive + beyond, max_touches };
-        follow(model, &mut supplies, &wanted, until, || |_: &Moment<'_>| true, progress)
+        let limit = Limit { margin: naive + beyond, max_touches };
+        follow(model, &mut supplies, &wanted, limit, progress)
     };
     let [near, far] = STRICTEST;
     let sequences = followed(near)?;
@@ -277,7 +186,7 @@ pub(super) struct Material {
 
 /// Refuses settings, models and data sets of which there is no calibration.
 pub(super) fn material(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Material> {
-    check(settings)?;
+    settings.check()?;
     refuse_names_of_placements(model, settings)?;
     let own = Stopping::from_model(model).max_touches();
     let max_touches = settings.max_touches.unwrap_or(own);
@@ -324,7 +233,7 @@ pub(super) struct Drawn<'d> {
     /// The fewest touches of an object.
     pub(super) fewest: u64,
     /// One of each object, with noise.
-    pub(super) supplies: Vec<Supply<'d>>,
+    pub(super) supplies: Vec<TouchSupply<'d>>,
 }
 
 /// Calibrates on touches drawn from supplies; `temperature` finds the temperature.
@@ -338,14 +247,14 @@ pub(super) fn calibrate_drawn(
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
     progress.begin("calibrating", Some((settings.sequences + settings.sequences / PILOT) as u64));
-    let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
-    let naive = ((1.0 - settings.rate) / settings.rate).ln();
+    let terms = settings.terms();
+    let naive = terms.margin();
     let wanted = |count: usize| wanted(model, outputs, settings.per, count);
-    let draw = |supplies: &mut [Supply<'_>], count: usize, margin: f64| {
-        let until = Until { margin, max_touches: *max_touches };
-        follow(model, supplies, &wanted(count), until, || |_: &Moment<'_>| true, progress)
+    let draw = |supplies: &mut [TouchSupply<'_>], count: usize, margin: f64| {
+        let limit = Limit { margin, max_touches: *max_touches };
+        follow(model, supplies, &wanted(count), limit, progress)
     };
-    let mut first: Vec<Supply<'_>> = supplies.iter_mut().map(|supply| supply.take_part(PILOT)).collect();
+    let mut first: Vec<TouchSupply<'_>> = supplies.iter_mut().map(|supply| supply.take_part(PILOT)).collect();
     if settings.active {
         let plan = model.plan().ok_or(EvaluateProblem::NoPlan)?;
         if !dataset.holds_approaches() {
@@ -409,18 +318,19 @@ pub(super) fn outputs(model: &Model<'_>, dataset: &Dataset) -> Vec<Vec<usize>> {
     dataset.objects.iter().map(|touched| candidate.outputs_of(&touched.name)).collect()
 }
 
-pub(super) fn check(settings: &Settings) -> Result<()> {
-    let Settings { rate, confidence, sequences, .. } = *settings;
-    if !(1e-9..0.5).contains(&rate) {
-        return Err(Error::setting("error_rate", rate, "a number of at least 1e-9 and below 0.5"));
+impl Settings {
+    /// The terms of the promise.
+    pub(crate) fn terms(&self) -> Terms {
+        Terms { rate: self.rate, confidence: self.confidence, per: self.per }
     }
-    if !((0.5..=0.999_999).contains(&confidence)) {
-        return Err(Error::setting("confidence", confidence, "a number from 0.5 to 0.999999"));
+
+    pub(super) fn check(&self) -> Result<()> {
+        self.terms().check()?;
+        if self.sequences == 0 || u32::try_from(self.sequences).is_err() {
+            return Err(Error::setting("sequences", self.sequences, "a number from 1 to 4294967295"));
+        }
+        self.noise.check()
     }
-    if sequences == 0 || u32::try_from(sequences).is_err() {
-        return Err(Error::setting("sequences", sequences, "a number from 1 to 4294967295"));
-    }
-    settings.noise.check()
 }
 
 /// Adds noise to the touches; the origin does not state it. With a bias every sequence is made by a robot of its own, which
@@ -460,7 +370,8 @@ fn is_kept_well(pilot: &[Sequence], margin: f64, rate: f64) -> bool {
 }
 
 /// Bytes that a calibration to an average error rate adds to a model that states neither promise nor temperature.
-pub fn added_bytes(noise: &Noise) -> usize {
+#[cfg(feature = "train")]
+pub(crate) fn added_bytes(noise: &Noise) -> usize {
     let promise = Promise::length(&noise.promised());
     2 * SECTION_HEADER_LENGTH + promise + Temperature::LENGTH
 }
@@ -475,87 +386,27 @@ pub(super) fn finished(
     temperature: f64,
 ) -> Result<Calibrated> {
     let approaches = dataset.holds_approaches();
-    let mean = if approaches { chosen.mean_approaches } else { chosen.mean_touches };
-    let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
-    let promise = Promise {
-        rate: settings.rate,
-        confidence: settings.confidence,
-        per: settings.per,
-        approaches,
-        active: settings.active,
-        groups: false,
-        sequences: count(chosen.sequences),
-        given: count(chosen.given),
-        wrong: count(chosen.wrong),
-        mean_thousandths: (1e3 * mean).round() as u32,
-        max_touches,
-        noise: dataset.real().and(&settings.noise).promised(),
-    };
-    let by_object = match &chosen.odds {
-        Odds::All(_) => None,
-        Odds::ByObject(odds) => {
-            // A background, which is never named, has a place too.
-            let all = odds.iter().copied().chain(std::iter::repeat(0)).take(model.object_count());
-            Some((true, all.flat_map(OddsByObject::to_bytes).collect()))
-        }
-    };
-    let stated = Temperature::new(temperature).unwrap_or(Temperature::ONE);
-    let mut sections = vec![
-        (Tag::ThresholdsByObject, by_object),
-        (Tag::Promise, Some((false, promise.write(<[u8]>::to_vec)))),
-        (Tag::Temperature, Some((false, stated.to_bytes().to_vec()))),
-    ];
+    let noise = dataset.real().and(&settings.noise).promised();
+    let stated = Stated { approaches, active: settings.active, groups: false, max_touches, noise };
+    let temperature = Temperature::new(temperature).unwrap_or(Temperature::ONE);
+    let mut sections = vec![(Tag::Temperature, Some((false, temperature.to_bytes().to_vec())))];
     if let (None, Some(probe)) = (model.probe(), StatedProbe::of(dataset)) {
         let trained = probe.trained();
         sections.push((Tag::Probe, Some((false, trained.to_bytes().into_iter().take(trained.length()).collect()))));
     }
-    let restated = Restated {
-        odds: Some(chosen.odds.strictest()),
-        max_touches: Some(max_touches),
-        sections,
-        ..Restated::default()
-    };
-    let share = |tally: &Tally| tally.wrong as f64 / tally.all.max(1) as f64;
-    let is_each = settings.per != Per::Average;
-    let errors = names.iter().cloned().zip(chosen.tallies.iter().map(share)).filter(|_| is_each).collect();
-    let margin = |(object, name): (usize, &String)| (name.clone(), margin_of(chosen.odds.of(object)));
-    let of_object = |(name, (touched, named)): (&String, (&Tally, &Tally))| {
-        let of = OfObject { given: touched.all, wrong: touched.wrong, named: named.all, named_wrongly: named.wrong };
-        (name.clone(), of)
-    };
-    let mut objects: BTreeMap<String, OfObject> =
-        names.iter().zip(chosen.touched.iter().zip(&chosen.named)).map(of_object).collect();
+    let mut calibrated = Calibrated::new(model, names, chosen, &settings.terms(), stated, sections)?;
     // Touches that state no placement are of the object as a whole.
     for (touched, outputs) in dataset.objects.iter().zip(self::outputs(model, dataset)) {
         if outputs.len() > 1 {
-            let own = outputs.iter().filter_map(|&output| objects.remove(names.get(output)?));
+            let own = outputs.iter().filter_map(|&output| calibrated.objects.remove(names.get(output)?));
             let sum = own.fold(OfObject::default(), |a, b| OfObject {
                 given: a.given + b.given,
                 wrong: a.wrong + b.wrong,
                 named: a.named + b.named,
                 named_wrongly: a.named_wrongly + b.named_wrongly,
             });
-            objects.insert(touched.name.clone(), sum);
+            calibrated.objects.insert(touched.name.clone(), sum);
         }
     }
-    Ok(Calibrated {
-        model: restate(model, &restated)?,
-        promise,
-        odds: chosen.odds.clone(),
-        promised: settings.rate,
-        per: settings.per.name(),
-        confidence: settings.confidence,
-        counted: if approaches { "approaches" } else { "touches" },
-        sequences: chosen.sequences,
-        error: chosen.wrong as f64 / chosen.given.max(1) as f64,
-        undecided: 1.0 - chosen.given as f64 / chosen.sequences.max(1) as f64,
-        mean_touches: chosen.mean_touches,
-        mean_approaches: approaches.then_some(chosen.mean_approaches),
-        uncalibrated_margin: ((1.0 - settings.rate) / settings.rate).ln(),
-        margins: names.iter().enumerate().map(margin).collect(),
-        errors,
-        objects,
-        temperature: stated.value(),
-        recorded: None,
-    })
+    Ok(Calibrated { temperature: Some(temperature.value()), ..calibrated })
 }

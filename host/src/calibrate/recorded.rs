@@ -13,19 +13,21 @@
 //! Fixed-sequence testing needs no more: an order that the tested sequences had no part in, and at each threshold a test
 //! that is valid by itself. If the simulation is wrong, a promise that could have been made is missed, and none is broken.
 
+use super::Limit;
+use super::calibrated::Calibrated;
 use super::choose::{By, Terms, steps, summary, tallies};
-use super::draw::{Moment, Supply, Until, follow, follow_plan};
+use super::draw::{TouchSupply, follow, follow_plan};
 use super::error::{Enough, Forecast};
 use super::model::{
-    Calibrated, OfRecorded, STRICTEST, Settings, add_noise, check, finished, named, noise_seed, outputs,
-    refuse_names_of_placements, refuse_unstated, shares,
+    OfRecorded, STRICTEST, Settings, add_noise, finished, named, noise_seed, outputs, refuse_names_of_placements,
+    refuse_unstated, shares,
 };
-use super::sequence::{Odds, Sequence, margin_of};
 use super::temperature::temperature;
 use super::walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};
 use crate::compile;
 use crate::error::{CalibrateProblem, EvaluateProblem, Result};
 use crate::evaluate::{Candidate, OfTouches};
+use crate::evidence::{Odds, Sequence, margin_of};
 use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, Source};
@@ -58,7 +60,7 @@ pub fn calibrate_recorded(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
-    check(settings)?;
+    settings.check()?;
     refuse_names_of_placements(model, settings)?;
     let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
     compile::stopping(settings.rate, max_touches)?;
@@ -69,8 +71,8 @@ pub fn calibrate_recorded(
     let delivered = Candidate::Compiled(model).delivered(recorded);
     let recorded = delivered.as_ref();
     add_noise(model, &mut simulated, &settings.noise, max_touches, noise_seed(settings));
-    let strictest = ((1.0 - settings.rate) / settings.rate).ln() + STRICTEST[0];
-    let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
+    let terms = settings.terms();
+    let strictest = terms.margin() + STRICTEST[0];
     let (cut, by) = (Cut { model, names: &names, settings, max_touches }, By::of(settings.per, names.len()));
     progress.begin("calibrating", Some(settings.sequences as u64));
     let sequences = cut.sequences(&simulated, settings.sequences, strictest, progress)?;
@@ -135,8 +137,8 @@ impl Cut<'_> {
     fn sequences(&self, dataset: &Dataset, most: usize, margin: f64, progress: &dyn Progress) -> Result<Vec<Sequence>> {
         let (_, known) = named(self.model, dataset)?;
         let objects = dataset.objects.iter().zip(&known);
-        let mut supplies: Vec<Supply<'_>> =
-            objects.map(|(touched, &object)| Supply::new(object, touched, self.settings.seed)).collect();
+        let mut supplies: Vec<TouchSupply<'_>> =
+            objects.map(|(touched, &object)| TouchSupply::new(object, touched, self.settings.seed)).collect();
         if self.settings.active {
             let plan = self.model.plan().ok_or(EvaluateProblem::NoPlan)?;
             if !dataset.holds_approaches() {
@@ -146,8 +148,8 @@ impl Cut<'_> {
         }
         let shares = shares(self.model, &outputs(self.model, dataset));
         let wanted: Vec<usize> = shares.iter().map(|share| (share * most as f64).round().max(1.0) as usize).collect();
-        let until = Until { margin, max_touches: self.max_touches };
-        follow(self.model, &mut supplies, &wanted, until, || |_: &Moment<'_>| true, progress)
+        let limit = Limit { margin, max_touches: self.max_touches };
+        follow(self.model, &mut supplies, &wanted, limit, progress)
     }
 }
 
@@ -282,8 +284,8 @@ pub(super) fn first_of(
 ) -> Result<usize> {
     let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
     let (names, _) = named(model, recorded)?;
-    let strictest = ((1.0 - settings.rate) / settings.rate).ln() + STRICTEST[0];
-    let terms = Terms { rate: settings.rate, confidence: settings.confidence, per: settings.per };
+    let terms = settings.terms();
+    let strictest = terms.margin() + STRICTEST[0];
     let cut = Cut { model, names: &names, settings, max_touches };
     let sequences = cut.sequences(&simulated, settings.sequences, strictest, &())?;
     let steps = steps(&sequences, names.len(), strictest, &terms);

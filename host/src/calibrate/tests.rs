@@ -3,6 +3,7 @@ use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::train;
 use crate::error::CalibrateProblem;
 use crate::evaluate::{Candidate, Margins, SequentialSettings};
+use crate::evidence::{Chip, Sequences, Supplier, chip, sequences};
 use crate::probe::noise::Noise;
 use crate::random::{Purpose, generator};
 use crate::tests::repetitions::{assert_rare, repetitions};
@@ -24,9 +25,53 @@ fn fresh(count: usize, seed: u64) -> Dataset {
     synthetic::dataset(&[count; OBJECTS], seed)
 }
 
-fn supplies(dataset: &Dataset) -> Vec<Supply<'_>> {
+fn supplies(dataset: &Dataset) -> Vec<TouchSupply<'_>> {
     let objects = dataset.objects.iter().enumerate();
-    objects.map(|(object, of)| Supply::new(object, of, 1)).collect()
+    objects.map(|(object, of)| TouchSupply::new(object, of, 1)).collect()
+}
+
+/// A supply, and for each sequence the positions of the touches that it used.
+struct Watched<'w, 'd, 'm> {
+    drawn: Drawn<'w, 'd, 'm>,
+    used: Vec<Vec<u32>>,
+    margins: Option<Vec<i32>>,
+}
+
+impl Supplier<Chip<'_>> for Watched<'_, '_, '_> {
+    type Error = crate::Error;
+
+    fn step(&mut self, follower: &Chip<'_>) -> crate::Result<Option<Option<&[i32]>>> {
+        let Some(step) = self.drawn.step(follower)? else { return Ok(None) };
+        self.margins = step.map(<[i32]>::to_vec);
+        self.used.last_mut().unwrap().push(self.drawn.last());
+        Ok(Some(self.margins.as_deref()))
+    }
+}
+
+impl Sequences<Chip<'_>> for Watched<'_, '_, '_> {
+    fn begin(&mut self) -> crate::Result<Option<Sequence>> {
+        self.used.push(Vec::new());
+        Sequences::<Chip<'_>>::begin(&mut self.drawn)
+    }
+
+    fn end(&mut self, steps: u32, is_whole: bool) -> bool {
+        Sequences::<Chip<'_>>::end(&mut self.drawn, steps, is_whole)
+    }
+}
+
+/// For each sequence of a supply the positions of the touches that it uses.
+fn used(model: &Model<'_>, supply: &mut TouchSupply<'_>, limit: Limit) -> Vec<Vec<u32>> {
+    let mut watched = Watched { drawn: Drawn::new(model, supply, &()), used: Vec::new(), margins: None };
+    let mut follower = chip(model, Stopping::from_odds(0, u32::MAX), None, None);
+    let found = sequences(&mut watched, &mut *follower, usize::MAX, limit).unwrap();
+    watched.used.truncate(found.len());
+    assert!(watched.used.iter().map(Vec::len).eq(found.iter().map(|sequence| sequence.approaches as usize)));
+    watched.used
+}
+
+/// The sources or robots that made the touches of each sequence: of so many, in turn.
+fn in_turns(used: Vec<Vec<u32>>, count: u32) -> Vec<BTreeSet<u32>> {
+    used.into_iter().map(|used| used.into_iter().map(|touch| touch % count).collect()).collect()
 }
 
 /// The same touches, made by `robots` robots in turn, whose biases change nothing.
@@ -59,7 +104,7 @@ fn walks(sequences: usize, seed: u64) -> Vec<Sequence> {
             let name = (0..4).max_by(|&a, &b| evidence[a].total_cmp(&evidence[b])).unwrap();
             let others: f64 = (0..4).filter(|&o| o != name).map(|o| (evidence[o] - evidence[name]).exp()).sum();
             let odds = odds_of(-others.ln());
-            sequence.look(Look { name, odds, touches, approaches: touches }, true);
+            sequence.take(Lead { name, odds, touches, approaches: touches }, true);
             if odds <= odds_of(10.0) {
                 break;
             }
@@ -144,9 +189,9 @@ fn known(object: usize, random: &mut impl rand::Rng) -> Sequence {
     for (touches, (turn, name)) in (1..).zip(wrong.into_iter().enumerate()) {
         // Where a uniform number is the probability.
         let margin = led_wrongly(name, 0.0)[turn].ln() - random.random::<f64>().ln();
-        sequence.look(Look { name, odds: odds_of(margin), touches, approaches: touches }, true);
+        sequence.take(Lead { name, odds: odds_of(margin), touches, approaches: touches }, true);
     }
-    sequence.look(Look { name: object, odds: odds_of(12.0), touches: 3, approaches: 3 }, true);
+    sequence.take(Lead { name: object, odds: odds_of(12.0), touches: 3, approaches: 3 }, true);
     sequence
 }
 
@@ -223,7 +268,7 @@ fn an_object_that_is_wrong_more_often_than_all_names_together_is_named() {
             (3, _) => return sequence,
             _ => object,
         };
-        sequence.look(Look { name, odds: odds_of(9.0), touches: 5, approaches: 5 }, true);
+        sequence.take(Lead { name, odds: odds_of(9.0), touches: 5, approaches: 5 }, true);
         sequence
     };
     let sequences: Vec<Sequence> = (0..8_000).map(sequence).collect();
@@ -237,7 +282,7 @@ fn an_object_that_is_wrong_more_often_than_all_names_together_is_named() {
         named: chosen.named[object].all,
         named_wrongly: chosen.named[object].wrong,
     };
-    let worse = model::worse(&names(4).into_iter().zip((0..4).map(of)).collect(), 0.05);
+    let worse = calibrated::worse(&names(4).into_iter().zip((0..4).map(of)).collect(), 0.05);
     let [first, last] = &worse[..] else { panic!("{worse:?}") };
     assert_eq!((first.object.as_str(), first.given, first.named), ("object0", None, Some(200.0 / 2_200.0)));
     assert_eq!((last.object.as_str(), last.given, last.named), ("object3", Some(200.0 / 600.0), None));
@@ -269,18 +314,13 @@ fn a_model_that_is_wrong_however_sure_it_is_keeps_no_promise() {
 #[test]
 fn sequences_are_whole_and_use_no_touch_twice() {
     let (compiled, dataset) = (model(), fresh(3_000, 2));
-    let until = Until { margin: 6.0, max_touches: 50 };
-    let seen = std::sync::Mutex::new(Vec::new());
-    let gate = || {
-        |moment: &Moment<'_>| {
-            seen.lock().unwrap().push(std::ptr::from_ref(moment.touch).addr());
-            true
-        }
-    };
-    let sequences = follow(&compiled.model(), &mut supplies(&dataset), &[90; 3], until, gate, &()).unwrap();
-    let seen = seen.into_inner().unwrap();
-    assert_eq!(seen.iter().collect::<BTreeSet<_>>().len(), seen.len());
+    let limit = Limit { margin: 6.0, max_touches: 50 };
+    let sequences = follow(&compiled.model(), &mut supplies(&dataset), &[90; 3], limit, &()).unwrap();
     assert_eq!(sequences.len(), 270);
+    for mut supply in supplies(&dataset) {
+        let used = used(&compiled.model(), &mut supply, limit).concat();
+        assert_eq!(used.iter().collect::<BTreeSet<_>>().len(), used.len());
+    }
     for sequence in &sequences {
         let is_sure = sequence.given(&Odds::All(odds_of(6.0))).is_some();
         assert!(is_sure || sequence.touches == 50, "{sequence:?}");
@@ -288,7 +328,7 @@ fn sequences_are_whole_and_use_no_touch_twice() {
     }
     // Fewer touches make fewer sequences, equally many of each object.
     let few = synthetic::dataset(&[300, 3_000, 3_000], 2);
-    let sequences = follow(&compiled.model(), &mut supplies(&few), &[90; 3], until, || |_: &Moment<'_>| true, &());
+    let sequences = follow(&compiled.model(), &mut supplies(&few), &[90; 3], limit, &());
     let sequences = sequences.unwrap();
     let of = |object| sequences.iter().filter(|sequence| sequence.object == object).count();
     assert!(of(0) > 3 && of(0) < 90 && of(0) == of(1) && of(0) == of(2), "{}", of(0));
@@ -297,27 +337,14 @@ fn sequences_are_whole_and_use_no_touch_twice() {
 #[test]
 fn every_robot_makes_one_sequence() {
     let (compiled, dataset) = (model(), of_robots(fresh(1_000, 2), 20));
-    let until = Until { margin: 6.0, max_touches: 50 };
-    let robots = std::sync::Mutex::new(BTreeSet::new());
-    let starts: Vec<usize> = dataset.objects.iter().map(|object| object.touches().as_ptr().addr()).collect();
-    let size = size_of::<palpate_shared::Touch>();
-    let gate = || {
-        let mut own = None;
-        let robots = &robots;
-        let starts = &starts;
-        move |moment: &Moment<'_>| {
-            let at = std::ptr::from_ref(moment.touch).addr();
-            let object = (0..OBJECTS).rfind(|&object| starts[object] <= at && at < starts[object] + 1_000 * size);
-            let touch = (at - starts[object.unwrap()]) / size;
-            let robot = *own.get_or_insert(touch % 20);
-            assert_eq!(touch % 20, robot);
-            robots.lock().unwrap().insert((object, robot));
-            true
-        }
-    };
-    let sequences = follow(&compiled.model(), &mut supplies(&dataset), &[90; 3], until, gate, &()).unwrap();
+    let limit = Limit { margin: 6.0, max_touches: 50 };
+    let sequences = follow(&compiled.model(), &mut supplies(&dataset), &[90; 3], limit, &()).unwrap();
     assert_eq!(sequences.len(), 3 * 20);
-    assert_eq!(robots.into_inner().unwrap().len(), 3 * 20);
+    for mut supply in supplies(&dataset) {
+        let robots: Vec<BTreeSet<u32>> = in_turns(used(&compiled.model(), &mut supply, limit), 20);
+        assert!(robots.iter().all(|robots| robots.len() == 1), "{robots:?}");
+        assert_eq!(robots.into_iter().flatten().collect::<BTreeSet<_>>().len(), 20);
+    }
 }
 
 #[test]
@@ -325,28 +352,20 @@ fn every_sequence_is_of_one_instance() {
     let (compiled, dataset) = (model(), fresh(1_000, 2));
     let names = ["a", "b", "c"].map(String::from);
     let touched = ObjectTouches::in_turn("object0", dataset.objects[0].touches().to_vec(), &names, 0);
-    let start = touched.touches().as_ptr().addr();
-    let gate = || {
-        let mut own = None;
-        move |moment: &Moment<'_>| {
-            let touch = (std::ptr::from_ref(moment.touch).addr() - start) / size_of::<palpate_shared::Touch>();
-            assert_eq!(*own.get_or_insert(touch % 3), touch % 3);
-            true
-        }
-    };
-    let until = Until { margin: 6.0, max_touches: 50 };
-    let mut supply = [Supply::new(0, &touched, 1)];
-    let sequences = follow(&compiled.model(), &mut supply, &[30], until, gate, &()).unwrap();
+    let limit = Limit { margin: 6.0, max_touches: 50 };
+    let mut supply = [TouchSupply::new(0, &touched, 1)];
+    let sequences = follow(&compiled.model(), &mut supply, &[30], limit, &()).unwrap();
     assert_eq!(sequences.len(), 30);
+    let instances = in_turns(used(&compiled.model(), &mut TouchSupply::new(0, &touched, 1), limit), 3);
+    assert!(instances.len() > 30 && instances.iter().all(|instances| instances.len() == 1), "{instances:?}");
 }
 
 #[test]
 fn sequences_stop_where_the_recognizer_stops() {
     let (compiled, dataset) = (model(), fresh(3_000, 2));
     let model = compiled.model();
-    let until = Until { margin: 8.0, max_touches: 60 };
-    let gate = || |_: &Moment<'_>| true;
-    let sequences = follow(&model, &mut supplies(&dataset), &[40; 3], until, gate, &()).unwrap();
+    let limit = Limit { margin: 8.0, max_touches: 60 };
+    let sequences = follow(&model, &mut supplies(&dataset), &[40; 3], limit, &()).unwrap();
     // The same touches in the same order, pushed into a recognizer that stops by itself.
     let own = [0x1000_0000 << 24, 0x0200_0000 << 24, 0x0400_0000 << 24];
     for odds in [Odds::All(odds_of(3.0)), Odds::ByObject(own.to_vec())] {
@@ -400,8 +419,12 @@ fn a_calibrated_model_states_its_promise_and_keeps_it_on_fresh_touches() {
         assert_eq!(model.promise(), Some(calibrated.promise));
         assert_eq!((calibrated.promise.rate, calibrated.promise.per, calibrated.promise.max_touches), (0.05, per, 60));
         assert_eq!(model.odds_of(0).is_some(), per == Per::Name);
-        assert!((model.temperature().value() - calibrated.temperature).abs() < 1e-12);
-        assert!((0.8..2.0).contains(&calibrated.temperature), "{}", calibrated.temperature);
+        assert!((model.temperature().value() - calibrated.temperature.unwrap()).abs() < 1e-12);
+        assert!(
+            calibrated.temperature.is_some_and(|found| (0.8..2.0).contains(&found)),
+            "{:?}",
+            calibrated.temperature
+        );
         // No margin changes.
         let touch = fresh(1, 3).objects[0].touches()[0];
         let mut margins = [[0; OBJECTS]; 2];

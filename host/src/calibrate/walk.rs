@@ -40,16 +40,16 @@ pub struct Tally {
 
 /// A threshold that is kept, and what happened at it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Kept<T> {
+pub(super) struct Kept<T> {
     /// The threshold.
-    pub threshold: T,
+    pub(super) threshold: T,
     /// Results: one tally, or one of each that the rate is promised for.
-    pub tallies: Vec<Tally>,
+    pub(super) tallies: Vec<Tally>,
 }
 
 /// Where a walk ended without a threshold that is kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Stop {
+pub(crate) enum Stop {
     /// This tally could not have passed without any error at any threshold; the cases that it had at most.
     TooFew {
         /// The position of the tally.
@@ -84,20 +84,9 @@ pub enum Stop {
 /// uninformative and skipped (Tarone, 1990): how many cases there are decides that, not how many are errors. That is exact as
 /// long as how many there are at one threshold says nothing about how many are errors at another.
 ///
-/// ```
-/// use palpate::calibrate::{Tally, walk};
-///
-/// // Of 10,000 sequences 83 may be wrong, to promise 1 %.
-/// let steps = [(9.0, 2), (5.0, 60), (4.0, 83), (3.5, 84), (3.4, 84)];
-/// let steps = steps.map(|(margin, wrong)| (margin, vec![Tally { wrong, all: 10_000 }]));
-/// assert_eq!(walk(steps.clone(), &[0], 0.01, 0.95).unwrap().threshold, 4.0);
-/// // Two starts that both pass have their whole level in the end.
-/// assert_eq!(walk(steps, &[0, 1], 0.01, 0.95).unwrap().threshold, 4.0);
-/// ```
-///
 /// # Errors
 /// [`Stop`], if no threshold can be kept.
-pub fn walk<T>(
+pub(super) fn walk<T>(
     steps: impl IntoIterator<Item = (T, Vec<Tally>)>,
     starts: &[usize],
     rate: f64,
@@ -207,7 +196,7 @@ pub fn needed(rate: f64, confidence: f64) -> u64 {
 }
 
 /// Smallest number of cases with which `wrong` errors allow a promise of `rate` with probability `confidence`.
-pub fn enough(wrong: u64, rate: f64, confidence: f64) -> u64 {
+pub(crate) fn enough(wrong: u64, rate: f64, confidence: f64) -> u64 {
     let passes = |all: u64| binomial_tail(Tally { wrong, all }, rate) <= 1.0 - confidence;
     let mut high = needed(rate, confidence).max(wrong + 1);
     while !passes(high) {
@@ -223,7 +212,7 @@ pub fn enough(wrong: u64, rate: f64, confidence: f64) -> u64 {
 }
 
 /// The most errors of `all` cases with which `rate` can be promised with probability `confidence`, if it can be.
-pub fn allowed(all: u64, rate: f64, confidence: f64) -> Option<u64> {
+pub(crate) fn allowed(all: u64, rate: f64, confidence: f64) -> Option<u64> {
     let passes = |wrong: u64| binomial_tail(Tally { wrong, all }, rate) <= 1.0 - confidence;
     if !passes(0) {
         return None;
@@ -239,7 +228,7 @@ pub fn allowed(all: u64, rate: f64, confidence: f64) -> Option<u64> {
 
 /// The probability of at most `wrong` errors in `all` cases at an error rate of `rate`: Σ C(all, i) rateⁱ
 /// (1 − rate)^(all − i) for i up to `wrong`.
-pub fn binomial_tail(Tally { wrong, all }: Tally, rate: f64) -> f64 {
+pub(crate) fn binomial_tail(Tally { wrong, all }: Tally, rate: f64) -> f64 {
     if wrong >= all {
         return 1.0;
     }
@@ -274,6 +263,16 @@ mod tests {
             sum += term;
         }
         sum
+    }
+
+    #[test]
+    fn the_loosest_threshold_before_the_first_failure_is_kept() {
+        // Of 10,000 sequences 83 may be wrong, to promise 1 %.
+        let steps = [(9.0, 2), (5.0, 60), (4.0, 83), (3.5, 84), (3.4, 84)];
+        let steps = steps.map(|(margin, wrong)| (margin, vec![Tally { wrong, all: 10_000 }]));
+        assert_eq!(walk(steps.clone(), &[0], 0.01, 0.95).unwrap().threshold, 4.0);
+        // Two starts that both pass have their whole level in the end.
+        assert_eq!(walk(steps, &[0, 1], 0.01, 0.95).unwrap().threshold, 4.0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A promise that is made on simulated touches, and kept or broken on recorded ones.
 
 use super::cost::Entry;
-use crate::calibrate::{self, Odds, Sequence, Supply, Tally, Until, binomial_tail, calibrate, follow, odds_of};
+use crate::calibrate::{self, Limit, Odds, Sequence, Tally, TouchSupply, binomial_tail, calibrate, follow, odds_of};
 use crate::compile::{self, compile};
 use crate::ensemble::Ensemble;
 use crate::error::{CalibrateProblem, Result};
@@ -88,7 +88,7 @@ pub(super) fn promised(
     }
     let Some((rate, margin)) = made else { return Ok(None) };
     let names = compile::names(&model);
-    let until = Until { margin, max_touches: Stopping::from_model(&model).max_touches() };
+    let limit = Limit { margin, max_touches: Stopping::from_model(&model).max_touches() };
     let follow = |dataset: &Dataset, seed: u64| -> Result<Vec<Sequence>> {
         let touched = |name: &String| dataset.objects.iter().find(|touched| touched.name == *name);
         let output = |name: &String| names.iter().position(|own| own == name);
@@ -100,13 +100,13 @@ pub(super) fn promised(
         };
         let objects: Vec<Vec<_>> = entries.iter().map(of).collect();
         let all = || objects.iter().flatten();
-        let mut supplies: Vec<Supply<'_>> =
-            all().map(|&(output, touched, _)| Supply::new(output, touched, seed)).collect();
+        let mut supplies: Vec<TouchSupply<'_>> =
+            all().map(|&(output, touched, _)| TouchSupply::new(output, touched, seed)).collect();
         // Each object has equally many, as many as the one with the fewest.
         let lengths = objects.iter().map(|of| of.iter().map(|(_, touched, _)| touched.len()).sum::<usize>());
         let fewest = lengths.min().unwrap_or(0) as f64;
         let wanted: Vec<usize> = all().map(|(.., share)| (share * fewest).round().max(1.0) as usize).collect();
-        follow(&model, &mut supplies, &wanted, until, || |_: &calibrate::Moment<'_>| true, &())
+        follow(&model, &mut supplies, &wanted, limit, &())
     };
     let own = tally(&follow(simulated, seed)?, margin);
     let (mut all, mut sequences) = (Tally::default(), 0);

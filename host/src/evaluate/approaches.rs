@@ -3,8 +3,9 @@
 use super::Estimate;
 use super::draws::Draws;
 use super::margins::Margins;
-use super::sequential::{Outcome, SequentialSettings, Stated};
+use super::sequential::{Sequential, SequentialSettings};
 use crate::error::{Error, Result};
+use crate::evidence::Outcome;
 use crate::random::Purpose;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -25,52 +26,7 @@ pub struct Approaches {
     /// Accuracy for each object.
     pub per_object: BTreeMap<String, BTreeMap<usize, f64>>,
     /// Results of the recognizer that stops by itself.
-    pub sequential: ApproachSequential,
-}
-
-/// Results on approaches of a recognizer that stops by itself. Each object is weighted by its prior, as in
-/// [`Sequential`](super::Sequential).
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ApproachSequential {
-    /// Error rate that it was asked to keep: the promised rate, or that of the posterior.
-    pub error_rate: f64,
-    /// The error rate that the model promises; none for thresholds that nothing was calibrated for.
-    pub promised: Option<f64>,
-    /// Cases that the promise covers: "average", "name" or "object".
-    pub per: Option<&'static str>,
-    /// Touches that are evidence, after which it gave up.
-    pub max_touches: u32,
-    /// Approaches used on average, also where it gave up.
-    pub mean_approaches: f64,
-    /// Standard error of [`ApproachSequential::mean_approaches`].
-    pub mean_approaches_standard_error: f64,
-    /// Touches used on average that were evidence.
-    pub mean_touches: f64,
-    /// Share of sequences with a wrong verdict.
-    pub error: f64,
-    /// Standard error of [`ApproachSequential::error`].
-    pub error_standard_error: f64,
-    /// Share of sequences without a verdict.
-    pub undecided: f64,
-    /// Share of sequences that ended as unknown, although the object is known.
-    pub unknown: f64,
-    /// Approaches used on average, for each object.
-    pub per_object: BTreeMap<String, f64>,
-    /// Share of sequences with a wrong verdict, for each object.
-    pub error_per_object: BTreeMap<String, f64>,
-    /// Share of sequences without a verdict, for each object.
-    pub undecided_per_object: BTreeMap<String, f64>,
-    /// Share of wrong names among those given; not a number if there are none.
-    pub error_of_given: f64,
-    /// Error rate of the names given to each object; objects that never got a name are left out.
-    pub error_of_given_per_object: BTreeMap<String, f64>,
-    /// Objects of whose names more are wrong than [`ApproachSequential::error_rate`], by more than chance.
-    pub above: Vec<String>,
-    /// Share of wrong names among those given of each name; without names that were never given.
-    pub error_per_name: BTreeMap<String, f64>,
-    /// For each tested object, how it went for every sequence.
-    #[serde(skip)]
-    pub outcomes: Vec<Vec<Outcome>>,
+    pub sequential: Sequential,
 }
 
 /// Accuracies by the number of approaches or touches.
@@ -114,17 +70,12 @@ impl Margins<'_> {
             })
             .collect();
         let used = self.tested.iter().map(|tested| tested.touches as f64 / tested.approaches.len().max(1) as f64);
-        let sequential = self.summary(outcomes, self.stated(settings, stopping), stopping.max_touches());
+        let sequential = self.of_outcomes(outcomes, self.stated(settings, stopping), stopping.max_touches(), true);
         Ok(self.in_approaches(used.collect(), self.accuracies(at, &correct), sequential))
     }
 
     /// The figures in approaches: of each tested object the share that are evidence, then the accuracies.
-    pub(super) fn in_approaches(
-        &self,
-        used: Vec<f64>,
-        accuracies: Accuracies,
-        sequential: ApproachSequential,
-    ) -> Approaches {
+    pub(super) fn in_approaches(&self, used: Vec<f64>, accuracies: Accuracies, sequential: Sequential) -> Approaches {
         Approaches {
             used: used.iter().sum::<f64>() / used.len().max(1) as f64,
             used_per_object: self.tested_names().iter().cloned().zip(used).collect(),
@@ -176,33 +127,5 @@ impl Margins<'_> {
         let add = |a: Vec<usize>, b: Vec<usize>| a.iter().zip(b).map(|(a, b)| a + b).collect();
         let correct: Vec<usize> = (0..groups).into_par_iter().fold(none, group).reduce(none, add);
         correct.into_iter().map(|correct| Estimate::share(correct, groups)).collect()
-    }
-
-    pub(super) fn summary(&self, outcomes: Vec<Vec<Outcome>>, stated: Stated, max_touches: u32) -> ApproachSequential {
-        let Stated { error_rate, promised, per } = stated;
-        let approaches = self.mean(&outcomes, |outcome| outcome.approaches);
-        let error = self.wrong(&outcomes);
-        let undecided = self.undecided(&outcomes);
-        ApproachSequential {
-            error_rate,
-            promised,
-            per,
-            max_touches,
-            mean_approaches: approaches.all.value,
-            mean_approaches_standard_error: approaches.all.standard_error,
-            mean_touches: self.mean(&outcomes, |outcome| outcome.touches).all.value,
-            error: error.all.value,
-            error_standard_error: error.all.standard_error,
-            undecided: undecided.all.value,
-            unknown: self.unknown(&outcomes).all.value,
-            per_object: approaches.per_object,
-            error_per_object: error.per_object,
-            undecided_per_object: undecided.per_object,
-            error_of_given: self.wrong_of_given(&outcomes).value,
-            error_of_given_per_object: self.wrong_by_object(&outcomes),
-            above: self.objects_above(&outcomes, error_rate),
-            error_per_name: self.wrong_by_name(&outcomes),
-            outcomes,
-        }
     }
 }

@@ -1,7 +1,7 @@
 //! Everything that is measured of a model on touches, as one call.
 
 use super::{
-    Active, ActiveFacts, Candidate, Evaluation, LEAST_GROUPS, Margins, Settings, Strangers, Switched, evaluate,
+    Active, ActiveFacts, Candidate, Evaluation, LEAST_GROUPS, Margins, OnStrangers, Settings, Switched, evaluate,
     evaluate_active, strangers,
 };
 use crate::error::{Error, Result};
@@ -59,7 +59,7 @@ pub struct Evaluated {
     pub switch: Option<Switched>,
     /// Answers to objects that the model does not know.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub strangers: Option<Strangers>,
+    pub strangers: Option<OnStrangers>,
 }
 
 /// A confusion matrix.

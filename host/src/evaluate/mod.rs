@@ -53,7 +53,9 @@ mod switch;
 mod tests;
 pub mod together;
 
-pub use approaches::{ApproachSequential, Approaches};
+pub use crate::evidence::Outcome;
+use approaches::Accuracies;
+pub use approaches::Approaches;
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
@@ -63,15 +65,18 @@ pub(crate) use margins::best;
 pub use margins::{Margins, delivered};
 pub(crate) use margins::{OfTouches, leading, objects_of};
 pub use measure::{Confusion, Evaluated, Expecting, Wanted, measure, own_weights};
-pub use noisy::{ROBOTS, add_noise};
+#[cfg(feature = "train")]
+pub(crate) use noisy::ROBOTS;
+pub use noisy::add_noise;
 pub use palpate_trees::verify::{
     self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict,
 };
-pub use plan::{Active, ActiveFacts, ByPose, Hardest, LEAST_IN_POSE, Planned, Stock, evaluate_active, plan};
-pub use promise::{AlarmCheck, Finding, PromiseCheck, by_theory};
-pub use sequential::significant;
-pub use sequential::{Outcome, Sequential, SequentialSettings};
-pub use strangers::{DETECTED_BY, Strangers, strangers};
+pub use plan::{Active, ActiveFacts, Hardest, Planned, evaluate_active, plan};
+pub(crate) use promise::by_theory;
+pub use promise::{AlarmCheck, Finding, PromiseCheck};
+pub(crate) use sequential::significant;
+pub use sequential::{Sequential, SequentialSettings};
+pub use strangers::{DETECTED_BY, OnStrangers, strangers};
 pub use switch::{Rule, Stopped, Switched};
 
 use crate::error::{Error, Result};
@@ -125,14 +130,6 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
-    /// Settings for drawing and stopping sequences.
-    pub fn sequential(&self) -> SequentialSettings {
-        let &Self { error_rate, max_touches, groups, seed, .. } = self;
-        SequentialSettings { error_rate, max_touches, sequences: groups, seed }
-    }
-}
-
 /// Results of an evaluation; as JSON, `palpate evaluate --json`. Shares are between 0 and 1; maps go from numbers of
 /// touches or objects' names to values.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -180,28 +177,38 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
     let sequential = margins.sequential(&stopping)?;
     let approaches = margins.hold_approaches().then(|| margins.approaches(&settings.at_approaches, &stopping));
     let approaches = approaches.transpose()?;
-    let outcomes = approaches.as_ref().map_or(&sequential.outcomes, |approaches| &approaches.sequential.outcomes);
-    let promise = match settings.error_rate {
-        None => margins.check_promise(outcomes, sequential.max_touches, &settings.noise, false),
-        Some(_) => None,
-    };
-    let false_alarms = if settings.error_rate.is_none() { margins.check_alarms(outcomes) } else { None };
-    let accuracy = |touches: &usize| (*touches, curve.accuracy(*touches));
-    let per_object = |(position, name): (usize, &String)| {
-        let accuracy = |&touches: &usize| (touches, curve.object_accuracy(position, touches).value);
-        (name.clone(), settings.at.iter().map(accuracy).collect())
-    };
-    Ok(Evaluation {
-        descriptor: margins.descriptor().name(),
-        touches: margins.touch_count(),
-        groups: settings.groups,
-        accuracy: settings.at.iter().map(accuracy).map(|(at, estimate)| (at, estimate.value)).collect(),
-        accuracy_standard_error: settings.at.iter().map(accuracy).map(|(at, e)| (at, e.standard_error)).collect(),
-        per_object: margins.tested_names().iter().enumerate().map(per_object).collect(),
-        sequential,
-        approaches,
-        promise,
-        false_alarms,
-        patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
-    })
+    let of_object = |position| settings.at.iter().map(|&at| curve.object_accuracy(position, at)).collect();
+    let correct: Vec<Vec<Estimate>> = (0..margins.tested.len()).map(of_object).collect();
+    let accuracies = margins.accuracies(&settings.at, &correct);
+    Ok(margins.evaluation(settings, accuracies, sequential, approaches, false))
+}
+
+impl Margins<'_> {
+    /// An evaluation, and what comes of the model's promises in it.
+    fn evaluation(
+        &self,
+        settings: &Settings,
+        accuracies: Accuracies,
+        sequential: Sequential,
+        approaches: Option<Approaches>,
+        active: bool,
+    ) -> Evaluation {
+        let outcomes = approaches.as_ref().map_or(&sequential.outcomes, |approaches| &approaches.sequential.outcomes);
+        // Other thresholds promise nothing.
+        let is_own = settings.error_rate.is_none();
+        let promise = || self.check_promise(outcomes, sequential.max_touches, &settings.noise, active);
+        Evaluation {
+            descriptor: self.descriptor().name(),
+            touches: self.touch_count(),
+            groups: settings.groups,
+            accuracy: accuracies.all,
+            accuracy_standard_error: accuracies.standard_error,
+            per_object: accuracies.per_object,
+            promise: if is_own { promise() } else { None },
+            false_alarms: if is_own { self.check_alarms(outcomes) } else { None },
+            sequential,
+            approaches,
+            patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(self.shares()).collect(),
+        }
+    }
 }

@@ -5,7 +5,7 @@ use crate::probe::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
 
 /// The most robots whose biases are drawn.
-pub const ROBOTS: usize = 20;
+pub(crate) const ROBOTS: usize = 20;
 
 /// The touches of each object that a robot makes at least, where there are enough.
 const LEAST: usize = 250;

@@ -6,6 +6,7 @@ use super::margins::{OfTouches, best, row};
 use super::together::margins_of_touches;
 use crate::ensemble::{Ensemble, OverTouches};
 use crate::error::{EvaluateProblem, Result};
+use crate::evidence::Follower;
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches, Pool};

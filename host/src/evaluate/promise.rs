@@ -3,7 +3,7 @@
 use super::Candidate;
 use super::Estimate;
 use super::margins::Margins;
-use super::sequential::Outcome;
+use crate::evidence::Outcome;
 use crate::probe::noise::Noise;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{Counted, Per};
@@ -306,7 +306,7 @@ pub(crate) fn at_least(errors: f64, trials: f64, rate: f64) -> f64 {
 ///
 /// With a temperature T above 1 the posterior is that of the evidence divided by T. The margin over n others together is
 /// then at least (margin − (T − 1) ln n) / T.
-pub fn by_theory(model: &Model<'_>) -> f64 {
+pub(crate) fn by_theory(model: &Model<'_>) -> f64 {
     let stopping = Stopping::from_model(model);
     let objects = model.object_count();
     let loosest = (0..objects).map(|object| stopping.odds_of(object, model)).max().unwrap_or(0);

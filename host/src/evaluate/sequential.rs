@@ -7,7 +7,8 @@ use super::margins::{Margins, Values, row};
 use super::{ERROR_RATE, MAX_TOUCHES};
 use crate::compile;
 use crate::error::{Error, Result};
-use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use crate::evidence::{Given, Outcome, chip, outcome};
+use palpate_onboard::Stopping;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -27,7 +28,7 @@ pub struct SequentialSettings {
     pub seed: u64,
 }
 
-/// Results of a recognizer that stops by itself. Each object is weighted by its prior: equally, unless the model or
+/// Results of a recognizer that stops by itself, counted in touches or approaches. Each object is weighted by its prior: equally, unless the model or
 /// [`Margins::expecting`] says otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sequential {
@@ -39,10 +40,17 @@ pub struct Sequential {
     pub per: Option<&'static str>,
     /// Touches after which it gave up.
     pub max_touches: u32,
-    /// Touches used on average, also where it gave up.
+    /// Approaches used on average, also where it gave up, if these are counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_approaches: Option<f64>,
+    /// Standard error of [`Sequential::mean_approaches`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_approaches_standard_error: Option<f64>,
+    /// Touches used on average that were evidence, also where it gave up.
     pub mean_touches: f64,
-    /// Standard error of [`Sequential::mean_touches`].
-    pub mean_touches_standard_error: f64,
+    /// Standard error of [`Sequential::mean_touches`], if touches are counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_touches_standard_error: Option<f64>,
     /// Share of sequences with a wrong verdict.
     pub error: f64,
     /// Standard error of [`Sequential::error`].
@@ -51,7 +59,7 @@ pub struct Sequential {
     pub undecided: f64,
     /// Share of sequences that ended as unknown, although the object is known.
     pub unknown: f64,
-    /// Touches used on average, for each object.
+    /// What is counted, approaches or touches, used on average, for each object.
     pub per_object: BTreeMap<String, f64>,
     /// Share of sequences with a wrong verdict, for each object.
     pub error_per_object: BTreeMap<String, f64>,
@@ -74,19 +82,13 @@ pub struct Sequential {
     pub outcomes: Vec<Vec<Outcome>>,
 }
 
-/// Outcome of a sequence.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outcome {
-    /// Touches used that were evidence.
-    pub touches: usize,
-    /// Approaches used: these touches, and those in between that were no evidence.
-    pub approaches: usize,
-    /// The object recognized (its index in the model), or none.
-    pub recognized: Option<usize>,
-    /// The output that was recognized: how the object lies, if outputs are placements.
-    pub output: Option<usize>,
-    /// True if the touches fitted no object. Neither this nor recognized: the recognizer gave up.
-    pub unknown: bool,
+impl Sequential {
+    /// What is counted, approaches or touches, used on average.
+    pub fn mean(&self) -> Estimate {
+        let standard_error = self.mean_approaches_standard_error.or(self.mean_touches_standard_error);
+        let value = self.mean_approaches.unwrap_or(self.mean_touches);
+        Estimate { value, standard_error: standard_error.unwrap_or_default() }
+    }
 }
 
 /// A figure of sequences.
@@ -107,13 +109,20 @@ impl Margins<'_> {
         let stopping = self.stopping(settings)?;
         let outcomes: Vec<Vec<Outcome>> =
             (0..self.tested.len()).map(|position| self.outcomes(position, stopping, sequences, seed)).collect();
-        Ok(self.of_outcomes(outcomes, self.stated(settings, stopping), stopping.max_touches()))
+        Ok(self.of_outcomes(outcomes, self.stated(settings, stopping), stopping.max_touches(), false))
     }
 
-    /// The figures of sequences, for each tested object as many.
-    pub(super) fn of_outcomes(&self, outcomes: Vec<Vec<Outcome>>, stated: Stated, max_touches: u32) -> Sequential {
+    /// The figures of sequences, for each tested object as many, in touches or in approaches.
+    pub(super) fn of_outcomes(
+        &self,
+        outcomes: Vec<Vec<Outcome>>,
+        stated: Stated,
+        max_touches: u32,
+        in_approaches: bool,
+    ) -> Sequential {
         let Stated { error_rate, promised, per } = stated;
         let touches = self.mean(&outcomes, |outcome| outcome.touches);
+        let approaches = in_approaches.then(|| self.mean(&outcomes, |outcome| outcome.approaches));
         let error = self.wrong(&outcomes);
         let undecided = self.undecided(&outcomes);
         Sequential {
@@ -121,20 +130,22 @@ impl Margins<'_> {
             promised,
             per,
             max_touches,
+            mean_approaches: approaches.as_ref().map(|of| of.all.value),
+            mean_approaches_standard_error: approaches.as_ref().map(|of| of.all.standard_error),
             mean_touches: touches.all.value,
-            mean_touches_standard_error: touches.all.standard_error,
+            mean_touches_standard_error: (!in_approaches).then_some(touches.all.standard_error),
             error: error.all.value,
             error_standard_error: error.all.standard_error,
             undecided: undecided.all.value,
             unknown: self.unknown(&outcomes).all.value,
-            per_object: touches.per_object,
+            per_object: approaches.unwrap_or(touches).per_object,
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,
             error_of_given: self.wrong_of_given(&outcomes).value,
             error_of_given_per_object: self.wrong_by_object(&outcomes),
             above: self.objects_above(&outcomes, error_rate),
             error_per_name: self.wrong_by_name(&outcomes),
-            placement: self.placement_named(&outcomes),
+            placement: if in_approaches { None } else { self.placement_named(&outcomes) },
             outcomes,
         }
     }
@@ -252,35 +263,21 @@ impl Margins<'_> {
         stopping: Stopping,
         approaches: impl Iterator<Item = Option<u32>>,
     ) -> Outcome {
-        let mut outcome = self.outcome_of_outputs(position, stopping, approaches);
-        outcome.recognized = outcome.recognized.map(|output| self.named(position, output));
-        outcome
-    }
-
-    fn outcome_of_outputs(
-        &self,
-        position: usize,
-        stopping: Stopping,
-        approaches: impl Iterator<Item = Option<u32>>,
-    ) -> Outcome {
-        let (objects, weights) = (self.objects().len(), self.weights.as_deref());
-        match &self.tested[position].values {
+        let objects = self.objects().len();
+        let at = |touch: u32| row(touch as usize, objects);
+        let outcome = match &self.tested[position].values {
             Values::Compiled(model, values) => {
-                let rows = approaches.map(|touch| touch.map(|touch| &values[row(touch as usize, objects)]));
-                match objects {
-                    0..=16 => onboard::<16>(model, stopping, weights, rows),
-                    17..=64 => onboard::<64>(model, stopping, weights, rows),
-                    _ => onboard::<256>(model, stopping, weights, rows),
-                }
+                let steps = approaches.map(|touch| touch.map(|touch| &values[at(touch)]));
+                outcome(&mut Given::new(steps), &mut *chip(model, stopping, self.weights.as_deref(), None))
             }
             Values::Full(values) => {
-                let known = self.candidate.known_count();
-                let numbers = self.numbers().map(<[u8]>::to_vec);
-                let mut recognizer = FullRecognizer::new(self.prior(), (known, numbers), stopping, None);
-                let rows = approaches.map(|touch| touch.map(|touch| &values[row(touch as usize, objects)]));
-                until_sure(rows.map(|margins| margins.map(|margins| recognizer.push(margins))))
+                let known = (self.candidate.known_count(), self.numbers().map(<[u8]>::to_vec));
+                let steps = approaches.map(|touch| touch.map(|touch| &values[at(touch)]));
+                outcome(&mut Given::new(steps), &mut FullRecognizer::new(self.prior(), known, stopping, None))
             }
-        }
+        };
+        let Ok(outcome) = outcome;
+        Outcome { recognized: outcome.recognized.map(|output| self.named(position, output)), ..outcome }
     }
 }
 
@@ -292,46 +289,6 @@ pub(super) struct Stated {
 }
 
 /// A stored threshold holds an error rate to about sixteen digits; nine say what was meant.
-pub fn significant(rate: f64) -> f64 {
+pub(crate) fn significant(rate: f64) -> f64 {
     format!("{rate:.8e}").parse().unwrap_or(rate)
-}
-
-/// The onboard recognizer's verdict on margins that its model computed beforehand.
-fn onboard<'r, const N: usize>(
-    model: &Model<'_>,
-    stopping: Stopping,
-    weights: Option<&[u32]>,
-    rows: impl Iterator<Item = Option<&'r [i32]>>,
-) -> Outcome {
-    let Ok(mut recognizer) = Recognizer::<N>::new(model, stopping) else {
-        // Room was made for at least as many objects as the model has.
-        return Outcome { touches: 0, approaches: 0, recognized: None, output: None, unknown: false };
-    };
-    if let Some(weights) = weights {
-        // Of which one is above 0.
-        _ = recognizer.reset_to(weights);
-    }
-    until_sure(rows.map(|margins| margins.map(|margins| recognizer.push_margins(margins))))
-}
-
-/// Counts approaches, and touches that are evidence, up to the first verdict.
-pub(super) fn until_sure(verdicts: impl Iterator<Item = Option<Verdict>>) -> Outcome {
-    let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None, output: None, unknown: false };
-    for verdict in verdicts {
-        outcome.approaches += 1;
-        outcome.touches += usize::from(verdict.is_some());
-        match verdict {
-            None | Some(Verdict::Undecided) => {}
-            Some(Verdict::Recognized { object, .. }) => {
-                (outcome.recognized, outcome.output) = (Some(object.into()), Some(object.into()));
-                break;
-            }
-            Some(Verdict::Unknown) => {
-                outcome.unknown = true;
-                break;
-            }
-            Some(Verdict::GaveUp) => break,
-        }
-    }
-    outcome
 }

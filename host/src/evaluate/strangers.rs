@@ -2,8 +2,9 @@
 
 use super::Candidate;
 use super::margins::Margins;
-use super::sequential::{Outcome, Sequential, SequentialSettings};
+use super::sequential::{Sequential, SequentialSettings};
 use crate::error::Result;
+use crate::evidence::Outcome;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -17,7 +18,7 @@ const USED_UP: f64 = 0.01;
 /// evidence; each object is weighted equally. A share is not a number (null in JSON) where more than one sequence in a
 /// hundred used up its touches before that: with more touches it could have got a name, or been detected.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Strangers {
+pub struct OnStrangers {
     /// True if the model has a misfit test; without one no stranger is ever detected.
     pub has_test: bool,
     /// Share of the known objects' sequences that ended as unknown.
@@ -34,9 +35,9 @@ pub struct Strangers {
     pub fewest_touches: usize,
     /// The limit of touches.
     pub max_touches: u32,
-    /// [`Strangers::detected`] for each stranger.
+    /// [`OnStrangers::detected`] for each stranger.
     pub detected_per_object: BTreeMap<String, BTreeMap<usize, f64>>,
-    /// [`Strangers::wrong_name`] for each stranger.
+    /// [`OnStrangers::wrong_name`] for each stranger.
     pub wrong_name_per_object: BTreeMap<String, f64>,
     /// Share of sequences that ended as unknown, for each known object.
     pub false_alarms_per_object: BTreeMap<String, f64>,
@@ -51,7 +52,7 @@ pub fn strangers(
     known: (&Margins<'_>, &Sequential),
     strangers: &Margins<'_>,
     settings: &SequentialSettings,
-) -> Result<Strangers> {
+) -> Result<OnStrangers> {
     let found = strangers.sequential(settings)?;
     let names = || strangers.tested_names().iter().cloned();
     let limit = usize::try_from(found.max_touches).unwrap_or(usize::MAX);
@@ -70,7 +71,7 @@ pub fn strangers(
         Candidate::Compiled(model) => model.strangers().is_some_and(|strangers| strangers.test.is_some()),
         Candidate::Full(_) => false,
     };
-    Ok(Strangers {
+    Ok(OnStrangers {
         has_test,
         false_alarms: alarms.all.value,
         detected: DETECTED_BY.map(|at| (at, mean_by(at))).into(),

@@ -2,10 +2,11 @@
 
 use super::Estimate;
 use super::margins::{Margins, Values, row};
-use super::sequential::{Outcome, SequentialSettings, until_sure};
+use super::sequential::SequentialSettings;
 use crate::error::{Error, EvaluateProblem, Result};
+use crate::evidence::{Given, Outcome, chip, outcome};
 use crate::random::{self, Purpose};
-use palpate_onboard::{Forgetting, Model, Recognizer, Stopping};
+use palpate_onboard::Stopping;
 use rand::RngExt;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -74,11 +75,7 @@ impl Margins<'_> {
         }
         let ends: Vec<Vec<Ends>> = (0..self.tested.len())
             .map(|position| {
-                let one = |group| match self.objects().len() {
-                    0..=16 => self.switch_ends::<16>((position, group), stopping, settings.seed, nats),
-                    17..=64 => self.switch_ends::<64>((position, group), stopping, settings.seed, nats),
-                    _ => self.switch_ends::<256>((position, group), stopping, settings.seed, nats),
-                };
+                let one = |group| self.switch_ends((position, group), stopping, settings.seed, nats);
                 (0..settings.sequences).into_par_iter().map(one).collect()
             })
             .collect::<Option<_>>()
@@ -112,17 +109,12 @@ impl Margins<'_> {
     }
 
     /// The ends of one sequence; none for a full model.
-    fn switch_ends<const N: usize>(
-        &self,
-        (position, group): (usize, usize),
-        stopping: Stopping,
-        seed: u64,
-        nats: f32,
-    ) -> Option<Ends> {
+    fn switch_ends(&self, (position, group): (usize, usize), stopping: Stopping, seed: u64, nats: f32) -> Option<Ends> {
         let Values::Compiled(model, _) = &self.tested[position].values else { return None };
         let run = |forgets: bool, rows: &mut dyn Iterator<Item = Option<&[i32]>>| {
-            let forgetting = forgets.then(|| Forgetting::<N>::new(model, nats));
-            follow::<N>(model, stopping, forgetting, rows)
+            let Ok(outcome) =
+                outcome(&mut Given::new(rows), &mut *chip(model, stopping, None, forgets.then_some(nats)));
+            outcome
         };
         let still = [false, true].map(|forgets| run(forgets, &mut self.rows(position, group, seed)));
         let decided = still[0].approaches;
@@ -151,30 +143,6 @@ impl Margins<'_> {
             }
         })
     }
-}
-
-/// A recognizer's verdict, with or without forgetting.
-fn follow<const N: usize>(
-    model: &Model<'_>,
-    stopping: Stopping,
-    mut forgetting: Option<Forgetting<N>>,
-    rows: &mut dyn Iterator<Item = Option<&[i32]>>,
-) -> Outcome {
-    let Ok(mut recognizer) = Recognizer::<N>::new(model, stopping) else {
-        // Room was made for at least as many objects as the model has.
-        return Outcome { touches: 0, approaches: 0, recognized: None, output: None, unknown: false };
-    };
-    until_sure(rows.map(|margins| {
-        let margins = margins?;
-        Some(match &mut forgetting {
-            None => recognizer.push_margins(margins),
-            Some(forgetting) => {
-                let mut own = [0; N];
-                own.iter_mut().zip(margins).for_each(|(to, from)| *to = *from);
-                recognizer.push_margins_forgetting(&own, forgetting)
-            }
-        })
-    }))
 }
 
 /// The figures of sequences, for each object: how each ended, after which approach it counts, which object is right.

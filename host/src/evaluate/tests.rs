@@ -270,9 +270,9 @@ fn touches_that_a_model_does_not_use_cost_an_approach_and_change_nothing() {
         assert!((of.used - 0.25).abs() < 0.001, "{of:?}");
         let sequential = &of.sequential;
         // Three approaches in four change nothing; the touches that are evidence are as many as without the others.
-        let per_touch = sequential.mean_approaches / sequential.mean_touches;
+        let per_touch = sequential.mean().value / sequential.mean_touches;
         assert!((3.7..4.3).contains(&per_touch), "{per_touch}");
-        let error = sequential.mean_approaches_standard_error + evaluation.sequential.mean_touches_standard_error;
+        let error = sequential.mean().standard_error + evaluation.sequential.mean().standard_error;
         assert!((sequential.mean_touches - evaluation.sequential.mean_touches).abs() < 3.0 * error, "{sequential:?}");
         assert!(sequential.undecided < 0.05 && sequential.error < 0.03, "{sequential:?}");
         assert_eq!(of.accuracy.keys().copied().collect::<Vec<_>>(), [10, 20, 60]);
@@ -308,7 +308,7 @@ fn every_contact_recognizes_in_fewer_approaches_than_full_touches_alone() {
         let margins = Margins::new(Candidate::Full(&ensemble), &test).unwrap();
         let of = evaluate(&margins, &quick()).unwrap().approaches.unwrap();
         assert!(of.sequential.error < 0.03, "{of:?}");
-        of.sequential.mean_approaches
+        of.sequential.mean().value
     };
     assert!(approaches(Counted::Contacts) < 0.9 * approaches(Counted::Full));
 }

@@ -1,6 +1,6 @@
 //! Sequences of touches, and how badly they fit at each look.
 
-use super::{EARLY, FIRST, HALVED_AFTER, NAT, Supply};
+use super::{EARLY, FIRST, HALVED_AFTER, NAT, Pools};
 use crate::evaluate::leading;
 use crate::random::{self, Purpose};
 use palpate_onboard::{Model, Stopping};
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 /// End of sequences.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Until {
+pub(super) enum Ending {
     /// After this number of touches.
     Touches(u32),
     /// Where a name would be given at a threshold of misfit at this level, in nats; at the limit of touches at the latest.
@@ -19,7 +19,7 @@ pub(super) enum Until {
 /// Rules for following sequences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Policy {
-    pub(super) until: Until,
+    pub(super) ending: Ending,
     /// Touches from which on names are given.
     pub(super) least: u32,
 }
@@ -27,9 +27,9 @@ pub(super) struct Policy {
 impl Policy {
     /// The number of touches that all sequences have; without meaning where they end at a name.
     pub(super) fn last(&self) -> u32 {
-        match self.until {
-            Until::Touches(touches) => touches,
-            Until::Named { .. } => u32::MAX,
+        match self.ending {
+            Ending::Touches(touches) => touches,
+            Ending::Named { .. } => u32::MAX,
         }
     }
 }
@@ -97,17 +97,17 @@ pub(super) fn early(touches: u32) -> f64 {
 /// Follows as many sequences of each object as its touches allow, each touch in one only, at most `most` of all
 /// together: of each pool as many, in turn. A sequence that the touches end in is left out; one that a robot's touches end
 /// in ends there.
-pub(super) fn sequences(model: &Model<'_>, supplies: &[Supply], policy: &Policy, most: usize) -> Vec<Vec<Sequence>> {
+pub(super) fn sequences(model: &Model<'_>, supplies: &[Pools], policy: &Policy, most: usize) -> Vec<Vec<Sequence>> {
     let objects = model.object_count();
     let of_each = most.div_ceil(supplies.len().max(1));
     // Where several outputs belong to one object, it is the object that is named.
     let numbers: Option<Vec<u8>> = model.outputs().map(|outputs| outputs.objects().collect());
     let numbers = numbers.as_deref();
-    let limit = match policy.until {
-        Until::Touches(touches) => touches,
-        Until::Named { .. } => Stopping::from_model(model).max_touches(),
+    let limit = match policy.ending {
+        Ending::Touches(touches) => touches,
+        Ending::Named { .. } => Stopping::from_model(model).max_touches(),
     };
-    let of = |supply: &Supply| {
+    let of = |supply: &Pools| {
         let mut all = Vec::new();
         if supply.is_once {
             let once = supply.pools.iter().take(of_each).map(|rows| {
@@ -147,8 +147,8 @@ fn one<'r>(
         let level = misfit.map_or(f64::NEG_INFINITY, |misfit| misfit as f64 / NAT - early(touches));
         let look = Look { level, is_decided: is_decided(model, numbers, &evidence, touches) };
         looks.push(look);
-        match policy.until {
-            Until::Named { level } if touches >= policy.least && look.is_decided && look.level <= level => break,
+        match policy.ending {
+            Ending::Named { level } if touches >= policy.least && look.is_decided && look.level <= level => break,
             _ => {}
         }
     }

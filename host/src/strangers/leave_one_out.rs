@@ -1,6 +1,6 @@
 //! Detection rate of a test for strangers: each object in turn is left out of the training.
 
-use super::{Calibrated, Settings, calibrate};
+use super::{Settings, Tested, calibrate};
 use crate::compile::{self, compile};
 use crate::ensemble::train::{self, train, train_with_background};
 use crate::error::Result;
@@ -26,9 +26,9 @@ pub struct LeftOut {
     /// The object.
     pub object: String,
     /// Result of the calibration; none without a test.
-    pub calibrated: Option<Calibrated>,
+    pub calibrated: Option<Tested>,
     /// Verdicts on it, and the rate at which a known object was taken for unknown.
-    pub strangers: evaluate::Strangers,
+    pub strangers: evaluate::OnStrangers,
     /// Outcomes of its sequences.
     pub outcomes: Vec<Outcome>,
     /// Verdicts on the other objects.
@@ -77,13 +77,13 @@ pub fn leave_one_out(
 
 fn measure(
     name: &str,
-    calibrated: Option<Calibrated>,
+    calibrated: Option<Tested>,
     candidate: Candidate<'_>,
     known: &Dataset,
     stranger: &Dataset,
 ) -> Result<LeftOut> {
     let evaluation = evaluate::Settings::default();
-    let settings = SequentialSettings { seed: 2, ..evaluation.sequential() };
+    let settings = SequentialSettings { seed: 2, ..evaluation.sequences() };
     let known = Margins::new(candidate, known)?;
     let unknown = Margins::of_strangers(candidate, stranger)?;
     let of_known = known.sequential(&settings)?;

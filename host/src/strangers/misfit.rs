@@ -1,7 +1,7 @@
 //! Expected evidence of touches of each object, and the distance of evidence from it.
 
 use super::follow::early;
-use super::{FIRST, Supply};
+use super::{FIRST, Pools};
 use nalgebra::{DMatrix, DVector};
 use palpate_shared::format::MisfitTest;
 use rayon::prelude::*;
@@ -44,8 +44,8 @@ impl Moments {
     /// A misfit from rows of margins in units, for each known object, and of recorded ones where there are some: recorded touches
     /// take the place of another instance. `shapes` are mean rows.
     pub(super) fn new(
-        supplies: &[Supply],
-        recorded: Option<&[Supply]>,
+        supplies: &[Pools],
+        recorded: Option<&[Pools]>,
         shapes: &[Vec<f64>],
         known: usize,
         objects: usize,
@@ -204,7 +204,7 @@ impl Misfit {
 
 /// For each known object, and each number of touches up to `last`, the share of its sequences that are detected when
 /// the model does not use its column: at a level of misfit of `threshold`.
-pub(super) fn left_out(moments: &Moments, supplies: &[Supply], threshold: f64, unit: f64, last: u32) -> Vec<Vec<f64>> {
+pub(super) fn left_out(moments: &Moments, supplies: &[Pools], threshold: f64, unit: f64, last: u32) -> Vec<Vec<f64>> {
     let of = |stranger: usize| {
         let objects = moments.objects;
         // With two objects, none is left that could be told from the other.

@@ -24,7 +24,6 @@
 
 mod fixed;
 mod follow;
-mod found;
 mod leave_one_out;
 mod misfit;
 mod promised;
@@ -34,14 +33,12 @@ mod shapes;
 #[cfg(test)]
 mod tests;
 
-pub use found::Found;
 pub use leave_one_out::{LeftOut, Sets, leave_one_out};
 pub use promised::calibrate_with_promise;
-pub use recorded::{Alarms, OnRecordings};
 #[cfg(feature = "objects")]
 pub use shapes::captured;
 
-use crate::calibrate::{allowed, needed};
+use crate::calibrate::{Found, OnRecordings, allowed, needed};
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::evaluate::together::margins_of_touches;
@@ -98,7 +95,7 @@ impl Default for Settings {
 
 /// A model with a test, and what the test was calibrated to.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Calibrated {
+pub struct Tested {
     /// The model's bytes.
     pub bytes: Vec<u8>,
     /// Terms that are the same for all objects.
@@ -116,9 +113,27 @@ pub struct Calibrated {
     pub recorded: Option<OnRecordings>,
 }
 
+impl Tested {
+    /// Its figures, for the settings that it was calibrated with.
+    pub fn found(&self, settings: &Settings) -> Found {
+        let terms = &self.terms;
+        Found {
+            held: settings.held.name(),
+            promised: self.recorded.as_ref().map_or(settings.alarms, |recorded| recorded.supported),
+            false_alarms: self.alarms as f64 / f64::from(terms.sequences.max(1)),
+            sequences: terms.sequences,
+            least_touches: terms.least,
+            mean_touches: self.mean_touches,
+            mean_touches_without: self.mean_touches_without,
+            left_out: self.left_out.clone(),
+            recorded: self.recorded.clone(),
+        }
+    }
+}
+
 /// The margins of one object's touches that are evidence, in the order in which they are used.
 #[derive(Debug, Default)]
-pub(crate) struct Supply {
+pub(crate) struct Pools {
     /// For each source, such as an instance, and each robot one row after the other, in units.
     pools: Vec<Vec<i32>>,
     /// True if a pool is a robot's, which makes one sequence.
@@ -127,7 +142,7 @@ pub(crate) struct Supply {
     is_short: bool,
 }
 
-impl Supply {
+impl Pools {
     /// Of sequences of rows: the evidence of each, row after row, in units.
     pub(crate) fn of_rows(pools: Vec<Vec<i32>>) -> Self {
         Self { pools, is_once: true, is_short: true }
@@ -161,7 +176,7 @@ pub fn calibrate(
     dataset: &Dataset,
     shapes: &[ObjectTouches],
     settings: &Settings,
-) -> Result<Calibrated> {
+) -> Result<Tested> {
     calibrate_on(model, dataset, None, shapes, settings)
 }
 
@@ -177,7 +192,7 @@ pub fn calibrate_recorded(
     recorded: &Dataset,
     shapes: &[ObjectTouches],
     settings: &Settings,
-) -> Result<Calibrated> {
+) -> Result<Tested> {
     let simulated = calibrate(model, dataset, shapes, settings)?;
     let before = recorded::alarms(&compile::open(&simulated.bytes)?, recorded, settings)?;
     let mut calibrated = calibrate_on(model, dataset, Some(recorded), shapes, settings)?;
@@ -191,7 +206,7 @@ fn calibrate_on(
     recorded: Option<&Dataset>,
     shapes: &[ObjectTouches],
     settings: &Settings,
-) -> Result<Calibrated> {
+) -> Result<Tested> {
     check(settings)?;
     let given = supplies(model, dataset, settings.seed)?;
     let recorded = recorded.map(|recorded| recorded::supplies(model, recorded, settings.seed)).transpose()?;
@@ -201,11 +216,11 @@ fn calibrate_on(
 /// The same of margins: of each known object, recorded ones too if there are some, and the mean ones of other shapes.
 pub(crate) fn calibrate_supplies(
     model: &Model<'_>,
-    given: Vec<Supply>,
+    given: Vec<Pools>,
     recorded: Option<Vec<OfRecorded>>,
     shapes: &[Vec<f64>],
     settings: &Settings,
-) -> Result<Calibrated> {
+) -> Result<Tested> {
     check(settings)?;
     let objects = model.object_count();
     let unit = f64::from(model.unit());
@@ -220,9 +235,9 @@ pub(crate) fn calibrate_supplies(
     // Levels of misfit do not depend on any threshold.
     let untested = stated(model, &terms(0.0, FIRST), &misfits)?;
     let untested = compile::open(&untested)?;
-    let follow = |of: &[Supply], policy: &Policy| follow::sequences(&untested, of, policy, settings.sequences);
+    let follow = |of: &[Pools], policy: &Policy| follow::sequences(&untested, of, policy, settings.sequences);
 
-    let free = Policy { until: follow::Until::Touches(MOST_HELD.min(model.header().max_touches())), least: FIRST };
+    let free = Policy { ending: follow::Ending::Touches(MOST_HELD.min(model.header().max_touches())), least: FIRST };
     let is_short = learn.iter().any(|supply| supply.is_short);
     let rough = follow::quantile(&counted(&follow(&learn, &free), is_short), 1.0 - settings.alarms);
     let left_out = misfit::left_out(&moments, &learn, rough, unit, free.last());
@@ -231,9 +246,9 @@ pub(crate) fn calibrate_supplies(
         Held::Certain => found_out(&left_out).min(free.last()).max(FIRST),
     };
     let loosest = rough - below(settings.held);
-    let to_the_end = Policy { until: follow::Until::Touches(model.header().max_touches()), least: FIRST };
+    let to_the_end = Policy { ending: follow::Ending::Touches(model.header().max_touches()), least: FIRST };
     let strictest = strictest(is_short.then(|| follow(&learn, &to_the_end)), settings, loosest);
-    let policy = Policy { until: follow::Until::Named { level: loosest - doubt(settings.held) }, least };
+    let policy = Policy { ending: follow::Ending::Named { level: loosest - doubt(settings.held) }, least };
     let sequences = follow(&test, &policy);
     let all = counted(&sequences, is_short);
     let tried = Tried { loosest, strictest, least, gap: doubt(settings.held) };
@@ -268,7 +283,7 @@ pub(crate) fn calibrate_supplies(
     let bytes = stated(model, &terms, &misfits)?;
     let at = |path: &[f64], touches: u32| path.get(touches as usize - 1).or(path.last()).copied().unwrap_or(0.0);
     let mean = |touches: u64| touches as f64 / all.len().max(1) as f64;
-    Ok(Calibrated {
+    Ok(Tested {
         bytes,
         terms,
         alarms: found.as_ref().map_or(alarms as usize, |found| found.alarms),
@@ -316,7 +331,7 @@ fn check(settings: &Settings) -> Result<()> {
 
 /// A quarter of each object's touches, or robots, which says what touches give, and the rest, which the threshold is tested
 /// on.
-fn learned_and_tested(supplies: Vec<Supply>, objects: usize) -> (Vec<Supply>, Vec<Supply>) {
+fn learned_and_tested(supplies: Vec<Pools>, objects: usize) -> (Vec<Pools>, Vec<Pools>) {
     supplies.into_iter().map(|supply| supply.divided(objects).into()).unzip()
 }
 
@@ -327,7 +342,7 @@ fn tested_means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Re
     let Some(misfit_test) = model.strangers().and_then(|strangers| strangers.test) else { return Ok([0.0; 2]) };
     let MisfitTerms { threshold, doubt, least, .. } = misfit_test.terms;
     let [threshold, doubt] = [threshold, doubt].map(|limit| f64::from(limit) / NAT);
-    let policy = Policy { until: follow::Until::Named { level: doubt }, least };
+    let policy = Policy { ending: follow::Ending::Named { level: doubt }, least };
     let sequences = follow::sequences(model, &test, &policy, settings.sequences);
     let all = equally_many(&sequences);
     let mean = |touches: &dyn Fn(&Sequence) -> u64| {
@@ -348,13 +363,13 @@ fn equally_many(sequences: &[Vec<Sequence>]) -> Vec<&Sequence> {
     sequences.iter().flat_map(|of| of.iter().take(fewest)).collect()
 }
 
-fn learn_count(learn: &[Supply], objects: usize) -> usize {
-    let count = |supply: &Supply| supply.pools.iter().map(Vec::len).sum::<usize>() / objects.max(1);
+fn learn_count(learn: &[Pools], objects: usize) -> usize {
+    let count = |supply: &Pools| supply.pools.iter().map(Vec::len).sum::<usize>() / objects.max(1);
     learn.iter().map(count).min().unwrap_or(0)
 }
 
 /// Touches of every known object, in the model's order: those that may follow each other in a random order.
-fn supplies(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Vec<Supply>> {
+fn supplies(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Vec<Pools>> {
     let candidate = Candidate::Compiled(model);
     candidate.of(dataset)?;
     let dataset = candidate.delivered(dataset);
@@ -369,7 +384,7 @@ fn supplies(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Vec<Suppl
 }
 
 /// The touches of an object that may follow each other in a random order.
-fn supply(model: &Model<'_>, touched: &ObjectTouches, seed: u64) -> Supply {
+fn supply(model: &Model<'_>, touched: &ObjectTouches, seed: u64) -> Pools {
     let is_once = touched.has_robots();
     let pool = |(turn, pool): (u64, Pool)| {
         let own = pool.touches.iter().filter_map(|&touch| touched.touches().get(touch as usize));
@@ -379,7 +394,7 @@ fn supply(model: &Model<'_>, touched: &ObjectTouches, seed: u64) -> Supply {
         }
         margins_of_touches(model, &touches)
     };
-    Supply { pools: (0..).zip(touched.pools()).map(pool).collect(), is_once, is_short: false }
+    Pools { pools: (0..).zip(touched.pools()).map(pool).collect(), is_once, is_short: false }
 }
 
 /// Those of the touches that the model takes as evidence.

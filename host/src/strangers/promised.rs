@@ -17,7 +17,7 @@
 //! It ends where the same calibration without the test ends, on all touches; then every sequence that gets a name has one
 //! without the test too.
 
-use super::{Calibrated, Settings, calibrate, calibrate_recorded, tested_means, without};
+use super::{Settings, Tested, calibrate, calibrate_recorded, tested_means, without};
 use crate::calibrate::{self, Start, add_noise, begin, calibrate_from, odds_of};
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};
@@ -48,7 +48,7 @@ pub fn calibrate_with_promise(
     settings: &Settings,
     promise: &calibrate::Settings,
     progress: &dyn Progress,
-) -> Result<(calibrate::Calibrated, Calibrated)> {
+) -> Result<(calibrate::Calibrated, Tested)> {
     let untested = without(model)?;
     let untested = compile::open(&untested)?;
     let halves = split(dataset, PROMISED, promise.seed)?;
@@ -90,7 +90,7 @@ pub fn calibrate_with_promise(
         problem.into()
     })?;
     let [mean_touches, mean_touches_without] = tested_means(&compile::open(&promised.model)?, &learned, settings)?;
-    let tested = Calibrated { bytes: promised.model.clone(), mean_touches, mean_touches_without, ..tested };
+    let tested = Tested { bytes: promised.model.clone(), mean_touches, mean_touches_without, ..tested };
     Ok((promised, tested))
 }
 

@@ -1,48 +1,15 @@
 //! A test that is calibrated on recordings too.
 
-use super::follow::{self, Policy, Sequence, Until};
-use super::{NAT, Settings, Supply, Tried, equally_many, supply};
-use crate::calibrate::{Tally, allowed, binomial_tail, needed};
+use super::follow::{self, Ending, Policy, Sequence};
+use super::{NAT, Pools, Settings, Tried, equally_many, supply};
+use crate::calibrate::{Alarms, OnRecordings, Tally, allowed, binomial_tail, needed};
 use crate::error::{CalibrateProblem, EvaluateProblem, Result};
 use crate::evaluate::{Candidate, EnoughRecorded, OfTouches};
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
-use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// The probability of more false alarms than the simulation's share allows, below which recordings are said to differ.
 const BY_CHANCE: f64 = 0.01;
-
-/// Results of recorded sequences.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OnRecordings {
-    /// Sequences that the threshold was tested on: of half of the recordings.
-    pub sequences: usize,
-    /// Those of them that ended as unknown.
-    pub alarms: usize,
-    /// The share of false alarms that so many sequences support: the promised one, or a higher one.
-    pub supported: f64,
-    /// Sequences of all recordings under a test that was calibrated on simulated touches alone.
-    pub before: Alarms,
-}
-
-/// Recorded sequences under a test.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Alarms {
-    /// All sequences: equally many of each object.
-    pub sequences: usize,
-    /// Those that ended as unknown, by object.
-    pub objects: BTreeMap<String, usize>,
-    /// True if they are more than the test's share allows but by chance: recorded and simulated misfit differ.
-    pub differs: bool,
-}
-
-impl Alarms {
-    /// Sequences that ended as unknown.
-    pub fn all(&self) -> usize {
-        self.objects.values().sum()
-    }
-}
 
 /// The touches of a recorded object.
 pub(crate) struct OfRecorded {
@@ -53,7 +20,7 @@ pub(crate) struct OfRecorded {
     touches: usize,
     /// The outputs that they may be of: several where they state no placement.
     outputs: Vec<usize>,
-    pub(super) supply: Supply,
+    pub(super) supply: Pools,
 }
 
 /// The recorded touches of every object that the model knows, as an effector would report them.
@@ -85,7 +52,7 @@ pub(super) fn halves(supplies: Vec<OfRecorded>, objects: usize) -> (Vec<OfRecord
         let half = |rows: &mut Vec<i32>| rows.split_off(rows.len() / objects / 2 * objects);
         let pools: Vec<Vec<i32>> = own.supply.pools.iter_mut().map(half).collect();
         let touches = pools.iter().map(Vec::len).sum::<usize>() / objects.max(1);
-        let supply = Supply { pools, is_once: own.supply.is_once, is_short: own.supply.is_short };
+        let supply = Pools { pools, is_once: own.supply.is_once, is_short: own.supply.is_short };
         let (name, outputs) = (own.name.clone(), own.outputs.clone());
         let test = OfRecorded { name, approaches: own.approaches, touches, outputs, supply };
         (own, test)
@@ -95,8 +62,8 @@ pub(super) fn halves(supplies: Vec<OfRecorded>, objects: usize) -> (Vec<OfRecord
 
 /// The touches of each of the model's known outputs. A recording that states no placement is of the one that has the most
 /// evidence.
-pub(super) fn by_output(supplies: Vec<OfRecorded>, known: usize, objects: usize) -> Vec<Supply> {
-    let mut by_output: Vec<Supply> = (0..known).map(|_| Supply::default()).collect();
+pub(super) fn by_output(supplies: Vec<OfRecorded>, known: usize, objects: usize) -> Vec<Pools> {
+    let mut by_output: Vec<Pools> = (0..known).map(|_| Pools::default()).collect();
     for OfRecorded { outputs, supply, .. } in supplies {
         for rows in supply.pools {
             let sum = |&output: &usize| -> i64 {
@@ -191,7 +158,7 @@ pub(super) fn alarms(model: &Model<'_>, recorded: &Dataset, settings: &Settings)
     let Some(test) = model.strangers().and_then(|strangers| strangers.test) else { return Ok(Alarms::default()) };
     let [threshold, doubt] = [test.terms.threshold, test.terms.doubt].map(|limit| f64::from(limit) / NAT);
     let least = test.terms.least;
-    let policy = Policy { until: Until::Named { level: doubt }, least };
+    let policy = Policy { ending: Ending::Named { level: doubt }, least };
     let follow = |own: &OfRecorded| {
         follow::sequences(model, std::slice::from_ref(&own.supply), &policy, settings.sequences).into_iter().flatten()
     };

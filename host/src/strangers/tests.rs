@@ -34,7 +34,7 @@ fn shapes() -> Vec<ObjectTouches> {
     of(4..9, 400, 7).objects
 }
 
-fn calibrated(bytes: &[u8], held: Held) -> Calibrated {
+fn calibrated(bytes: &[u8], held: Held) -> Tested {
     let model = compile::open(bytes).unwrap();
     let fresh = of(0..KNOWN, 30_000, 2);
     calibrate(&model, &fresh, &shapes(), &Settings { held, ..Settings::default() }).unwrap()
@@ -171,7 +171,7 @@ fn what_cannot_be_calibrated_says_so() {
 }
 
 /// Touches of the known objects for a promise, and what is promised.
-fn promised(seed: u64, held: Held, rate: f64) -> (crate::calibrate::Calibrated, Calibrated) {
+fn promised(seed: u64, held: Held, rate: f64) -> (crate::calibrate::Calibrated, Tested) {
     let model = compile::open(&MODELS[0]).unwrap();
     let promise = crate::calibrate::Settings { rate, max_touches: Some(60), seed, ..Default::default() };
     let settings = Settings { held, alarms: 0.05, seed, ..Settings::default() };
@@ -214,7 +214,7 @@ fn a_promise_beside_a_test_for_strangers_is_one_of_the_model_with_its_test() {
         let [wrong, unknown, touches] = on_fresh_touches(&tested.bytes, &fresh);
         assert!(wrong < 0.06 && unknown < 0.06, "{held:?}: {wrong} {unknown}");
         // As many touches as the promise says: those of a model that waits for its test.
-        assert!((touches / promised.mean_touches - 1.0).abs() < 0.1, "{held:?}: {touches} {}", promised.mean_touches);
+        assert!((touches / promised.used.mean() - 1.0).abs() < 0.1, "{held:?}: {touches} {}", promised.used.mean());
         assert!((touches / tested.mean_touches - 1.0).abs() < 0.1, "{held:?}: {touches} {}", tested.mean_touches);
         // And without a name as often: unknown, or undecided.
         assert!(promised.undecided > 0.3 * unknown, "{held:?}: {} {unknown}", promised.undecided);
@@ -265,7 +265,7 @@ fn a_test_that_is_calibrated_on_recordings_keeps_its_false_alarms_on_them_and_wa
     let model = compile::open(&MODELS[0]).unwrap();
     let (simulated, robot) = (of(0..KNOWN, 30_000, 2), of_robot(2_000, 5));
     let settings = Settings { held: Held::Certain, ..Settings::default() };
-    let alarms = |calibrated: &Calibrated, seed| {
+    let alarms = |calibrated: &Tested, seed| {
         let model = compile::open(&calibrated.bytes).unwrap();
         let alarms = recorded::alarms(&model, &of_robot(20_000, seed), &settings).unwrap();
         alarms.all() as f64 / alarms.sequences as f64

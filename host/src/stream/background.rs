@@ -2,11 +2,11 @@
 
 use super::Rows;
 use super::parts::Parts;
-use super::settings::Strangers;
-use crate::calibrate::{needed, odds_of};
+use super::settings::StrangerTest;
+use crate::calibrate::{Found, needed, odds_of};
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result};
-use crate::strangers::{self, Found, Supply};
+use crate::strangers::{self, Pools};
 use palpate_shared::format::Tag;
 use palpate_trees::rows::RowSequence;
 
@@ -21,7 +21,7 @@ pub(super) fn test<'s>(
     shaped: &[u8],
     rows: &Rows<'_>,
     parts: Parts<'s>,
-    wanted: &Strangers,
+    wanted: &StrangerTest,
     begin: f64,
 ) -> Result<(Vec<u8>, Parts<'s>, Found)> {
     let model = compile::open(shaped)?;
@@ -41,7 +41,7 @@ pub(super) fn test<'s>(
         let own = alarms.iter().filter(|sequence| sequence.class == class);
         let of =
             |sequence: &&RowSequence| evidence(sequence.rows.clone().flat_map(|row| rows.row(row)).copied().collect());
-        Supply::of_rows(own.map(of).collect())
+        Pools::of_rows(own.map(of).collect())
     };
     let supplies = (0..begun.known_count()).map(pools).collect();
     let objects = begun.object_count();
@@ -55,7 +55,7 @@ pub(super) fn test<'s>(
     let shapes: Vec<Vec<f64>> = wanted.background.iter().filter(|margins| !margins.is_empty()).map(mean).collect();
     let tested = strangers::calibrate_supplies(&begun, supplies, None, &shapes, &wanted.settings);
     let tested = tested.map_err(|error| problem(error, &parts, &wanted.settings))?;
-    let found = Found::new(&wanted.settings, &tested);
+    let found = tested.found(&wanted.settings);
     Ok((tested.bytes, parts, found))
 }
 

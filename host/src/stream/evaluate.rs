@@ -6,7 +6,8 @@ use crate::compile;
 use crate::error::Result;
 use crate::evaluate::Finding;
 use crate::evaluate::promise::{BY_CHANCE, at_least};
-use palpate_onboard::{Forgetting, Model, Recognizer, Stopping, Verdict};
+use crate::evidence::{Chip, Given, Outcome, chip, outcome};
+use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::format::{Per, Promise};
 use palpate_trees::rows::{RowSequence, Sequences};
 use rayon::prelude::*;
@@ -56,7 +57,7 @@ pub struct Evaluated {
     /// Rows used on average.
     pub mean_rows: f64,
     /// The rows after which half of the sequences had ended.
-    pub median_rows: u32,
+    pub median_rows: usize,
     /// Check of the promise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promise: Option<PromiseOfSequences>,
@@ -127,7 +128,7 @@ pub struct Grown {
     /// The posterior of each class after each row.
     pub posteriors: Vec<Vec<f64>>,
     /// The row after which there was a verdict, and the name if one was given.
-    pub ended: Option<(u32, Option<usize>)>,
+    pub ended: Option<(usize, Option<usize>)>,
     /// The share of the sequences with a name that took more rows; none if no name was given.
     pub longer: Option<f64>,
 }
@@ -153,37 +154,18 @@ impl Switched {
     }
 }
 
-/// End of a sequence.
-#[derive(Clone, Copy, Debug)]
-struct End {
-    name: Option<usize>,
-    unknown: bool,
-    rows: u32,
-}
-
 /// Measures a model on sequences of rows.
 ///
 /// # Errors
-/// As [`Rows::new`]; [`Setting`](crate::error::Setting) for settings out of their ranges.
+/// [`RowsProblem`](crate::error::RowsProblem) for a model without classes of rows, and for rows of another number of features;
+/// [`Setting`](crate::error::Setting) for settings out of their ranges.
 pub fn evaluate(model: &Model<'_>, sequences: &Sequences, wanted: &Wanted) -> Result<Evaluated> {
     let rows = Rows::new(model, sequences)?;
-    evaluate_margins(model, &rows, &sequences.sequences, wanted)
+    measured(model, &rows, &sequences.sequences, wanted, true)
 }
 
-/// The same of margins that were computed before.
-///
-/// # Errors
-/// As [`evaluate`].
-pub fn evaluate_margins(
-    model: &Model<'_>,
-    rows: &Rows<'_>,
-    sequences: &[RowSequence],
-    wanted: &Wanted,
-) -> Result<Evaluated> {
-    measured(model, rows, sequences, wanted, true)
-}
-
-/// The same, without the comparison and a sequence's evidence unless these are wanted.
+/// Like [`evaluate`], from margins that were computed before; without the comparison and a sequence's evidence unless it
+/// `compares`.
 pub(super) fn measured(
     model: &Model<'_>,
     rows: &Rows<'_>,
@@ -205,13 +187,13 @@ pub(super) fn measured(
     names.truncate(model.known_count());
     let mut confusion = vec![vec![0; names.len() + 1]; names.len()];
     for (sequence, end) in sequences.iter().zip(&ends) {
-        confusion[sequence.class][end.name.unwrap_or(names.len())] += 1;
+        confusion[sequence.class][end.recognized.unwrap_or(names.len())] += 1;
     }
     let all = sequences.len().max(1) as f64;
-    let share = |is: &dyn Fn(&RowSequence, &End) -> bool| {
+    let share = |is: &dyn Fn(&RowSequence, &Outcome) -> bool| {
         sequences.iter().zip(&ends).filter(|(sequence, end)| is(sequence, end)).count() as f64 / all
     };
-    let mut lengths: Vec<u32> = ends.iter().map(|end| end.rows).collect();
+    let mut lengths: Vec<usize> = ends.iter().map(|end| end.touches).collect();
     lengths.sort_unstable();
     let groups: std::collections::BTreeSet<usize> = sequences.iter().filter_map(|sequence| sequence.group).collect();
     let at = point(sequences, &ends);
@@ -221,8 +203,8 @@ pub(super) fn measured(
         groups: (!groups.is_empty()).then_some(groups.len()),
         rows: sequences.iter().map(|sequence| sequence.rows.len()).sum(),
         error: at.error,
-        wrong: share(&|sequence, end| end.name.is_some_and(|name| name != sequence.class)),
-        undecided: share(&|_, end| end.name.is_none() && !end.unknown),
+        wrong: share(&|sequence, end| end.recognized.is_some_and(|name| name != sequence.class)),
+        undecided: share(&|_, end| end.recognized.is_none() && !end.unknown),
         unknown: share(&|_, end| end.unknown),
         mean_rows: at.rows,
         median_rows: lengths.get(lengths.len() / 2).copied().unwrap_or(0),
@@ -236,23 +218,28 @@ pub(super) fn measured(
 }
 
 /// Names, errors and rows of sequences.
-fn point(sequences: &[RowSequence], ends: &[End]) -> Point {
+fn point(sequences: &[RowSequence], ends: &[Outcome]) -> Point {
     let (mut given, mut wrong, mut rows) = (0_u64, 0_u64, 0_u64);
     for (sequence, end) in sequences.iter().zip(ends) {
-        given += u64::from(end.name.is_some());
-        wrong += u64::from(end.name.is_some_and(|name| name != sequence.class));
-        rows += u64::from(end.rows);
+        given += u64::from(end.recognized.is_some());
+        wrong += u64::from(end.recognized.is_some_and(|name| name != sequence.class));
+        rows += end.touches as u64;
     }
     let all = sequences.len().max(1) as f64;
     Point { rows: rows as f64 / all, error: wrong as f64 / given.max(1) as f64, named: given as f64 / all }
 }
 
 /// Holds a promise against the ends of sequences.
-fn check_promise(promise: &Promise, sequences: &[RowSequence], ends: &[End], names: &[String]) -> PromiseOfSequences {
-    let case = |sequence: &RowSequence, end: &End| match promise.per {
+fn check_promise(
+    promise: &Promise,
+    sequences: &[RowSequence],
+    ends: &[Outcome],
+    names: &[String],
+) -> PromiseOfSequences {
+    let case = |sequence: &RowSequence, end: &Outcome| match promise.per {
         Per::Average => Some(0),
         Per::Object => Some(sequence.class),
-        Per::Name => end.name,
+        Per::Name => end.recognized,
     };
     let cases = if promise.per == Per::Average { 1 } else { names.len() };
     let mut units = vec![BTreeMap::<usize, Unit>::new(); cases];
@@ -260,8 +247,8 @@ fn check_promise(promise: &Promise, sequences: &[RowSequence], ends: &[End], nam
         let Some(case) = case(sequence, end).and_then(|case| units.get_mut(case)) else { continue };
         let unit = case.entry(sequence.group.filter(|_| promise.groups).unwrap_or(number)).or_default();
         unit.all += 1.0;
-        unit.named += f64::from(u8::from(end.name.is_some()));
-        unit.wrong += f64::from(u8::from(end.name.is_some_and(|name| name != sequence.class)));
+        unit.named += f64::from(u8::from(end.recognized.is_some()));
+        unit.wrong += f64::from(u8::from(end.recognized.is_some_and(|name| name != sequence.class)));
     }
     let found: Vec<(f64, f64)> = units.iter().map(|units| Unit::error(units, promise)).collect();
     let is_above = |(error, _): &&(f64, f64)| *error > promise.rate;
@@ -316,29 +303,21 @@ struct Run<'r> {
 }
 
 impl Run<'_> {
-    fn recognizer(&self, stopping: Stopping) -> Option<Recognizer<'_, 256>> {
-        // A model has at most 256 classes.
-        Recognizer::new(self.model, stopping).ok()
+    fn chip(&self, stopping: Stopping, forgets: Option<f32>) -> Box<Chip<'_>> {
+        chip(self.model, stopping, self.weights, forgets)
     }
 
-    fn reset(&self, recognizer: &mut Recognizer<'_, 256>) {
-        match self.weights {
-            // One of them is above 0, which whoever made them saw to; otherwise the priors stay.
-            Some(weights) => _ = recognizer.reset_to(weights),
-            None => recognizer.reset(),
-        }
+    /// Outcome of these rows, as one sequence.
+    fn outcome(&self, rows: impl Iterator<Item = usize>, follower: &mut Chip<'_>) -> Outcome {
+        let Ok(outcome) = outcome(&mut Given::new(rows.map(|row| Some(self.rows.row(row)))), follower);
+        outcome
     }
 
     /// Verdicts on all sequences, as the chip gives them.
-    fn ends(&self, sequences: &[RowSequence], stopping: Stopping) -> Vec<End> {
-        let chunk = |sequences: &[RowSequence]| -> Vec<End> {
-            let Some(mut recognizer) = self.recognizer(stopping) else { return Vec::new() };
-            let one = |sequence: &RowSequence| {
-                self.reset(&mut recognizer);
-                let rows = sequence.rows.clone().map(|row| self.rows.row(row));
-                end(rows.map(|row| recognizer.push_margins(row)))
-            };
-            sequences.iter().map(one).collect()
+    fn ends(&self, sequences: &[RowSequence], stopping: Stopping) -> Vec<Outcome> {
+        let chunk = |sequences: &[RowSequence]| -> Vec<Outcome> {
+            let mut follower = self.chip(stopping, None);
+            sequences.iter().map(|sequence| self.outcome(sequence.rows.clone(), &mut *follower)).collect()
         };
         sequences.par_chunks(64).map(chunk).collect::<Vec<_>>().concat()
     }
@@ -357,15 +336,15 @@ impl Run<'_> {
         // For each number of rows whether the class with the most evidence, and that with the most rows, is wrong.
         let chunk = |sequences: &[RowSequence]| {
             let mut wrong = vec![(0_u64, 0_u64, 0_u64); last];
-            let Some(mut recognizer) = self.recognizer(Stopping::from_odds(0, u32::MAX)) else { return wrong };
+            let mut follower = self.chip(Stopping::from_odds(0, u32::MAX), None);
             for sequence in sequences {
-                self.reset(&mut recognizer);
+                follower.reset();
                 let mut votes = vec![0_u32; self.model.known_count()];
                 let (mut by_evidence, mut by_vote, mut used) = (0, 0, 0);
                 for count in 1..=last {
                     if let Some(row) = sequence.rows.clone().nth(count - 1).map(|row| self.rows.row(row)) {
-                        recognizer.push_margins(row);
-                        by_evidence = recognizer.best();
+                        follower.push(row);
+                        by_evidence = follower.leader();
                         votes[largest(&row[..self.model.known_count()])] += 1;
                         by_vote = largest(&votes);
                         used = count;
@@ -394,21 +373,24 @@ impl Run<'_> {
     }
 
     /// A sequence with a name, if there is one: that at three quarters of these in the order of their rows.
-    fn grown(&self, sequences: &[RowSequence], ends: &[End], stopping: Stopping) -> Option<Grown> {
-        let mut order: Vec<usize> = (0..ends.len()).filter(|&at| ends[at].name.is_some()).collect();
-        order.sort_by_key(|&at| (ends[at].rows, at));
+    fn grown(&self, sequences: &[RowSequence], ends: &[Outcome], stopping: Stopping) -> Option<Grown> {
+        let mut order: Vec<usize> = (0..ends.len()).filter(|&at| ends[at].recognized.is_some()).collect();
+        order.sort_by_key(|&at| (ends[at].touches, at));
         let at = order.get(order.len() * 3 / 4).copied().or((!sequences.is_empty()).then_some(0))?;
         let sequence = &sequences[at];
-        let mut recognizer = self.recognizer(Stopping::from_odds(0, stopping.max_touches()))?;
-        self.reset(&mut recognizer);
+        // A model has at most 256 classes.
+        let mut recognizer = Recognizer::<256>::new(self.model, Stopping::from_odds(0, stopping.max_touches())).ok()?;
+        // One of the weights is above 0, which whoever made them saw to; otherwise the priors stay.
+        self.weights.iter().for_each(|weights| _ = recognizer.reset_to(weights));
         let mut posteriors = Vec::new();
         for row in sequence.rows.clone().take(MOST_SHOWN) {
             recognizer.push_margins(self.rows.row(row));
             posteriors.push((0..self.model.known_count()).map(|class| recognizer.posterior(class).to_f64()).collect());
         }
         let end = &ends[at];
-        let ended = (end.name.is_some() || end.unknown).then_some((end.rows, end.name));
-        let longer = order.iter().filter(|&&other| ends[other].rows > end.rows).count() as f64 / order.len() as f64;
+        let ended = (end.recognized.is_some() || end.unknown).then_some((end.touches, end.recognized));
+        let longer =
+            order.iter().filter(|&&other| ends[other].touches > end.touches).count() as f64 / order.len() as f64;
         Some(Grown { class: sequence.class, posteriors, ended, longer: Some(longer).filter(|share| share.is_finite()) })
     }
 
@@ -417,8 +399,7 @@ impl Run<'_> {
     fn switched(&self, sequences: &[RowSequence], stopping: Stopping, nats: f32, mean_rows: f64) -> Switched {
         let cut = ((mean_rows / 2.0).round() as usize).max(1);
         let of = |changed: bool, forgets: bool| {
-            let Some(mut recognizer) = self.recognizer(stopping) else { return Vec::new() };
-            let mut forgetting = Forgetting::<256>::new(self.model, nats);
+            let mut follower = self.chip(stopping, forgets.then_some(nats));
             let one = |number: usize| {
                 let last = &sequences[number];
                 let first = (1..sequences.len())
@@ -426,38 +407,13 @@ impl Run<'_> {
                     .find(|other| other.class != last.class)
                     .filter(|_| changed);
                 let first = first.map_or(0..0, |first| first.rows.start..first.rows.end.min(first.rows.start + cut));
-                self.reset(&mut recognizer);
-                forgetting.reset();
-                let push = |row: usize| {
-                    let mut margins = [0; 256];
-                    margins.iter_mut().zip(self.rows.row(row)).for_each(|(to, from)| *to = *from);
-                    match forgets {
-                        true => recognizer.push_margins_forgetting(&margins, &mut forgetting),
-                        false => recognizer.push_margins(self.rows.row(row)),
-                    }
-                };
-                end(first.chain(last.rows.clone()).map(push))
+                self.outcome(first.chain(last.rows.clone()), &mut *follower)
             };
-            (0..sequences.len()).map(one).collect()
+            (0..sequences.len()).map(one).collect::<Vec<_>>()
         };
         let both = |changed| [false, true].map(|forgets| point(sequences, &of(changed, forgets)));
         Switched { nats, unchanged: both(false), changed: both(true) }
     }
-}
-
-/// The end of a sequence of which verdicts come, row by row.
-fn end(verdicts: impl Iterator<Item = Verdict>) -> End {
-    let mut rows = 0;
-    for verdict in verdicts {
-        rows += 1;
-        match verdict {
-            Verdict::Undecided => {}
-            Verdict::Recognized { object, .. } => return End { name: Some(object.into()), unknown: false, rows },
-            Verdict::Unknown => return End { name: None, unknown: true, rows },
-            Verdict::GaveUp => return End { name: None, unknown: false, rows },
-        }
-    }
-    End { name: None, unknown: false, rows }
 }
 
 /// The position of the largest number, the first of several.

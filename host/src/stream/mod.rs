@@ -35,15 +35,11 @@ mod shape;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 
-pub use calibrate::{Calibrated, calibrate, calibrate_margins};
-pub use evaluate::{
-    Comparison, Evaluated, Grown, Point, PromiseOfSequences, Switched, Wanted, evaluate, evaluate_margins,
-};
-pub use follow::follow;
+pub use calibrate::calibrate;
+pub use evaluate::{Comparison, Evaluated, Grown, Point, PromiseOfSequences, Switched, Wanted, evaluate};
 pub use settings::Settings;
 #[cfg(feature = "train")]
-pub use settings::Strangers;
-pub use shape::Gain;
+pub use settings::StrangerTest;
 
 use crate::error::{EvaluateProblem, Result, RowsProblem};
 use crate::evaluate::together::units_of_rows;
@@ -54,7 +50,7 @@ use std::path::Path;
 
 /// The margins of rows, in a model's units.
 #[derive(Clone, Debug)]
-pub struct Rows<'r> {
+pub(crate) struct Rows<'r> {
     /// Row after row, one margin for each class.
     margins: Cow<'r, [i32]>,
     objects: usize,
@@ -72,7 +68,7 @@ impl Rows<'_> {
     /// # Errors
     /// [`EvaluateProblem::OverTouches`] for a model over touches, [`RowsProblem::Regression`] for one with a single output,
     /// [`RowsProblem::Columns`] for rows of another number of features.
-    pub fn new(model: &Model<'_>, sequences: &Sequences) -> Result<Self> {
+    pub(crate) fn new(model: &Model<'_>, sequences: &Sequences) -> Result<Self> {
         check(model)?;
         let (found, wanted) = (sequences.features, model.feature_count());
         if found != wanted {
@@ -84,14 +80,14 @@ impl Rows<'_> {
 
 impl<'r> Rows<'r> {
     /// Margins that were computed before, row after row, one for each of the model's classes, in its units.
-    pub fn of(model: &Model<'_>, margins: Cow<'r, [i32]>) -> Self {
+    pub(crate) fn of(model: &Model<'_>, margins: Cow<'r, [i32]>) -> Self {
         let unit = f64::from(model.unit());
         let priors = (0..model.object_count()).map(|object| f64::from(model.prior(object)) * unit).collect();
         Self { margins, objects: model.object_count(), known: model.known_count(), unit, priors }
     }
 
     /// The margins of a row; nothing beyond the rows that there are.
-    pub fn row(&self, row: usize) -> &[i32] {
+    pub(crate) fn row(&self, row: usize) -> &[i32] {
         self.margins.get(row * self.objects..(row + 1) * self.objects).unwrap_or_default()
     }
 }

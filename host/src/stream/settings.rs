@@ -2,7 +2,7 @@
 
 #[cfg(feature = "train")]
 use super::Rows;
-use crate::calibrate::Per;
+use crate::calibrate::{Per, Terms};
 use crate::error::{Error, Result};
 #[cfg(feature = "train")]
 use crate::strangers;
@@ -26,7 +26,7 @@ pub struct Settings {
     pub max_rows: Option<u32>,
     /// A test for what the model does not know, if one is wanted.
     #[cfg(feature = "train")]
-    pub strangers: Option<Strangers>,
+    pub strangers: Option<StrangerTest>,
     /// Seed of which sequences are learned from.
     pub seed: u64,
 }
@@ -47,17 +47,16 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// The terms of the promise.
+    pub(super) fn terms(&self) -> Terms {
+        Terms { rate: self.rate, confidence: self.confidence, per: self.per }
+    }
+
     /// Refuses settings out of their ranges.
     pub(super) fn check(&self) -> Result<()> {
-        let Self { rate, confidence, sequences, .. } = *self;
-        if !(1e-9..0.5).contains(&rate) {
-            return Err(Error::setting("error_rate", rate, "a number of at least 1e-9 and below 0.5"));
-        }
-        if !((0.5..=0.999_999).contains(&confidence)) {
-            return Err(Error::setting("confidence", confidence, "a number from 0.5 to 0.999999"));
-        }
-        if sequences == 0 {
-            return Err(Error::setting("sequences", sequences, "at least 1"));
+        self.terms().check()?;
+        if self.sequences == 0 {
+            return Err(Error::setting("sequences", self.sequences, "at least 1"));
         }
         check_rows(self.max_rows)
     }
@@ -71,7 +70,7 @@ pub(super) fn check_rows(max_rows: Option<u32>) -> Result<()> {
 /// A test for what the model does not know.
 #[cfg(feature = "train")]
 #[derive(Clone, Debug, PartialEq)]
-pub struct Strangers {
+pub struct StrangerTest {
     /// Its settings.
     pub settings: strangers::Settings,
     /// The margins of rows of others, a list for each sequence of them, in the model's units; there may be none.
@@ -79,11 +78,11 @@ pub struct Strangers {
 }
 
 #[cfg(feature = "train")]
-impl Strangers {
+impl StrangerTest {
     /// A test with a background of these sequences, whose classes do not matter.
     ///
     /// # Errors
-    /// As [`Rows::new`].
+    /// [`RowsProblem`](crate::error::RowsProblem) for a model without classes of rows, and for rows of another number of features.
     pub fn new(settings: strangers::Settings, model: &Model<'_>, others: Option<&Sequences>) -> Result<Self> {
         let Some(others) = others else { return Ok(Self { settings, background: Vec::new() }) };
         let rows = Rows::new(model, others)?;

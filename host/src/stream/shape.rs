@@ -1,7 +1,7 @@
 //! Evidence of a row, and weights of rows that resemble each other: found on sequences that no promise rests on.
 
 use super::Rows;
-use crate::calibrate::{Look, Odds, Sequence, odds_of};
+use crate::calibrate::{Gain, Lead, Odds, Sequence, odds_of};
 use palpate_onboard::Model;
 use palpate_shared::format::{RowEvidence, Shifts, Weights};
 use palpate_trees::rows::RowSequence;
@@ -21,8 +21,6 @@ const LEAST_SEQUENCES: usize = 20;
 const HALVINGS: usize = 20;
 /// The least weight.
 const LEAST_WEIGHT: f64 = 1e-3;
-/// The share of rows that a table or weights must save to be kept.
-const SAVED: f64 = 0.05;
 /// Beyond this margin, in nats, a threshold is not stored precisely.
 pub(super) const STRICTEST: f64 = 36.0;
 /// Beyond this margin a threshold is too near to the strictest: a walk that begins there has no room.
@@ -46,29 +44,6 @@ pub(super) struct Shape {
     pub(super) table: Option<Table>,
     /// By [`Weights::position`].
     pub(super) weights: Option<Vec<f64>>,
-}
-
-/// Rows that a part of the shape saves.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Gain {
-    /// True if it is kept.
-    pub kept: bool,
-    /// The rows to a verdict without it, at the promised error rate on sequences that it was not fitted to; `None` if no
-    /// threshold that a model can store keeps the rate.
-    pub rows_without: Option<f64>,
-    /// Rows with it.
-    pub rows_with: Option<f64>,
-}
-
-impl Gain {
-    fn new(without: Option<f64>, with: Option<f64>) -> Self {
-        let kept = match (without, with) {
-            (Some(without), Some(with)) => with <= (1.0 - SAVED) * without,
-            (None, Some(_)) => true,
-            _ => false,
-        };
-        Self { kept, rows_without: without, rows_with: with }
-    }
 }
 
 /// A fitted shape, and what its parts save.
@@ -330,7 +305,7 @@ fn looks(rows: &Rows<'_>, sequences: &[&RowSequence], shape: &Shape, max_rows: u
             let others = sums.iter().enumerate().filter(|(object, _)| *object != best);
             let others: f64 = others.map(|(_, sum)| (weight * (sum - sums[best])).exp()).sum();
             let odds = odds_of(-others.ln());
-            followed.look(Look { name: best, odds, touches: count, approaches: count }, true);
+            followed.take(Lead { name: best, odds, touches: count, approaches: count }, true);
             odds > odds_of(STRICTEST) && count < max_rows
         });
         followed

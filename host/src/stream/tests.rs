@@ -1,6 +1,7 @@
 //! Promises on simulated streams, whose error rates are known: a population of sequences, from which calibrations draw with
 //! replacement, so that its own error rate is the true one.
 
+use super::calibrate::calibrate_margins;
 use super::*;
 use crate::calibrate::Per;
 use crate::compile::{self, Settings as Compilation, compile};
@@ -220,12 +221,13 @@ fn weights_are_kept_where_rows_resemble_each_other_and_not_where_they_are_indepe
         calibrate(&model, &made, &settings, &()).unwrap()
     };
     let independent = of(Kind::Independent, 60);
-    assert!(!independent.weights.unwrap().kept, "{independent:?}");
-    assert!(!independent.row_evidence.unwrap().kept, "{independent:?}");
+    assert!(!independent.rows.as_ref().unwrap().weights.unwrap().kept, "{independent:?}");
+    assert!(!independent.rows.as_ref().unwrap().row_evidence.unwrap().kept, "{independent:?}");
     assert_eq!(compile::open(&independent.model).unwrap().weight_of(8), Weights::ONE);
     let dependent = of(Kind::Autoregressive(0.9), 160);
-    let gain = dependent.weights.unwrap();
-    println!("{gain:?} {:?}", dependent.weights_by_doubling);
+    let shape = dependent.rows.as_ref().unwrap();
+    let gain = shape.weights.unwrap();
+    println!("{gain:?} {:?}", shape.weights_by_doubling);
     assert!(gain.kept, "{gain:?}");
     let stated = compile::open(&dependent.model).unwrap();
     assert!(stated.weight_of(64) < stated.weight_of(1));
@@ -318,10 +320,10 @@ fn a_calibrated_model_is_calibrated_again_as_if_it_had_not_been() {
 }
 
 /// A test for what the model does not know, with a background of sequences at `place` if there is one.
-fn strangers(place: Option<f64>) -> Strangers {
+fn strangers(place: Option<f64>) -> StrangerTest {
     let model = compile::open(&MODEL).unwrap();
     let others = place.map(|place| at(place, 300, 40));
-    Strangers::new(crate::strangers::Settings::default(), &model, others.as_ref()).unwrap()
+    StrangerTest::new(crate::strangers::Settings::default(), &model, others.as_ref()).unwrap()
 }
 
 /// Sequences of rows about a place where no class is.
@@ -419,7 +421,7 @@ fn names_that_a_test_never_lets_be_given_are_no_lack_of_sequences() {
     let model = compile::open(&MODEL).unwrap();
     let short = sequences(Kind::Independent, 3_000, 12, 3);
     let certain = crate::strangers::Settings { held: palpate_shared::format::Held::Certain, ..Default::default() };
-    let strangers = Some(Strangers::new(certain, &model, None).unwrap());
+    let strangers = Some(StrangerTest::new(certain, &model, None).unwrap());
     let settings = Settings { rate: 0.05, strangers, ..Settings::default() };
     let refused = calibrate(&model, &short, &settings, &()).unwrap_err().to_string();
     assert!(

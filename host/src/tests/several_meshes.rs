@@ -4,7 +4,7 @@
 //! A sequence is of one mesh. Sequences of touches of several would agree with each other, and with nothing that a robot
 //! meets: an object would be known from the mean of its meshes.
 
-use crate::calibrate::{self, Odds, Per, Supply, Until, follow};
+use crate::calibrate::{self, Limit, Odds, Per, TouchSupply, follow};
 use crate::compare;
 use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::Ensemble;
@@ -103,11 +103,10 @@ fn agree(what: &str, stated: [Share; 3], fresh: [Share; 3]) {
 fn wrong_names(odds: &Odds) -> [f64; 2] {
     static SEQUENCES: LazyLock<Vec<calibrate::Sequence>> = LazyLock::new(|| {
         let fresh = touches(60_000, 78);
-        let mut supplies: Vec<Supply<'_>> =
-            fresh.objects.iter().enumerate().map(|(object, of)| Supply::new(object, of, 1)).collect();
-        let until = Until { margin: 13.0, max_touches: MOST };
-        let gate = || |_: &calibrate::Moment<'_>| true;
-        follow(&MODEL.model(), &mut supplies, &[usize::MAX; KINDS.len()], until, gate, &()).unwrap()
+        let mut supplies: Vec<TouchSupply<'_>> =
+            fresh.objects.iter().enumerate().map(|(object, of)| TouchSupply::new(object, of, 1)).collect();
+        let limit = Limit { margin: 13.0, max_touches: MOST };
+        follow(&MODEL.model(), &mut supplies, &[usize::MAX; KINDS.len()], limit, &()).unwrap()
     });
     let mut tallies = [[0.0; 2]; KINDS.len()];
     for sequence in &*SEQUENCES {

@@ -325,7 +325,7 @@ fn measure(
         instructions_m0_plus: compiled.and_then(|(_, compiled)| compiled.instructions.m0_plus),
         accuracy: evaluation.accuracy,
         mean_touches: evaluation.sequential.mean_touches,
-        mean_approaches: evaluation.approaches.as_ref().map(|approaches| approaches.sequential.mean_approaches),
+        mean_approaches: evaluation.approaches.as_ref().map(|approaches| approaches.sequential.mean().value),
         error: evaluation.approaches.map_or(evaluation.sequential.error, |approaches| approaches.sequential.error),
         frontier: false,
     })

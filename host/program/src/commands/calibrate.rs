@@ -4,21 +4,23 @@ use super::plan::{self, Wanted};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
-use super::sequences::{self, Calibration, SequenceArguments};
+use super::sequences::{self, SequenceArguments};
 use super::strangers::StrangersArguments;
 use super::thresholds;
 use palpate::Result;
-use palpate::calibrate::{self, Calibrated, OfRecorded, Per, Settings};
+use palpate::calibrate::{self, Calibrated, Gain, OfRecorded, OfRows, Per, Settings, Used};
 use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, EvaluateProblem, Place};
 use palpate::output;
 use palpate::probe::noise::Noise;
-use palpate::strangers::{self, Found};
+use palpate::strangers;
+use palpate::stream::{self, StrangerTest};
 use palpate::touches::Dataset;
 use palpate::wording::{self, count, decimal};
+use palpate_shared::format::Held;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Set a model's thresholds so that it keeps a promised error rate, and uses it up.
 #[derive(clap::Args)]
@@ -123,9 +125,23 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         let Arguments { model, directory, output, probe, real, .. } = &arguments;
         return plan::run(&Wanted { model, directory, output, rolls, probe, real }, global);
     }
-    if arguments.rows.label.is_some() {
-        return rows(&arguments, global);
+    let calibrated = match arguments.rows.label.is_some() {
+        true => on_rows(&arguments, global)?,
+        false => on_touches(&arguments, global)?,
+    };
+    output::write_bytes(&arguments.output, &calibrated.model)?;
+    if global.json {
+        return output::print_json_about(&arguments.output, &calibrated);
     }
+    let placements = match arguments.placement_prior {
+        PlacementPrior::Stated => String::new(),
+        PlacementPrior::Any => in_each_placement(&calibrated),
+    };
+    output::print_about(&arguments.output, &text(&arguments.output, &calibrated, &placements))
+}
+
+/// Calibrates on touches.
+fn on_touches(arguments: &Arguments, global: &Global) -> Result<Calibrated> {
     output::admit(&arguments.output, super::files_of(&arguments.directory))?;
     if let Some(recorded) = &arguments.recorded {
         output::refuse_input(&arguments.output, super::files_of(recorded))?;
@@ -157,63 +173,56 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             || matches!(error.problem(), Some(TooFewRecorded { .. } | RecordedUnknown { .. }));
         error.in_file(arguments.recorded.as_ref().filter(|_| is_of_recorded).unwrap_or(&arguments.directory))
     };
-    let (calibrated, found) = match arguments.strangers.held() {
-        None => {
-            let untested = strangers::without(&compiled.model())?;
-            let model = compile::open(&untested)?;
-            let calibrated = match &recorded {
-                Some(recorded) => calibrate::calibrate_recorded(&model, dataset, recorded, &settings, &Bar::new()),
-                None => calibrate::calibrate(&model, dataset, &settings, &Bar::new()),
-            };
-            (calibrated.map_err(wrong)?, None)
-        }
-        Some(held) => {
-            let test = strangers::Settings {
-                held,
-                sequences: settings.sequences,
-                confidence: settings.confidence,
-                seed: settings.seed,
-                ..Default::default()
-            };
-            let shapes = arguments.strangers.shapes(&dataset)?;
-            let (model, recorded) = (compiled.model(), recorded.as_ref());
-            let both =
-                strangers::calibrate_with_promise(&model, &dataset, recorded, &shapes, &test, &settings, &Bar::new());
-            let (calibrated, tested) = both.map_err(wrong)?;
-            (calibrated, Some(Found::new(&test, &tested)))
-        }
+    let Some(held) = arguments.strangers.held() else {
+        let untested = strangers::without(&compiled.model())?;
+        let model = compile::open(&untested)?;
+        let calibrated = match &recorded {
+            Some(recorded) => calibrate::calibrate_recorded(&model, dataset, recorded, &settings, &Bar::new()),
+            None => calibrate::calibrate(&model, dataset, &settings, &Bar::new()),
+        };
+        return calibrated.map_err(wrong);
     };
-    output::write_bytes(&arguments.output, &calibrated.model)?;
-    if global.json {
-        return output::print_json_about(&arguments.output, &Both { calibrated: &calibrated, strangers: &found });
-    }
-    let strangers = found.map_or_else(String::new, |found| super::strangers::text(&found) + "\n");
-    let placements = match arguments.placement_prior {
-        PlacementPrior::Stated => String::new(),
-        PlacementPrior::Any => in_each_placement(&calibrated),
-    };
-    let text = format!("{}{placements}{strangers}{}\n", text(&calibrated), written(&arguments.output, &calibrated));
-    output::print_about(&arguments.output, &text)
+    let sequences = settings.sequences;
+    let test = strangers::Settings { sequences, ..test(held, arguments, global) };
+    let shapes = arguments.strangers.shapes(&dataset)?;
+    let (model, recorded) = (compiled.model(), recorded.as_ref());
+    let both = strangers::calibrate_with_promise(&model, &dataset, recorded, &shapes, &test, &settings, &Bar::new());
+    let (calibrated, tested) = both.map_err(wrong)?;
+    Ok(Calibrated { strangers: Some(tested.found(&test)), ..calibrated })
+}
+
+/// The test for what the model does not know, with the confidence and the seed of the promise.
+fn test(held: Held, arguments: &Arguments, global: &Global) -> strangers::Settings {
+    strangers::Settings { held, confidence: arguments.confidence, seed: global.seed(), ..Default::default() }
 }
 
 /// Calibrates on sequences of rows.
-fn rows(arguments: &Arguments, global: &Global) -> Result<()> {
+fn on_rows(arguments: &Arguments, global: &Global) -> Result<Calibrated> {
     let Some(columns) = arguments.rows.columns() else {
         let allowed = "it with --sequence-column, which says which rows are of one sequence";
         return Err(Error::setting("label", arguments.rows.label.as_deref().unwrap_or_default(), allowed));
     };
-    let Arguments { error_rate, per, confidence, sequences, max_touches, .. } = *arguments;
-    let settings = sequences::settings(error_rate, per, confidence, sequences, max_touches, global.seed());
-    let asked = Calibration {
-        model: &arguments.model,
-        rows: &arguments.directory,
-        output: &arguments.output,
-        columns,
-        settings,
-        held: arguments.strangers.held(),
-        background: arguments.strangers.background(),
+    let Arguments { model: path, directory: rows, .. } = arguments;
+    let background = arguments.strangers.background();
+    output::admit(&arguments.output, [path, rows].into_iter().chain(background))?;
+    let compiled = CompiledModel::read(path)?;
+    let model = compiled.model();
+    stream::check(&model).map_err(|error| error.in_file(path))?;
+    let found = sequences::read(rows, &model, &columns)?;
+    let strangers = |held: Held| {
+        let others = background.map(|path| sequences::others(path, &model, &columns)).transpose()?;
+        StrangerTest::new(test(held, arguments, global), &model, others.as_ref())
     };
-    sequences::calibrate(asked, global)
+    let settings = stream::Settings {
+        rate: arguments.error_rate,
+        per: arguments.per,
+        confidence: arguments.confidence,
+        sequences: usize::try_from(arguments.sequences).unwrap_or(usize::MAX),
+        max_rows: arguments.max_touches,
+        strangers: arguments.strangers.held().map(strangers).transpose()?,
+        seed: global.seed(),
+    };
+    stream::calibrate(&model, &found, &settings, &Bar::new()).map_err(|error| error.in_file(rows))
 }
 
 /// Touches that the model was not trained on.
@@ -227,48 +236,66 @@ fn untrained(compiled: &CompiledModel, directory: &PathBuf) -> Result<Dataset> {
     Err(Error::at(Place::file(directory), CalibrateProblem::TrainedOn { objects }))
 }
 
-/// Results of both calibrations.
-#[derive(serde::Serialize)]
-struct Both<'c> {
-    #[serde(flatten)]
-    calibrated: &'c Calibrated,
-    /// About strangers.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    strangers: &'c Option<Found>,
-}
-
-fn written(path: &std::path::Path, calibrated: &Calibrated) -> String {
-    format!("{}: {} bytes", path.display(), count(calibrated.model.len()))
-}
-
-fn text(calibrated: &Calibrated) -> String {
+fn text(path: &Path, calibrated: &Calibrated, placements: &str) -> String {
     let percent = |share: f64| wording::percent(share, 2);
-    let mut text = thresholds::promised(calibrated.promised, calibrated.promise.per, "", calibrated.confidence);
+    let (promised, per) = (calibrated.promised, calibrated.promise.per);
+    let number = |number: usize| if calibrated.rows.is_some() { number.to_string() } else { count(number) };
+    let cases = if calibrated.groups.is_some() { " in new groups" } else { "" };
+    let mut text = thresholds::promised(promised, per, cases, calibrated.confidence);
     // Writing to a string cannot fail.
-    _ = writeln!(
+    _ = write!(
         text,
-        "{} sequences: of the names given {} wrong, {} without a name; {} {} each.",
-        count(calibrated.sequences),
+        "{} sequences{}: of the names given {} wrong, {} without a name; {} {} each",
+        number(calibrated.sequences),
+        calibrated.groups.map_or_else(String::new, |groups| format!(" of {groups} groups")),
         percent(calibrated.error),
         percent(calibrated.undecided),
-        decimal(calibrated.mean_approaches.unwrap_or(calibrated.mean_touches), 1),
+        decimal(calibrated.used.mean(), 1),
         calibrated.counted,
     );
+    if let (Used::Rows { max_rows, .. }, Some(learned)) = (calibrated.used, calibrated.learned) {
+        _ = write!(text, ", at most {max_rows}. The shape of evidence was learned from {learned} others");
+    }
+    text += ".\n";
+    text += &calibrated.rows.as_ref().map_or_else(String::new, shape);
     text += &thresholds::text(&calibrated.margins, &calibrated.errors, calibrated.uncalibrated_margin);
-    _ = writeln!(text, "Temperature of the posteriors that are shown: {:.2}", calibrated.temperature);
-    let hidden = calibrated
-        .objects
-        .values()
-        .any(|of| 2 * of.given < calibrated.sequences as u64 / calibrated.objects.len() as u64);
-    text + &calibrated.recorded.as_ref().map_or_else(String::new, |recorded| of_recorded(recorded, calibrated))
-        + &thresholds::worse(&calibrated.worse(), calibrated.promised, calibrated.promise.per, hidden)
+    if let Some(temperature) = calibrated.temperature {
+        _ = writeln!(text, "Temperature of the posteriors that are shown: {temperature:.2}");
+    }
+    text += &calibrated.recorded.as_ref().map_or_else(String::new, |recorded| of_recorded(recorded, calibrated));
+    text += &thresholds::worse(&calibrated.worse(), promised, per, calibrated.has_hidden());
+    text += placements;
+    text += &calibrated.strangers.as_ref().map_or_else(String::new, |found| super::strangers::text(found) + "\n");
+    text += &calibrated.note.as_ref().map_or_else(String::new, |note| format!("note: {note}\n"));
+    text + &format!("{}: {} bytes\n", path.display(), number(calibrated.model.len()))
+}
+
+/// The shape of evidence of rows.
+fn shape(of: &OfRows) -> String {
+    let gain = |gain: Option<Gain>| {
+        let Some(Gain { kept, rows_without, rows_with }) = gain else {
+            return "not used; too few sequences to learn from".to_owned();
+        };
+        let rows = |rows: Option<f64>| rows.map_or_else(|| "no threshold".into(), |rows| format!("{rows:.1} rows"));
+        let what = if kept { "used" } else { "not used" };
+        format!("{what} ({} with them, {} without, on held-back sequences)", rows(rows_with), rows(rows_without))
+    };
+    let weights = of.weights_by_doubling.as_ref().map_or_else(String::new, |weights| {
+        let each = (0..).zip(weights).map(|(doubling, weight)| format!("{} × {weight:.2}", 1_u32 << doubling));
+        format!("\n  rows × weight: {}", each.collect::<Vec<_>>().join(", "))
+    });
+    format!(
+        "Learned evidence table: {}\nLearned weights, smaller for later rows: {}{weights}\n",
+        gain(of.row_evidence),
+        gain(of.weights)
+    )
 }
 
 /// A promise whatever the placements' shares, and the approaches that one takes at least: as many names of each placement as
 /// are needed if none is wrong, each at the cost of those that came before.
 fn in_each_placement(calibrated: &Calibrated) -> String {
     let placements = calibrated.objects.len();
-    let touches = calibrated.mean_approaches.unwrap_or(calibrated.mean_touches);
+    let touches = calibrated.used.mean();
     let named = (1.0 - calibrated.undecided).max(f64::MIN_POSITIVE);
     let least = |rate: f64| {
         let names = calibrate::needed(rate, calibrated.confidence);

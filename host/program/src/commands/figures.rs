@@ -1,7 +1,7 @@
 //! The figures of an evaluation as JSON and as text.
 
 use palpate::evaluate::{
-    ActiveFacts, AlarmCheck, Approaches, Confusion, Evaluated, Evaluation, Finding, PromiseCheck, Rule, Strangers,
+    ActiveFacts, AlarmCheck, Approaches, Confusion, Evaluated, Evaluation, Finding, OnStrangers, PromiseCheck, Rule,
     Switched,
 };
 use palpate::wording::{self, count, counted, rate};
@@ -212,12 +212,7 @@ fn table(evaluation: &Evaluation) -> String {
     );
     _ = write!(text, "{:width$}", "±");
     cells(&mut text, &mut evaluation.accuracy_standard_error.values().map(percent));
-    _ = writeln!(
-        text,
-        " {:>9.1} {:>9}",
-        sequential.mean_touches_standard_error,
-        percent(&sequential.error_standard_error)
-    );
+    _ = writeln!(text, " {:>9.1} {:>9}", sequential.mean().standard_error, percent(&sequential.error_standard_error));
     _ = write!(
         text,
         "\nStopping {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \
@@ -267,13 +262,8 @@ fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> 
         ];
         line(name, accuracy.values().copied().collect(), stopping);
     }
-    let stopping = [
-        sequential.mean_approaches,
-        sequential.error,
-        sequential.error_of_given,
-        sequential.undecided,
-        approaches.used,
-    ];
+    let stopping =
+        [sequential.mean().value, sequential.error, sequential.error_of_given, sequential.undecided, approaches.used];
     line("all", approaches.accuracy.values().copied().collect(), stopping);
     let shares = patterns.iter().map(|(pattern, share)| format!("{pattern} {}", percent(*share)));
     _ = writeln!(
@@ -281,8 +271,8 @@ fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> 
         "\nStopping {}: {:.1} approaches on average (± {:.1}), of which {:.1} were evidence, {:.2} % \
          wrong (± {:.2}), {:.2} % undecided.\nFingers that touched: {}.",
         stops(sequential.error_rate, sequential.promised),
-        sequential.mean_approaches,
-        sequential.mean_approaches_standard_error,
+        sequential.mean().value,
+        sequential.mean().standard_error,
         sequential.mean_touches,
         100.0 * sequential.error,
         100.0 * sequential.error_standard_error,
@@ -317,7 +307,7 @@ fn switch_table(switch: &Switched) -> String {
 }
 
 /// Answers to strangers, in percent: one row per object.
-fn strangers_table(strangers: &Strangers) -> String {
+fn strangers_table(strangers: &OnStrangers) -> String {
     let percent = |share: f64| wording::percent(share, 1);
     if !strangers.has_test {
         let named = strangers.wrong_name_per_object.iter().map(|(name, share)| format!("{name} {}", percent(*share)));
@@ -356,8 +346,8 @@ fn strangers_table(strangers: &Strangers) -> String {
 }
 
 /// Meaning of a dash in the shares of strangers; nothing where there is none.
-fn used_up(strangers: &Strangers) -> String {
-    let Strangers { used_up, fewest_touches, max_touches, .. } = strangers;
+fn used_up(strangers: &OnStrangers) -> String {
+    let OnStrangers { used_up, fewest_touches, max_touches, .. } = strangers;
     let shares = || strangers.detected_per_object.values().flat_map(BTreeMap::values);
     if shares().chain(strangers.wrong_name_per_object.values()).all(|share| share.is_finite()) {
         return String::new();

@@ -1,22 +1,18 @@
-//! Sequences of rows of features: calibrating and evaluating on them.
+//! Sequences of rows of features: reading them, and evaluating on them.
 
 use super::Global;
 use super::figures::shares_table;
-use super::progress::Bar;
 use palpate::Result;
-use palpate::calibrate::Per;
 use palpate::compile::{self, CompiledModel};
 use palpate::error::{Error, Place, RowsProblem};
 use palpate::evaluate::{Confusion, Finding};
 use palpate::output;
 use palpate::rows::{SequenceColumns, Sequences};
-use palpate::strangers;
-use palpate::stream::{self, Calibrated, Evaluated, Gain, Strangers};
+use palpate::stream::{self, Evaluated};
 use palpate::wording;
 use palpate_onboard::Model;
-use palpate_shared::format::Held;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Columns of a file of rows that are no features.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -54,103 +50,14 @@ fn read_of(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>, classe
     Ok(sequences)
 }
 
-/// A calibration on sequences of rows that is asked for.
-pub(crate) struct Calibration<'a> {
-    pub(crate) model: &'a Path,
-    pub(crate) rows: &'a Path,
-    pub(crate) output: &'a Path,
-    pub(crate) columns: SequenceColumns<'a>,
-    pub(crate) settings: stream::Settings,
-    /// The test for what the model does not know, and rows of others.
-    pub(crate) held: Option<Held>,
-    pub(crate) background: Option<&'a PathBuf>,
-}
-
-/// Calibrates a model on sequences of rows.
-pub(crate) fn calibrate(asked: Calibration<'_>, global: &Global) -> Result<()> {
-    let Calibration { model: path, rows, output: written, columns, mut settings, held, background } = asked;
-    output::admit(written, [path, rows].into_iter().chain(background.map(PathBuf::as_path)))?;
-    let compiled = CompiledModel::read(path)?;
-    let model = compiled.model();
-    stream::check(&model).map_err(|error| error.in_file(path))?;
-    let sequences = read(rows, &model, &columns)?;
-    settings.strangers = held
-        .map(|held| {
-            let test = strangers::Settings {
-                held,
-                confidence: settings.confidence,
-                seed: settings.seed,
-                ..Default::default()
-            };
-            let others = background.map(|path| others(path, &model, &columns)).transpose()?;
-            Strangers::new(test, &model, others.as_ref())
-        })
-        .transpose()?;
-    let calibrated =
-        stream::calibrate(&model, &sequences, &settings, &Bar::new()).map_err(|error| error.in_file(rows))?;
-    output::write_bytes(written, &calibrated.model)?;
-    if global.json {
-        return output::print_json_about(written, &calibrated);
-    }
-    output::print_about(written, &calibrated_text(written, &calibrated))
-}
-
 /// Sequences of what the model does not know: any column of labels is as good as another.
-fn others(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>) -> Result<Sequences> {
+pub(crate) fn others(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>) -> Result<Sequences> {
     let columns = SequenceColumns { label: None, group: None, ..*columns };
     read_of(path, model, &columns, &[String::new()])
 }
 
 fn percent(share: f64) -> String {
     format!("{:.2} %", 100.0 * share)
-}
-
-fn calibrated_text(path: &Path, calibrated: &Calibrated) -> String {
-    let Calibrated { sequences, learned, error, undecided, mean_rows, max_rows, .. } = calibrated;
-    let cases = if calibrated.groups.is_some() { " in new groups" } else { "" };
-    let mut text =
-        super::thresholds::promised(calibrated.promised, calibrated.promise.per, cases, calibrated.confidence);
-    let groups = calibrated.groups.map_or_else(String::new, |groups| format!(" of {groups} groups"));
-    // Writing to a string cannot fail.
-    _ = writeln!(
-        text,
-        "{sequences} sequences{groups}: of the names given {} wrong, {} without a name; {mean_rows:.1} rows each, at most \
-         {max_rows}. The shape of evidence was learned from {learned} others.",
-        percent(*error),
-        percent(*undecided),
-    );
-    _ = writeln!(text, "Learned evidence table: {}", gain(calibrated.row_evidence, "used", "not used"));
-    _ = writeln!(
-        text,
-        "Learned weights, smaller for later rows: {}{}",
-        gain(calibrated.weights, "used", "not used"),
-        calibrated.weights_by_doubling.as_ref().map_or_else(String::new, |weights| weights_text(weights)),
-    );
-    text += &super::thresholds::text(&calibrated.margins, &calibrated.errors, calibrated.uncalibrated_margin);
-    text += &calibrated.strangers.as_ref().map_or_else(String::new, |found| super::strangers::text(found) + "\n");
-    text += &super::thresholds::worse(
-        &calibrated.worse(),
-        calibrated.promised,
-        calibrated.promise.per,
-        calibrated.objects.values().any(|of| 2 * of.given < *sequences as u64 / calibrated.objects.len() as u64),
-    );
-    text += &calibrated.note.as_ref().map_or_else(String::new, |note| format!("note: {note}\n"));
-    text + &format!("{}: {} bytes\n", path.display(), calibrated.model.len())
-}
-
-fn gain(gain: Option<Gain>, with: &str, without: &str) -> String {
-    let Some(Gain { kept, rows_without, rows_with }) = gain else {
-        return format!("{without}; too few sequences to learn from");
-    };
-    let rows = |rows: Option<f64>| rows.map_or_else(|| "no threshold".into(), |rows| format!("{rows:.1} rows"));
-    let what = if kept { with } else { without };
-    format!("{what} ({} with them, {} without, on held-back sequences)", rows(rows_with), rows(rows_without))
-}
-
-fn weights_text(weights: &[f64]) -> String {
-    let all: Vec<String> =
-        (0..).zip(weights).map(|(doubling, weight)| format!("{} × {weight:.2}", 1_u32 << doubling)).collect();
-    format!("\n  rows × weight: {}", all.join(", "))
 }
 
 /// An evaluation on sequences of rows.
@@ -271,19 +178,6 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
         "Confusion matrix",
         &Confusion { touches: 0, touched: evaluated.names.clone(), recognized, counts: evaluated.confusion.clone() },
     )
-}
-
-/// Settings of a calibration on rows, from the options.
-pub(crate) fn settings(
-    rate: f64,
-    per: Per,
-    confidence: f64,
-    sequences: u64,
-    max_rows: Option<u32>,
-    seed: u64,
-) -> stream::Settings {
-    let sequences = usize::try_from(sequences).unwrap_or(usize::MAX);
-    stream::Settings { rate, per, confidence, sequences, max_rows, seed, ..stream::Settings::default() }
 }
 
 /// Refuses sequences of an ensemble: only a compiled model stops.

@@ -2,8 +2,9 @@
 
 use super::progress::Bar;
 use palpate::Result;
+use palpate::calibrate::{Found, OnRecordings};
 use palpate::mesh::builtin::BACKGROUND_SHAPES;
-use palpate::strangers::{self, Found, OnRecordings};
+use palpate::strangers;
 use palpate::touches::{Dataset, ObjectTouches};
 use palpate_shared::format::Held;
 use std::fmt::Write as _;

@@ -61,7 +61,7 @@ pub(super) fn table(summary: &Summary) -> Records {
     };
     row(
         format!("approaches to a {wanted} error rate, stopping when sure"),
-        approaches(&|of| Cell::Spread(of.sequential.mean_approaches, of.sequential.mean_approaches_standard_error, 1)),
+        approaches(&|of| Cell::Spread(of.sequential.mean().value, of.sequential.mean().standard_error, 1)),
     );
     let promised = |rate: Option<f64>| rate.map_or(Cell::Missing, |rate| Cell::Percent(rate, 2));
     row("  promised".into(), approaches(&|of| promised(of.sequential.promised)));
@@ -89,7 +89,7 @@ pub(super) fn table(summary: &Summary) -> Records {
         format!("touches to a {wanted} error rate, stopping when sure"),
         both(&|m| {
             let sequential = &m.evaluation.sequential;
-            Cell::Spread(sequential.mean_touches, sequential.mean_touches_standard_error, 1)
+            Cell::Spread(sequential.mean_touches, sequential.mean().standard_error, 1)
         }),
     );
     row("  promised".into(), both(&|m| promised(m.evaluation.sequential.promised)));

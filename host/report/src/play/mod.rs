@@ -21,7 +21,7 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 use palpate::compile::CompiledModel;
 use palpate::error::{CaptureProblem, EvaluateProblem, Result};
-use palpate::evaluate::ApproachSequential;
+use palpate::evaluate::Sequential;
 use palpate::mesh::Object;
 use palpate::play::compress;
 use palpate::probe::approach::Aim;
@@ -68,11 +68,11 @@ pub struct Expected {
     pub wrong: f64,
 }
 
-impl From<&ApproachSequential> for Expected {
-    fn from(measured: &ApproachSequential) -> Self {
+impl From<&Sequential> for Expected {
+    fn from(measured: &Sequential) -> Self {
         Self {
-            approaches: measured.mean_approaches,
-            standard_error: measured.mean_approaches_standard_error,
+            approaches: measured.mean().value,
+            standard_error: measured.mean().standard_error,
             wrong: measured.error,
         }
     }

@@ -4,11 +4,12 @@ use super::poses::{ByPose, Stock};
 use crate::error::{EvaluateProblem, Result};
 use crate::evaluate::Candidate;
 use crate::evaluate::margins::{Margins, Tested, Values, row};
-use crate::evaluate::sequential::Outcome;
+use crate::evidence::{Chip, Counted, Follower, Outcome, Supplier, chip, follow, outcome};
 use crate::touches::{Dataset, ObjectTouches};
-use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
+use palpate_onboard::{Model, Stopping};
 use palpate_shared::Poses;
 use serde::Serialize;
+use std::convert::Infallible;
 
 /// The test approaches by pose: what a robot meets that goes where the plan says.
 ///
@@ -80,29 +81,7 @@ impl Active {
         let turns = &self.by_pose[position];
         turns[group % turns.len()].stock(group, seed)
     }
-
-    /// The number of the next approach in a sequence, as the recognizer proposes it and the stock has it; `None` if none
-    /// is left.
-    pub fn next<const N: usize>(&self, recognizer: &Recognizer<'_, N>, stock: &mut Stock<'_>) -> Option<u32> {
-        let candidates = self.candidates.iter().copied().filter(|&pose| stock.left(pose) > 0);
-        let pose = recognizer.next_approach(candidates)?.pose;
-        stock.draw(pose)
-    }
 }
-
-/// State after an approach.
-pub(super) struct Moment {
-    /// The object with the most evidence.
-    pub(super) best: usize,
-    /// Approaches so far.
-    pub(super) approaches: usize,
-    /// Touches so far that are evidence.
-    pub(super) touches: usize,
-    pub(super) verdict: Verdict,
-}
-
-/// Function called after each approach of a sequence; true ends it.
-type See<'s> = &'s mut dyn FnMut(&Moment) -> bool;
 
 impl Margins<'_> {
     /// Follows one sequence of a tested object under the plan's policy, until `see` says that it is enough or no approach
@@ -110,58 +89,59 @@ impl Margins<'_> {
     pub(super) fn follow_plan(
         &self,
         active: &Active,
-        (position, group): (usize, usize),
+        which: (usize, usize),
         (stopping, seed): (Stopping, u64),
-        see: See<'_>,
+        see: impl FnMut(&Chip<'_>, Counted) -> bool,
     ) {
-        let Values::Compiled(model, values) = &self.tested[position].values else { return };
-        let sequence = Sequence { active, approaches: &self.tested[position].approaches, values };
-        let stock = active.stock(position, group, seed);
-        match self.objects().len() {
-            0..=16 => sequence.follow::<16>(model, stopping, stock, see),
-            17..=64 => sequence.follow::<64>(model, stopping, stock, see),
-            _ => sequence.follow::<256>(model, stopping, stock, see),
+        if let Some((model, mut chosen)) = self.chosen(active, which, seed) {
+            let Ok(_) = follow(&mut chosen, &mut *chip(model, stopping, None, None), see);
         }
     }
 
     /// Outcome of a sequence of approaches under the plan's policy.
-    pub(super) fn active_outcome(&self, active: &Active, which: (usize, usize), rule: (Stopping, u64)) -> Outcome {
-        let mut outcome = Outcome { touches: 0, approaches: 0, recognized: None, output: None, unknown: false };
-        self.follow_plan(active, which, rule, &mut |moment| {
-            (outcome.touches, outcome.approaches) = (moment.touches, moment.approaches);
-            if let Verdict::Recognized { object, .. } = moment.verdict {
-                outcome.recognized = Some(object.into());
-            }
-            outcome.unknown = moment.verdict == Verdict::Unknown;
-            moment.verdict != Verdict::Undecided
-        });
+    pub(super) fn active_outcome(
+        &self,
+        active: &Active,
+        which: (usize, usize),
+        (stopping, seed): (Stopping, u64),
+    ) -> Outcome {
+        let Some((model, mut chosen)) = self.chosen(active, which, seed) else { return Outcome::default() };
+        let Ok(outcome) = outcome(&mut chosen, &mut *chip(model, stopping, None, None));
         outcome
+    }
+
+    fn chosen<'c>(
+        &'c self,
+        active: &'c Active,
+        (position, group): (usize, usize),
+        seed: u64,
+    ) -> Option<(&'c Model<'c>, Chosen<'c>)> {
+        let tested = &self.tested[position];
+        let Values::Compiled(model, values) = &tested.values else { return None };
+        let stock = active.stock(position, group, seed);
+        Some((model, Chosen { active, stock, approaches: &tested.approaches, values, objects: self.objects().len() }))
     }
 }
 
-/// An object's approaches and their margins, and the policy.
-struct Sequence<'s> {
+/// An object's approaches and their margins, each next one in the pose that the follower proposes.
+struct Chosen<'s> {
     active: &'s Active,
+    stock: Stock<'s>,
     /// For each approach the position of its touch among those that are evidence.
     approaches: &'s [Option<u32>],
     values: &'s [i32],
+    objects: usize,
 }
 
-impl Sequence<'_> {
-    fn follow<const N: usize>(&self, model: &Model<'_>, stopping: Stopping, mut stock: Stock<'_>, see: See<'_>) {
-        // Room was made for at least as many objects as the model has.
-        let Ok(mut recognizer) = Recognizer::<N>::new(model, stopping) else { return };
-        let (mut approaches, mut touches) = (0, 0);
-        while let Some(approach) = self.active.next(&recognizer, &mut stock) {
-            approaches += 1;
-            if let Some(touch) = self.approaches[approach as usize] {
-                recognizer.push_margins(&self.values[row(touch as usize, model.object_count())]);
-                touches += 1;
-            }
-            let (best, verdict) = (recognizer.best(), recognizer.verdict());
-            if see(&Moment { best, approaches, touches, verdict }) {
-                break;
-            }
-        }
+impl<F: Follower<Step = [i32]> + ?Sized> Supplier<F> for Chosen<'_> {
+    type Error = Infallible;
+
+    fn step(&mut self, follower: &F) -> Result<Option<Option<&[i32]>>, Infallible> {
+        let Self { active, stock, approaches, values, objects } = self;
+        let mut candidates = active.candidates.iter().copied().filter(|&pose| stock.left(pose) > 0);
+        let pose = follower.propose(&mut candidates);
+        let approach = pose.and_then(|pose| stock.draw(pose));
+        let touch = approach.map(|approach| approaches[approach as usize]);
+        Ok(touch.map(|touch| touch.map(|touch| &values[row(touch as usize, *objects)])))
     }
 }

@@ -3,10 +3,9 @@
 use super::active::Active;
 use crate::error::{Error, Result};
 use crate::evaluate::margins::Margins;
-use crate::evaluate::sequential::Outcome;
 use crate::evaluate::{Estimate, Evaluation, Settings};
+use crate::evidence::{Counted, Outcome};
 use palpate_onboard::Stopping;
-use palpate_shared::ContactPattern;
 use rayon::prelude::*;
 
 /// Counts over sequences of one object without a verdict.
@@ -42,27 +41,13 @@ pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settin
             (0..*groups).into_par_iter().map(run).collect()
         })
         .collect();
-    let (stated, most) = (|| margins.stated(&settings.sequences(), rule), rule.max_touches());
-    let promise = match settings.error_rate {
-        None => margins.check_promise(&outcomes, most, &settings.noise, true),
-        Some(_) => None,
+    let figures = |outcomes, in_approaches| {
+        margins.of_outcomes(outcomes, margins.stated(&settings.sequences(), rule), rule.max_touches(), in_approaches)
     };
-    let false_alarms = if settings.error_rate.is_none() { margins.check_alarms(&outcomes) } else { None };
-    let in_approaches = margins.summary(outcomes.clone(), stated(), most);
+    let accuracies = margins.accuracies(at_approaches, &by_approaches);
+    let approaches = margins.in_approaches(used, accuracies, figures(outcomes.clone(), true));
     let accuracies = margins.accuracies(at, &by_touches);
-    Ok(Evaluation {
-        descriptor: margins.descriptor().name(),
-        touches: margins.touch_count(),
-        groups: *groups,
-        accuracy: accuracies.all,
-        accuracy_standard_error: accuracies.standard_error,
-        per_object: accuracies.per_object,
-        sequential: margins.of_outcomes(outcomes, stated(), most),
-        approaches: Some(margins.in_approaches(used, margins.accuracies(at_approaches, &by_approaches), in_approaches)),
-        promise,
-        false_alarms,
-        patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
-    })
+    Ok(margins.evaluation(settings, accuracies, figures(outcomes, false), Some(approaches), true))
 }
 
 impl Margins<'_> {
@@ -84,16 +69,21 @@ impl Margins<'_> {
         let group = |mut counts: Counts, group| {
             // Touches, approaches, and whether the object had the most evidence then.
             let mut last = (0, 0, false);
-            self.follow_plan(active, (position, group), (never, *seed), &mut |moment| {
-                // A moment counts up to the next one.
-                let (touches, approaches, is_right) = last;
-                if is_right {
-                    add(&mut counts.touches, at, touches..moment.touches);
-                    add(&mut counts.approaches, at_approaches, approaches..moment.approaches);
-                }
-                last = (moment.touches, moment.approaches, moment.touches > 0 && moment.best == object);
-                moment.touches >= most_touches && moment.approaches >= most_approaches
-            });
+            self.follow_plan(
+                active,
+                (position, group),
+                (never, *seed),
+                |follower, Counted { touches, approaches, .. }| {
+                    // A state counts up to the next one.
+                    let (touches, approaches) = (touches as usize, approaches as usize);
+                    if last.2 {
+                        add(&mut counts.touches, at, last.0..touches);
+                        add(&mut counts.approaches, at_approaches, last.1..approaches);
+                    }
+                    last = (touches, approaches, touches > 0 && follower.leader() == object);
+                    touches >= most_touches && approaches >= most_approaches
+                },
+            );
             let (touches, approaches, is_right) = last;
             if is_right {
                 add(&mut counts.touches, at, touches..usize::MAX);

@@ -6,7 +6,7 @@ mod poses;
 
 pub use active::{Active, ActiveFacts};
 pub use figures::evaluate_active;
-pub use poses::{ByPose, Stock};
+use poses::ByPose;
 
 use super::Candidate;
 use super::margins::{Margins, Values, row};
@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 /// Approaches of an object in a pose that a mean is taken of at least.
-pub const LEAST_IN_POSE: usize = 20;
+const LEAST_IN_POSE: usize = 20;
 
 /// A model with a plan.
 #[derive(Clone, Debug, PartialEq, Serialize)]

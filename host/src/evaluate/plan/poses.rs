@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 /// The approaches of one object, or some of them, by the number of their pose.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ByPose {
+pub(super) struct ByPose {
     name: String,
     /// For each pose the numbers of its approaches.
     approaches: Vec<Vec<u32>>,
@@ -20,7 +20,7 @@ impl ByPose {
     ///
     /// # Errors
     /// [`EvaluateProblem::NoPoseOf`] for a touch without a pose.
-    pub fn new(touched: &ObjectTouches, poses: Poses, approaches_of: &[u32]) -> Result<Self> {
+    pub(super) fn new(touched: &ObjectTouches, poses: Poses, approaches_of: &[u32]) -> Result<Self> {
         let mut approaches = vec![Vec::new(); poses.count().into()];
         let touches =
             approaches_of.iter().filter_map(|&number| Some((number, touched.touches().get(number as usize)?)));
@@ -33,30 +33,30 @@ impl ByPose {
     }
 
     /// The object's name.
-    pub fn name(&self) -> &str {
+    pub(super) fn name(&self) -> &str {
         &self.name
     }
 
     /// For each pose the numbers of its approaches.
-    pub fn approaches(&self) -> &[Vec<u32>] {
+    pub(super) fn approaches(&self) -> &[Vec<u32>] {
         &self.approaches
     }
 
     /// Number of approaches made in a pose; 0 for one that does not exist.
-    pub fn count(&self, pose: u16) -> usize {
+    pub(super) fn count(&self, pose: u16) -> usize {
         self.approaches.get(usize::from(pose)).map_or(0, Vec::len)
     }
 
     /// Draws approaches in poses that are asked for, each once, in an order that depends on the seed, on `group` and on
     /// nothing else.
-    pub fn stock(&self, group: usize, seed: u64) -> Stock<'_> {
+    pub(super) fn stock(&self, group: usize, seed: u64) -> Stock<'_> {
         Stock { of: self, group: u64::try_from(group).unwrap_or(u64::MAX), seed, draws: HashMap::new() }
     }
 }
 
 /// Approaches of one object that were not drawn yet. One stock for each sequence draws no approach twice in a sequence;
 /// one for several sequences draws none twice in all of them.
-pub struct Stock<'b> {
+pub(super) struct Stock<'b> {
     of: &'b ByPose,
     group: u64,
     seed: u64,
@@ -66,12 +66,12 @@ pub struct Stock<'b> {
 
 impl Stock<'_> {
     /// Number of approaches left in a pose.
-    pub fn left(&self, pose: u16) -> usize {
+    pub(super) fn left(&self, pose: u16) -> usize {
         self.draws.get(&pose).map_or_else(|| self.of.count(pose), Draws::left)
     }
 
     /// The number of an approach in this pose, drawn at random; `None` if none is left.
-    pub fn draw(&mut self, pose: u16) -> Option<u32> {
+    pub(super) fn draw(&mut self, pose: u16) -> Option<u32> {
         let approaches = self.of.approaches.get(usize::from(pose))?;
         // Each pose has its own stream, so that the order in which poses are asked for makes no difference.
         let stream = self.group.wrapping_mul(256).wrapping_add(pose.into());

@@ -72,9 +72,9 @@ fn what_a_run_states_is_what_its_model_does() {
     Share::of(stated.accuracy[&20], cases(900, 900, 20.0))
         .agrees("run, accuracy", Share::of(measured.accuracy[&20], cases(1_500, 18_000, 20.0)));
     let (own, other) = (&stated.sequential, &measured.sequential);
-    Share::of(own.error, cases(900, 900, own.mean_approaches))
-        .agrees("run, wrong names", Share::of(other.error, cases(1_500, 18_000, other.mean_approaches)));
+    Share::of(own.error, cases(900, 900, own.mean().value))
+        .agrees("run, wrong names", Share::of(other.error, cases(1_500, 18_000, other.mean().value)));
     let promised = summary.ours.calibration.ok_or(summary.ours.uncalibrated).unwrap();
-    let measured = Share::of(other.error, cases(1_500, 18_000, other.mean_approaches));
+    let measured = Share::of(other.error, cases(1_500, 18_000, other.mean().value));
     assert!(measured.0 <= promised.promised + 3.0 * measured.1, "{measured:?}");
 }

@@ -1,7 +1,5 @@
 //! Whole sequences, and the result of each under any threshold.
 
-use palpate_onboard::Recognizer;
-
 /// Thresholds: the largest sum of the weights of all other objects, the leader's being 1, at which it is named; in Q56.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Odds {
@@ -13,7 +11,7 @@ pub enum Odds {
 
 impl Odds {
     /// True if no object's threshold is looser than that of `other`.
-    pub fn is_as_strict_as(&self, other: &Self) -> bool {
+    pub(crate) fn is_as_strict_as(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::All(own), Self::All(other)) => own <= other,
             (Self::All(own), Self::ByObject(others)) => others.iter().all(|other| own <= other),
@@ -30,7 +28,7 @@ impl Odds {
     }
 
     /// The strictest threshold.
-    pub fn strictest(&self) -> u64 {
+    pub(crate) fn strictest(&self) -> u64 {
         match self {
             Self::All(odds) => *odds,
             Self::ByObject(odds) => odds.iter().copied().min().unwrap_or(0),
@@ -54,7 +52,7 @@ const ONE: f64 = 72_057_594_037_927_936.0;
 
 /// A moment of a sequence at which an object led by more than ever before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Look {
+pub struct Lead {
     /// The object with the most evidence.
     pub name: usize,
     /// Sum of the weights of the others, in Q56: the recognizer's own integers.
@@ -74,51 +72,44 @@ pub struct Sequence {
     pub touches: u32,
     /// Approaches at its end.
     pub approaches: u32,
-    looks: Vec<Look>,
+    /// The group that it is of, if it is not independent of all others.
+    pub group: Option<usize>,
+    leads: Vec<Lead>,
     /// The same without what holds names back, once a name was.
-    ungated: Option<Vec<Look>>,
-    /// True if it ended since it fits no object that the model knows.
-    unknown: bool,
+    ungated: Option<Vec<Lead>>,
 }
 
 impl Sequence {
     /// A sequence of touches of an object, by its index in the model, without any touch yet.
     pub fn new(object: usize) -> Self {
-        Self { object, touches: 0, approaches: 0, looks: Vec::new(), ungated: None, unknown: false }
+        Self { object, touches: 0, approaches: 0, group: None, leads: Vec::new(), ungated: None }
     }
 
-    /// Takes in what a recognizer knows after the approach with this number. `may_name` is false where a verdict would be
-    /// held back, such as by a test for unknown objects: then no threshold gives a name here. The recognizer must not stop
-    /// by itself. The answer is the sum of the weights of the others, as [`Look::odds`].
-    pub fn push<const N: usize>(&mut self, recognizer: &Recognizer<'_, N>, approaches: u32, may_name: bool) -> u64 {
-        let odds = recognizer.rivals();
-        let (best, model) = (recognizer.best(), recognizer.model());
-        // Of several outputs of the object that is touched, each is right.
-        let name = if model.is_same_object(best, self.object) { self.object } else { best };
-        let look = Look { name, odds, touches: recognizer.touches(), approaches };
-        self.look(look, may_name);
-        odds
+    /// The same sequence as one of a group.
+    pub(crate) fn of_group(self, group: Option<usize>) -> Self {
+        Self { group, ..self }
     }
 
-    /// The same with what is known given.
-    pub fn look(&mut self, look: Look, may_name: bool) {
-        (self.touches, self.approaches) = (look.touches, look.approaches);
+    /// Takes in a lead. `may_name` is false where a verdict would be held back, such as by a test for unknown objects: then no
+    /// threshold gives a name here.
+    pub fn take(&mut self, lead: Lead, may_name: bool) {
+        (self.touches, self.approaches) = (lead.touches, lead.approaches);
         if !may_name && self.ungated.is_none() {
-            self.ungated = Some(self.looks.clone());
+            self.ungated = Some(self.leads.clone());
         }
-        let gated = may_name.then_some(&mut self.looks);
-        for looks in gated.into_iter().chain(&mut self.ungated) {
-            let own = looks.iter().rev().find(|earlier| earlier.name == look.name);
-            if own.is_none_or(|own| look.odds < own.odds) {
-                looks.push(look);
+        let gated = may_name.then_some(&mut self.leads);
+        for leads in gated.into_iter().chain(&mut self.ungated) {
+            let own = leads.iter().rev().find(|earlier| earlier.name == lead.name);
+            if own.is_none_or(|own| lead.odds < own.odds) {
+                leads.push(lead);
             }
         }
     }
 
     /// The same sequence as if no name had been held back.
-    pub fn ungated(&self) -> Self {
-        let looks = self.ungated.as_ref().unwrap_or(&self.looks).clone();
-        Self { looks, ungated: None, ..*self }
+    pub(crate) fn ungated(&self) -> Self {
+        let leads = self.ungated.as_ref().unwrap_or(&self.leads).clone();
+        Self { leads, ungated: None, ..*self }
     }
 
     /// Takes in that the sequence ended after this approach, whose touch was no evidence.
@@ -126,24 +117,15 @@ impl Sequence {
         self.approaches = self.approaches.max(approaches);
     }
 
-    /// Takes in that a test for unknown objects ended it here.
-    pub fn make_unknown(&mut self) {
-        self.unknown = true;
-    }
-
-    /// True if a test for unknown objects ended it, if no threshold gave a name before.
-    pub fn is_unknown(&self) -> bool {
-        self.unknown
-    }
-
     /// The first moment at which a threshold is passed, as a recognizer with these thresholds would stop.
-    pub fn given(&self, odds: &Odds) -> Option<&Look> {
-        self.looks.iter().find(|look| look.odds <= odds.of(look.name))
+    pub fn given(&self, odds: &Odds) -> Option<&Lead> {
+        self.leads.iter().find(|lead| lead.odds <= odds.of(lead.name))
     }
 
     /// The moments at which an object led by more than it ever had before.
-    pub fn looks(&self) -> &[Look] {
-        &self.looks
+    #[cfg(test)]
+    pub(crate) fn leads(&self) -> &[Lead] {
+        &self.leads
     }
 }
 
@@ -151,8 +133,8 @@ impl Sequence {
 mod tests {
     use super::*;
 
-    fn look(name: usize, odds: u64, touches: u32) -> Look {
-        Look { name, odds, touches, approaches: 2 * touches }
+    fn lead(name: usize, odds: u64, touches: u32) -> Lead {
+        Lead { name, odds, touches, approaches: 2 * touches }
     }
 
     #[test]
@@ -167,9 +149,9 @@ mod tests {
     fn a_sequence_stops_at_the_first_look_that_passes_the_threshold_of_its_name() {
         let mut sequence = Sequence::new(1);
         for step in [(0, 90, 1), (0, 70, 2), (1, 80, 3), (0, 75, 4), (1, 60, 5), (1, 20, 6)] {
-            sequence.look(look(step.0, step.1, step.2), true);
+            sequence.take(lead(step.0, step.1, step.2), true);
         }
-        let given = |odds| sequence.given(&odds).map(|look| (look.name, look.touches));
+        let given = |odds| sequence.given(&odds).map(|lead| (lead.name, lead.touches));
         assert_eq!(given(Odds::All(90)), Some((0, 1)));
         assert_eq!(given(Odds::All(70)), Some((0, 2)));
         assert_eq!(given(Odds::All(69)), Some((1, 5)));
@@ -177,7 +159,7 @@ mod tests {
         assert_eq!(given(Odds::ByObject(vec![10, 80])), Some((1, 3)));
         assert_eq!(given(Odds::ByObject(vec![10])), None);
         // 75 was no record of its name.
-        assert_eq!(sequence.looks().len(), 5);
+        assert_eq!(sequence.leads().len(), 5);
         assert_eq!((sequence.touches, sequence.approaches), (6, 12));
         sequence.end(15);
         assert_eq!((sequence.touches, sequence.approaches), (6, 15));
@@ -186,13 +168,13 @@ mod tests {
     #[test]
     fn a_verdict_that_is_held_back_is_given_at_the_next_moment_at_which_it_may_be() {
         let mut sequence = Sequence::new(0);
-        sequence.look(look(0, 10, 1), false);
-        sequence.look(look(0, 50, 2), true);
-        assert_eq!(sequence.given(&Odds::All(60)).map(|look| look.touches), Some(2));
+        sequence.take(lead(0, 10, 1), false);
+        sequence.take(lead(0, 50, 2), true);
+        assert_eq!(sequence.given(&Odds::All(60)).map(|lead| lead.touches), Some(2));
         assert_eq!(sequence.given(&Odds::All(10)), None);
         let ungated = sequence.ungated();
-        assert_eq!(ungated.given(&Odds::All(10)).map(|look| look.touches), Some(1));
-        assert_eq!((ungated.object, ungated.touches, ungated.looks().len()), (0, 2, 1));
+        assert_eq!(ungated.given(&Odds::All(10)).map(|lead| lead.touches), Some(1));
+        assert_eq!((ungated.object, ungated.touches, ungated.leads().len()), (0, 2, 1));
     }
 
     #[test]

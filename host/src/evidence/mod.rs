@@ -1,0 +1,194 @@
+//! One stream of evidence: the steps of sequences, and what they add up to.
+//!
+//! ```text
+//! supplier ──steps──► follower ──leader, lead, familiarity──┬──► sequence: its end under any threshold
+//!     ▲                  │                                  └──► outcome: its end under the follower's own
+//!     └─where to touch───┘
+//! ```
+//!
+//! A [`Supplier`] yields steps: touches that were captured before or are when they are needed, drawn at random or chosen by
+//! the follower's plan, or rows. A [`Follower`] adds them up: the chip's own recognizer ([`chip`]), or the full model. Everything
+//! above these two is the same for all of them: thresholds and promises take a [`Sequence`], figures take an [`Outcome`].
+
+mod chip;
+mod sequence;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use chip::{Chip, chip};
+use palpate_onboard::{Familiarity, Verdict};
+pub use sequence::{Lead, Odds, Sequence, margin_of, odds_of};
+use std::convert::Infallible;
+use std::marker::PhantomData;
+
+/// Adds up the steps of a sequence.
+pub(crate) trait Follower {
+    /// A step that is evidence, such as a row of margins.
+    type Step: ?Sized + 'static;
+
+    /// Forgets the steps, and begins another sequence.
+    fn reset(&mut self);
+
+    /// Takes in a step; returns the verdict under its own thresholds. After a verdict steps change nothing.
+    fn push(&mut self, step: &Self::Step) -> Verdict;
+
+    /// The class with the most evidence.
+    fn leader(&self) -> usize;
+
+    /// How far it leads: the sum of the weights of all others, its own being 1, in Q56.
+    fn rivals(&self) -> u64;
+
+    /// Result of a test of whether the steps fit a class at all.
+    fn familiarity(&self) -> Familiarity {
+        Familiarity::Known
+    }
+
+    /// True if two classes count as the same, such as two placements of an object.
+    fn is_same(&self, one: usize, other: usize) -> bool {
+        one == other
+    }
+
+    /// The pose among these in which to touch next; none without a plan.
+    fn propose(&self, _poses: &mut dyn Iterator<Item = u16>) -> Option<u16> {
+        None
+    }
+}
+
+/// Supplies the steps of a sequence to followers of a kind.
+pub(crate) trait Supplier<F: Follower + ?Sized> {
+    /// The error of a step that cannot be made.
+    type Error;
+
+    /// The next step, which may depend on the follower's state: none at the end, and nothing to follow if it is no evidence.
+    fn step(&mut self, follower: &F) -> Result<Option<Option<&F::Step>>, Self::Error>;
+}
+
+/// Supplies one sequence after the other.
+pub(crate) trait Sequences<F: Follower + ?Sized>: Supplier<F> {
+    /// Begins a sequence, which has a class and may have a group; none if there are no more.
+    fn begin(&mut self) -> Result<Option<Sequence>, Self::Error>;
+
+    /// Ends it after so many steps; `is_whole` if its steps did not run out. False if it does not count, and is the last.
+    fn end(&mut self, steps: u32, is_whole: bool) -> bool;
+}
+
+/// Steps that are there, as an iterator.
+pub(crate) struct Given<'g, I>(I, PhantomData<&'g ()>);
+
+impl<'g, S: ?Sized + 'g, I: Iterator<Item = Option<&'g S>>> Given<'g, I> {
+    pub(crate) fn new(steps: I) -> Self {
+        Self(steps, PhantomData)
+    }
+}
+
+impl<'g, F: Follower + ?Sized, I: Iterator<Item = Option<&'g F::Step>>> Supplier<F> for Given<'g, I> {
+    type Error = Infallible;
+
+    fn step(&mut self, _: &F) -> Result<Option<Option<&F::Step>>, Infallible> {
+        Ok(self.0.next())
+    }
+}
+
+/// End of a sequence at the latest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limit {
+    /// Once the leader has this much more evidence than all others together, in nats.
+    pub margin: f64,
+    /// After this number of touches that are evidence, if no sooner.
+    pub max_touches: u32,
+}
+
+/// Outcome of a sequence.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Outcome {
+    /// Touches, or rows, used that were evidence.
+    pub touches: usize,
+    /// Approaches used: these touches, and those in between that were no evidence.
+    pub approaches: usize,
+    /// The object recognized (its index in the model), or none.
+    pub recognized: Option<usize>,
+    /// The output that was recognized: how the object lies, if outputs are placements.
+    pub output: Option<usize>,
+    /// True if the touches fitted no object. Neither this nor recognized: the recognizer gave up.
+    pub unknown: bool,
+}
+
+/// Numbers of steps in a sequence.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Counted {
+    /// Steps so far that are evidence.
+    pub(crate) touches: u32,
+    /// Steps so far.
+    pub(crate) approaches: u32,
+    /// The verdict after the last step; none if that is no evidence.
+    pub(crate) verdict: Option<Verdict>,
+}
+
+/// Follows the steps of a sequence until `see`, called after each, has seen enough; false if they end before.
+pub(crate) fn follow<F: Follower + ?Sized, S: Supplier<F> + ?Sized>(
+    supplier: &mut S,
+    follower: &mut F,
+    mut see: impl FnMut(&F, Counted) -> bool,
+) -> Result<bool, S::Error> {
+    follower.reset();
+    let mut counted = Counted { touches: 0, approaches: 0, verdict: None };
+    while let Some(step) = supplier.step(follower)? {
+        counted.verdict = step.map(|step| follower.push(step));
+        counted.approaches += 1;
+        counted.touches += u32::from(counted.verdict.is_some());
+        if see(follower, counted) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Outcome of a sequence under the follower's own thresholds.
+pub(crate) fn outcome<F: Follower + ?Sized, S: Supplier<F> + ?Sized>(
+    supplier: &mut S,
+    follower: &mut F,
+) -> Result<Outcome, S::Error> {
+    let mut outcome = Outcome::default();
+    follow(supplier, follower, |_, Counted { touches, approaches, verdict }| {
+        (outcome.touches, outcome.approaches) = (touches as usize, approaches as usize);
+        if let Some(Verdict::Recognized { object, .. }) = verdict {
+            (outcome.recognized, outcome.output) = (Some(object.into()), Some(object.into()));
+        }
+        outcome.unknown = verdict == Some(Verdict::Unknown);
+        verdict.is_some_and(|verdict| verdict != Verdict::Undecided)
+    })?;
+    Ok(outcome)
+}
+
+/// Follows up to `most` sequences of a supplier to a limit. The follower must not stop by itself. Names are held back, and
+/// sequences end, where its own test says so, as on the chip.
+pub(crate) fn sequences<F: Follower + ?Sized, S: Sequences<F> + ?Sized>(
+    supplier: &mut S,
+    follower: &mut F,
+    most: usize,
+    limit: Limit,
+) -> Result<Vec<Sequence>, S::Error> {
+    let strictest = odds_of(limit.margin);
+    let mut found = Vec::new();
+    while found.len() < most {
+        let Some(mut sequence) = supplier.begin()? else { break };
+        let is_whole = follow(supplier, follower, |follower, Counted { touches, approaches, verdict }| {
+            if verdict.is_none() {
+                // No evidence: it cost an approach.
+                sequence.end(approaches);
+                return false;
+            }
+            let (familiarity, leader, odds) = (follower.familiarity(), follower.leader(), follower.rivals());
+            let may_name = familiarity == Familiarity::Known;
+            // Of several outputs of the object that is touched, each is right.
+            let name = if follower.is_same(leader, sequence.object) { sequence.object } else { leader };
+            sequence.take(Lead { name, odds, touches, approaches }, may_name);
+            (may_name && odds <= strictest) || familiarity == Familiarity::Stranger || touches >= limit.max_touches
+        })?;
+        if !supplier.end(sequence.approaches, is_whole) {
+            break;
+        }
+        found.push(sequence);
+    }
+    Ok(found)
+}
