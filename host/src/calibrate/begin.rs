@@ -88,7 +88,7 @@ fn apart(seen: &[Seen], passes: &[f64], first: usize, count: usize) -> Vec<usize
 /// Names of a case that a rate is promised of.
 #[derive(Clone, Copy, Debug, Default)]
 struct Names {
-    /// Those seen, each sequence of a group weighing as much, and the wrong ones.
+    /// Names seen, each sequence of a group weighing as much, and the wrong ones.
     wrong: f64,
     given: f64,
     /// Names expected where it is tested.
@@ -104,7 +104,7 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    /// Of sequences, and the units that they belong to, as for [`Begin::new`].
+    /// Names in sequences of these units, as for [`Begin::new`].
     pub(super) fn new(followed: &[Sequence], units: &[usize], tested: usize, terms: &Terms, margin: f64) -> Self {
         let odds = Odds::All(odds_of(margin));
         // Of each case and unit: wrong names, names, sequences.
@@ -133,7 +133,7 @@ impl Seen {
         Self { margin, cases: cases.into_values().collect() }
     }
 
-    /// So many names of each case are expected, of which none was seen.
+    /// A number of names expected of each case, none of them seen yet.
     pub(super) fn nothing(expected: f64, margin: f64) -> Self {
         Self { margin, cases: vec![Names { expected, ..Names::default() }] }
     }

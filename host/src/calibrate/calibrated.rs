@@ -50,9 +50,9 @@ pub struct Calibrated {
     /// Steps used on average, also where no name was given.
     #[serde(flatten)]
     pub used: Used,
-    /// Where an uncalibrated recognizer stops at this rate: nats of evidence ahead of all other objects.
+    /// Margin at which an uncalibrated recognizer stops at this rate: nats of evidence ahead of all other objects.
     pub uncalibrated_margin: f64,
-    /// Where this one stops: for each name.
+    /// Margin at which this one stops, for each name.
     pub margins: BTreeMap<String, f64>,
     /// For each name, or object, that the rate is promised for: the share that was wrong. Empty for an average.
     pub errors: BTreeMap<String, f64>,
@@ -61,7 +61,7 @@ pub struct Calibrated {
     /// Divisor of the evidence before it is shown as a posterior; none for rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature: Option<f64>,
-    /// Where the thresholds were tested on recordings.
+    /// Facts about recordings, if the thresholds were tested on some.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recorded: Option<OfRecorded>,
     /// The shape of evidence of rows.
@@ -76,7 +76,6 @@ pub struct Calibrated {
 }
 
 /// Results on rows have no unit in JSON: their keys name it.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
 fn is_rows(counted: &&'static str) -> bool {
     *counted == "rows"
 }
@@ -103,7 +102,7 @@ pub enum Used {
 }
 
 impl Used {
-    /// What is counted: approaches where the data set holds those, otherwise touches; or rows.
+    /// Mean number of approaches where the data set holds those, otherwise of touches; or of rows.
     pub fn mean(&self) -> f64 {
         match *self {
             Self::Touches { mean_touches, mean_approaches } => mean_approaches.unwrap_or(mean_touches),
@@ -152,11 +151,11 @@ impl Gain {
 pub struct OfObject {
     /// Names given to it, right or wrong.
     pub given: u64,
-    /// How many of those were wrong.
+    /// Wrong ones among them.
     pub wrong: u64,
     /// Times that its name was given, to whatever object.
     pub named: u64,
-    /// How many of those were wrong.
+    /// Wrong ones among them.
     pub named_wrongly: u64,
 }
 

@@ -3,7 +3,7 @@
 use super::begin::Seen;
 use super::walk::{Kept, Stop, Tally, walk};
 use crate::error::{CalibrateProblem, Error, Result, Supplied};
-use crate::evidence::{Odds, Sequence, odds_of};
+use crate::evidence::{Odds, Sequence, odds_of, totals};
 use palpate_shared::format::Per;
 use rayon::prelude::*;
 
@@ -30,12 +30,12 @@ pub struct Terms {
     pub rate: f64,
     /// The probability that the rate is kept.
     pub confidence: f64,
-    /// Of what the rate is promised.
+    /// Cases that the rate covers.
     pub per: Per,
 }
 
 impl Terms {
-    /// Where an uncalibrated recognizer stops at this rate: the posterior's own margin, in nats.
+    /// Margin at which an uncalibrated recognizer stops at this rate, in nats: the posterior's own.
     pub(crate) fn margin(&self) -> f64 {
         ((1.0 - self.rate) / self.rate).ln()
     }
@@ -52,7 +52,7 @@ impl Terms {
     }
 }
 
-/// Where walks over thresholds begin, and where they end at the latest.
+/// Range of a walk over thresholds.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Way<'w> {
     /// Margins, in nats, at which a walk may begin, from strict to loose. Sequences were followed to the first of them or
@@ -68,7 +68,7 @@ impl Way<'_> {
     }
 }
 
-/// So many starts, the first of them the strictest, in equal steps: where nothing says which would do best.
+/// A number of starts in equal steps from the strictest, for when nothing says which would do best.
 pub(super) fn spread(strictest: f64, count: usize, rate: f64) -> Vec<f64> {
     let beyond = strictest - ((1.0 - rate) / rate).ln();
     let step = beyond.max(SPREAD) / count.max(1) as f64;
@@ -82,9 +82,9 @@ pub struct Chosen {
     pub odds: Odds,
     /// Wrong names of those given: one tally for an average, one for each object otherwise.
     pub tallies: Vec<Tally>,
-    /// Of the names given to each object, those that were wrong, whatever the rate is promised of.
+    /// Wrong names among those given to each object, regardless of what the rate covers.
     pub touched: Vec<Tally>,
-    /// Of the times that each object was named, those when another was touched, whatever the rate is promised of.
+    /// Times that each object was named, and how often wrongly, regardless of what the rate covers.
     pub named: Vec<Tally>,
     /// Sequences that were tested on; with thresholds by name, without those that these were learned on.
     pub sequences: usize,
@@ -102,7 +102,7 @@ pub struct Chosen {
 /// `strictest` (a margin in nats) or to the limit of touches. `objects` are the model's.
 ///
 /// A sequence that ends without a name is neither right nor wrong: the error rate is that of names that are given. One
-/// threshold is walked from strict to loose for an average as for each object ([`walk`]: fixed-sequence testing, with an
+/// threshold is walked from strict to loose for an average as for each object (fixed-sequence testing, with an
 /// intersection-union test at each step), so that the rates of all objects are kept at once with the stated probability. The
 /// walk has up to seven starts, in equal steps from the strictest threshold to the posterior's own; as many as the number of
 /// sequences allows.
@@ -127,7 +127,7 @@ pub(crate) fn share_tested(per: Per) -> f64 {
     if per == Per::Name { 1.0 - share } else { 1.0 }
 }
 
-/// The same of sequences that used up what was `supplied`, if they did.
+/// Chooses thresholds from starts; `supplied` is what the sequences used up, if they did.
 pub(super) fn chosen(
     sequences: &[Sequence],
     objects: &[String],
@@ -169,7 +169,7 @@ fn kept<'s>(
     Ok((kept, tested))
 }
 
-/// The same as [`choose`] of independent sequences that were not drawn from a supply; `objects` is the number of objects.
+/// Like [`choose`], from given starts; `objects` is the number of objects.
 ///
 /// # Errors
 /// [`Stop`], if no threshold can be kept.
@@ -373,16 +373,16 @@ fn around(learned: &[f64], strictest: f64, starts: usize) -> Steps {
 
 pub(super) fn summary(odds: Odds, kept: Vec<Tally>, tested: &[&Sequence], count: usize) -> Chosen {
     let [touched, named] = [By::Touched(count), By::Named(count)].map(|by| tallies(tested, &odds, by));
-    let (mut given, mut wrong, mut touches, mut approaches) = (0, 0, 0_u64, 0_u64);
-    for sequence in tested {
-        let look = sequence.given(&odds);
-        given += usize::from(look.is_some());
-        wrong += usize::from(look.is_some_and(|look| look.name != sequence.object));
-        touches += u64::from(look.map_or(sequence.touches, |look| look.touches));
-        approaches += u64::from(look.map_or(sequence.approaches, |look| look.approaches));
+    let totals = totals(tested.iter().copied(), &odds);
+    Chosen {
+        odds,
+        tallies: kept,
+        touched,
+        named,
+        sequences: totals.sequences,
+        given: totals.given,
+        wrong: totals.wrong,
+        mean_touches: totals.mean_touches(),
+        mean_approaches: totals.mean_approaches(),
     }
-    let sequences = tested.len();
-    let mean = |sum: u64| sum as f64 / sequences.max(1) as f64;
-    let (mean_touches, mean_approaches) = (mean(touches), mean(approaches));
-    Chosen { odds, tallies: kept, touched, named, sequences, given, wrong, mean_touches, mean_approaches }
 }

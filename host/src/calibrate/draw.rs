@@ -84,7 +84,7 @@ impl<'d> TouchSupply<'d> {
 }
 
 /// A supply's touches as a model takes them.
-pub(super) struct Drawn<'s, 'd, 'm> {
+pub(super) struct MarginSupply<'s, 'd, 'm> {
     supply: &'s mut TouchSupply<'d>,
     ahead: Ahead<'m>,
     /// Position of the next touch in its pool's order.
@@ -92,7 +92,7 @@ pub(super) struct Drawn<'s, 'd, 'm> {
     progress: &'s dyn Progress,
 }
 
-impl<'s, 'd, 'm> Drawn<'s, 'd, 'm> {
+impl<'s, 'd, 'm> MarginSupply<'s, 'd, 'm> {
     pub(super) fn new(model: &'m Model<'m>, supply: &'s mut TouchSupply<'d>, progress: &'s dyn Progress) -> Self {
         let ahead = Ahead::new(model, supply.pools.len(), supply.is_once);
         Self { supply, ahead, next: 0, progress }
@@ -105,7 +105,7 @@ impl<'s, 'd, 'm> Drawn<'s, 'd, 'm> {
     }
 }
 
-impl<F: Follower<Step = [i32]> + ?Sized> Supplier<F> for Drawn<'_, '_, '_> {
+impl<F: Follower<Step = [i32]> + ?Sized> Supplier<F> for MarginSupply<'_, '_, '_> {
     type Error = Error;
 
     fn step(&mut self, follower: &F) -> Result<Option<Option<&[i32]>>> {
@@ -123,7 +123,7 @@ impl<F: Follower<Step = [i32]> + ?Sized> Supplier<F> for Drawn<'_, '_, '_> {
     }
 }
 
-impl<F: Follower<Step = [i32]> + ?Sized> Sequences<F> for Drawn<'_, '_, '_> {
+impl<F: Follower<Step = [i32]> + ?Sized> Sequences<F> for MarginSupply<'_, '_, '_> {
     fn begin(&mut self) -> Result<Option<Sequence>> {
         progress::advance(self.progress, 1)?;
         let Some(pool) = self.supply.pools.get(self.supply.next) else { return Ok(None) };
@@ -186,12 +186,12 @@ pub fn follow(
     limit: Limit,
     progress: &dyn Progress,
 ) -> Result<Vec<Sequence>> {
-    let of = |(supply, wanted): (&mut Drawn<'_, '_, '_>, usize)| {
+    let of = |(supply, wanted): (&mut MarginSupply<'_, '_, '_>, usize)| {
         let mut follower = chip(model, Stopping::from_odds(0, u32::MAX), None, None);
         evidence::sequences(supply, &mut *follower, wanted, limit)
     };
-    let mut drawn: Vec<Drawn<'_, '_, '_>> =
-        supplies.iter_mut().map(|supply| Drawn::new(model, supply, progress)).collect();
+    let mut drawn: Vec<MarginSupply<'_, '_, '_>> =
+        supplies.iter_mut().map(|supply| MarginSupply::new(model, supply, progress)).collect();
     let mut found: Vec<Vec<Sequence>> = vec![Vec::new(); drawn.len()];
     // Side by side: once a supply has ended, what the others had beyond its share would be left out again.
     for round in 1..=ROUNDS {

@@ -32,7 +32,7 @@ pub struct Found {
 pub struct OnRecordings {
     /// Sequences that the threshold was tested on: of half of the recordings.
     pub sequences: usize,
-    /// Those of them that ended as unknown.
+    /// Sequences among them that ended as unknown.
     pub alarms: usize,
     /// The share of false alarms that so many sequences support: the promised one, or a higher one.
     pub supported: f64,
@@ -45,7 +45,7 @@ pub struct OnRecordings {
 pub struct Alarms {
     /// All sequences: equally many of each object.
     pub sequences: usize,
-    /// Those that ended as unknown, by object.
+    /// Sequences that ended as unknown, by object.
     pub objects: BTreeMap<String, usize>,
     /// True if they are more than the test's share allows but by chance: recorded and simulated misfit differ.
     pub differs: bool,

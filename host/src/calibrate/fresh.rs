@@ -4,7 +4,7 @@ use super::Limit;
 use super::calibrated::Calibrated;
 use super::demand::Demand;
 use super::draw::{TouchSupply, follow};
-use super::model::{Drawn, Settings, calibrate, calibrate_drawn, material, noise_seed};
+use super::model::{Drawn, Material, Settings, calibrate, calibrate_drawn, noise_seed};
 use super::temperature::temperature_on_demand;
 use crate::capture::{self, Sampler};
 use crate::error::Result;
@@ -13,7 +13,7 @@ use crate::mesh::Object;
 use crate::probe::scene::Scene;
 use crate::progress::Progress;
 use crate::touches::{Dataset, ObjectTouches, Origin, Source};
-use palpate_onboard::{Model, Refused, Stopping};
+use palpate_onboard::{Model, Refused};
 use palpate_shared::Touch;
 use std::sync::OnceLock;
 
@@ -107,14 +107,14 @@ pub fn calibrate_fresh(
     }
     let seed = noise_seed(settings);
     captured.demands.iter_mut().for_each(|demand| demand.add_noise(&settings.noise, seed));
-    let material = material(model, &captured.first, settings)?;
+    let material = Material::stated(model, &captured.first, settings)?;
     let drawn = Drawn {
         dataset: &captured.first,
         fewest: captured.demands.iter().map(|demand| demand.len() as u64).min().unwrap_or(0),
         supplies: captured.supplies(&material.known, settings.seed),
     };
     let temperature = || temperature_on_demand(model, &captured.demands, &material.known);
-    calibrate_drawn(model, &material, drawn, settings, None, temperature, progress)
+    calibrate_drawn(&material, drawn, None, temperature, progress)
 }
 
 /// The touches of objects, by name and instances' scenes, that [`calibrate_fresh`] calibrates on; the first samples, from
@@ -162,7 +162,7 @@ struct Lengths {
 
 /// Mean number of samples of each object in a sequence.
 fn means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Vec<Lengths>> {
-    let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
+    let max_touches = settings.limit(model);
     let (_, known) = Candidate::Compiled(model).of(dataset)?;
     let trained = model.trained_touches();
     let mean = |(touched, &object): (&ObjectTouches, &usize)| -> Result<Lengths> {

@@ -25,9 +25,9 @@ const FRACTIONS: u32 = 200;
 /// Losses of the groups that have one.
 #[derive(Clone, Debug, Default)]
 struct Losses {
-    /// Of each group: the mean over its sequences.
+    /// Mean over the sequences of each group.
     of: Vec<f64>,
-    /// Of each group: the share of its sequences that got a name.
+    /// Share of the sequences of each group that got a name.
     named: Vec<f64>,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A recognizer that stops when the posterior exceeds 1 − α makes fewer errors than α: the last touch carries the
 //! evidence beyond the threshold. How much less depends on the model and the touches. [`calibrate`](fn@calibrate) finds
-//! out on touches that nothing was trained on: it sets the model's thresholds by Learn-then-Test ([`walk`]) on whole
+//! out on touches that nothing was trained on: it sets the model's thresholds by Learn-then-Test on whole
 //! sequences ([`Sequence`]), followed by the onboard recognizer's own integers.
 //!
 //! The error rate is the share of the names given that are wrong. A sequence that reaches the limit of touches without a
@@ -60,7 +60,7 @@ pub(crate) use choose::share_tested;
 pub use choose::{Chosen, Terms, choose};
 pub(crate) use choose::{Way, choose_independent};
 #[cfg(all(test, feature = "train"))]
-use draw::Drawn;
+use draw::MarginSupply;
 pub use draw::{TouchSupply, follow};
 pub use error::{CalibrateProblem, Enough, Forecast, Remedy, Supplied};
 pub use found::{Alarms, Found, OnRecordings};

@@ -11,7 +11,7 @@ use crate::compile;
 use crate::ensemble::StatedProbe;
 use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result, Supplied};
 use crate::evaluate::{Candidate, OfTouches};
-use crate::evidence::{Odds, Sequence, odds_of};
+use crate::evidence::{Odds, Sequence, odds_of, totals};
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
 use crate::touches::{Dataset, ObjectTouches};
@@ -31,7 +31,7 @@ pub(crate) const STRICTEST: [f64; 2] = [2.5, 10.0];
 pub struct Settings {
     /// The error rate: wrong names of those that are given.
     pub rate: f64,
-    /// Of what the rate is promised.
+    /// Cases that the rate covers.
     pub per: Per,
     /// The probability that the rate is kept.
     pub confidence: f64,
@@ -92,7 +92,7 @@ pub fn calibrate(
     calibrate_from(model, dataset, settings, None, progress)
 }
 
-/// Where a calibration begins that other touches say something of.
+/// Start of a calibration that other touches say something about.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Start {
     /// The threshold at which the walk begins, as a margin in nats.
@@ -112,26 +112,25 @@ pub(crate) fn calibrate_from(
     start: Option<Start>,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
-    let material = material(model, &dataset, settings)?;
+    let material = Material::stated(model, &dataset, settings)?;
     if let Cow::Owned(delivered) = Candidate::Compiled(model).delivered(&dataset) {
         dataset = delivered;
     }
     add_noise(model, &mut dataset, &settings.noise, material.max_touches, noise_seed(settings));
-    let touched = dataset.objects.iter().zip(&material.known);
     let drawn = Drawn {
         dataset: &dataset,
         fewest: dataset.objects.iter().map(|object| object.len() as u64).min().unwrap_or(0),
-        supplies: touched.map(|(touched, &object)| TouchSupply::new(object, touched, settings.seed)).collect(),
+        supplies: material.supplies(&dataset),
     };
     let temperature = || Ok(temperature(model, &dataset, &material.known));
-    calibrate_drawn(model, &material, drawn, settings, start, temperature, progress)
+    calibrate_drawn(&material, drawn, start, temperature, progress)
 }
 
 /// The threshold, a margin in nats, at which a walk over `times` as many touches as there are in a part of them best begins: the
 /// loosest one at which it passes with nearly the greatest probability, up to where a calibration that knows nothing begins.
 ///
 /// # Errors
-/// As [`calibrate`], but for a rate that is not kept.
+/// As [`calibrate`], except for a rate that is not kept.
 pub(crate) fn begin(
     model: &Model<'_>,
     mut part: Dataset,
@@ -139,22 +138,13 @@ pub(crate) fn begin(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<f64> {
-    let Material { names, known, outputs, max_touches } = material(model, &part, settings)?;
-    add_noise(model, &mut part, &settings.noise, max_touches, noise_seed(settings));
+    let material = Material::stated(model, &part, settings)?;
+    add_noise(model, &mut part, &settings.noise, material.max_touches, noise_seed(settings));
     let terms = settings.terms();
     let naive = terms.margin();
     let most = ((settings.sequences as f64 / times) as usize).max(1);
-    let wanted = wanted(model, &outputs, settings.per, most);
-    let followed = |beyond: f64| {
-        let touched = part.objects.iter().zip(&known);
-        let mut supplies: Vec<TouchSupply<'_>> =
-            touched.map(|(touched, &object)| TouchSupply::new(object, touched, settings.seed)).collect();
-        if settings.active {
-            follow_plan(&mut supplies, &names, &model.plan().ok_or(EvaluateProblem::NoPlan)?)?;
-        }
-        let limit = Limit { margin: naive + beyond, max_touches };
-        follow(model, &mut supplies, &wanted, limit, progress)
-    };
+    let wanted = material.wanted(most);
+    let followed = |beyond: f64| material.sequences(&part, &wanted, naive + beyond, progress);
     let [near, far] = STRICTEST;
     let sequences = followed(near)?;
     let (sequences, beyond) =
@@ -163,42 +153,93 @@ pub(crate) fn begin(
     Ok(Begin::new(&sequences, &(0..sequences.len()).collect::<Vec<_>>(), tested, &terms, naive + beyond).loosest)
 }
 
-/// The sequences of each object of so many in all: as often as the model's priors say.
-fn wanted(model: &Model<'_>, outputs: &[Vec<usize>], per: Per, count: usize) -> Vec<usize> {
-    // Each placement has a promise of its own, however rare it is.
-    let shares = match model.outputs() {
-        Some(_) if per == Per::Object => vec![1.0 / outputs.len() as f64; outputs.len()],
-        _ => shares(model, outputs),
-    };
-    shares.iter().map(|share| (share * count as f64).round().max(1.0) as usize).collect()
-}
-
-/// Touches that a model can be calibrated on.
-pub(super) struct Material {
-    /// The names that it gives.
-    names: Vec<String>,
+/// A model, and a data set that it can be calibrated on.
+pub(super) struct Material<'m> {
+    pub(super) model: &'m Model<'m>,
+    pub(super) settings: &'m Settings,
+    /// The names that the model gives.
+    pub(super) names: Vec<String>,
     /// The data set's objects' indices in the model.
     pub(super) known: Vec<usize>,
     /// Their outputs: several of one whose touches state no placement.
-    outputs: Vec<Vec<usize>>,
-    max_touches: u32,
+    pub(super) outputs: Vec<Vec<usize>>,
+    pub(super) max_touches: u32,
 }
 
-/// Refuses settings, models and data sets of which there is no calibration.
-pub(super) fn material(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Material> {
-    settings.check()?;
-    refuse_names_of_placements(model, settings)?;
-    let own = Stopping::from_model(model).max_touches();
-    let max_touches = settings.max_touches.unwrap_or(own);
-    compile::stopping(settings.rate, max_touches)?;
-    let (names, known) = named(model, dataset)?;
-    let outputs = outputs(model, dataset);
-    refuse_unstated(&outputs, dataset, settings)?;
-    Ok(Material { names, known, outputs, max_touches })
+impl<'m> Material<'m> {
+    /// Refuses settings, models and data sets of which there is no calibration.
+    pub(super) fn new(model: &'m Model<'m>, dataset: &Dataset, settings: &'m Settings) -> Result<Self> {
+        settings.check()?;
+        refuse_names_of_placements(model, settings)?;
+        let max_touches = settings.limit(model);
+        compile::stopping(settings.rate, max_touches)?;
+        let (names, known) = named(model, dataset)?;
+        Ok(Self { model, settings, names, known, outputs: outputs(model, dataset), max_touches })
+    }
+
+    /// Like [`Material::new`]; also refuses touches without a placement where the rate is one in each.
+    pub(super) fn stated(model: &'m Model<'m>, dataset: &Dataset, settings: &'m Settings) -> Result<Self> {
+        let material = Self::new(model, dataset, settings)?;
+        refuse_unstated(&material.outputs, dataset, settings)?;
+        Ok(material)
+    }
+
+    /// One supply of each of the data set's objects.
+    fn supplies<'d>(&self, dataset: &'d Dataset) -> Vec<TouchSupply<'d>> {
+        let touched = dataset.objects.iter().zip(&self.known);
+        touched.map(|(touched, &object)| TouchSupply::new(object, touched, self.settings.seed)).collect()
+    }
+
+    /// Lets sequences go where the plan of the model says, if settings say so.
+    fn follow_plan(&self, dataset: &Dataset, supplies: &mut [TouchSupply<'_>]) -> Result<()> {
+        if !self.settings.active {
+            return Ok(());
+        }
+        let plan = self.model.plan().ok_or(EvaluateProblem::NoPlan)?;
+        if !dataset.holds_approaches() {
+            return Err(EvaluateProblem::NoApproaches.into());
+        }
+        follow_plan(supplies, &self.names, &plan)
+    }
+
+    /// Sequences that share no touch, `wanted` of each object, to a margin in nats.
+    pub(super) fn sequences(
+        &self,
+        dataset: &Dataset,
+        wanted: &[usize],
+        margin: f64,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Sequence>> {
+        let mut supplies = self.supplies(dataset);
+        self.follow_plan(dataset, &mut supplies)?;
+        follow(self.model, &mut supplies, wanted, Limit { margin, max_touches: self.max_touches }, progress)
+    }
+
+    /// The sequences of each object of so many in all: as often as the model's priors say.
+    pub(super) fn by_priors(&self, count: usize) -> Vec<usize> {
+        let prior = |&output: &usize| (f64::from(self.model.prior(output)) * f64::from(self.model.unit())).exp();
+        let weights: Vec<f64> = self.outputs.iter().map(|own| own.iter().map(prior).sum()).collect();
+        let sum: f64 = weights.iter().sum();
+        weights.into_iter().map(|weight| of_share(weight / sum, count)).collect()
+    }
+
+    /// Like [`Material::by_priors`]; equally many for a rate in each placement, since each has a promise of its own, however rare.
+    fn wanted(&self, count: usize) -> Vec<usize> {
+        match self.model.outputs() {
+            Some(_) if self.settings.per == Per::Object => {
+                vec![of_share(1.0 / self.outputs.len() as f64, count); self.outputs.len()]
+            }
+            _ => self.by_priors(count),
+        }
+    }
+}
+
+fn of_share(share: f64, count: usize) -> usize {
+    (share * count as f64).round().max(1.0) as usize
 }
 
 /// Refuses a rate of each name where names are placements: how often one is wrong depends on their shares.
-pub(super) fn refuse_names_of_placements(model: &Model<'_>, settings: &Settings) -> Result<()> {
+fn refuse_names_of_placements(model: &Model<'_>, settings: &Settings) -> Result<()> {
     match model.outputs().is_some() && settings.per == Per::Name {
         true => Err(Error::setting("per", "name", "average or object with a model whose objects have several outputs")),
         false => Ok(()),
@@ -206,7 +247,7 @@ pub(super) fn refuse_names_of_placements(model: &Model<'_>, settings: &Settings)
 }
 
 /// Refuses a rate in each placement on touches of which some state none.
-pub(super) fn refuse_unstated(outputs: &[Vec<usize>], dataset: &Dataset, settings: &Settings) -> Result<()> {
+fn refuse_unstated(outputs: &[Vec<usize>], dataset: &Dataset, settings: &Settings) -> Result<()> {
     let unstated = dataset.objects.iter().zip(outputs).find(|(_, outputs)| outputs.len() > 1);
     match unstated {
         Some((touched, _)) if settings.per == Per::Object => {
@@ -238,31 +279,23 @@ pub(super) struct Drawn<'d> {
 
 /// Calibrates on touches drawn from supplies; `temperature` finds the temperature.
 pub(super) fn calibrate_drawn(
-    model: &Model<'_>,
-    Material { names, outputs, max_touches, .. }: &Material,
+    material: &Material<'_>,
     Drawn { dataset, fewest, mut supplies }: Drawn<'_>,
-    settings: &Settings,
     start: Option<Start>,
     temperature: impl FnOnce() -> Result<f64>,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
+    let Material { model, settings, names, max_touches, .. } = material;
     progress.begin("calibrating", Some((settings.sequences + settings.sequences / PILOT) as u64));
     let terms = settings.terms();
     let naive = terms.margin();
-    let wanted = |count: usize| wanted(model, outputs, settings.per, count);
     let draw = |supplies: &mut [TouchSupply<'_>], count: usize, margin: f64| {
         let limit = Limit { margin, max_touches: *max_touches };
-        follow(model, supplies, &wanted(count), limit, progress)
+        follow(model, supplies, &material.wanted(count), limit, progress)
     };
     let mut first: Vec<TouchSupply<'_>> = supplies.iter_mut().map(|supply| supply.take_part(PILOT)).collect();
-    if settings.active {
-        let plan = model.plan().ok_or(EvaluateProblem::NoPlan)?;
-        if !dataset.holds_approaches() {
-            return Err(EvaluateProblem::NoApproaches.into());
-        }
-        follow_plan(&mut first, names, &plan)?;
-        follow_plan(&mut supplies, names, &plan)?;
-    }
+    material.follow_plan(dataset, &mut first)?;
+    material.follow_plan(dataset, &mut supplies)?;
     let (starts, loosest, sequences) = match start {
         Some(Start { margin, loosest }) => (vec![margin], loosest, draw(&mut supplies, settings.sequences, margin)?),
         None => {
@@ -275,7 +308,7 @@ pub(super) fn calibrate_drawn(
             (spread(strictest, seen.most_starts(&terms), settings.rate), None, sequences)
         }
     };
-    let supplied = (sequences.len() < wanted(settings.sequences).iter().sum())
+    let supplied = (sequences.len() < material.wanted(settings.sequences).iter().sum())
         .then(|| Supplied { approaches: dataset.holds_approaches(), fewest });
     let way = Way { starts: &starts, loosest: loosest.as_ref() };
     let chosen = chosen(&sequences, names, &way, &terms, supplied).map_err(|mut problem| {
@@ -287,7 +320,7 @@ pub(super) fn calibrate_drawn(
         }
         problem
     })?;
-    finished(model, dataset, settings, *max_touches, names, &chosen, temperature()?)
+    finished(material, dataset, settings, &chosen, temperature()?)
 }
 
 /// The names that a model gives, and the objects of a data set, which has all of them, by their indices in the model: of an
@@ -313,12 +346,17 @@ pub(super) fn named(model: &Model<'_>, dataset: &Dataset) -> Result<(Vec<String>
 }
 
 /// The outputs of each of these objects, which are in the order of [`named`].
-pub(super) fn outputs(model: &Model<'_>, dataset: &Dataset) -> Vec<Vec<usize>> {
+fn outputs(model: &Model<'_>, dataset: &Dataset) -> Vec<Vec<usize>> {
     let candidate = Candidate::Compiled(model);
     dataset.objects.iter().map(|touched| candidate.outputs_of(&touched.name)).collect()
 }
 
 impl Settings {
+    /// Touches after which a sequence ends undecided.
+    pub(super) fn limit(&self, model: &Model<'_>) -> u32 {
+        self.max_touches.unwrap_or(Stopping::from_model(model).max_touches())
+    }
+
     /// The terms of the promise.
     pub(crate) fn terms(&self) -> Terms {
         Terms { rate: self.rate, confidence: self.confidence, per: self.per }
@@ -351,22 +389,10 @@ pub(crate) fn add_noise(model: &Model<'_>, dataset: &mut Dataset, noise: &Noise,
     }
 }
 
-/// Share of the touches that each object of a data set gets, by the priors of its outputs.
-pub(super) fn shares(model: &Model<'_>, outputs: &[Vec<usize>]) -> Vec<f64> {
-    let prior = |&output: &usize| (f64::from(model.prior(output)) * f64::from(model.unit())).exp();
-    let weights: Vec<f64> = outputs.iter().map(|own| own.iter().map(prior).sum()).collect();
-    let sum: f64 = weights.iter().sum();
-    weights.into_iter().map(|weight| weight / sum).collect()
-}
-
 /// True if at this margin clearly fewer names are wrong than promised, as far as a few sequences tell.
 fn is_kept_well(pilot: &[Sequence], margin: f64, rate: f64) -> bool {
-    let odds = Odds::All(odds_of(margin));
-    let given = pilot.iter().filter_map(|sequence| Some((sequence, sequence.given(&odds)?)));
-    let (wrong, given) = given.fold((0_u32, 0_u32), |(wrong, given), (sequence, look)| {
-        (wrong + u32::from(look.name != sequence.object), given + 1)
-    });
-    f64::from(wrong) <= 0.5 * rate * f64::from(given)
+    let totals = totals(pilot, &Odds::All(odds_of(margin)));
+    totals.wrong as f64 <= 0.5 * rate * totals.given as f64
 }
 
 /// Bytes that a calibration to an average error rate adds to a model that states neither promise nor temperature.
@@ -376,15 +402,15 @@ pub(crate) fn added_bytes(noise: &Noise) -> usize {
     2 * SECTION_HEADER_LENGTH + promise + Temperature::LENGTH
 }
 
+/// The calibrated model; the promise holds for touches with the noise of these settings.
 pub(super) fn finished(
-    model: &Model<'_>,
+    material: &Material<'_>,
     dataset: &Dataset,
     settings: &Settings,
-    max_touches: u32,
-    names: &[String],
     chosen: &Chosen,
     temperature: f64,
 ) -> Result<Calibrated> {
+    let &Material { model, ref names, ref outputs, max_touches, .. } = material;
     let approaches = dataset.holds_approaches();
     let noise = dataset.real().and(&settings.noise).promised();
     let stated = Stated { approaches, active: settings.active, groups: false, max_touches, noise };
@@ -396,7 +422,7 @@ pub(super) fn finished(
     }
     let mut calibrated = Calibrated::new(model, names, chosen, &settings.terms(), stated, sections)?;
     // Touches that state no placement are of the object as a whole.
-    for (touched, outputs) in dataset.objects.iter().zip(self::outputs(model, dataset)) {
+    for (touched, outputs) in dataset.objects.iter().zip(outputs) {
         if outputs.len() > 1 {
             let own = outputs.iter().filter_map(|&output| calibrated.objects.remove(names.get(output)?));
             let sum = own.fold(OfObject::default(), |a, b| OfObject {

@@ -13,30 +13,24 @@
 //! Fixed-sequence testing needs no more: an order that the tested sequences had no part in, and at each threshold a test
 //! that is valid by itself. If the simulation is wrong, a promise that could have been made is missed, and none is broken.
 
-use super::Limit;
 use super::calibrated::Calibrated;
 use super::choose::{By, Terms, steps, summary, tallies};
-use super::draw::{TouchSupply, follow, follow_plan};
 use super::error::{Enough, Forecast};
-use super::model::{
-    OfRecorded, STRICTEST, Settings, add_noise, finished, named, noise_seed, outputs, refuse_names_of_placements,
-    refuse_unstated, shares,
-};
+use super::model::{Material, OfRecorded, STRICTEST, Settings, add_noise, finished, noise_seed};
 use super::temperature::temperature;
 use super::walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};
-use crate::compile;
-use crate::error::{CalibrateProblem, EvaluateProblem, Result};
+use crate::error::{CalibrateProblem, Result};
 use crate::evaluate::{Candidate, OfTouches};
 use crate::evidence::{Odds, Sequence, margin_of};
 use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, Source};
 use palpate_base::wording::two_digits;
-use palpate_onboard::{Model, Stopping};
+use palpate_onboard::Model;
 
 /// The probability with which a forecast number of approaches is enough, if the simulation is right.
 pub(super) const LIKELY: f64 = 0.8;
-/// Of first thresholds that pass with nearly the same probability, to this share, the strictest is taken.
+/// Share of the greatest probability of passing from which on the strictest first threshold is taken.
 const AS_LIKELY: f64 = 0.95;
 /// A probability below which recordings that make too few names are not tested at all.
 const HOPELESS: f64 = 0.01;
@@ -60,27 +54,24 @@ pub fn calibrate_recorded(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
-    settings.check()?;
-    refuse_names_of_placements(model, settings)?;
-    let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
-    compile::stopping(settings.rate, max_touches)?;
-    let (names, _) = named(model, &simulated)?;
-    let (_, known) = named(model, recorded)?;
-    let of_recorded = outputs(model, recorded);
-    refuse_unstated(&of_recorded, recorded, settings)?;
+    let of_simulated = Material::new(model, &simulated, settings)?;
+    let material = Material::stated(model, recorded, settings)?;
+    let names = &material.names;
     let delivered = Candidate::Compiled(model).delivered(recorded);
     let recorded = delivered.as_ref();
-    add_noise(model, &mut simulated, &settings.noise, max_touches, noise_seed(settings));
+    add_noise(model, &mut simulated, &settings.noise, material.max_touches, noise_seed(settings));
     let terms = settings.terms();
     let strictest = terms.margin() + STRICTEST[0];
-    let (cut, by) = (Cut { model, names: &names, settings, max_touches }, By::of(settings.per, names.len()));
+    let by = By::of(settings.per, names.len());
     progress.begin("calibrating", Some(settings.sequences as u64));
-    let sequences = cut.sequences(&simulated, settings.sequences, strictest, progress)?;
+    let wanted = of_simulated.by_priors(settings.sequences);
+    let sequences = of_simulated.sequences(&simulated, &wanted, strictest, progress)?;
     let steps = steps(&sequences, names.len(), strictest, &terms);
-    let foreseen = Foreseen::new(&sequences, &steps, by, recorded, &of_recorded);
+    let foreseen = Foreseen::new(&sequences, &steps, by, recorded, &material.outputs);
     let of_step = |odds: &Odds| -> Result<(Vec<Sequence>, Vec<Tally>)> {
         progress::check(progress)?;
-        let sequences = cut.sequences(recorded, recorded.len(), margin_of(odds.strictest()), &())?;
+        let wanted = material.by_priors(recorded.len());
+        let sequences = material.sequences(recorded, &wanted, margin_of(odds.strictest()), &())?;
         let tallies = tallies(&sequences.iter().collect::<Vec<_>>(), odds, by);
         Ok((sequences, tallies))
     };
@@ -90,7 +81,7 @@ pub fn calibrate_recorded(
         let found = tallies.get(fewest).map_or(0, |tally| tally.all);
         if found < needed(terms.rate, terms.confidence) {
             let needed = needed(terms.rate, terms.confidence);
-            return Err(foreseen.problem(Stop::TooFew { position: fewest, found, needed }, &names, &terms).into());
+            return Err(foreseen.problem(Stop::TooFew { position: fewest, found, needed }, names, &terms).into());
         }
     }
     let mut failed = None;
@@ -106,12 +97,12 @@ pub fn calibrate_recorded(
     if let Some(error) = failed {
         return Err(error);
     }
-    let Kept { threshold: step, tallies } = kept.map_err(|stop| foreseen.problem(stop, &names, &terms))?;
+    let Kept { threshold: step, tallies } = kept.map_err(|stop| foreseen.problem(stop, names, &terms))?;
     let (sequences, _) = of_step(&steps[step])?;
     let chosen = summary(steps[step].clone(), tallies, &sequences.iter().collect::<Vec<_>>(), names.len());
-    let temperature = temperature(model, recorded, &known);
+    let temperature = temperature(model, recorded, &material.known);
     let plain = Settings { noise: Noise::default(), ..settings.clone() };
-    let calibrated = finished(model, recorded, &plain, max_touches, &names, &chosen, temperature)?;
+    let calibrated = finished(&material, recorded, &plain, &chosen, temperature)?;
     let simulated_error = foreseen.steps[step].error();
     let facts = OfRecorded { approaches: foreseen.fewest, recordings: recordings(recorded), simulated_error };
     Ok(Calibrated { recorded: Some(facts), ..calibrated })
@@ -122,35 +113,6 @@ fn recordings(dataset: &Dataset) -> Option<usize> {
     let of = |source: &&Source| matches!(source, Source::Recording(_) | Source::Log(_));
     let count = dataset.objects.iter().map(|object| object.sources().iter().filter(of).count()).sum();
     (count > 0).then_some(count)
-}
-
-/// Cutting of touches into sequences.
-struct Cut<'c> {
-    model: &'c Model<'c>,
-    names: &'c [String],
-    settings: &'c Settings,
-    max_touches: u32,
-}
-
-impl Cut<'_> {
-    /// Sequences that share no touch, of all objects as often as the priors say, at most so many, to a margin in nats.
-    fn sequences(&self, dataset: &Dataset, most: usize, margin: f64, progress: &dyn Progress) -> Result<Vec<Sequence>> {
-        let (_, known) = named(self.model, dataset)?;
-        let objects = dataset.objects.iter().zip(&known);
-        let mut supplies: Vec<TouchSupply<'_>> =
-            objects.map(|(touched, &object)| TouchSupply::new(object, touched, self.settings.seed)).collect();
-        if self.settings.active {
-            let plan = self.model.plan().ok_or(EvaluateProblem::NoPlan)?;
-            if !dataset.holds_approaches() {
-                return Err(EvaluateProblem::NoApproaches.into());
-            }
-            follow_plan(&mut supplies, self.names, &plan)?;
-        }
-        let shares = shares(self.model, &outputs(self.model, dataset));
-        let wanted: Vec<usize> = shares.iter().map(|share| (share * most as f64).round().max(1.0) as usize).collect();
-        let limit = Limit { margin, max_touches: self.max_touches };
-        follow(self.model, &mut supplies, &wanted, limit, progress)
-    }
 }
 
 /// A threshold on simulated sequences.
@@ -190,7 +152,7 @@ struct Foreseen {
 }
 
 impl Foreseen {
-    /// Of recorded objects with these outputs.
+    /// Every threshold, for recorded objects with these outputs.
     fn new(sequences: &[Sequence], steps: &[Odds], by: By, recorded: &Dataset, outputs: &[Vec<usize>]) -> Self {
         let all: Vec<&Sequence> = sequences.iter().collect();
         let object = |output: usize| outputs.iter().position(|own| own.contains(&output));
@@ -222,8 +184,7 @@ impl Foreseen {
         self.best(1.0, terms.rate, terms.confidence).1
     }
 
-    /// Where hardly any threshold can pass because the recordings make too few names, the threshold that the simulation would
-    /// choose.
+    /// The threshold that the simulation would choose, if hardly any can pass because the recordings make too few names.
     fn too_few(&self, terms: &Terms) -> Option<usize> {
         let chosen = self.steps.iter().rposition(|step| step.error() <= terms.rate).unwrap_or(0);
         let step = self.steps.get(chosen)?;
@@ -282,13 +243,13 @@ pub(super) fn first_of(
     recorded: &Dataset,
     settings: &Settings,
 ) -> Result<usize> {
-    let max_touches = settings.max_touches.unwrap_or(Stopping::from_model(model).max_touches());
-    let (names, _) = named(model, recorded)?;
-    let terms = settings.terms();
+    let of_simulated = Material::new(model, &simulated, settings)?;
+    let material = Material::new(model, recorded, settings)?;
+    let (names, terms) = (&material.names, settings.terms());
     let strictest = terms.margin() + STRICTEST[0];
-    let cut = Cut { model, names: &names, settings, max_touches };
-    let sequences = cut.sequences(&simulated, settings.sequences, strictest, &())?;
+    let wanted = of_simulated.by_priors(settings.sequences);
+    let sequences = of_simulated.sequences(&simulated, &wanted, strictest, &())?;
     let steps = steps(&sequences, names.len(), strictest, &terms);
-    let of_recorded = outputs(model, recorded);
-    Ok(Foreseen::new(&sequences, &steps, By::of(settings.per, names.len()), recorded, &of_recorded).first(&terms))
+    let by = By::of(settings.per, names.len());
+    Ok(Foreseen::new(&sequences, &steps, by, recorded, &material.outputs).first(&terms))
 }

@@ -31,7 +31,7 @@ pub fn temperature(model: &Model<'_>, dataset: &Dataset, known: &[usize]) -> f64
     temperature_of(model, &dataset.objects.iter().map(evidence).collect::<Vec<_>>(), &outputs)
 }
 
-/// The same on touches that are captured for it.
+/// Like [`temperature`], on touches that are captured for it.
 pub(super) fn temperature_on_demand(model: &Model<'_>, demands: &[Demand<'_>], known: &[usize]) -> Result<f64> {
     let evidence = |demand: &Demand<'_>| -> Result<Vec<Touch>> {
         let mut evidence = Vec::new();
@@ -49,7 +49,7 @@ pub(super) fn temperature_on_demand(model: &Model<'_>, demands: &[Demand<'_>], k
     Ok(temperature_of(model, &demands.iter().map(evidence).collect::<Result<Vec<_>>>()?, &outputs))
 }
 
-/// The same on these touches of each object, which are all evidence, and its outputs.
+/// Temperature on touches of each object, which are all evidence, and its outputs.
 fn temperature_of(model: &Model<'_>, evidence: &[Vec<Touch>], outputs: &[Vec<usize>]) -> f64 {
     let rows = |(evidence, outputs): (&Vec<Touch>, &Vec<usize>)| {
         let row = |margins: &[i32]| {

@@ -32,7 +32,7 @@ fn supplies(dataset: &Dataset) -> Vec<TouchSupply<'_>> {
 
 /// A supply, and for each sequence the positions of the touches that it used.
 struct Watched<'w, 'd, 'm> {
-    drawn: Drawn<'w, 'd, 'm>,
+    drawn: MarginSupply<'w, 'd, 'm>,
     used: Vec<Vec<u32>>,
     margins: Option<Vec<i32>>,
 }
@@ -61,7 +61,7 @@ impl Sequences<Chip<'_>> for Watched<'_, '_, '_> {
 
 /// For each sequence of a supply the positions of the touches that it uses.
 fn used(model: &Model<'_>, supply: &mut TouchSupply<'_>, limit: Limit) -> Vec<Vec<u32>> {
-    let mut watched = Watched { drawn: Drawn::new(model, supply, &()), used: Vec::new(), margins: None };
+    let mut watched = Watched { drawn: MarginSupply::new(model, supply, &()), used: Vec::new(), margins: None };
     let mut follower = chip(model, Stopping::from_odds(0, u32::MAX), None, None);
     let found = sequences(&mut watched, &mut *follower, usize::MAX, limit).unwrap();
     watched.used.truncate(found.len());

@@ -47,7 +47,7 @@ pub(super) struct Kept<T> {
     pub(super) tallies: Vec<Tally>,
 }
 
-/// Where a walk ended without a threshold that is kept.
+/// End of a walk without a threshold that is kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Stop {
     /// This tally could not have passed without any error at any threshold; the cases that it had at most.

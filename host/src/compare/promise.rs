@@ -6,6 +6,7 @@ use crate::compile::{self, compile};
 use crate::ensemble::Ensemble;
 use crate::error::{CalibrateProblem, Result};
 use crate::evaluate::Finding;
+use crate::evidence::totals;
 use crate::progress::Progress;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Stopping;
@@ -128,12 +129,8 @@ pub(super) fn promised(
 
 /// Names given at this margin, and the wrong ones.
 fn tally(sequences: &[Sequence], margin: f64) -> Tally {
-    let odds = Odds::All(odds_of(margin));
-    let given = sequences.iter().filter_map(|sequence| Some((sequence.object, sequence.given(&odds)?.name)));
-    given.fold(Tally::default(), |Tally { wrong, all }, (touched, named)| Tally {
-        wrong: wrong + u64::from(touched != named),
-        all: all + 1,
-    })
+    let totals = totals(sequences, &Odds::All(odds_of(margin)));
+    Tally { wrong: totals.wrong as u64, all: totals.given as u64 }
 }
 
 /// The finding on a share of wrong names among about that many independent ones.

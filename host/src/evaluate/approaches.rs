@@ -5,7 +5,6 @@ use super::draws::Draws;
 use super::margins::Margins;
 use super::sequential::{Sequential, SequentialSettings};
 use crate::error::{Error, Result};
-use crate::evidence::Outcome;
 use crate::random::Purpose;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -58,17 +57,11 @@ impl Margins<'_> {
         }
         let positions = 0..self.tested.len();
         let correct: Vec<Vec<Estimate>> =
-            positions.clone().map(|position| self.after(position, at, most, groups, seed)).collect();
-        let outcomes: Vec<Vec<Outcome>> = positions
-            .map(|position| {
-                let run = |sequence| {
-                    let all = self.most_approaches_of(position, sequence);
-                    let draws = self.draws(all, position, sequence, seed);
-                    self.outcome(position, stopping, draws.map(|draw| self.approach(position, sequence, draw)))
-                };
-                (0..groups).into_par_iter().map(run).collect()
-            })
-            .collect();
+            positions.map(|position| self.after(position, at, most, groups, seed)).collect();
+        let outcomes = self.each(groups, |position, sequence| {
+            let draws = self.draws(self.most_approaches_of(position, sequence), position, sequence, seed);
+            self.outcome(position, stopping, draws.map(|draw| self.approach(position, sequence, draw)))
+        });
         let used = self.tested.iter().map(|tested| tested.touches as f64 / tested.approaches.len().max(1) as f64);
         let sequential = self.of_outcomes(outcomes, self.stated(settings, stopping), stopping.max_touches(), true);
         Ok(self.in_approaches(used.collect(), self.accuracies(at, &correct), sequential))

@@ -48,7 +48,7 @@ pub(super) struct Tested<'m> {
     pub(super) touches: usize,
     /// For each touch of the data set its position among those that are evidence, if it is.
     pub(super) approaches: Vec<Option<u32>>,
-    /// Of each source and robot one: group i, and sequence i, is of pool i modulo their number.
+    /// One for each source and robot: group i, and sequence i, is of pool i modulo their number.
     pub(super) pools: Vec<TestedPool>,
     /// Margins of the touches that are evidence.
     pub(super) values: Values<'m>,
@@ -214,7 +214,7 @@ impl<'m> Margins<'m> {
         Ok(Self::with(candidate, descriptor, outputs, dataset))
     }
 
-    /// The same for objects that the model does not know: no verdict on them is right.
+    /// Margins for objects that the model does not know: no verdict on them is right.
     ///
     /// # Errors
     /// As [`new`](Self::new), and [`EvaluateProblem::KnownObject`] if the model knows one.
@@ -350,7 +350,7 @@ impl<'m> Margins<'m> {
     }
 
     /// True if outputs are placements of objects.
-    pub fn has_placements(&self) -> bool {
+    pub(crate) fn has_placements(&self) -> bool {
         self.numbers.is_some()
     }
 
@@ -359,8 +359,7 @@ impl<'m> Margins<'m> {
         self.numbers.as_deref()
     }
 
-    /// Of the objects that can be named, the one with the most evidence; as the right output, if it is that of the tested
-    /// object.
+    /// The object with the most evidence among those that can be named; as the right output, if it is that of the tested object.
     pub(super) fn best(&self, position: usize, evidence: &[f64]) -> usize {
         match self.numbers {
             None => best(&evidence[..self.known]),
@@ -374,17 +373,17 @@ impl<'m> Margins<'m> {
     }
 
     /// The objects of the data set, in its order.
-    pub fn tested_names(&self) -> &[String] {
+    pub(crate) fn tested_names(&self) -> &[String] {
         &self.tested_names
     }
 
     /// The touches of all tested objects together that are evidence to the model.
-    pub fn touch_count(&self) -> usize {
+    pub(crate) fn touch_count(&self) -> usize {
         self.tested.iter().map(|tested| tested.touches).sum()
     }
 
     /// True if the data set holds approaches.
-    pub fn hold_approaches(&self) -> bool {
+    pub(crate) fn hold_approaches(&self) -> bool {
         self.hold_approaches
     }
 
@@ -394,7 +393,8 @@ impl<'m> Margins<'m> {
     }
 
     /// All touches of all tested objects together, evidence or not: approaches, if the data set holds those.
-    pub fn approach_count(&self) -> usize {
+    #[cfg(all(test, feature = "train"))]
+    pub(crate) fn approach_count(&self) -> usize {
         self.tested.iter().map(|tested| tested.approaches.len()).sum()
     }
 
@@ -501,7 +501,7 @@ impl<'m> Margins<'m> {
     }
 }
 
-/// The pools of an object's touches, of which `approaches` says which are evidence.
+/// Pools of an object's touches; `approaches` says which are evidence.
 fn pools(touched: &ObjectTouches, approaches: &[Option<u32>]) -> Vec<TestedPool> {
     let pools = touched.pools();
     let evidence = |touches: &[u32]| -> Vec<u32> {

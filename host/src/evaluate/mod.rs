@@ -144,7 +144,7 @@ pub struct Evaluation {
     pub accuracy: BTreeMap<usize, f64>,
     /// Standard error of [`Evaluation::accuracy`].
     pub accuracy_standard_error: BTreeMap<usize, f64>,
-    /// The same for each object.
+    /// [`Evaluation::accuracy`] for each object.
     pub per_object: BTreeMap<String, BTreeMap<usize, f64>>,
     /// Results of the recognizer that stops by itself.
     pub sequential: Sequential,

@@ -34,7 +34,7 @@ pub(crate) const BY_CHANCE: f64 = 0.01;
 pub struct PromiseCheck {
     /// The promised error rate.
     pub promised: f64,
-    /// Of what it is promised: "average", "name" or "object".
+    /// Cases that the promise covers: "average", "name" or "object".
     pub per: &'static str,
     /// The probability that it is kept.
     pub confidence: f64,
@@ -272,7 +272,7 @@ impl Wrong {
         }
     }
 
-    /// The same for one of `number` that are looked at.
+    /// Finding about one of `number` that are looked at.
     fn finding_of(self, rate: f64, number: usize) -> Finding {
         if self.given <= 0.0 {
             return Finding::Untested;
@@ -287,7 +287,7 @@ impl Wrong {
     }
 }
 
-/// The probability of at least `errors`, of which there is at least one, in `trials` at a rate: the binomial upper tail.
+/// The probability of at least `errors` in `trials` at a rate: the binomial upper tail. There is at least one error.
 pub(crate) fn at_least(errors: f64, trials: f64, rate: f64) -> f64 {
     let ln_choose = libm::lgamma(trials + 1.0) - libm::lgamma(errors + 1.0) - libm::lgamma(trials - errors + 1.0);
     let mut term = (ln_choose + errors * rate.ln() + (trials - errors) * (1.0 - rate).ln()).exp();

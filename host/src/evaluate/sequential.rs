@@ -7,7 +7,7 @@ use super::margins::{Margins, Values, row};
 use super::{ERROR_RATE, MAX_TOUCHES};
 use crate::compile;
 use crate::error::{Error, Result};
-use crate::evidence::{Given, Outcome, chip, outcome};
+use crate::evidence::{Given, Outcome, Totals, chip, outcome};
 use palpate_onboard::Stopping;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -36,7 +36,7 @@ pub struct Sequential {
     pub error_rate: f64,
     /// The error rate that the model promises; none for thresholds that nothing was calibrated for.
     pub promised: Option<f64>,
-    /// Of what it is promised: "average", "name" or "object".
+    /// Cases that the promise covers: "average", "name" or "object".
     pub per: Option<&'static str>,
     /// Touches after which it gave up.
     pub max_touches: u32,
@@ -59,7 +59,7 @@ pub struct Sequential {
     pub undecided: f64,
     /// Share of sequences that ended as unknown, although the object is known.
     pub unknown: f64,
-    /// What is counted, approaches or touches, used on average, for each object.
+    /// Approaches used on average for each object if these are counted, otherwise touches.
     pub per_object: BTreeMap<String, f64>,
     /// Share of sequences with a wrong verdict, for each object.
     pub error_per_object: BTreeMap<String, f64>,
@@ -83,7 +83,7 @@ pub struct Sequential {
 }
 
 impl Sequential {
-    /// What is counted, approaches or touches, used on average.
+    /// Approaches used on average if these are counted, otherwise touches.
     pub fn mean(&self) -> Estimate {
         let standard_error = self.mean_approaches_standard_error.or(self.mean_touches_standard_error);
         let value = self.mean_approaches.unwrap_or(self.mean_touches);
@@ -107,8 +107,13 @@ impl Margins<'_> {
     pub fn sequential(&self, settings: &SequentialSettings) -> Result<Sequential> {
         let SequentialSettings { sequences, seed, .. } = *settings;
         let stopping = self.stopping(settings)?;
-        let outcomes: Vec<Vec<Outcome>> =
-            (0..self.tested.len()).map(|position| self.outcomes(position, stopping, sequences, seed)).collect();
+        let most = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX);
+        let outcomes = self.each(sequences, |position, sequence| {
+            let limit = most.min(self.most_touches_of(position, sequence));
+            let touches = self.draw(position, sequence, limit, seed).into_iter();
+            // A position is below the number of a file's lines.
+            self.outcome(position, stopping, touches.map(|touch| u32::try_from(touch).ok()))
+        });
         Ok(self.of_outcomes(outcomes, self.stated(settings, stopping), stopping.max_touches(), false))
     }
 
@@ -123,8 +128,8 @@ impl Margins<'_> {
         let Stated { error_rate, promised, per } = stated;
         let touches = self.mean(&outcomes, |outcome| outcome.touches);
         let approaches = in_approaches.then(|| self.mean(&outcomes, |outcome| outcome.approaches));
-        let error = self.wrong(&outcomes);
-        let undecided = self.undecided(&outcomes);
+        let error = self.share(&outcomes, |totals| totals.wrong);
+        let undecided = self.share(&outcomes, Totals::undecided);
         Sequential {
             error_rate,
             promised,
@@ -137,7 +142,7 @@ impl Margins<'_> {
             error: error.all.value,
             error_standard_error: error.all.standard_error,
             undecided: undecided.all.value,
-            unknown: self.unknown(&outcomes).all.value,
+            unknown: self.share(&outcomes, |totals| totals.unknown).all.value,
             per_object: approaches.unwrap_or(touches).per_object,
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,
@@ -167,27 +172,12 @@ impl Margins<'_> {
         (right > 0.0).then(|| placed / right)
     }
 
-    /// The share of sequences with a wrong verdict.
-    pub(super) fn wrong(&self, outcomes: &[Vec<Outcome>]) -> Figure {
+    /// The share of sequences that a number of their totals is.
+    pub(super) fn share(&self, outcomes: &[Vec<Outcome>], number: fn(&Totals) -> usize) -> Figure {
         self.figure(outcomes, |position, outcomes| {
-            let is_wrong = |object| object != self.tested[position].object;
-            let wrong = outcomes.iter().filter(|outcome| outcome.recognized.is_some_and(is_wrong));
-            Estimate::share(wrong.count(), outcomes.len())
-        })
-    }
-
-    /// The share of sequences without a verdict.
-    pub(super) fn undecided(&self, outcomes: &[Vec<Outcome>]) -> Figure {
-        self.figure(outcomes, |_, outcomes| {
-            let is_undecided = |outcome: &&Outcome| outcome.recognized.is_none() && !outcome.unknown;
-            Estimate::share(outcomes.iter().filter(is_undecided).count(), outcomes.len())
-        })
-    }
-
-    /// The share of sequences that ended as unknown.
-    pub(super) fn unknown(&self, outcomes: &[Vec<Outcome>]) -> Figure {
-        self.figure(outcomes, |_, outcomes| {
-            Estimate::share(outcomes.iter().filter(|outcome| outcome.unknown).count(), outcomes.len())
+            let object = self.tested[position].object;
+            let totals = Totals::of(outcomes.iter().map(|outcome| (object, *outcome)));
+            Estimate::share(number(&totals), totals.sequences)
         })
     }
 
@@ -208,15 +198,10 @@ impl Margins<'_> {
         }
     }
 
-    fn outcomes(&self, position: usize, stopping: Stopping, sequences: usize, seed: u64) -> Vec<Outcome> {
-        let most = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX);
-        let run = |sequence| {
-            let limit = most.min(self.most_touches_of(position, sequence));
-            let touches = self.draw(position, sequence, limit, seed).into_iter();
-            // A position is below the number of a file's lines.
-            self.outcome(position, stopping, touches.map(|touch| u32::try_from(touch).ok()))
-        };
-        (0..sequences).into_par_iter().map(run).collect()
+    /// Results of a number of sequences of each tested object, by its position and their numbers.
+    pub(super) fn each<T: Send>(&self, sequences: usize, of: impl Fn(usize, usize) -> T + Sync) -> Vec<Vec<T>> {
+        let each = |position| (0..sequences).into_par_iter().map(|sequence| of(position, sequence)).collect();
+        (0..self.tested.len()).map(each).collect()
     }
 
     /// When to stop.

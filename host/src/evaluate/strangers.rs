@@ -64,8 +64,8 @@ pub fn strangers(
     let detected = |at: usize| move |outcomes: &[Outcome]| share(outcomes, |own| own.unknown && own.touches <= at);
     let by = |outcomes: &[Outcome], at: usize| known_if(used_up(at)(outcomes), detected(at)(outcomes));
     let mean_by = |at: usize| known_if(mean(&used_up(at)), mean(&detected(at)));
-    let named = strangers.wrong(&found.outcomes);
-    let alarms = known.0.unknown(&known.1.outcomes);
+    let named = strangers.share(&found.outcomes, |totals| totals.wrong);
+    let alarms = known.0.share(&known.1.outcomes, |totals| totals.unknown);
     let all_used_up = mean(&used_up(limit));
     let has_test = match strangers.candidate {
         Candidate::Compiled(model) => model.strangers().is_some_and(|strangers| strangers.test.is_some()),

@@ -8,7 +8,6 @@ use crate::evidence::{Given, Outcome, chip, outcome};
 use crate::random::{self, Purpose};
 use palpate_onboard::Stopping;
 use rand::RngExt;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Sequences with and without a switch of the object, with and without forgetting.
@@ -73,13 +72,9 @@ impl Margins<'_> {
         if self.tested.len() < 2 {
             return Err(EvaluateProblem::NothingToSwitch.into());
         }
-        let ends: Vec<Vec<Ends>> = (0..self.tested.len())
-            .map(|position| {
-                let one = |group| self.switch_ends((position, group), stopping, settings.seed, nats);
-                (0..settings.sequences).into_par_iter().map(one).collect()
-            })
-            .collect::<Option<_>>()
-            .ok_or(EvaluateProblem::NotCompiled)?;
+        let one = |position, group| self.switch_ends((position, group), stopping, settings.seed, nats);
+        let ends = self.each(settings.sequences, one).into_iter().map(|of| of.into_iter().collect());
+        let ends: Vec<Vec<Ends>> = ends.collect::<Option<_>>().ok_or(EvaluateProblem::NotCompiled)?;
         let rule = |which: usize| {
             let still = |position: usize| {
                 let object = self.tested[position].object;

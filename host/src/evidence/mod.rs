@@ -11,12 +11,16 @@
 //! above these two is the same for all of them: thresholds and promises take a [`Sequence`], figures take an [`Outcome`].
 
 mod chip;
+mod outcome;
 mod sequence;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use chip::{Chip, chip};
+pub use outcome::Outcome;
+pub(crate) use outcome::Totals;
 use palpate_onboard::{Familiarity, Verdict};
+pub(crate) use sequence::totals;
 pub use sequence::{Lead, Odds, Sequence, margin_of, odds_of};
 use std::convert::Infallible;
 use std::marker::PhantomData;
@@ -35,7 +39,7 @@ pub(crate) trait Follower {
     /// The class with the most evidence.
     fn leader(&self) -> usize;
 
-    /// How far it leads: the sum of the weights of all others, its own being 1, in Q56.
+    /// The sum of the weights of all others, its own being 1, in Q56.
     fn rivals(&self) -> u64;
 
     /// Result of a test of whether the steps fit a class at all.
@@ -96,21 +100,6 @@ pub struct Limit {
     pub margin: f64,
     /// After this number of touches that are evidence, if no sooner.
     pub max_touches: u32,
-}
-
-/// Outcome of a sequence.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Outcome {
-    /// Touches, or rows, used that were evidence.
-    pub touches: usize,
-    /// Approaches used: these touches, and those in between that were no evidence.
-    pub approaches: usize,
-    /// The object recognized (its index in the model), or none.
-    pub recognized: Option<usize>,
-    /// The output that was recognized: how the object lies, if outputs are placements.
-    pub output: Option<usize>,
-    /// True if the touches fitted no object. Neither this nor recognized: the recognizer gave up.
-    pub unknown: bool,
 }
 
 /// Numbers of steps in a sequence.

@@ -1,9 +1,11 @@
 //! Whole sequences, and the result of each under any threshold.
 
+use super::{Outcome, Totals};
+
 /// Thresholds: the largest sum of the weights of all other objects, the leader's being 1, at which it is named; in Q56.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Odds {
-    /// The same for all objects.
+    /// One threshold for all objects.
     All(u64),
     /// One for each object, in the model's order.
     ByObject(Vec<u64>),
@@ -19,7 +21,7 @@ impl Odds {
         }
     }
 
-    /// The threshold of an object; 0, which hardly ever is passed, beyond those that there are.
+    /// The threshold of an object; 0, which hardly ever is passed, beyond the last one.
     pub fn of(&self, object: usize) -> u64 {
         match self {
             Self::All(odds) => *odds,
@@ -117,6 +119,19 @@ impl Sequence {
         self.approaches = self.approaches.max(approaches);
     }
 
+    /// Its outcome under thresholds.
+    pub(crate) fn outcome(&self, odds: &Odds) -> Outcome {
+        let lead = self.given(odds);
+        let recognized = lead.map(|lead| lead.name);
+        Outcome {
+            touches: lead.map_or(self.touches, |lead| lead.touches) as usize,
+            approaches: lead.map_or(self.approaches, |lead| lead.approaches) as usize,
+            recognized,
+            output: recognized,
+            unknown: false,
+        }
+    }
+
     /// The first moment at which a threshold is passed, as a recognizer with these thresholds would stop.
     pub fn given(&self, odds: &Odds) -> Option<&Lead> {
         self.leads.iter().find(|lead| lead.odds <= odds.of(lead.name))
@@ -127,6 +142,11 @@ impl Sequence {
     pub(crate) fn leads(&self) -> &[Lead] {
         &self.leads
     }
+}
+
+/// Totals over sequences under thresholds.
+pub(crate) fn totals<'s>(sequences: impl IntoIterator<Item = &'s Sequence>, odds: &Odds) -> Totals {
+    Totals::of(sequences.into_iter().map(|sequence| (sequence.object, sequence.outcome(odds))))
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
-//! Sequences of touches, and how badly they fit at each look.
+//! Sequences of touches, and how badly they fit after each touch.
 
 use super::{EARLY, FIRST, HALVED_AFTER, NAT, Pools};
 use crate::evaluate::leading;
 use crate::random::{self, Purpose};
 use palpate_onboard::{Model, Stopping};
+use palpate_shared::format::MisfitTerms;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
@@ -12,7 +13,7 @@ use rayon::prelude::*;
 pub(super) enum Ending {
     /// After this number of touches.
     Touches(u32),
-    /// Where a name would be given at a threshold of misfit at this level, in nats; at the limit of touches at the latest.
+    /// At a name that a threshold of misfit at this level, in nats, would let be given; at the limit of touches at the latest.
     Named { level: f64 },
 }
 
@@ -25,6 +26,14 @@ pub(super) struct Policy {
 }
 
 impl Policy {
+    /// The rules of a calibrated test, and the end of a sequence under it.
+    pub(super) fn of(terms: &MisfitTerms) -> (Self, impl Fn(&Sequence) -> End + use<>) {
+        let [threshold, doubt] = [terms.threshold, terms.doubt].map(|limit| f64::from(limit) / NAT);
+        let least = terms.least;
+        let policy = Self { ending: Ending::Named { level: doubt }, least };
+        (policy, move |sequence| sequence.end(threshold, doubt, least))
+    }
+
     /// The number of touches that all sequences have; without meaning where they end at a name.
     pub(super) fn last(&self) -> u32 {
         match self.ending {
@@ -34,9 +43,9 @@ impl Policy {
     }
 }
 
-/// State at a look.
+/// State after a touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Look {
+struct State {
     /// The misfit of the leading object less what is allowed at first, in nats; infinitely small before the first test.
     level: f64,
     /// True if the leading object's posterior has passed the model's threshold.
@@ -45,7 +54,7 @@ struct Look {
 
 /// One sequence of a known object's touches.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Sequence(Vec<Look>);
+pub(super) struct Sequence(Vec<State>);
 
 /// End of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,11 +66,11 @@ pub(super) struct End {
 impl Sequence {
     /// Its end with these limits of misfit and names from `least` touches on.
     pub(super) fn end(&self, threshold: f64, doubt: f64, least: u32) -> End {
-        for (look, touches) in self.0.iter().zip(1_u64..) {
-            if look.level > threshold {
+        for (state, touches) in self.0.iter().zip(1_u64..) {
+            if state.level > threshold {
                 return End { is_alarm: true, touches };
             }
-            if touches >= u64::from(least) && look.is_decided && look.level <= doubt {
+            if touches >= u64::from(least) && state.is_decided && state.level <= doubt {
                 return End { is_alarm: false, touches };
             }
         }
@@ -75,12 +84,12 @@ impl Sequence {
 
     /// The touches after which it ends without a test.
     pub(super) fn decided_after(&self) -> u32 {
-        self.0.iter().position(|look| look.is_decided).map_or(self.0.len(), |at| at + 1) as u32
+        self.0.iter().position(|state| state.is_decided).map_or(self.0.len(), |at| at + 1) as u32
     }
 
-    /// The highest level up to the last look.
+    /// The highest level up to the last state.
     fn highest(&self) -> f64 {
-        self.0.iter().map(|look| look.level).fold(f64::NEG_INFINITY, f64::max)
+        self.0.iter().map(|state| state.level).fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
@@ -111,20 +120,20 @@ pub(super) fn sequences(model: &Model<'_>, supplies: &[Pools], policy: &Policy, 
         let mut all = Vec::new();
         if supply.is_once {
             let once = supply.pools.iter().take(of_each).map(|rows| {
-                let mut looks = Vec::new();
-                one(model, numbers, &mut rows.chunks_exact(objects), (policy, limit), &mut looks);
-                Sequence(looks)
+                let mut states = Vec::new();
+                one(model, numbers, &mut rows.chunks_exact(objects), (policy, limit), &mut states);
+                Sequence(states)
             });
             return once.filter(|sequence| !sequence.0.is_empty()).collect();
         }
         let mut pools: Vec<_> = supply.pools.iter().map(|rows| rows.chunks_exact(objects)).collect();
         while all.len() < of_each && !pools.is_empty() {
             let next = all.len() % pools.len();
-            let mut looks = Vec::new();
-            if !one(model, numbers, &mut pools[next], (policy, limit), &mut looks) {
+            let mut states = Vec::new();
+            if !one(model, numbers, &mut pools[next], (policy, limit), &mut states) {
                 break;
             }
-            all.push(Sequence(looks));
+            all.push(Sequence(states));
         }
         all
     };
@@ -137,7 +146,7 @@ fn one<'r>(
     numbers: Option<&[u8]>,
     rows: &mut impl Iterator<Item = &'r [i32]>,
     (policy, limit): (&Policy, u32),
-    looks: &mut Vec<Look>,
+    states: &mut Vec<State>,
 ) -> bool {
     let mut evidence: Vec<i64> = (0..model.object_count()).map(|object| model.prior(object).into()).collect();
     for touches in 1..=limit {
@@ -145,10 +154,10 @@ fn one<'r>(
         evidence.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += i64::from(margin));
         let misfit = model.misfit(&evidence, touches).filter(|_| touches >= FIRST);
         let level = misfit.map_or(f64::NEG_INFINITY, |misfit| misfit as f64 / NAT - early(touches));
-        let look = Look { level, is_decided: is_decided(model, numbers, &evidence, touches) };
-        looks.push(look);
+        let state = State { level, is_decided: is_decided(model, numbers, &evidence, touches) };
+        states.push(state);
         match policy.ending {
-            Ending::Named { level } if touches >= policy.least && look.is_decided && look.level <= level => break,
+            Ending::Named { level } if touches >= policy.least && state.is_decided && state.level <= level => break,
             _ => {}
         }
     }

@@ -100,7 +100,7 @@ pub struct Tested {
     pub bytes: Vec<u8>,
     /// Terms that are the same for all objects.
     pub terms: MisfitTerms,
-    /// Of the sequences that the threshold was tested on, those that ended as unknown.
+    /// Sequences that ended as unknown, among those that the threshold was tested on.
     pub alarms: usize,
     /// Touches used on average in these sequences.
     pub mean_touches: f64,
@@ -143,7 +143,7 @@ pub(crate) struct Pools {
 }
 
 impl Pools {
-    /// Of sequences of rows: the evidence of each, row after row, in units.
+    /// Pools of sequences of rows: the evidence of each, row after row, in units.
     pub(crate) fn of_rows(pools: Vec<Vec<i32>>) -> Self {
         Self { pools, is_once: true, is_short: true }
     }
@@ -180,7 +180,7 @@ pub fn calibrate(
     calibrate_on(model, dataset, None, shapes, settings)
 }
 
-/// The same, with `recorded` touches of every object: half of them say, beside the simulated ones of `dataset`, what touches
+/// Like [`calibrate`], with `recorded` touches of every object: half of them say, beside the simulated ones of `dataset`, what touches
 /// of each object give, and the other half tests the threshold too. The stricter threshold of both is taken. Where the
 /// recordings are too few for the share of `settings`, the share that the model states is the one that they support.
 ///
@@ -213,7 +213,8 @@ fn calibrate_on(
     calibrate_supplies(model, given, recorded, &of_shapes(model, shapes), settings)
 }
 
-/// The same of margins: of each known object, recorded ones too if there are some, and the mean ones of other shapes.
+/// Like [`calibrate`], from margins: of each known object, recorded ones too if there are some, and the mean ones of other
+/// shapes.
 pub(crate) fn calibrate_supplies(
     model: &Model<'_>,
     given: Vec<Pools>,
@@ -340,15 +341,13 @@ fn learned_and_tested(supplies: Vec<Pools>, objects: usize) -> (Vec<Pools>, Vec<
 fn tested_means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<[f64; 2]> {
     let (_, test) = learned_and_tested(supplies(model, dataset, settings.seed)?, model.object_count());
     let Some(misfit_test) = model.strangers().and_then(|strangers| strangers.test) else { return Ok([0.0; 2]) };
-    let MisfitTerms { threshold, doubt, least, .. } = misfit_test.terms;
-    let [threshold, doubt] = [threshold, doubt].map(|limit| f64::from(limit) / NAT);
-    let policy = Policy { ending: follow::Ending::Named { level: doubt }, least };
+    let (policy, end) = Policy::of(&misfit_test.terms);
     let sequences = follow::sequences(model, &test, &policy, settings.sequences);
     let all = equally_many(&sequences);
     let mean = |touches: &dyn Fn(&Sequence) -> u64| {
         all.iter().map(|sequence| touches(sequence)).sum::<u64>() as f64 / all.len().max(1) as f64
     };
-    let with = mean(&|sequence| sequence.end(threshold, doubt, least).touches);
+    let with = mean(&|sequence| end(sequence).touches);
     Ok([with, mean(&|sequence| sequence.decided_after().into())])
 }
 
@@ -397,7 +396,7 @@ fn supply(model: &Model<'_>, touched: &ObjectTouches, seed: u64) -> Pools {
     Pools { pools: (0..).zip(touched.pools()).map(pool).collect(), is_once, is_short: false }
 }
 
-/// Those of the touches that the model takes as evidence.
+/// Touches that the model takes as evidence.
 fn evidence<'d>(model: &Model<'_>, touches: impl Iterator<Item = &'d Touch>) -> impl Iterator<Item = &'d Touch> {
     let trained = model.trained_touches();
     touches.filter(move |touch| Refused::check(&trained, touch).is_ok())

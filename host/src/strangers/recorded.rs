@@ -1,7 +1,7 @@
 //! A test that is calibrated on recordings too.
 
-use super::follow::{self, Ending, Policy, Sequence};
-use super::{NAT, Pools, Settings, Tried, equally_many, supply};
+use super::follow::{self, Policy, Sequence};
+use super::{Pools, Settings, Tried, equally_many, supply};
 use crate::calibrate::{Alarms, OnRecordings, Tally, allowed, binomial_tail, needed};
 use crate::error::{CalibrateProblem, EvaluateProblem, Result};
 use crate::evaluate::{Candidate, EnoughRecorded, OfTouches};
@@ -156,15 +156,13 @@ fn no_sequence(
 pub(super) fn alarms(model: &Model<'_>, recorded: &Dataset, settings: &Settings) -> Result<Alarms> {
     let supplies = supplies(model, recorded, settings.seed)?;
     let Some(test) = model.strangers().and_then(|strangers| strangers.test) else { return Ok(Alarms::default()) };
-    let [threshold, doubt] = [test.terms.threshold, test.terms.doubt].map(|limit| f64::from(limit) / NAT);
-    let least = test.terms.least;
-    let policy = Policy { ending: Ending::Named { level: doubt }, least };
+    let (policy, end) = Policy::of(&test.terms);
     let follow = |own: &OfRecorded| {
         follow::sequences(model, std::slice::from_ref(&own.supply), &policy, settings.sequences).into_iter().flatten()
     };
     let sequences: Vec<Vec<Sequence>> = supplies.iter().map(|own| follow(own).collect()).collect();
     let fewest = sequences.iter().map(Vec::len).min().unwrap_or(0);
-    let is_alarm = |sequence: &&Sequence| sequence.end(threshold, doubt, least).is_alarm;
+    let is_alarm = |sequence: &&Sequence| end(sequence).is_alarm;
     let count = |of: &Vec<Sequence>| of.iter().take(fewest).filter(is_alarm).count();
     let mut found = Alarms { sequences: fewest * sequences.len(), ..Alarms::default() };
     found.objects = supplies.into_iter().map(|own| own.name).zip(sequences.iter().map(count)).collect();

@@ -6,7 +6,7 @@ use crate::compile;
 use crate::error::Result;
 use crate::evaluate::Finding;
 use crate::evaluate::promise::{BY_CHANCE, at_least};
-use crate::evidence::{Chip, Given, Outcome, chip, outcome};
+use crate::evidence::{Chip, Given, Outcome, Totals, chip, outcome};
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::format::{Per, Promise};
 use palpate_trees::rows::{RowSequence, Sequences};
@@ -189,44 +189,38 @@ pub(super) fn measured(
     for (sequence, end) in sequences.iter().zip(&ends) {
         confusion[sequence.class][end.recognized.unwrap_or(names.len())] += 1;
     }
-    let all = sequences.len().max(1) as f64;
-    let share = |is: &dyn Fn(&RowSequence, &Outcome) -> bool| {
-        sequences.iter().zip(&ends).filter(|(sequence, end)| is(sequence, end)).count() as f64 / all
-    };
+    let totals = totals(sequences, &ends);
     let mut lengths: Vec<usize> = ends.iter().map(|end| end.touches).collect();
     lengths.sort_unstable();
     let groups: std::collections::BTreeSet<usize> = sequences.iter().filter_map(|sequence| sequence.group).collect();
-    let at = point(sequences, &ends);
     let is_own = wanted.error_rate.is_none() && wanted.weights.is_none() && max_rows == own.max_touches();
     Ok(Evaluated {
         sequences: sequences.len(),
         groups: (!groups.is_empty()).then_some(groups.len()),
         rows: sequences.iter().map(|sequence| sequence.rows.len()).sum(),
-        error: at.error,
-        wrong: share(&|sequence, end| end.recognized.is_some_and(|name| name != sequence.class)),
-        undecided: share(&|_, end| end.recognized.is_none() && !end.unknown),
-        unknown: share(&|_, end| end.unknown),
-        mean_rows: at.rows,
+        error: totals.error(),
+        wrong: totals.share(totals.wrong),
+        undecided: totals.share(totals.undecided()),
+        unknown: totals.share(totals.unknown),
+        mean_rows: totals.mean_touches(),
         median_rows: lengths.get(lengths.len() / 2).copied().unwrap_or(0),
         promise: model.promise().filter(|_| is_own).map(|promise| check_promise(&promise, sequences, &ends, &names)),
-        comparison: if compares { run.compared(sequences, max_rows, at) } else { Comparison::default() },
+        comparison: if compares { run.compared(sequences, max_rows, totals.error()) } else { Comparison::default() },
         confusion,
-        switched: wanted.switch.map(|nats| run.switched(sequences, stopping, nats, at.rows)),
+        switched: wanted.switch.map(|nats| run.switched(sequences, stopping, nats, totals.mean_touches())),
         grown: if compares { run.grown(sequences, &ends, stopping) } else { None },
         names,
     })
 }
 
+fn totals(sequences: &[RowSequence], ends: &[Outcome]) -> Totals {
+    Totals::of(sequences.iter().map(|sequence| sequence.class).zip(ends.iter().copied()))
+}
+
 /// Names, errors and rows of sequences.
 fn point(sequences: &[RowSequence], ends: &[Outcome]) -> Point {
-    let (mut given, mut wrong, mut rows) = (0_u64, 0_u64, 0_u64);
-    for (sequence, end) in sequences.iter().zip(ends) {
-        given += u64::from(end.recognized.is_some());
-        wrong += u64::from(end.recognized.is_some_and(|name| name != sequence.class));
-        rows += end.touches as u64;
-    }
-    let all = sequences.len().max(1) as f64;
-    Point { rows: rows as f64 / all, error: wrong as f64 / given.max(1) as f64, named: given as f64 / all }
+    let totals = totals(sequences, ends);
+    Point { rows: totals.mean_touches(), error: totals.error(), named: totals.share(totals.given) }
 }
 
 /// Holds a promise against the ends of sequences.
@@ -248,7 +242,7 @@ fn check_promise(
         let unit = case.entry(sequence.group.filter(|_| promise.groups).unwrap_or(number)).or_default();
         unit.all += 1.0;
         unit.named += f64::from(u8::from(end.recognized.is_some()));
-        unit.wrong += f64::from(u8::from(end.recognized.is_some_and(|name| name != sequence.class)));
+        unit.wrong += f64::from(u8::from(end.is_wrong(sequence.class)));
     }
     let found: Vec<(f64, f64)> = units.iter().map(|units| Unit::error(units, promise)).collect();
     let is_above = |(error, _): &&(f64, f64)| *error > promise.rate;
@@ -323,7 +317,7 @@ impl Run<'_> {
     }
 
     /// The curves of early stopping, of fixed numbers of rows, and of votes.
-    fn compared(&self, sequences: &[RowSequence], max_rows: u32, own: Point) -> Comparison {
+    fn compared(&self, sequences: &[RowSequence], max_rows: u32, own: f64) -> Comparison {
         let [strict, loose] = CURVE;
         let thresholds = (0..THRESHOLDS).map(|step| strict - (strict - loose) * step as f64 / (THRESHOLDS - 1) as f64);
         let early = thresholds.map(|margin| {
@@ -366,7 +360,7 @@ impl Run<'_> {
         let of = |(wrong, rows): (u64, u64)| Point { rows: rows as f64 / all, error: wrong as f64 / all, named: 1.0 };
         let fixed: Vec<Point> = wrong.iter().map(|of| (of.0, of.2)).map(of).collect();
         let vote: Vec<Point> = wrong.iter().map(|of| (of.1, of.2)).map(of).collect();
-        let least = |points: &[Point]| points.iter().find(|point| point.error <= own.error).map(|point| point.rows);
+        let least = |points: &[Point]| points.iter().find(|point| point.error <= own).map(|point| point.rows);
         let (fixed_rows, vote_rows) = (least(&fixed), least(&vote));
         let shown = |points: Vec<Point>| numbers.iter().map(|number| points[number - 1]).collect();
         Comparison { early, fixed: shown(fixed), vote: shown(vote), fixed_rows, vote_rows }

@@ -19,7 +19,7 @@
 //! the other three quarters alone.
 //!
 //! Without groups sequences must be independent of each other; the test is binomial. With groups, such as persons or machines,
-//! the promise is for new groups, and the test is a bet ([`choose_groups`](crate::calibrate::choose_groups)).
+//! the promise is for new groups, and the test is a bet (Waudby-Smith and Ramdas, 2024).
 
 #[cfg(feature = "train")]
 mod background;

@@ -2,6 +2,7 @@
 
 use super::Rows;
 use crate::calibrate::{Gain, Lead, Odds, Sequence, odds_of};
+use crate::evidence::totals;
 use palpate_onboard::Model;
 use palpate_shared::format::{RowEvidence, Shifts, Weights};
 use palpate_trees::rows::RowSequence;
@@ -291,7 +292,7 @@ fn best_weight(cases: &[&[f64]]) -> f64 {
 }
 
 /// Sequences under a shape, reduced to what a comparison of thresholds needs.
-fn looks(rows: &Rows<'_>, sequences: &[&RowSequence], shape: &Shape, max_rows: u32) -> Vec<Sequence> {
+fn followed(rows: &Rows<'_>, sequences: &[&RowSequence], shape: &Shape, max_rows: u32) -> Vec<Sequence> {
     let of = |sequence: &&RowSequence| {
         let mut followed = Sequence::new(sequence.class);
         sums(rows, sequence, shape.table.as_ref(), |count, sums| {
@@ -320,16 +321,9 @@ fn rows_at(sequences: &[Sequence], rate: f64) -> Option<f64> {
     let rate = rate.max(2.0 / sequences.len().max(1) as f64);
     let margins = (1..).map(|step| STEP * f64::from(step)).take_while(|margin| *margin < ROOM);
     margins.into_iter().find_map(|margin| {
-        let odds = Odds::All(odds_of(margin));
-        let (mut wrong, mut given, mut rows) = (0_u64, 0_u64, 0_u64);
-        for sequence in sequences {
-            let look = sequence.given(&odds);
-            given += u64::from(look.is_some());
-            wrong += u64::from(look.is_some_and(|look| look.name != sequence.object));
-            rows += u64::from(look.map_or(sequence.touches, |look| look.touches));
-        }
-        let is_kept = given > 0 && wrong as f64 <= rate * given as f64;
-        is_kept.then(|| rows as f64 / sequences.len() as f64)
+        let totals = totals(sequences, &Odds::All(odds_of(margin)));
+        let is_kept = totals.given > 0 && totals.wrong as f64 <= rate * totals.given as f64;
+        is_kept.then(|| totals.mean_touches())
     })
 }
 
@@ -343,7 +337,7 @@ pub(super) fn fit(rows: &Rows<'_>, sequences: &[&RowSequence], rate: f64, max_ro
     let halves = sequences.split_at(sequences.len() / 2);
     let folds = [(halves.0, halves.1), (halves.1, halves.0)];
     let measured = |shape: &dyn Fn(&[&RowSequence]) -> Shape| {
-        let of = folds.iter().flat_map(|(fit, test)| looks(rows, test, &shape(fit), max_rows));
+        let of = folds.iter().flat_map(|(fit, test)| followed(rows, test, &shape(fit), max_rows));
         rows_at(&of.collect::<Vec<_>>(), rate)
     };
     let tables = folds.map(|(fit, _)| Table::fit(rows, fit));

@@ -4,7 +4,7 @@ use super::active::Active;
 use crate::error::{Error, Result};
 use crate::evaluate::margins::Margins;
 use crate::evaluate::{Estimate, Evaluation, Settings};
-use crate::evidence::{Counted, Outcome};
+use crate::evidence::Counted;
 use palpate_onboard::Stopping;
 use rayon::prelude::*;
 
@@ -30,17 +30,13 @@ pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settin
         return Err(Error::setting("at", 0, "numbers of touches of at least 1"));
     }
     let positions = 0..margins.tested.len();
-    let counts: Vec<Counts> = positions.clone().map(|position| margins.counts(active, position, settings)).collect();
+    let counts: Vec<Counts> = positions.map(|position| margins.counts(active, position, settings)).collect();
     let share = |counts: &Vec<usize>| counts.iter().map(|&count| Estimate::share(count, *groups)).collect();
     let by_touches: Vec<Vec<Estimate>> = counts.iter().map(|counts| share(&counts.touches)).collect();
     let by_approaches: Vec<Vec<Estimate>> = counts.iter().map(|counts| share(&counts.approaches)).collect();
     let used = counts.iter().map(|counts| counts.made[1] as f64 / counts.made[0].max(1) as f64).collect();
-    let outcomes: Vec<Vec<Outcome>> = positions
-        .map(|position| {
-            let run = |group| margins.active_outcome(active, (position, group), (rule, *seed));
-            (0..*groups).into_par_iter().map(run).collect()
-        })
-        .collect();
+    let run = |position, group| margins.active_outcome(active, (position, group), (rule, *seed));
+    let outcomes = margins.each(*groups, run);
     let figures = |outcomes, in_approaches| {
         margins.of_outcomes(outcomes, margins.stated(&settings.sequences(), rule), rule.max_touches(), in_approaches)
     };
