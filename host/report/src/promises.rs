@@ -49,7 +49,7 @@ struct Promised {
     uncalibrated: Stopped,
     /// Promised on average.
     average: Option<Stopped>,
-    /// The same of the limit.
+    /// Results of the limit, under the same promise.
     limit: Option<Stopped>,
     /// Promised of each name, and of each object; `error` is that of the worst.
     name: Option<Stopped>,

@@ -820,7 +820,7 @@ fn every_candidate_of_every_model_costs_what_it_takes_once_it_is_written_and_the
     }
 }
 
-/// LightGBM's text of a tree over so many columns, of which it splits on two, with these names or none.
+/// LightGBM's text of a tree over this many columns that splits on two of them, with these names or none.
 fn many_columns(columns: usize, name: impl Fn(usize) -> String) -> String {
     let names: Vec<String> = (0..columns).map(name).collect();
     format!(

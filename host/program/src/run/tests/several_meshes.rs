@@ -9,7 +9,7 @@ use palpate::mesh::{Instance, Mesh};
 struct Share(f64, f64);
 
 impl Share {
-    /// Of so many independent cases.
+    /// A share of so many independent cases, with its standard error.
     fn of(value: f64, cases: f64) -> Self {
         // One that is 0 or 1 is not known exactly.
         let spread = value.clamp(1.0 / (cases + 2.0), 1.0 - 1.0 / (cases + 2.0));
