@@ -65,7 +65,8 @@ fn bound(forest: &Forest<'_>, object: usize, scale: &Scale) -> f64 {
     // What f32 sums lose: half an ulp of the largest partial sum at each addition, or nothing at all while they are
     // whole numbers of a power of two that f32 holds.
     let range = forest.range(object);
-    if bound == 0.0 && unit.to_bits().trailing_zeros() >= f64::MANTISSA_DIGITS - 1 && range / unit <= f64::from(1 << 24) {
+    if bound == 0.0 && unit.to_bits().trailing_zeros() >= f64::MANTISSA_DIGITS - 1 && range / unit <= f64::from(1 << 24)
+    {
         return 0.0;
     }
     bound + forest.trees_of(object).count() as f64 * range * f64::from(f32::EPSILON) / 2.0

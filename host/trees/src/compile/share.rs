@@ -1,12 +1,9 @@
 //! Equal leaves once: what stands for a leaf is its number in a table.
 
-use super::groups::leaves_of_trees;
+use super::groups::groups_and_splits;
 use super::parts::Parts;
-use crate::error::Result;
 use palpate_onboard::Model;
-use palpate_shared::format::{
-    CHECKSUM_LENGTH, Group, HEADER_LENGTH, HeaderBuilder, LeafType, SECTION_HEADER_LENGTH, SharedLeaves, Tag, checksum,
-};
+use palpate_shared::format::{Group, LeafType, SECTION_HEADER_LENGTH, SharedLeaves};
 use std::collections::{HashMap, HashSet};
 
 /// The most leaves that two bytes number.
@@ -68,48 +65,10 @@ pub(super) fn share(mut parts: Parts, leaf: LeafType) -> Parts {
     parts
 }
 
-/// The bytes of a model whose leaves are shared, with every leaf's values where the leaf is; `None` if they are there already.
-/// Its margins are the same.
-///
-/// # Errors
-/// [`CompileProblem`](crate::error::CompileProblem) for more than 4 GB.
-pub(crate) fn unshared(model: &Model<'_>) -> Result<Option<Vec<u8>>> {
-    let Some(shared) = model.shared_leaves() else { return Ok(None) };
-    let (bytes, header) = (model.bytes(), model.header());
-    let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
-    let end = bytes.len() - CHECKSUM_LENGTH;
-    let numbers = &bytes[end - length(header.leaves_length())..end];
-    let mut leaves = Vec::new();
-    let mut index = 0;
-    for (group, trees) in leaves_of_trees(model) {
-        let values = if group.object.is_some() { 1 } else { model.object_count() };
-        let length = values * model.leaf_type().size();
-        for _ in 0..trees.into_iter().sum() {
-            let start = usize::from(shared.number(numbers, index)) * length;
-            leaves.extend_from_slice(&shared.values()[start..start + length]);
-            index += 1;
-        }
-    }
-    let text_end = HEADER_LENGTH + length(header.text_length());
-    let mut sections = Vec::new();
-    let others = model.optional_sections().filter(|section| section.tag != Tag::SharedLeaves.code());
-    others.for_each(|section| section.write(&mut |part| sections.extend_from_slice(part)));
-    let rest = &bytes[text_end + length(header.optional_length())..end - numbers.len()];
-    let mut all = [&bytes[..text_end], &sections, rest, &leaves].concat();
-    let header = HeaderBuilder::from(header)
-        .with_length(super::write::count(all.len() + CHECKSUM_LENGTH)?)
-        .with_sections(super::write::count(sections.len())?)
-        .with_leaves_length(super::write::count(leaves.len())?);
-    all[..HEADER_LENGTH].copy_from_slice(header.bytes());
-    let sum = checksum(&all);
-    all.extend(sum.to_le_bytes());
-    Ok(Some(all))
-}
-
 /// Number of leaves in a model's table; `None` if its leaves are where they belong. Where some have one value and some
 /// one for each object, how many values.
 pub fn different_leaves(model: &Model<'_>) -> Option<usize> {
     let values = model.shared_leaves()?.values().len() / model.leaf_type().size();
-    let has_one_for_each = leaves_of_trees(model).iter().all(|(group, _)| group.object.is_none());
+    let has_one_for_each = groups_and_splits(model).0.iter().all(|group| group.object.is_none());
     Some(if has_one_for_each { values / model.object_count() } else { values })
 }

@@ -2,8 +2,8 @@
 //! made at every threshold.
 
 mod candidate;
+mod different;
 mod estimate;
-mod isolated;
 pub mod predict;
 mod reference;
 mod score;
@@ -20,7 +20,7 @@ use crate::ensemble::{Ensemble, Threshold};
 use crate::error::{Result, RowsProblem};
 use crate::progress::{self, Progress};
 use crate::rows::{Encoder, Rows, ValueDiffers, generate};
-use isolated::first_different_tree;
+use different::first_different_tree;
 use palpate_onboard::Model;
 use predict::class_by;
 use rayon::prelude::*;
