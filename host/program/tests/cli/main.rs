@@ -32,4 +32,4 @@ mod table;
 mod teach;
 mod view;
 
-use support::{command, globe, json, listing, run, stderr, stdout};
+use support::{command, fails, globe, json, listing, palpate, run, stderr, stdout, succeeds, touches};

@@ -1,10 +1,9 @@
 //! The commands that make and measure models, as a user calls them: train, tune, evaluate.
 
-use crate::{command, stderr, stdout};
+use crate::{fails, succeeds};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::Output;
 
 /// A directory of touches of two objects: one bends by up to 0.1 s, the other by up to 0.2 s.
 fn touches(directory: &Path) {
@@ -22,24 +21,6 @@ fn touches(directory: &Path) {
         });
         std::fs::write(directory.join(format!("{name}.txt")), text).unwrap();
     }
-}
-
-fn palpate(directory: &Path, arguments: &[&str]) -> Output {
-    command(arguments).current_dir(directory).output().unwrap()
-}
-
-#[track_caller]
-fn succeeds(directory: &Path, arguments: &[&str]) -> String {
-    stdout(palpate(directory, arguments))
-}
-
-/// Runs and fails with this exit code; the message must contain `expected`.
-#[track_caller]
-fn fails(directory: &Path, arguments: &[&str], code: i32, expected: &str) {
-    let output = palpate(directory, arguments);
-    assert!(output.stdout.is_empty());
-    let message = stderr(output, code);
-    assert!(message.contains(expected), "{message}");
 }
 
 fn set_up() -> tempfile::TempDir {

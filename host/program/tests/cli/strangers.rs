@@ -1,41 +1,19 @@
 //! Objects that a model does not know: from shapes to figures, as a user does it.
 
-use crate::{command, stderr, stdout};
+use crate::{palpate, stderr, stdout, succeeds};
 use serde_json::Value;
-use std::fmt::Write as _;
 use std::path::Path;
-use std::process::Output;
 
 /// Touches of objects that bend by up to so many microseconds; other seeds are other touches.
 fn touches(directory: &Path, objects: &[(&str, u64)], count: u64, seed: u64) {
     std::fs::create_dir(directory).unwrap();
     for &(name, most) in objects {
-        // A small generator, so that sequences are not in any order.
-        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ most;
-        let mut random = |range: u64| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) % range
-        };
-        let text = (0..count).fold(String::new(), |mut text, _| {
-            let (slope, bend) = (random(300_000), random(most) / 2 + random(most) / 2);
-            let times = [0, slope / 2 + bend, slope].map(|micros| micros as f64 * 1e-6);
-            _ = writeln!(text, "{:.6} {:.6} {:.6}", times[0], times[1], times[2]);
-            text
-        });
-        std::fs::write(directory.join(format!("{name}.txt")), text).unwrap();
+        crate::touches(&directory.join(format!("{name}.txt")), [most, count, seed], false, "");
     }
 }
 
 const KNOWN: [(&str, u64); 2] = [("bowl", 100_000), ("fork", 200_000)];
 const SHAPES: [(&str, u64); 3] = [("shape-a", 50_000), ("shape-b", 400_000), ("shape-c", 700_000)];
-
-fn palpate(directory: &Path, arguments: &[&str]) -> Output {
-    command(arguments).current_dir(directory).output().unwrap()
-}
-
-fn succeeds(directory: &Path, arguments: &[&str]) -> String {
-    stdout(palpate(directory, arguments))
-}
 
 #[test]
 fn a_stranger_is_unknown_to_a_model_that_was_calibrated_for_strangers() {

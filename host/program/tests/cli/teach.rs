@@ -1,28 +1,13 @@
 //! Objects that are learned from recorded touches: `palpate train --teach`.
 
-use crate::{command, stderr, stdout};
+use crate::{palpate, stderr, stdout, succeeds};
 use serde_json::Value;
-use std::fmt::Write as _;
 use std::path::Path;
-use std::process::Output;
 
 /// Touches of an object that bends by up to so many microseconds; some miss a finger.
 fn touches(path: &Path, most: u64, count: u64, seed: u64, pose: &str) {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ most;
-    let mut random = |range: u64| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) % range
-    };
-    let text = (0..count).fold(String::new(), |mut text, _| {
-        let (slope, bend) = (random(300_000), random(most) / 2 + random(most) / 2);
-        let times = [0, slope / 2 + bend, slope].map(|micros| format!("{:.6}", micros as f64 * 1e-6));
-        let missing = random(10);
-        let field = |finger: u64| if finger == missing { "-" } else { times[finger as usize].as_str() };
-        _ = writeln!(text, "{} {} {}{pose}", field(0), field(1), field(2));
-        text
-    });
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-    std::fs::write(path, text).unwrap();
+    crate::touches(path, [most, count, seed], true, pose);
 }
 
 const POSE: &str = " 0 0 1 1 0 0";
@@ -41,21 +26,9 @@ fn set_up(pose: &str) -> tempfile::TempDir {
     directory
 }
 
-fn palpate(directory: &Path, arguments: &[&str]) -> Output {
-    command(arguments).current_dir(directory).output().unwrap()
-}
-
-#[track_caller]
-fn succeeds(directory: &Path, arguments: &[&str]) -> String {
-    stdout(palpate(directory, arguments))
-}
-
 #[track_caller]
 fn fails(directory: &Path, arguments: &[&str], code: i32, expected: &str) {
-    let output = palpate(directory, arguments);
-    assert!(output.stdout.is_empty());
-    let message = stderr(output, code);
-    assert!(message.contains(expected), "{message}");
+    crate::fails(directory, arguments, code, expected);
     assert!(!directory.join("t.json").exists(), "something was written");
 }
 

@@ -62,7 +62,7 @@ impl Instructions {
     }
 
     /// The most instructions that margins take, if features lead the longest way through every tree.
-    pub fn of_longest_ways(model: &Model<'_>) -> Self {
+    pub(crate) fn of_longest_ways(model: &Model<'_>) -> Self {
         Self::with_steps(model, f64::max)
     }
 

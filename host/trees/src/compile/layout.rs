@@ -28,7 +28,7 @@ pub(super) struct Layouts<'f> {
 }
 
 impl<'f> Layouts<'f> {
-    /// Needs of the layouts that are asked for.
+    /// Finds the facts that the layouts asked for are costed from.
     pub(super) fn new(forest: &Forest<'f>, settings: &Settings, stated: &Statements) -> Self {
         let (objects, leaf) = (forest.objects(), settings.leaf);
         let cells = Cells::new(forest);

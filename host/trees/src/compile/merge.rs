@@ -193,6 +193,7 @@ fn balanced<'a>(cuts: &[i32], values: &[f32], feature: u8, missing_left: bool, o
 
 #[cfg(test)]
 mod tests {
+    use super::super::groups::groups_and_splits;
     use super::super::{Leaf, Settings, compile, open};
     use crate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
     use palpate_shared::MISSING_FEATURE;
@@ -299,7 +300,7 @@ mod tests {
     fn the_household_model_has_nothing_to_merge() {
         let bytes = include_bytes!("../../../../models/household.palpate");
         let model = open(bytes).unwrap();
-        let trees = super::super::leaves_of_trees(&model);
-        assert!(trees.iter().all(|(group, _)| group.object.is_none()), "a leaf has a value for each object");
+        let groups = groups_and_splits(&model).0;
+        assert!(groups.iter().all(|group| group.object.is_none()), "a leaf has a value for each object");
     }
 }

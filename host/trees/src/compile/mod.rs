@@ -69,13 +69,12 @@ pub use cost::{Core, Instructions, Memory};
 pub use early::{EarlyExit, EarlyExitFound};
 pub use emit::{Language, emit, emit_code};
 pub use error::CompileProblem;
-pub(crate) use groups::{ends_of_walks, leaves_of_trees};
 pub(crate) use merge::Source;
-pub use model::{CompiledModel, names, open, open_with_code, thresholds};
+pub(crate) use model::open_with_code;
+pub use model::{CompiledModel, names, open, thresholds};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
 pub use share::different_leaves;
-pub(crate) use share::unshared;
 
 use crate::ensemble::Ensemble;
 use crate::error::{Error, Result};

@@ -104,7 +104,7 @@ pub(super) fn open_any(bytes: &[u8]) -> Result<Model<'_>> {
 ///
 /// # Errors
 /// As [`open`]; for a model of another layout.
-pub fn open_with_code(bytes: &[u8]) -> Result<Model<'_>> {
+pub(crate) fn open_with_code(bytes: &[u8]) -> Result<Model<'_>> {
     Model::with_code(bytes, |_, _| {}).map_err(|error| CompileProblem::Model(error).into())
 }
 

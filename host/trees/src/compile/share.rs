@@ -1,11 +1,9 @@
 //! Equal leaves once: what stands for a leaf is its number in a table.
 
-use super::container::Container;
-use super::groups::leaves_of_trees;
+use super::groups::groups_and_splits;
 use super::parts::Parts;
-use crate::error::Result;
 use palpate_onboard::Model;
-use palpate_shared::format::{Group, LeafType, SECTION_HEADER_LENGTH, SharedLeaves, Tag};
+use palpate_shared::format::{Group, LeafType, SECTION_HEADER_LENGTH, SharedLeaves};
 use std::collections::{HashMap, HashSet};
 
 /// The most leaves that two bytes number.
@@ -67,37 +65,10 @@ pub(super) fn share(mut parts: Parts, leaf: LeafType) -> Parts {
     parts
 }
 
-/// The bytes of a model whose leaves are shared, with every leaf's values where the leaf is; `None` if they are there already.
-/// Its margins are the same.
-///
-/// # Errors
-/// [`CompileProblem`](crate::error::CompileProblem) for more than 4 GB.
-pub(crate) fn unshared(model: &Model<'_>) -> Result<Option<Vec<u8>>> {
-    let Some(shared) = model.shared_leaves() else { return Ok(None) };
-    let mut container = Container::of(model);
-    let length = usize::try_from(model.header().leaves_length()).unwrap_or(usize::MAX);
-    let numbers = container.content.split_off(container.content.len() - length);
-    let mut leaves = Vec::new();
-    let mut index = 0;
-    for (group, trees) in leaves_of_trees(model) {
-        let values = if group.object.is_some() { 1 } else { model.object_count() };
-        let length = values * model.leaf_type().size();
-        for _ in 0..trees.into_iter().sum() {
-            let start = usize::from(shared.number(&numbers, index)) * length;
-            leaves.extend_from_slice(&shared.values()[start..start + length]);
-            index += 1;
-        }
-    }
-    container.header = container.header.with_leaves_length(super::write::count(leaves.len())?);
-    container.sections.retain(|section| section.tag != Tag::SharedLeaves.code());
-    container.content.extend(leaves);
-    Ok(Some(container.bytes()?))
-}
-
 /// Number of leaves in a model's table; `None` if its leaves are where they belong. Where some have one value and some
 /// one for each object, how many values.
 pub fn different_leaves(model: &Model<'_>) -> Option<usize> {
     let values = model.shared_leaves()?.values().len() / model.leaf_type().size();
-    let has_one_for_each = leaves_of_trees(model).iter().all(|(group, _)| group.object.is_none());
+    let has_one_for_each = groups_and_splits(model).0.iter().all(|group| group.object.is_none());
     Some(if has_one_for_each { values / model.object_count() } else { values })
 }

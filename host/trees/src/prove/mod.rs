@@ -34,6 +34,8 @@ use crate::verify::unit;
 use boxes::{Keys, Rows, Tree, Values, of_ensemble};
 use chip::Chip;
 use format::Plain;
+use palpate_onboard::Model;
+use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{LeafType, Link, f32_key};
 
 /// Result of a proof.
@@ -98,7 +100,7 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
     let found = if chip.is_table() {
         tables::of_chip(&chip, subject)?
     } else {
-        trees::of_chip(&chip, subject, &subject.order(model.leaf_type(), &compile::ends_of_walks(&model), None)?)?
+        trees::of_chip(&chip, subject, &plain.order(ensemble, model.leaf_type(), None)?)?
     };
     let mut proof = subject.proof(&found);
     if proof.margin_error > proof.stated
@@ -125,8 +127,7 @@ pub fn prove_code(bytes: &[u8], code: &str, ensemble: &Ensemble, file: &[u8]) ->
     statements(&plain, ensemble)?;
     let sources = of_ensemble(ensemble, &plain.keys)?;
     let subject = Subject { plain: &plain, sources: &sources, ensemble };
-    let ends: Vec<usize> = read.exits.iter().map(|exit| exit.0).collect();
-    let order = subject.order(model.leaf_type(), &ends, Some(read.chip))?;
+    let order = plain.order(ensemble, model.leaf_type(), Some(read.chip))?;
     let found = trees::of_code(subject, &order, true)?;
     let proof = Proof { instructions: Some(read.instructions), ..subject.proof(&found) };
     let Found { trees, table, outputs, .. } = found;
@@ -256,6 +257,52 @@ fn holds(certificate: &Certificate, found: &Found, ensemble: &Ensemble) -> Resul
     Ok(())
 }
 
+/// For each tree of a model the trees of the ensemble that it should stand for, the size of a step of its leaves, and the
+/// values of the leaf that a row of keys reaches.
+///
+/// # Errors
+/// [`ProofProblem`] if the bytes cannot be read, or the model has another number of trees than it should.
+pub(crate) fn leaves_at(
+    model: &Model<'_>,
+    ensemble: &Ensemble,
+    row: &[i32],
+) -> Result<Vec<(Source, f64, Vec<f64>)>, ProofProblem> {
+    let plain = format::read(model.bytes())?;
+    let order = plain.order(ensemble, model.leaf_type(), None)?;
+    if order.len() != plain.trees.len() {
+        return Err(ProofProblem::Trees { what: format!("{} and not {}", plain.trees.len(), order.len()) });
+    }
+    let key = |key: &i32| match Values::of((*key).into(), (*key).into(), false) {
+        values if *key == MISSING_FEATURE || plain.is_sentinel(&values) => Values::MISSING,
+        values => values,
+    };
+    let mut row: Vec<Values> = row.iter().map(key).collect();
+    let mut leaf = |(source, (tree, step)): (Source, &(Tree, f64))| {
+        let mut values = Vec::new();
+        tree.leaves(&mut row, &mut |leaf, _| {
+            values = leaf.to_vec();
+            Ok::<(), ProofProblem>(())
+        })?;
+        Ok((source, *step, values))
+    };
+    order.into_iter().zip(&plain.trees).map(&mut leaf).collect()
+}
+
+impl Plain {
+    /// Trees of the ensemble that each tree of the model should stand for, or each tree of assembly for a chip.
+    fn order(
+        &self,
+        ensemble: &Ensemble,
+        leaf: LeafType,
+        chip: Option<code::Chip>,
+    ) -> Result<Vec<Source>, ProofProblem> {
+        let scales = if let Keys::Scaled(scales) = &self.keys { Some(scales.as_slice()) } else { None };
+        let ends: Vec<usize> = self.exits.iter().map(|exit| exit.trees).collect();
+        let order = compile::order(ensemble, leaf, scales, &ends, chip);
+        order.map_err(|error| ProofProblem::Trees { what: error.to_string() })
+    }
+}
+
 /// A model's meaning, and the ensemble that it is compared with.
 #[derive(Clone, Copy)]
 struct Subject<'s> {
@@ -266,13 +313,6 @@ struct Subject<'s> {
 }
 
 impl Subject<'_> {
-    /// Trees of the ensemble that each tree of the model should stand for.
-    fn order(self, leaf: LeafType, ends: &[usize], chip: Option<code::Chip>) -> Result<Vec<Source>, ProofProblem> {
-        let scales = if let Keys::Scaled(scales) = &self.plain.keys { Some(scales.as_slice()) } else { None };
-        let order = compile::order(self.ensemble, leaf, scales, ends, chip);
-        order.map_err(|error| ProofProblem::Trees { what: error.to_string() })
-    }
-
     fn proof(self, found: &Found) -> Proof {
         let Self { plain, ensemble, .. } = self;
         let largest = found.trees.iter().map(|tree| tree.error).fold(found.table.unwrap_or(0.0), f64::max);

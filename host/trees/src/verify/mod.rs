@@ -2,8 +2,8 @@
 //! made at every threshold.
 
 mod candidate;
+mod different;
 mod estimate;
-mod isolated;
 pub mod predict;
 mod reference;
 mod score;
@@ -19,7 +19,7 @@ pub use score::{Classes, Regression, RowsEvaluation, evaluate_rows};
 use crate::ensemble::{Ensemble, Threshold};
 use crate::error::{Result, RowsProblem};
 use crate::rows::{Encoder, Rows, ValueDiffers, generate};
-use isolated::first_different_tree;
+use different::first_different_tree;
 use palpate_base::progress::{self, Progress};
 use palpate_onboard::Model;
 use predict::class_by;

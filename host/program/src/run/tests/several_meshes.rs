@@ -4,23 +4,17 @@ use crate::run::*;
 use palpate::evaluate::SequentialSettings;
 use palpate::mesh::{Instance, Mesh};
 
-/// A share, and its standard error.
-#[derive(Clone, Copy, Debug)]
-struct Share(f64, f64);
+/// Standard error of a share of this many independent cases.
+fn standard_error(value: f64, cases: f64) -> f64 {
+    // A share of 0 or 1 is not known exactly.
+    let spread = value.clamp(1.0 / (cases + 2.0), 1.0 - 1.0 / (cases + 2.0));
+    (spread * (1.0 - spread) / cases).sqrt()
+}
 
-impl Share {
-    /// A share of so many independent cases, with its standard error.
-    fn of(value: f64, cases: f64) -> Self {
-        // One that is 0 or 1 is not known exactly.
-        let spread = value.clamp(1.0 / (cases + 2.0), 1.0 - 1.0 / (cases + 2.0));
-        Self(value, (spread * (1.0 - spread) / cases).sqrt())
-    }
-
-    /// That of another one within three standard errors of the difference.
-    fn agrees(self, what: &str, measured: Self) {
-        let error = self.1.hypot(measured.1);
-        assert!((self.0 - measured.0).abs() <= 3.0 * error, "{what}: {self:?} stated, {measured:?} measured");
-    }
+/// Two shares, each with its cases, are within three standard errors of their difference.
+fn agree(what: &str, stated: [f64; 2], measured: [f64; 2]) {
+    let [a, b] = [stated, measured].map(|[value, cases]| standard_error(value, cases));
+    assert!((stated[0] - measured[0]).abs() <= 3.0 * a.hypot(b), "{what}: {stated:?} stated, {measured:?} measured");
 }
 
 /// The cases that groups of `length` of `touches` touches make: as many as do not share any.
@@ -69,12 +63,11 @@ fn what_a_run_states_is_what_its_model_does() {
     let sequences = SequentialSettings { error_rate: None, max_touches: None, sequences: 500, seed: 9 };
     let measured = margins.approaches(&[20], &sequences).unwrap();
     let stated = summary.ours.evaluation.approaches.unwrap();
-    Share::of(stated.accuracy[&20], cases(900, 900, 20.0))
-        .agrees("run, accuracy", Share::of(measured.accuracy[&20], cases(1_500, 18_000, 20.0)));
+    let of_20 = [stated.accuracy[&20], cases(900, 900, 20.0)];
+    agree("run, accuracy", of_20, [measured.accuracy[&20], cases(1_500, 18_000, 20.0)]);
     let (own, other) = (&stated.sequential, &measured.sequential);
-    Share::of(own.error, cases(900, 900, own.mean().value))
-        .agrees("run, wrong names", Share::of(other.error, cases(1_500, 18_000, other.mean().value)));
+    let (own_cases, cases) = (cases(900, 900, own.mean().value), cases(1_500, 18_000, other.mean().value));
+    agree("run, wrong names", [own.error, own_cases], [other.error, cases]);
     let promised = summary.ours.calibration.ok_or(summary.ours.uncalibrated).unwrap();
-    let measured = Share::of(other.error, cases(1_500, 18_000, other.mean().value));
-    assert!(measured.0 <= promised.promised + 3.0 * measured.1, "{measured:?}");
+    assert!(other.error <= promised.promised + 3.0 * standard_error(other.error, cases), "{}", other.error);
 }

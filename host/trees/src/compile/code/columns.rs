@@ -2,7 +2,6 @@
 
 use super::super::axes::{Axes, visit};
 use super::super::forest::Forest;
-use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Columns as Directions, Key};
 use std::collections::BTreeMap;
 
@@ -80,8 +79,9 @@ impl Column {
     }
 
     /// The number of a feature's key.
+    #[cfg(test)]
     pub(super) fn rank(&self, key: i32) -> u8 {
-        if key == MISSING_FEATURE {
+        if key == palpate_shared::MISSING_FEATURE {
             return if self.missing_left { 0 } else { u8::MAX };
         }
         match self.kind {

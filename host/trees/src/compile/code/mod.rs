@@ -17,7 +17,7 @@ pub use program::Program;
 pub(super) use program::Statements;
 pub use thumb::Chip;
 
-use super::cost::{Core, Instructions};
+use super::cost::Instructions;
 use serde::Serialize;
 
 /// A form of code that a program is written in.
@@ -74,11 +74,6 @@ impl Program {
         }
     }
 
-    /// Size and speed in every form.
-    pub fn costs(&self) -> Vec<CodeCost> {
-        Form::ALL.map(|form| self.cost(form)).into()
-    }
-
     /// The trees in the order of assembly, and what the base has instead of each, in units.
     pub(super) fn in_assembly(&self, chip: Chip) -> Vec<(usize, i32)> {
         thumb::order(self, chip)
@@ -108,12 +103,5 @@ impl Program {
     /// The function in C that opens the model with its trees.
     pub(super) fn c_opening(&self, name: &str) -> String {
         c::opening(self, name)
-    }
-}
-
-impl CodeCost {
-    /// Instructions on a processor; `None` where the form is not for it.
-    pub fn on(&self, core: Core) -> Option<u64> {
-        self.instructions.on(core)
     }
 }

@@ -124,7 +124,8 @@ impl Program {
     }
 
     /// The class of a row of keys, as the code finds it: from no more trees than it takes.
-    pub fn class(&self, keys: &[i32]) -> usize {
+    #[cfg(test)]
+    pub(super) fn class(&self, keys: &[i32]) -> usize {
         let ranks = self.ranks(keys);
         let mut margins = self.base.clone();
         for (trees, bound) in self.parts() {
@@ -144,13 +145,8 @@ impl Program {
     }
 
     /// Number of objects.
-    pub fn objects(&self) -> usize {
+    pub(super) fn objects(&self) -> usize {
         self.base.len()
-    }
-
-    /// Number of trees.
-    pub fn trees(&self) -> usize {
-        self.trees.len()
     }
 
     /// The trees of one object, and those with a value for each.
@@ -181,7 +177,8 @@ impl Program {
     }
 
     /// Margins of a row of keys (missing: the least number), as the code computes them.
-    pub fn margins(&self, keys: &[i32]) -> Vec<i32> {
+    #[cfg(test)]
+    pub(super) fn margins(&self, keys: &[i32]) -> Vec<i32> {
         let ranks = self.ranks(keys);
         let mut margins = self.base.clone();
         for tree in &self.trees {
@@ -191,6 +188,7 @@ impl Program {
     }
 
     /// The rank of every column.
+    #[cfg(test)]
     pub(super) fn ranks(&self, keys: &[i32]) -> Vec<u8> {
         let missing = palpate_shared::MISSING_FEATURE;
         let known = |key: i32| self.sentinel.map_or(key, |sentinel| sentinel.or_missing(key));
@@ -199,6 +197,7 @@ impl Program {
     }
 }
 
+#[cfg(test)]
 impl CodeTree {
     /// Adds the leaf that is reached.
     pub(super) fn add(&self, ranks: &[u8], margins: &mut [i32]) {

@@ -1,5 +1,6 @@
 //! Code against the layouts of data: to the bit, on this machine and on emulated chips.
 
+use super::super::groups::groups_and_splits;
 use super::super::{Leaf, Settings, compile, emit_code, open};
 use super::{Chip, Form, Program};
 use crate::compile::{Compiled, EarlyExit, Language, Layout};
@@ -418,8 +419,12 @@ fn rows_decide_where_walks_may_end_and_models_without_a_place_are_as_before() {
     let with = of(&case.ensemble, Some(EarlyExit::IfItPays(some.clone())));
     let found = with.early_exit.clone().unwrap();
     assert!(!found.ends.is_empty() && found.walked.unwrap() < 0.95 * found.trees as f64, "{found:?}");
-    let places: Vec<usize> = crate::compile::ends_of_walks(&open(&with.bytes).unwrap());
-    assert_eq!(places, found.ends);
+    let model = open(&with.bytes).unwrap();
+    let groups = groups_and_splits(&model).0;
+    let trees = |exit: palpate_shared::format::EarlyExit| {
+        groups[..exit.groups.into()].iter().map(|group| group.trees as usize).sum()
+    };
+    assert_eq!(model.early_exits().map(trees).collect::<Vec<usize>>(), found.ends);
     // Two classes with the same trees: nothing is ever known.
     let mut level =
         Ensemble { objects: vec!["a".into(), "b".into()], base_margins: vec![0.0; 2], ..case.ensemble.clone() };
