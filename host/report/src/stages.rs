@@ -258,7 +258,7 @@ fn shortened(settings: &Settings) -> Option<Table> {
     }
     (!numbers.is_empty()).then(|| Table {
         id: "shortened".into(),
-        title: "What `--quick` shortens".into(),
+        title: "What --quick shortens".into(),
         caption: "All other numbers are those of a full report.".into(),
         command: settings.command.clone(),
         data,

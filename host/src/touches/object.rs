@@ -395,7 +395,7 @@ impl ObjectTouches {
 
     /// These touches under another name.
     #[must_use]
-    pub fn renamed(self, name: impl Into<String>) -> Self {
+    pub(crate) fn renamed(self, name: impl Into<String>) -> Self {
         Self { name: name.into(), ..self }
     }
 
@@ -424,7 +424,7 @@ impl ObjectTouches {
 
     /// Up to `count` of the touches, spread over all of them within each source, in their order.
     #[must_use]
-    pub fn thinned(&self, count: usize) -> Self {
+    pub(crate) fn thinned(&self, count: usize) -> Self {
         let step = self.len().div_ceil(count.max(1)).max(1);
         let mut chosen: Vec<usize> =
             self.by_source().into_iter().flat_map(|touches| touches.into_iter().step_by(step)).collect();

@@ -289,7 +289,7 @@ impl Recording {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn checkpoint(&mut self) -> Result<()> {
+    pub(crate) fn checkpoint(&mut self) -> Result<()> {
         self.checkpointed = Instant::now();
         let (Some(open), Some(last)) = (&self.open, self.listing.recorded.last_mut()) else { return Ok(()) };
         if self.recorded.touches > 0 {
