@@ -22,7 +22,7 @@ pub(crate) struct TeachArguments {
         conflicts_with_all = ["preset", "descriptor", "evidence", "trees", "probe", "real"]
     )]
     pub(crate) extend: Option<PathBuf>,
-    /// Also write a page of how well the recorded objects are recognized
+    /// Also write a page of the results; how well the recorded objects are recognized
     #[arg(long, value_name = "FILE", requires = "teach")]
     pub(crate) page: Option<PathBuf>,
 }
