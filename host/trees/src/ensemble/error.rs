@@ -330,9 +330,9 @@ impl Problem for EnsembleProblem {
             Self::NotJson { .. } => {
                 "Give a file that `palpate train` or XGBoost's `save_model(\"….json\")` wrote.".into()
             }
-            Self::Objective { of: Some(of), .. } => format!("Train a model of {of} with multi:softprob."),
-            Self::Objective { of: None, .. } => {
-                "Train with multi:softprob, binary:logistic or a regression of one target.".into()
+            Self::Objective { of, .. } => {
+                let only = of.map_or_else(String::new, |of| format!("; a model of {of} with multi:softprob"));
+                format!("Train with multi:softprob, binary:logistic or a regression of one target{only}.")
             }
             Self::Booster { .. } => "Train with booster=gbtree or dart.".into(),
             Self::NoAttribute { name, example } => {
