@@ -118,7 +118,7 @@ fn what_contradicts_itself_is_refused_and_the_place_named() {
             true,
             "/learner/objective/name",
             json!("reg:squarederror"),
-            "its objective is reg:squarederror. Train a model of touches with multi:softprob",
+            "its objective is reg:squarederror. Train with multi:softprob",
         ),
         (true, "/learner/gradient_booster/name", json!("gblinear"), "booster is gblinear"),
         (true, &format!("{model}/tree_info"), json!([0]), "tree_info has 1 entries for 4 trees"),
