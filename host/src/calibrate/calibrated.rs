@@ -170,6 +170,9 @@ pub struct Worse {
     pub named: Option<f64>,
 }
 
+/// Optional sections of a model: whether a reader must know one, and its content; none to leave it out.
+type Sections = Vec<(Tag, Option<(bool, Vec<u8>)>)>;
+
 /// Statements of a promise beside its terms.
 pub(crate) struct Stated {
     pub(crate) approaches: bool,
@@ -187,7 +190,7 @@ impl Calibrated {
         chosen: &Chosen,
         terms: &Terms,
         stated: Stated,
-        further: Vec<(Tag, Option<(bool, Vec<u8>)>)>,
+        further: Sections,
     ) -> Result<Self> {
         let Terms { rate, confidence, per } = *terms;
         let Stated { approaches, active, groups, max_touches, noise } = stated;
