@@ -368,7 +368,7 @@ mod tests {
         for (starts, least) in [(1, 299), (2, 368), (7, 492)] {
             let positions: Vec<usize> = (0..starts).collect();
             let walked =
-                |all| walk((0..).zip(tallies(&vec![0; 9], all)), &positions, 0.01, 0.95).map(|kept| kept.threshold);
+                |all| walk((0..).zip(tallies(&[0; 9], all)), &positions, 0.01, 0.95).map(|kept| kept.threshold);
             assert_eq!(walked(least), Ok(8), "{starts}");
             let few = Stop::TooFew { position: 0, found: least - 1, needed: least };
             assert_eq!(walked(least - 1), Err(few), "{starts}");

@@ -137,8 +137,8 @@ impl<'a> Sampler<'a> {
     /// As [`sample`](Self::sample).
     pub(super) fn try_each(&self) -> Result<()> {
         let samples = self.origin.samples();
-        let each = samples.take(self.scenes.len().max(1));
-        each.map(|sample| self.drawn(sample).map(drop)).collect()
+        let mut each = samples.take(self.scenes.len().max(1));
+        each.try_for_each(|sample| self.drawn(sample).map(drop))
     }
 
     /// The first approach that sample `index` draws, to this scene of the object: the sample itself where every approach is

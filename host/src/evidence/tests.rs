@@ -54,14 +54,14 @@ impl Follower for Words {
 
 /// Sentences of a class each; a sentence that ends with a comma goes on, and an empty word is no evidence.
 struct Sentences<'s> {
-    coming: std::vec::IntoIter<(usize, &'s str)>,
+    coming: std::slice::Iter<'s, (usize, &'s str)>,
     words: Vec<&'s str>,
     ends: Vec<(u32, bool)>,
 }
 
 impl<'s> Sentences<'s> {
-    fn new(sentences: &[(usize, &'s str)]) -> Self {
-        Self { coming: sentences.to_vec().into_iter(), words: Vec::new(), ends: Vec::new() }
+    fn new(sentences: &'s [(usize, &'s str)]) -> Self {
+        Self { coming: sentences.iter(), words: Vec::new(), ends: Vec::new() }
     }
 }
 
@@ -75,7 +75,7 @@ impl Supplier<Words> for Sentences<'_> {
 
 impl Sequences<Words> for Sentences<'_> {
     fn begin(&mut self) -> Result<Option<Sequence>, Infallible> {
-        let Some((class, sentence)) = self.coming.next() else { return Ok(None) };
+        let Some(&(class, sentence)) = self.coming.next() else { return Ok(None) };
         self.words = sentence.split(' ').rev().collect();
         Ok(Some(Sequence::new(class)))
     }

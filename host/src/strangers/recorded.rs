@@ -106,7 +106,7 @@ pub(super) fn tested(
         let mut unknown: Vec<(String, usize)> =
             recorded.iter().map(|own| own.name.clone()).zip(sequences.iter().map(unknown)).collect();
         unknown.retain(|(_, count)| *count > 0);
-        unknown.sort_by(|a, b| b.1.cmp(&a.1));
+        unknown.sort_by_key(|own| std::cmp::Reverse(own.1));
         let allowed = allowed(all.len() as u64, supported, confidence).unwrap_or(0);
         return Err(EvaluateProblem::RecordedUnknown { of_each, unknown, share: supported, allowed }.into());
     };

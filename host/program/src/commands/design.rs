@@ -31,7 +31,7 @@ enum Command {
     /// Find the probe that needs the fewest approaches to your objects
     Design(Box<DesignArguments>),
     /// Measure how your probe differs from the ideal, from its touches
-    Fit(super::fit::FitArguments),
+    Fit(Box<super::fit::FitArguments>),
 }
 
 #[derive(clap::Args)]

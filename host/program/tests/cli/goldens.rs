@@ -159,7 +159,7 @@ fn sequences(count: usize, mut state: u64) -> String {
 #[test]
 fn calibration_and_evaluation_on_rows_stay() {
     let mut script = Script::new();
-    ensemble().save(&script.path("rows.json")).unwrap();
+    ensemble().save(script.path("rows.json")).unwrap();
     std::fs::write(script.path("calibration.csv"), sequences(900, 1)).unwrap();
     std::fs::write(script.path("unseen.csv"), sequences(300, 2)).unwrap();
     let columns = "--label kind --sequence-column id";

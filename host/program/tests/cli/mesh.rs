@@ -231,8 +231,10 @@ fn a_probe_file_may_be_a_pipe() {
     let capture = |out: &str, probe: &str| {
         let words = ["capture", "ball.obj", "-o", out, "--touches", "5", "--probe", probe];
         let file = std::fs::File::open(at.join("probe.toml")).unwrap();
-        let cat = std::process::Command::new("cat").stdin(file).stdout(std::process::Stdio::piped()).spawn().unwrap();
-        stdout(command(words).current_dir(at).stdin(cat.stdout.unwrap()).output().unwrap());
+        let mut cat =
+            std::process::Command::new("cat").stdin(file).stdout(std::process::Stdio::piped()).spawn().unwrap();
+        stdout(command(words).current_dir(at).stdin(cat.stdout.take().unwrap()).output().unwrap());
+        cat.wait().unwrap();
         std::fs::read(at.join(out).join("ball.txt")).unwrap()
     };
     assert_eq!(capture("file", "probe.toml"), capture("pipe", "/dev/stdin"));

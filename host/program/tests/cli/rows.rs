@@ -665,7 +665,8 @@ fn evidence_ends_where_a_sequence_does_and_nothing_is_said_of_one_after_its_verd
     let said: Vec<Value> = stdout(said).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let (mut wrong, mut named, mut undecided) = (0, 0, 0);
     for number in 300..600 {
-        let own: Vec<&Value> = said.iter().filter(|line| line["sequence"] == number.to_string()).collect();
+        let id = number.to_string();
+        let own: Vec<&Value> = said.iter().filter(|line| line["sequence"] == id).collect();
         let (last, before) = own.split_last().unwrap();
         assert!(before.iter().all(|line| line["verdict"] == "undecided"), "{own:?}");
         assert_eq!(last["rows"], own.len());

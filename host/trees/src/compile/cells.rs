@@ -17,11 +17,14 @@ const MAX_WORK: usize = 2_000_000_000;
 /// The most cells held in memory at once.
 const MAX_CELLS: usize = 4_000_000;
 
+/// A feature and its thresholds.
+pub(super) type Dimension = (u8, Vec<i32>);
+
 /// The cells of a forest. A place along a dimension is the number of thresholds at or below the value; a missing value
 /// has the place after the last.
 pub(super) struct Cells {
     /// Features and their thresholds; at least two.
-    dimensions: Vec<(u8, Vec<i32>)>,
+    dimensions: Vec<Dimension>,
     /// Boxes of places; values fall into one of them.
     planes: Vec<Vec<Range<usize>>>,
     /// True if each plane has a table of its own, and the dimensions are all features.
@@ -74,7 +77,7 @@ impl Cells {
     }
 
     /// Layout of a table of all cells, and its dimensions, if there is one.
-    pub(super) fn table(&self) -> Option<(Layout, &[(u8, Vec<i32>)])> {
+    pub(super) fn table(&self) -> Option<(Layout, &[Dimension])> {
         match self.dimensions.as_slice() {
             // The pattern takes no axis: it says which table it is.
             [_, differences @ ..] if self.by_pattern => Some((Layout::Patterns, differences)),

@@ -21,7 +21,7 @@ enum Command {
     /// Check a data set, or compare it with simulated touches
     Check(check::Arguments),
     /// Record touches of a real probe: from lines, a log, or a chip
-    Record(record::Arguments),
+    Record(Box<record::Arguments>),
     /// Write built-in objects, meshes or surfaces of scans as OBJ files
     Objects(objects::Arguments),
     /// Move spheres against a mesh as a file says, to compare the simulator with another engine

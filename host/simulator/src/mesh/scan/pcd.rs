@@ -52,12 +52,12 @@ pub(in crate::mesh) fn parse(mut reader: impl BufRead, length: u64, path: &Path)
             "its points have no fields x, y and z of one number each",
         ));
     }
-    let mut points = Points::default();
-    points.sensors = match header.viewpoint {
+    let sensors = match header.viewpoint {
         _ if columns[6..].iter().all(Option::is_some) => Sensors::Points,
         DEFAULT_VIEWPOINT => Sensors::Default,
         _ => Sensors::File,
     };
+    let mut points = Points { sensors, ..Points::default() };
     let [x, y, z, ..] = header.viewpoint;
     let mut add = |values: [Option<f64>; 9]| {
         let three = |first: usize| match values[first..first + 3] {

@@ -44,7 +44,7 @@ pub(super) fn smoothed(cloud: Cloud) -> Option<Smoothed> {
     let noise = loop {
         let is_kept = |number: usize, other: usize| outward[other].dot(outward[number]) > SEEN;
         let fits = near.some(
-            |number| order[number] as usize % step == 0,
+            |number| (order[number] as usize).is_multiple_of(step),
             count,
             AMONG,
             is_kept,

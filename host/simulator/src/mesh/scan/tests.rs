@@ -149,7 +149,7 @@ fn the_same_points_give_the_same_bytes_on_any_number_of_threads() {
 #[test]
 fn neighbors_are_the_nearest_points_that_are_kept() {
     let places: Vec<DVec3> = sphere(3.0, |_| true).into_iter().map(|(place, _)| place).collect();
-    let is_kept = |one: usize, two: usize| places[one].dot(places[two]) > 0.0 && two % 3 > 0;
+    let is_kept = |one: usize, two: usize| places[one].dot(places[two]) > 0.0 && !two.is_multiple_of(3);
     let found = super::near::Near::new(&places).each(40, 4, is_kept, |_, near| {
         let mut numbers: Vec<u32> = near.iter().map(|(_, number)| *number).collect();
         numbers.sort_unstable();
@@ -658,6 +658,9 @@ fn one_view_of_a_ball_leaves_a_guess() {
     assert!(object.complaints(&facts).concat().contains("% of the surface is a guess"));
 }
 
+/// A change of each camera's pose.
+type Turned<'t> = &'t dyn Fn(CameraPose) -> CameraPose;
+
 #[test]
 fn usual_mistakes_of_cameras_are_named() {
     let directory = tempfile::tempdir().unwrap();
@@ -670,7 +673,7 @@ fn usual_mistakes_of_cameras_are_named() {
     let eyes = [&above(6)[..], &[DVec3::NEG_Z]].concat();
     images(place, &eyes, &scene, |pose| pose);
     assert!(scan(place).is_ok());
-    let stated: [(&dyn Fn(CameraPose) -> CameraPose, &str, &str); 4] = [
+    let stated: [(Turned<'_>, &str, &str); 4] = [
         (&|(rows, t)| (rows, t / 1000.0), "cam_t_w2c is in meters", "multiply cam_t_w2c by 1000"),
         (&|([x, y, z], t)| ([x, -y, -z], -t), "those of OpenGL", "negate the second and the third row"),
         (
