@@ -58,7 +58,7 @@ struct Ends {
 impl Margins<'_> {
     /// Follows sequences of approaches of each object, and the same sequences with another object from a random approach
     /// on: one of those before the recognizer without forgetting would have decided, each as likely. Both with and without
-    /// [`Forgetting`] at `nats`.
+    /// [`Forgetting`](palpate_onboard::Forgetting) at `nats`.
     ///
     /// # Errors
     /// [`Setting`](crate::error::Setting) as [`Margins::sequential`], and `switch` if `nats` is not above

@@ -217,7 +217,7 @@ impl Recording {
     /// Adds a touch. When this returns, the touch is on the disk.
     ///
     /// # Errors
-    /// [`TouchesProblem::NoPose`] if it [lacks its pose](Self::lacks_pose); [`TouchesProblem::LaterThanStroke`] if a contact is
+    /// [`TouchesProblem::NoPose`] if it lacks its pose; [`TouchesProblem::LaterThanStroke`] if a contact is
     /// later than the stroke that the data set states; when the file cannot be written.
     pub fn add(&mut self, touch: &Touch) -> Result<()> {
         self.append(std::slice::from_ref(touch))?;
