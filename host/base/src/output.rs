@@ -312,8 +312,17 @@ fn fill_json(mut out: &mut dyn Write, value: &impl serde::Serialize) -> std::io:
 /// # Errors
 /// [`Error::Closed`], or [`Error::Io`].
 pub fn print(text: &str) -> Result<()> {
+    HAS_PRINTED.store(true, Ordering::Relaxed);
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(to_stdout)
+}
+
+/// True once [`print()`] was called.
+static HAS_PRINTED: AtomicBool = AtomicBool::new(false);
+
+/// True if something was printed to standard output by this process, or its printing was tried.
+pub fn has_printed() -> bool {
+    HAS_PRINTED.load(Ordering::Relaxed)
 }
 
 fn to_stdout(source: std::io::Error) -> Error {

@@ -44,7 +44,7 @@ use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use palpate::error::{CaptureProblem, Foreign, MeshProblem, Setting, TouchesProblem};
 use palpate::touches::{Dataset, Format, Listing, Log, Warning};
-use palpate::{Error, Result};
+use palpate::{Error, Result, output};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -294,9 +294,9 @@ pub fn main() -> ExitCode {
             if !matches!(error, Error::Closed) {
                 let command = matches.subcommand_name().unwrap_or_default();
                 let text = message(&error, command);
-                if cli.global.json {
-                    // Programs that read results find the error there too.
-                    println!("{}", serde_json::json!({ "error": text }));
+                // Programs that read results find the error where those would be. If there are some, the exit code tells.
+                if cli.global.json && !output::has_printed() {
+                    _ = output::print_json(&serde_json::json!({ "error": text }));
                 }
                 eprintln!("palpate: {text}");
                 if let Some(hint) = hint(&error, command) {
