@@ -28,7 +28,7 @@ pub(crate) struct Totals {
     pub(crate) sequences: usize,
     /// Names given.
     pub(crate) given: usize,
-    /// How many of those were wrong.
+    /// Wrong names among those.
     pub(crate) wrong: usize,
     /// Sequences that ended as unknown.
     pub(crate) unknown: usize,

@@ -2,10 +2,11 @@
 
 use super::candidate::Hypothesis;
 use super::layer::{Layer, MOST_ANGLE};
+use super::recording::Recording;
 use super::search::{Best, Ends};
 use super::suspects::Suspect;
 use super::words::{Estimate, NOT_TOLD, between, offset, offset_between};
-use super::{Evidence, Settings, Timer};
+use super::{Evidence, LEAST_TO_CHECK, Settings, Timer};
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::hand;
 use crate::probe::noise::{Grazing, Noise};
@@ -75,7 +76,8 @@ pub struct Fit {
     pub presses: usize,
     /// Names of the recorded objects, or placements.
     pub objects: Vec<String>,
-    /// Names of these without a placement on a table, which were not checked for other objects.
+    /// Names of these that were not checked for other objects: those without a placement on a table, or all if fewer than
+    /// [`LEAST_TO_CHECK`] approaches to each object were simulated.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unchecked: Vec<String>,
     /// Surroundings of the objects.
@@ -147,7 +149,10 @@ pub(super) fn outcome(
         contacts: super::counts(evidence),
         presses: evidence.plate.as_ref().map_or(0, |plate| plate.count),
         objects: evidence.recordings.iter().map(|own| own.name.to_owned()).collect(),
-        unchecked: evidence.recordings.iter().filter(|own| own.is_mixed).map(|own| own.name.to_owned()).collect(),
+        unchecked: {
+            let is_unchecked = |own: &&Recording<'_>| own.is_mixed || settings.approaches < LEAST_TO_CHECK;
+            evidence.recordings.iter().filter(is_unchecked).map(|own| own.name.to_owned()).collect()
+        },
         scene: settings.origin.scene,
         warnings: Vec::new(),
         suspects,

@@ -6,10 +6,10 @@ use super::progress::Bar;
 use super::scene::SceneArguments;
 use super::{Global, remark};
 use palpate::error::{FitProblem, ProbeProblem};
-use palpate::fit::{Fit, GrazingEstimate, NOT_TOLD, Settings, between, fit, offset, offset_between};
+use palpate::fit::{Fit, GrazingEstimate, LEAST_TO_CHECK, NOT_TOLD, Settings, between, fit, offset, offset_between};
 use palpate::output;
 use palpate::touches::{Origin, read_touches};
-use palpate::{Error, Result};
+use palpate::{Error, Result, wording};
 use palpate_shared::format::Length;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -86,7 +86,7 @@ pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
     if global.json {
         output::print_json_about(&arguments.output, &found)?;
     } else {
-        output::print_about(&arguments.output, &table(&found))?;
+        output::print_about(&arguments.output, &table(&found, arguments.approaches))?;
     }
     if !suspects.is_empty() && !global.force {
         return Err(Error::from(FitProblem::Suspects { suspects }).in_file(&arguments.recorded));
@@ -101,7 +101,7 @@ pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
 }
 
 /// Estimates, one line for each number.
-fn table(found: &Fit) -> String {
+fn table(found: &Fit, simulated: u64) -> String {
     let [full, pairs] = found.contacts;
     let presses = if found.presses > 0 { format!(", {} presses on a plate", found.presses) } else { String::new() };
     let mut text = format!(
@@ -148,7 +148,12 @@ fn table(found: &Fit) -> String {
         // Writing to a string cannot fail.
         _ = write!(
             text,
-            "\nNot checked for other objects, since their recordings state no placement: {}.",
+            "\nNot checked for other objects, since {}: {}.",
+            match simulated < LEAST_TO_CHECK {
+                true =>
+                    format!("fewer than {} approaches to each object were simulated", wording::count(LEAST_TO_CHECK)),
+                false => "their recordings state no placement".to_owned(),
+            },
             found.unchecked.join(", ")
         );
     }

@@ -118,7 +118,7 @@ impl<'f> Lowered<'f> {
         HEADER_LENGTH + records + cuts + trees + sharing.map_or(0, |sharing| sharing.section)
     }
 
-    /// About how many instructions a touch takes in a layout.
+    /// About how many instructions a row takes in a layout.
     pub(super) fn instructions(&self, layout: Layout, is_shared: bool) -> Instructions {
         let steps = || {
             let trees = self.runs.iter().flat_map(|run| &run.trees);

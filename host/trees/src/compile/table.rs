@@ -58,7 +58,7 @@ impl Table {
         HEADER_LENGTH + records + self.cuts.len() + cells * self.leaf.size()
     }
 
-    /// About how many instructions a touch takes.
+    /// About how many instructions a row takes.
     pub(super) fn instructions(&self) -> Instructions {
         let Self { layout, leaf, axes, .. } = self;
         let (layout, leaf, objects) = (*layout, *leaf, self.sums.len());

@@ -30,7 +30,6 @@ pub use moves::{Moves, moves};
 use crate::compile::{self, Instructions, Source, code};
 use crate::ensemble::{Ensemble, Inputs};
 use crate::error::Result;
-use crate::verify::unit;
 use boxes::{Keys, Rows, Tree, Values, of_ensemble};
 use chip::Chip;
 use format::Plain;
@@ -94,7 +93,9 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
     let model = compile::open(bytes)?;
     let plain = format::read(bytes)?;
     statements(&plain, ensemble)?;
-    let chip = Chip::new(model, unit(&model))?;
+    // Size of one unit of a margin in the library, in nats.
+    let unit = f64::from(model.unit()) * f64::from(model.prediction().scale);
+    let chip = Chip::new(model, unit)?;
     let sources = of_ensemble(ensemble, &plain.keys)?;
     let subject = Subject { plain: &plain, sources: &sources, ensemble };
     let found = if chip.is_table() {

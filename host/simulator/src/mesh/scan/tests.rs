@@ -478,7 +478,7 @@ fn a_pcds_damaged_header_is_named_by_its_line() {
         ("SIZE 4 4 4", "SIZE 4 4 four", "cup.pcd:4: the PCD file is damaged: \"four\" is not a count"),
         ("DATA ascii", "DATA zip", "cup.pcd:11: the PCD file is damaged: \"DATA zip\""),
         ("FIELDS x y z", "FIELDS x y w", "no fields x, y and z"),
-        ("TYPE F F F", "TYPE F F Q", "the field z is no number"),
+        ("TYPE F F F", "TYPE F F Q", "the field z is not a number of a known kind"),
         ("COUNT 1 1 1", "COUNT 1 1", "same number of words"),
         ("VIEWPOINT 0 0 0", "VIEWPOINT 0 0 up", "\"up\" is not a coordinate"),
     ] {
