@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::named::{descriptor_of, noise_of};
 use crate::work::{Callback, long};
 use numpy::ndarray::{Ix1, Ix2};
-use palpate::ensemble::import::{self, Options, PartTree, Parts};
+use palpate::ensemble::import::{Options, PartTree, Parts};
 use palpate::ensemble::train::{self as library, Outputs, Settings, Small};
 use palpate::ensemble::{self, Inputs, OverTouches, StatedProbe};
 use palpate::error::{Error, EvaluateProblem};

@@ -53,9 +53,12 @@ def test_a_scan_is_touched_like_a_mesh(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "ball.xyz", np.hstack([50 * normals, normals]))
     data = palpate.capture([tmp_path / "ball.xyz"], touches=50)
     assert data.names == ["ball"] and len(data) == 50
+    # Without normals, neighbors say which side is outside.
     np.savetxt(tmp_path / "bare.xyz", 50 * normals)
-    with pytest.raises(palpate.InputError, match="normal"):
-        palpate.capture([tmp_path / "bare.xyz"], touches=50)
+    assert len(palpate.capture([tmp_path / "bare.xyz"], touches=50)) == 50
+    np.savetxt(tmp_path / "few.xyz", 50 * normals[:3])
+    with pytest.raises(palpate.InputError, match="points"):
+        palpate.capture([tmp_path / "few.xyz"])
 
 
 def test_the_probe_is_the_one_that_was_given() -> None:

@@ -128,7 +128,7 @@ class DataSet:
         """
     def to_text(self, /, directory: str | PathLike[str]) -> None:
         """
-        The same as text, one line per touch.
+        Writes the touches as text, one line per touch.
         """
     @property
     def warnings(self, /) -> list[str]:
