@@ -12,18 +12,18 @@ const TARGET: &str = "thumbv6m-none-eabi";
 
 /// Rows of the README's table, the features of their images, and the most bytes of flash that verdicts may take.
 const IMAGES: [(&str, &str, usize); 7] = [
-    ("`grid`, `i8-leaves`", "grid,i8-leaves", 5_750),
+    ("`grid`, `i8-leaves`", "grid,i8-leaves", 5_800),
     ("`patterns`, `i8-leaves`", "patterns,i8-leaves", 6_000),
     // 6 KB and 7 KB are what is wanted; both are a little above.
-    ("`compact`, `i8-leaves`", "compact,i8-leaves", 6_450),
-    ("`complete`, `i8-leaves`", "complete,i8-leaves", 7_350),
-    ("`complete`, `i16-leaves`", "complete,i16-leaves", 7_550),
+    ("`compact`, `i8-leaves`", "compact,i8-leaves", 6_500),
+    ("`complete`, `i8-leaves`", "complete,i8-leaves", 7_450),
+    ("`complete`, `i16-leaves`", "complete,i16-leaves", 7_650),
     (
         "`compact`, `complete`, `grid`, `wide`, `i8-leaves`, `i16-leaves`",
         "compact,complete,grid,wide,i8-leaves,i16-leaves",
-        9_850,
+        9_900,
     ),
-    ("… and `strangers`", "compact,complete,grid,wide,i8-leaves,i16-leaves,strangers", 14_500),
+    ("… and `strangers`", "compact,complete,grid,wide,i8-leaves,i16-leaves,strangers", 14_600),
 ];
 
 /// Rows of what verdicts alone take, which other tests build.
