@@ -130,7 +130,7 @@
     expect(text("rounds") === "100 rounds played.", `it says "${text("rounds")}"`);
     for (const row of rows("models")) {
       // Within a factor of two: a hundred rounds.
-      const [mean, expected] = [5, 6].map((column) => parseFloat(row.cells[column].textContent));
+      const [mean, expected] = [5, 6].map((column) => parseFloat(row.cells[column].textContent.replaceAll(",", "")));
       expect(mean > expected / 2 && mean < expected * 2, `${row.cells[0].textContent} needs ${mean} approaches, expected ${expected}`);
     }
     slide("noise", 20);

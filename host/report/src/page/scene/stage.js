@@ -69,9 +69,9 @@ function openStage() {
   controls.addEventListener("change", draw);
   // A printer gets a picture, since it may ask for the drawing when it is gone.
   const picture = Object.assign(new Image(), { alt: "" });
-  stage.prepend(picture);
   addEventListener("beforeprint", () => {
     render();
+    stage.prepend(picture);
     picture.src = renderer.domElement.toDataURL();
   });
 
