@@ -94,9 +94,6 @@
 //! `palpate = { version = "0.3", default-features = false }` brings no terminal, no progress bar, no plots, no serial
 //! port and no trainer.
 
-// Some items of the crate serve training alone.
-#![cfg_attr(not(feature = "train"), allow(dead_code, unused_imports))]
-
 pub mod error;
 
 pub mod touches;

@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::instructions::Instructions;
 use super::limit::Large;
+use super::settings::LAYOUTS;
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
@@ -51,10 +52,6 @@ pub(super) struct Member {
 /// Trees, depth and bins of the family.
 const FAMILY: [(usize, usize, usize); 8] =
     [(120, 6, 256), (60, 6, 256), (40, 5, 256), (30, 5, 64), (30, 4, 64), (20, 4, 32), (12, 4, 32), (8, 3, 16)];
-
-/// Layouts that each model of the family is compiled into.
-pub(super) const LAYOUTS: [compile::Layout; 3] =
-    [compile::Layout::Compact, compile::Layout::Complete, compile::Layout::Grid];
 
 /// Trains, compiles and measures the family.
 pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {

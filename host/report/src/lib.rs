@@ -16,6 +16,7 @@ pub mod design;
 pub mod error;
 mod instructions;
 mod limit;
+mod measured;
 mod noise;
 mod objects;
 pub mod page;

@@ -1,10 +1,13 @@
 //! Extent of a report's measurements.
 
-use super::cost::LAYOUTS;
+use palpate::compile::Layout;
 use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
+
+/// Layouts that each model of the section on cost is compiled into.
+pub(super) const LAYOUTS: [Layout; 3] = [Layout::Compact, Layout::Complete, Layout::Grid];
 
 /// A section of the report that can be chosen, with what it measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -178,7 +181,7 @@ impl Settings {
         }
     }
 
-    /// The same figures in less than a minute.
+    /// Settings for all figures in less than a minute.
     pub fn quick(sources: Vec<String>, seed: u64) -> Self {
         Self {
             quick: true,

@@ -2,6 +2,7 @@
 
 use super::cache::{self, Cache};
 use super::context::{Context, get_or_try};
+use super::measured::Measured;
 use super::settings::{Part, Settings};
 use super::{
     approaches, calibration, cost, cross_validation, limit, noise, objects, promises, published, recorded, results,
@@ -11,7 +12,6 @@ use crate::error::ReportProblem;
 use crate::page::document::{Page, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::capture;
-use palpate::compare::Comparison;
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
@@ -115,7 +115,7 @@ impl Stages<'_> {
 /// resumed with [`Existing::resume`].
 ///
 /// # Errors
-/// What `objects`, measuring and writing return; [`ReportProblem::OneObject`] for fewer than two objects;
+/// Errors of `objects`, of measuring and of writing; [`ReportProblem::OneObject`] for fewer than two objects;
 /// [`ReportProblem::OtherResults`] for a directory that holds other results, unless [`Existing::replace`];
 /// [`Error::Cancelled`](palpate::Error::Cancelled).
 pub fn report(
@@ -178,19 +178,6 @@ pub fn report(
     files.extend(page.write(&directory.join("index.html"))?);
     let summary = results::json("summary", &everything)?;
     Ok(Report { files, stages, sentence, summary })
-}
-
-/// Results that the sections show; none of a part that was not chosen.
-pub(super) struct Measured {
-    pub(super) folds: Option<Vec<cross_validation::Fold>>,
-    pub(super) noisy: Option<Vec<noise::Fold>>,
-    pub(super) limit: Option<limit::Limit>,
-    pub(super) sequences: Option<sequential::Sequences>,
-    calibration: Option<calibration::Calibration>,
-    promises: Option<promises::Promises>,
-    members: Option<Vec<cost::Member>>,
-    approaches: Option<approaches::ByApproach>,
-    recorded: Option<Comparison>,
 }
 
 /// Measures the chosen parts.

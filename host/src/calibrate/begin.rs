@@ -8,7 +8,7 @@
 //! in which it tries thresholds is fixed before (Learn then Test, arXiv 2110.01052, on learning hypotheses and their order from
 //! other data). What is predicted here decides whether a promise can be made, and never whether it is kept.
 
-use super::choose::Terms;
+use super::terms::Terms;
 use super::walk::{allowed, needed, of_share};
 use crate::evidence::{Odds, Sequence, odds_of};
 use palpate_shared::format::Per;

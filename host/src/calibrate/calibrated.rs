@@ -1,7 +1,8 @@
 //! A calibrated model: its thresholds and its promise, from those that were chosen.
 
-use super::choose::{Chosen, Terms};
+use super::choose::Chosen;
 use super::found::Found;
+use super::terms::Terms;
 use super::{OfRecorded, Per, Tally, binomial_tail};
 use crate::compile::{Restated, restate};
 use crate::error::Result;

@@ -1,7 +1,7 @@
 //! Problems with calibrating.
 
-use super::choose::Terms;
 use super::recorded::{GROWN, GROWTH, LIKELY};
+use super::terms::Terms;
 use super::walk::{Tally, allowed, binomial_tail};
 use crate::error::Problem;
 use palpate_base::wording::two_digits;

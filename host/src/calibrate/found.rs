@@ -10,7 +10,7 @@ pub struct Found {
     pub held: &'static str,
     /// The promised share of known objects' sequences that end as unknown.
     pub promised: f64,
-    /// That share of the sequences that it was tested on, under thresholds for names that are at least as strict.
+    /// Share of known objects called unknown in the tested sequences, under thresholds for names that are at least as strict.
     pub false_alarms: f64,
     /// The sequences that it was tested on.
     pub sequences: u32,
@@ -18,7 +18,7 @@ pub struct Found {
     pub least_touches: u32,
     /// Touches used on average with known objects.
     pub mean_touches: f64,
-    /// The same without the test.
+    /// Touches used on average without the test.
     pub mean_touches_without: f64,
     /// Share of known objects' sequences detected after 30, 60 and 120 touches when their columns are not used.
     pub left_out: BTreeMap<String, BTreeMap<u32, f64>>,

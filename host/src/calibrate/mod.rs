@@ -47,6 +47,7 @@ mod recorded;
 #[cfg(all(test, feature = "train"))]
 mod recorded_tests;
 mod temperature;
+mod terms;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 mod unlike;
@@ -57,7 +58,7 @@ pub(crate) use begin::Begin;
 pub(crate) use calibrated::Stated;
 pub use calibrated::{Calibrated, Gain, OfObject, OfRows, Used, Worse};
 pub(crate) use choose::share_tested;
-pub use choose::{Chosen, Terms, choose};
+pub use choose::{Chosen, choose};
 pub(crate) use choose::{Way, choose_independent};
 #[cfg(all(test, feature = "train"))]
 use draw::MarginSupply;
@@ -73,6 +74,7 @@ pub use model::{OfRecorded, Settings, calibrate};
 pub(crate) use model::{STRICTEST, Start, add_noise, begin, calibrate_from};
 pub use palpate_shared::format::Per;
 pub use recorded::calibrate_recorded;
+pub use terms::Terms;
 
 pub use temperature::temperature;
 pub use unlike::unlike_training;
@@ -86,7 +88,9 @@ pub fn of_what(per: Per) -> &'static str {
     }
 }
 
-#[cfg(test)]
+#[cfg(feature = "train")]
+pub(crate) use walk::allowed;
+#[cfg(all(test, feature = "train"))]
 pub(crate) use walk::enough;
-pub(crate) use walk::{Stop, allowed, binomial_tail};
+pub(crate) use walk::{Stop, binomial_tail};
 pub use walk::{Tally, needed};

@@ -1,11 +1,14 @@
 //! A model's thresholds, its promise and its temperature.
 
-use super::begin::{Begin, Seen};
+#[cfg(feature = "train")]
+use super::begin::Begin;
+use super::begin::Seen;
 use super::calibrated::{Calibrated, OfObject, Stated};
-use super::choose::{Chosen, Terms, Way, chosen, share_tested, spread};
+use super::choose::{Chosen, Way, chosen, share_tested, spread};
 use super::draw::{TouchSupply, follow, follow_plan};
 use super::error::Remedy;
 use super::temperature::temperature;
+use super::terms::Terms;
 use super::{Limit, Per, Tally};
 use crate::compile;
 use crate::ensemble::StatedProbe;
@@ -16,7 +19,7 @@ use crate::probe::noise::Noise;
 use crate::progress::Progress;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Refused, Stopping};
-use palpate_shared::format::{Promise, SECTION_HEADER_LENGTH, Tag, Temperature};
+use palpate_shared::format::{Tag, Temperature};
 use serde::Serialize;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -130,7 +133,8 @@ pub(crate) fn calibrate_from(
 /// loosest one at which it passes with nearly the greatest probability, up to where a calibration that knows nothing begins.
 ///
 /// # Errors
-/// As [`calibrate`], except for a rate that is not kept.
+/// Errors as those of [`calibrate`], except for a rate that is not kept.
+#[cfg(feature = "train")]
 pub(crate) fn begin(
     model: &Model<'_>,
     mut part: Dataset,
@@ -398,6 +402,7 @@ fn is_kept_well(pilot: &[Sequence], margin: f64, rate: f64) -> bool {
 /// Bytes that a calibration to an average error rate adds to a model that states neither promise nor temperature.
 #[cfg(feature = "train")]
 pub(crate) fn added_bytes(noise: &Noise) -> usize {
+    use palpate_shared::format::{Promise, SECTION_HEADER_LENGTH};
     let promise = Promise::length(&noise.promised());
     2 * SECTION_HEADER_LENGTH + promise + Temperature::LENGTH
 }

@@ -350,6 +350,7 @@ impl<'m> Margins<'m> {
     }
 
     /// True if outputs are placements of objects.
+    #[cfg(feature = "train")]
     pub(crate) fn has_placements(&self) -> bool {
         self.numbers.is_some()
     }

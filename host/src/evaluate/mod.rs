@@ -60,10 +60,12 @@ pub use approaches::Approaches;
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
 pub use error::{EnoughRecorded, EvaluateProblem};
+pub(crate) use margins::OfTouches;
 #[cfg(feature = "train")]
 pub(crate) use margins::best;
 pub use margins::{Margins, delivered};
-pub(crate) use margins::{OfTouches, leading, objects_of};
+#[cfg(feature = "train")]
+pub(crate) use margins::{leading, objects_of};
 pub use measure::{Confusion, Evaluated, Expecting, Wanted, measure, own_weights};
 #[cfg(feature = "train")]
 pub(crate) use noisy::ROBOTS;

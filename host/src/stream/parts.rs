@@ -18,6 +18,7 @@ pub(super) struct Parts<'s> {
     pub(super) tested: Vec<&'s RowSequence>,
     pub(super) has_groups: bool,
     /// Groups, or sequences without groups, of both parts.
+    #[cfg(feature = "train")]
     pub(super) units: usize,
 }
 
@@ -57,7 +58,13 @@ impl<'s> Parts<'s> {
             let tested = all.split_off(learned);
             (all, tested)
         };
-        Ok(Self { learned, tested, has_groups, units })
+        Ok(Self {
+            learned,
+            tested,
+            has_groups,
+            #[cfg(feature = "train")]
+            units,
+        })
     }
 
     /// Groups, or sequences without groups, that are tested on.

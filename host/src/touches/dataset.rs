@@ -47,6 +47,7 @@ impl Dataset {
     /// This data set, with each placement of an object as an object of its own, called `object/placement`: for a model with
     /// an output for each placement is trained on. Objects without placements stay as they are.
     #[must_use]
+    #[cfg(feature = "train")]
     pub(crate) fn by_placement(&self) -> Self {
         let objects = self.objects.iter().flat_map(ObjectTouches::by_placement).collect();
         Self { objects, origin: self.origin.clone(), warnings: Vec::new() }
@@ -74,6 +75,7 @@ impl Dataset {
     }
 
     /// Removes contacts by the stroke of a probe, if a hand with this stroke explains all of them; else changes nothing.
+    #[cfg(feature = "train")]
     pub(crate) fn delivered_by(&self, probe: &Probe) -> Cow<'_, Self> {
         let is_explained = |latest: f64| self.touches().all(|touch| f64::from(touch.spread()) <= latest);
         self.within(probe.window().filter(|_| probe.latest().is_some_and(is_explained)))

@@ -340,6 +340,7 @@ impl ObjectTouches {
     /// These touches, with a number of each placement in proportion to its weight: as an object that is put down at random is
     /// touched. All of them without placements, and for recordings, whose shares are those of the robot.
     #[must_use]
+    #[cfg(any(feature = "train", test))]
     pub(crate) fn as_often_as_placed(&self) -> Self {
         let is_recorded = self.sources.iter().any(|source| matches!(source, Source::Recording(_)));
         if is_recorded || self.placement_weights().is_none() {
@@ -395,6 +396,7 @@ impl ObjectTouches {
 
     /// These touches under another name.
     #[must_use]
+    #[cfg(feature = "train")]
     pub(crate) fn renamed(self, name: impl Into<String>) -> Self {
         Self { name: name.into(), ..self }
     }
@@ -418,12 +420,14 @@ impl ObjectTouches {
 
     /// The touches that `keep` says.
     #[must_use]
+    #[cfg(any(feature = "train", test))]
     pub(crate) fn filtered(&self, keep: impl Fn(&Touch) -> bool) -> Self {
         self.select((0..self.len()).filter(|&touch| keep(&self.touches[touch])))
     }
 
     /// Up to `count` of the touches, spread over all of them within each source, in their order.
     #[must_use]
+    #[cfg(any(feature = "train", test))]
     pub(crate) fn thinned(&self, count: usize) -> Self {
         let step = self.len().div_ceil(count.max(1)).max(1);
         let mut chosen: Vec<usize> =

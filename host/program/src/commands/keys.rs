@@ -1,13 +1,4 @@
-//! Options that take keys with values, such as `rounds=100,depth=6`: their keys, in errors and in completions.
-
-use super::{design, trees};
-use clap_complete::Shell;
-use palpate::probe::noise::PartialNoise;
-
-/// The options, and the keys of each.
-fn options() -> [(&'static str, Vec<&'static str>); 3] {
-    [("real", PartialNoise::KEYS.into()), ("search", design::KEYS.into()), ("trees", trees::keys().collect())]
-}
+//! Texts of keys with values, such as `rounds=100,depth=6`, and errors that name the nearest key.
 
 /// Keys and values of a text such as `rounds=100,depth=6`, in its order. An error names `what` a key is not, and an
 /// `example`.
@@ -42,73 +33,6 @@ pub(super) fn nearest(word: &str, keys: &[&str]) -> String {
     let closest = |a: &&&str, b: &&&str| strsim::jaro(word, a).total_cmp(&strsim::jaro(word, b));
     keys.iter().filter(near).max_by(closest).map_or_else(String::new, |key| format!(". Did you mean {key}?"))
 }
-
-/// The script of a shell that also completes keys, after a comma too.
-pub(super) fn completed(script: &str, shell: Shell) -> String {
-    let options = options();
-    match shell {
-        Shell::Bash => {
-            let case =
-                |(option, keys): &(&str, Vec<&str>)| format!("        --{option}) keys=\"{}=\" ;;\n", keys.join("= "));
-            script.to_owned() + &BASH.replace("CASES", &options.iter().map(case).collect::<String>())
-        }
-        Shell::Zsh => {
-            let function = |(option, keys): &(&str, Vec<&str>)| {
-                let keys: String = keys.iter().map(|key| format!(" '{key}:value: '")).collect();
-                let files = if *option == "real" { "    _files -g '*.toml'\n" } else { "" };
-                format!("_palpate_{option}() {{\n    _values -s , key{keys}\n{files}}}\n\n")
-            };
-            let functions: String = options.iter().map(function).collect();
-            let line = |line: &str| match options.iter().find(|(option, _)| line.starts_with(&format!("'--{option}=[")))
-            {
-                Some((option, _)) => line.replace(":_default'", &format!(":_palpate_{option}'")) + "\n",
-                None if line.starts_with("if [ \"$funcstack[1]\"") => format!("{functions}{line}\n"),
-                None => format!("{line}\n"),
-            };
-            script.lines().map(line).collect()
-        }
-        Shell::Fish => {
-            let line = |line: &str| match options.iter().find(|(option, _)| line.contains(&format!(" -l {option} "))) {
-                Some((option, keys)) => {
-                    let only = if *option == "real" { "r" } else { "x" };
-                    let end = format!(" -{only} -a '(__palpate_keys {}=)'", keys.join("= "));
-                    line.strip_suffix(" -r").unwrap_or(line).to_owned() + &end + "\n"
-                }
-                None => format!("{line}\n"),
-            };
-            script.lines().map(line).collect::<String>() + FISH
-        }
-        _ => script.into(),
-    }
-}
-
-/// Bash breaks words at `=`: the word is taken from the line, and what is replaced of it is `$2`.
-const BASH: &str = r#"
-_palpate_keys() {
-    local line="${COMP_LINE:0:COMP_POINT}" word option keys
-    word="${line##* }"
-    option="${line% *}"
-    option="${option##* }"
-    [[ "$word" == --*=* ]] && option="${word%%=*}" word="${word#*=}"
-    case "$option" in
-CASES        *) _palpate "$@"; return ;;
-    esac
-    COMPREPLY=()
-    word="${word##*,}"
-    [[ "$word" == *=* ]] && return
-    compopt -o nospace 2>/dev/null
-    COMPREPLY=($(compgen -P "${2%"$word"}" -W "$keys" -- "$word"))
-}
-
-complete -F _palpate_keys -o bashdefault -o default palpate
-"#;
-
-const FISH: &str = r"
-function __palpate_keys
-    set -l given (commandline -ct | string replace -r '^--[a-z]+=' '' | string replace -r '[^,]*$' '')
-    printf '%s\n' $given$argv
-end
-";
 
 #[cfg(test)]
 mod tests {

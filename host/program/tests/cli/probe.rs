@@ -27,7 +27,7 @@ fn listing(data: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(data.join("dataset.json")).unwrap()).unwrap()
 }
 
-/// The program's arguments, some of which are paths.
+/// Arguments of the program: words and paths.
 macro_rules! arguments {
     ($($argument:expr),* $(,)?) => { [$(std::ffi::OsStr::new($argument)),*] };
 }

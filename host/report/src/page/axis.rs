@@ -14,7 +14,7 @@ pub(crate) struct Axis {
     pub(crate) ticks: Vec<(f64, String)>,
     /// True if lines are drawn across the chart at the ticks.
     pub(crate) grid: bool,
-    /// True if ticks are names, all of which must be shown.
+    /// True if ticks are names. Names are never left out.
     pub(crate) is_names: bool,
 }
 

@@ -194,7 +194,10 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
         Format::Depth => {
             let mut bytes = Vec::new();
             reader.take(length).read_to_end(&mut bytes).map_err(io)?;
-            (Parsed::Points(scan::depth::parse(&bytes, path, folder)?), Some(1.0))
+            (
+                Parsed::Points(scan::depth::parse(&bytes, path, folder, chosen(path).map(|(_, number)| number))?),
+                Some(1.0),
+            )
         }
         Format::Gltf | Format::Collada => {
             let mut bytes = Vec::new();

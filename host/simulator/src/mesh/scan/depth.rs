@@ -9,7 +9,6 @@
 use super::views::{self, View};
 use super::{MOST, Point, Points, Sensors, table};
 use crate::error::{Error, MeshProblem, Place, Result};
-use crate::mesh::file;
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -45,13 +44,13 @@ fn damaged(place: Place, what: impl Into<String>) -> Error {
 
 /// Reads the points of the images that a list names, from `folder`. Coordinates are in millimeters; errors name `path`, or
 /// the image.
-pub(in crate::mesh) fn parse(list: &[u8], path: &Path, folder: Option<&Path>) -> Result<Points> {
+pub(in crate::mesh) fn parse(list: &[u8], path: &Path, folder: Option<&Path>, chosen: Option<u32>) -> Result<Points> {
     let cameras: BTreeMap<u32, Camera> = serde_json::from_slice(list)
         .map_err(|error| damaged(Place::line(path, error.line() as u64), error.to_string()))?;
     let whole = |what: String| damaged(Place::file(path), what);
     let folder = folder.ok_or_else(|| whole("its images are files beside it, which it cannot have here".into()))?;
     let mut points = Points { sensors: Sensors::Images, ..Points::default() };
-    let masks = Masks::find(folder, &cameras, path, &mut points.notes)?;
+    let masks = Masks::find(folder, &cameras, (path, chosen), &mut points.notes)?;
     let view = |(number, camera): (&u32, &Camera)| view(*number, camera, path, folder, &masks);
     let step = cameras.len().div_ceil(COMPARED).max(1);
     let compared: Vec<View> = cameras.iter().step_by(step).map(view).collect::<Result<_>>()?;
@@ -118,11 +117,15 @@ struct Masks {
 }
 
 impl Masks {
-    /// The masks of the object that `path` chooses, or of that with the number 0. Either all images have one, or there are no
+    /// The masks of the object that is chosen of the list at `path`, or of the one with the number 0. Either all images have one, or there are no
     /// masks at all.
-    fn find(folder: &Path, cameras: &BTreeMap<u32, Camera>, path: &Path, notes: &mut Vec<String>) -> Result<Self> {
+    fn find(
+        folder: &Path,
+        cameras: &BTreeMap<u32, Camera>,
+        (path, chosen): (&Path, Option<u32>),
+        notes: &mut Vec<String>,
+    ) -> Result<Self> {
         let folder = folder.join("mask_visib");
-        let chosen = file::chosen(path).map(|(_, number)| number);
         let mut found: BTreeSet<(u32, u32)> = BTreeSet::new();
         let entries = if folder.exists() {
             let io = |error| Error::io(&folder, "read the directory", error);

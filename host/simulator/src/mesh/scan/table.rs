@@ -34,8 +34,8 @@ pub(super) fn leave_out(points: &mut Points) {
     points.measured.retain(|point| DVec3::from(point.place).dot(up) > top);
     points.table = Some((up, height));
     points.notes.push(format!(
-        "a plane that extends beyond all else is taken for a table: {} of {before} points, in it and below, are left out (masks \
-         say otherwise)",
+        "the widest plane, which extends beyond all else, is removed as a table: {} of {before} points on or below it are left \
+         out. Masks choose what stays",
         before - points.measured.len()
     ));
 }

@@ -615,7 +615,7 @@ fn a_table_under_an_object_is_left_out_and_its_underside_is_no_guess() {
     images(place, &above(8), &both(&ball(middle, 50.0), &table_top(0.0)), |pose| pose);
     let contents = scan(place).unwrap();
     let said = contents.notes.concat();
-    assert!(said.contains("a plane that extends beyond all else is taken for a table"), "{said}");
+    assert!(said.contains("the widest plane, which extends beyond all else, is removed as a table"), "{said}");
     assert!(said.contains("the underside") && contents.guessed < 0.1, "{said} {}", contents.guessed);
     let [low, high] = contents.mesh.bounds();
     assert!((high - low).max_element() < 106.0 && (high.z - 70.0).abs() < 2.0 && low.z > -10.0, "{low} {high}");
