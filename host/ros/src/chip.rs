@@ -110,7 +110,7 @@ impl Line {
         (self.under_way, self.decided, self.unasked) = (0, false, false);
         let mut model = self.model(connection)?;
         loop {
-        // One touch at a time: questions to the chip must be about this one.
+            // One touch at a time: questions to the chip must be about this one.
             if self.under_way == 0 {
                 match orders.try_recv() {
                     Ok(Order::Touch(touch)) => {
