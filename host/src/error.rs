@@ -8,6 +8,7 @@ pub use crate::ensemble::train::TrainProblem;
 pub use crate::evaluate::EvaluateProblem;
 #[cfg(feature = "train")]
 pub use crate::fit::FitProblem;
+pub use crate::locate::LocateProblem;
 #[cfg(feature = "train")]
 pub use crate::teach::TeachProblem;
 pub use crate::touches::TouchesProblem;

@@ -38,6 +38,7 @@
 //! |---|---|
 //! | [`effector`] | edges of three switches to touches |
 //! | [`Model`], [`Recognizer`] | touches to verdicts |
+//! | [`locate`] | touches with positions to an object, its pose, and where to touch next |
 //! | [`station`] | touches, verdicts and models to and from a host, and what lasts through a power cut |
 //!
 //! | feature | what |
@@ -54,6 +55,7 @@
 //! | `row-evidence` | models that state what a row adds to the evidence, and how much rows count together |
 //! | `strangers` | models with a background, or a test for objects that they do not know |
 //! | `outputs` | models with several outputs for one object |
+//! | `locate` | [`locate`]; off by default |
 //! | `rows` | many rows at once, for hosts (`Model::margins_of_rows`) |
 //! | `defmt` | touches, verdicts, refusals and faults can be logged; off by default |
 //!
@@ -75,6 +77,8 @@ mod decide;
 pub mod effector;
 mod exponential;
 mod layouts;
+#[cfg(feature = "locate")]
+pub mod locate;
 mod model;
 #[cfg(feature = "station")]
 pub mod station;

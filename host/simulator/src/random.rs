@@ -41,6 +41,8 @@ pub enum Purpose {
     Fit,
     /// Recorded touches that are held out together, and groups of them.
     Teach,
+    /// Objects on a simulated table, and a hand's approaches to them.
+    Table,
     /// Made-up touches for tests.
     Synthetic,
 }
@@ -66,6 +68,7 @@ impl Purpose {
             Self::Capture => Some(28),
             Self::Fit => Some(29),
             Self::Teach => Some(18),
+            Self::Table => Some(30),
             Self::Synthetic => Some(6),
         }
     }
@@ -119,6 +122,7 @@ mod tests {
             Capture,
             Fit,
             Teach,
+            Table,
             Synthetic,
         ];
         let draw = |purpose| generator(1, purpose, "fork", 0).random::<u64>();

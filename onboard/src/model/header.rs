@@ -12,7 +12,7 @@ use palpate_shared::format::{
 /// Checks that bytes are a whole model of a version that is read, as it was written.
 // Otherwise its error would be moved, and a call that moves memory takes more flash than all of this.
 #[inline(always)]
-pub(super) fn whole(bytes: &[u8]) -> Result<(), ModelError> {
+pub(crate) fn whole(bytes: &[u8]) -> Result<(), ModelError> {
     let found = bytes.len();
     if bytes.iter().zip(MAGIC).any(|(&byte, magic)| byte != magic) {
         return Err(ModelError::NotAModel);

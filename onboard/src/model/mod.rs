@@ -15,6 +15,8 @@ mod rows;
 
 #[cfg(feature = "code")]
 pub use code::Code;
+#[cfg(feature = "locate")]
+pub(crate) use header::whole;
 pub use predict::{inverse_link, predicted_value};
 pub use refused::Refused;
 

@@ -5,6 +5,9 @@ use crate::pattern::Patterns;
 /// The header's descriptor code for a model over rows of features instead of touches.
 pub const RAW_FEATURES: u8 = 255;
 
+/// The header's layout of a model that has maps instead of trees; no [`Layout`], since readers of trees refuse it.
+pub const MAPS_LAYOUT: u8 = 7;
+
 macro_rules! codes {
     ($(#[$meta:meta])* $enum:ident { $($(#[$variant_meta:meta])* $variant:ident = $code:literal, $name:literal;)* }) => {
         $(#[$meta])*

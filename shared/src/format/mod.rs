@@ -20,7 +20,7 @@ mod strangers;
 mod trained;
 
 pub use crate::checksum::checksum;
-pub use codes::{Counted, Held, Key, Layout, LeafType, Length, Per, RAW_FEATURES};
+pub use codes::{Counted, Held, Key, Layout, LeafType, Length, MAPS_LAYOUT, Per, RAW_FEATURES};
 pub use early::EarlyExit;
 pub use evidence::{RowEvidence, Shifts, Weights};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION};

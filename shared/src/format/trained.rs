@@ -47,6 +47,8 @@ pub enum Tag {
     Outputs,
     /// Columns of the library's rows that a model over some of them has: how many there were, and the number of each, as u32.
     Columns,
+    /// Maps of the heights that a fingertip meets on objects on a table, for a model of [`MAPS_LAYOUT`](super::MAPS_LAYOUT).
+    Maps,
 }
 
 impl Tag {
@@ -72,6 +74,7 @@ impl Tag {
             Self::EarlyExit => 17,
             Self::Outputs => 18,
             Self::Columns => 19,
+            Self::Maps => 20,
         }
     }
 }

@@ -1,0 +1,222 @@
+//! A located approach as a step of evidence, and an object's cells as a follower.
+
+use super::world::{Aimed, Drawn, Truth};
+use crate::evidence::{Follower, Sequence, Sequences, Supplier};
+use palpate_onboard::locate::{Approach, Effort, Hand, Locator, Maps, Pose, Seen};
+use palpate_onboard::{Familiarity, Stopping, Verdict};
+use std::convert::Infallible;
+
+/// Room for touches.
+pub const TOUCHES: usize = 32;
+/// Cells within the memory of a chip with 128 KB.
+pub const CELLS: usize = 14_336;
+/// Cells and objects on a host that follows many objects.
+const MANY: usize = 65_536;
+
+/// A locator of the host: with a chip's room for up to 16 objects, with more for more.
+pub trait Locating: Send {
+    /// Begins another object, with another seed of the choice of approaches.
+    fn begin(&mut self, seed: u32);
+    /// Takes in the heights of an approach.
+    fn push(&mut self, seen: Seen) -> Verdict;
+    /// The verdict so far.
+    fn verdict(&self) -> Verdict;
+    /// The object with the most evidence.
+    fn leader(&self) -> usize;
+    /// Sum of the weights of the others, in Q56.
+    fn rivals(&self) -> u64;
+    /// True if the last search ended before it was done.
+    fn is_exhausted(&self) -> bool;
+    /// Result of the test for unknown objects.
+    fn familiarity(&self) -> Familiarity;
+    /// Logarithm of the best cell's likelihood for each touch, in 1/64 nat.
+    fn fit(&self) -> i32;
+    /// The most likely poses of an object, at most four.
+    fn poses(&self, object: usize) -> Vec<Pose>;
+    /// Posteriors of all objects.
+    fn posteriors(&self) -> Vec<f64>;
+    /// The next approach; `pose` is how much the pose counts, in 64ths.
+    fn choose(&mut self, hand: &Hand, within: u32, pose: u16) -> Approach;
+    /// Heights that were looked up by the last search, and since.
+    fn looked(&self) -> u32;
+}
+
+struct Room<'m, const CELLS: usize, const OBJECTS: usize> {
+    maps: Maps<'m>,
+    stopping: Stopping,
+    effort: Effort,
+    locator: Locator<'m, CELLS, TOUCHES, OBJECTS>,
+}
+
+/// A locator of maps with these thresholds, and bounds on its work; by default a chip's for up to 16 objects.
+pub fn locating<'m>(maps: Maps<'m>, stopping: Stopping, effort: Option<Effort>) -> Box<dyn Locating + 'm> {
+    if maps.objects() <= 16 {
+        of::<CELLS, 16>(maps, stopping, effort.unwrap_or_default())
+    } else {
+        let many = Effort { lookups: 2_000_000, ..Effort::default() };
+        of::<MANY, 256>(maps, stopping, effort.unwrap_or(many))
+    }
+}
+
+fn of<'m, const CELLS: usize, const OBJECTS: usize>(
+    maps: Maps<'m>,
+    stopping: Stopping,
+    effort: Effort,
+) -> Box<dyn Locating + 'm> {
+    let Ok(locator) = Locator::new(maps, stopping, effort, 1) else {
+        unreachable!("there is room for as many objects")
+    };
+    Box::new(Room::<CELLS, OBJECTS> { maps, stopping, effort, locator })
+}
+
+impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJECTS> {
+    fn begin(&mut self, seed: u32) {
+        if let Ok(locator) = Locator::new(self.maps, self.stopping, self.effort, seed) {
+            self.locator = locator;
+        }
+    }
+
+    fn push(&mut self, seen: Seen) -> Verdict {
+        self.locator.push_seen(seen)
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.locator.verdict()
+    }
+
+    fn leader(&self) -> usize {
+        self.locator.leader()
+    }
+
+    fn rivals(&self) -> u64 {
+        self.locator.rivals().q56()
+    }
+
+    fn is_exhausted(&self) -> bool {
+        self.locator.exhausted().is_some()
+    }
+
+    fn familiarity(&self) -> Familiarity {
+        self.locator.familiarity()
+    }
+
+    fn fit(&self) -> i32 {
+        self.locator.fit()
+    }
+
+    fn poses(&self, object: usize) -> Vec<Pose> {
+        let none = Pose { placement: 0, position: [0; 2], yaw: 0, within: [0; 2], yaw_within: None, share: 0 };
+        let mut poses = vec![none; 4];
+        let found = self.locator.poses(object, &mut poses);
+        poses.truncate(found);
+        poses
+    }
+
+    fn posteriors(&self) -> Vec<f64> {
+        (0..self.maps.objects()).map(|object| f64::from(self.locator.posterior(object)) / 65_536.0).collect()
+    }
+
+    fn choose(&mut self, hand: &Hand, within: u32, pose: u16) -> Approach {
+        self.locator.choose(hand.spacing, hand.stroke.unwrap_or(u32::MAX), within, pose)
+    }
+
+    fn looked(&self) -> u32 {
+        self.locator.looked()
+    }
+}
+
+/// The follower of located approaches, which knows where to touch next.
+pub(super) struct Pressing<'m> {
+    pub(super) locating: Box<dyn Locating + 'm>,
+    pub(super) hand: Hand,
+    pub(super) within: u32,
+    pub(super) aimed: Aimed,
+    pub(super) pose: u16,
+    /// Where to touch next; none before the first touch, and where approaches are aimed at random.
+    pub(super) next: Option<Approach>,
+    /// Heights that were looked up by all approaches, and at most by one.
+    pub(super) looked: [u64; 2],
+}
+
+impl Pressing<'_> {
+    /// Where the most likely cell is, in millimeters.
+    fn believed(&self) -> Option<[f64; 2]> {
+        let pose = self.locating.poses(self.locating.leader()).into_iter().next()?;
+        Some(pose.position.map(|micrometers| f64::from(micrometers) / 1_000.0))
+    }
+}
+
+impl Follower for Pressing<'_> {
+    type Step = Seen;
+
+    fn reset(&mut self) {
+        self.next = None;
+    }
+
+    fn push(&mut self, seen: &Seen) -> Verdict {
+        let verdict = self.locating.push(*seen);
+        if self.aimed == Aimed::Chosen {
+            self.next = Some(self.locating.choose(&self.hand, self.within, self.pose));
+        }
+        let looked = self.locating.looked().into();
+        self.looked = [self.looked[0] + looked, self.looked[1].max(looked)];
+        verdict
+    }
+
+    fn leader(&self) -> usize {
+        self.locating.leader()
+    }
+
+    fn rivals(&self) -> u64 {
+        // Exhausted: no name.
+        if self.locating.is_exhausted() { 1 << 56 } else { self.locating.rivals() }
+    }
+
+    fn familiarity(&self) -> Familiarity {
+        self.locating.familiarity()
+    }
+}
+
+/// The approaches to one object on a simulated table.
+pub(super) struct Pressed<'w> {
+    pub(super) drawn: Drawn<'w>,
+    /// Its number in the model; beyond all for an unknown one.
+    pub(super) class: usize,
+    pub(super) begun: bool,
+    pub(super) seen: Seen,
+    /// Half of the square that random approaches are aimed in, in millimeters.
+    pub(super) reach: f64,
+    /// What stood where at the last approach.
+    pub(super) before: Truth,
+}
+
+impl<'m> Supplier<Pressing<'m>> for Pressed<'_> {
+    type Error = Infallible;
+
+    fn step(&mut self, follower: &Pressing<'m>) -> Result<Option<Option<&Seen>>, Infallible> {
+        let at = match (follower.next, follower.aimed) {
+            (Some(next), _) => next,
+            (None, Aimed::Chosen) => Approach { roll: self.drawn.anywhere([0.0; 2], 0.0).roll, ..Approach::default() },
+            (None, Aimed::Random) => {
+                let about = follower.believed().filter(|_| self.begun).unwrap_or_default();
+                self.drawn.anywhere(about, self.reach)
+            }
+        };
+        self.begun = true;
+        self.before = self.drawn.truth;
+        let touch = self.drawn.press(at);
+        // It has a position, and comes straight down.
+        self.seen = follower.hand.seen(&touch).unwrap_or_default();
+        Ok(Some(Some(&self.seen)))
+    }
+}
+
+impl<'m> Sequences<Pressing<'m>> for Pressed<'_> {
+    fn begin(&mut self) -> Result<Option<Sequence>, Infallible> {
+        Ok((!self.begun).then(|| Sequence::new(self.class)))
+    }
+
+    fn end(&mut self, _: u32, _: bool) -> bool {
+        true
+    }
+}

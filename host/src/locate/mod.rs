@@ -1,0 +1,127 @@
+//! What an object is and where it lies on a table, from touches of a hand that knows where it is.
+//!
+//! ```text
+//! touches with positions ──learn──► surfaces ──write──► maps ──► locator ──► verdict, poses, next approach
+//!                                                        │           ▲
+//!                            objects on a simulated table (world) ───┴──► sequences ──► thresholds, promise
+//! ```
+//!
+//! [`learn`](fn@learn) makes a height map of each placement, [`write`](fn@write) the model that a chip reads, [`locating`] follows
+//! approaches with the chip's own code, and [`calibrate`](fn@calibrate) finds thresholds that keep a promise on approaches to
+//! objects on a simulated table, chosen or at random.
+
+mod error;
+mod follow;
+mod learn;
+mod promise;
+#[cfg(test)]
+mod tests;
+mod world;
+mod write;
+
+pub use error::LocateProblem;
+pub use follow::{CELLS, Locating, TOUCHES, locating};
+pub use learn::{Surface, learn, probe_of};
+pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, Pose, Seen};
+pub use promise::{Calibrated, Evaluation, Terms, calibrate, evaluate};
+pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};
+pub use write::write;
+
+use crate::error::{Error, Result};
+
+/// Settings of a model of maps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Cells of 1 mm, otherwise of 2 mm: a quarter of the bytes.
+    pub fine: bool,
+    /// Half of the side of the square in which an object's origin is looked for, in millimeters.
+    pub range: f64,
+    /// Standard deviation of the height of a contact, in millimeters.
+    pub noise: f64,
+    /// Standard deviation of the hand's position, in millimeters.
+    pub position: f64,
+    /// Share of contacts that are lost.
+    pub lost: f64,
+    /// Density of heights that nothing explains, for each millimeter.
+    pub outliers: f64,
+    /// Share of contacts with the table that are not felt.
+    pub table_missed: f64,
+    /// Standard deviation of an object's move in an approach, in millimeters.
+    pub drift: f64,
+    /// Standard deviation of an object's turn in an approach, in degrees.
+    pub drift_yaw: f64,
+    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown; 0: never.
+    pub misfit: i16,
+    /// Posterior at which an object is named until the model is calibrated: 1 less this.
+    pub error_rate: f64,
+    /// Limit of touches.
+    pub max_touches: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            fine: true,
+            range: 30.0,
+            noise: 0.5,
+            position: 0.0,
+            lost: 0.02,
+            outliers: 1e-4,
+            table_missed: 0.02,
+            drift: 0.0,
+            drift_yaw: 0.0,
+            misfit: 0,
+            error_rate: 0.01,
+            max_touches: 25,
+        }
+    }
+}
+
+impl Settings {
+    /// Side of a cell, in millimeters.
+    fn cell(&self) -> f64 {
+        if self.fine { 1.0 } else { 2.0 }
+    }
+
+    /// Root cells along a side: at most 15 mm each, or small objects are missed.
+    fn roots(&self) -> u8 {
+        ((2.0 * self.range / 15.0).ceil() as u8).max(1)
+    }
+
+    /// Standard deviation that rounding to cells adds to heights, and what the position's error does on slopes, in millimeters.
+    fn blur(&self) -> f64 {
+        (0.5 * self.cell()).hypot(1.1 * self.position)
+    }
+
+    fn margin(&self) -> f64 {
+        ((1.0 - self.error_rate) / self.error_rate).ln()
+    }
+
+    /// Rejects settings out of range.
+    ///
+    /// # Errors
+    /// [`Setting`](crate::error::Setting) naming the field.
+    pub fn check(&self) -> Result<()> {
+        let within = [
+            ("range", self.range, 1.0, 112.0, "a number of millimeters from 1 to 112"),
+            ("noise", self.noise, 0.05, 5.0, "a number of millimeters from 0.05 to 5"),
+            ("position", self.position, 0.0, 5.0, "a number of millimeters from 0 to 5"),
+            ("lost", self.lost, 1e-4, 0.5, "a share from 0.0001 to 0.5"),
+            ("outliers", self.outliers, 1e-6, 0.1, "a number from 1e-6 to 0.1"),
+            ("table_missed", self.table_missed, 1e-4, 1.0, "a share from 0.0001 to 1"),
+            ("drift", self.drift, 0.0, 10.0, "a number of millimeters from 0 to 10"),
+            ("drift_yaw", self.drift_yaw, 0.0, 3.0, "a number of degrees from 0 to 3"),
+            ("error_rate", self.error_rate, 1e-9, 0.5, "a share from 1e-9 to 0.5"),
+        ];
+        for (name, value, least, most, allowed) in within {
+            if !(least..=most).contains(&value) {
+                return Err(Error::setting(name, value, allowed));
+            }
+        }
+        let most = TOUCHES as u32;
+        if !(1..=most).contains(&self.max_touches) {
+            return Err(Error::setting("max_touches", self.max_touches, format!("1 to {most}")));
+        }
+        Ok(())
+    }
+}

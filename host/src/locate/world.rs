@@ -1,0 +1,207 @@
+//! Objects on a simulated table, pressed by a hand that knows where it is.
+
+use crate::capture;
+use crate::error::Result;
+use crate::mesh::Object;
+use crate::probe::approach::{FINGERS, Probe, to_q15};
+use crate::probe::scene::Scene;
+use crate::progress::Progress;
+use crate::random::{self, Purpose};
+use crate::touches::{Origin, Surroundings};
+use glam::DVec3;
+use palpate_onboard::locate::Approach;
+use palpate_shared::format::Length;
+use palpate_shared::{ContactTime, Pose, Position, Touch};
+use rand::rngs::ChaCha8Rng;
+use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StandardNormal};
+
+/// An object on the table: its placements as scenes, and how often it lies in each.
+#[derive(Clone, Debug)]
+pub struct Standing {
+    /// Name of the object.
+    pub name: String,
+    /// Placements, each with its share.
+    pub placements: Vec<(Scene, f64)>,
+}
+
+/// Noise of a hand and of a table.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Real {
+    /// Standard deviation of each finger's height, in millimeters.
+    pub height: f64,
+    /// Share of contacts with the object that are lost.
+    pub lost: f64,
+    /// Standard deviation of the hand's position along each axis, in millimeters.
+    pub position: f64,
+    /// Standard deviation of the object's move along x and y in an approach, in millimeters.
+    pub drift: f64,
+    /// Standard deviation of its turn in an approach, in degrees.
+    pub drift_yaw: f64,
+    /// Size of the objects relative to the maps.
+    pub size: f64,
+    /// Standard deviation of each fingertip's offset across the row and along it, in millimeters, the same for all approaches of an
+    /// object: fingers that are bent.
+    pub bent: f64,
+}
+
+impl Default for Real {
+    fn default() -> Self {
+        Self { height: 0.5, lost: 0.02, position: 0.0, drift: 0.0, drift_yaw: 0.0, size: 1.0, bent: 0.0 }
+    }
+}
+
+/// How approaches are aimed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Aimed {
+    /// Where they tell most.
+    Chosen,
+    /// At random about the most likely place.
+    Random,
+}
+
+/// A truth on the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// Position of the object among those that stand.
+    pub object: usize,
+    /// Position of its placement.
+    pub placement: usize,
+    /// Origin in millimeters.
+    pub place: [f64; 2],
+    /// Turn in radians.
+    pub yaw: f64,
+}
+
+/// The objects as they lie on a table, at their true size.
+///
+/// # Errors
+/// A mesh that makes no scene, or whose true size is not known.
+pub fn standing(objects: &[&Object], probe: &Probe, progress: &dyn Progress) -> Result<Vec<Standing>> {
+    let scene = Surroundings::Table { cone: 0.0 };
+    let origin =
+        Origin { scene, unit: Length::Millimeter, probe: *probe, touches: 1, approaches: true, ..Origin::default() };
+    let scenes = capture::scenes(objects, &origin, progress)?;
+    let with_share = |scene: Scene| {
+        let share = scene.table().map_or(1.0, |table| table.weight);
+        (scene, share)
+    };
+    let of = |(object, scenes): (&&Object, Vec<Scene>)| Standing {
+        name: object.name.clone(),
+        placements: scenes.into_iter().map(with_share).collect(),
+    };
+    Ok(objects.iter().zip(scenes).map(of).collect())
+}
+
+/// A table with objects to choose from, and a hand.
+#[derive(Clone, Copy, Debug)]
+pub struct World<'w> {
+    /// The objects.
+    pub standing: &'w [Standing],
+    /// The hand.
+    pub probe: &'w Probe,
+    /// Noise.
+    pub real: Real,
+    /// Half of the square that objects stand in, in millimeters.
+    pub range: f64,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+impl World<'_> {
+    /// Draws an object that stands on the table: object after object in turn, everything else by chance.
+    pub fn draw(&self, index: u64) -> Drawn<'_> {
+        let mut random = random::generator(self.seed, Purpose::Table, "", index);
+        let object = usize::try_from(index).unwrap_or(0) % self.standing.len().max(1);
+        let placements = &self.standing[object].placements;
+        let mut left: f64 = random.random::<f64>() * placements.iter().map(|(_, share)| share).sum::<f64>();
+        let below = |(_, share): &(Scene, f64)| {
+            left -= share;
+            left < 0.0
+        };
+        let placement = placements.iter().position(below).unwrap_or(placements.len() - 1);
+        let place = [0; 2].map(|_| (2.0 * random.random::<f64>() - 1.0) * self.range);
+        let yaw = random.random::<f64>() * std::f64::consts::TAU;
+        let bent = [[0; 2]; FINGERS].map(|axes| axes.map(|_| self.real.bent * normal(&mut random)));
+        Drawn { world: *self, truth: Truth { object, placement, place, yaw }, random, bent }
+    }
+}
+
+/// An object that stands on the table.
+#[derive(Debug)]
+pub struct Drawn<'w> {
+    world: World<'w>,
+    /// What stands where.
+    pub truth: Truth,
+    random: ChaCha8Rng,
+    bent: [[f64; 2]; FINGERS],
+}
+
+impl Drawn<'_> {
+    /// Presses straight down, and returns the touch that the hand reports, in the table's frame. Then the object may have moved.
+    pub fn press(&mut self, at: Approach) -> Touch {
+        let World { standing, probe, real, .. } = self.world;
+        let Truth { object, placement, place, yaw } = self.truth;
+        let (scene, _) = &standing[object].placements[placement];
+        let [low, high] = scene.bounds();
+        let roll = f64::from(at.roll) / 256.0 * std::f64::consts::TAU;
+        let (row_sin, row_cos) = roll.sin_cos();
+        let stated = [at.x, at.y].map(|micrometers| f64::from(micrometers) / 1_000.0);
+        let shift = [0; 3].map(|_| real.position * normal(&mut self.random));
+        let (sin, cos) = yaw.sin_cos();
+        // The scene is centered on its box; the table is at its lowest point.
+        let top = high.z - low.z + 2.0 * probe.radius + 1.0;
+        let mut heights = [None; FINGERS];
+        for ((height, bent), finger) in heights.iter_mut().zip(self.bent).zip([-1.0, 0.0, 1.0]) {
+            let along = finger * probe.spacing + bent[0];
+            let x = stated[0] + shift[0] + along * row_cos - bent[1] * row_sin - place[0];
+            let y = stated[1] + shift[1] + along * row_sin + bent[1] * row_cos - place[1];
+            let (u, v) = ((cos * x + sin * y) / real.size, (cos * y - sin * x) / real.size);
+            let start = DVec3::new(u, v, low.z + top / real.size);
+            let contact = scene.first_contact(start, DVec3::NEG_Z, probe.radius);
+            let met = contact.map_or(0.0, |way| (top - way * real.size - probe.radius).max(0.0));
+            let is_lost = self.random.random::<f64>() < real.lost && met > 0.0;
+            *height = (!is_lost).then_some(met + shift[2] + real.height * normal(&mut self.random));
+        }
+        let first = heights.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
+        // Where every contact was lost, the hand went down to the table.
+        let first = if first.is_finite() { first } else { 0.0 };
+        let lowest = probe.stroke.map_or(f64::NEG_INFINITY, |stroke| first - stroke);
+        let times = heights.map(|height| match height {
+            Some(height) if height >= lowest => {
+                ContactTime::from_micros(((first - height) / probe.speed * 1e6).round() as u32)
+            }
+            _ => ContactTime::MISSING,
+        });
+        let pose = Pose { direction: [0, 0, to_q15(-1.0)], alignment: [row_cos, row_sin, 0.0].map(to_q15) };
+        let position = Position { micrometers: [at.x, at.y, (first * 1_000.0).round() as i32] };
+        let mut drift = || real.drift * normal(&mut self.random);
+        let moved = [place[0] + drift(), place[1] + drift()];
+        let turned = yaw + (real.drift_yaw * normal(&mut self.random)).to_radians();
+        self.truth = Truth { place: moved, yaw: turned, ..self.truth };
+        Touch::new(times).with_pose(pose).with_position(position)
+    }
+
+    /// The same with the object at another place.
+    #[must_use]
+    pub fn at(self, truth: Truth) -> Self {
+        Self { truth, ..self }
+    }
+
+    /// A seed of the choice of approaches.
+    pub(super) fn seed(&mut self) -> u32 {
+        self.random.random()
+    }
+
+    /// An approach at random within a square about a place, in millimeters.
+    pub fn anywhere(&mut self, [x, y]: [f64; 2], reach: f64) -> Approach {
+        let mut at = |middle: f64| ((middle + (2.0 * self.random.random::<f64>() - 1.0) * reach) * 1_000.0) as i32;
+        let (x, y) = (at(x), at(y));
+        Approach { x, y, roll: self.random.random::<u8>() }
+    }
+}
+
+fn normal(random: &mut impl Rng) -> f64 {
+    StandardNormal.sample(random)
+}

@@ -1,0 +1,168 @@
+//! Surfaces as the bytes that the chip reads.
+
+use super::learn::Surface;
+use super::{LocateProblem, Settings};
+use crate::compile::{OwnedSection, file, restate_header};
+use crate::error::Result;
+use crate::probe::approach::Probe;
+use palpate_onboard::locate::{BEYOND, DISTANCES, Maps, WIDTHS, WITHIN};
+use palpate_shared::format::{HeaderBuilder, Length, MAPS_LAYOUT, Tag, TrainedProbe};
+
+/// 1/16 mm in a millimeter.
+const SIXTEENTHS: f64 = 16.0;
+/// Units of logarithms in a nat.
+const NAT: f64 = 64.0;
+/// Squares of the radius of a window's disc, in squares of its size.
+const DISC: i32 = 13;
+/// Sides of windows that have minima and maxima of their own, in millimeters.
+const WINDOWS: [i32; 4] = [4, 8, 16, 32];
+
+/// Writes a model of maps.
+///
+/// # Errors
+/// [`LocateProblem`] for a name or a map that is too large; [`Setting`](crate::error::Setting) for settings out of range.
+pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: &Settings) -> Result<Vec<u8>> {
+    settings.check()?;
+    let (mut records, mut heights) = (Vec::new(), Vec::new());
+    for surface in surfaces {
+        let offset = u32::try_from(heights.len()).unwrap_or(u32::MAX);
+        let scale = (surface.top() * SIXTEENTHS * 64.0 / 255.0).ceil().max(1.0);
+        let radius = ((surface.radius() + 2.0) * SIXTEENTHS).ceil();
+        let large =
+            |_| LocateProblem::Large { object: objects[surface.object].clone(), placement: surface.placement.clone() };
+        let [scale, radius] =
+            [scale, radius].map(|number| if number < 65_535.0 { Ok(number as u16) } else { Err(large(())) });
+        let (scale, radius) = (scale?, radius?);
+        records.push(u8::try_from(surface.object).unwrap_or(u8::MAX));
+        records.push(u8::from(surface.is_round));
+        records.extend(((surface.share.max(1e-6).ln() * NAT).round() as i16).to_le_bytes());
+        records.extend(scale.to_le_bytes());
+        records.extend(radius.to_le_bytes());
+        records.extend(offset.to_le_bytes());
+        for half in levels(surface, &mut heights, scale) {
+            for half in half {
+                records.push(u8::try_from(half).map_err(|_| large(()))?);
+            }
+        }
+        records.extend([0; 2]);
+    }
+    let number = |number: f64, most: u16| (number.round() as u16).min(most).to_le_bytes();
+    let mut content =
+        vec![if settings.fine { 4 } else { 5 }, settings.roots(), u8::try_from(surfaces.len()).unwrap_or(u8::MAX), 0];
+    content.extend(number(settings.range * SIXTEENTHS, 4_096));
+    content.extend(number(settings.drift * SIXTEENTHS, 1_023));
+    content.extend(number(settings.drift_yaw.to_radians() * 16_384.0, 1_023));
+    content.extend(settings.misfit.to_le_bytes());
+    content.resize(palpate_onboard::locate::MAPS_LENGTH, 0);
+    content.extend(records);
+    content.extend(likelihoods(settings).into_iter().flat_map(i16::to_le_bytes));
+    content.extend(heights);
+    let mut text = Vec::new();
+    let placements = surfaces.iter().map(|surface| surface.placement.as_str());
+    for name in std::iter::once(env!("CARGO_PKG_VERSION")).chain(objects.iter().map(String::as_str)).chain(placements) {
+        text.push(u8::try_from(name.len()).map_err(|_| LocateProblem::NameTooLong { name: name.into() })?);
+        text.extend(name.bytes());
+    }
+    text.resize(text.len().next_multiple_of(4), 0);
+    let stated = TrainedProbe {
+        radius: probe.radius as f32,
+        spacing: probe.spacing as f32,
+        speed: probe.speed as f32,
+        length: Length::Millimeter,
+        cone: 0,
+        stroke: probe.stroke.map(|stroke| stroke as f32),
+        travel: probe.travel.map(|travel| travel as f32),
+        stroke_tolerance: probe.stroke_tolerance.map(|tolerance| tolerance as f32),
+    };
+    let sections = vec![
+        OwnedSection::new(Tag::Probe, false, &stated.to_bytes()[..stated.length()]),
+        OwnedSection::new(Tag::Maps, true, content),
+    ];
+    let header = HeaderBuilder::default()
+        .with_layout(MAPS_LAYOUT)
+        .with_last_object(u8::try_from(objects.len() - 1).unwrap_or(u8::MAX))
+        .with_odds(crate::calibrate::odds_of(settings.margin()))
+        .with_max_touches(settings.max_touches);
+    let bytes = file(header, text, sections, Vec::new())?;
+    Maps::new(&bytes).map_err(|error| LocateProblem::Refused { error })?;
+    Ok(bytes)
+}
+
+/// The model with another threshold and limit of touches.
+///
+/// # Errors
+/// [`LocateProblem::Refused`] if it could not be read then.
+pub(super) fn restated(maps: Maps<'_>, odds: u64, max_touches: u32) -> Result<Vec<u8>> {
+    let bytes = restate_header(maps.model(), |header| header.with_odds(odds).with_max_touches(max_touches));
+    Maps::new(&bytes).map_err(|error| LocateProblem::Refused { error })?;
+    Ok(bytes)
+}
+
+/// Writes a surface's heights, cells first and then the windows' minima and maxima, and returns how many cells each level has on
+/// each side of its middle.
+fn levels(surface: &Surface, bytes: &mut Vec<u8>, scale: u16) -> Vec<[i32; 2]> {
+    let count = |height: f64| height * SIXTEENTHS * 64.0 / f64::from(scale);
+    let [x, y] = surface.half;
+    let mut halves = vec![[x, y]];
+    for j in -y..=y {
+        bytes.extend((-x..=x).map(|i| count(surface.at(i, j)).round().min(255.0) as u8));
+    }
+    let cell = surface.cell as i32;
+    for window in WINDOWS {
+        let half = [x, y].map(|half| half * cell / window + 2);
+        halves.push(half);
+        let reach = window / cell;
+        for j in -half[1]..=half[1] {
+            for i in -half[0]..=half[0] {
+                let [mut low, mut high] = [f64::INFINITY, 0.0_f64];
+                for v in -reach..=reach {
+                    for u in -reach..=reach {
+                        if (u * u + v * v) * 10 <= reach * reach * DISC {
+                            let height = surface.at(i * reach + u, j * reach + v);
+                            (low, high) = (low.min(height), high.max(height));
+                        }
+                    }
+                }
+                bytes.extend([count(low).floor() as u8, count(high).ceil().min(255.0) as u8]);
+            }
+        }
+    }
+    halves
+}
+
+/// Logarithms of the likelihoods of contacts and of missing ones, in 1/64 nat.
+fn likelihoods(settings: &Settings) -> Vec<i16> {
+    let Settings { noise, lost, outliers, .. } = *settings;
+    // Rounding to cells adds to the noise.
+    let sigma = noise.hypot(settings.blur());
+    let log = |likelihood: f64| (likelihood.max(1e-200).ln() * NAT).round().max(-32_000.0) as i16;
+    let gauss = |distance: f64| (-0.5 * (distance / sigma).powi(2)).exp();
+    let around = (std::f64::consts::TAU).sqrt() * sigma;
+    let mut all = Vec::new();
+    for is_near in [false, true] {
+        for width in (0..WIDTHS).map(middle) {
+            for distance in 0..DISTANCES {
+                let own = if distance == DISTANCES - 1 { 0.0 } else { gauss(distance as f64 / 8.0) / (width + around) };
+                let table = if is_near { lost / (2.5 * sigma) } else { 0.0 };
+                all.push(log(own * (1.0 - lost) + outliers + table));
+            }
+        }
+    }
+    all.extend((0..WITHIN).map(|share| log((share as f64 / 64.0).max(0.02) * (1.0 - lost) + lost)));
+    all.extend((0..BEYOND).map(|distance| log(0.3 * gauss(distance as f64 / 8.0) + lost + outliers)));
+    all.push(log(settings.table_missed.max(lost)));
+    all
+}
+
+/// Middle of a bin of widths, in millimeters: half millimeters, then two for each octave.
+fn middle(bin: usize) -> f64 {
+    match bin {
+        0 => 0.0,
+        1..=3 => 0.5 * bin as f64 + 0.25,
+        _ => {
+            let octave = 0.5 * f64::from(1_u32 << (bin / 2));
+            let middle = octave * (1.0 + 0.5 * (bin % 2) as f64) + octave / 4.0;
+            if bin == WIDTHS - 1 { middle * 1.3 } else { middle }
+        }
+    }
+}

@@ -1,0 +1,330 @@
+//! Cells of (placement, yaw, x, y), and their likelihoods.
+
+use super::locator::{Exhausted, Locator};
+use super::maps::{Maps, Placement};
+use super::number::{NAT, NOTHING, add, direction, of_sum, power};
+use super::seen::Seen;
+use crate::bytes::at;
+
+/// Root cells of yaw.
+pub(super) const YAWS: u8 = 8;
+/// Times that a root cell can be split: finest cells are of 0.9 mm and 2.8°.
+pub(super) const FINEST: u8 = 4;
+/// Logarithm of the number of parts of a cell.
+const PARTS: i32 = 133;
+/// Logarithm of the number of parts of a cell of a round placement, which has no yaw.
+const ROUND_PARTS: i32 = 89;
+/// Logarithm of the number of root cells of yaw.
+const OF_YAWS: i32 = 133;
+/// Cells less likely than the best by this are dropped, and count.
+const CUT: i32 = 30 * NAT;
+/// Cells within this of all together are split.
+const SPLIT: i32 = 12 * NAT;
+/// Search ends when cells that are not fine weigh less than all by this.
+const DONE: i32 = 8 * NAT;
+/// Share that a pool may lose at once when it is full.
+const LOSS: i32 = 9 * NAT;
+
+/// A cell: its likelihood, and what it is of.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Cell {
+    pub(super) placement: u8,
+    pub(super) yaw: u8,
+    pub(super) x: u8,
+    pub(super) y: u8,
+    pub(super) level: u8,
+    /// Logarithm of its share, in 1/64 nat.
+    pub(super) likely: i16,
+}
+
+impl Maps<'_> {
+    /// Middle of a cell along an axis, in 1/16 mm.
+    #[inline(always)]
+    pub(super) fn middle(&self, place: u8, level: u8) -> i32 {
+        ((2 * i32::from(place) + 1) * self.range) / (i32::from(self.roots) << level) - self.range
+    }
+
+    /// Half of a cell's side, in 1/16 mm.
+    pub(super) fn half(&self, level: u8) -> i32 {
+        self.range / (i32::from(self.roots) << level)
+    }
+
+    /// Likelihood of a cell given the touches, the last first; less than `least` may be of some of them alone.
+    #[inline(always)]
+    fn likely(
+        &self,
+        cell: &Cell,
+        placement: &Placement,
+        [mut whole, mut finest]: [i32; 2],
+        seen: &[Seen],
+        least: i32,
+        looked: &mut u32,
+    ) -> i32 {
+        let level = i32::from(cell.level);
+        let (cos, sin) = direction(turn(cell.yaw, cell.level));
+        let (x, y) = (self.middle(cell.x, cell.level), self.middle(cell.y, cell.level));
+        let side = (self.range * 5) / ((i32::from(self.roots) << level) * 4);
+        let [drift, drift_yaw] = self.drift;
+        // Half of a cell's turn, in radians in Q14.
+        let (angle, drift_yaw) =
+            if placement.is_round { (0, 0) } else { (HALF_TURN / (i32::from(YAWS) << level), drift_yaw) };
+        let (mut blur, mut angle) = (side, angle);
+        for seen in seen.iter().rev() {
+            for finger in 0..3 {
+                let (u, v) = (i32::from(at(&seen.x, finger)) - x, i32::from(at(&seen.y, finger)) - y);
+                let (u, v) = ((cos * u + sin * v) >> 14, (cos * v - sin * u) >> 14);
+                let radius = length(u, v).min(placement.radius);
+                let interval = self.heights(placement, u, v, blur + ((radius * angle) >> 14));
+                *looked += 1;
+                let [of_whole, of_finest] =
+                    self.of_finger(i32::from(at(&seen.z, finger)), i32::from(seen.limit), interval);
+                whole += of_whole;
+                finest += of_finest;
+            }
+            if whole < least && finest < least {
+                break;
+            }
+            blur += drift;
+            angle += drift_yaw;
+        }
+        whole.max(finest).max(NOTHING)
+    }
+
+    /// Likelihood of a finger's height given an interval, and given the height in it that fits best.
+    #[inline(always)]
+    fn of_finger(&self, z: i32, limit: i32, [low, high]: [i32; 2]) -> [i32; 2] {
+        if z >= 0 {
+            let distance = (low - z).max(z - high).max(0);
+            let (is_near, width) = (z < NEAR, width(high - low));
+            [self.of_contact(is_near, width, distance), self.of_contact(is_near, width.min(1), distance)]
+        } else if limit <= 0 {
+            // The table was within the stroke: it was not felt, or a contact was lost.
+            let missed = if low == 0 { self.of_table_missed() } else { self.of_missing_beyond(low - limit) };
+            [missed; 2]
+        } else if high <= limit {
+            [self.of_missing_within(64); 2]
+        } else if low > limit {
+            [self.of_missing_beyond(low - limit); 2]
+        } else {
+            [self.of_missing_within(((limit - low + 11) * 64) / (high - low + 22)), self.of_missing_within(64)]
+        }
+    }
+}
+
+/// Heights below this may be of the table after a contact was lost, in 1/16 mm.
+const NEAR: i32 = 24;
+/// Half a turn, in radians in Q14.
+const HALF_TURN: i32 = 51_472;
+
+/// Middle of a cell's yaw, in 1/256 turn.
+pub(super) fn turn(yaw: u8, level: u8) -> i32 {
+    ((2 * i32::from(yaw) + 1) * 128) / (i32::from(YAWS) << level)
+}
+
+/// Length of a vector, at most 6 % off.
+fn length(x: i32, y: i32) -> i32 {
+    let (longer, shorter) = (x.abs().max(y.abs()), x.abs().min(y.abs()));
+    longer + (shorter >> 1) - (longer >> 3)
+}
+
+/// Bin of an interval's width: half millimeters, then two for each octave.
+fn width(sixteenths: i32) -> usize {
+    let halves = (sixteenths >> 3).unsigned_abs();
+    let bin = match halves.checked_ilog2() {
+        Some(octave) if halves >= 4 => 2 * octave + ((halves >> (octave - 1)) & 1),
+        _ => halves,
+    };
+    usize::try_from(bin.min(15)).unwrap_or(0)
+}
+
+impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_, CELLS, TOUCHES, OBJECTS> {
+    /// The cells in the pool.
+    pub(super) fn cells(&self) -> &[Cell] {
+        self.pool.get(..self.count).unwrap_or_default()
+    }
+
+    fn object_of(&self, cell: &Cell) -> usize {
+        usize::from(self.maps.object_of(cell.placement))
+    }
+
+    /// Logarithm of a cell's share before the first touch.
+    pub(super) fn prior(&self, index: u8, placement: &Placement, level: u8) -> i32 {
+        let parts = if placement.is_round { ROUND_PARTS } else { PARTS };
+        let yaws = if placement.is_round { 0 } else { OF_YAWS };
+        self.object_prior(index) + placement.prior - yaws - i32::from(level) * parts
+    }
+
+    /// Weight of a cell, relative to the best, in Q16.
+    #[inline(always)]
+    pub(super) fn weight(&self, cell: &Cell) -> u32 {
+        power(self.best - i32::from(cell.likely))
+    }
+
+    fn highest(&self) -> i32 {
+        self.cells().iter().map(|cell| i32::from(cell.likely)).max().unwrap_or(NOTHING)
+    }
+
+    /// Adds a cell's weight to what was dropped of its object.
+    fn drop_cell(&mut self, cell: &Cell) {
+        let object = self.object_of(cell);
+        if let Some(dropped) = self.dropped.get_mut(object) {
+            *dropped = add(*dropped, i32::from(cell.likely));
+        }
+    }
+
+    /// Puts a cell into the pool, which has room, or drops it.
+    fn put(&mut self, mut cell: Cell) {
+        let least = self.best - CUT;
+        let seen = self.seen.get(..self.touches).unwrap_or_default();
+        let placement = self.maps.placement(cell.placement);
+        let priors = [cell.level, FINEST].map(|level| self.prior(cell.placement, &placement, level));
+        let likely = self.maps.likely(&cell, &placement, priors, seen, least, &mut self.looked);
+        cell.likely = i16::try_from(likely).unwrap_or(i16::MIN);
+        match self.pool.get_mut(self.count) {
+            Some(slot) if likely >= least => {
+                *slot = cell;
+                self.count += 1;
+                self.best = self.best.max(likely);
+            }
+            _ => self.drop_cell(&cell),
+        }
+    }
+
+    /// Drops the least likely cells as far as they weigh little together; true if that made room worth having.
+    fn prune(&mut self) -> bool {
+        let (count, top) = (self.count, self.highest());
+        let bin = |cell: &Cell| usize::try_from((top - i32::from(cell.likely)) >> 5).unwrap_or(0).min(63);
+        let (mut counts, mut weights) = ([0_usize; 64], [0_u64; 64]);
+        for cell in self.cells() {
+            if let (Some(count), Some(weight)) = (counts.get_mut(bin(cell)), weights.get_mut(bin(cell))) {
+                *count += 1;
+                *weight += u64::from(self.weight(cell));
+            }
+        }
+        let may_lose = (weights.iter().sum::<u64>() * u64::from(power(LOSS))) >> 16;
+        let (mut first, mut found, mut lost) = (64_usize, 0, 0);
+        while first > 1 && found < count / 4 && lost + at(&weights, first - 1) <= may_lose {
+            first -= 1;
+            lost += at(&weights, first);
+            found += at(&counts, first);
+        }
+        let mut kept = 0;
+        for index in 0..count {
+            let cell = at(&self.pool, index);
+            if bin(&cell) >= first {
+                self.drop_cell(&cell);
+            } else if let Some(slot) = self.pool.get_mut(kept) {
+                *slot = cell;
+                kept += 1;
+            }
+        }
+        self.count = kept;
+        kept + count / 16 + 8 <= count
+    }
+
+    /// Weighs the cells; returns the weight of those that could be split, as a logarithm.
+    fn weigh(&mut self) -> (i32, i32) {
+        self.best = self.highest();
+        let (mut all, mut coarse) = (0_u64, 0_u64);
+        for cell in self.cells() {
+            let weight = u64::from(self.weight(cell));
+            all += weight;
+            if cell.level < FINEST - 1 {
+                coarse += weight;
+            }
+        }
+        let of = |sum| if sum == 0 { NOTHING } else { self.best + of_sum(sum) };
+        (of(all), of(coarse))
+    }
+
+    /// Searches the cells for all touches.
+    pub(super) fn search(&mut self) {
+        (self.count, self.best, self.looked, self.exhausted) = (0, NOTHING, 0, None);
+        self.dropped = [NOTHING; OBJECTS];
+        let roots = self.maps.roots;
+        for placement in 0..u8::try_from(self.maps.placements()).unwrap_or(u8::MAX) {
+            if self.object_prior(placement) == NOTHING {
+                continue;
+            }
+            let yaws = if self.maps.placement(placement).is_round { 1 } else { YAWS };
+            for root in 0..u32::from(yaws) * u32::from(roots) * u32::from(roots) {
+                if self.count >= CELLS && !self.prune() && self.count >= CELLS {
+                    self.exhausted = Some(Exhausted::Cells);
+                }
+                let number = |value: u32| u8::try_from(value).unwrap_or(0);
+                let (rest, roots) = (root / u32::from(yaws), u32::from(roots));
+                let (yaw, x, y) = (number(root % u32::from(yaws)), number(rest % roots), number(rest / roots));
+                self.put(Cell { placement, yaw, x, y, level: 0, likely: 0 });
+            }
+        }
+        let mut total;
+        let mut threshold = self.highest() - NAT / 2;
+        loop {
+            let mut index = 0;
+            while index < self.count {
+                let cell = at(&self.pool, index);
+                if cell.level >= FINEST || i32::from(cell.likely) < threshold {
+                    index += 1;
+                    continue;
+                }
+                if self.count + 7 > CELLS {
+                    if !self.prune() {
+                        self.exhausted = Some(Exhausted::Cells);
+                        break;
+                    }
+                    index = 0;
+                    continue;
+                }
+                if self.looked > self.effort.lookups {
+                    self.exhausted = Some(Exhausted::Lookups);
+                    break;
+                }
+                self.split(index, &cell);
+            }
+            let coarse;
+            (total, coarse) = self.weigh();
+            threshold -= NAT / 2;
+            if self.exhausted.is_some() || coarse < total - DONE || threshold < total - SPLIT {
+                break;
+            }
+        }
+        self.sum_up();
+    }
+
+    /// Replaces a cell by its parts.
+    fn split(&mut self, index: usize, cell: &Cell) {
+        self.count -= 1;
+        let last = at(&self.pool, self.count);
+        if let Some(slot) = self.pool.get_mut(index) {
+            *slot = last;
+        }
+        let turns = if self.maps.placement(cell.placement).is_round { 1 } else { 2 };
+        for part in 0..4 * turns {
+            let (yaw, part) = (part % turns, part / turns);
+            self.put(Cell {
+                yaw: turns * cell.yaw + yaw,
+                x: 2 * cell.x + (part & 1),
+                y: 2 * cell.y + (part >> 1),
+                level: cell.level + 1,
+                ..*cell
+            });
+        }
+    }
+
+    /// The objects' posteriors.
+    fn sum_up(&mut self) {
+        let mut sums = [0_u64; OBJECTS];
+        for cell in self.cells() {
+            if let Some(sum) = sums.get_mut(self.object_of(cell)) {
+                *sum += u64::from(self.weight(cell));
+            }
+        }
+        let mut all = NOTHING;
+        for ((posterior, sum), dropped) in self.posteriors.iter_mut().zip(sums).zip(self.dropped) {
+            let kept = if sum == 0 { NOTHING } else { self.best + of_sum(sum) };
+            *posterior = add(kept, dropped);
+            all = add(all, *posterior);
+        }
+        self.posteriors.iter_mut().for_each(|posterior| *posterior -= all);
+    }
+}

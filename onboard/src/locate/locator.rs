@@ -1,0 +1,274 @@
+//! The follower: touches in, a verdict out.
+
+use super::belief::{Cell, FINEST};
+use super::maps::Maps;
+use super::number::{NOTHING, Random, add, logarithm, odds};
+use super::seen::{Contact, Seen};
+use crate::bytes::at;
+use crate::decide::{CapacityError, Familiarity, Rivals, Stopping, Verdict};
+use palpate_shared::Touch;
+
+/// Bounds on the work of an approach.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Effort {
+    /// Heights that are looked up until a search ends, each about 160 instructions on a Cortex-M4F. 450,000 serve ten objects.
+    pub lookups: u32,
+    /// Approaches that are compared to choose the next.
+    pub candidates: u16,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self { lookups: 450_000, candidates: 64 }
+    }
+}
+
+/// Bound at which a search ended before it was done. No object is named then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exhausted {
+    /// The pool of cells was full.
+    Cells,
+    /// As many heights were looked up as may be.
+    Lookups,
+}
+
+/// Recognizes which object lies on a table, and where, with room for `CELLS` cells of 8 bytes, `TOUCHES` touches and `OBJECTS`
+/// objects.
+#[derive(Clone, Debug)]
+pub struct Locator<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> {
+    pub(super) maps: Maps<'m>,
+    pub(super) stopping: Stopping,
+    pub(super) effort: Effort,
+    pub(super) seen: [Seen; TOUCHES],
+    pub(super) touches: usize,
+    pub(super) pool: [Cell; CELLS],
+    pub(super) count: usize,
+    /// Logarithm of each object's weight before the first touch.
+    priors: [i32; OBJECTS],
+    /// Logarithm of the weight of an object's cells that are not in the pool.
+    pub(super) dropped: [i32; OBJECTS],
+    pub(super) posteriors: [i32; OBJECTS],
+    /// The likelihood of the most likely cell.
+    pub(super) best: i32,
+    pub(super) looked: u32,
+    pub(super) exhausted: Option<Exhausted>,
+    pub(super) random: Random,
+    seed: u32,
+}
+
+impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'m, CELLS, TOUCHES, OBJECTS> {
+    /// A locator without a touch, which stops as `stopping` says. The seed is of the choice of approaches.
+    ///
+    /// # Errors
+    /// [`CapacityError`] for more objects than there is room for.
+    pub fn new(maps: Maps<'m>, stopping: Stopping, effort: Effort, seed: u32) -> Result<Self, CapacityError> {
+        let objects = maps.objects();
+        if objects > OBJECTS || CELLS < 64 || TOUCHES == 0 {
+            return Err(CapacityError { objects, capacity: OBJECTS });
+        }
+        // Xorshift stays at 0.
+        let seed = seed.max(1);
+        let mut locator = Self {
+            maps,
+            stopping,
+            effort,
+            seen: [Seen::default(); TOUCHES],
+            touches: 0,
+            pool: [Cell::default(); CELLS],
+            count: 0,
+            priors: [NOTHING; OBJECTS],
+            dropped: [NOTHING; OBJECTS],
+            posteriors: [NOTHING; OBJECTS],
+            best: NOTHING,
+            looked: 0,
+            exhausted: None,
+            random: Random(seed),
+            seed,
+        };
+        locator.priors.iter_mut().take(objects).for_each(|prior| *prior = 0);
+        locator.reset();
+        Ok(locator)
+    }
+
+    /// Forgets all touches, for another object. Cost: that of a search without touches.
+    pub fn reset(&mut self) {
+        (self.touches, self.random) = (0, Random(self.seed));
+        self.search();
+    }
+
+    /// Begins another object: one of those that have a weight, which says how often each is met. Like [`reset`](Self::reset);
+    /// changes nothing and returns false unless one of as many weights as there are objects is above 0.
+    pub fn reset_to(&mut self, weights: &[u32]) -> bool {
+        if weights.len() != self.maps.objects() || weights.iter().all(|&weight| weight == 0) {
+            return false;
+        }
+        self.priors.iter_mut().zip(weights).for_each(|(prior, &weight)| *prior = logarithm(weight.into()));
+        self.reset();
+        true
+    }
+
+    /// Logarithm of the weight of a placement's object; [`NOTHING`] for one that is not expected.
+    pub(super) fn object_prior(&self, placement: u8) -> i32 {
+        at(&self.priors, usize::from(self.maps.object_of(placement)))
+    }
+
+    /// Takes in a touch with pose and position, of a probe whose fingers are `spacing` micrometers apart and move at `speed`
+    /// micrometers per second until `stroke` micrometers after the first contact.
+    ///
+    /// `None`, and nothing is counted, for a touch without a position, or from another direction than straight down (a direction's
+    /// z above −0.95).
+    /// Cost and verdict: see [`push_seen`](Self::push_seen).
+    pub fn push(&mut self, touch: &Touch, hand: Hand) -> Option<Verdict> {
+        hand.seen(touch).map(|seen| self.push_seen(seen))
+    }
+
+    /// Takes in the heights of an approach.
+    ///
+    /// Cost: a search, at most about 200 instructions for each of [`Effort::lookups`]. Cannot fail: once there is no more room for
+    /// touches, the verdict is [`Verdict::GaveUp`] unless an object has been named.
+    pub fn push_seen(&mut self, seen: Seen) -> Verdict {
+        let Some(slot) = self.seen.get_mut(self.touches) else { return self.verdict() };
+        *slot = seen;
+        self.touches += 1;
+        self.search();
+        self.verdict()
+    }
+
+    /// The verdict on the touches so far.
+    pub fn verdict(&self) -> Verdict {
+        let touches = u32::try_from(self.touches).unwrap_or(u32::MAX);
+        let is_sure = self.exhausted.is_none() && self.touches > 0 && self.rivals().q56() <= self.stopping.odds();
+        if self.familiarity() == Familiarity::Stranger {
+            Verdict::Unknown
+        } else if is_sure {
+            let object = u8::try_from(self.leader()).unwrap_or(u8::MAX);
+            Verdict::Recognized { object, touches, rivals: self.rivals() }
+        } else if self.touches >= TOUCHES || touches >= self.stopping.max_touches() {
+            Verdict::GaveUp
+        } else {
+            Verdict::Undecided
+        }
+    }
+
+    /// The object with the most evidence.
+    pub fn leader(&self) -> usize {
+        let objects = self.posteriors.iter().take(self.maps.objects()).enumerate();
+        objects
+            .fold(
+                (0, i32::MIN),
+                |best, (object, &posterior)| if posterior > best.1 { (object, posterior) } else { best },
+            )
+            .0
+    }
+
+    /// Sum of the weights of all other objects, that of the leader being 1.
+    pub fn rivals(&self) -> Rivals {
+        let leader = self.leader();
+        let objects = self.posteriors.iter().take(self.maps.objects()).enumerate();
+        let others =
+            objects.filter(|(object, _)| *object != leader).fold(NOTHING, |sum, (_, &posterior)| add(sum, posterior));
+        Rivals::from_q56(odds(at(&self.posteriors, leader) - others))
+    }
+
+    /// Posterior of an object in Q16.
+    pub fn posterior(&self, object: usize) -> u32 {
+        super::number::power(-self.posteriors.get(object).copied().unwrap_or(NOTHING))
+    }
+
+    /// Result of the test of whether the touches fit an object at all: from the third touch, whether the most likely cell is too
+    /// unlikely.
+    pub fn familiarity(&self) -> Familiarity {
+        let limit = self.maps.misfit();
+        if limit == 0 || self.touches < 3 {
+            return Familiarity::Known;
+        }
+        if self.fit() < limit { Familiarity::Stranger } else { Familiarity::Known }
+    }
+
+    /// Logarithm of the likelihood of the most likely cell for each touch, in 1/64 nat.
+    pub fn fit(&self) -> i32 {
+        let best = self.cells().iter().max_by_key(|cell| cell.likely);
+        let prior = best.map_or(0, |cell| self.prior(cell.placement, &self.maps.placement(cell.placement), FINEST));
+        (self.best - prior).checked_div(i32::try_from(self.touches).unwrap_or(1)).unwrap_or(0)
+    }
+
+    /// Number of touches so far.
+    pub const fn touches(&self) -> usize {
+        self.touches
+    }
+
+    /// Bound at which the last search ended before it was done, if it did.
+    pub const fn exhausted(&self) -> Option<Exhausted> {
+        self.exhausted
+    }
+
+    /// Heights that were looked up by the last search, and since.
+    pub const fn looked(&self) -> u32 {
+        self.looked
+    }
+
+    /// The maps.
+    pub const fn maps(&self) -> Maps<'m> {
+        self.maps
+    }
+
+    /// Number of cells that the last search kept.
+    pub const fn kept(&self) -> usize {
+        self.count
+    }
+}
+
+/// Measures of a hand that comes straight down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hand {
+    /// Distance between neighboring fingers, in micrometers.
+    pub spacing: u32,
+    /// Speed, in micrometers per second.
+    pub speed: u32,
+    /// Way that the hand goes on after the first contact, in micrometers; none: until all fingers have met something.
+    pub stroke: Option<u32>,
+}
+
+impl Hand {
+    /// The hand that the maps were learned with; none if they do not state it, or not in millimeters.
+    pub fn of(maps: &Maps<'_>) -> Option<Self> {
+        let probe = maps.probe()?;
+        if probe.length != palpate_shared::format::Length::Millimeter {
+            return None;
+        }
+        // Floats become integers without a panic.
+        let micrometers = |millimeters: f32| (millimeters * 1_000.0) as u32;
+        Some(Self {
+            spacing: micrometers(probe.spacing),
+            speed: micrometers(probe.speed),
+            stroke: probe.stroke.map(micrometers),
+        })
+    }
+
+    /// Heights that a touch met; none without a position, or from another direction than straight down.
+    pub fn seen(&self, touch: &Touch) -> Option<Seen> {
+        let (pose, position) = (touch.pose()?, touch.position()?);
+        let [_, _, down] = pose.direction;
+        if i32::from(down) > -31_128 {
+            return None;
+        }
+        let [x, y, z] = position.micrometers;
+        let along = |share: i16| {
+            let micrometers = i64::from(self.spacing) * i64::from(share) / i64::from(palpate_shared::Q15_ONE);
+            i32::try_from(micrometers).unwrap_or(0)
+        };
+        let [row_x, row_y, row_z] = pose.alignment.map(along);
+        let mut contacts = [Contact::Nothing; 3];
+        for ((contact, time), finger) in contacts.iter_mut().zip(touch.times()).zip([-1, 0, 1]) {
+            if let Some(micros) = time.micros() {
+                let way = i64::from(micros) * i64::from(self.speed) / 1_000_000;
+                let height = i64::from(z) + finger * i64::from(row_z) - way;
+                *contact = Contact::At(i32::try_from(height).unwrap_or(i32::MIN));
+            }
+        }
+        let stroke = if touch.is_empty() { Some(0) } else { self.stroke };
+        // Without a stroke the hand goes on to the table.
+        let limit = stroke.map_or(i64::MIN, |stroke| i64::from(z) - i64::from(stroke)).max(i32::MIN.into());
+        Some(Seen::new([x, y], [row_x, row_y], contacts, i32::try_from(limit).unwrap_or(i32::MAX)))
+    }
+}

@@ -1,0 +1,179 @@
+//! Measures recognition of objects with a place on a simulated table: approaches, wrong names, bytes and time, as
+//! docs/measurements/located.md has them.
+//!
+//!     cargo run --release -p palpate-tests --bin located -- [KEY=VALUE ...]
+
+use palpate::calibrate;
+use palpate::locate::{self, Aimed, Approach, Effort, Maps, Real, Settings, Standing, Truth, World};
+use palpate::mesh::Object;
+use palpate::probe::approach::Probe;
+use palpate::shared::format::{Length, Per};
+use palpate::touches::{Dataset, ObjectTouches, Origin, Source};
+use std::collections::HashMap;
+use std::error::Error;
+use std::time::Instant;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let given: HashMap<String, String> = std::env::args()
+        .skip(1)
+        .filter_map(|pair| pair.split_once('=').map(|(key, value)| (key.into(), value.into())))
+        .collect();
+    let number = |key: &str, default: f64| given.get(key).map_or(default, |value| value.parse().expect("a number"));
+    let shared = std::env::var("PALPATE_SHARED").unwrap_or_else(|_| "../shared".into());
+    let folder = given.get("objects").cloned().unwrap_or(format!("{shared}/objects"));
+    let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 0.0, stroke: Some(20.0), ..Probe::default() };
+    let began = Instant::now();
+    let sizes: Vec<f64> = [1.0, 0.8, 0.9, 1.1, 1.2][..number("sizes", 1.0) as usize].to_vec();
+    let mut standing: Vec<Standing> = Vec::new();
+    for size in &sizes {
+        let objects = meshes(&folder, 100.0 * size)?;
+        let more = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, &())?;
+        standing.extend(more.into_iter().map(|object| Standing {
+            name: if sizes.len() > 1 { format!("{} {size}", object.name) } else { object.name },
+            ..object
+        }));
+    }
+    standing.sort_by(|a, b| a.name.cmp(&b.name));
+    eprintln!("scenes {:.1} s", began.elapsed().as_secs_f64());
+    let touches = number("touches", 20_000.0) as u64;
+    let dataset = taught(&standing, &probe, touches);
+    let real = Real {
+        height: number("noise", 0.5),
+        lost: number("lost", 0.02),
+        position: number("position", 0.0),
+        drift: number("drift", 0.0),
+        drift_yaw: number("drift", 0.0),
+        size: number("size", 1.0),
+        bent: number("bent", 0.0),
+    };
+    let settings = Settings {
+        fine: number("cell", 1.0) < 1.5,
+        noise: number("stated", real.height),
+        position: number("stated_position", real.position),
+        lost: number("stated_lost", 0.02),
+        drift: number("stated_drift", real.drift),
+        drift_yaw: number("stated_drift", real.drift),
+        error_rate: 1.0 - number("threshold", 0.99),
+        ..Settings::default()
+    };
+    let surfaces = locate::learn(&dataset, &settings)?;
+    for surface in &surfaces {
+        if number("v", 0.0) > 0.0 {
+            println!(
+                "{} {} share {:.3} half {:?} known {:.2} round {}",
+                dataset.objects[surface.object].name,
+                surface.placement,
+                surface.share,
+                surface.half,
+                surface.known,
+                surface.is_round
+            );
+        }
+    }
+    let names: Vec<String> = dataset.names().into_iter().map(Into::into).collect();
+    let model = locate::write(&surfaces, &names, &probe, &settings)?;
+    eprintln!("maps {:.1} s, {} placements, {} bytes", began.elapsed().as_secs_f64(), surfaces.len(), model.len());
+    let maps = Maps::new(&model).map_err(|error| error.to_string())?;
+    let effort =
+        given.contains_key("lookups").then(|| Effort { lookups: number("lookups", 0.0) as u32, ..Effort::default() });
+    let terms = locate::Terms {
+        promise: calibrate::Terms { rate: number("rate", 0.01), confidence: 0.95, per: Per::Average },
+        sequences: number("sequences", 300.0) as usize,
+        max_touches: 25,
+        aimed: if number("random", 0.0) > 0.0 { Aimed::Random } else { Aimed::Chosen },
+        real,
+        pose: number("pose", 10.0) as u16,
+        seed: number("seed", 1.0) as u64,
+        effort,
+    };
+    let mut calibrated = None;
+    if number("calibrate", 0.0) > 0.0 {
+        let found = locate::calibrate(
+            maps,
+            &standing,
+            &probe,
+            &locate::Terms { sequences: number("calibrate", 0.0) as usize, seed: 1000, ..terms },
+            &(),
+        )?;
+        println!(
+            "promise: margin {:.2}, wrong {} of {}, approaches {:.2}",
+            found.margin, found.wrong, found.given, found.mean_approaches
+        );
+        calibrated = Some(found.model);
+    }
+    let bytes = calibrated.as_ref().unwrap_or(&model);
+    let maps = Maps::new(bytes).map_err(|error| error.to_string())?;
+    let began = Instant::now();
+    let found = locate::evaluate(maps, &standing, &probe, &terms, &())?;
+    let seconds = began.elapsed().as_secs_f64();
+    println!(
+        "approaches {:.2}, wrong {} of {}, undecided {}, unknown {}; off {:.1} mm, 95 %: {:.1} mm; lookups {} k, at most {} k; {:.1} ms of wall time per approach",
+        found.mean_approaches,
+        found.wrong,
+        found.given,
+        found.undecided,
+        found.unknown,
+        found.off[0],
+        found.off[1],
+        found.looked[0] / 1000,
+        found.looked[1] / 1000,
+        seconds * 1000.0 / (found.mean_approaches * found.sequences as f64)
+    );
+    if number("v", 0.0) > 0.0 {
+        for (name, approaches, wrong) in found.objects {
+            println!("  {name}: {approaches:.1}, {wrong} wrong");
+        }
+    }
+    Ok(())
+}
+
+/// The objects of a folder, their longest side of this length in millimeters.
+fn meshes(folder: &str, longest: f64) -> Result<Vec<Object>, Box<dyn Error>> {
+    let mut objects = palpate::mesh::source::objects(&[folder.into()])?;
+    for object in &mut objects {
+        object.millimeters = Some(1.0);
+        let length = object.instances().filter_map(|instance| object.true_length(instance)).fold(0.0, f64::max);
+        object.millimeters = Some(longest / length);
+    }
+    Ok(objects)
+}
+
+/// Touches of each placement, at random about its box.
+fn taught(standing: &[Standing], probe: &Probe, touches: u64) -> Dataset {
+    let real = Real { lost: 0.0, height: 0.2, ..Real::default() };
+    let world = World { standing, probe, real, range: 0.0, seed: 77 };
+    let of = |(object, stands): (usize, &Standing)| {
+        let mut drawn: Vec<_> = (0..stands.placements.len())
+            .map(|placement| {
+                world.draw(object as u64 * 1_000 + placement as u64).at(Truth {
+                    object,
+                    placement,
+                    place: [0.0; 2],
+                    yaw: 0.0,
+                })
+            })
+            .collect();
+        let sources: Vec<Source> = (0..)
+            .zip(&stands.placements)
+            .map(|(number, (scene, share)): (i32, _)| Source::Placement {
+                instance: None,
+                placement: scene.table().map_or(number.to_string(), |table| table.placement.clone()),
+                millionths: (share * 1e6) as u32,
+            })
+            .collect();
+        let mut all = Vec::new();
+        for _ in 0..touches {
+            for (drawn, (scene, _)) in drawn.iter_mut().zip(&stands.placements) {
+                let [low, high] = scene.bounds();
+                let reach = (high - low) / 2.0 + 5.0;
+                let at = drawn.anywhere([0.0; 2], 1.0);
+                let scaled = |micrometers: i32, reach: f64| (f64::from(micrometers) * reach) as i32;
+                all.push(drawn.press(Approach { x: scaled(at.x, reach.x), y: scaled(at.y, reach.y), ..at }));
+            }
+        }
+        ObjectTouches::in_turn(stands.name.clone(), all, &sources, 0)
+    };
+    let objects = standing.iter().enumerate().map(of).collect();
+    let origin = Origin { unit: Length::Millimeter, probe: *probe, pose: true, approaches: true, ..Origin::default() };
+    Dataset { origin: Some(origin), ..Dataset::new(objects) }
+}
