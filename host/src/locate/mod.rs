@@ -90,7 +90,7 @@ impl Settings {
 
     /// Standard deviation that rounding to cells adds to heights, and what the position's error does on slopes, in millimeters.
     fn blur(&self) -> f64 {
-        (0.5 * self.cell()).hypot(1.1 * self.position)
+        0.5_f64.hypot(1.1 * self.position)
     }
 
     fn margin(&self) -> f64 {

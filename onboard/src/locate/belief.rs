@@ -6,6 +6,8 @@ use super::number::{NAT, NOTHING, add, direction, of_sum, power};
 use super::seen::Seen;
 use crate::bytes::at;
 
+/// Most touches that a locator has room for.
+pub(super) const MOST_TOUCHES: usize = 64;
 /// Root cells of yaw.
 pub(super) const YAWS: u8 = 8;
 /// Times that a root cell can be split: finest cells are of 0.9 mm and 2.8°.
@@ -21,7 +23,7 @@ const CUT: i32 = 30 * NAT;
 /// Cells within this of all together are split.
 const SPLIT: i32 = 12 * NAT;
 /// Search ends when cells that are not fine weigh less than all by this.
-const DONE: i32 = 8 * NAT;
+const DONE: i32 = 6 * NAT;
 /// Share that a pool may lose at once when it is full.
 const LOSS: i32 = 9 * NAT;
 
@@ -68,8 +70,9 @@ impl Maps<'_> {
         // Half of a cell's turn, in radians in Q14.
         let (angle, drift_yaw) =
             if placement.is_round { (0, 0) } else { (HALF_TURN / (i32::from(YAWS) << level), drift_yaw) };
-        let (mut blur, mut angle) = (side, angle);
-        for seen in seen.iter().rev() {
+        for (seen, moves) in seen.iter().rev().zip(ROOTS) {
+            // Moves add up as the root of their number.
+            let (blur, angle) = (side + ((drift * moves) >> 4), angle + ((drift_yaw * moves) >> 4));
             for finger in 0..3 {
                 let (u, v) = (i32::from(at(&seen.x, finger)) - x, i32::from(at(&seen.y, finger)) - y);
                 let (u, v) = ((cos * u + sin * v) >> 14, (cos * v - sin * u) >> 14);
@@ -84,8 +87,6 @@ impl Maps<'_> {
             if whole < least && finest < least {
                 break;
             }
-            blur += drift;
-            angle += drift_yaw;
         }
         whole.max(finest).max(NOTHING)
     }
@@ -111,6 +112,18 @@ impl Maps<'_> {
     }
 }
 
+/// Roots of 0, 1, 2 and so on in Q4: of the number of moves since a touch.
+const ROOTS: [i32; MOST_TOUCHES] = {
+    let (mut roots, mut number, mut root) = ([0; MOST_TOUCHES], 0, 0);
+    while number < MOST_TOUCHES as i32 {
+        while (root + 1) * (root + 1) <= number * 256 {
+            root += 1;
+        }
+        roots[number as usize] = root;
+        number += 1;
+    }
+    roots
+};
 /// Heights below this may be of the table after a contact was lost, in 1/16 mm.
 const NEAR: i32 = 24;
 /// Half a turn, in radians in Q14.
@@ -172,13 +185,18 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         }
     }
 
-    /// Puts a cell into the pool, which has room, or drops it.
-    fn put(&mut self, mut cell: Cell) {
-        let least = self.best - CUT;
+    /// Likelihood of a cell; less than `least` may be of some of the touches alone.
+    fn likely(&mut self, cell: &Cell, least: i32) -> i32 {
         let seen = self.seen.get(..self.touches).unwrap_or_default();
         let placement = self.maps.placement(cell.placement);
         let priors = [cell.level, FINEST].map(|level| self.prior(cell.placement, &placement, level));
-        let likely = self.maps.likely(&cell, &placement, priors, seen, least, &mut self.looked);
+        self.maps.likely(cell, &placement, priors, seen, least, &mut self.looked)
+    }
+
+    /// Puts a cell into the pool, which has room, or drops it.
+    fn put(&mut self, mut cell: Cell) {
+        let least = self.best - CUT;
+        let likely = self.likely(&cell, least);
         cell.likely = i16::try_from(likely).unwrap_or(i16::MIN);
         match self.pool.get_mut(self.count) {
             Some(slot) if likely >= least => {
@@ -239,8 +257,13 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
 
     /// Searches the cells for all touches.
     pub(super) fn search(&mut self) {
+        // What was most likely before bounds what is worth keeping, until something is more likely.
+        let before = self.cells().iter().max_by_key(|cell| cell.likely).copied();
         (self.count, self.best, self.looked, self.exhausted) = (0, NOTHING, 0, None);
         self.dropped = [NOTHING; OBJECTS];
+        if let Some(before) = before.filter(|cell| self.touches > 1 && self.object_prior(cell.placement) > NOTHING) {
+            self.best = self.likely(&before, NOTHING);
+        }
         let roots = self.maps.roots;
         for placement in 0..u8::try_from(self.maps.placements()).unwrap_or(u8::MAX) {
             if self.object_prior(placement) == NOTHING {

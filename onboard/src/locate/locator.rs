@@ -1,6 +1,6 @@
 //! The follower: touches in, a verdict out.
 
-use super::belief::{Cell, FINEST};
+use super::belief::{Cell, FINEST, MOST_TOUCHES};
 use super::maps::Maps;
 use super::number::{NOTHING, Random, add, logarithm, odds};
 use super::seen::{Contact, Seen};
@@ -63,7 +63,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
     /// [`CapacityError`] for more objects than there is room for.
     pub fn new(maps: Maps<'m>, stopping: Stopping, effort: Effort, seed: u32) -> Result<Self, CapacityError> {
         let objects = maps.objects();
-        if objects > OBJECTS || CELLS < 64 || TOUCHES == 0 {
+        if objects > OBJECTS || CELLS < 64 || TOUCHES == 0 || TOUCHES > MOST_TOUCHES {
             return Err(CapacityError { objects, capacity: OBJECTS });
         }
         // Xorshift stays at 0.
@@ -92,7 +92,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
 
     /// Forgets all touches, for another object. Cost: that of a search without touches.
     pub fn reset(&mut self) {
-        (self.touches, self.random) = (0, Random(self.seed));
+        (self.touches, self.count, self.random) = (0, 0, Random(self.seed));
         self.search();
     }
 
