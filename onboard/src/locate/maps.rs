@@ -39,8 +39,10 @@ pub struct Maps<'a> {
     pub(super) roots: u8,
     /// Standard deviation of an object's move in an approach, in 1/16 mm, and of its turn, in radians in Q14.
     pub(super) drift: [i32; 2],
-    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown; 0: never.
+    /// Mean logarithm of the likelihood for each touch of a known object, in 1/64 nat; 0: no test for unknown ones.
     misfit: i16,
+    /// How far below it a known object's may be after one touch; after n touches a root of n-th of that.
+    misfit_width: u16,
     /// Factor of the half of a pose's intervals, in Q8; 0: 1.
     stretch: u16,
 }
@@ -103,7 +105,7 @@ impl<'a> Maps<'a> {
         let (fixed, rest) = content.split_first_chunk::<MAPS_LENGTH>()?;
         let &[shift, roots, placements, _, ref range @ ..] = fixed;
         let (numbers, _) = range.as_chunks::<2>();
-        let &[range, drift, turn, misfit, stretch, ..] = numbers else { return None };
+        let &[range, drift, turn, misfit, stretch, width, ..] = numbers else { return None };
         let (records, rest) = rest.split_at_checked(usize::from(placements) * PLACEMENT_LENGTH)?;
         let (likelihoods, heights) = rest.split_at_checked(LIKELIHOODS_LENGTH)?;
         let range = i32::from(u16::from_le_bytes(range));
@@ -116,6 +118,7 @@ impl<'a> Maps<'a> {
             range,
             roots,
             misfit: i16::from_le_bytes(misfit),
+            misfit_width: u16::from_le_bytes(width),
             stretch: u16::from_le_bytes(stretch),
             drift: [drift, turn].map(|bytes| i32::from(u16::from_le_bytes(bytes))),
         };
@@ -211,9 +214,11 @@ impl<'a> Maps<'a> {
         if self.is_fine { 1 } else { 2 }
     }
 
-    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown; 0: never.
-    pub(super) const fn misfit(&self) -> i32 {
-        self.misfit as i32
+    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown after so many touches; none
+    /// without a test for unknown objects.
+    pub(super) fn misfit(&self, touches: usize) -> Option<i32> {
+        let root = super::belief::root(touches).max(1);
+        (self.misfit != 0).then(|| i32::from(self.misfit) - (i32::from(self.misfit_width) << 4) / root)
     }
 
     /// Thresholds that the model states.

@@ -86,6 +86,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         max_touches: 25,
         aimed: if number("random", 0.0) > 0.0 { Aimed::Random } else { Aimed::Chosen },
         real,
+        unknown: number("strangers", 0.0) > 0.0,
         until: given
             .contains_key("until")
             .then(|| Until { millimeters: number("until", 3.0), degrees: number("degrees", 5.0) }),
