@@ -41,7 +41,7 @@ impl TouchOrigin {
     const PLACEMENTS: &str = "palpate_placements";
 
     /// Statements of touches about themselves, and the probe that they were made with.
-    pub fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
+    pub(crate) fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
         Self { probe, touches: fingerprints(dataset), captured: Captured::of(dataset), ..Self::default() }
     }
 
@@ -72,7 +72,7 @@ impl TouchOrigin {
     }
 
     /// Makes `origin` state this.
-    pub fn state(&self, origin: &mut Provenance) {
+    pub(crate) fn state(&self, origin: &mut Provenance) {
         let hexadecimal = |touches: &BTreeMap<String, u64>| {
             let numbers = touches.iter().map(|(name, fingerprint)| (name, format!("{fingerprint:016x}")));
             let numbers = Some(numbers.collect::<BTreeMap<_, _>>()).filter(|touches| !touches.is_empty());
@@ -98,14 +98,14 @@ impl TouchOrigin {
     }
 
     /// Provenance of an ensemble that states this and nothing else.
-    pub fn origin(&self) -> Provenance {
+    pub(crate) fn origin(&self) -> Provenance {
         let mut origin = Provenance::default();
         self.state(&mut origin);
         origin
     }
 
     /// Statements of a compiled model of these objects.
-    pub fn stated(&self, objects: &[String]) -> compile::Stated {
+    pub(crate) fn stated(&self, objects: &[String]) -> compile::Stated {
         // Where nothing is known, the published probe.
         let probe = self.probe.map_or_else(Probe::default, |stated| stated.probe);
         let mut sections = Vec::new();
@@ -137,7 +137,7 @@ impl TouchOrigin {
     }
 
     /// For each of an ensemble's outputs the number of its object, and its share of it; none if each is an object.
-    pub fn outputs(&self, names: &[String]) -> Option<Vec<(u8, f64)>> {
+    pub(crate) fn outputs(&self, names: &[String]) -> Option<Vec<(u8, f64)>> {
         if self.placements.is_empty() {
             return None;
         }
@@ -172,7 +172,7 @@ impl TouchOrigin {
     /// The objects whose touches in `dataset` are of the capture that made those of the training, or begin like those: the
     /// same touches, or more or fewer of them. What becomes of them elsewhere, such as noise, does not count. A part of a data
     /// set that was trained on counts as the whole.
-    pub fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
+    pub(crate) fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
         let own = fingerprints(dataset);
         let captured = self.captured.as_ref().zip(Captured::of(dataset));
         let shared: Vec<String> = captured

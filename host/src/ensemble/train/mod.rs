@@ -11,7 +11,7 @@
 use crate::ensemble::{
     Ensemble, MAX_OBJECTS, Node, Provenance, StatedProbe, TouchOrigin, Trained, check_names, feature_row, inputs,
 };
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, TrainProblem};
 use crate::mesh::BACKGROUND;
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
@@ -24,12 +24,11 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-mod error;
+pub(crate) mod error;
 mod small;
 #[cfg(feature = "xgboost")]
 mod xgboost;
 
-pub use error::TrainProblem;
 pub use small::Small;
 pub(crate) use small::train_each as train_small;
 
@@ -288,7 +287,7 @@ pub fn train_with_background(
 /// A 16-bit unit is about 10⁻⁴ nats, far below what a finite number of touches can teach a leaf. In exchange, f32 sums
 /// of leaves are exact in any order while they stay below 2²⁴ units, a compiled model with leaves of that width holds
 /// the very same numbers, and full and compiled model cannot differ.
-pub fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
+pub(crate) fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
     let unit = leaf_unit(ensemble, bits);
     // Multiplying and dividing by a power of two is exact.
     let rounded = |value: &mut f32| *value = (*value / unit).round() * unit;

@@ -160,11 +160,6 @@ impl Recording {
         Ok(touches)
     }
 
-    /// Origin of the touches.
-    pub fn origin(&self) -> &Origin {
-        &self.listing.origin
-    }
-
     /// The object's name.
     pub fn object(&self) -> &str {
         &self.recorded.object
@@ -219,7 +214,7 @@ impl Recording {
     /// # Errors
     /// [`TouchesProblem::NoPose`] if it lacks its pose; [`TouchesProblem::LaterThanStroke`] if a contact is
     /// later than the stroke that the data set states; when the file cannot be written.
-    pub fn add(&mut self, touch: &Touch) -> Result<()> {
+    pub(crate) fn add(&mut self, touch: &Touch) -> Result<()> {
         self.append(std::slice::from_ref(touch))?;
         if self.checkpointed.elapsed() >= CHECKPOINT { self.checkpoint() } else { Ok(()) }
     }
