@@ -140,10 +140,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let measured = file.with(|candidate| evaluate::measure(candidate, &dataset, &wanted, &expecting))?;
     let evaluated = Evaluated { robots, trained_on, ..measured };
     drop(progress);
-    if global.json {
-        return output::print_json(&evaluated);
-    }
-    output::print(&text(&evaluated))
+    global.print(&evaluated, || text(&evaluated))
 }
 
 /// Evaluates a model on sequences of rows.
