@@ -29,7 +29,7 @@ pub struct SequentialSettings {
 }
 
 /// Results of a recognizer that stops by itself, counted in touches or approaches. Each object is weighted by its prior: equally, unless the model or
-/// [`Margins::expecting`] says otherwise.
+/// weights of the objects say otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sequential {
     /// Error rate that it was asked to keep: the promised rate, or that of the posterior.

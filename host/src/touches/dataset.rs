@@ -90,7 +90,7 @@ impl Dataset {
         self.objects.iter().flat_map(of).collect()
     }
 
-    /// Adds noise to all touches, made by `robots` robots in turn (see [`ObjectTouches::noisy`]); the origin then states it
+    /// Adds noise to all touches, made by `robots` robots in turn; the origin then states it
     /// too.
     pub fn add_noise(&mut self, noise: &Noise, seed: u64, robots: usize) {
         if noise.is_none() {

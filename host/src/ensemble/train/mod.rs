@@ -73,7 +73,7 @@ pub struct Settings {
     /// number for each feature of the descriptor, or of its form for full touches.
     pub feature_bins: Option<Vec<usize>>,
     /// Rounds the leaves to whole multiples of a power of two, so that the largest leaf takes at most this many bits
-    /// with its sign; `None` leaves them as the trainer made them. See [`round_leaves`].
+    /// with its sign; `None` leaves them as the trainer made them.
     pub leaf_bits: Option<u32>,
     /// Grows trees with few thresholds and few different leaves, for models of a few KB; `None` grows them for accuracy alone.
     /// Needs [`multi_output`](Self::multi_output). With [`leaf_bits`](Self::leaf_bits) of 8 a model with leaves of one byte is
@@ -299,7 +299,7 @@ pub(crate) fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
     }
 }
 
-/// True if [`round_leaves`] to this many bits changes no leaf, so that a compiled model loses nothing in leaves of that width.
+/// True if [rounding](Settings::leaf_bits) to this many bits changes no leaf, so that a compiled model loses nothing in leaves of that width.
 pub fn is_rounded(ensemble: &Ensemble, bits: u32) -> bool {
     let unit = leaf_unit(ensemble, bits);
     leaves(ensemble).all(|value| (value / unit).fract() == 0.0)

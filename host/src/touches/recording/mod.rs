@@ -214,7 +214,7 @@ impl Recording {
     /// # Errors
     /// [`TouchesProblem::NoPose`] if it lacks its pose; [`TouchesProblem::LaterThanStroke`] if a contact is
     /// later than the stroke that the data set states; when the file cannot be written.
-    pub(crate) fn add(&mut self, touch: &Touch) -> Result<()> {
+    pub fn add(&mut self, touch: &Touch) -> Result<()> {
         self.append(std::slice::from_ref(touch))?;
         if self.checkpointed.elapsed() >= CHECKPOINT { self.checkpoint() } else { Ok(()) }
     }
