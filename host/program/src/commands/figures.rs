@@ -178,14 +178,17 @@ fn table(evaluation: &Evaluation) -> String {
     )
 }
 
+/// Shares by numbers of touches or approaches.
+type ByNumber = BTreeMap<usize, f64>;
+
 /// Accuracies in percent: one row per object, one column per number of what `head` names; beside them when recognizers stopped
 /// and, if given, the share that was evidence. Below them standard errors, if given.
 fn rows(
     head: &str,
     sequential: &Sequential,
-    (accuracy, per_object): (&BTreeMap<usize, f64>, &BTreeMap<String, BTreeMap<usize, f64>>),
+    (accuracy, per_object): (&ByNumber, &BTreeMap<String, ByNumber>),
     used: Option<(f64, &BTreeMap<String, f64>)>,
-    spread: Option<&BTreeMap<usize, f64>>,
+    spread: Option<&ByNumber>,
 ) -> String {
     let width = per_object.keys().map(|name| name.chars().count()).max().unwrap_or(0).max(head.len());
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
@@ -194,7 +197,7 @@ fn rows(
         let stops = stops.iter().map(|cell| format!(" {cell:>9}"));
         format!("{name:width$}{}\n", accuracy.chain(stops).collect::<String>())
     };
-    let shares = |accuracy: &BTreeMap<usize, f64>| accuracy.values().copied().map(percent).collect();
+    let shares = |accuracy: &ByNumber| accuracy.values().copied().map(percent).collect();
     let stops = |stop: f64, wrong: f64, of_given: f64, undecided: f64, used: Option<f64>| {
         let own = [format!("{stop:.1}"), percent(wrong), given(of_given), percent(undecided)];
         own.into_iter().chain(used.map(percent)).collect()
