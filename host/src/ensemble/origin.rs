@@ -41,7 +41,7 @@ impl TouchOrigin {
     const PLACEMENTS: &str = "palpate_placements";
 
     /// Statements of touches about themselves, and the probe that they were made with.
-    pub(crate) fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
+    pub fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
         Self { probe, touches: fingerprints(dataset), captured: Captured::of(dataset), ..Self::default() }
     }
 
@@ -72,7 +72,7 @@ impl TouchOrigin {
     }
 
     /// Makes `origin` state this.
-    pub(crate) fn state(&self, origin: &mut Provenance) {
+    pub fn state(&self, origin: &mut Provenance) {
         let hexadecimal = |touches: &BTreeMap<String, u64>| {
             let numbers = touches.iter().map(|(name, fingerprint)| (name, format!("{fingerprint:016x}")));
             let numbers = Some(numbers.collect::<BTreeMap<_, _>>()).filter(|touches| !touches.is_empty());
@@ -98,7 +98,7 @@ impl TouchOrigin {
     }
 
     /// Provenance of an ensemble that states this and nothing else.
-    pub(crate) fn origin(&self) -> Provenance {
+    pub fn origin(&self) -> Provenance {
         let mut origin = Provenance::default();
         self.state(&mut origin);
         origin
