@@ -145,7 +145,7 @@ impl Page {
     }
 
     /// The page as HTML.
-    pub fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let body = html! {
             header {
                 h1 { (self.title) }

@@ -59,7 +59,7 @@ impl Cell {
     }
 
     /// Number that the column is sorted by, if this is one.
-    pub fn value(&self) -> Option<f64> {
+    pub(crate) fn value(&self) -> Option<f64> {
         match *self {
             Self::Number(value, _)
             | Self::Spread(value, _, _)
@@ -107,7 +107,7 @@ impl Records {
     ///
     /// # Errors
     /// If the CSV library refuses, which it has no reason to.
-    pub fn csv(&self) -> Result<Vec<u8>> {
+    pub(crate) fn csv(&self) -> Result<Vec<u8>> {
         let spread: Vec<bool> = (0..self.columns.len())
             .map(|c| self.rows.iter().any(|row| matches!(row[c], Cell::Spread(..) | Cell::PercentSpread(..))))
             .collect();
