@@ -10,7 +10,7 @@
 //! approaches with the chip's own code, and [`calibrate`](fn@calibrate) finds thresholds that keep a promise on approaches to
 //! objects on a simulated table, chosen or at random.
 
-mod error;
+pub(crate) mod error;
 mod follow;
 mod learn;
 mod pose;
@@ -20,7 +20,6 @@ mod tests;
 mod world;
 mod write;
 
-pub use error::LocateProblem;
 pub use follow::{CELLS, Locating, TOUCHES, locating};
 pub use learn::{Surface, learn, probe_of};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, Pose, Seen, TESTED};
