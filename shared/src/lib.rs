@@ -38,4 +38,6 @@ pub use checksum::checksum;
 pub use descriptor::{Descriptor, FEATURE_LIMIT, Features, MAX_FEATURES, MISSING_FEATURE};
 pub use pattern::{ContactPattern, Patterns};
 pub use poses::{DIRECTIONS, MOST_POSES, Poses};
+#[cfg(feature = "position")]
+pub use touch::Position;
 pub use touch::{ContactTime, Pose, Q15_ONE, Touch};

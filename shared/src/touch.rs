@@ -34,7 +34,7 @@ impl ContactTime {
 /// One in Q15: a direction cosine of 1 is stored as 32767.
 pub const Q15_ONE: i16 = i16::MAX;
 
-/// Direction and alignment of the probe, in the object's frame: direction cosines in Q15 (-32767 to 32767).
+/// Direction and alignment of the probe, in the object's frame, or in the table's where a touch has a position: direction cosines in Q15 (-32767 to 32767).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pose {
@@ -44,12 +44,26 @@ pub struct Pose {
     pub alignment: [i16; 3],
 }
 
+/// Position of the hand at the first contact, in the table's frame, in whole micrometers.
+///
+/// It is the lowest point of the middle fingertip at the moment of the first contact with object or table; where nothing was
+/// met, the lowest point of the approach. z points up and is 0 on the table.
+#[cfg(feature = "position")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Position {
+    /// x, y and z.
+    pub micrometers: [i32; 3],
+}
+
 /// The result of an approach: three contact times, any of which may be missing, and the probe's pose, if known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Touch {
     times: [ContactTime; 3],
     pose: Option<Pose>,
+    #[cfg(feature = "position")]
+    position: Option<Position>,
 }
 
 impl Touch {
@@ -61,6 +75,8 @@ impl Touch {
         Self {
             times: times.map(|t| if t.is_missing() { t } else { ContactTime(t.0.saturating_sub(earliest)) }),
             pose: None,
+            #[cfg(feature = "position")]
+            position: None,
         }
     }
 
@@ -75,6 +91,18 @@ impl Touch {
         self
     }
 
+    /// This touch with the hand's position, in the frame that its pose is in: a touch with a position has a pose, too.
+    #[cfg(feature = "position")]
+    pub const fn with_position(mut self, position: Position) -> Self {
+        self.position = Some(position);
+        self
+    }
+
+    /// This touch with other contact times, on any common clock: the earliest becomes 0. All else stays.
+    pub fn with_times(&self, times: [ContactTime; 3]) -> Self {
+        Self { times: Self::new(times).times, ..*self }
+    }
+
     /// The three contact times; unless all are missing, the earliest is 0.
     pub const fn times(&self) -> [ContactTime; 3] {
         self.times
@@ -83,6 +111,12 @@ impl Touch {
     /// The probe's pose, if known.
     pub const fn pose(&self) -> Option<Pose> {
         self.pose
+    }
+
+    /// The hand's position, if known.
+    #[cfg(feature = "position")]
+    pub const fn position(&self) -> Option<Position> {
+        self.position
     }
 
     /// The set of fingers that touched.
@@ -114,6 +148,8 @@ impl Touch {
         Self {
             times: [c, b, a],
             pose: self.pose.map(|pose| Pose { alignment: pose.alignment.map(i16::saturating_neg), ..pose }),
+            #[cfg(feature = "position")]
+            position: self.position,
         }
     }
 }
@@ -145,5 +181,17 @@ mod tests {
         let touch = Touch::from_micros([0, 5, 9]).with_pose(pose);
         assert_eq!(touch.mirrored().mirrored(), touch);
         assert_eq!(touch.mirrored().times().map(|t| t.micros()), [Some(9), Some(5), Some(0)]);
+    }
+
+    #[cfg(feature = "position")]
+    #[test]
+    fn a_position_stays_when_fingers_are_counted_from_the_other_end_and_when_times_change() {
+        let pose = Pose { direction: [0, 0, -32767], alignment: [32767, 0, 0] };
+        let position = Position { micrometers: [i32::MIN, 0, i32::MAX] };
+        let touch = Touch::from_micros([0, 5, 9]).with_pose(pose).with_position(position);
+        assert_eq!((touch.mirrored().position(), touch.mirrored().mirrored()), (Some(position), touch));
+        let later = touch.with_times([ContactTime::MISSING, ContactTime::from_micros(7), ContactTime::MISSING]);
+        assert_eq!((later.pose(), later.position()), (Some(pose), Some(position)));
+        assert_eq!(later.times().map(|t| t.micros()), [None, Some(0), None]);
     }
 }
