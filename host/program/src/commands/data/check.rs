@@ -6,6 +6,7 @@ use crate::commands::train::descriptor;
 use palpate::Result;
 use palpate::compare::Settings;
 use palpate::error::{Error, Place, TouchesProblem};
+use palpate::touches::Origin;
 use palpate::touches::check::{Check, ObjectSummary, Quantiles, Summary};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Length;
@@ -106,7 +107,11 @@ fn summary(summary: &Summary) -> String {
                 probe.speed,
                 probe.tilt,
                 origin.seed,
-                if origin.approaches { "every approach" } else { "full touches only" }
+                match origin {
+                    Origin { position: true, .. } => "every approach, with the hand's position",
+                    Origin { approaches: true, .. } => "every approach",
+                    _ => "full touches only",
+                }
             );
         }
     }
