@@ -226,6 +226,9 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
     }
 }
 
+/// More than 2 m, in micrometers.
+const FAR: i64 = 4_000_000;
+
 /// Measures of a hand that comes straight down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hand {
@@ -263,15 +266,16 @@ impl Hand {
         let [x, y, z] = position.micrometers;
         let along = |share: i16| {
             let micrometers = i64::from(self.spacing) * i64::from(share) / i64::from(palpate_shared::Q15_ONE);
-            i32::try_from(micrometers).unwrap_or(0)
+            // What is farther than 2 m counts as 2 m away.
+            i32::try_from(micrometers.clamp(-FAR, FAR)).unwrap_or(0)
         };
         let [row_x, row_y, row_z] = pose.alignment.map(along);
         let mut contacts = [Contact::Nothing; 3];
         for ((contact, time), finger) in contacts.iter_mut().zip(touch.times()).zip([-1, 0, 1]) {
             if let Some(micros) = time.micros() {
-                let way = i64::from(micros) * i64::from(self.speed) / 1_000_000;
-                let height = i64::from(z) + finger * i64::from(row_z) - way;
-                *contact = Contact::At(i32::try_from(height).unwrap_or(i32::MIN));
+                let way = i64::from(micros).saturating_mul(self.speed.into()) / 1_000_000;
+                let height = (i64::from(z) + finger * i64::from(row_z) - way).clamp(i32::MIN.into(), i32::MAX.into());
+                *contact = Contact::At(i32::try_from(height).unwrap_or(0));
             }
         }
         let stroke = if touch.is_empty() { Some(0) } else { self.stroke };

@@ -2,7 +2,9 @@
 
 use crate::bytes::{ModelError, at};
 use crate::decide::Stopping;
-use palpate_shared::format::{HEADER_LENGTH, Header, MAPS_LAYOUT, Promise, Section, Tag, TrainedProbe, take_section};
+use palpate_shared::format::{
+    CHECKSUM_LENGTH, HEADER_LENGTH, Header, MAPS_LAYOUT, Promise, Section, Tag, TrainedProbe, take_section,
+};
 
 /// Levels of a pyramid: finest cells, windows of two of them, and of 4, 8, 16 and 32 mm.
 pub(super) const LEVELS: usize = 6;
@@ -74,17 +76,24 @@ impl<'a> Maps<'a> {
     pub fn new(model: &'a [u8]) -> Result<Self, ModelError> {
         crate::model::whole(model)?;
         let header = Header::of(model);
-        if header.layout() != MAPS_LAYOUT {
-            return Err(ModelError::Field { offset: 6 });
+        // The layout, the threshold, the limit of touches.
+        let fields =
+            [(6, header.layout() == MAPS_LAYOUT), (48, header.odds() < 1 << 56), (56, header.max_touches() > 0)];
+        if let Some((offset, _)) = fields.into_iter().find(|(_, is_right)| !is_right) {
+            return Err(ModelError::Field { offset });
         }
         let text = usize::try_from(header.text_length()).unwrap_or(usize::MAX);
         let start = HEADER_LENGTH.saturating_add(text);
         let length = usize::try_from(header.optional_length()).unwrap_or(usize::MAX);
         let sections = model.get(start..start.saturating_add(length));
         let mut rest = sections.ok_or(ModelError::Section { offset: start })?;
+        let end = start + rest.len();
+        if model.len() != end.saturating_add(CHECKSUM_LENGTH) {
+            return Err(ModelError::Section { offset: end });
+        }
         let (mut found, mut previous) = (None, 0);
         while !rest.is_empty() {
-            let offset = start + length - rest.len();
+            let offset = end - rest.len();
             let wrong = ModelError::Section { offset };
             let Some(Section { tag, must_understand, content }) = take_section(&mut rest) else { return Err(wrong) };
             if tag <= previous {
@@ -141,7 +150,7 @@ impl<'a> Maps<'a> {
         (is_plausible && all).then_some(maps)
     }
 
-    /// Number of objects.
+    /// Number of objects: 1 to 256. Cost of this and of all other numbers here: a few instructions. Cannot fail.
     pub fn objects(&self) -> usize {
         usize::from(Header::of(self.model).last_object()) + 1
     }
@@ -156,14 +165,15 @@ impl<'a> Maps<'a> {
         at(self.records, usize::from(placement) * PLACEMENT_LENGTH)
     }
 
-    /// The name of an object; empty if it has none.
+    /// The name of an object; empty if it has none, or is not there. Cost: a few instructions for each name before it.
     pub fn object_name(&self, object: usize) -> &'a str {
-        self.text(object + 1)
+        if object < self.objects() { self.text(object + 1) } else { "" }
     }
 
-    /// The name of a placement; empty if it has none.
+    /// The name of a placement; empty if it has none, or is not there. Cost: as [`object_name`](Self::object_name).
     pub fn placement_name(&self, placement: u8) -> &'a str {
-        self.text(self.objects() + 1 + usize::from(placement))
+        let placement = usize::from(placement);
+        if placement < self.placements() { self.text(self.objects() + 1 + placement) } else { "" }
     }
 
     fn text(&self, index: usize) -> &'a str {
@@ -227,7 +237,7 @@ impl<'a> Maps<'a> {
         Stopping::from_odds(header.odds(), header.max_touches())
     }
 
-    /// The content of an optional section; none if the model does not have it.
+    /// The content of an optional section; none if the model does not have it. Cost: a few instructions for each section.
     pub fn section(&self, tag: Tag) -> Option<&'a [u8]> {
         let header = Header::of(self.model);
         let start = HEADER_LENGTH.saturating_add(usize::try_from(header.text_length()).ok()?);
