@@ -21,7 +21,7 @@ mod write;
 
 pub use error::LocateProblem;
 pub use follow::{CELLS, Locating, TOUCHES, locating};
-pub use learn::{Surface, learn, probe_of};
+pub use learn::{Surface, learn, probe_of, probe_of_maps};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, Pose, Seen};
 pub use promise::{Calibrated, Evaluation, Terms, calibrate, evaluate};
 pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};
