@@ -13,11 +13,11 @@ const TABLE: f64 = 0.3;
 /// Cells without an own sample take the mean of those about them, as far as this, in cells.
 const FILLED: usize = 4;
 /// Two placements of an object are the same where their heights differ by less than this on average, in millimeters.
-const SAME: f64 = 0.8;
+pub(super) const SAME: f64 = 0.8;
 /// Turns that are compared for that.
 const TURNS: usize = 72;
 /// A placement is round where its heights differ from their mean at the same distance by less than this, in millimeters.
-const ROUND: f64 = 0.6;
+const ROUND: f64 = 1.2;
 
 /// A height that a fingertip met, in the placement's frame, in millimeters.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +49,13 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// One with these heights in cells of 1 mm.
+    pub(super) fn of(object: usize, half: [i32; 2], height: impl Fn([i32; 2]) -> f64) -> Self {
+        let heights = places(half).map(height).collect();
+        let (placement, share, cell, known, is_round) = (String::new(), 1.0, 1.0, 1.0, false);
+        Self { object, placement, share, cell, half, heights, known, is_round }
+    }
+
     /// The height of a cell; 0 outside.
     pub(super) fn at(&self, i: i32, j: i32) -> f64 {
         index(self.half, [i, j]).map_or(0.0, |cell| self.heights[cell])
@@ -75,7 +82,7 @@ impl Surface {
     }
 
     /// Mean difference of heights from another's that is turned, over the cells of either.
-    fn differs(&self, other: &Self, turn: f64) -> f64 {
+    pub(super) fn differs(&self, other: &Self, turn: f64) -> f64 {
         let (sin, cos) = turn.sin_cos();
         let (mut sum, mut count) = (0.0, 0.0_f64);
         for ([x, y], height) in self.cells() {

@@ -13,6 +13,7 @@
 mod error;
 mod follow;
 mod learn;
+mod pose;
 mod promise;
 #[cfg(test)]
 mod tests;
@@ -23,7 +24,8 @@ pub use error::LocateProblem;
 pub use follow::{CELLS, Locating, TOUCHES, locating};
 pub use learn::{Surface, learn, probe_of, probe_of_maps};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, Pose, Seen};
-pub use promise::{Calibrated, Evaluation, Terms, calibrate, evaluate};
+pub use pose::{Off, Until};
+pub use promise::{Calibrated, Evaluation, OfObject, Terms, calibrate, evaluate};
 pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};
 pub use write::write;
 
@@ -52,6 +54,8 @@ pub struct Settings {
     pub drift_yaw: f64,
     /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown; 0: never.
     pub misfit: i16,
+    /// Factor of the half of poses' intervals, in Q8; 0: 1.
+    pub stretch: u16,
     /// Posterior at which an object is named until the model is calibrated: 1 less this.
     pub error_rate: f64,
     /// Limit of touches.
@@ -71,6 +75,7 @@ impl Default for Settings {
             drift: 0.0,
             drift_yaw: 0.0,
             misfit: 0,
+            stretch: 0,
             error_rate: 0.01,
             max_touches: 25,
         }

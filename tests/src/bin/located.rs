@@ -4,7 +4,7 @@
 //!     cargo run --release -p palpate-tests --bin located -- [KEY=VALUE ...]
 
 use palpate::calibrate;
-use palpate::locate::{self, Aimed, Approach, Effort, Maps, Real, Settings, Standing, Truth, World};
+use palpate::locate::{self, Aimed, Approach, Effort, Maps, Real, Settings, Standing, Truth, Until, World};
 use palpate::mesh::Object;
 use palpate::probe::approach::Probe;
 use palpate::shared::format::{Length, Per};
@@ -36,7 +36,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     standing.sort_by(|a, b| a.name.cmp(&b.name));
     eprintln!("scenes {:.1} s", began.elapsed().as_secs_f64());
     let touches = number("touches", 20_000.0) as u64;
-    let dataset = taught(&standing, &probe, touches);
+    // Objects that the model does not know.
+    let unknown = given.get("unknown").cloned().unwrap_or_default();
+    let known: Vec<Standing> =
+        standing.iter().filter(|object| !unknown.split(',').any(|name| name == object.name)).cloned().collect();
+    let dataset = taught(&known, &probe, touches);
     let real = Real {
         height: number("noise", 0.5),
         lost: number("lost", 0.02),
@@ -82,6 +86,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         max_touches: 25,
         aimed: if number("random", 0.0) > 0.0 { Aimed::Random } else { Aimed::Chosen },
         real,
+        until: given
+            .contains_key("until")
+            .then(|| Until { millimeters: number("until", 3.0), degrees: number("degrees", 5.0) }),
         pose: number("pose", 10.0) as u16,
         seed: number("seed", 1.0) as u64,
         effort,
@@ -90,7 +97,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     if number("calibrate", 0.0) > 0.0 {
         let found = locate::calibrate(
             maps,
-            &standing,
+            &known,
             &probe,
             &locate::Terms { sequences: number("calibrate", 0.0) as usize, seed: 1000, ..terms },
             &(),
@@ -107,7 +114,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let found = locate::evaluate(maps, &standing, &probe, &terms, &())?;
     let seconds = began.elapsed().as_secs_f64();
     println!(
-        "approaches {:.2}, wrong {} of {}, undecided {}, unknown {}; off {:.1} mm, 95 %: {:.1} mm; lookups {} k, at most {} k; {:.1} ms of wall time per approach",
+        "poses {}: {} in their intervals, {} within; approaches {:.2}, wrong {} of {}, undecided {}, unknown {}; off {:.1} mm, 95 %: {:.1} mm; lookups {} k, at most {} k; {:.1} ms of wall time per approach",
+        found.poses,
+        found.poses_in_interval,
+        found.poses_within,
         found.mean_approaches,
         found.wrong,
         found.given,
@@ -120,8 +130,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         seconds * 1000.0 / (found.mean_approaches * found.sequences as f64)
     );
     if number("v", 0.0) > 0.0 {
-        for (name, approaches, wrong) in found.objects {
-            println!("  {name}: {approaches:.1}, {wrong} wrong");
+        for object in found.objects {
+            println!(
+                "  {}: {:.1}, {} wrong, {} unknown",
+                object.name, object.mean_approaches, object.wrong, object.unknown
+            );
         }
     }
     Ok(())
