@@ -12,7 +12,7 @@ use palpate::calibrate::{self, Per};
 use palpate::capture::{self, Settings as Capture};
 use palpate::compile;
 use palpate::error::{Error, LocateProblem, Place, TouchesProblem};
-use palpate::locate::{self, Aimed, Approach, Hand, Seen, Settings, Terms};
+use palpate::locate::{self, Aimed, Approach, Hand, Seen, Settings, Terms, Until};
 use palpate::mesh::Object;
 use palpate::onboard::Verdict;
 use palpate::onboard::locate::Contact;
@@ -210,9 +210,10 @@ impl Maps {
     /// `confidence`, on sequences of approaches to these meshes on a simulated table.
     ///
     /// `aimed` says how approaches are aimed, and so of which the promise is: "chosen" ones, as by `Locator.next`, or "random" ones
-    /// about the place believed in. `real` is what the simulated hand and table add.
+    /// about the place believed in. `real` is what the simulated hand and table add. `until` goes on until the place is as sure, such as
+    /// (3.0, 5.0) for 3 mm and 5 degrees.
     #[pyo3(signature = (meshes, *, millimeters=None, error_rate=0.01, confidence=0.95, sequences=1000, max_touches=25,
-        aimed="chosen", real=None, pose=10, seed=1, progress=None))]
+        aimed="chosen", real=None, pose=10, until=None, seed=1, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn calibrate<'py>(
         &self,
@@ -226,12 +227,13 @@ impl Maps {
         aimed: &str,
         real: Option<Real>,
         pose: u16,
+        until: Option<(f64, f64)>,
         seed: u64,
         progress: Option<Callback>,
     ) -> Result<objects::CalibratedMaps<'py>, Failure> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let promise = calibrate::Terms { rate: error_rate, confidence, per: Per::Average };
-        let terms = terms(promise, sequences, max_touches, aimed, real, pose, seed)?;
+        let terms = terms(promise, sequences, max_touches, aimed, real, pose, until, seed)?;
         let played = Played { objects: meshes, millimeters, terms };
         let maps = *self.maps();
         let found = long(py, progress.as_ref(), |progress| {
@@ -248,7 +250,7 @@ impl Maps {
     /// Plays sequences of approaches to these meshes on a simulated table, other ones than those of `calibrate` if the seed is
     /// another, to the maps' own threshold. The arguments are as for `calibrate`.
     #[pyo3(signature = (meshes, *, millimeters=None, sequences=1000, max_touches=25, aimed="chosen", real=None, pose=10,
-        seed=2, progress=None))]
+        until=None, seed=2, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn evaluate<'py>(
         &self,
@@ -260,12 +262,13 @@ impl Maps {
         aimed: &str,
         real: Option<Real>,
         pose: u16,
+        until: Option<(f64, f64)>,
         seed: u64,
         progress: Option<Callback>,
     ) -> Result<objects::MapsEvaluation<'py>, Failure> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let promise = calibrate::Terms { rate: 0.01, confidence: 0.95, per: Per::Average };
-        let terms = terms(promise, sequences, max_touches, aimed, real, pose, seed)?;
+        let terms = terms(promise, sequences, max_touches, aimed, real, pose, until, seed)?;
         let played = Played { objects: meshes, millimeters, terms };
         let maps = *self.maps();
         let found = long(py, progress.as_ref(), |progress| {
@@ -340,10 +343,12 @@ fn terms(
     name: &str,
     real: Option<Real>,
     pose: u16,
+    until: Option<(f64, f64)>,
     seed: u64,
 ) -> palpate::Result<Terms> {
     let (aimed, Real(real)) = (aimed(name)?, real.unwrap_or_default());
-    Ok(Terms { promise, sequences, max_touches, aimed, real, pose, seed, effort: None })
+    let until = until.map(|(millimeters, degrees)| Until { millimeters, degrees });
+    Ok(Terms { promise, sequences, max_touches, aimed, real, pose, until, seed, effort: None })
 }
 
 /// Three numbers, NaN or `None` where one is missing.

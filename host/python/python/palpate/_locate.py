@@ -61,3 +61,8 @@ class MapsEvaluation:
         """Median of how far the place of right names was from the true one, and what 95 % were within, in millimeters."""
         median, most = self.raw["off"]
         return median, most
+
+    @property
+    def placed(self) -> float:
+        """Of the right names, the share whose place was as true as `until` asked for; 1 without it."""
+        return float(self.raw["poses_within"] / max(self.raw["poses"], 1))
