@@ -102,6 +102,9 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Real {
             drift_yaw: number("drift_yaw")?,
             size: number("size")?,
             bent: number("bent")?,
+            tips: number("tips")?,
+            table: number("table")?,
+            turned: number("turned")?,
         }))
     }
 }

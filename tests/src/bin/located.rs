@@ -49,12 +49,17 @@ fn main() -> Result<(), Box<dyn Error>> {
         drift_yaw: number("drift", 0.0),
         size: number("size", 1.0),
         bent: number("bent", 0.0),
+        tips: number("tips", 0.0),
+        table: number("table", 0.0),
+        turned: number("turned", 0.0),
     };
     let settings = Settings {
         fine: number("cell", 1.0) < 1.5,
         noise: number("stated", real.height),
         position: number("stated_position", real.position),
         lost: number("stated_lost", 0.02),
+        outliers: number("outliers", 1e-4),
+        table_missed: number("table_missed", 0.02),
         drift: number("stated_drift", real.drift),
         drift_yaw: number("stated_drift", real.drift),
         error_rate: 1.0 - number("threshold", 0.99),

@@ -77,6 +77,12 @@ class Real:
     bent: float = 0.0
     """Of each fingertip's offset across the row and along it, in millimeters, the same in all approaches to an object; maps
     expect none: state it as part of `position`."""
+    tips: float = 0.0
+    """Of each fingertip's height, in millimeters, the same in all approaches to an object; maps expect none."""
+    table: float = 0.0
+    """Height of the table in the frame that heights are stated in, in millimeters, and no deviation; maps expect 0."""
+    turned: float = 0.0
+    """Turn of the row of fingers beyond the stated one, in degrees, and no deviation; maps expect 0."""
 
 
 @dataclass(frozen=True)
