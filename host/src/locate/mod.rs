@@ -21,7 +21,7 @@ mod world;
 mod write;
 
 pub use follow::{CELLS, Locating, TOUCHES, locating};
-pub use learn::{Surface, learn, probe_of};
+pub use learn::{Surface, learn, probe_of, probe_of_maps};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, Pose, Seen, TESTED};
 pub use pose::{Off, Until};
 pub use promise::{Calibrated, Evaluation, OfObject, Terms, calibrate, evaluate};

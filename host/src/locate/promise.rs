@@ -1,10 +1,10 @@
 //! Thresholds that keep a promise about located objects, and their test.
 
+use super::error::LocateProblem;
 use super::follow::{Pressed, Pressing};
 use super::pose::{Equivalents, Off, Until};
 use super::world::{Aimed, Drawn, Real, Standing, World};
 use super::write::{Restated, restated};
-use super::error::LocateProblem;
 use super::{Effort, Hand, Maps, Seen, TESTED, locating};
 use crate::calibrate::{self, margin_of, odds_of};
 use crate::error::Result;

@@ -1,8 +1,8 @@
 //! Surfaces as the bytes that the chip reads.
 
-use super::learn::Surface;
 use super::Settings;
 use super::error::LocateProblem;
+use super::learn::Surface;
 use crate::compile::{OwnedSection, file};
 use crate::error::Result;
 use crate::probe::approach::Probe;
