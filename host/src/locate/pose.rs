@@ -19,12 +19,19 @@ pub struct Until {
 }
 
 impl Until {
-    /// True if a pose is as sure: one mode, and its intervals.
-    pub fn is_met(&self, pose: &Pose) -> bool {
+    /// True if the most likely of an object's poses is as sure: its intervals, and that the object is there, turned like that or
+    /// as it looks the same. Those that it may be turned to are at the same place.
+    pub fn is_met(&self, poses: &[Pose]) -> bool {
+        let Some(first) = poses.first() else { return false };
         let most = self.millimeters * 1_000.0;
-        pose.within.iter().all(|&within| f64::from(within) <= most)
-            && pose.yaw_within.is_none_or(|within| f64::from(within) / 65_536.0 * 360.0 <= self.degrees)
-            && f64::from(pose.share) >= 0.95 * 65_536.0
+        let is_there = |pose: &&Pose| {
+            let mut apart = first.position.iter().zip(pose.position).map(|(one, other)| one.abs_diff(other));
+            pose.placement == first.placement && apart.all(|apart| f64::from(apart) <= most)
+        };
+        let share: f64 = poses.iter().filter(is_there).map(|pose| f64::from(pose.share)).sum();
+        first.within.iter().all(|&within| f64::from(within) <= most)
+            && first.yaw_within.is_none_or(|within| f64::from(within) / 65_536.0 * 360.0 <= self.degrees)
+            && share >= 0.95 * 65_536.0
     }
 }
 

@@ -267,11 +267,11 @@ fn play(
                 fits.push(follower.locating.fit());
             }
             let leader = follower.leader();
-            let first = follower.locating.poses(leader).first().copied();
-            let is_sure = terms.until.is_none_or(|until| first.is_some_and(|pose| until.is_met(&pose)));
+            let poses = follower.locating.poses(leader);
+            let is_sure = terms.until.is_none_or(|until| until.is_met(&poses));
             let may_name = familiarity == Familiarity::Known && counted.touches as usize >= least;
             if may_name && follower.rivals() <= odds && is_sure {
-                (outcome.recognized, pose) = (Some(leader), first);
+                (outcome.recognized, pose) = (Some(leader), poses.first().copied());
             }
             outcome.unknown || outcome.recognized.is_some() || counted.touches >= terms.max_touches
         });

@@ -1,1 +1,165 @@
+//! Located objects, from touches to verdicts.
 
+use super::*;
+use crate::calibrate;
+use crate::capture;
+use crate::mesh::{Mesh, Object};
+use crate::probe::approach::Probe;
+use crate::touches::{Dataset, Origin, Surroundings};
+use palpate_shared::format::{Length, Per};
+
+fn probe() -> Probe {
+    Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 0.0, stroke: Some(20.0), ..Probe::default() }
+}
+
+/// A long box without corners, and one that is round from above.
+fn objects() -> [Object; 2] {
+    [("bar", [40.0, 15.0, 10.0]), ("puck", [25.0, 25.0, 8.0])].map(|(name, half)| {
+        let mut mesh = Mesh::globe(12);
+        for vertex in &mut mesh.vertices {
+            let longest = vertex.iter().fold(0.0_f32, |longest, axis| longest.max(axis.abs()));
+            let is_bar = name == "bar";
+            // The bar is a globe that is made square.
+            *vertex = [0, 1, 2].map(|axis| half[axis] * vertex[axis] / if is_bar { longest } else { 1.0 });
+        }
+        sized(name, mesh)
+    })
+}
+
+/// An object whose mesh is in millimeters.
+fn sized(name: &str, mesh: Mesh) -> Object {
+    let mut object = Object::new(name, mesh);
+    object.millimeters = Some(1.0);
+    object
+}
+
+fn touched(objects: &[Object], touches: u64) -> Dataset {
+    let origin = Origin {
+        touches,
+        probe: probe(),
+        unit: Length::Millimeter,
+        scene: Surroundings::Table { cone: 0.0 },
+        position: true,
+        pose: true,
+        approaches: true,
+        ..Origin::default()
+    };
+    capture::in_memory(objects, &origin.into(), &()).unwrap().0
+}
+
+fn model(settings: &Settings) -> Vec<u8> {
+    let dataset = touched(&objects(), 60_000);
+    let surfaces = learn(&dataset, settings).unwrap();
+    let names: Vec<String> = dataset.names().into_iter().map(Into::into).collect();
+    write(&surfaces, &names, &probe(), settings).unwrap()
+}
+
+fn terms(sequences: usize) -> Terms {
+    Terms {
+        promise: calibrate::Terms { rate: 0.1, confidence: 0.9, per: Per::Average },
+        sequences,
+        max_touches: 20,
+        aimed: Aimed::Chosen,
+        real: Real::default(),
+        unknown: false,
+        until: None,
+        pose: 10,
+        seed: 7,
+        effort: None,
+    }
+}
+
+#[test]
+fn an_object_is_named_and_found_in_a_few_approaches_chosen_or_at_random() {
+    let bytes = model(&Settings::default());
+    let maps = Maps::new(&bytes).unwrap();
+    assert_eq!([0, 1].map(|object| maps.object_name(object)), ["bar", "puck"]);
+    let objects = objects();
+    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
+    for aimed in [Aimed::Chosen, Aimed::Random] {
+        let found = evaluate(maps, &standing, &probe(), &Terms { aimed, ..terms(40) }, &()).unwrap();
+        assert!(found.wrong <= 1 && found.given >= 35, "{found:?}");
+        assert!(found.mean_approaches < 12.0, "{found:?}");
+    }
+    let until = Some(Until { millimeters: 6.0, degrees: 10.0 });
+    let sure = evaluate(maps, &standing, &probe(), &Terms { until, ..terms(40) }, &()).unwrap();
+    assert!(sure.poses_within * 10 >= sure.poses * 9 && sure.poses >= 30, "{sure:?}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_sequences_on_any_number_of_threads() {
+    let bytes = model(&Settings { fine: false, ..Settings::default() });
+    let objects = objects();
+    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
+    let found = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let evaluate = || evaluate(Maps::new(&bytes).unwrap(), &standing, &probe(), &terms(12), &()).unwrap();
+        format!("{:?}", pool.install(evaluate))
+    };
+    assert_eq!(found(1), found(4));
+}
+
+#[test]
+fn a_calibrated_model_states_its_promise_and_how_approaches_were_aimed() {
+    let bytes = model(&Settings::default());
+    let objects = objects();
+    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
+    for (aimed, unknown) in [(Aimed::Chosen, false), (Aimed::Random, true)] {
+        let terms = Terms { aimed, unknown, ..terms(80) };
+        let calibrated = calibrate(Maps::new(&bytes).unwrap(), &standing, &probe(), &terms, &()).unwrap();
+        let maps = Maps::new(&calibrated.model).unwrap();
+        let promise = maps.promise().unwrap();
+        assert_eq!((promise.rate, promise.active), (0.1, aimed == Aimed::Chosen));
+        assert_eq!((promise.given as usize, promise.wrong as usize), (calibrated.given, calibrated.wrong));
+        let other = Terms { seed: 8, ..terms };
+        let found = evaluate(maps, &standing, &probe(), &other, &()).unwrap();
+        assert!(found.wrong * 4 <= found.given, "{found:?}");
+        assert_eq!(Maps::new(&bytes).unwrap().promise(), None);
+    }
+}
+
+#[test]
+fn an_object_that_the_model_does_not_know_is_called_unknown() {
+    let bytes = model(&Settings::default());
+    let mut objects = objects().to_vec();
+    let known = standing(&objects.iter().collect::<Vec<_>>(), &probe(), &()).unwrap();
+    let terms = Terms { unknown: true, ..terms(80) };
+    let calibrated = calibrate(Maps::new(&bytes).unwrap(), &known, &probe(), &terms, &()).unwrap();
+    // As high as three pucks.
+    let mut tower = objects[1].mesh().clone();
+    tower.vertices.iter_mut().for_each(|vertex| *vertex = [vertex[0] * 0.7, vertex[1] * 0.7, vertex[2] * 5.0]);
+    objects.push(sized("tower", tower));
+    let all = standing(&objects.iter().collect::<Vec<_>>(), &probe(), &()).unwrap();
+    let found =
+        evaluate(Maps::new(&calibrated.model).unwrap(), &all, &probe(), &Terms { seed: 9, ..terms }, &()).unwrap();
+    let unknown: Vec<usize> = found.objects.iter().map(|object| object.unknown).collect();
+    assert!(unknown[2] > 20 && unknown[0] + unknown[1] <= 6, "{found:?}");
+}
+
+#[test]
+fn touches_without_a_position_and_other_units_are_refused() {
+    let mut dataset = touched(&objects(), 50);
+    let touch = dataset.objects[0].touches()[0];
+    let bare = palpate_shared::Touch::new(touch.times()).with_pose(touch.pose().unwrap());
+    let object = crate::touches::ObjectTouches::new("bar", vec![touch, bare], crate::touches::Source::Object);
+    dataset.objects = vec![object];
+    let error = learn(&dataset, &Settings::default()).unwrap_err().to_string();
+    assert!(error.contains("bar: touch 2 has no position"), "{error}");
+    dataset.origin = None;
+    let error = learn(&dataset, &Settings::default()).unwrap_err().to_string();
+    assert!(error.contains("true size"), "{error}");
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    let settings = Settings::default();
+    for (wrong, name) in [
+        (Settings { range: 200.0, ..settings.clone() }, "range"),
+        (Settings { noise: f64::NAN, ..settings.clone() }, "noise"),
+        (Settings { lost: 0.0, ..settings.clone() }, "lost"),
+        (Settings { max_touches: 33, ..settings.clone() }, "max_touches"),
+    ] {
+        let error = wrong.check().unwrap_err().to_string();
+        assert!(error.starts_with(name), "{error}");
+    }
+}
