@@ -170,15 +170,15 @@ fn captures_with_a_position_share_no_touches_with_others() {
 #[test]
 fn what_a_position_needs_is_named() {
     for (origin, what) in [
-        (Origin { scene: Surroundings::Floating, ..origin(1) }, "scene is floating; use table with --position"),
-        (Origin { scene: Surroundings::Table { cone: 5.0 }, ..origin(1) }, "cone is 5; use 0 with --position"),
-        (Origin { unit: Length::Tenth, ..origin(1) }, "true_size is not given; use it with --position"),
-        (Origin { pose: false, ..origin(1) }, "pose is false; use it with --position"),
-        (Origin { approaches: false, ..origin(1) }, "approaches is false; use it with --position"),
-        (Origin { aim: crate::probe::Aim::Mass, ..origin(1) }, "aim is mass; use --within MM"),
-        (Origin { within: Some(-1.0), ..origin(1) }, "within is -1; use a length"),
-        (Origin { within: Some(f64::NAN), ..origin(1) }, "within is NaN; use a length"),
-        (Origin { within: Some(1.0), ..Origin::default() }, "within is 1; use it with --position"),
+        (Origin { scene: Surroundings::Floating, ..origin(1) }, "scene is floating. Use table with --position"),
+        (Origin { scene: Surroundings::Table { cone: 5.0 }, ..origin(1) }, "cone is 5. Use 0 with --position"),
+        (Origin { unit: Length::Tenth, ..origin(1) }, "true_size is not given. Use it with --position"),
+        (Origin { pose: false, ..origin(1) }, "pose is false. Use it with --position"),
+        (Origin { approaches: false, ..origin(1) }, "approaches is false. Use it with --position"),
+        (Origin { aim: crate::probe::Aim::Mass, ..origin(1) }, "aim is mass. Use --within MM"),
+        (Origin { within: Some(-1.0), ..origin(1) }, "within is -1. Use a length"),
+        (Origin { within: Some(f64::NAN), ..origin(1) }, "within is NaN. Use a length"),
+        (Origin { within: Some(1.0), ..Origin::default() }, "within is 1. Use it with --position"),
     ] {
         let error = origin.check().unwrap_err().to_string();
         assert!(error.contains(what), "{error}");

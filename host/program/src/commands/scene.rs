@@ -170,7 +170,7 @@ mod tests {
         let cone = |cone| SceneArguments { cone: Some(cone), ..on_table.clone() };
         assert_eq!(cone(0.0).straight_down(Surroundings::Floating).unwrap(), down);
         assert!(
-            cone(5.0).straight_down(Surroundings::Floating).unwrap_err().to_string().contains("use 0 with --position")
+            cone(5.0).straight_down(Surroundings::Floating).unwrap_err().to_string().contains("Use 0 with --position")
         );
     }
 

@@ -216,16 +216,16 @@ fn touches_with_a_position_are_captured_straight_down_and_other_combinations_are
     let located = ["--position", "--true-size", "mm", "--probe", probe.to_str().unwrap()];
     let table = [&located[..], &["--scene", "table"]].concat();
     for (arguments, more, what) in [
-        (&located[..], &[][..], "scene is \"floating\"; use table with --position"),
-        (&table, &["--cone", "30"], "cone is \"30\"; use 0 with --position"),
-        (&table, &["--touches", "30"], "touches is \"30\"; use --approaches N with --position"),
-        (&table, &["--aim", "mass"], "aim is \"mass\"; use --within MM with --position"),
-        (&table, &["--within", "-1"], "within is"),
-        (&table[..1], &["--scene", "table"], "probe is \"not given\""),
-        (&[], &["--within", "30"], "within is \"30\"; use it with --position"),
+        (&located[..], &[][..], "scene is floating. Use table with --position"),
+        (&table, &["--cone", "30"], "cone is 30. Use 0 with --position"),
+        (&table, &["--touches", "30"], "touches is 30. Use --approaches N with --position"),
+        (&table, &["--aim", "mass"], "aim is mass. Use --within MM with --position"),
+        (&table, &["--within=-1"], "within is"),
+        (&table[..1], &["--scene", "table"], "probe is not given"),
+        (&[], &["--within", "30"], "within is 30. Use it with --position"),
     ] {
         let error = stderr(capture(directory.path(), "out", &[arguments, more].concat()).output().unwrap(), 2);
-        assert!(error.replace('"', "").contains(&what.replace('"', "")), "{more:?}: {error}");
+        assert!(error.contains(what), "{more:?}: {error}");
     }
     let error = stderr(
         capture(directory.path(), "out", &["--position", "--scene", "table", "--probe", located[4]]).output().unwrap(),

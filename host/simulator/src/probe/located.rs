@@ -51,18 +51,17 @@ impl Approach {
     }
 
     /// The touch of this approach to an object on a table, each finger going on by itself. Noise is added, if any, with random
-    /// numbers of the generator beside it; it includes fingers that bend aside. Contacts later than the stroke are missing. If a
-    /// finger's contact is the first one and is not noticed, the position is that of the next one.
+    /// numbers of the generator beside it; it includes fingers that bend aside. Contacts later than the stroke are missing. The
+    /// position is that of the first contact that is noticed.
     ///
     /// Cost: a cast for each finger, and with fingers that bend aside two more.
     pub fn locate(&self, scene: &Scene, probe: &Probe, mut noise: Option<(&Noise, &mut ChaCha8Rng)>) -> Located {
-        let object = match &mut noise {
+        let mut distances = match &mut noise {
             Some((Noise { grazing, .. }, random)) if !grazing.is_none() => {
                 grazing.each_distance(self, scene, probe, *random)
             }
             _ => self.each_distance(scene, probe),
         };
-        let mut distances = object;
         for (distance, finger) in distances.iter_mut().zip(self.fingers(probe.spacing)) {
             let table = Some(scene.reaches_table(finger, self.direction, probe.radius)).filter(|way| way.is_finite());
             *distance = match (*distance, table) {
@@ -186,7 +185,7 @@ mod tests {
         );
     }
 
-    /// An approach whose first finger stands 10 mm above the others, which are beside the brick.
+    /// An approach whose first finger comes down on the brick, and the others beside it.
     fn edge() -> Approach {
         Approach::straight_down(&brick(), &probe(), [38.0, 0.0], 0.0, 50.0)
     }

@@ -67,7 +67,7 @@ impl Serialize for Posteriors {
     }
 }
 
-/// `Touch.msg`.
+/// `Touch.msg` up to the object, where it ended before touches had positions.
 #[derive(Deserialize)]
 struct CdrTouch {
     times: [f64; 3],
@@ -77,7 +77,7 @@ struct CdrTouch {
     object: String,
 }
 
-/// What `Touch.msg` has behind these.
+/// All of `Touch.msg`.
 #[derive(Deserialize)]
 struct CdrLocated {
     touch: CdrTouch,

@@ -508,7 +508,6 @@ fn turned(vector: [i16; 3], turn: impl Fn(DVec3) -> DVec3) -> [i16; 3] {
     turn(vector).to_array().map(to_q15)
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_zero(number: &f64) -> bool {
     *number == 0.0
 }
