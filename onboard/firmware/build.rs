@@ -13,8 +13,8 @@ fn main() -> io::Result<()> {
     models(&out.join("bench"))
 }
 
-/// Files that `palpate-tests`' `bench_models` writes.
-const BENCH: [&str; 17] = [
+/// Files that `palpate-tests`' `bench_models` writes, and those of its `located`.
+const BENCH: [&str; 19] = [
     "one-i16.palpate",
     "one-compact.palpate",
     "one-d3.palpate",
@@ -32,6 +32,8 @@ const BENCH: [&str; 17] = [
     "one-nodes.bin",
     "one-irithyll.bin",
     "touches.bin",
+    "located.palpate",
+    "located.bin",
 ];
 
 /// Copies the benchmark's files from the directory in `PALPATE_BENCH`; without one they are empty, and the benchmark
@@ -42,12 +44,12 @@ fn models(out: &Path) -> io::Result<()> {
     let source = env::var_os("PALPATE_BENCH").map(PathBuf::from);
     for name in BENCH {
         match &source {
-            Some(directory) => {
+            Some(directory) if directory.join(name).exists() || !name.starts_with("located") => {
                 let file = directory.join(name);
                 println!("cargo::rerun-if-changed={}", file.display());
                 fs::copy(file, out.join(name))?;
             }
-            None => fs::write(out.join(name), [])?,
+            _ => fs::write(out.join(name), [])?,
         }
     }
     Ok(())

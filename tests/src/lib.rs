@@ -5,6 +5,8 @@ pub mod desk;
 pub mod flash;
 #[path = "../../onboard/firmware/src/identity.rs"]
 pub mod identity;
+#[path = "../../onboard/firmware/src/located.rs"]
+pub mod located;
 pub mod mutants;
 pub mod pins;
 pub mod plain;

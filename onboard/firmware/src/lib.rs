@@ -7,6 +7,7 @@
 //! | [`uart`] | the UART, received by interrupt |
 //! | [`pins`] | three pins that a host plays |
 //! | [`identity`] | what every machine must make of a touch |
+//! | `located` | the same of a touch with a position, with the feature `locate` |
 //! | [`chip`] | the only place with `unsafe`: registers, linker symbols, the stack |
 //!
 //! Under emulation an image prints through semihosting ([`println!`]) and ends with [`exit`]; a panic or a fault ends
@@ -15,6 +16,8 @@
 
 pub mod chip;
 pub mod identity;
+#[cfg(feature = "locate")]
+pub mod located;
 pub mod meter;
 pub mod pins;
 pub mod sections;

@@ -64,6 +64,16 @@ impl Meter {
         (instructions + 500_000) / 1_000_000
     }
 
+    /// The result of `f`, which runs once, and its instructions, to about a hundred: for what cannot be repeated.
+    ///
+    /// # Panics
+    /// As [`Meter::measure`].
+    pub fn once<T>(&mut self, f: impl FnOnce() -> T) -> (Option<T>, u64) {
+        let (mut f, mut result) = (Some(f), None);
+        let ticks = self.ticks(1, &mut || result = f.take().map(|f| f()));
+        (result, ticks * PER_TICK)
+    }
+
     /// Instructions that `f` takes for one of `items`, on average over all of them.
     ///
     /// # Panics

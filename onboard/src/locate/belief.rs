@@ -161,6 +161,11 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         self.pool.get(..self.count).unwrap_or_default()
     }
 
+    /// Number of cells that the pool may hold.
+    fn room(&self) -> usize {
+        usize::try_from(self.effort.cells).unwrap_or(usize::MAX).min(CELLS)
+    }
+
     fn object_of(&self, cell: &Cell) -> usize {
         usize::from(self.maps.object_of(cell.placement))
     }
@@ -203,8 +208,9 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         let least = self.best - CUT;
         let likely = self.likely(&cell, least);
         cell.likely = i16::try_from(likely).unwrap_or(i16::MIN);
+        let has_room = self.count < self.room();
         match self.pool.get_mut(self.count) {
-            Some(slot) if likely >= least => {
+            Some(slot) if likely >= least && has_room => {
                 *slot = cell;
                 self.count += 1;
                 self.best = self.best.max(likely);
@@ -280,7 +286,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
                     self.exhausted = Some(Exhausted::Lookups);
                     break;
                 }
-                if self.count >= CELLS && !self.prune() && self.count >= CELLS {
+                if self.count >= self.room() && !self.prune() && self.count >= self.room() {
                     self.exhausted = Some(Exhausted::Cells);
                 }
                 let number = |value: u32| u8::try_from(value).unwrap_or(0);
@@ -299,7 +305,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
                     index += 1;
                     continue;
                 }
-                if self.count + 7 > CELLS {
+                if self.count + 7 > self.room() {
                     if !self.prune() {
                         self.exhausted = Some(Exhausted::Cells);
                         break;

@@ -16,13 +16,15 @@ pub const TESTED: usize = 8;
 pub struct Effort {
     /// Heights that are looked up until a search ends, each about 160 instructions on a Cortex-M4F. 450,000 serve ten objects.
     pub lookups: u32,
+    /// Cells that are kept, if there is room for as many.
+    pub cells: u32,
     /// Approaches that are compared to choose the next.
     pub candidates: u16,
 }
 
 impl Default for Effort {
     fn default() -> Self {
-        Self { lookups: 450_000, candidates: 64 }
+        Self { lookups: 450_000, cells: u32::MAX, candidates: 64 }
     }
 }
 

@@ -259,6 +259,12 @@ fn a_search_that_was_not_finished_names_nothing() {
     let mut locator = Locator::<64, 32, 2>::new(maps, stopping, Effort::default(), 1).unwrap();
     assert_eq!(locator.push_seen(met(wedge, Approach::default(), [0.0; 2], 0.3)), Verdict::Undecided);
     assert_eq!((locator.exhausted(), locator.kept() <= 64), (Some(Exhausted::Cells), true));
+    // As with room for no more.
+    let effort = Effort { cells: 64, ..Effort::default() };
+    let mut bounded = Locator::<4096, 32, 2>::new(maps, stopping, effort, 1).unwrap();
+    bounded.push_seen(met(wedge, Approach::default(), [0.0; 2], 0.3));
+    assert_eq!((bounded.kept(), bounded.rivals().q56()), (locator.kept(), locator.rivals().q56()));
+    assert_eq!(bounded.exhausted(), Some(Exhausted::Cells));
 }
 
 #[test]
@@ -318,7 +324,7 @@ fn what_fits_no_object_is_unknown() {
 fn the_forty_first_touch_is_one_too_many() {
     let bytes = model(&PINS, 0);
     let maps = Maps::new(&bytes).unwrap();
-    let effort = Effort { lookups: 5_000, candidates: 1 };
+    let effort = Effort { lookups: 5_000, candidates: 1, ..Effort::default() };
     let mut locator = Locator::<64, 32, 2>::new(maps, Stopping::from_odds(0, 100), effort, 0).unwrap();
     for touches in 1..=40 {
         let verdict = locator.push_seen(met(pin, Approach::default(), [20.0; 2], 0.0));
@@ -435,7 +441,7 @@ fn extreme() -> Vec<Seen> {
 /// Opens bytes, and if they are maps follows touches on them with everything that can be asked.
 fn follow(bytes: &[u8], touches: &[Seen]) -> bool {
     let Ok(maps) = Maps::new(bytes) else { return false };
-    let effort = Effort { lookups: 1_000, candidates: 2 };
+    let effort = Effort { lookups: 1_000, candidates: 2, ..Effort::default() };
     let Ok(mut locator) = Locator::<128, 8, 2>::new(maps, maps.stopping(), effort, 3) else { return true };
     for (&seen, end) in touches.iter().zip([0, 10_000, u32::MAX].into_iter().cycle()) {
         locator.push_seen(seen);

@@ -7,11 +7,13 @@
 //! before, `row=NAME` prints a row of a table.
 
 use palpate::calibrate;
-use palpate::locate::{self, Aimed, Approach, Effort, Maps, Real, Settings, Standing, Truth, Until, World};
+use palpate::locate::{self, Aimed, Approach, Effort, Hand, Maps, Real, Settings, Standing, Truth, Until, World};
 use palpate::mesh::Object;
 use palpate::probe::approach::Probe;
 use palpate::shared::format::{Length, Per};
 use palpate::touches::{Dataset, ObjectTouches, Origin, Source};
+use palpate_onboard::Verdict;
+use palpate_tests::located::{self, OnChip, Terms};
 use std::collections::HashMap;
 use std::error::Error;
 use std::time::Instant;
@@ -119,8 +121,14 @@ fn run(
     probe: &Probe,
 ) -> Result<(), Box<dyn Error>> {
     let number = |key: &str, default: f64| given.number(key, default);
-    let effort =
-        given.0.contains_key("lookups").then(|| Effort { lookups: number("lookups", 0.0) as u32, ..Effort::default() });
+    let bounded = ["lookups", "cells"].iter().any(|key| given.0.contains_key(*key));
+    let bounds = Effort::default();
+    let bounds = Effort {
+        lookups: number("lookups", bounds.lookups.into()) as u32,
+        cells: number("cells", bounds.cells.into()) as u32,
+        ..bounds
+    };
+    let effort = bounded.then_some(bounds);
     let until = given.0.contains_key("until");
     let terms = locate::Terms {
         promise: calibrate::Terms { rate: number("rate", 0.01), confidence: 0.95, per: Per::Average },
@@ -145,6 +153,19 @@ fn run(
         *model = found.model;
     }
     let maps = Maps::new(model).map_err(|error| error.to_string())?;
+    if let Some(directory) = given.0.get("write") {
+        let bounds = Terms { effort: bounds, within: maps.range().unsigned_abs() * 2, pose: terms.pose };
+        let world =
+            World { standing, probe, real: terms.real, range: f64::from(maps.range()) / 1e3 - 1.0, seed: 1 };
+        let directory = std::path::Path::new(directory);
+        std::fs::create_dir_all(directory)?;
+        std::fs::write(directory.join("located.palpate"), &*model)?;
+        std::fs::write(
+            directory.join("located.bin"),
+            approaches(maps, &world, &bounds, number("approaches", 1_000.0))?,
+        )?;
+        return Ok(());
+    }
     let began = Instant::now();
     let found = locate::evaluate(maps, standing, probe, &terms, &())?;
     let seconds = began.elapsed().as_secs_f64();
@@ -185,6 +206,31 @@ fn run(
         }
     }
     Ok(())
+}
+
+/// Approaches as the image `located` reads them: the terms, then each touch with what this machine makes of it.
+fn approaches(maps: Maps<'_>, world: &World<'_>, terms: &Terms, count: f64) -> Result<Vec<u8>, Box<dyn Error>> {
+    let hand = Hand::of(&maps).ok_or("the maps state no hand")?;
+    let mut locator = OnChip::new(maps, maps.stopping(), terms.effort, 1).map_err(|error| error.to_string())?;
+    let mut bytes = terms.to_bytes().to_vec();
+    let mut index = 0;
+    while bytes.len() < located::TERMS + count as usize * (located::TOUCH + located::LENGTH) {
+        let mut drawn = world.draw(index);
+        index += 1;
+        let mut at = Approach::default();
+        locator.reset();
+        loop {
+            let touch = drawn.press(at);
+            let found = located::push(&mut locator, &touch, hand, terms);
+            bytes.extend(located::to_bytes(&touch));
+            bytes.extend(located::record(&locator, &found));
+            at = found.next;
+            if found.verdict != Some(Verdict::Undecided) {
+                break;
+            }
+        }
+    }
+    Ok(bytes)
 }
 
 /// The objects of a folder, their longest side of this length in millimeters.
