@@ -534,7 +534,9 @@ impl Locator {
     /// Forgets all touches, for the next object.
     fn reset(&mut self) {
         self.seed = self.seed.wrapping_add(1);
-        (self.next, _) = (None, self.cell.with_dependent_mut(|_, locating| locating.begin(self.seed)));
+        self.next = None;
+        let seed = self.seed;
+        self.cell.with_dependent_mut(|_, locating| locating.begin(seed));
     }
 }
 
