@@ -310,3 +310,28 @@ fn every_abuse_of_a_model_is_refused_at_its_place() {
         assert!(FORMAT.contains(&row), "FORMAT.md has no row {row}");
     }
 }
+
+#[test]
+fn maps_have_the_numbers_that_the_format_states() {
+    use palpate_onboard::locate::{
+        BEYOND, DISTANCES, LIKELIHOODS_LENGTH, MAPS_LENGTH, PLACEMENT_LENGTH, WIDTHS, WITHIN,
+    };
+    use palpate_shared::format::{MAPS_LAYOUT, Tag};
+    let format = FORMAT.replace(',', "").split_whitespace().collect::<Vec<_>>().join(" ");
+    let lengths = format!(
+        "{MAPS_LENGTH} bytes a record of {PLACEMENT_LENGTH} bytes for each placement {LIKELIHOODS_LENGTH} bytes of likelihoods"
+    );
+    let stated = [
+        format!("A model of layout {MAPS_LAYOUT} has maps"),
+        format!("6 code {MAPS_LAYOUT} maps |"),
+        format!("| {} | yes | maps in layout {MAPS_LAYOUT} alone", Tag::Maps.code()),
+        format!("**Maps** tag {} must be understood: {lengths}", Tag::Maps.code()),
+        format!("| {} | (near · {WIDTHS} + width) · {DISTANCES} + distance |", 2 * WIDTHS * DISTANCES),
+        format!("| {WITHIN} | share |"),
+        format!("| {BEYOND} | distance |"),
+        format!("at most {} or {}.", DISTANCES - 1, BEYOND - 1),
+    ];
+    for stated in stated {
+        assert!(format.contains(&stated), "{stated}");
+    }
+}

@@ -1,7 +1,8 @@
 //! Messages as they travel, field by field as in `host/msg`, `host/srv` and `host/action`.
 
+use palpate::error::TouchesProblem;
 use palpate::onboard::shared::{Pose, Q15_ONE, Touch as Felt};
-use palpate::touches::{TouchesProblem, located, touch_of_seconds};
+use palpate::touches::{located, touch_of_seconds};
 use ros2_client::Message;
 use ros2_client::builtin_interfaces::Time;
 use serde::{Deserialize, Serialize};

@@ -17,7 +17,9 @@ fn brick() -> Object {
     let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles = faces.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
     let mesh = Mesh { vertices: vertices.collect(), triangles: triangles.collect() };
-    Object { millimeters: Some(1.0), ..Object::new("brick", mesh) }
+    let mut brick = Object::new("brick", mesh);
+    brick.millimeters = Some(1.0);
+    brick
 }
 
 fn probe() -> Probe {

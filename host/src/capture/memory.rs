@@ -14,7 +14,7 @@ use std::ops::Range;
 const CHUNK: u64 = 256;
 
 /// Touches the objects as [`capture`](super::capture) does, and returns what reading its directory would: the same touches,
-/// with a pose only if [`Origin::writes_pose`](crate::touches::Origin::writes_pose). The second value says how many
+/// with a pose only where the capture would write one. The second value says how many
 /// approaches each object took, in the data set's order. Settings about directories are ignored.
 ///
 /// # Errors

@@ -25,16 +25,16 @@ pub(crate) const MOST_ATTEMPTS: u64 = 1 << 22;
 
 /// A sample, and the number of approaches for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drawn {
+pub(crate) struct Drawn {
     /// The touch.
-    pub touch: Touch,
+    pub(crate) touch: Touch,
     /// Number of approaches that it took.
-    pub approaches: u64,
+    pub(crate) approaches: u64,
     /// Contacts of each finger in these approaches that came later than the stroke, and are missing; where only full touches
     /// are kept, of approaches in which all fingers would have touched.
-    pub late: [u64; FINGERS],
+    pub(crate) late: [u64; FINGERS],
     /// Number of these approaches that ended before the first contact, at the end of the travel.
-    pub turned_back: u64,
+    pub(crate) turned_back: u64,
 }
 
 /// Draws the samples of one object.
@@ -49,7 +49,7 @@ pub struct Sampler<'a> {
 
 impl<'a> Sampler<'a> {
     /// The samples of the object with this scene and name, made as `origin` says.
-    pub fn new(scene: &'a Scene, name: &'a str, origin: &'a Origin) -> Self {
+    pub(crate) fn new(scene: &'a Scene, name: &'a str, origin: &'a Origin) -> Self {
         Self::of_instances(std::slice::from_ref(scene), name, origin)
     }
 
@@ -61,7 +61,7 @@ impl<'a> Sampler<'a> {
     }
 
     /// The object's name.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         self.name
     }
 
@@ -78,7 +78,7 @@ impl<'a> Sampler<'a> {
     ///
     /// # Errors
     /// As [`sample`](Self::sample).
-    pub fn drawn(&self, index: u64) -> Result<Drawn> {
+    pub(crate) fn drawn(&self, index: u64) -> Result<Drawn> {
         let mut rng = self.rng(index);
         let probe = &self.origin.probe;
         let turn = index % self.scenes.len().max(1) as u64;
@@ -146,7 +146,7 @@ impl<'a> Sampler<'a> {
 
     /// The first approach that sample `index` draws, to this scene of the object: the sample itself where every approach is
     /// kept.
-    pub fn approach(&self, scene: &Scene, index: u64) -> Approach {
+    pub(crate) fn approach(&self, scene: &Scene, index: u64) -> Approach {
         self.draw(&mut self.rng(index), scene)
     }
 

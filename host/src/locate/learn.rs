@@ -1,6 +1,7 @@
 //! Maps of placements, learned from touches with positions.
 
-use super::{LocateProblem, Maps, Settings};
+use super::error::LocateProblem;
+use super::{Maps, Settings};
 use crate::error::{Error, Result};
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, ObjectTouches};

@@ -1,10 +1,11 @@
 //! Thresholds that keep a promise about located objects, and their test.
 
+use super::error::LocateProblem;
 use super::follow::{Pressed, Pressing};
 use super::pose::{Equivalents, Off, Until};
 use super::world::{Aimed, Drawn, Real, Standing, World};
 use super::write::{Restated, restated};
-use super::{Effort, Hand, LocateProblem, Maps, Seen, locating};
+use super::{Effort, Hand, Maps, Seen, TESTED, locating};
 use crate::calibrate::{self, margin_of, odds_of};
 use crate::error::Result;
 use crate::evidence::{self, Follower, Limit, Outcome, Sequence, Totals};
@@ -28,6 +29,8 @@ pub struct Terms {
     pub aimed: Aimed,
     /// Noise of hand and table.
     pub real: Real,
+    /// Make a test for unknown objects: no object is named before the eighth touch then.
+    pub unknown: bool,
     /// Go on until the pose is as sure, beyond the name.
     pub until: Option<Until>,
     /// How much the pose counts where approaches are chosen, in 64ths.
@@ -110,8 +113,8 @@ pub struct OfObject {
 /// code: Learn-then-Test by fixed-sequence testing, as for all models. Chosen approaches depend on the follower, so they are played
 /// with it.
 ///
-/// Before, half as many other sequences say how unlikely touches of a known object may be (1 % of them are less likely at some
-/// touch), and by what factor the intervals of poses must be wider to hold 95 % of the poses at which names are sure (split
+/// Before, half as many other sequences say how unlikely touches of a known object may be, where unknown ones are to be found (1 %
+/// of them are less likely at some touch), and by what factor the intervals of poses must be wider to hold 95 % of the poses at which names are sure (split
 /// conformal prediction).
 ///
 /// # Errors
@@ -126,12 +129,15 @@ pub fn calibrate(
 ) -> Result<Calibrated> {
     let calibrate::Terms { rate, confidence, per } = terms.promise;
     let own = ((1.0 - rate) / rate).ln();
-    let plain = Restated { odds: 0, max_touches: terms.max_touches, misfit: 0, stretch: 0, promise: None };
+    let plain = Restated { odds: 0, max_touches: terms.max_touches, misfit: None, stretch: 0, promise: None };
     let bytes = restated(maps, &plain)?;
     let plain_maps = opened(&bytes)?;
     let before = Terms { sequences: terms.sequences.div_ceil(2), seed: terms.seed.wrapping_add(1), ..*terms };
-    let each = play(plain_maps, standing, probe, &before, odds_of(own), progress)?;
-    let stated = Restated { misfit: misfit(&each), stretch: stretch(&each), ..plain };
+    // Where a test is to decide, sequences are as long as it takes.
+    let least = if terms.unknown { TESTED } else { 1 };
+    let each = play(plain_maps, standing, probe, &before, (odds_of(own), least), progress)?;
+    let misfit = terms.unknown.then(|| misfit(&each));
+    let stated = Restated { misfit, stretch: stretch(&each), ..plain };
     let bytes = restated(maps, &stated)?;
     let strictest = own + STRICTER;
     let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest, progress)?;
@@ -176,12 +182,21 @@ fn opened(bytes: &[u8]) -> Result<Maps<'_>> {
     Ok(Maps::new(bytes).map_err(|error| LocateProblem::Refused { error })?)
 }
 
-/// The likelihood for each touch that all but a share of known objects keep to.
-fn misfit(each: &[Played]) -> i16 {
-    let mut fits: Vec<i32> = each.iter().map(|played| played.least_fit).collect();
-    fits.sort_unstable();
-    let limit = fits.get((fits.len() as f64 * ALARMS) as usize).copied().unwrap_or(0);
-    i16::try_from(limit).unwrap_or(i16::MIN).min(-1)
+/// The mean likelihood for each touch, and how far below it all but a share of known objects stay: by a root of the number of
+/// touches, since likelihoods of touches are nearly independent.
+fn misfit(each: &[Played]) -> (i16, u16) {
+    let last: Vec<f64> = each.iter().filter_map(|played| Some(f64::from(*played.fits.last()?))).collect();
+    let mean = last.iter().sum::<f64>() / last.len().max(1) as f64;
+    let below = |played: &Played| {
+        let each =
+            (TESTED..).zip(&played.fits).map(|(touches, fit)| (mean - f64::from(*fit)) * (touches as f64).sqrt());
+        each.fold(0.0, f64::max)
+    };
+    let mut widths: Vec<f64> = each.iter().map(below).collect();
+    widths.sort_by(f64::total_cmp);
+    let place = ((widths.len() as f64 * (1.0 - ALARMS)).ceil() as usize).min(widths.len()).saturating_sub(1);
+    let width = widths.get(place).copied().unwrap_or(0.0);
+    ((mean.round() as i16).min(-1), width.ceil() as u16)
 }
 
 /// The factor in Q8 by which intervals hold 95 % of the poses.
@@ -216,11 +231,11 @@ fn follow(
 }
 
 /// A sequence that was played to its end.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Played {
     outcome: Outcome,
-    /// The least likelihood of the best cell for each touch, from the third touch on.
-    least_fit: i32,
+    /// Likelihoods of the best cell for each touch, from where a test decides.
+    fits: Vec<i32>,
     /// How far the pose is from the truth; none if the object does not lie like that, or no name was given.
     off: Option<Off>,
     /// The same in units of the pose's intervals; far outside if the object does not lie like that.
@@ -234,7 +249,7 @@ fn play(
     standing: &[Standing],
     probe: &Probe,
     terms: &Terms,
-    odds: u64,
+    (odds, least): (u64, usize),
     progress: &dyn Progress,
 ) -> Result<Vec<Played>> {
     let setup = Setup::new(maps, standing, probe, terms)?;
@@ -243,17 +258,19 @@ fn play(
     let of = |index: usize| -> Result<Played> {
         progress::advance(progress, 1)?;
         let (mut pressed, mut pressing) = setup.sequence(index as u64);
-        let (mut outcome, mut least_fit, mut pose) = (Outcome::default(), 0, None);
+        let (mut outcome, mut fits, mut pose) = (Outcome::default(), Vec::new(), None);
         let Ok(_) = evidence::follow(&mut pressed, &mut pressing, |follower, counted| {
             (outcome.touches, outcome.approaches) = (counted.touches as usize, counted.approaches as usize);
-            outcome.unknown = follower.familiarity() == Familiarity::Stranger;
-            if counted.touches >= 3 {
-                least_fit = least_fit.min(follower.locating.fit());
+            let familiarity = follower.familiarity();
+            outcome.unknown = familiarity == Familiarity::Stranger;
+            if counted.touches as usize >= TESTED {
+                fits.push(follower.locating.fit());
             }
             let leader = follower.leader();
             let first = follower.locating.poses(leader).first().copied();
             let is_sure = terms.until.is_none_or(|until| first.is_some_and(|pose| until.is_met(&pose)));
-            if !outcome.unknown && follower.rivals() <= odds && is_sure {
+            let may_name = familiarity == Familiarity::Known && counted.touches as usize >= least;
+            if may_name && follower.rivals() <= odds && is_sure {
                 (outcome.recognized, pose) = (Some(leader), first);
             }
             outcome.unknown || outcome.recognized.is_some() || counted.touches >= terms.max_touches
@@ -261,7 +278,7 @@ fn play(
         let off = pose.and_then(|pose| equivalents.off(&pressed.before, &pose));
         let is_right = outcome.recognized == Some(pressed.class);
         let in_intervals = pose.filter(|_| is_right).map(|pose| off.map_or(1e3, |off| off.in_intervals(&pose)));
-        Ok(Played { outcome, least_fit, off, in_intervals, looked: pressing.looked })
+        Ok(Played { outcome, fits, off, in_intervals, looked: pressing.looked })
     };
     (0..terms.sequences).into_par_iter().map(of).collect()
 }
@@ -277,7 +294,7 @@ pub fn evaluate(
     terms: &Terms,
     progress: &dyn Progress,
 ) -> Result<Evaluation> {
-    let each = play(maps, standing, probe, terms, maps.stopping().odds(), progress)?;
+    let each = play(maps, standing, probe, terms, (maps.stopping().odds(), 1), progress)?;
     let class_of = classes(maps, standing);
     let number = |index: usize| index % standing.len().max(1);
     let outcome = |(index, played): (usize, &Played)| (class_of[number(index)], played.outcome);

@@ -1,7 +1,8 @@
 //! Surfaces as the bytes that the chip reads.
 
+use super::Settings;
+use super::error::LocateProblem;
 use super::learn::Surface;
-use super::{LocateProblem, Settings};
 use crate::compile::{OwnedSection, file};
 use crate::error::Result;
 use crate::probe::approach::Probe;
@@ -54,8 +55,7 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
     content.extend(number(settings.range * SIXTEENTHS, 4_096));
     content.extend(number(settings.drift * SIXTEENTHS, 1_023));
     content.extend(number(settings.drift_yaw.to_radians() * 16_384.0, 1_023));
-    content.extend(settings.misfit.to_le_bytes());
-    content.extend(settings.stretch.to_le_bytes());
+    content.extend(tests(settings.misfit, settings.stretch));
     content.resize(palpate_onboard::locate::MAPS_LENGTH, 0);
     content.extend(records);
     content.extend(likelihoods(settings).into_iter().flat_map(i16::to_le_bytes));
@@ -97,7 +97,7 @@ pub(super) struct Restated {
     pub(super) odds: u64,
     pub(super) max_touches: u32,
     /// See [`Settings::misfit`].
-    pub(super) misfit: i16,
+    pub(super) misfit: Option<(i16, u16)>,
     /// See [`Settings::stretch`].
     pub(super) stretch: u16,
     pub(super) promise: Option<Promise>,
@@ -118,7 +118,7 @@ pub(super) fn restated(maps: Maps<'_>, stated: &Restated) -> Result<Vec<u8>> {
     while let Some(Section { tag, must_understand, content }) = take_section(&mut own) {
         let mut content = content.to_vec();
         if tag == Tag::Maps.code() {
-            content[MISFIT..MISFIT + 4].copy_from_slice(&[misfit.to_le_bytes(), stretch.to_le_bytes()].concat());
+            content[MISFIT..MISFIT + 6].copy_from_slice(&tests(misfit, stretch));
         }
         if tag != Tag::Promise.code() {
             sections.push(OwnedSection { tag, must_understand, content });
@@ -133,6 +133,12 @@ pub(super) fn restated(maps: Maps<'_>, stated: &Restated) -> Result<Vec<u8>> {
     let bytes = file(header, text.to_vec(), sections, Vec::new())?;
     Maps::new(&bytes).map_err(|error| LocateProblem::Refused { error })?;
     Ok(bytes)
+}
+
+/// The bytes of a test for unknown objects, and of the factor of intervals.
+fn tests(misfit: Option<(i16, u16)>, stretch: u16) -> Vec<u8> {
+    let (mean, width) = misfit.unwrap_or_default();
+    [mean.to_le_bytes(), stretch.to_le_bytes(), width.to_le_bytes()].concat()
 }
 
 /// Place of the misfit in a section of maps.

@@ -68,7 +68,7 @@ impl Dataset {
 
     /// This data set without the contacts that are later than `window` microseconds, such as by the stroke of the probe that a
     /// model is for: what an effector takes for missing.
-    pub fn within(&self, window: Option<u32>) -> Cow<'_, Self> {
+    pub(crate) fn within(&self, window: Option<u32>) -> Cow<'_, Self> {
         match self.touches().any(|touch| hand::late(touch, window).contains(&true)) {
             true => Cow::Owned(self.each(|own| own.changed(|touch| hand::within(touch, window)))),
             false => Cow::Borrowed(self),
@@ -91,7 +91,7 @@ impl Dataset {
         self.objects.iter().flat_map(of).collect()
     }
 
-    /// Adds noise to all touches, made by `robots` robots in turn (see [`ObjectTouches::noisy`]); the origin then states it
+    /// Adds noise to all touches, made by `robots` robots in turn; the origin then states it
     /// too.
     pub fn add_noise(&mut self, noise: &Noise, seed: u64, robots: usize) {
         if noise.is_none() {
@@ -283,7 +283,7 @@ impl Dataset {
 
     /// The share of each contact pattern among all touches, in the order of the patterns' codes, each object weighted
     /// equally.
-    pub fn shares(&self) -> [f64; 6] {
+    pub(crate) fn shares(&self) -> [f64; 6] {
         let mut shares = [0.0; 6];
         for touches in self.objects.iter().map(ObjectTouches::touches) {
             let mut counts = [0_usize; 6];

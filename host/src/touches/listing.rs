@@ -74,13 +74,13 @@ pub struct Lying {
 
 impl Lying {
     /// The source of its touches.
-    pub fn source(&self) -> Source {
+    pub(crate) fn source(&self) -> Source {
         let millionths = (self.weight * 1e6).round().clamp(0.0, 1e6) as u32;
         Source::Placement { instance: self.instance.clone(), placement: self.name.clone(), millionths }
     }
 
     /// The placement that is a source of touches, if it is one.
-    pub fn of(source: &Source) -> Option<Self> {
+    pub(crate) fn of(source: &Source) -> Option<Self> {
         match source {
             Source::Placement { instance, placement, millionths } => {
                 Some(Self { instance: instance.clone(), name: placement.clone(), weight: f64::from(*millionths) / 1e6 })
@@ -92,7 +92,7 @@ impl Lying {
 
 impl Entry {
     /// Sources of its touches in turn: placements, instances, or none.
-    pub fn sources(&self) -> Vec<Source> {
+    pub(crate) fn sources(&self) -> Vec<Source> {
         match self.placements.is_empty() {
             true => self.instances.iter().cloned().map(Source::Instance).collect(),
             false => self.placements.iter().map(Lying::source).collect(),
@@ -108,7 +108,7 @@ impl Listing {
     pub(super) const STATED: &str = "the touches that dataset.json states";
 
     /// A listing of objects without touches so far.
-    pub fn new(origin: &Origin, names: impl IntoIterator<Item = String>) -> Self {
+    pub(crate) fn new(origin: &Origin, names: impl IntoIterator<Item = String>) -> Self {
         Self {
             palpate: env!("CARGO_PKG_VERSION").into(),
             complete: false,
@@ -120,7 +120,7 @@ impl Listing {
 
     /// True if a real probe made the touches. Such a data set may grow at any time: what its files hold beyond what is
     /// listed counts, up to the last whole line.
-    pub fn is_recorded(&self) -> bool {
+    pub(crate) fn is_recorded(&self) -> bool {
         !self.recorded.is_empty()
     }
 
@@ -207,7 +207,7 @@ impl Listing {
     }
 
     /// The objects' names.
-    pub fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         self.objects.iter().map(|entry| entry.name.clone()).collect()
     }
 }

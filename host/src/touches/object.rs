@@ -31,7 +31,7 @@ pub enum Source {
 
 impl Source {
     /// The placement on a table, where it is of one.
-    pub fn placement(&self) -> Option<&str> {
+    pub(crate) fn placement(&self) -> Option<&str> {
         match self {
             Self::Placement { placement, .. } => Some(placement),
             Self::Recording(recorded) => recorded.placement.as_deref(),
@@ -202,7 +202,7 @@ impl ObjectTouches {
     }
 
     /// Adds more touches of the same object: those of equal sources are of one.
-    pub fn append(&mut self, more: &Self) {
+    pub(crate) fn append(&mut self, more: &Self) {
         self.extend(more, true);
     }
 
@@ -290,7 +290,7 @@ impl ObjectTouches {
     }
 
     /// The meshes that were touched, if they are known.
-    pub fn meshes(&self) -> Option<&Meshes> {
+    pub(crate) fn meshes(&self) -> Option<&Meshes> {
         self.meshes.as_ref()
     }
 
@@ -347,7 +347,7 @@ impl ObjectTouches {
 
     /// The weights of the object's placements by name, over all of its instances; the greatest first, equal ones by name. They
     /// sum to 1. None if the object was not touched in placements, or a recording states none.
-    pub fn placement_weights(&self) -> Option<Vec<(String, f64)>> {
+    pub(crate) fn placement_weights(&self) -> Option<Vec<(String, f64)>> {
         let mut sums = std::collections::BTreeMap::<&str, f64>::new();
         for (source, weight) in self.source_weights().into_iter().enumerate() {
             *sums.entry(self.placement_of_source(source)?).or_default() += weight;
@@ -482,14 +482,14 @@ impl ObjectTouches {
 
     /// These touches, each changed.
     #[must_use]
-    pub fn changed(&self, change: impl FnMut(&Touch) -> Touch) -> Self {
+    pub(crate) fn changed(&self, change: impl FnMut(&Touch) -> Touch) -> Self {
         Self { touches: self.touches.iter().map(change).collect(), ..self.clone() }
     }
 
     /// The touches with noise, made by `robots` robots in turn within each source. Without a bias robots do not differ, and
     /// their number does not matter; touches that robots made stay those robots'.
     #[must_use]
-    pub fn noisy(&self, noise: &Noise, seed: u64, robots: usize) -> Self {
+    pub(crate) fn noisy(&self, noise: &Noise, seed: u64, robots: usize) -> Self {
         let mut robot_of = self.robot_of.clone();
         if robot_of.is_empty() && noise.has_bias() && robots > 1 {
             let sources = self.sources.len();

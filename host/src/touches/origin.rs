@@ -164,12 +164,12 @@ impl Origin {
     }
 
     /// The samples of each object: the shard's part of all.
-    pub fn samples(&self) -> Range<u64> {
+    pub(crate) fn samples(&self) -> Range<u64> {
         self.shard.part(self.touches)
     }
 
     /// True if the pose is written.
-    pub fn writes_pose(&self) -> bool {
+    pub(crate) fn writes_pose(&self) -> bool {
         self.pose || self.format == Format::Parquet
     }
 }

@@ -78,17 +78,17 @@ impl Maps<'_> {
                 let (u, v) = ((cos * u + sin * v) >> 14, (cos * v - sin * u) >> 14);
                 let radius = length(u, v).min(placement.radius);
                 let interval = self.heights(placement, u, v, blur + ((radius * angle) >> 14));
-                *looked += 1;
                 let [of_whole, of_finest] =
                     self.of_finger(i32::from(at(&seen.z, finger)), i32::from(seen.limit), interval);
                 whole += of_whole;
                 finest += of_finest;
             }
+            *looked = looked.saturating_add(3);
             if whole < least && finest < least {
                 break;
             }
         }
-        whole.max(finest).max(NOTHING)
+        whole.max(finest).clamp(NOTHING, -NOTHING)
     }
 
     /// Likelihood of a finger's height given an interval, and given the height in it that fits best.
@@ -124,6 +124,11 @@ const ROOTS: [i32; MOST_TOUCHES] = {
     }
     roots
 };
+/// Root of a number of touches in Q4.
+pub(super) fn root(touches: usize) -> i32 {
+    at(&ROOTS, touches.min(MOST_TOUCHES - 1))
+}
+
 /// Heights below this may be of the table after a contact was lost, in 1/16 mm.
 const NEAR: i32 = 24;
 /// Half a turn, in radians in Q14.
@@ -271,6 +276,10 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
             }
             let yaws = if self.maps.placement(placement).is_round { 1 } else { YAWS };
             for root in 0..u32::from(yaws) * u32::from(roots) * u32::from(roots) {
+                if self.looked > self.effort.lookups {
+                    self.exhausted = Some(Exhausted::Lookups);
+                    break;
+                }
                 if self.count >= CELLS && !self.prune() && self.count >= CELLS {
                     self.exhausted = Some(Exhausted::Cells);
                 }

@@ -2,7 +2,9 @@
 
 use crate::bytes::{ModelError, at};
 use crate::decide::Stopping;
-use palpate_shared::format::{HEADER_LENGTH, Header, MAPS_LAYOUT, Promise, Section, Tag, TrainedProbe, take_section};
+use palpate_shared::format::{
+    CHECKSUM_LENGTH, HEADER_LENGTH, Header, MAPS_LAYOUT, Promise, Section, Tag, TrainedProbe, take_section,
+};
 
 /// Levels of a pyramid: finest cells, windows of two of them, and of 4, 8, 16 and 32 mm.
 pub(super) const LEVELS: usize = 6;
@@ -39,8 +41,10 @@ pub struct Maps<'a> {
     pub(super) roots: u8,
     /// Standard deviation of an object's move in an approach, in 1/16 mm, and of its turn, in radians in Q14.
     pub(super) drift: [i32; 2],
-    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown; 0: never.
+    /// Mean logarithm of the likelihood for each touch of a known object, in 1/64 nat; 0: no test for unknown ones.
     misfit: i16,
+    /// How far below it a known object's may be after one touch; after n touches a root of n-th of that.
+    misfit_width: u16,
     /// Factor of the half of a pose's intervals, in Q8; 0: 1.
     stretch: u16,
 }
@@ -72,17 +76,24 @@ impl<'a> Maps<'a> {
     pub fn new(model: &'a [u8]) -> Result<Self, ModelError> {
         crate::model::whole(model)?;
         let header = Header::of(model);
-        if header.layout() != MAPS_LAYOUT {
-            return Err(ModelError::Field { offset: 6 });
+        // The layout, the threshold, the limit of touches.
+        let fields =
+            [(6, header.layout() == MAPS_LAYOUT), (48, header.odds() < 1 << 56), (56, header.max_touches() > 0)];
+        if let Some((offset, _)) = fields.into_iter().find(|(_, is_right)| !is_right) {
+            return Err(ModelError::Field { offset });
         }
         let text = usize::try_from(header.text_length()).unwrap_or(usize::MAX);
         let start = HEADER_LENGTH.saturating_add(text);
         let length = usize::try_from(header.optional_length()).unwrap_or(usize::MAX);
         let sections = model.get(start..start.saturating_add(length));
         let mut rest = sections.ok_or(ModelError::Section { offset: start })?;
+        let end = start + rest.len();
+        if model.len() != end.saturating_add(CHECKSUM_LENGTH) {
+            return Err(ModelError::Section { offset: end });
+        }
         let (mut found, mut previous) = (None, 0);
         while !rest.is_empty() {
-            let offset = start + length - rest.len();
+            let offset = end - rest.len();
             let wrong = ModelError::Section { offset };
             let Some(Section { tag, must_understand, content }) = take_section(&mut rest) else { return Err(wrong) };
             if tag <= previous {
@@ -103,7 +114,7 @@ impl<'a> Maps<'a> {
         let (fixed, rest) = content.split_first_chunk::<MAPS_LENGTH>()?;
         let &[shift, roots, placements, _, ref range @ ..] = fixed;
         let (numbers, _) = range.as_chunks::<2>();
-        let &[range, drift, turn, misfit, stretch, ..] = numbers else { return None };
+        let &[range, drift, turn, misfit, stretch, width, ..] = numbers else { return None };
         let (records, rest) = rest.split_at_checked(usize::from(placements) * PLACEMENT_LENGTH)?;
         let (likelihoods, heights) = rest.split_at_checked(LIKELIHOODS_LENGTH)?;
         let range = i32::from(u16::from_le_bytes(range));
@@ -116,6 +127,7 @@ impl<'a> Maps<'a> {
             range,
             roots,
             misfit: i16::from_le_bytes(misfit),
+            misfit_width: u16::from_le_bytes(width),
             stretch: u16::from_le_bytes(stretch),
             drift: [drift, turn].map(|bytes| i32::from(u16::from_le_bytes(bytes))),
         };
@@ -138,7 +150,7 @@ impl<'a> Maps<'a> {
         (is_plausible && all).then_some(maps)
     }
 
-    /// Number of objects.
+    /// Number of objects: 1 to 256. Cost of this and of all other numbers here: a few instructions. Cannot fail.
     pub fn objects(&self) -> usize {
         usize::from(Header::of(self.model).last_object()) + 1
     }
@@ -153,14 +165,15 @@ impl<'a> Maps<'a> {
         at(self.records, usize::from(placement) * PLACEMENT_LENGTH)
     }
 
-    /// The name of an object; empty if it has none.
+    /// The name of an object; empty if it has none, or is not there. Cost: a few instructions for each name before it.
     pub fn object_name(&self, object: usize) -> &'a str {
-        self.text(object + 1)
+        if object < self.objects() { self.text(object + 1) } else { "" }
     }
 
-    /// The name of a placement; empty if it has none.
+    /// The name of a placement; empty if it has none, or is not there. Cost: as [`object_name`](Self::object_name).
     pub fn placement_name(&self, placement: u8) -> &'a str {
-        self.text(self.objects() + 1 + usize::from(placement))
+        let placement = usize::from(placement);
+        if placement < self.placements() { self.text(self.objects() + 1 + placement) } else { "" }
     }
 
     fn text(&self, index: usize) -> &'a str {
@@ -211,9 +224,11 @@ impl<'a> Maps<'a> {
         if self.is_fine { 1 } else { 2 }
     }
 
-    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown; 0: never.
-    pub(super) const fn misfit(&self) -> i32 {
-        self.misfit as i32
+    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown after so many touches; none
+    /// without a test for unknown objects.
+    pub(super) fn misfit(&self, touches: usize) -> Option<i32> {
+        let root = super::belief::root(touches).max(1);
+        (self.misfit != 0).then(|| i32::from(self.misfit) - (i32::from(self.misfit_width) << 4) / root)
     }
 
     /// Thresholds that the model states.
@@ -222,7 +237,7 @@ impl<'a> Maps<'a> {
         Stopping::from_odds(header.odds(), header.max_touches())
     }
 
-    /// The content of an optional section; none if the model does not have it.
+    /// The content of an optional section; none if the model does not have it. Cost: a few instructions for each section.
     pub fn section(&self, tag: Tag) -> Option<&'a [u8]> {
         let header = Header::of(self.model);
         let start = HEADER_LENGTH.saturating_add(usize::try_from(header.text_length()).ok()?);

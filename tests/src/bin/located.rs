@@ -128,6 +128,7 @@ fn run(
         max_touches: 25,
         aimed: if number("random", 0.0) > 0.0 { Aimed::Random } else { Aimed::Chosen },
         real: real(given),
+        unknown: number("strangers", 0.0) > 0.0,
         until: until.then(|| Until { millimeters: number("until", 3.0), degrees: number("degrees", 5.0) }),
         pose: number("pose", 10.0) as u16,
         seed: number("seed", 1.0) as u64,

@@ -164,7 +164,7 @@ impl Approach {
 
     /// Like [`Self::draw`], with the aim uniform in another box, such as [`Aim::target`] gives, and another clearance than
     /// [`CLEARANCE`].
-    pub fn draw_at(rng: &mut impl Rng, [low, high]: [DVec3; 2], target: [DVec3; 2], tilt: f64, clearance: f64) -> Self {
+    fn draw_at(rng: &mut impl Rng, [low, high]: [DVec3; 2], target: [DVec3; 2], tilt: f64, clearance: f64) -> Self {
         let (center, side) = ((low + high) / 2.0, high - low);
         let start = center + on_sphere(rng) * (side.length() / 2.0 + clearance);
         let [low, high] = target;
@@ -173,8 +173,8 @@ impl Approach {
         Self { start, direction, alignment: row(rng, direction, tilt) }
     }
 
-    /// Draws an approach to this scene, with the aim uniform in the `target`: to a floating object as [`draw_at`](Self::draw_at)
-    /// does, to one on a table as [`draw_above`](Self::draw_above) does.
+    /// Draws an approach to this scene, with the aim uniform in the `target`: to a floating object as `draw_at` does,
+    /// to one on a table as `draw_above` does.
     pub fn draw_to(rng: &mut impl Rng, scene: &Scene, target: [DVec3; 2], tilt: f64, clearance: f64) -> Self {
         match scene.table() {
             None => Self::draw_at(rng, scene.bounds(), target, tilt, clearance),
@@ -185,7 +185,7 @@ impl Approach {
     /// Draws an approach from above. Direction: uniform within `cone` degrees of straight down. Aim: uniform in the `target`; the
     /// middle finger moves to the aim, from the sphere about the box's center with half the box's diagonal plus `clearance` as
     /// its radius. Row: as [`draw_at`](Self::draw_at).
-    pub fn draw_above(
+    fn draw_above(
         rng: &mut impl Rng,
         [low, high]: [DVec3; 2],
         target: [DVec3; 2],

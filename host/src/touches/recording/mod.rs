@@ -160,11 +160,6 @@ impl Recording {
         Ok(touches)
     }
 
-    /// Origin of the touches.
-    pub fn origin(&self) -> &Origin {
-        &self.listing.origin
-    }
-
     /// The object's name.
     pub fn object(&self) -> &str {
         &self.recorded.object

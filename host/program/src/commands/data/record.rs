@@ -71,13 +71,11 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     for touch in &touches {
         counts[touch.times().iter().filter(|time| !time.is_missing()).count()] += 1;
     }
-    if global.json {
-        let all = recording.all_touches();
-        return output::print_json(&serde_json::json!({
-            "object": object, "touches": touches.len(), "all_touches": all, "contacts": counts,
-        }));
-    }
-    output::print(&summary(&recording, directory, counts))
+    let all = recording.all_touches();
+    let result = serde_json::json!({
+        "object": object, "touches": touches.len(), "all_touches": all, "contacts": counts,
+    });
+    global.print(&result, || summary(&recording, directory, counts))
 }
 
 /// True if a source is a chip rather than a file of touches.
