@@ -211,9 +211,10 @@ impl Maps {
     ///
     /// `aimed` says how approaches are aimed, and so of which the promise is: "chosen" ones, as by `Locator.next`, or "random" ones
     /// about the place believed in. `real` is what the simulated hand and table add. `until` goes on until the place is as sure, such as
-    /// (3.0, 5.0) for 3 mm and 5 degrees.
+    /// (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing is named before the
+    /// eighth approach then.
     #[pyo3(signature = (meshes, *, millimeters=None, error_rate=0.01, confidence=0.95, sequences=1000, max_touches=25,
-        aimed="chosen", real=None, pose=10, until=None, seed=1, progress=None))]
+        aimed="chosen", real=None, pose=10, until=None, unknown=false, seed=1, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn calibrate<'py>(
         &self,
@@ -228,12 +229,13 @@ impl Maps {
         real: Option<Real>,
         pose: u16,
         until: Option<(f64, f64)>,
+        unknown: bool,
         seed: u64,
         progress: Option<Callback>,
     ) -> Result<objects::CalibratedMaps<'py>, Failure> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let promise = calibrate::Terms { rate: error_rate, confidence, per: Per::Average };
-        let terms = terms(promise, sequences, max_touches, aimed, real, pose, until, seed)?;
+        let terms = Terms { unknown, ..terms(promise, sequences, max_touches, aimed, real, pose, until, seed)? };
         let played = Played { objects: meshes, millimeters, terms };
         let maps = *self.maps();
         let found = long(py, progress.as_ref(), |progress| {
@@ -348,7 +350,7 @@ fn terms(
 ) -> palpate::Result<Terms> {
     let (aimed, Real(real)) = (aimed(name)?, real.unwrap_or_default());
     let until = until.map(|(millimeters, degrees)| Until { millimeters, degrees });
-    Ok(Terms { promise, sequences, max_touches, aimed, real, pose, until, seed, effort: None })
+    Ok(Terms { promise, sequences, max_touches, aimed, real, pose, until, unknown: false, seed, effort: None })
 }
 
 /// Three numbers, NaN or `None` where one is missing.
@@ -534,7 +536,9 @@ impl Locator {
     /// Forgets all touches, for the next object.
     fn reset(&mut self) {
         self.seed = self.seed.wrapping_add(1);
-        (self.next, _) = (None, self.cell.with_dependent_mut(|_, locating| locating.begin(self.seed)));
+        self.next = None;
+        let seed = self.seed;
+        self.cell.with_dependent_mut(|_, locating| locating.begin(seed));
     }
 }
 
