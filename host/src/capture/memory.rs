@@ -55,7 +55,7 @@ fn touch(objects: &[&Object], settings: &Settings, progress: &dyn Progress) -> R
         let (sources, entry) = (sources(object, scenes), entry(object, scenes, origin));
         let meshes = Meshes { checksums: entry.meshes, millimeters: entry.millimeters };
         let object = ObjectTouches::in_turn(&object.name, touches, &sources, samples.start);
-        touched.push(object.of_meshes(Some(meshes)).of_stroke(origin.probe.window()));
+        touched.push(object.of_meshes(Some(meshes)).of_origin(origin));
     }
     Ok((Dataset { origin: Some(origin.clone()), ..Dataset::new(touched) }, approaches))
 }

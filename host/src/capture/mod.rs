@@ -27,6 +27,8 @@
 
 mod admission;
 mod error;
+#[cfg(test)]
+mod located_tests;
 mod memory;
 mod pipeline;
 mod sample;
@@ -292,7 +294,7 @@ pub fn touches(scenes: &[Scene], name: &str, origin: &Origin, samples: Range<u64
     let sampler = Sampler::of_instances(scenes, name, origin);
     let first = samples.start;
     let touches = in_order(samples.into_par_iter().map(|sample| sampler.sample(sample).map(|(touch, _)| touch)))?;
-    Ok(ObjectTouches::in_turn(name, touches, &numbered(scenes), first).of_stroke(origin.probe.window()))
+    Ok(ObjectTouches::in_turn(name, touches, &numbered(scenes), first).of_origin(origin))
 }
 
 /// Sources of the touches of an object's scenes, in turn, where the names of its instances are not known: they are called by

@@ -104,6 +104,9 @@ impl Listing {
     /// The file's name.
     pub const FILE: &str = "dataset.json";
 
+    /// The touches as the file states them, for messages.
+    pub(super) const STATED: &str = "the touches that dataset.json states";
+
     /// A listing of objects without touches so far.
     pub fn new(origin: &Origin, names: impl IntoIterator<Item = String>) -> Self {
         Self {
@@ -169,7 +172,7 @@ impl Listing {
 
     /// The touches of a listed object, and what each of them is of.
     pub(super) fn with_sources(&self, entry: &Entry, touches: Vec<Touch>) -> Result<ObjectTouches> {
-        let (name, window) = (entry.name.clone(), self.origin.probe.window());
+        let (name, origin) = (entry.name.clone(), &self.origin);
         if self.is_recorded() {
             let recorded = self.recorded.iter().filter(|recorded| recorded.object == name).cloned();
             let mut runs: Vec<_> = recorded.map(|one| (one.touches, Source::Recording(one))).collect();
@@ -180,12 +183,12 @@ impl Listing {
                 runs.push((count, Source::Recording(one)));
             }
             let runs = runs.into_iter().map(|(count, source)| (source, count)).collect();
-            return Ok(ObjectTouches::in_runs(name, touches, runs).of_stroke(window));
+            return Ok(ObjectTouches::in_runs(name, touches, runs).of_origin(origin));
         }
         if entry.counts.is_empty() {
             let meshes = Meshes { checksums: entry.meshes.clone(), millimeters: entry.millimeters };
             let object =
-                ObjectTouches::in_turn(name, touches, &entry.sources(), self.origin.samples().start).of_stroke(window);
+                ObjectTouches::in_turn(name, touches, &entry.sources(), origin.samples().start).of_origin(origin);
             return Ok(object.of_meshes(Some(meshes).filter(|meshes| !meshes.checksums.is_empty())));
         }
         let stated = entry.counts.iter().try_fold(0_u64, |sum, &count| sum.checked_add(count));
@@ -200,7 +203,7 @@ impl Listing {
             return Err(TouchesProblem::BadListing { message }.into());
         }
         let runs = sources.into_iter().zip(entry.counts.iter().copied()).collect();
-        Ok(ObjectTouches::in_runs(name, touches, runs).of_stroke(window))
+        Ok(ObjectTouches::in_runs(name, touches, runs).of_origin(origin))
     }
 
     /// The objects' names.

@@ -76,7 +76,7 @@ pub use origin::Origin;
 #[cfg(feature = "parquet")]
 pub(crate) use parquet::table as parquet_table;
 pub use recording::{Recorded, Recording};
-pub use seconds::touch_of_seconds;
+pub use seconds::{located, touch_of_seconds};
 pub use shard::Shard;
 pub use surroundings::Surroundings;
 pub use text::{parse_touch, write_touch};

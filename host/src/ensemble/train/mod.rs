@@ -442,7 +442,9 @@ impl<'d> Evidence<'d> {
             let mut touches: Cow<'_, [Touch]> = if settings.noise.is_none() {
                 object.touches().into()
             } else {
-                object.within_stroke(settings.noise.add(&object.name, object.touches(), settings.seed)).into()
+                let stream = object.stream(&settings.noise, settings.seed);
+                let noisy = (0..).zip(object.touches()).map(|(index, touch)| stream.add(touch, index, index as u64));
+                object.within_stroke(noisy.collect()).into()
             };
             if !touches.iter().all(counts) {
                 touches.to_mut().retain(counts);

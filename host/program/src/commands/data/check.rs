@@ -7,6 +7,7 @@ use palpate::Result;
 use palpate::compare::Settings;
 use palpate::error::{Error, Place, TouchesProblem};
 use palpate::output;
+use palpate::touches::Origin;
 use palpate::touches::check::{Check, ObjectSummary, Quantiles, Summary};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Length;
@@ -110,7 +111,11 @@ fn summary(summary: &Summary) -> String {
                 probe.speed,
                 probe.tilt,
                 origin.seed,
-                if origin.approaches { "every approach" } else { "full touches only" }
+                match origin {
+                    Origin { position: true, .. } => "every approach, with the hand's position",
+                    Origin { approaches: true, .. } => "every approach",
+                    _ => "full touches only",
+                }
             );
         }
     }
