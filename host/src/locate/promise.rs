@@ -2,13 +2,15 @@
 
 use super::follow::{Pressed, Pressing};
 use super::world::{Aimed, Drawn, Real, Standing, World};
-use super::{Effort, Hand, LocateProblem, Maps, Seen, locating};
+use super::{Effort, Hand, LocateProblem, Maps, Promised, Seen, locating};
 use crate::calibrate;
 use crate::error::Result;
+use crate::evaluate::Finding;
 use crate::evidence::{self, Follower, Limit, Odds, Sequence};
 use crate::probe::approach::Probe;
 use crate::progress::{self, Progress};
 use palpate_onboard::{Familiarity, Stopping};
+use palpate_shared::format::Promise;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -55,6 +57,10 @@ pub struct Calibrated {
     pub mean_approaches: f64,
     /// Margin at which an object is named, in nats.
     pub margin: f64,
+    /// Limit of approaches.
+    pub max_touches: u32,
+    /// Noise that it holds for, in words.
+    pub noise: String,
 }
 
 /// Results of an evaluation on a simulated table.
@@ -78,6 +84,20 @@ pub struct Evaluation {
     pub objects: Vec<(String, f64, usize)>,
     /// Heights that an approach looked up on average, and at most.
     pub looked: [u64; 2],
+    /// The promise that was tested, and the outcome; none without a promise.
+    pub promise: Option<Tested>,
+}
+
+/// A promise that was tested on other sequences.
+#[derive(Clone, Debug, Serialize)]
+pub struct Tested {
+    /// The promise.
+    #[serde(flatten)]
+    pub promised: Promised,
+    /// Wrong names of those given.
+    pub error: f64,
+    /// Whether it was kept.
+    pub finding: Finding,
 }
 
 /// Finds the loosest threshold that keeps a promise, on sequences of approaches to these objects, each followed by the chip's own
@@ -97,10 +117,33 @@ pub fn calibrate(
     let calibrate::Terms { rate, confidence, .. } = terms.promise;
     let strictest = ((1.0 - rate) / rate).ln() + STRICTER;
     let sequences = follow(maps, standing, probe, terms, strictest, progress)?;
-    let names: Vec<String> = (0..maps.objects()).map(|object| maps.object_name(object).to_owned()).collect();
+    let names = super::names(&maps);
+    let missing = names.iter().find(|name| !standing.iter().any(|object| object.name == **name));
+    let unknown = standing.iter().find(|object| !names.contains(&object.name));
+    match (missing, unknown) {
+        (Some(object), _) => return Err(LocateProblem::Missing { object: object.clone() }.into()),
+        (_, Some(object)) => return Err(LocateProblem::Unknown { object: object.name.clone() }.into()),
+        _ => {}
+    }
     let chosen = calibrate::choose(&sequences, &names, strictest, &terms.promise)?;
     let odds = chosen.odds.of(0);
-    let model = super::write::restated(maps, odds, terms.max_touches)?;
+    let noise = terms.real.noise(probe.speed);
+    let whole = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+    let promise = Promise {
+        rate,
+        confidence,
+        per: terms.promise.per,
+        approaches: true,
+        active: terms.aimed == Aimed::Chosen,
+        groups: false,
+        sequences: whole(chosen.sequences),
+        given: whole(chosen.given),
+        wrong: whole(chosen.wrong),
+        mean_thousandths: (chosen.mean_approaches * 1e3).round() as u32,
+        max_touches: terms.max_touches,
+        noise: noise.promised(),
+    };
+    let model = super::write::restated(maps, odds, &promise)?;
     Ok(Calibrated {
         model,
         promised: rate,
@@ -111,6 +154,8 @@ pub fn calibrate(
         wrong: chosen.wrong,
         mean_approaches: chosen.mean_approaches,
         margin: calibrate::margin_of(odds),
+        max_touches: terms.max_touches,
+        noise: noise.to_string(),
     })
 }
 
@@ -200,6 +245,12 @@ pub fn evaluate(
     evaluation.off = [quantile(0.5), quantile(0.95)];
     evaluation.mean_approaches = approaches as f64 / terms.sequences.max(1) as f64;
     evaluation.looked = [looked[0] / (approaches as u64).max(1), looked[1]];
+    let Evaluation { wrong, given, .. } = evaluation;
+    evaluation.promise = Promised::of(&maps).map(|promised| Tested {
+        error: wrong as f64 / given.max(1) as f64,
+        finding: Finding::of(wrong, given, promised.error_rate),
+        promised,
+    });
     evaluation.objects =
         objects.into_iter().map(|(name, sum, wrong, count)| (name, sum / count.max(1) as f64, wrong)).collect();
     Ok(evaluation)

@@ -2,11 +2,11 @@
 
 use super::learn::Surface;
 use super::{LocateProblem, Settings};
-use crate::compile::{OwnedSection, file, restate_header};
+use crate::compile::{OwnedSection, file, with_section};
 use crate::error::Result;
 use crate::probe::approach::Probe;
 use palpate_onboard::locate::{BEYOND, DISTANCES, Maps, WIDTHS, WITHIN};
-use palpate_shared::format::{HeaderBuilder, Length, MAPS_LAYOUT, Tag, TrainedProbe};
+use palpate_shared::format::{HeaderBuilder, Length, MAPS_LAYOUT, Promise, Tag, TrainedProbe};
 
 /// 1/16 mm in a millimeter.
 const SIXTEENTHS: f64 = 16.0;
@@ -53,7 +53,8 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
     content.extend(number(settings.drift * SIXTEENTHS, 1_023));
     content.extend(number(settings.drift_yaw.to_radians() * 16_384.0, 1_023));
     content.extend(settings.misfit.to_le_bytes());
-    content.resize(palpate_onboard::locate::MAPS_LENGTH, 0);
+    content.extend([settings.noise, settings.position].map(|length| (length * 50.0).round() as u8));
+    content.extend(number(settings.lost * 1e4, 10_000));
     content.extend(records);
     content.extend(likelihoods(settings).into_iter().flat_map(i16::to_le_bytes));
     content.extend(heights);
@@ -88,12 +89,14 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
     Ok(bytes)
 }
 
-/// The model with another threshold and limit of touches.
+/// The model with another threshold, and a promise.
 ///
 /// # Errors
 /// [`LocateProblem::Refused`] if it could not be read then.
-pub(super) fn restated(maps: Maps<'_>, odds: u64, max_touches: u32) -> Result<Vec<u8>> {
-    let bytes = restate_header(maps.model(), |header| header.with_odds(odds).with_max_touches(max_touches));
+pub(super) fn restated(maps: Maps<'_>, odds: u64, promise: &Promise) -> Result<Vec<u8>> {
+    let change = |header: HeaderBuilder| header.with_odds(odds).with_max_touches(promise.max_touches);
+    let promise = OwnedSection::new(Tag::Promise, false, promise.write(<[u8]>::to_vec));
+    let bytes = with_section(maps.model(), change, promise)?;
     Maps::new(&bytes).map_err(|error| LocateProblem::Refused { error })?;
     Ok(bytes)
 }

@@ -3,7 +3,7 @@
 use super::write::count;
 use crate::error::Result;
 use palpate_onboard::Model;
-use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, Header, HeaderBuilder, Section, Tag, checksum};
+use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, Header, HeaderBuilder, Section, Tag, checksum, take_section};
 
 /// An optional section of a model's file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,7 +38,11 @@ pub(super) struct Container {
 impl Container {
     /// The parts of a model, including sections that nobody knows.
     pub(super) fn of(model: &Model<'_>) -> Self {
-        let (bytes, header) = (model.bytes(), model.header());
+        Self::of_parts(model.bytes(), model.header(), model.optional_sections())
+    }
+
+    /// The parts of a checked model's bytes, with these sections.
+    fn of_parts<'s>(bytes: &[u8], header: Header<'_>, sections: impl Iterator<Item = Section<'s>>) -> Self {
         let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
         let (text, rest) = bytes[HEADER_LENGTH..bytes.len() - CHECKSUM_LENGTH].split_at(length(header.text_length()));
         let owned = |Section { tag, must_understand, content }: Section<'_>| OwnedSection {
@@ -49,7 +53,7 @@ impl Container {
         Self {
             header: HeaderBuilder::from(header),
             text: text.into(),
-            sections: model.optional_sections().map(owned).collect(),
+            sections: sections.map(owned).collect(),
             content: rest[length(header.optional_length())..].into(),
         }
     }
@@ -81,14 +85,23 @@ pub fn file(header: HeaderBuilder, text: Vec<u8>, sections: Vec<OwnedSection>, c
     Container { header, text, sections, content }.bytes()
 }
 
-/// A model's file with another header, whose lengths must be the same.
-pub fn restate_header(model: &[u8], change: impl FnOnce(HeaderBuilder) -> HeaderBuilder) -> Vec<u8> {
-    let mut bytes = model.to_vec();
-    let header = change(HeaderBuilder::from(Header::of(model)));
-    bytes.iter_mut().zip(header.bytes()).for_each(|(to, from)| *to = *from);
-    bytes.truncate(model.len().saturating_sub(CHECKSUM_LENGTH));
-    bytes.extend(checksum(&bytes).to_le_bytes());
-    bytes
+/// A model's file with another header, and a section in place of the one of its tag, if it has one.
+///
+/// # Errors
+/// As [`file`].
+pub fn with_section(
+    model: &[u8],
+    change: impl FnOnce(HeaderBuilder) -> HeaderBuilder,
+    section: OwnedSection,
+) -> Result<Vec<u8>> {
+    let header = Header::of(model);
+    let (text, length) = (header.text_length() as usize, header.optional_length() as usize);
+    let mut rest = &model[HEADER_LENGTH + text..][..length];
+    let sections = std::iter::from_fn(|| take_section(&mut rest));
+    let mut container = Container::of_parts(model, header, sections);
+    container.sections.retain(|own| own.tag != section.tag);
+    container.sections.push(section);
+    Container { header: change(container.header), ..container }.bytes()
 }
 
 /// Bytes of sections, in their order.
