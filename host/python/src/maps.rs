@@ -105,7 +105,7 @@ impl Played {
         with: impl FnOnce(&[locate::Standing], &palpate::probe::approach::Probe, &Terms) -> palpate::Result<T>,
     ) -> palpate::Result<T> {
         let objects = sized(self.objects, self.millimeters)?;
-        let probe = locate::probe_of_maps(maps)?;
+        let probe = locate::hand(maps)?;
         let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, progress)?;
         with(&standing, &probe, &self.terms)
     }
@@ -323,7 +323,7 @@ impl Maps {
     /// The hand that they were learned with, in millimeters.
     #[getter]
     fn probe(&self) -> Result<Probe, Failure> {
-        Ok(Probe(locate::probe_of_maps(self.maps())?))
+        Ok(Probe(locate::hand(self.maps())?))
     }
 
     /// Half of the side of the square about the table's origin in which objects are looked for, in millimeters.

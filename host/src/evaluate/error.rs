@@ -117,6 +117,9 @@ pub enum EvaluateProblem {
     /// The model has no plan of approaches.
     #[error("the model has no plan of approaches")]
     NoPlan,
+    /// Touches with a position are for maps.
+    #[error("touches with a position, which a model of trees does not use")]
+    Located,
     /// A plan was asked for a model of one object.
     #[error("the model has one object: there is nothing to distinguish it from")]
     OneObjectToPlan,
@@ -251,6 +254,9 @@ impl Problem for EvaluateProblem {
             Self::TooManyObjects { .. } => "Use a model of fewer objects.",
             Self::NoPlan => {
                 "Add one: `palpate calibrate MODEL DIR -o OUT --plan 4`, from approaches with pose. An ensemble (JSON) has to be exported first."
+            }
+            Self::Located => {
+                "Train maps on touches with a position (`palpate train`), or leave positions out."
             }
             Self::OneObjectToPlan => "Train a model of two objects or more.",
             Self::NoApproaches => "Capture every approach: --approaches N --pose.",

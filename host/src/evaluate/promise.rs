@@ -25,6 +25,13 @@ pub enum Finding {
     Untested,
 }
 
+impl Finding {
+    /// Finding about wrong names of those given, compared with a promised rate.
+    pub fn of(wrong: usize, given: usize, rate: f64) -> Self {
+        Wrong { wrong: wrong as f64, given: given as f64, spread: given as f64 }.finding_of(rate, 1)
+    }
+}
+
 /// The probability of errors that a promise just kept is taken to be able to make.
 pub(crate) const BY_CHANCE: f64 = 0.01;
 

@@ -55,6 +55,27 @@ pub enum LocateProblem {
     /// The model states no probe in millimeters.
     #[error("the maps do not state the hand that they were learned with")]
     NoHand,
+    /// A touch of a stream has no position.
+    #[error("the touch has no position")]
+    Nowhere,
+    /// A finger stopped below the table.
+    #[error("a finger stopped {millimeters:.0} mm below the table")]
+    Below {
+        /// Distance.
+        millimeters: f64,
+    },
+    /// Meshes were given for a model of trees.
+    #[error("a model of trees, not of maps")]
+    Trees,
+    /// There is noise that a simulated table does not have.
+    #[error("a simulated table has other noise")]
+    Noise,
+    /// An object of the model is not on the table.
+    #[error("{object} is not among the objects to calibrate on")]
+    Missing {
+        /// The object.
+        object: String,
+    },
     /// An object on the table is unknown to the model.
     #[error("the model does not know {object}")]
     Unknown {
@@ -80,7 +101,13 @@ impl Problem for LocateProblem {
             Self::NameTooLong { .. } => "Give it a shorter name.",
             Self::Refused { .. } => "Train it again; models of trees are for `recognize` without positions.",
             Self::NoHand => "Train it on a data set whose probe is in millimeters.",
-            Self::Unknown { .. } => "Give the objects that the model was trained on.",
+            Self::Nowhere => {
+                "A model of maps needs twelve columns: times, direction, alignment, and the hand's position in millimeters."
+            }
+            Self::Below { .. } => "Give times in seconds, and the position in millimeters above the table.",
+            Self::Trees => "Give a directory of touches, or a model that was trained on touches with a position.",
+            Self::Noise => "Use noise, timer, missed (one share for all fingers), position and drift.",
+            Self::Missing { .. } | Self::Unknown { .. } => "Give the objects that the model was trained on, all of them and no others.",
         }
         .into()
     }

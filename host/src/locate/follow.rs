@@ -17,6 +17,8 @@ const MANY: usize = 65_536;
 pub trait Locating: Send + Sync {
     /// Begins another object, with another seed of the choice of approaches.
     fn begin(&mut self, seed: u32);
+    /// Begins another object, one of those that have a weight.
+    fn begin_of(&mut self, weights: &[u32]);
     /// Takes in the heights of an approach.
     fn push(&mut self, seen: Seen) -> Verdict;
     /// The verdict so far.
@@ -76,6 +78,10 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
         if let Ok(locator) = Locator::new(self.maps, self.stopping, self.effort, seed) {
             self.locator = locator;
         }
+    }
+
+    fn begin_of(&mut self, weights: &[u32]) {
+        _ = self.locator.reset_to(weights);
     }
 
     fn push(&mut self, seen: Seen) -> Verdict {

@@ -1,7 +1,7 @@
 //! Maps of placements, learned from touches with positions.
 
+use super::Settings;
 use super::error::LocateProblem;
-use super::{Maps, Settings};
 use crate::error::{Error, Result};
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, ObjectTouches};
@@ -289,21 +289,4 @@ pub fn probe_of(dataset: &Dataset) -> Result<Probe> {
     let origin = dataset.origin.as_ref();
     let origin = origin.filter(|origin| origin.unit == Length::Millimeter).ok_or(LocateProblem::Unit)?;
     Ok::<_, Error>(origin.probe)
-}
-
-/// The probe that maps were learned with.
-///
-/// # Errors
-/// [`LocateProblem::NoHand`] unless they state one in millimeters.
-pub fn probe_of_maps(maps: &Maps<'_>) -> Result<Probe> {
-    let probe = maps.probe().filter(|probe| probe.length == Length::Millimeter).ok_or(LocateProblem::NoHand)?;
-    Ok(Probe {
-        radius: probe.radius.into(),
-        spacing: probe.spacing.into(),
-        speed: probe.speed.into(),
-        tilt: 0.0,
-        stroke: probe.stroke.map(f64::from),
-        travel: probe.travel.map(f64::from),
-        stroke_tolerance: probe.stroke_tolerance.map(f64::from),
-    })
 }

@@ -12,6 +12,7 @@
 
 pub(crate) mod error;
 mod follow;
+mod inspect;
 mod learn;
 mod pose;
 mod promise;
@@ -21,10 +22,11 @@ mod world;
 mod write;
 
 pub use follow::{CELLS, Locating, TOUCHES, locating};
-pub use learn::{Surface, learn, probe_of, probe_of_maps};
+pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspect, names, stated};
+pub use learn::{Surface, learn, probe_of};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, Pose, Seen, TESTED};
 pub use pose::{Off, Until};
-pub use promise::{Calibrated, Evaluation, OfObject, Terms, calibrate, evaluate};
+pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, calibrate, evaluate};
 pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};
 pub use write::write;
 
@@ -83,6 +85,20 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// These settings for noise that is stated; what it leaves open stays.
+    #[must_use]
+    pub fn expecting(self, real: &Real) -> Self {
+        let stated = |stated: f64, own: f64| if stated > 0.0 { stated } else { own };
+        Self {
+            noise: stated(real.height, self.noise),
+            lost: stated(real.lost, self.lost),
+            position: stated(real.position, self.position),
+            drift: stated(real.drift, self.drift),
+            drift_yaw: stated(real.drift_yaw, self.drift_yaw),
+            ..self
+        }
+    }
+
     /// Side of a cell, in millimeters.
     fn cell(&self) -> f64 {
         if self.fine { 1.0 } else { 2.0 }

@@ -5,14 +5,15 @@ use super::follow::{Pressed, Pressing};
 use super::pose::{Equivalents, Off, Until};
 use super::world::{Aimed, Drawn, Real, Standing, World};
 use super::write::{Restated, restated};
-use super::{Effort, Hand, Maps, Seen, TESTED, locating};
+use super::{Effort, Hand, Maps, Promised, Seen, TESTED, locating};
 use crate::calibrate::{self, margin_of, odds_of};
 use crate::error::Result;
+use crate::evaluate::Finding;
 use crate::evidence::{self, Follower, Limit, Outcome, Sequence, Totals};
 use crate::probe::approach::Probe;
 use crate::progress::{self, Progress};
 use palpate_onboard::{Familiarity, Stopping};
-use palpate_shared::format::{Promise, PromisedNoise};
+use palpate_shared::format::Promise;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -63,6 +64,10 @@ pub struct Calibrated {
     pub mean_approaches: f64,
     /// Margin at which an object is named, in nats.
     pub margin: f64,
+    /// Limit of approaches.
+    pub max_touches: u32,
+    /// Noise that it holds for, in words.
+    pub noise: String,
 }
 
 /// Results of an evaluation on a simulated table.
@@ -92,6 +97,20 @@ pub struct Evaluation {
     pub objects: Vec<OfObject>,
     /// Heights that an approach looked up on average, and at most.
     pub looked: [u64; 2],
+    /// The promise that was tested, and the outcome; none without a promise.
+    pub promise: Option<Tested>,
+}
+
+/// A promise that was tested on other sequences.
+#[derive(Clone, Debug, Serialize)]
+pub struct Tested {
+    /// The promise.
+    #[serde(flatten)]
+    pub promised: Promised,
+    /// Wrong names of those given.
+    pub error: f64,
+    /// Whether it was kept.
+    pub finding: Finding,
 }
 
 /// Results for an object.
@@ -128,6 +147,14 @@ pub fn calibrate(
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
     let calibrate::Terms { rate, confidence, per } = terms.promise;
+    let names = super::names(&maps);
+    let missing = names.iter().find(|name| !standing.iter().any(|object| object.name == **name));
+    let unknown = standing.iter().find(|object| !names.contains(&object.name));
+    match (missing, unknown) {
+        (Some(object), _) => return Err(LocateProblem::Missing { object: object.clone() }.into()),
+        (_, Some(object)) => return Err(LocateProblem::Unknown { object: object.name.clone() }.into()),
+        _ => {}
+    }
     let own = ((1.0 - rate) / rate).ln();
     let plain = Restated { odds: 0, max_touches: terms.max_touches, misfit: None, stretch: 0, promise: None };
     let bytes = restated(maps, &plain)?;
@@ -141,9 +168,9 @@ pub fn calibrate(
     let bytes = restated(maps, &stated)?;
     let strictest = own + STRICTER;
     let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest, progress)?;
-    let names: Vec<String> = (0..maps.objects()).map(|object| maps.object_name(object).to_owned()).collect();
     let chosen = calibrate::choose(&sequences, &names, strictest, &terms.promise)?;
     let odds = chosen.odds.strictest();
+    let noise = terms.real.noise(probe.speed);
     let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
     let promise = Promise {
         rate,
@@ -157,7 +184,7 @@ pub fn calibrate(
         wrong: count(chosen.wrong),
         mean_thousandths: (chosen.mean_approaches * 1_000.0).round() as u32,
         max_touches: terms.max_touches,
-        noise: PromisedNoise::default(),
+        noise: noise.promised(),
     };
     let model = restated(maps, &Restated { odds, promise: Some(promise), ..stated })?;
     Ok(Calibrated {
@@ -170,6 +197,8 @@ pub fn calibrate(
         wrong: chosen.wrong,
         mean_approaches: chosen.mean_approaches,
         margin: margin_of(odds),
+        max_touches: terms.max_touches,
+        noise: noise.to_string(),
     })
 }
 
@@ -325,7 +354,13 @@ pub fn evaluate(
             unknown: totals.unknown,
         }
     };
+    let promise = Promised::of(&maps).map(|promised| Tested {
+        error: totals.error(),
+        finding: Finding::of(totals.wrong, totals.given, promised.error_rate),
+        promised,
+    });
     Ok(Evaluation {
+        promise,
         sequences: totals.sequences,
         given: totals.given,
         wrong: totals.wrong,

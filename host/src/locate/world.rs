@@ -1,9 +1,11 @@
 //! Objects on a simulated table, pressed by a hand that knows where it is.
 
+use super::error::LocateProblem;
 use crate::capture;
 use crate::error::Result;
 use crate::mesh::Object;
 use crate::probe::approach::{FINGERS, Probe, to_q15};
+use crate::probe::noise::{Deviation, Noise};
 use crate::probe::scene::Scene;
 use crate::progress::Progress;
 use crate::random::{self, Purpose};
@@ -64,6 +66,48 @@ impl Default for Real {
             tips: 0.0,
             table: 0.0,
             turned: 0.0,
+        }
+    }
+}
+
+impl Real {
+    /// Noise of a hand of this speed, in millimeters per second.
+    ///
+    /// # Errors
+    /// [`LocateProblem::Noise`] for noise that a simulated table does not have.
+    pub fn of(noise: &Noise, speed: f64) -> Result<Self> {
+        let real = Self::like(noise, speed);
+        let Noise { deviation, timer, position, drift, .. } = *noise;
+        let known = Noise { deviation, timer, position, drift, ..real.noise(speed) };
+        if known == *noise { Ok(real) } else { Err(LocateProblem::Noise.into()) }
+    }
+
+    /// The part of the noise that a simulated table has. A range of noise becomes its root mean square.
+    pub fn like(noise: &Noise, speed: f64) -> Self {
+        let Noise { deviation: Deviation { least, largest }, timer, missed: [lost, ..], position, drift, .. } = *noise;
+        let [moved, turned] = drift;
+        // A touch's deviation is at a uniform number to the power of 3/2 of the range.
+        let more = largest - least;
+        let square = least * least + 0.8 * least * more + 0.25 * more * more + timer * timer / 12.0;
+        Self {
+            height: square.sqrt() * 1e-6 * speed,
+            lost,
+            position: position / 1e3,
+            drift: moved / 1e3,
+            drift_yaw: turned,
+            ..Self::default()
+        }
+    }
+
+    /// The noise as touches have it, of a hand of this speed.
+    pub fn noise(&self, speed: f64) -> Noise {
+        // Rounded as a promise states it.
+        let whole = |number: f64| (number * 1e3).round();
+        Noise {
+            missed: [self.lost; FINGERS],
+            position: whole(self.position),
+            drift: [whole(self.drift), whole(self.drift_yaw) / 1e3],
+            ..Noise::gaussian(whole(self.height / speed * 1e3))
         }
     }
 }

@@ -56,7 +56,8 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
     content.extend(number(settings.drift * SIXTEENTHS, 1_023));
     content.extend(number(settings.drift_yaw.to_radians() * 16_384.0, 1_023));
     content.extend(tests(settings.misfit, settings.stretch));
-    content.resize(palpate_onboard::locate::MAPS_LENGTH, 0);
+    content.extend([settings.noise, settings.position].map(|length| (length * 50.0).round() as u8));
+    content.extend(number(settings.lost * 1e4, 10_000));
     content.extend(records);
     content.extend(likelihoods(settings).into_iter().flat_map(i16::to_le_bytes));
     content.extend(heights);
@@ -125,9 +126,7 @@ pub(super) fn restated(maps: Maps<'_>, stated: &Restated) -> Result<Vec<u8>> {
         }
     }
     if let Some(promise) = promise {
-        let mut content = Vec::new();
-        promise.write(&mut |part: &[u8]| content.extend_from_slice(part));
-        sections.push(OwnedSection::new(Tag::Promise, false, content));
+        sections.push(OwnedSection::new(Tag::Promise, false, promise.write(<[u8]>::to_vec)));
     }
     let header = HeaderBuilder::from(header).with_odds(odds).with_max_touches(max_touches);
     let bytes = file(header, text.to_vec(), sections, Vec::new())?;

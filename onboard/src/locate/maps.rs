@@ -9,7 +9,7 @@ use palpate_shared::format::{
 /// Levels of a pyramid: finest cells, windows of two of them, and of 4, 8, 16 and 32 mm.
 pub(super) const LEVELS: usize = 6;
 /// Bytes of the fixed part of a section of maps.
-pub const MAPS_LENGTH: usize = 16;
+pub const MAPS_LENGTH: usize = 20;
 /// Bytes of a placement's record.
 pub const PLACEMENT_LENGTH: usize = 24;
 /// Bytes of the likelihoods that follow the records: of contacts, of missing contacts below and above a limit, of a table that
@@ -184,6 +184,34 @@ impl<'a> Maps<'a> {
         }
         let (&length, rest) = text.split_first().unwrap_or((&0, &[]));
         core::str::from_utf8(rest.get(..usize::from(length)).unwrap_or_default()).unwrap_or_default()
+    }
+
+    /// Logarithm of a placement's share of its object, in 1/64 nat.
+    pub fn prior_of(&self, placement: u8) -> i32 {
+        self.placement(placement).prior
+    }
+
+    /// True if a placement looks the same from all sides.
+    pub fn is_round(&self, placement: u8) -> bool {
+        self.placement(placement).is_round
+    }
+
+    /// Noise that the likelihoods are for: the standard deviation of heights and of the hand's position, each in 20 micrometers,
+    /// and lost contacts in 1/10,000. For people: nothing here uses it.
+    pub fn noise(&self) -> [u16; 3] {
+        let section = self.section(Tag::Maps).and_then(|content| content.get(MAPS_LENGTH - 4..)?.first_chunk());
+        let &[height, position, low, high] = section.unwrap_or(&[0; 4]);
+        [height.into(), position.into(), u16::from_le_bytes([low, high])]
+    }
+
+    /// Standard deviations of an object's move in an approach, in 1/16 mm, and of its turn, in radians in Q14.
+    pub const fn drift(&self) -> [i32; 2] {
+        self.drift
+    }
+
+    /// Version of the tool that wrote the model.
+    pub fn tool_version(&self) -> &'a str {
+        self.text(0)
     }
 
     /// Bytes of a placement's map.

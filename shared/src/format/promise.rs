@@ -34,7 +34,7 @@ impl<'a> OddsByObject<'a> {
     }
 }
 
-/// Promise of a model about its verdicts, and how it was determined: 48 bytes, and 36 more if the touches had more
+/// Promise of a model about its verdicts, and how it was determined: 48 bytes, and up to 56 more if the touches had more
 /// noise than [`TrainedNoise`] can say. Nothing on the chip uses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Promise {
@@ -84,6 +84,10 @@ pub struct PromisedNoise {
     pub speed: i32,
     /// Standard deviation of the angle by which all poses of a robot are turned, in thousandths of a degree.
     pub pose_bias: u32,
+    /// Standard deviation of each coordinate of a touch's position, in micrometers.
+    pub position: u32,
+    /// Standard deviations of an object's move in an approach, in micrometers, and of its turn, in thousandths of a degree.
+    pub drift: [u32; 2],
 }
 
 impl PromisedNoise {
@@ -107,9 +111,14 @@ impl Promise {
     pub(crate) const FULL_LENGTH: usize = 84;
     /// Bytes of the section with all noise, in which every finger misses another share of its contacts.
     pub(crate) const FINGERS_LENGTH: usize = 92;
+    /// Bytes of the section with noise of the position, or objects that move.
+    pub(crate) const LOCATED_LENGTH: usize = 104;
 
-    /// Bytes of the section with this noise: one of the three lengths.
+    /// Bytes of the section with this noise: one of the four lengths.
     pub fn length(noise: &PromisedNoise) -> usize {
+        if noise.position > 0 || noise.drift != [0; 2] {
+            return Self::LOCATED_LENGTH;
+        }
         match (noise.is_short(), noise.missed_more()) {
             (true, _) => Self::LENGTH,
             (false, [0, 0]) => Self::FULL_LENGTH,
@@ -127,7 +136,8 @@ impl Promise {
         let [first, second, third] = noise.bent.map(i32::cast_unsigned);
         let head = [billionths(self.rate), billionths(self.confidence), codes, sequences, given, wrong];
         let [middle, last] = noise.missed_more().map(i32::cast_unsigned);
-        let words: [[u32; 3]; 8] = [
+        let [moved, turned] = noise.drift;
+        let words: [[u32; 3]; 9] = [
             [head[0], head[1], head[2]],
             [head[3], head[4], head[5]],
             [mean_thousandths, max_touches, least],
@@ -135,9 +145,10 @@ impl Promise {
             [noise.debounce, first, second],
             [third, noise.missed[0], noise.speed_error],
             [noise.speed_bias, noise.speed.cast_unsigned(), noise.pose_bias],
-            [middle, last, 0],
+            [middle, last, noise.position],
+            [moved, turned, 0],
         ];
-        let mut bytes = [0; Self::FINGERS_LENGTH];
+        let mut bytes = [0; Self::LOCATED_LENGTH];
         let numbers = words.into_iter().flatten().flat_map(u32::to_le_bytes);
         bytes.iter_mut().zip(numbers).for_each(|(to, from)| *to = from);
         put(bytes.get(..Self::length(&noise)).unwrap_or(&bytes))
@@ -155,6 +166,8 @@ impl Promise {
         let more = rest.first_chunk::<9>().map_or([0; 9], |more| more.map(u32::from_le_bytes));
         let fingers = rest.get(9..).and_then(<[[u8; 4]]>::first_chunk::<2>);
         let [middle, last] = fingers.map_or([0; 2], |fingers| fingers.map(i32::from_le_bytes));
+        let located = rest.get(11..).and_then(<[[u8; 4]]>::first_chunk::<3>);
+        let [position, drift @ ..] = located.map_or([0; 3], |located| located.map(u32::from_le_bytes));
         let [debounce, first, second, third, missed, speed_error, speed_bias, speed, pose_bias] = more;
         let share = |billionths: u32| {
             let share = f64::from(billionths) / BILLION;
@@ -184,6 +197,8 @@ impl Promise {
                 speed_bias,
                 speed: speed.cast_signed(),
                 pose_bias,
+                position,
+                drift,
             },
         })
     }
@@ -260,6 +275,8 @@ mod tests {
             speed_bias: 0,
             speed: 0,
             pose_bias: 0,
+            position: 0,
+            drift: [0; 2],
         },
     };
 
@@ -277,6 +294,8 @@ mod tests {
             (Promise { noise, ..PROMISE }, Promise::FULL_LENGTH),
             (Promise { noise: alike, ..PROMISE }, Promise::FULL_LENGTH),
             (Promise { noise: fingers, ..PROMISE }, Promise::FINGERS_LENGTH),
+            (Promise { noise: PromisedNoise { position: 7, ..PROMISE.noise }, ..PROMISE }, Promise::LOCATED_LENGTH),
+            (Promise { noise: PromisedNoise { drift: [5, 6], ..fingers }, ..PROMISE }, Promise::LOCATED_LENGTH),
         ] {
             assert_eq!(Promise::length(&promise.noise), length);
             let bytes = bytes(&promise);

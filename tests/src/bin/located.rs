@@ -155,8 +155,7 @@ fn run(
     let maps = Maps::new(model).map_err(|error| error.to_string())?;
     if let Some(directory) = given.0.get("write") {
         let bounds = Terms { effort: bounds, within: maps.range().unsigned_abs() * 2, pose: terms.pose };
-        let world =
-            World { standing, probe, real: terms.real, range: f64::from(maps.range()) / 1e3 - 1.0, seed: 1 };
+        let world = World { standing, probe, real: terms.real, range: f64::from(maps.range()) / 1e3 - 1.0, seed: 1 };
         let directory = std::path::Path::new(directory);
         std::fs::create_dir_all(directory)?;
         std::fs::write(directory.join("located.palpate"), &*model)?;

@@ -6,9 +6,10 @@ use super::progress::Bar;
 use super::real::RealArguments;
 use super::sequences::{self, SequenceArguments};
 use super::strangers::StrangersArguments;
+use super::table::{self, TableArguments};
 use super::thresholds;
 use palpate::Result;
-use palpate::calibrate::{self, Calibrated, Gain, OfRecorded, OfRows, Per, Settings, Used};
+use palpate::calibrate::{self, Calibrated, Gain, OfRecorded, OfRows, Per, Settings, Terms, Used};
 use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, EvaluateProblem, Place};
@@ -25,19 +26,25 @@ use std::path::{Path, PathBuf};
 /// Set a model's thresholds so that it keeps a promised error rate, and uses it up.
 #[derive(clap::Args)]
 #[command(after_help = "\
-The promise holds for touches like those of DIR, which the model was not trained on, or with --recorded for touches like the recorded ones. A sequence without a name is neither right nor wrong. With --plan DIR holds approaches with pose. Of a model over rows DIR is a CSV or Parquet file: rows of a sequence may depend on each other; sequences, or with --group-column groups, must not. Calibrate once. Where several seeds, rates or models are tried on the same data, the one that looks best keeps its promise less often than stated. docs/reference/options.md has the method.
+The promise holds for touches like those of DIR, which the model was not trained on, or with --recorded for touches like the recorded ones. A sequence without a name is neither right nor wrong. Of a model of maps it holds for approaches to the meshes on a simulated table, with the noise that the model states and --real. With --plan DIR holds approaches with pose. Of a model over rows DIR is a CSV or Parquet file: rows of a sequence may depend on each other; sequences, or with --group-column groups, must not. Calibrate once. Where several seeds, rates or models are tried on the same data, the one that looks best keeps its promise less often than stated. docs/reference/options.md has the method.
 
 Examples:
   palpate capture builtin -o fresh --approaches 100000 --seed 3
   palpate calibrate model.palpate fresh -o calibrated.palpate
   palpate calibrate model.palpate posed -o planned.palpate --plan 4
+  palpate calibrate maps.palpate --objects meshes/ -o sure.palpate
   palpate calibrate a.palpate a.csv --label a --sequence-column id -o b.palpate")]
 pub(crate) struct Arguments {
     /// Compiled model
     model: PathBuf,
     /// Touches to calibrate on: a directory that `palpate capture` filled; or a file of sequences of rows
-    #[arg(value_name = "DIR")]
-    directory: PathBuf,
+    #[arg(value_name = "DIR", required_unless_present = "objects")]
+    directory: Option<PathBuf>,
+    /// Meshes of the objects, for a model of maps: approaches to them on a table are simulated
+    #[arg(long, value_name = "MESHES", num_args = 1.., conflicts_with_all = TOUCHES)]
+    objects: Vec<String>,
+    #[command(flatten)]
+    table: TableArguments,
     /// Recorded touches of the objects; thresholds, or --strangers, are tested on them
     #[arg(long, value_name = "DIR", conflicts_with_all = ["plan", "label"])]
     recorded: Option<PathBuf>,
@@ -56,9 +63,9 @@ pub(crate) struct Arguments {
     /// Probability that it is kept
     #[arg(long, default_value = "0.95", value_name = "SHARE", value_parser = share)]
     confidence: f64,
-    /// Sequences of touches to draw; of all objects together, at most
-    #[arg(long, default_value = "100000", value_name = "N", value_parser = numbers::count)]
-    sequences: u64,
+    /// Sequences of touches to draw; of all objects together, at most [default: 100000, or 1000 with --objects]
+    #[arg(long, value_name = "N", value_parser = numbers::count)]
+    sequences: Option<u64>,
     /// Give up after this many touches [default: the model's own limit]
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
@@ -92,6 +99,10 @@ const PROMISE: [&str; 10] = [
     "label",
 ];
 
+/// The options that approaches on a simulated table have no use for.
+const TOUCHES: [&str; 10] =
+    ["directory", "recorded", "per", "placement_prior", "active", "plan", "strangers", "background", "label", "probe"];
+
 /// Shares of the placements of objects for which a promise holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum PlacementPrior {
@@ -121,13 +132,26 @@ impl PlacementPrior {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Some(directory) = &arguments.directory else {
+        let wanted = table::Wanted {
+            model: &arguments.model,
+            objects: &arguments.objects,
+            real: &arguments.real,
+            promise: Terms { rate: arguments.error_rate, confidence: arguments.confidence, per: Per::Average },
+            sequences: arguments.sequences.map_or(1_000, |count| usize::try_from(count).unwrap_or(usize::MAX)),
+            max_touches: arguments.max_touches,
+            seed: global.seed(),
+        };
+        return arguments.table.calibrate(&wanted, &arguments.output, global);
+    };
+    arguments.table.check_unused()?;
     if let Some(rolls) = arguments.plan {
-        let Arguments { model, directory, output, probe, real, .. } = &arguments;
+        let Arguments { model, output, probe, real, .. } = &arguments;
         return plan::run(&Wanted { model, directory, output, rolls, probe, real }, global);
     }
     let calibrated = match arguments.rows.label.is_some() {
-        true => on_rows(&arguments, global)?,
-        false => on_touches(&arguments, global)?,
+        true => on_rows(&arguments, directory, global)?,
+        false => on_touches(&arguments, directory, global)?,
     };
     output::write_bytes(&arguments.output, &calibrated.model)?;
     let placements = match arguments.placement_prior {
@@ -137,14 +161,21 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     global.print_about(&arguments.output, &calibrated, || text(&arguments.output, &calibrated, &placements))
 }
 
+impl Arguments {
+    /// Sequences of touches or rows to draw.
+    fn drawn(&self) -> usize {
+        usize::try_from(self.sequences.unwrap_or(100_000)).unwrap_or(usize::MAX)
+    }
+}
+
 /// Calibrates on touches.
-fn on_touches(arguments: &Arguments, global: &Global) -> Result<Calibrated> {
-    output::admit(&arguments.output, super::files_of(&arguments.directory))?;
+fn on_touches(arguments: &Arguments, directory: &PathBuf, global: &Global) -> Result<Calibrated> {
+    output::admit(&arguments.output, super::files_of(directory))?;
     if let Some(recorded) = &arguments.recorded {
         output::refuse_input(&arguments.output, super::files_of(recorded))?;
     }
     let compiled = CompiledModel::read(&arguments.model)?;
-    let dataset = untrained(&compiled, &arguments.directory)?;
+    let dataset = untrained(&compiled, directory)?;
     let recorded = arguments.recorded.as_ref().map(|recorded| untrained(&compiled, recorded)).transpose()?;
     let file = arguments.probe.read()?;
     arguments.probe.of_dataset(file.as_ref(), &dataset)?;
@@ -152,7 +183,7 @@ fn on_touches(arguments: &Arguments, global: &Global) -> Result<Calibrated> {
         rate: arguments.error_rate,
         per: arguments.placement_prior.per(arguments.per, &compiled)?,
         confidence: arguments.confidence,
-        sequences: usize::try_from(arguments.sequences).unwrap_or(usize::MAX),
+        sequences: arguments.drawn(),
         max_touches: arguments.max_touches,
         noise: arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?)?,
         active: arguments.active,
@@ -168,7 +199,7 @@ fn on_touches(arguments: &Arguments, global: &Global) -> Result<Calibrated> {
         use EvaluateProblem::{RecordedUnknown, TooFewRecorded};
         let is_of_recorded = matches!(error.problem(), Some(NotSupported { .. } | MissingRecordings { .. }))
             || matches!(error.problem(), Some(TooFewRecorded { .. } | RecordedUnknown { .. }));
-        error.in_file(arguments.recorded.as_ref().filter(|_| is_of_recorded).unwrap_or(&arguments.directory))
+        error.in_file(arguments.recorded.as_ref().filter(|_| is_of_recorded).unwrap_or(directory))
     };
     let Some(held) = arguments.strangers.held() else {
         let untested = strangers::without(&compiled.model())?;
@@ -194,12 +225,12 @@ fn test(held: Held, arguments: &Arguments, global: &Global) -> strangers::Settin
 }
 
 /// Calibrates on sequences of rows.
-fn on_rows(arguments: &Arguments, global: &Global) -> Result<Calibrated> {
+fn on_rows(arguments: &Arguments, rows: &PathBuf, global: &Global) -> Result<Calibrated> {
     let Some(columns) = arguments.rows.columns() else {
         let allowed = "it with --sequence-column, which says which rows are of one sequence";
         return Err(Error::setting("label", arguments.rows.label.as_deref().unwrap_or_default(), allowed));
     };
-    let Arguments { model: path, directory: rows, .. } = arguments;
+    let path = &arguments.model;
     let background = arguments.strangers.background();
     output::admit(&arguments.output, [path, rows].into_iter().chain(background))?;
     let compiled = CompiledModel::read(path)?;
@@ -214,7 +245,7 @@ fn on_rows(arguments: &Arguments, global: &Global) -> Result<Calibrated> {
         rate: arguments.error_rate,
         per: arguments.per,
         confidence: arguments.confidence,
-        sequences: usize::try_from(arguments.sequences).unwrap_or(usize::MAX),
+        sequences: arguments.drawn(),
         max_rows: arguments.max_touches,
         strangers: arguments.strangers.held().map(strangers).transpose()?,
         seed: global.seed(),
@@ -224,7 +255,9 @@ fn on_rows(arguments: &Arguments, global: &Global) -> Result<Calibrated> {
 
 /// Touches that the model was not trained on.
 fn untrained(compiled: &CompiledModel, directory: &PathBuf) -> Result<Dataset> {
-    let dataset = super::dataset(directory)?.matching(&compiled.names());
+    let dataset = super::dataset(directory)?;
+    super::refuse_located(&dataset, directory)?;
+    let dataset = dataset.matching(&compiled.names());
     let trained_on = compiled_trained_on(compiled, &dataset);
     if trained_on.is_empty() {
         return Ok(dataset);

@@ -1,6 +1,6 @@
 //! `palpate completions`: the parser's scripts, which also complete the keys of options.
 
-use super::{Global, design, trees};
+use super::{Global, design, maps, trees};
 use clap_complete::Shell;
 use palpate::Result;
 use palpate::output::print;
@@ -39,8 +39,13 @@ fn hidden(command: &clap::Command) -> Vec<&str> {
 }
 
 /// The options, and the keys of each.
-fn options() -> [(&'static str, Vec<&'static str>); 3] {
-    [("real", PartialNoise::KEYS.into()), ("search", design::KEYS.into()), ("trees", trees::keys().collect())]
+fn options() -> [(&'static str, Vec<&'static str>); 4] {
+    [
+        ("maps", maps::keys().collect()),
+        ("real", PartialNoise::KEYS.into()),
+        ("search", design::KEYS.into()),
+        ("trees", trees::keys().collect()),
+    ]
 }
 
 /// The script of a shell that also completes keys, after a comma too.

@@ -6,6 +6,8 @@ use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
 use super::sequences::{self, Evaluation, SequenceArguments};
+use super::table::{self, TableArguments};
+use palpate::calibrate::{Per, Terms};
 use palpate::ensemble::OverTouches;
 use palpate::error::{EvaluateProblem, RowsProblem};
 use palpate::evaluate::model_file::ModelFile;
@@ -19,7 +21,7 @@ use palpate::touches::Dataset;
 use palpate::{Error, Result};
 use palpate_shared::format::Counted;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Measure how often a model is right, and after how many touches.
 #[derive(clap::Args)]
@@ -32,14 +34,20 @@ Examples:
   palpate evaluate ensemble.json unseen --at 10,30 --json
   palpate evaluate model.palpate unseen --real timer=1ms,missed=2%
   palpate evaluate model.palpate unseen --prior fork=0.3,spoon=0.3
+  palpate evaluate maps.palpate --objects meshes/ --aimed random
   palpate evaluate model.palpate rows.csv --label kind
   palpate evaluate sure.palpate rows.csv --label kind --sequence-column id")]
 pub(crate) struct Arguments {
     /// Compiled model or ensemble
     model: PathBuf,
     /// Touches: a directory, or a robot's log (MCAP); with --label a file of rows
-    #[arg(value_name = "DIR")]
-    directory: PathBuf,
+    #[arg(value_name = "DIR", required_unless_present = "objects")]
+    directory: Option<PathBuf>,
+    /// Meshes of the objects, for a model of maps: approaches to them on a table are simulated
+    #[arg(long, value_name = "MESHES", num_args = 1.., conflicts_with_all = TOUCHES)]
+    objects: Vec<String>,
+    #[command(flatten)]
+    table: TableArguments,
     #[command(flatten)]
     sequences_of_rows: SequenceArguments,
     /// Also write a page of the results; for sequences of rows
@@ -51,9 +59,9 @@ pub(crate) struct Arguments {
     /// Give the accuracy after these touches [default: 5,10,20,30,60]
     #[arg(long, value_delimiter = ',', value_name = "N,…", conflicts_with = "label")]
     at: Option<Vec<usize>>,
-    /// Sequences of touches to draw; of each object, and as many groups
-    #[arg(long, value_name = "N", default_value = "1000", value_parser = sequences, conflicts_with = "label")]
-    sequences: usize,
+    /// Sequences of touches to draw; of each object, and as many groups [default: 1000, or 500 of all with --objects]
+    #[arg(long, value_name = "N", value_parser = sequences, conflicts_with = "label")]
+    sequences: Option<usize>,
     /// The share of wrong names to accept, such as 1%; stops there [default: the model's own thresholds]
     #[arg(long, value_name = "RATE", value_parser = error_rate)]
     error_rate: Option<f64>,
@@ -77,6 +85,10 @@ pub(crate) struct Arguments {
     real: RealArguments,
 }
 
+/// The options that approaches on a simulated table have no use for.
+const TOUCHES: [&str; 11] =
+    ["directory", "label", "unknown", "at", "error_rate", "confusion", "active", "switch", "probe", "only", "prior"];
+
 impl Arguments {
     /// True if there is an option for sequences of touches or rows.
     fn stops(&self) -> bool {
@@ -94,17 +106,31 @@ fn counts_patterns(file: &ModelFile) -> bool {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Some(directory) = &arguments.directory else {
+        let wanted = table::Wanted {
+            model: &arguments.model,
+            objects: &arguments.objects,
+            real: &arguments.real,
+            promise: Terms { rate: 0.01, confidence: 0.95, per: Per::Average },
+            sequences: arguments.sequences.unwrap_or(500),
+            max_touches: arguments.max_touches,
+            seed: global.seed(),
+        };
+        return arguments.table.evaluate(&wanted, global);
+    };
+    arguments.table.check_unused()?;
     let file = ModelFile::load(&arguments.model)?;
     if let Some(label) = &arguments.sequences_of_rows.label {
         return match arguments.sequences_of_rows.columns() {
-            Some(columns) => sequences_of(&arguments, &file, columns, global),
+            Some(columns) => sequences_of(&arguments, directory, &file, columns, global),
             None if arguments.stops() => {
                 Err(Error::setting("label", label, "it with --sequence-column, or without options of sequences"))
             }
-            None => rows(&arguments, &file, label, global),
+            None => rows(directory, &arguments, &file, label, global),
         };
     }
-    let mut dataset = super::checked(Dataset::read_any(&arguments.directory)?).matching(&file.names());
+    let mut dataset = super::checked(Dataset::read_any(directory)?).matching(&file.names());
+    super::refuse_located(&dataset, directory)?;
     let touches = || dataset.touches();
     if counts_patterns(&file) {
         super::warn_of_full(touches().count(), touches().any(|touch| !touch.is_full()));
@@ -126,7 +152,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let unknown = unknown.transpose()?;
     let wanted = Wanted {
         at: arguments.at.clone(),
-        groups: arguments.sequences,
+        groups: arguments.sequences.unwrap_or(1_000),
         error_rate: arguments.error_rate,
         max_touches: arguments.max_touches,
         seed: global.seed(),
@@ -144,14 +170,20 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
 }
 
 /// Evaluates a model on sequences of rows.
-fn sequences_of(arguments: &Arguments, file: &ModelFile, columns: SequenceColumns<'_>, global: &Global) -> Result<()> {
+fn sequences_of(
+    arguments: &Arguments,
+    rows: &Path,
+    file: &ModelFile,
+    columns: SequenceColumns<'_>,
+    global: &Global,
+) -> Result<()> {
     let ModelFile::Compiled(compiled) = file else { return Err(sequences::needs_compiled(&arguments.model)) };
     let model = compiled.model();
     let weights = arguments.expected.weights(&compiled.names(), &evaluate::own_weights(&model))?;
     let Arguments { error_rate, max_touches, switch, .. } = *arguments;
     let asked = Evaluation {
         model: &arguments.model,
-        rows: &arguments.directory,
+        rows,
         columns,
         wanted: stream::Wanted { error_rate, max_rows: max_touches, weights, switch },
         page: arguments.page.as_deref(),
@@ -160,7 +192,7 @@ fn sequences_of(arguments: &Arguments, file: &ModelFile, columns: SequenceColumn
 }
 
 /// Evaluates a model on labeled rows.
-fn rows(arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -> Result<()> {
+fn rows(directory: &Path, arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -> Result<()> {
     if file.with(|candidate| Ok(!candidate.is_of_rows()))? {
         return Err(Error::from(EvaluateProblem::OverTouches).in_file(&arguments.model));
     }
@@ -168,9 +200,9 @@ fn rows(arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -
         ModelFile::Full(ensemble) => Features::from(&**ensemble),
         ModelFile::Compiled(compiled) => Features::from(&compiled.model()),
     };
-    let rows = super::rows::read_rows(&arguments.directory, features, Some(label))?;
+    let rows = super::rows::read_rows(directory, features, Some(label))?;
     let evaluated = file.with(|candidate| evaluate_rows(candidate, &rows)).map_err(|error| match error.problem() {
-        Some(RowsProblem::Label { .. }) => error.in_file(&arguments.directory),
+        Some(RowsProblem::Label { .. }) => error.in_file(directory),
         _ => error.in_file(&arguments.model),
     })?;
     if global.json {

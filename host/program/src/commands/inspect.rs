@@ -1,12 +1,13 @@
 use super::Global;
 use super::chips::{core, instructions};
-use palpate::Result;
 use palpate::chip::inspect::{
     Defaults, Feature, Inspected, Noise, OnChip, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches,
     TrainedOn, inspect, on_chip,
 };
 use palpate::compile::{CompiledModel, Core, Memory};
+use palpate::locate::MapsFile;
 use palpate::wording::{count, counted, rate, scientific};
+use palpate::{Error, Result};
 use palpate_shared::DIRECTIONS;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -32,6 +33,12 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    if let Some(maps) = MapsFile::read(&arguments.model)? {
+        return match arguments.chip {
+            Some(chip) => Err(Error::setting("chip", chip.name(), "it with a model of trees")),
+            None => super::table::inspect(&maps, global),
+        };
+    }
     let compiled = CompiledModel::read(&arguments.model)?;
     let model = compiled.model();
     let mut inspected = inspect(&model);

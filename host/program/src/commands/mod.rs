@@ -14,6 +14,7 @@ mod fit;
 mod inspect;
 mod keys;
 mod link;
+mod maps;
 mod numbers;
 mod parity;
 mod plan;
@@ -23,6 +24,7 @@ mod progress;
 mod prove;
 mod real;
 mod recognize;
+mod recognize_maps;
 mod recognize_rows;
 mod report;
 mod rows;
@@ -31,6 +33,7 @@ mod scene;
 mod sequences;
 mod shell;
 mod strangers;
+mod table;
 mod teach;
 mod thresholds;
 mod train;
@@ -42,7 +45,7 @@ mod view;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use palpate::error::{CaptureProblem, Foreign, MeshProblem, Setting, TouchesProblem};
+use palpate::error::{CaptureProblem, EvaluateProblem, Foreign, MeshProblem, Place, Setting, TouchesProblem};
 use palpate::touches::{Dataset, Format, Listing, Log, Warning};
 use palpate::{Error, Result, output};
 use std::path::{Path, PathBuf};
@@ -381,6 +384,16 @@ fn percent(share: f64) -> f64 {
 /// Reads a data set; its warnings go to stderr.
 fn dataset(directory: &Path) -> Result<Dataset> {
     Dataset::read(directory).map(checked)
+}
+
+/// True if the touches have positions, all of them or none.
+fn is_located(dataset: &Dataset) -> bool {
+    dataset.touches().next().is_some_and(|touch| touch.position().is_some())
+}
+
+/// Refuses touches with a position, for a model of trees.
+fn refuse_located(dataset: &Dataset, directory: &Path) -> Result<()> {
+    if is_located(dataset) { Err(Error::at(Place::file(directory), EvaluateProblem::Located)) } else { Ok(()) }
 }
 
 /// A data set whose warnings went to stderr.

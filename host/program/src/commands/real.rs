@@ -32,8 +32,20 @@ impl RealArguments {
     /// Noise of the option; `base` without it, and where it leaves settings open.
     ///
     /// # Errors
-    /// If its probe file cannot be read; [`ProbeProblem::OnlyCaptured`] for fingers that bend aside.
+    /// As [`on_table`](Self::on_table), and for objects that move.
     pub(crate) fn over(&self, base: Noise) -> Result<Noise> {
+        let noise = self.on_table(base)?;
+        if noise.drift == [0.0; 2] {
+            return Ok(noise);
+        }
+        Err(Error::setting("real", "drift=…", "it with maps: objects move between approaches to a simulated table"))
+    }
+
+    /// The same for approaches on a table, where objects may move.
+    ///
+    /// # Errors
+    /// If its probe file cannot be read; [`ProbeProblem::OnlyCaptured`] for fingers that bend aside.
+    pub(crate) fn on_table(&self, base: Noise) -> Result<Noise> {
         let noise = match self.real.as_ref().map(|real| &real.given) {
             None => base,
             Some(Given::Settings(settings)) => settings.over(base),

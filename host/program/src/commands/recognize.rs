@@ -6,6 +6,7 @@ use palpate::Result;
 use palpate::chip::Entry;
 use palpate::compile::{self, CompiledModel};
 use palpate::error::{Error, EvaluateProblem, Place, TouchesProblem};
+use palpate::locate::MapsFile;
 use palpate::output;
 use palpate::touches::{Log, LogWriter, Logged, LoggedVerdict, begins_log, parse_touch};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
@@ -19,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// Recognize objects from a stream of touches.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and six numbers of the probe's direction and alignment if the model needs them. Each line out is the verdict so far: undecided, recognized, unknown or gave-up. After a verdict, and after an empty line, the next touch is the first of another object. FILE may be a robot's log (MCAP) as well.
+Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and six numbers of the probe's direction and alignment if the model needs them. Each line out is the verdict so far: undecided, recognized, unknown or gave-up. After a verdict, and after an empty line, the next touch is the first of another object. FILE may be a robot's log (MCAP) as well. A model of maps takes touches with a position: twelve columns.
 
 With --features each line in is a row of features for a model of another library: CSV with the features' names in the header; out is the class of each row, or a regression's value. With --add-up out is the verdict so far. With --sequence-column evidence begins where a sequence does, and nothing more is said of one after its verdict; without it the row after a verdict is the first of another object, and a promise is for the first verdict alone.
 
@@ -30,6 +31,7 @@ Examples:
   palpate recognize model.palpate data/fork.txt --only fork,spoon,bowl
   palpate recognize model.palpate data/fork.txt --prior fork=0.3,spoon=0.3
   probe | palpate recognize planned.palpate --active
+  robot | palpate recognize maps.palpate --next
   palpate recognize model.palpate monday.mcap --mcap verdicts.mcap
   palpate recognize model.palpate rows.csv --features --json
   palpate recognize a.palpate a.csv --features --add-up --sequence-column id")]
@@ -41,7 +43,7 @@ pub(crate) struct Arguments {
     file: PathBuf,
     /// The file has rows of features, not touches
     #[arg(long)]
-    features: bool,
+    pub(super) features: bool,
     /// Add up the evidence of rows until there is a verdict, as that of touches
     #[arg(long, requires = "features")]
     add_up: bool,
@@ -50,36 +52,39 @@ pub(crate) struct Arguments {
     sequence_column: Option<String>,
     /// The share of wrong names to accept, such as 1%; stops there [default: the model's own thresholds]
     #[arg(long, value_name = "RATE", value_parser = error_rate)]
-    error_rate: Option<f64>,
+    pub(super) error_rate: Option<f64>,
     /// Give up after this many touches [default: the model's own limit]
     #[arg(long, value_name = "N")]
-    max_touches: Option<u32>,
+    pub(super) max_touches: Option<u32>,
+    /// With a model of maps: print each touch's verdict, place and next approach as JSON
+    #[arg(long, conflicts_with_all = ["features", "active", "mcap"])]
+    pub(super) next: bool,
     /// Follow the model's plan of approaches; says after each touch where to touch next
     #[arg(long)]
-    active: bool,
+    pub(super) active: bool,
     /// Write touches, verdicts and posteriors as a log, which Foxglove shows
     #[arg(long, value_name = "FILE", conflicts_with = "features")]
-    mcap: Option<PathBuf>,
+    pub(super) mcap: Option<PathBuf>,
     #[command(flatten)]
-    expected: ExpectedArguments,
+    pub(super) expected: ExpectedArguments,
 }
 
 #[derive(serde::Serialize)]
-struct Line<'a> {
-    touch: u32,
-    verdict: &'static str,
-    object: &'a str,
-    posterior: f64,
+pub(super) struct Line<'a> {
+    pub(super) touch: u32,
+    pub(super) verdict: &'static str,
+    pub(super) object: &'a str,
+    pub(super) posterior: f64,
     /// Reason why the touch was not counted.
     #[serde(skip_serializing_if = "Option::is_none")]
-    refused: Option<String>,
+    pub(super) refused: Option<String>,
     /// The approach that helps most.
     #[serde(skip_serializing_if = "Option::is_none")]
-    next: Option<Entry>,
+    pub(super) next: Option<Entry>,
 }
 
 impl Line<'_> {
-    fn print(&self, json: bool) -> Result<()> {
+    pub(super) fn print(&self, json: bool) -> Result<()> {
         if json {
             return super::print_line(self);
         }
@@ -95,6 +100,9 @@ impl Line<'_> {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    if let Some(maps) = MapsFile::read(&arguments.model)? {
+        return super::recognize_maps::run(&maps, &arguments, global);
+    }
     let compiled = CompiledModel::read(&arguments.model)?;
     let model = compiled.model();
     let own = Stopping::from_model(&model);
@@ -120,6 +128,11 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if model.descriptor().is_none() {
         return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::RawFeatures));
     }
+    if arguments.next {
+        let allowed =
+            "it with a model of maps (palpate train on touches with a position); of a plan --active says the next";
+        return Err(Error::setting("next", "given", allowed));
+    }
     if arguments.active && model.plan().is_none() {
         return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
     }
@@ -129,13 +142,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let mut stream =
         Stream { recognizer, model: &model, weights, longest, active, json, log, touches: 0, is_any_partial: false };
     stream.reset();
-    let path = &arguments.file;
-    if path.as_os_str() == "-" {
-        stream.run(std::io::stdin().lock(), Path::new("standard input"))?;
-    } else {
-        let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
-        stream.run(touches, path)?;
-    }
+    arguments.each(&mut |event| stream.take(event))?;
     if model.trained_touches().counted != Counted::Full {
         super::warn_of_full(stream.touches, stream.is_any_partial);
     }
@@ -143,6 +150,75 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         (Some(log), Some(path)) => log.finish(path),
         _ => Ok(()),
     }
+}
+
+/// Part of a stream of touches.
+pub(super) enum Event<'e> {
+    /// Another object begins.
+    Begin,
+    /// A touch, with its place in the file and what a log says of it.
+    Touch {
+        /// The touch.
+        touch: &'e Touch,
+        /// Its place.
+        place: Place,
+        /// Name of its object.
+        object: Option<&'e str>,
+        /// Its time, in nanoseconds.
+        time: Option<u64>,
+    },
+}
+
+impl Arguments {
+    /// Hands on the touches of the file; of lines each before the next is waited for.
+    pub(super) fn each(&self, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
+        let path = &self.file;
+        if path.as_os_str() == "-" {
+            return each(std::io::stdin().lock(), Path::new("standard input"), take);
+        }
+        let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
+        each(touches, path, take)
+    }
+}
+
+fn each(touches: impl Read, path: &Path, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
+    let mut reader = BufReader::new(touches);
+    let begin = reader.fill_buf().map_err(|source| Error::io(path, "read the touches", source))?;
+    if begins_log(begin) {
+        return each_of_log(&Log::of(reader, path)?, path, take);
+    }
+    let mut bytes = Vec::new();
+    for number in 1.. {
+        bytes.clear();
+        let read = reader.read_until(b'\n', &mut bytes);
+        if read.map_err(|source| Error::io(path, "read the touches", source))? == 0 {
+            break;
+        }
+        let place = || Place::line(path, number);
+        let line = std::str::from_utf8(&bytes).map_err(|_| Error::at(place(), TouchesProblem::NotText))?.trim();
+        if line.is_empty() {
+            take(Event::Begin)?;
+            continue;
+        }
+        let touch = parse_touch(line).map_err(|problem| Error::at(place(), problem))?;
+        take(Event::Touch { touch: &touch, place: place(), object: None, time: None })?;
+    }
+    Ok(())
+}
+
+fn each_of_log(log: &Log, path: &Path, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
+    log.skipped().iter().for_each(super::say);
+    let mut before = None;
+    for logged in log.touches() {
+        let Logged { time, touch, offset, .. } = logged;
+        let object = log.object(logged);
+        if object != before {
+            take(Event::Begin)?;
+        }
+        before = object;
+        take(Event::Touch { touch, place: Place::byte(path, *offset), object, time: Some(*time) })?;
+    }
+    Ok(())
 }
 
 /// A log of verdicts that is to become the file at `path`.
@@ -172,46 +248,13 @@ struct Stream<'m> {
 }
 
 impl<'m> Stream<'m> {
-    /// Prints a verdict for each touch; of lines, before the next line is waited for.
-    fn run(&mut self, touches: impl Read, path: &Path) -> Result<()> {
-        let mut reader = BufReader::new(touches);
-        let begin = reader.fill_buf().map_err(|source| Error::io(path, "read the touches", source))?;
-        if begins_log(begin) {
-            return self.run_log(&Log::of(reader, path)?, path);
-        }
-        let mut bytes = Vec::new();
-        for number in 1.. {
-            bytes.clear();
-            let read = reader.read_until(b'\n', &mut bytes);
-            if read.map_err(|source| Error::io(path, "read the touches", source))? == 0 {
-                break;
+    fn take(&mut self, event: Event<'_>) -> Result<()> {
+        match event {
+            Event::Begin => self.reset(),
+            Event::Touch { touch, place, object, time } => {
+                self.check(touch).map_err(|problem| Error::at(place, problem))?;
+                self.push(touch, object, time)?;
             }
-            let place = || Place::line(path, number);
-            let line = std::str::from_utf8(&bytes).map_err(|_| Error::at(place(), TouchesProblem::NotText))?.trim();
-            if line.is_empty() {
-                self.reset();
-                continue;
-            }
-            let touch = parse_touch(line).map_err(|problem| Error::at(place(), problem))?;
-            self.check(&touch).map_err(|problem| Error::at(place(), problem))?;
-            self.push(&touch, None, None)?;
-        }
-        Ok(())
-    }
-
-    /// Prints a verdict for each touch of a log.
-    fn run_log(&mut self, log: &Log, path: &Path) -> Result<()> {
-        log.skipped().iter().for_each(super::say);
-        let mut before = None;
-        for logged in log.touches() {
-            let Logged { time, touch, offset, .. } = logged;
-            let object = log.object(logged);
-            if object != before {
-                self.reset();
-            }
-            before = object;
-            self.check(touch).map_err(|problem| Error::at(Place::byte(path, *offset), problem))?;
-            self.push(touch, object, Some(*time))?;
         }
         Ok(())
     }
@@ -252,6 +295,9 @@ impl<'m> Stream<'m> {
 
     /// Refuses times that no object can give, such as times in milliseconds.
     fn check(&self, touch: &Touch) -> Result<(), EvaluateProblem> {
+        if touch.position().is_some() {
+            return Err(EvaluateProblem::Located);
+        }
         let last = touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or(0);
         let seconds = f64::from(last) * 1e-6;
         if seconds <= self.longest {

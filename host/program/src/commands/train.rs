@@ -1,4 +1,5 @@
 use super::Global;
+use super::maps::MapSettings;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
@@ -23,7 +24,7 @@ use std::time::Instant;
 /// Train an ensemble on captured touches, and save it as XGBoost JSON.
 #[derive(clap::Args)]
 #[command(after_help = "\
-The ensemble is XGBoost's JSON. Its features are in microseconds, where data sets have seconds, and cosines in units of 1/32767.
+Of touches with a position (capture --position) a model of maps is made, ready for calibrate and recognize. The ensemble is XGBoost's JSON. Its features are in microseconds, where data sets have seconds, and cosines in units of 1/32767.
 
 Presets: compact is small and accurate (leaves hold a value per object; curvature), paper the published method (one tree per object and round; contact times). Keys of --trees: rounds, depth, eta, min_child_weight, bins, leaves, leaf_bits, different_leaves, threshold_cost, trainer; docs/reference/options.md explains them, --teach and --evidence.
 
@@ -37,6 +38,7 @@ Examples:
   palpate train approaches -o all.json --evidence all
   palpate train approaches -o wary.json --background shapes
   palpate train approaches -o taught.json --teach pot.txt --page pot.html
+  palpate train located -o maps.palpate --maps cell=2mm
   palpate train --teach recorded -o own.json")]
 pub(crate) struct Arguments {
     /// Touches to train on: a directory that `palpate capture` filled
@@ -44,27 +46,30 @@ pub(crate) struct Arguments {
     directory: Option<PathBuf>,
     #[command(flatten)]
     teach: TeachArguments,
-    /// Where to write; the ensemble
+    /// Where to write; the ensemble, or the model of maps
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Touches of many other shapes; they train a column for what the model does not know
     #[arg(long, value_name = "DIR")]
     background: Option<PathBuf>,
-    /// Preset that the settings start from: compact or paper
-    #[arg(long, value_parser = preset, default_value = "compact", value_name = "NAME")]
-    preset: Preset,
+    /// Preset that the settings start from: compact or paper [default: compact]
+    #[arg(long, value_parser = preset, value_name = "NAME")]
+    preset: Option<Preset>,
     /// Features of a touch: times, curvature, gravity or oriented [default: the preset's]
     #[arg(long, value_parser = descriptor, value_name = "NAME")]
     descriptor: Option<Descriptor>,
     /// Approaches that are evidence: full, contacts (at least one) or all [default: as the data set has]
     #[arg(long, value_parser = evidence, value_name = "WHICH")]
     evidence: Option<Counted>,
-    /// Outputs for objects on a table: placements (one for each) or objects
-    #[arg(long, value_parser = outputs, default_value = "placements", value_name = "OF")]
-    outputs: Outputs,
+    /// Outputs for objects on a table: placements (one for each) or objects [default: placements]
+    #[arg(long, value_parser = outputs, value_name = "OF")]
+    outputs: Option<Outputs>,
     /// Settings of the trees, such as rounds=30,depth=6,eta=0.3 [default: the preset's]
     #[arg(long, value_name = "SETTINGS")]
     trees: Option<Trees>,
+    /// Settings of maps, from touches with a position, such as cell=2mm,range=30mm [default: those of the noise]
+    #[arg(long, value_name = "SETTINGS")]
+    maps: Option<MapSettings>,
     #[command(flatten)]
     probe: ProbeArguments,
     #[command(flatten)]
@@ -121,8 +126,22 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     arguments.teach.page.iter().try_for_each(|page| output::admit(page, &read))?;
     let start = Instant::now();
     let recorded = arguments.teach.read()?;
-    let made = match (&arguments.directory, recorded) {
-        (Some(directory), recorded) => simulated(&arguments, global, directory, recorded.as_ref())?,
+    let dataset = arguments.directory.as_deref().map(super::dataset).transpose()?;
+    let located = dataset.as_ref().filter(|dataset| super::is_located(dataset)).zip(arguments.directory.as_ref());
+    if let Some((dataset, directory)) = located {
+        return maps(&arguments, dataset, global).map_err(|error| match error.exit_code() {
+            1 => error.in_file(directory),
+            _ => error,
+        });
+    }
+    if arguments.maps.is_some() {
+        return Err(Error::setting("maps", "given", "it with touches that have a position (capture --position)"));
+    }
+    if let (Some(recorded), Some(path)) = (&recorded, arguments.teach.files().first()) {
+        super::refuse_located(recorded, path)?;
+    }
+    let made = match (dataset.zip(arguments.directory.as_ref()), recorded) {
+        (Some((dataset, directory)), recorded) => simulated(&arguments, global, directory, dataset, recorded.as_ref())?,
         (None, recorded) => alone(&arguments, global, recorded.unwrap_or_default())?,
     };
     arguments.teach.check_page(made.taught.as_ref())?;
@@ -188,9 +207,39 @@ fn text(output: &Path, trained: &Trained<'_>, made: &Made) -> String {
         + &trained.taught.map_or_else(String::new, super::teach::text)
 }
 
+/// Trains maps on touches with a position, without the options of trees.
+fn maps(arguments: &Arguments, dataset: &Dataset, global: &Global) -> Result<()> {
+    let of_trees = [
+        ("teach", !arguments.teach.files().is_empty()),
+        ("background", arguments.background.is_some()),
+        ("preset", arguments.preset.is_some()),
+        ("descriptor", arguments.descriptor.is_some()),
+        ("evidence", arguments.evidence.is_some()),
+        ("outputs", arguments.outputs.is_some()),
+        ("trees", arguments.trees.is_some()),
+    ];
+    if let Some((option, _)) = of_trees.iter().find(|(_, is_given)| *is_given) {
+        return Err(Error::setting(
+            option,
+            "given",
+            "it with touches without a position; of these maps are made (--maps)",
+        ));
+    }
+    let file = arguments.probe.read()?;
+    arguments.probe.of_dataset(file.as_ref(), dataset)?;
+    let noise = arguments.real.on_table(arguments.probe.noise(file.as_ref(), dataset, Noise::default())?)?;
+    let given = arguments.maps.clone().unwrap_or_default();
+    super::maps::train(dataset, &noise, &given, &arguments.output, global)
+}
+
 /// Trains on simulated touches, or takes the ensemble that was, and teaches it the recorded ones, if there are any.
-fn simulated(arguments: &Arguments, global: &Global, directory: &PathBuf, recorded: Option<&Dataset>) -> Result<Made> {
-    let dataset = super::dataset(directory)?;
+fn simulated(
+    arguments: &Arguments,
+    global: &Global,
+    directory: &PathBuf,
+    dataset: Dataset,
+    recorded: Option<&Dataset>,
+) -> Result<Made> {
     let file = arguments.probe.read()?;
     let probe = arguments.probe.of_dataset(file.as_ref(), &dataset)?;
     let mut settings = Settings { probe, ..arguments.settings(global, &dataset) };
@@ -296,11 +345,11 @@ fn cost(trained: &Trained<'_>, is_clean: bool) -> String {
 impl Arguments {
     /// All but the noise and the probe.
     fn settings(&self, global: &Global, dataset: &Dataset) -> Settings {
-        let outputs = match self.outputs {
+        let outputs = match self.outputs.unwrap_or(Outputs::Placements) {
             Outputs::Placements => dataset.placement_shares().len().max(dataset.objects.len()),
             Outputs::Objects => dataset.objects.len(),
         };
-        let preset = match self.preset {
+        let preset = match self.preset.unwrap_or(Preset::Compact) {
             Preset::Compact => Settings::compact_for(self.descriptor.unwrap_or(Descriptor::Curvature), outputs),
             Preset::Paper => Settings::paper(),
         };
@@ -310,7 +359,7 @@ impl Arguments {
             seed: global.seed(),
             threads: global.threads,
             probe: None,
-            outputs: self.outputs,
+            outputs: self.outputs.unwrap_or(Outputs::Placements),
             ..preset
         };
         self.trees.as_ref().map_or_else(|| settings.clone(), |trees| trees.over(settings.clone()))

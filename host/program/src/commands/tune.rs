@@ -63,6 +63,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         output::admit(path, super::files_of(&arguments.directory))?;
     }
     let dataset = super::dataset(&arguments.directory)?;
+    super::refuse_located(&dataset, &arguments.directory)?;
     let file = arguments.probe.read()?;
     let tuned = tune::tune(
         &dataset,

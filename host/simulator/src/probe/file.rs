@@ -152,6 +152,7 @@ impl ProbeFile {
             pose: real.pose_noise.unwrap_or_default(),
             pose_bias: real.pose_bias.unwrap_or_default(),
             position: real.position.unwrap_or_default(),
+            drift: [0.0; 2],
             // Lengths become the times that the probe takes for them.
             grazing: real.grazing.map_or_else(Grazing::default, |Aside { angle, bend }| Grazing {
                 angle: angle.unwrap_or_default(),
@@ -254,6 +255,7 @@ mod tests {
             pose: 2.0,
             pose_bias: 1.0,
             position: 1_000.0,
+            drift: [0.0; 2],
             grazing: Grazing { angle: 30.0, bend: 5_000.0 },
         };
         assert_eq!(file.real, real);

@@ -12,6 +12,9 @@ pub enum CompileProblem {
     /// Bytes are not a model.
     #[error("{0}")]
     Model(ModelError),
+    /// It is a model of maps.
+    #[error("a model of maps, not of trees")]
+    Maps,
     /// There are too few or too many objects, or other base margins than objects.
     #[error("cannot compile an ensemble of {objects} objects and {base_margins} base margins")]
     Objects {
@@ -116,6 +119,9 @@ fn limit(layout: Layout) -> &'static str {
 impl Problem for CompileProblem {
     fn fix(&self) -> String {
         match self {
+            Self::Maps => {
+                "`palpate inspect` and `recognize` take it, and `calibrate` and `evaluate` with --objects; other commands take models of trees."
+            }
             Self::Model(ModelError::NotAModel) => "Give a file that `palpate export` wrote.",
             Self::Model(ModelError::Version(_)) => "Export the ensemble again with this version of palpate.",
             Self::Model(ModelError::Length { .. } | ModelError::Checksum { .. }) => {

@@ -2,7 +2,7 @@
 
 use crate::error::{CompileProblem, Error, Place, Result};
 use palpate_onboard::{Model, ModelError};
-use palpate_shared::format::{Axis, HEADER_LENGTH, Layout};
+use palpate_shared::format::{Axis, HEADER_LENGTH, Header, Layout, MAGIC, MAPS_LAYOUT};
 use std::path::{Path, PathBuf};
 
 /// A compiled model that was checked: its bytes, and the file that they came from.
@@ -39,6 +39,9 @@ impl CompiledModel {
     pub fn from_file(path: &Path, bytes: Vec<u8>) -> Result<Self> {
         match Model::new(&bytes) {
             Ok(_) => Ok(Self { path: Some(path.into()), bytes }),
+            Err(_) if bytes.starts_with(&MAGIC) && Header::of(&bytes).layout() == MAPS_LAYOUT => {
+                Err(Error::at(Place::file(path), CompileProblem::Maps))
+            }
             Err(error) => {
                 let offset = u64::try_from(error.offset()).unwrap_or(u64::MAX);
                 Err(Error::at(Place::byte(path, offset), CompileProblem::Model(error)))

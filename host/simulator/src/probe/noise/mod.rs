@@ -66,6 +66,10 @@ pub struct Noise {
     /// The standard deviation of each coordinate of a touch's position, in micrometers, for touches that state one.
     #[serde(skip_serializing_if = "is_zero")]
     pub position: f64,
+    /// The standard deviations of an object's move in an approach, in micrometers, and of its turn, in degrees. Only a table that is
+    /// simulated approach by approach has it.
+    #[serde(skip_serializing_if = "is_still")]
+    pub drift: [f64; 2],
     /// Fingers that bend aside at flat angles. Only a capture adds it: a data set does not hold the angles of contacts.
     #[serde(skip_serializing_if = "Grazing::is_none")]
     pub grazing: Grazing,
@@ -85,6 +89,7 @@ impl Default for Noise {
             pose: 0.0,
             pose_bias: 0.0,
             position: 0.0,
+            drift: [0.0; 2],
             grazing: Grazing::default(),
         }
     }
@@ -165,6 +170,8 @@ impl fmt::Display for Noise {
         say(self.pose > 0.0, format!("a pose turned by {}° per touch", self.pose));
         say(self.pose_bias > 0.0, format!("a pose turned by {}° per robot", self.pose_bias));
         say(self.position > 0.0, format!("a position off by {} mm per touch", self.position / 1e3));
+        let [moved, turned] = self.drift;
+        say(!is_still(&self.drift), format!("an object that moves by {} mm and {turned}° per approach", moved / 1e3));
         let Grazing { angle, bend } = self.grazing;
         say(bend > 0.0, format!("fingers that bend aside by {} ms beyond {angle}°", ms(bend)));
         f.write_str(&if parts.is_empty() { "no noise".into() } else { parts.join(", ") })
@@ -235,6 +242,8 @@ impl Noise {
             speed_bias: billionths(self.speed_bias),
             speed: (1e9 * (self.speed - 1.0)).round() as i32,
             pose_bias: whole(1e3 * self.pose_bias),
+            position: whole(self.position),
+            drift: [whole(self.drift[0]), whole(1e3 * self.drift[1])],
         }
     }
 
@@ -253,6 +262,8 @@ impl Noise {
             speed_bias: share(promised.speed_bias),
             pose: f64::from(pose) / 1e3,
             pose_bias: f64::from(promised.pose_bias) / 1e3,
+            position: promised.position.into(),
+            drift: [promised.drift[0].into(), f64::from(promised.drift[1]) / 1e3],
             ..Self::default()
         }
     }
@@ -296,6 +307,9 @@ impl Noise {
         }
         if !(self.position >= 0.0 && self.position.is_finite()) {
             return Err(Error::setting("position", self.position, "a length of at least 0"));
+        }
+        if let Some(drift) = self.drift.iter().find(|drift| !(**drift >= 0.0 && drift.is_finite())) {
+            return Err(Error::setting("drift", drift, "a length and an angle of at least 0"));
         }
         Ok(())
     }
@@ -351,6 +365,7 @@ impl Noise {
             pose: self.pose.hypot(more.pose),
             pose_bias: self.pose_bias.hypot(more.pose_bias),
             position: self.position.hypot(more.position),
+            drift: std::array::from_fn(|axis| self.drift[axis].hypot(more.drift[axis])),
             // Added by a capture, and so by no second one.
             grazing: if self.grazing.is_none() { more.grazing } else { self.grazing },
         }
@@ -510,6 +525,10 @@ fn turned(vector: [i16; 3], turn: impl Fn(DVec3) -> DVec3) -> [i16; 3] {
 
 fn is_zero(number: &f64) -> bool {
     *number == 0.0
+}
+
+fn is_still(drift: &[f64; 2]) -> bool {
+    *drift == [0.0; 2]
 }
 
 /// The nearest whole number; a conversion saturates.

@@ -9,8 +9,8 @@ use std::str::FromStr;
 /// Some settings of [`Noise`], as one text of `key=value` with commas between them; the others are left open.
 ///
 /// The keys are those of `[real]` in a probe file: `noise`, `timer`, `debounce`, `missed`, `bent`, `speed_factor`,
-/// `speed_error`, `speed_bias`, `pose_noise`, `pose_bias` and `position`. Fingers that bend aside have no
-/// key: only a capture adds that, from a probe file. `missed` and `bent` also take a value for each finger, such as
+/// `speed_error`, `speed_bias`, `pose_noise`, `pose_bias` and `position`, and `drift` such as
+/// `1mm/1deg`, which a file does not state. Fingers that bend aside have no key: only a capture adds that, from a probe file. `missed` and `bent` also take a value for each finger, such as
 /// `bent=3ms/0ms/-1ms`; `bent` says how much earlier a finger touches. `none`, which comes first, sets everything to
 /// nothing. [`Display`](fmt::Display) writes a text that reads as the same.
 ///
@@ -47,6 +47,8 @@ pub struct PartialNoise {
     pub pose_bias: Option<f64>,
     /// See [`Noise::position`].
     pub position: Option<f64>,
+    /// See [`Noise::drift`].
+    pub drift: Option<[f64; 2]>,
 }
 
 /// A text that is not noise: the key, its value, and what to write instead.
@@ -75,13 +77,14 @@ impl From<Noise> for PartialNoise {
             pose: Some(noise.pose),
             pose_bias: Some(noise.pose_bias),
             position: Some(noise.position),
+            drift: Some(noise.drift),
         }
     }
 }
 
 impl PartialNoise {
     /// All keys, in the order in which they are written.
-    pub const KEYS: [&str; 11] = [
+    pub const KEYS: [&str; 12] = [
         "noise",
         "timer",
         "debounce",
@@ -93,6 +96,7 @@ impl PartialNoise {
         "pose_noise",
         "pose_bias",
         "position",
+        "drift",
     ];
 
     /// The settings that are given, and `base` where they are open.
@@ -110,6 +114,7 @@ impl PartialNoise {
             pose: self.pose.unwrap_or(base.pose),
             pose_bias: self.pose_bias.unwrap_or(base.pose_bias),
             position: self.position.unwrap_or(base.position),
+            drift: self.drift.unwrap_or(base.drift),
             grazing: if self.is_whole() { super::Grazing::default() } else { base.grazing },
         }
     }
@@ -133,6 +138,7 @@ impl PartialNoise {
             "pose_noise" => self.pose.is_some(),
             "pose_bias" => self.pose_bias.is_some(),
             "position" => self.position.is_some(),
+            "drift" => self.drift.is_some(),
             _ => false,
         }
     }
@@ -161,7 +167,13 @@ impl PartialNoise {
             "speed_bias" => self.speed_bias = Some(quantity::share(value).map_err(bad)?),
             "pose_noise" => self.pose = Some(quantity::angle(value).map_err(bad)?),
             "pose_bias" => self.pose_bias = Some(quantity::angle(value).map_err(bad)?),
-            _ => self.position = Some(quantity::length(value).map_err(bad)?),
+            "position" => self.position = Some(quantity::length(value).map_err(bad)?),
+            _ => {
+                let example = "a length and an angle such as 1mm/1deg";
+                let parts = value.split_once('/').ok_or(ProbeProblem::BadQuantity { text: value.into(), example });
+                let (moved, turned) = parts.map_err(bad)?;
+                self.drift = Some([quantity::length(moved).map_err(bad)?, quantity::angle(turned).map_err(bad)?]);
+            }
         }
         // Ranges are those of any noise.
         match self.over(Noise::default()).check() {
@@ -262,7 +274,8 @@ fn value_of(noise: &Noise, key: &str) -> String {
         "speed_bias" => share(noise.speed_bias),
         "pose_noise" => format!("{}deg", noise.pose),
         "pose_bias" => format!("{}deg", noise.pose_bias),
-        _ => length(noise.position),
+        "position" => length(noise.position),
+        _ => format!("{}/{}deg", length(noise.drift[0]), noise.drift[1]),
     }
 }
 
@@ -316,6 +329,7 @@ mod tests {
             ("speed_error=5%", PartialNoise { speed_error: Some(0.05), ..PartialNoise::default() }),
             ("speed-bias=0.1", PartialNoise { speed_bias: Some(0.1), ..PartialNoise::default() }),
             ("pose-noise=5deg", PartialNoise { pose: Some(5.0), ..PartialNoise::default() }),
+            ("drift=1mm/0.5deg", PartialNoise { drift: Some([1_000.0, 0.5]), ..PartialNoise::default() }),
             ("position=0.5mm", PartialNoise { position: Some(500.0), ..PartialNoise::default() }),
             (" pose_bias = 1.5° ", PartialNoise { pose_bias: Some(1.5), ..PartialNoise::default() }),
         ] {
@@ -330,7 +344,7 @@ mod tests {
     fn what_is_written_reads_as_the_same_to_the_last_bit() {
         for text in [
             "noise=0ms..5ms,timer=1ms,debounce=2ms,missed=2%,bent=3ms/0ms/-0.5ms,speed_factor=0.98",
-            "speed_error=5%,speed_bias=10%,pose_noise=5deg,pose_bias=1.5deg,position=0.3mm",
+            "speed_error=5%,speed_bias=10%,pose_noise=5deg,pose_bias=1.5deg,position=0.3mm,drift=1mm/1deg",
             "none",
             "none,timer=1ms",
             "missed=1%/2%/0%",
@@ -353,6 +367,7 @@ mod tests {
                 pose: 180.0 * number(),
                 pose_bias: number(),
                 position: 1e4 * number(),
+                drift: [1e3 * number(), number()],
                 grazing: super::super::Grazing::default(),
             };
             let given = PartialNoise::from(noise);
@@ -382,6 +397,7 @@ mod tests {
             ("speed_error=95%", "speed_error is \"95%\"; use a share from 0 to 0.9"),
             ("pose_noise=5", "pose_noise is \"5\"; use an angle such as 5deg"),
             ("position=1", "position is \"1\"; use a length such as 1mm"),
+            ("drift=1mm", "drift is \"1mm\"; use a length and an angle such as 1mm/1deg"),
             ("position=-1mm", "position is \"-1mm\"; use a length"),
             ("pose_bias=181deg", "pose_bias is \"181deg\"; use degrees from 0 to 180"),
             ("timer=1ms,timer=2ms", "timer is \"2ms\"; use each key once"),

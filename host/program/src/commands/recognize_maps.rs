@@ -1,0 +1,202 @@
+//! `palpate recognize` with a model of maps: objects with their place on a table.
+
+use super::Global;
+use super::recognize::{Arguments, Event, Line};
+use super::recognize_rows::word;
+use super::table::POSE;
+use palpate::error::LocateProblem;
+use palpate::locate::{self, Approach, Hand, Locating, Maps, MapsFile, Pose};
+use palpate::output;
+use palpate::{Error, Result, compile};
+use palpate_onboard::{Stopping, Verdict};
+use palpate_shared::Touch;
+
+/// What an object is and where, after a touch.
+#[derive(serde::Serialize)]
+struct Located<'m> {
+    #[serde(flatten)]
+    line: Line<'m>,
+    placement: &'m str,
+    /// The most likely pose, if a touch was counted.
+    pose: Option<Mode<'m>>,
+    /// Others of this object.
+    modes: Vec<Mode<'m>>,
+    /// Where to touch next; none after a verdict.
+    next: Option<Next>,
+}
+
+/// A pose, with half-widths of 95 % intervals. Lengths are in millimeters, angles in degrees.
+#[derive(serde::Serialize)]
+struct Mode<'m> {
+    placement: &'m str,
+    x: f64,
+    y: f64,
+    /// Null for a placement that looks the same from all sides.
+    yaw: Option<f64>,
+    x_within: f64,
+    y_within: f64,
+    yaw_within: Option<f64>,
+    /// Share of the object's posterior.
+    share: f64,
+}
+
+/// An approach straight down: the place of the middle finger in millimeters, and the row's angle from the x axis in degrees.
+#[derive(serde::Serialize)]
+struct Next {
+    x: f64,
+    y: f64,
+    roll: f64,
+}
+
+fn millimeters(micrometers: i32) -> f64 {
+    f64::from(micrometers) / 1e3
+}
+
+/// Degrees of 1/65,536 turns, in hundredths.
+fn degrees(turn: u16) -> f64 {
+    (f64::from(turn) / 65_536.0 * 36_000.0).round() / 100.0
+}
+
+impl<'m> Mode<'m> {
+    fn of(maps: &Maps<'m>, pose: Pose) -> Self {
+        let [x, y] = pose.position.map(millimeters);
+        let [x_within, y_within] = pose.within.map(|within| f64::from(within) / 1e3);
+        Self {
+            placement: maps.placement_name(pose.placement),
+            x,
+            y,
+            yaw: pose.yaw_within.map(|_| degrees(pose.yaw)),
+            x_within,
+            y_within,
+            yaw_within: pose.yaw_within.map(degrees),
+            share: (f64::from(pose.share) / 65.536).round() / 1e3,
+        }
+    }
+}
+
+impl From<Approach> for Next {
+    fn from(Approach { x, y, roll }: Approach) -> Self {
+        let degrees = f64::from(roll) / 256.0 * 360.0;
+        Self { x: millimeters(x), y: millimeters(y), roll: (degrees * 100.0).round() / 100.0 }
+    }
+}
+
+/// Recognizes objects by touches with a position.
+pub(super) fn run(file: &MapsFile, arguments: &Arguments, global: &Global) -> Result<()> {
+    let maps = file.maps();
+    let of_trees = [("features", arguments.features), ("active", arguments.active), ("mcap", arguments.mcap.is_some())];
+    if let Some((option, _)) = of_trees.iter().find(|(_, is_given)| *is_given) {
+        let allowed = "it with a model of trees; a model of maps says with --next where to touch next";
+        return Err(Error::setting(option, "given", allowed));
+    }
+    let own = maps.stopping();
+    let max_touches = arguments.max_touches.unwrap_or(own.max_touches());
+    if max_touches as usize > locate::TOUCHES {
+        return Err(Error::setting("max_touches", max_touches, format!("1 to {}", locate::TOUCHES)));
+    }
+    let stopping = match arguments.error_rate {
+        Some(rate) => compile::stopping(rate, max_touches)?,
+        None => own.with_max_touches(max_touches),
+    };
+    let names = locate::names(&maps);
+    let weights = arguments.expected.weights(&names, &vec![1.0; names.len()])?;
+    let hand = Hand::of(&maps).ok_or(LocateProblem::NoHand).map_err(Error::from)?;
+    let mut stream = Stream::new(maps, hand, stopping, weights, arguments.next, global);
+    stream.begin();
+    arguments.each(&mut |event| stream.take(event))
+}
+
+/// A stream of touches and what locates by them.
+struct Stream<'m> {
+    maps: Maps<'m>,
+    hand: Hand,
+    locating: Box<dyn Locating + 'm>,
+    weights: Option<Vec<u32>>,
+    asks: bool,
+    json: bool,
+    seed: u32,
+    touches: u32,
+}
+
+impl<'m> Stream<'m> {
+    fn new(
+        maps: Maps<'m>,
+        hand: Hand,
+        stopping: Stopping,
+        weights: Option<Vec<u32>>,
+        asks: bool,
+        global: &Global,
+    ) -> Self {
+        let locating = locate::locating(maps, stopping, None);
+        let seed = u32::try_from(global.seed()).unwrap_or(1);
+        Self { maps, hand, locating, weights, asks, json: global.json, seed, touches: 0 }
+    }
+
+    /// Begins another object.
+    fn begin(&mut self) {
+        self.touches = 0;
+        self.locating.begin(self.seed);
+        if let Some(weights) = &self.weights {
+            self.locating.begin_of(weights);
+        }
+    }
+
+    fn take(&mut self, event: Event<'_>) -> Result<()> {
+        let Event::Touch { touch, place, .. } = event else {
+            self.begin();
+            return Ok(());
+        };
+        self.check(touch).map_err(|problem| Error::at(place, problem))?;
+        let refused = match self.hand.seen(touch) {
+            Some(seen) => {
+                self.touches += 1;
+                self.locating.push(seen);
+                None
+            }
+            None => Some("it does not come straight down".to_owned()),
+        };
+        self.print(refused)?;
+        if self.locating.verdict() != Verdict::Undecided {
+            self.begin();
+        }
+        Ok(())
+    }
+
+    /// Refuses a touch without a position, and one that cannot be of a hand above a table.
+    fn check(&self, touch: &Touch) -> Result<(), LocateProblem> {
+        let position = touch.position().ok_or(LocateProblem::Nowhere)?;
+        let last = touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or(0);
+        let way = f64::from(last) * 1e-6 * f64::from(self.hand.speed) / 1e3;
+        let below = way - millimeters(position.micrometers[2]);
+        if below > BELOW { Err(LocateProblem::Below { millimeters: below }) } else { Ok(()) }
+    }
+
+    fn print(&mut self, refused: Option<String>) -> Result<()> {
+        let leader = self.locating.leader();
+        let verdict = self.locating.verdict();
+        let posterior = self.locating.posteriors().get(leader).copied().unwrap_or(0.0);
+        let line = Line {
+            touch: self.touches,
+            verdict: word(verdict),
+            object: if self.touches == 0 { "" } else { self.maps.object_name(leader) },
+            posterior,
+            refused,
+            next: None,
+        };
+        if !self.asks {
+            return line.print(self.json);
+        }
+        let poses = if self.touches == 0 { Vec::new() } else { self.locating.poses(leader) };
+        let mut modes = poses.into_iter().map(|pose| Mode::of(&self.maps, pose)).collect::<Vec<_>>().into_iter();
+        let pose = modes.next();
+        let within = self.maps.range().unsigned_abs() * 2;
+        let next = (verdict == Verdict::Undecided).then(|| self.locating.choose(&self.hand, within, POSE).into());
+        let placement = pose.as_ref().map_or("", |pose| pose.placement);
+        let located = Located { line, placement, pose, modes: modes.collect(), next };
+        // Numbers and strings are always JSON.
+        output::print(&format!("{}\n", serde_json::to_string(&located).unwrap_or_default()))
+    }
+}
+
+/// Distance below the table at which a finger cannot have stopped, in millimeters.
+const BELOW: f64 = 15.0;
