@@ -108,7 +108,7 @@ fn learned(given: &Given, dataset: &Dataset, probe: &Probe) -> Result<Vec<u8>, B
             println!("{name} {placement} share {share:.3} half {half:?} known {known:.2} round {is_round}");
         }
     }
-    let names: Vec<String> = dataset.names().into_iter().map(Into::into).collect();
+    let names: Vec<String> = dataset.names();
     let model = locate::write(&surfaces, &names, probe, &settings)?;
     eprintln!("maps: {} placements, {} bytes", surfaces.len(), model.len());
     Ok(model)
