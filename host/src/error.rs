@@ -1,18 +1,18 @@
 //! Errors, with the place and a remedy. Each room has its own problems; one error holds any of them, and the place.
 
-pub use crate::calibrate::{CalibrateProblem, Supplied};
-pub use crate::capture::CaptureProblem;
-pub use crate::chip::ChipProblem;
+pub use crate::calibrate::error::*;
+pub use crate::capture::error::*;
+pub use crate::chip::error::*;
 #[cfg(feature = "train")]
-pub use crate::ensemble::train::TrainProblem;
-pub use crate::evaluate::EvaluateProblem;
+pub use crate::ensemble::train::error::*;
+pub use crate::evaluate::error::*;
 #[cfg(feature = "train")]
-pub use crate::fit::FitProblem;
-pub use crate::locate::LocateProblem;
+pub use crate::fit::error::*;
+pub use crate::locate::error::*;
 #[cfg(feature = "train")]
-pub use crate::teach::TeachProblem;
-pub use crate::touches::TouchesProblem;
+pub use crate::teach::error::*;
+pub use crate::touches::error::*;
 #[cfg(feature = "train")]
-pub use crate::tune::TuneProblem;
+pub use crate::tune::error::*;
 pub use palpate_simulator::error::*;
 pub use palpate_trees::error::*;

@@ -13,7 +13,7 @@ pub const MISSING_FEATURE: i32 = i32::MIN;
 
 /// Features are clamped to ± this many units: the largest range in which every whole number is exact in f32, so that
 /// trainers that work in f32 see what the chip sees.
-pub const FEATURE_LIMIT: i32 = (1 << 24) - 1;
+pub(crate) const FEATURE_LIMIT: i32 = (1 << 24) - 1;
 
 /// Features that a touch is turned into. Times in microseconds, direction cosines in Q15.
 ///
@@ -207,7 +207,7 @@ impl Descriptor {
         }
     }
 
-    /// The features of a touch, clamped to ±[`FEATURE_LIMIT`].
+    /// The features of a touch, clamped to ±(2^24 − 1).
     ///
     /// Cost: a few instructions for each feature. Cannot fail.
     pub fn features(self, touch: &Touch) -> Features {

@@ -35,7 +35,7 @@ mod poses;
 mod touch;
 
 pub use checksum::checksum;
-pub use descriptor::{Descriptor, FEATURE_LIMIT, Features, MAX_FEATURES, MISSING_FEATURE};
+pub use descriptor::{Descriptor, Features, MAX_FEATURES, MISSING_FEATURE};
 pub use pattern::{ContactPattern, Patterns};
 pub use poses::{DIRECTIONS, MOST_POSES, Poses};
 #[cfg(feature = "position")]

@@ -70,7 +70,7 @@ pub struct Patterns(u8);
 
 impl Patterns {
     /// No pattern at all.
-    pub const EMPTY: Self = Self(0);
+    const EMPTY: Self = Self(0);
     /// Full touches only.
     pub const FULL: Self = Self(0b10_0000);
     /// Every pattern with at least one contact.

@@ -34,7 +34,7 @@ pub(crate) enum Given {
 
 impl Meshes {
     /// The objects, read.
-    fn objects(self, instances: bool) -> palpate::Result<Vec<Object>> {
+    pub(crate) fn objects(self, instances: bool) -> palpate::Result<Vec<Object>> {
         match self {
             Self::Sources(sources) if instances => source::objects_of_instances(&sources),
             Self::Sources(sources) => source::objects(&sources),
@@ -143,7 +143,8 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 ///
 /// `touches` full touches of each object are kept, or with `approaches` that many approaches whether fingers touch or not;
 /// `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a table in each of their placements, and
-/// approaches come within that many degrees of straight down. The same `seed` gives the same touches on any number of `threads`, and
+/// approaches come within that many degrees of straight down. `position` keeps where the hand was, too, of all approaches straight
+/// down to objects of true size on a table; `within` is how far from an object's middle they aim at most. The same `seed` gives the same touches on any number of `threads`, and
 /// the same as the program's. `shard` is "K/N" for a part. With `instances` a directory inside a directory is one object.
 /// With `out` the touches are written there, as "text" or "parquet", as `palpate capture` does: `resume`, `add` and `force`
 /// are its options.
@@ -158,7 +159,7 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 /// ((200, 3), True)
 #[pyo3::pyfunction]
 #[pyo3(signature = (meshes, *, touches=21_000, seed=1, probe=None, approaches=false, pose=false, aim="box", cone=None,
-    length=10.0, millimeters=None, instances=false, shard="1/1", out=None, format="text", resume=false, add=false, force=false,
+    position=false, within=None, length=10.0, millimeters=None, instances=false, shard="1/1", out=None, format="text", resume=false, add=false, force=false,
     threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "they are keywords in Python")]
 pub(crate) fn capture(
@@ -171,6 +172,8 @@ pub(crate) fn capture(
     pose: bool,
     aim: &str,
     cone: Option<f64>,
+    position: bool,
+    within: Option<f64>,
     length: f64,
     millimeters: Option<f64>,
     instances: bool,
@@ -193,9 +196,11 @@ pub(crate) fn capture(
         length,
         probe: probe.map(|Probe(probe)| probe).unwrap_or_default(),
         aim: Aim::from_name(aim).ok_or_else(|| Error::setting("aim", aim, "box, middle or mass"))?,
-        pose,
-        approaches,
-        scene: cone.map_or(Surroundings::Floating, |cone| Surroundings::Table { cone }),
+        pose: pose || position,
+        position,
+        within,
+        approaches: approaches || position,
+        scene: cone.or(position.then_some(0.0)).map_or(Surroundings::Floating, |cone| Surroundings::Table { cone }),
         format: format.parse().map_err(Error::from)?,
         shard: shard.parse().map_err(Error::from)?,
         ..Origin::default()

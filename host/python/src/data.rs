@@ -9,8 +9,11 @@ use numpy::ndarray::{Ix1, Ix2};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use palpate::ensemble::feature_row;
 use palpate::error::Error;
+use palpate::shared::format::Length;
 use palpate::shared::{Q15_ONE, Touch};
-use palpate::touches::{Dataset, Format, Listing, ObjectTouches, Origin, folds, touch_of_seconds};
+use palpate::touches::{
+    Dataset, Format, Listing, ObjectTouches, Origin, Surroundings, folds, located, touch_of_seconds,
+};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use std::path::PathBuf;
@@ -41,6 +44,7 @@ pub(crate) struct DataSet {
     objects: PyOnceLock<Py<PyArray1<i16>>>,
     instances: PyOnceLock<Py<PyArray1<i16>>>,
     poses: PyOnceLock<[Py<PyArray2<f32>>; 2]>,
+    positions: PyOnceLock<Py<PyArray2<f64>>>,
 }
 
 impl DataSet {
@@ -52,6 +56,7 @@ impl DataSet {
             objects: PyOnceLock::new(),
             instances: PyOnceLock::new(),
             poses: PyOnceLock::new(),
+            positions: PyOnceLock::new(),
         }
     }
 
@@ -108,11 +113,13 @@ impl DataSet {
     ///
     /// `times` has three contact times per touch, in seconds on any clock, NaN for a finger that did not touch; they are
     /// rounded to microseconds, and the earliest becomes 0. `objects` says which of the `names` each touch is of.
-    /// `direction` and `alignment` are unit vectors. Without a `probe` nothing is known about it. `instances` are numbers
+    /// `direction` and `alignment` are unit vectors, `position` where the hand was at the first contact, on a table, in
+    /// millimeters (the `probe` is in millimeters then). Without a `probe` nothing is known about it. `instances` are numbers
     /// that say which mesh, or recording, of its object each touch is of, where objects have several: a sequence is of one.
     #[staticmethod]
     #[pyo3(signature = (
-        times, objects, names, *, direction=None, alignment=None, probe=None, approaches=false, instances=None
+        times, objects, names, *, direction=None, alignment=None, position=None, probe=None, approaches=false,
+        instances=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn from_arrays(
@@ -121,6 +128,7 @@ impl DataSet {
         names: Vec<String>,
         direction: Option<Input<'_, f64, Ix2>>,
         alignment: Option<Input<'_, f64, Ix2>>,
+        position: Option<Input<'_, f64, Ix2>>,
         probe: Option<Probe>,
         approaches: bool,
         instances: Option<Input<'_, i64, Ix1>>,
@@ -129,12 +137,14 @@ impl DataSet {
         let objects = objects.values()?;
         let direction = direction.as_ref().map(|array| triples(array, "direction")).transpose()?;
         let alignment = alignment.as_ref().map(|array| triples(array, "alignment")).transpose()?;
+        let position = position.as_ref().map(|array| triples(array, "position")).transpose()?;
         let instances = instances.as_ref().map(Input::values).transpose()?;
-        let lengths =
-            [Some(objects.len()), direction.map(<[_]>::len), alignment.map(<[_]>::len), instances.map(<[_]>::len)];
-        if lengths.into_iter().flatten().any(|length| length != times.len()) {
+        let vectors = [direction, alignment, position].map(|vectors| vectors.map(<[_]>::len));
+        let lengths = [Some(objects.len()), instances.map(<[_]>::len)].into_iter().chain(vectors);
+        if lengths.flatten().any(|length| length != times.len()) {
             let rows = "as many rows as times";
-            return Err(Error::setting("objects, direction, alignment and instances", "of another length", rows).into());
+            let all = "objects, direction, alignment, position and instances";
+            return Err(Error::setting(all, "of another length", rows).into());
         }
         let mut order: Vec<usize> = (0..names.len()).collect();
         order.sort_by(|&a, &b| names[a].cmp(&names[b]));
@@ -151,6 +161,10 @@ impl DataSet {
                 there(direction),
                 there(alignment),
             );
+            let touch = match position {
+                Some(position) => touch.and_then(|touch| located(touch, position[row])),
+                None => touch,
+            };
             let touch = touch.map_err(|problem| palpate::error::TouchesProblem::Row {
                 row: row as u64 + 1,
                 problem: Box::new(problem),
@@ -168,8 +182,11 @@ impl DataSet {
         }
         let origin = probe.map(|Probe(probe)| Origin {
             probe,
-            approaches,
+            approaches: approaches || position.is_some(),
             pose: direction.is_some(),
+            position: position.is_some(),
+            unit: if position.is_some() { Length::Millimeter } else { Length::Tenth },
+            scene: if position.is_some() { Surroundings::Table { cone: 0.0 } } else { Surroundings::Floating },
             touches: objects.iter().map(|object| object.len()).max().unwrap_or(0) as u64,
             ..Origin::default()
         });
@@ -273,6 +290,23 @@ impl DataSet {
         Ok(self.poses(py)?.map(|[_, alignment]| Output(alignment.bind(py).clone())))
     }
 
+    /// The position of the hand at each touch, in millimeters; `None` if no touch has one.
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> PyResult<Option<Output<'py, f64, Ix2>>> {
+        if self.touches().all(|touch| touch.position().is_none()) {
+            return Ok(None);
+        }
+        let made = self.positions.get_or_try_init(py, || {
+            let column = |axis: usize| {
+                self.touches().map(move |touch| {
+                    touch.position().map_or(f64::NAN, |position| f64::from(position.micrometers[axis]) / 1e3)
+                })
+            };
+            Self::columns(py, (0..3).flat_map(column).collect::<Vec<_>>())
+        })?;
+        Ok(Some(Output(made.bind(py).clone())))
+    }
+
     /// The features of each touch under a descriptor, one row of whole numbers per touch (microseconds, and direction cosines times
     /// 32767), NaN where one is missing: for training with another library. The code is the chip's.
     #[pyo3(signature = (descriptor="curvature"))]
@@ -303,7 +337,7 @@ impl DataSet {
         Ok(Self::new(noisy, self.approaches.clone()))
     }
 
-    /// The touches as a table: object (a category), t1, t2 and t3, and, if known, direction and alignment.
+    /// The touches as a table: object (a category), t1, t2 and t3, and, if known, direction, alignment and position.
     /// The columns are those of the arrays, without copies. Needs pandas.
     fn to_pandas<'py>(slf: Bound<'py, Self>) -> PyResult<DataFrame<'py>> {
         let frames = slf.py().import("palpate._frames")?;

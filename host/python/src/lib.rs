@@ -7,6 +7,7 @@ mod data;
 mod ensemble;
 mod evaluate;
 mod failure;
+mod maps;
 mod model;
 mod named;
 mod objects;
@@ -26,6 +27,8 @@ mod _native {
     use crate::ensemble::{Ensemble, train};
     #[pymodule_export]
     use crate::evaluate::{evaluate, parity};
+    #[pymodule_export]
+    use crate::maps::{Locator, Maps};
     #[pymodule_export]
     use crate::model::{Model, compile};
     #[pymodule_export]

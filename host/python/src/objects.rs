@@ -1,5 +1,6 @@
 //! Values whose classes are written in Python, with the types that the stub states.
 
+use palpate::locate::Real as Deviations;
 use palpate::probe::approach::Probe as Measures;
 use pyo3::Borrowed;
 use pyo3::inspect::PyStaticExpr;
@@ -40,6 +41,12 @@ macro_rules! handed_out {
 handed_out! {
     /// A verdict.
     Verdict is "palpate._types"."Verdict";
+    /// What a locator says.
+    Located is "palpate._types"."Located";
+    /// Maps that keep a promise.
+    CalibratedMaps is "palpate._locate"."CalibratedMaps";
+    /// Results of maps on a simulated table.
+    MapsEvaluation is "palpate._locate"."MapsEvaluation";
     /// A table of pandas.
     DataFrame is "pandas"."DataFrame";
 }
@@ -73,5 +80,31 @@ impl<'py> IntoPyObject<'py> for Probe {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let Measures { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance } = self.0;
         class(py, "Probe", &CLASS)?.call1((radius, spacing, speed, tilt, stroke, travel, stroke_tolerance))
+    }
+}
+
+/// What a hand and a table add to touches.
+#[derive(Default)]
+pub(crate) struct Real(pub(crate) Deviations);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Real {
+    type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = type_hint_identifier!("palpate._types", "Real");
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        let number = |name: &str| object.getattr(name)?.extract::<f64>();
+        Ok(Self(Deviations {
+            height: number("height")?,
+            lost: number("lost")?,
+            position: number("position")?,
+            drift: number("drift")?,
+            drift_yaw: number("drift_yaw")?,
+            size: number("size")?,
+            bent: number("bent")?,
+            tips: number("tips")?,
+            table: number("table")?,
+            turned: number("turned")?,
+        }))
     }
 }

@@ -19,6 +19,29 @@ use pyo3::{Borrowed, intern, type_hint_identifier};
 use std::collections::HashMap;
 use std::sync::Arc;
 
+/// The first `N` numbers of a tuple, a list, an array or an iterator, NaN for `None`, and how many there are in all.
+pub(crate) fn numbers<const N: usize>(object: Borrowed<'_, '_, PyAny>) -> PyResult<([f64; N], usize)> {
+    let mut numbers = [f64::NAN; N];
+    let mut count = 0;
+    let mut take = |item: Bound<'_, PyAny>| {
+        if let Some(slot) = numbers.get_mut(count)
+            && !item.is_none()
+        {
+            *slot = item.extract()?;
+        }
+        count += 1;
+        PyResult::Ok(())
+    };
+    if let Ok(tuple) = object.cast::<PyTuple>() {
+        tuple.iter().try_for_each(&mut take)?;
+    } else if let Ok(list) = object.cast::<PyList>() {
+        list.iter().try_for_each(&mut take)?;
+    } else {
+        object.try_iter()?.try_for_each(|item| take(item?))?;
+    }
+    Ok((numbers, count))
+}
+
 /// A touch: three contact times in seconds, with the pose nine numbers.
 pub(crate) struct TouchInput(Touch);
 
@@ -28,24 +51,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for TouchInput {
     const INPUT_TYPE: PyStaticExpr = type_hint_identifier!("palpate._types", "Touch");
 
     fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        let mut numbers = [f64::NAN; 9];
-        let mut count = 0;
-        let mut take = |item: Bound<'py, PyAny>| {
-            if let Some(slot) = numbers.get_mut(count)
-                && !item.is_none()
-            {
-                *slot = item.extract()?;
-            }
-            count += 1;
-            PyResult::Ok(())
-        };
-        if let Ok(tuple) = object.cast::<PyTuple>() {
-            tuple.iter().try_for_each(&mut take)?;
-        } else if let Ok(list) = object.cast::<PyList>() {
-            list.iter().try_for_each(&mut take)?;
-        } else {
-            object.try_iter()?.try_for_each(|item| take(item?))?;
-        }
+        let (numbers, count) = numbers::<9>(object)?;
         let touch = match numbers.get(..count) {
             Some(numbers) => touch(numbers),
             None => Err(TouchesProblem::Fields { count }),

@@ -49,6 +49,16 @@ surface = palpate.Surface(np.zeros((3, 3)), [[0, 1, 2]])
 assert_type(surface.first_contact([[0.0, 0.0, 1.0]], [[0.0, 0.0, -1.0]], 0.1), npt.NDArray[np.float64])
 assert_type(surface.bounds, tuple[list[float], list[float]])
 
+maps = palpate.Maps.of_meshes(["bowl"], probe=palpate.Probe(stroke=20.0), millimeters=10.0, real=palpate.Real())
+assert_type(maps, palpate.Maps)
+assert_type(maps.calibrate(["bowl"]).maps, palpate.Maps)
+assert_type(maps.evaluate(["bowl"], aimed="random").error, float)
+locator = palpate.Locator(maps)
+assert_type(locator.next(), tuple[float, float, float])
+assert_type(locator.push((0.0, None, 0.1), (1.0, 2.0, 3.0), 30.0), palpate.Located)
+assert_type(locator.push_heights((3.0, None, 0.1), 1.0, 2.0, np.array([1.0, 0.0, 0.0])).object, str | None)
+assert_type(data.position, npt.NDArray[np.float64] | None)
+
 palpate.capture(1)  # type: ignore[arg-type]
 model.margins(data, 3)  # type: ignore[call-arg]
 recognizer.push("touch")  # type: ignore[arg-type]

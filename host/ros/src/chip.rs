@@ -3,8 +3,9 @@
 use crate::decide::{Step, UNDECIDED, behind, with_best};
 use crate::wire::{Approach, Evidence, Verdict, unit_vectors};
 use async_channel::{Receiver, Sender, TryRecvError};
-use palpate::chip::{ChipModel, ChipProblem, Connection, Emulator, Port, Received, probability};
+use palpate::chip::{ChipModel, Connection, Emulator, Port, Received, probability};
 use palpate::compile::CompiledModel;
+use palpate::error::ChipProblem;
 use palpate::onboard::shared::Touch;
 use palpate::onboard::shared::link::{Command, Decision, Event, HostSettings, Outcome, VerdictMessage};
 use palpate::{Error, Result};

@@ -1,7 +1,8 @@
 //! Messages as they travel, field by field as in `host/msg`, `host/srv` and `host/action`.
 
+use palpate::error::TouchesProblem;
 use palpate::onboard::shared::{Pose, Q15_ONE, Touch as Felt};
-use palpate::touches::{TouchesProblem, touch_of_seconds};
+use palpate::touches::{located, touch_of_seconds};
 use ros2_client::Message;
 use ros2_client::builtin_interfaces::Time;
 use serde::{Deserialize, Serialize};
@@ -18,6 +19,8 @@ pub(crate) struct Touch {
     pub(crate) direction: [f64; 3],
     pub(crate) alignment: [f64; 3],
     pub(crate) object: String,
+    pub(crate) has_position: bool,
+    pub(crate) position: [f64; 3],
 }
 
 impl Touch {
@@ -28,7 +31,11 @@ impl Touch {
     pub(crate) fn felt(&self) -> Result<Felt, TouchesProblem> {
         let pose = |vector| self.has_pose.then_some(vector);
         let times = self.times.map(|time| if time.is_nan() { None } else { Some(time) });
-        touch_of_seconds(times, pose(self.direction), pose(self.alignment))
+        let touch = touch_of_seconds(times, pose(self.direction), pose(self.alignment))?;
+        match self.has_position {
+            true => located(touch, self.position.map(|meters| 1e3 * meters)),
+            false => Ok(touch),
+        }
     }
 }
 
@@ -36,7 +43,17 @@ impl From<&Felt> for Touch {
     fn from(touch: &Felt) -> Self {
         let times = touch.times().map(|time| time.micros().map_or(f64::NAN, |micros| f64::from(micros) / 1e6));
         let (direction, alignment) = touch.pose().as_ref().map(unit_vectors).unwrap_or_default();
-        Self { times, has_pose: touch.pose().is_some(), direction, alignment, object: String::new() }
+        let position =
+            touch.position().map(|position| position.micrometers.map(|micrometers| f64::from(micrometers) / 1e6));
+        Self {
+            times,
+            has_pose: touch.pose().is_some(),
+            direction,
+            alignment,
+            object: String::new(),
+            has_position: position.is_some(),
+            position: position.unwrap_or_default(),
+        }
     }
 }
 

@@ -19,6 +19,8 @@ class Touch(IdlStruct, typename="palpate_msgs::msg::dds_::Touch_"):
     direction: array[float64, 3] = field(default_factory=zeros)
     alignment: array[float64, 3] = field(default_factory=zeros)
     object: str = ""
+    has_position: bool = False
+    position: array[float64, 3] = field(default_factory=zeros)
 
 
 @dataclass

@@ -43,7 +43,7 @@ impl<'d> TouchSupply<'d> {
     /// The touches of the object with this index in the model. A sequence is of touches of one source, such as an
     /// instance, by one robot. Where robots differ, every robot makes one sequence, so that the sequences' biases are
     /// independent.
-    pub fn new(object: usize, touched: &'d ObjectTouches, seed: u64) -> Self {
+    pub(crate) fn new(object: usize, touched: &'d ObjectTouches, seed: u64) -> Self {
         let pools = touched.pools().into_iter().map(|pool| pool.touches).collect();
         let supply = Self::of(object, Feed::Given(touched.touches()), pools);
         let is_once = touched.has_robots();

@@ -38,7 +38,7 @@ mod calibrated;
 mod choose;
 mod demand;
 mod draw;
-mod error;
+pub(crate) mod error;
 mod found;
 mod fresh;
 mod groups;
@@ -63,7 +63,6 @@ pub(crate) use choose::{Way, choose_independent};
 #[cfg(all(test, feature = "train"))]
 use draw::MarginSupply;
 pub use draw::{TouchSupply, follow};
-pub use error::{CalibrateProblem, Enough, Forecast, Remedy, Supplied};
 pub use found::{Alarms, Found, OnRecordings};
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
 pub(crate) use groups::choose_groups;

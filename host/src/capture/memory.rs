@@ -14,7 +14,7 @@ use std::ops::Range;
 const CHUNK: u64 = 256;
 
 /// Touches the objects as [`capture`](super::capture) does, and returns what reading its directory would: the same touches,
-/// with a pose only if [`Origin::writes_pose`](crate::touches::Origin::writes_pose). The second value says how many
+/// with a pose only where the capture would write one. The second value says how many
 /// approaches each object took, in the data set's order. Settings about directories are ignored.
 ///
 /// # Errors
@@ -55,7 +55,7 @@ fn touch(objects: &[&Object], settings: &Settings, progress: &dyn Progress) -> R
         let (sources, entry) = (sources(object, scenes), entry(object, scenes, origin));
         let meshes = Meshes { checksums: entry.meshes, millimeters: entry.millimeters };
         let object = ObjectTouches::in_turn(&object.name, touches, &sources, samples.start);
-        touched.push(object.of_meshes(Some(meshes)).of_stroke(origin.probe.window()));
+        touched.push(object.of_meshes(Some(meshes)).of_origin(origin));
     }
     Ok((Dataset { origin: Some(origin.clone()), ..Dataset::new(touched) }, approaches))
 }

@@ -26,7 +26,9 @@
 //! ```
 
 mod admission;
-mod error;
+pub(crate) mod error;
+#[cfg(test)]
+mod located_tests;
 mod memory;
 mod pipeline;
 mod sample;
@@ -36,14 +38,13 @@ mod table_tests;
 #[cfg(test)]
 mod tests;
 
-use crate::error::{Error, Result};
+use crate::error::{CaptureProblem, Error, Result};
 use crate::in_order::in_order;
 use crate::mesh::{Instance, Object, placements};
 use crate::probe::approach::FINGERS;
 use crate::probe::scene::{Scene, Table};
 use crate::progress::{self, Progress};
 use crate::touches::{Entry, Lying, ObjectTouches, Origin, Source};
-pub use error::{CaptureProblem, Untouched};
 use palpate_shared::format::Length;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -51,7 +52,7 @@ use std::path::Path;
 use std::time::Instant;
 
 pub use memory::in_memory;
-pub use sample::{Drawn, Sampler};
+pub use sample::Sampler;
 
 /// Settings of a capture, and its treatment of existing files.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -111,7 +112,8 @@ pub struct ObjectSummary {
     pub approaches: u64,
     /// Number of approaches made in this run.
     pub approaches_now: u64,
-    /// Contacts of each finger in this run that came later than the stroke, and are missing; see [`Drawn::late`].
+    /// Contacts of each finger in this run that came later than the stroke, and are missing; where only full touches
+    /// are kept, in approaches in which all fingers would have touched.
     pub late: [u64; FINGERS],
     /// Number of approaches in this run in which a finger touched; if only full touches are kept, of full touches.
     pub touching: u64,
@@ -267,7 +269,7 @@ pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> 
 }
 
 /// Sources of the touches of an object's scenes, in turn: its instances, if it has several, or its placements.
-pub fn sources(object: &Object, scenes: &[Scene]) -> Vec<Source> {
+pub(crate) fn sources(object: &Object, scenes: &[Scene]) -> Vec<Source> {
     sources_of(&named(object), scenes)
 }
 
@@ -292,7 +294,7 @@ pub fn touches(scenes: &[Scene], name: &str, origin: &Origin, samples: Range<u64
     let sampler = Sampler::of_instances(scenes, name, origin);
     let first = samples.start;
     let touches = in_order(samples.into_par_iter().map(|sample| sampler.sample(sample).map(|(touch, _)| touch)))?;
-    Ok(ObjectTouches::in_turn(name, touches, &numbered(scenes), first).of_stroke(origin.probe.window()))
+    Ok(ObjectTouches::in_turn(name, touches, &numbered(scenes), first).of_origin(origin))
 }
 
 /// Sources of the touches of an object's scenes, in turn, where the names of its instances are not known: they are called by

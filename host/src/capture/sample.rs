@@ -6,11 +6,11 @@
 use super::error::Untouched;
 use crate::error::{CaptureProblem, Result};
 use crate::mesh::facts::sides;
-use crate::probe::Probe;
 use crate::probe::approach::{Approach, FINGERS};
 use crate::probe::hand;
 use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
+use crate::probe::{Located, Probe};
 use crate::random::{self, Purpose};
 use crate::touches::Origin;
 use glam::DVec3;
@@ -25,16 +25,16 @@ pub(crate) const MOST_ATTEMPTS: u64 = 1 << 22;
 
 /// A sample, and the number of approaches for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drawn {
+pub(crate) struct Drawn {
     /// The touch.
-    pub touch: Touch,
+    pub(crate) touch: Touch,
     /// Number of approaches that it took.
-    pub approaches: u64,
+    pub(crate) approaches: u64,
     /// Contacts of each finger in these approaches that came later than the stroke, and are missing; where only full touches
     /// are kept, of approaches in which all fingers would have touched.
-    pub late: [u64; FINGERS],
+    pub(crate) late: [u64; FINGERS],
     /// Number of these approaches that ended before the first contact, at the end of the travel.
-    pub turned_back: u64,
+    pub(crate) turned_back: u64,
 }
 
 /// Draws the samples of one object.
@@ -49,7 +49,7 @@ pub struct Sampler<'a> {
 
 impl<'a> Sampler<'a> {
     /// The samples of the object with this scene and name, made as `origin` says.
-    pub fn new(scene: &'a Scene, name: &'a str, origin: &'a Origin) -> Self {
+    pub(crate) fn new(scene: &'a Scene, name: &'a str, origin: &'a Origin) -> Self {
         Self::of_instances(std::slice::from_ref(scene), name, origin)
     }
 
@@ -61,7 +61,7 @@ impl<'a> Sampler<'a> {
     }
 
     /// The object's name.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         self.name
     }
 
@@ -78,21 +78,24 @@ impl<'a> Sampler<'a> {
     ///
     /// # Errors
     /// As [`sample`](Self::sample).
-    pub fn drawn(&self, index: u64) -> Result<Drawn> {
+    pub(crate) fn drawn(&self, index: u64) -> Result<Drawn> {
         let mut rng = self.rng(index);
         let probe = &self.origin.probe;
         let turn = index % self.scenes.len().max(1) as u64;
         let scene = usize::try_from(turn).ok().and_then(|turn| self.scenes.get(turn));
         let scene = scene.ok_or_else(|| self.untouchable(DVec3::ZERO))?;
-        let clearance = self.origin.clearance(scene.bounds());
         // What the real probe adds has a stream of its own, so that the approaches stay the same with it and without.
         let mut added = (!self.origin.real.is_none())
             .then(|| random::generator(self.origin.seed, Purpose::Capture, self.name, index));
+        if self.origin.position {
+            let noise = added.as_mut().map(|random| (&self.origin.real, random));
+            let Located { touch, late, is_turned_back } = self.draw(&mut rng, scene).locate(scene, probe, noise);
+            return Ok(Drawn { touch, approaches: 1, late: late.map(u64::from), turned_back: is_turned_back.into() });
+        }
         let Noise { grazing, .. } = self.origin.real;
         let (window, mut late, mut turned_back) = (probe.window(), [0; FINGERS], 0);
         for approaches in 1..=MOST_ATTEMPTS {
-            let target = self.origin.aim.target(scene);
-            let approach = Approach::draw_to(&mut rng, scene, target, probe.tilt, clearance);
+            let approach = self.draw(&mut rng, scene);
             let distances = match &mut added {
                 Some(random) if !grazing.is_none() => grazing.distances(&approach, scene, probe, random),
                 _ if self.origin.approaches => approach.distances(scene, probe),
@@ -103,7 +106,7 @@ impl<'a> Sampler<'a> {
             }
             let (distances, is_turned_back) = probe.within_travel(distances);
             let touch = approach.touch(distances, probe);
-            let touch = added.as_mut().map_or(touch, |random| self.origin.real.add_to(&touch, random));
+            let touch = added.as_mut().map_or(touch, |random| self.origin.real.add_to(&touch, probe, random));
             // The stroke begins with the first contact that is noticed.
             let is_late = hand::late(&touch, window);
             late.iter_mut().zip(is_late).for_each(|(late, is_late)| *late += u64::from(is_late));
@@ -143,10 +146,17 @@ impl<'a> Sampler<'a> {
 
     /// The first approach that sample `index` draws, to this scene of the object: the sample itself where every approach is
     /// kept.
-    pub fn approach(&self, scene: &Scene, index: u64) -> Approach {
+    pub(crate) fn approach(&self, scene: &Scene, index: u64) -> Approach {
+        self.draw(&mut self.rng(index), scene)
+    }
+
+    fn draw(&self, rng: &mut Xoshiro256PlusPlus, scene: &Scene) -> Approach {
         let origin = self.origin;
-        let (target, clearance) = (origin.aim.target(scene), origin.clearance(scene.bounds()));
-        Approach::draw_to(&mut self.rng(index), scene, target, origin.probe.tilt, clearance)
+        let clearance = origin.clearance(scene.bounds());
+        match origin.position {
+            true => Approach::draw_down(rng, scene, &origin.probe, origin.region(scene.bounds()), clearance),
+            false => Approach::draw_to(rng, scene, origin.aim.target(scene), origin.probe.tilt, clearance),
+        }
     }
 
     fn rng(&self, index: u64) -> Xoshiro256PlusPlus {

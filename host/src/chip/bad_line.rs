@@ -41,7 +41,7 @@ impl FromStr for Faults {
 
 /// One direction of a bad line.
 #[derive(Debug)]
-pub struct BadLine {
+pub(crate) struct BadLine {
     faults: Faults,
     rng: ChaCha8Rng,
     under_way: VecDeque<(Instant, Vec<u8>)>,
@@ -49,12 +49,12 @@ pub struct BadLine {
 
 impl BadLine {
     /// A line. The same seed does the same to the same bytes, except for effects of the delay.
-    pub fn new(faults: Faults, seed: u64) -> Self {
+    pub(crate) fn new(faults: Faults, seed: u64) -> Self {
         Self { faults, rng: ChaCha8Rng::seed_from_u64(seed), under_way: VecDeque::new() }
     }
 
     /// Puts bytes on the line.
-    pub fn push(&mut self, bytes: &[u8], now: Instant) {
+    pub(crate) fn push(&mut self, bytes: &[u8], now: Instant) {
         if bytes.is_empty() {
             return;
         }
@@ -75,7 +75,7 @@ impl BadLine {
     }
 
     /// Takes bytes that have arrived.
-    pub fn pop(&mut self, now: Instant) -> Option<Vec<u8>> {
+    pub(crate) fn pop(&mut self, now: Instant) -> Option<Vec<u8>> {
         self.under_way.pop_front_if(|(due, _)| *due <= now).map(|(_, bytes)| bytes)
     }
 }

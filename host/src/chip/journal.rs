@@ -109,6 +109,11 @@ impl Journal {
 }
 
 impl Entry {
+    /// The entry for a chip's model.
+    pub fn model(chip: &ChipModel) -> Self {
+        Self::Model { objects: chip.names.clone(), length: chip.info.length, checksum: chip.info.checksum }
+    }
+
     /// The entry for a proposed approach.
     pub fn next(approach: &ApproachMessage) -> Self {
         // Q15, to four digits.

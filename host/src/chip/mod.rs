@@ -11,7 +11,7 @@
 mod bad_line;
 mod connection;
 mod emulator;
-mod error;
+pub(crate) mod error;
 pub mod inspect;
 pub mod instructions;
 mod journal;
@@ -23,10 +23,10 @@ mod stream;
 mod transport;
 pub mod watch;
 
-pub use bad_line::{BadLine, Faults};
+use bad_line::BadLine;
+pub use bad_line::Faults;
 pub use connection::{ChipModel, Connection, Received};
 pub use emulator::Emulator;
-pub use error::ChipProblem;
 pub use journal::{Entry, Journal};
 pub use port::Port;
 pub use record::{RecordEvent, RecordSummary, record};

@@ -19,7 +19,7 @@ pub struct Transport {
 impl Transport {
     /// A transport of a reader, on which a thread waits, and a writer; `name` is for errors. Where bytes come one by one,
     /// `gather` is how long they may pile up before they are read.
-    pub fn new(
+    pub(crate) fn new(
         name: String,
         mut reader: impl Read + Send + 'static,
         writer: impl Write + Send + 'static,
@@ -60,7 +60,7 @@ impl Transport {
     }
 
     /// Name of the transport in messages.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
@@ -79,7 +79,7 @@ impl Transport {
     ///
     /// # Errors
     /// When the other end is gone.
-    pub fn send(&mut self, bytes: &[u8]) -> Result<()> {
+    pub(crate) fn send(&mut self, bytes: &[u8]) -> Result<()> {
         match &mut self.bad {
             Some((down, _)) => {
                 down.push(bytes, Instant::now());
@@ -105,7 +105,7 @@ impl Transport {
     ///
     /// # Errors
     /// When the other end is gone.
-    pub fn receive(&mut self, wait: Duration) -> Result<Vec<u8>> {
+    pub(crate) fn receive(&mut self, wait: Duration) -> Result<Vec<u8>> {
         self.send_due()?;
         let wait = if self.bad.is_some() { wait.min(Duration::from_millis(1)) } else { wait };
         let bytes = match self.received.recv_timeout(wait) {

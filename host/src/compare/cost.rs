@@ -57,7 +57,7 @@ pub struct Confused {
 impl Cost {
     /// Accuracy that is lost on recorded touches after the largest number of approaches that both were measured at, and
     /// that number.
-    pub fn loss(&self) -> Option<(usize, f64)> {
+    pub(crate) fn loss(&self) -> Option<(usize, f64)> {
         self.simulated.iter().rev().find_map(|(at, own)| Some((*at, own.value - self.recorded.get(at)?.value)))
     }
 
@@ -182,14 +182,14 @@ fn confused(
         return Ok(Vec::new());
     }
     let has_placements = margins[1].has_placements();
-    let columns = margins[1].objects();
+    let columns = &margins[1].objects;
     let names = objects_of(columns, has_placements);
     // Of each object, how often it was named, as a share of an entry's groups.
     let shares = |margins: &Margins<'_>| -> Result<Vec<BTreeMap<String, f64>>> {
         let counts = margins.confusion(touches, settings.groups, settings.seed)?;
         let of_entry = |entry: &Entry| {
             let mut shares: BTreeMap<String, f64> = names.iter().map(|name| (name.clone(), 0.0)).collect();
-            for (name, counts) in margins.tested_names().iter().zip(&counts) {
+            for (name, counts) in margins.tested_names.iter().zip(&counts) {
                 let share = entry.share_of(name) / settings.groups.max(1) as f64;
                 for (column, &count) in columns.iter().zip(counts) {
                     let object = if has_placements { object_of(column) } else { column };

@@ -105,7 +105,7 @@ impl TouchOrigin {
     }
 
     /// Statements of a compiled model of these objects.
-    pub fn stated(&self, objects: &[String]) -> compile::Stated {
+    pub(crate) fn stated(&self, objects: &[String]) -> compile::Stated {
         // Where nothing is known, the published probe.
         let probe = self.probe.map_or_else(Probe::default, |stated| stated.probe);
         let mut sections = Vec::new();
@@ -137,7 +137,7 @@ impl TouchOrigin {
     }
 
     /// For each of an ensemble's outputs the number of its object, and its share of it; none if each is an object.
-    pub fn outputs(&self, names: &[String]) -> Option<Vec<(u8, f64)>> {
+    pub(crate) fn outputs(&self, names: &[String]) -> Option<Vec<(u8, f64)>> {
         if self.placements.is_empty() {
             return None;
         }
@@ -172,7 +172,7 @@ impl TouchOrigin {
     /// The objects whose touches in `dataset` are of the capture that made those of the training, or begin like those: the
     /// same touches, or more or fewer of them. What becomes of them elsewhere, such as noise, does not count. A part of a data
     /// set that was trained on counts as the whole.
-    pub fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
+    pub(crate) fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
         let own = fingerprints(dataset);
         let captured = self.captured.as_ref().zip(Captured::of(dataset));
         let shared: Vec<String> = captured

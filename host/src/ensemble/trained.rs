@@ -17,7 +17,7 @@ pub struct Trained {
 
 impl Trained {
     /// Statement of the chip's model about [`Trained::shares`].
-    pub fn pattern_shares(&self) -> Option<PatternShares> {
+    pub(crate) fn pattern_shares(&self) -> Option<PatternShares> {
         // `as` saturates.
         self.shares.map(|shares| PatternShares(shares.map(|share| (share * 65_535.0).round() as u16)))
     }

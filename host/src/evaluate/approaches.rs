@@ -51,7 +51,7 @@ impl Margins<'_> {
             return Err(Error::setting("at", 0, "numbers of approaches of at least 1"));
         }
         if let Some(position) = (0..self.tested.len()).find(|&position| self.most_approaches(position) < most) {
-            let (name, has) = (&self.tested_names()[position], self.most_approaches(position));
+            let (name, has) = (&self.tested_names[position], self.most_approaches(position));
             let allowed = format!("fewer approaches, or capture more: {name} has only {has}{}", self.of_what(name));
             return Err(Error::setting("at", most, allowed));
         }
@@ -71,7 +71,7 @@ impl Margins<'_> {
     pub(super) fn in_approaches(&self, used: Vec<f64>, accuracies: Accuracies, sequential: Sequential) -> Approaches {
         Approaches {
             used: used.iter().sum::<f64>() / used.len().max(1) as f64,
-            used_per_object: self.tested_names().iter().cloned().zip(used).collect(),
+            used_per_object: self.tested_names.iter().cloned().zip(used).collect(),
             accuracy: accuracies.all,
             accuracy_standard_error: accuracies.standard_error,
             per_object: accuracies.per_object,
@@ -85,7 +85,7 @@ impl Margins<'_> {
         let by_number = |value: &dyn Fn(usize) -> f64| -> BTreeMap<usize, f64> {
             at.iter().enumerate().map(|(index, &at)| (at, value(index))).collect()
         };
-        let names = self.tested_names().iter().cloned();
+        let names = self.tested_names.iter().cloned();
         Accuracies {
             all: by_number(&|index| accuracy(index).value),
             standard_error: by_number(&|index| accuracy(index).standard_error),
@@ -96,7 +96,7 @@ impl Margins<'_> {
     /// The numbers of approaches in the order in which a group has them.
     pub(super) fn draws(&self, all: usize, position: usize, group: usize, seed: u64) -> Draws {
         let group = u64::try_from(group).unwrap_or(u64::MAX);
-        Draws::new(all, Purpose::Approaches, &self.tested_names()[position], group, seed)
+        Draws::new(all, Purpose::Approaches, &self.tested_names[position], group, seed)
     }
 
     /// The share of groups that are recognized after each of `at` approaches.

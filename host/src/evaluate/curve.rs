@@ -67,7 +67,7 @@ impl Margins<'_> {
         let most = most.max(touches);
         self.check(most, groups)?;
         let row = |position| {
-            let mut row = vec![0; self.objects().len()];
+            let mut row = vec![0; self.objects.len()];
             self.ends(position, (touches, most), groups, seed, |evidence| match self.is_of_any_placement(position) {
                 true => self.output(evidence),
                 false => self.best(position, evidence),
@@ -108,7 +108,7 @@ impl Margins<'_> {
             return Err(Error::setting("at", 0, "numbers of touches of at least 1"));
         }
         let touches = (0..self.tested.len()).map(|position| self.most_touches(position));
-        match touches.zip(self.tested_names()).find(|(touches, _)| *touches < most) {
+        match touches.zip(&self.tested_names).find(|(touches, _)| *touches < most) {
             Some((touches, name)) => {
                 let allowed =
                     format!("fewer touches, or capture more: {name} has only {touches}{}", self.of_what(name));

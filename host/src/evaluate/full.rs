@@ -17,7 +17,8 @@ pub(super) struct FullRecognizer {
     /// The number of each output's object, where several belong to one.
     numbers: Option<Vec<u8>>,
     touches: u32,
-    verdict: Verdict,
+    /// The verdict after the last touch.
+    pub(super) verdict: Verdict,
 }
 
 impl FullRecognizer {
@@ -39,11 +40,6 @@ impl FullRecognizer {
     /// The output that leads, and the sum of the weights of the others, its own being 1.
     fn leading(&self) -> (usize, f64) {
         leading(&self.evidence, self.known, self.numbers.as_deref(), 1.0)
-    }
-
-    /// The verdict after the last touch.
-    pub(super) fn verdict(&self) -> Verdict {
-        self.verdict
     }
 }
 

@@ -17,20 +17,21 @@ use std::ops::Range;
 /// A model's margins for every touch of a data set.
 pub struct Margins<'m> {
     pub(super) candidate: Candidate<'m>,
-    descriptor: Descriptor,
-    /// The objects that the model has margins for.
-    objects: Vec<String>,
+    pub(super) descriptor: Descriptor,
+    /// The objects that the model has margins for, in its order; the last one may be a background.
+    pub(crate) objects: Vec<String>,
     /// Number of them that can be named: all but a background.
     known: usize,
     /// The number of each output's object, where several belong to one.
     numbers: Option<Vec<u8>>,
     /// The data set's objects.
     pub(super) tested: Vec<Tested<'m>>,
-    tested_names: Vec<String>,
-    hold_approaches: bool,
+    pub(crate) tested_names: Vec<String>,
+    pub(super) hold_approaches: bool,
     /// True if a real probe made the touches.
     pub(super) is_recorded: bool,
-    shares: [f64; 6],
+    /// The share of each contact pattern in the data set, in the order of the patterns' codes.
+    pub(crate) shares: [f64; 6],
     /// Weights of the objects that the model knows, if not as the model says.
     pub(super) weights: Option<Vec<u32>>,
 }
@@ -218,7 +219,7 @@ impl<'m> Margins<'m> {
     ///
     /// # Errors
     /// As [`new`](Self::new), and [`EvaluateProblem::KnownObject`] if the model knows one.
-    pub fn of_strangers(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
+    pub(crate) fn of_strangers(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
         let descriptor = candidate.takes(dataset)?;
         let is_known = |name: &&String| !candidate.outputs_of(name).is_empty();
         if let Some(object) = dataset.objects.iter().map(|object| &object.name).find(is_known) {
@@ -273,7 +274,7 @@ impl<'m> Margins<'m> {
     /// # Errors
     /// [`Setting`](crate::error::Setting) `prior` unless there is a weight for each object, and one of
     /// a tested object is above 0.
-    pub fn expecting(mut self, weights: Vec<u32>) -> Result<Self> {
+    pub(crate) fn expecting(mut self, weights: Vec<u32>) -> Result<Self> {
         let objects = self.objects.len();
         let has_weight = |output: &usize| weights.get(*output).is_some_and(|&weight| weight > 0);
         let is_there = |tested: &Tested<'_>| tested.outputs.iter().any(has_weight);
@@ -322,16 +323,6 @@ impl<'m> Margins<'m> {
         outputs.into_iter().flatten().map(|(_, share)| share).collect()
     }
 
-    /// The model's descriptor.
-    pub fn descriptor(&self) -> Descriptor {
-        self.descriptor
-    }
-
-    /// The objects that the model has margins for, in its order; the last one may be a background.
-    pub fn objects(&self) -> &[String] {
-        &self.objects
-    }
-
     /// The object that the model would name, as the right one's output if it is the tested object; and the sum of the weights of
     /// the others, its own being 1.
     pub(super) fn leading(&self, position: usize, evidence: &[f64], unit: f64) -> (usize, f64) {
@@ -373,24 +364,9 @@ impl<'m> Margins<'m> {
         leading(evidence, self.known, self.numbers.as_deref(), self.unit()).0
     }
 
-    /// The objects of the data set, in its order.
-    pub(crate) fn tested_names(&self) -> &[String] {
-        &self.tested_names
-    }
-
     /// The touches of all tested objects together that are evidence to the model.
     pub(crate) fn touch_count(&self) -> usize {
         self.tested.iter().map(|tested| tested.touches).sum()
-    }
-
-    /// True if the data set holds approaches.
-    pub(crate) fn hold_approaches(&self) -> bool {
-        self.hold_approaches
-    }
-
-    /// The share of each contact pattern in the data set, in the order of the patterns' codes.
-    pub fn shares(&self) -> [f64; 6] {
-        self.shares
     }
 
     /// All touches of all tested objects together, evidence or not: approaches, if the data set holds those.

@@ -1,8 +1,8 @@
 //! Everything that is measured of a model on touches, as one call.
 
+use super::plan::{Active, evaluate_active};
 use super::{
-    Active, ActiveFacts, Candidate, Evaluation, LEAST_GROUPS, Margins, OnStrangers, Settings, Switched, evaluate,
-    evaluate_active, strangers,
+    ActiveFacts, Candidate, Evaluation, LEAST_GROUPS, Margins, OnStrangers, Settings, Switched, evaluate, strangers,
 };
 use crate::error::{Error, Result};
 use crate::probe::noise::Noise;
@@ -75,27 +75,25 @@ pub struct Confusion {
     pub counts: Vec<Vec<usize>>,
 }
 
-/// Weights of objects, of their names and the model's own weights; `None` for these.
-pub type Expecting<'e> = dyn Fn(&[String], &[f64]) -> Result<Option<Vec<u32>>> + 'e;
-
 /// Measures a model on touches that have their noise already. `expecting` gives the weight of each object, of the objects'
 /// names and the model's own weights; `None` leaves these.
 ///
 /// # Errors
-/// As [`evaluate`], [`evaluate_active`] and [`strangers`]; [`Setting`](crate::error::Setting) `at` for more touches than
+/// As [`evaluate`] and [`Margins::new`]; [`EvaluateProblem`](crate::error::EvaluateProblem) for a plan or strangers that cannot
+/// be evaluated; [`Setting`](crate::error::Setting) `at` for more touches than
 /// enough groups can be drawn of.
 pub fn measure(
     candidate: Candidate<'_>,
     dataset: &Dataset,
     wanted: &Wanted<'_>,
-    expecting: &Expecting<'_>,
+    expecting: impl Fn(&[String], &[f64]) -> Result<Option<Vec<u32>>>,
 ) -> Result<Evaluated> {
     let mut margins = Margins::new(candidate, dataset)?;
     let own = match candidate {
         Candidate::Compiled(model) => own_weights(model),
         Candidate::Full(ensemble) => vec![1.0; ensemble.objects.len()],
     };
-    if let Some(weights) = expecting(margins.objects(), &own)? {
+    if let Some(weights) = expecting(&margins.objects, &own)? {
         margins = margins.expecting(weights)?;
     }
     let settings = Settings {
@@ -110,8 +108,8 @@ pub fn measure(
     let confusion = wanted.confusion.map(|touches| -> Result<_> {
         Ok(Confusion {
             touches,
-            touched: margins.tested_names().to_vec(),
-            recognized: margins.objects().to_vec(),
+            touched: margins.tested_names.clone(),
+            recognized: margins.objects.clone(),
             counts: margins.confusion(touches, wanted.groups, wanted.seed)?,
         })
     });

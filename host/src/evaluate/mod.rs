@@ -37,7 +37,7 @@ mod approaches;
 mod cost_of_noise;
 mod curve;
 mod draws;
-mod error;
+pub(crate) mod error;
 mod full;
 mod margins;
 mod measure;
@@ -59,26 +59,26 @@ pub use approaches::Approaches;
 #[cfg(feature = "train")]
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
-pub use error::{EnoughRecorded, EvaluateProblem};
 pub(crate) use margins::OfTouches;
 #[cfg(feature = "train")]
 pub(crate) use margins::best;
 pub use margins::{Margins, delivered};
 #[cfg(feature = "train")]
 pub(crate) use margins::{leading, objects_of};
-pub use measure::{Confusion, Evaluated, Expecting, Wanted, measure, own_weights};
+pub use measure::{Confusion, Evaluated, Wanted, measure, own_weights};
 #[cfg(feature = "train")]
 pub(crate) use noisy::ROBOTS;
 pub use noisy::add_noise;
 pub use palpate_trees::verify::{
     self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict,
 };
-pub use plan::{Active, ActiveFacts, Hardest, Planned, evaluate_active, plan};
+pub use plan::{ActiveFacts, Hardest, Planned, plan};
 pub(crate) use promise::by_theory;
 pub use promise::{AlarmCheck, Finding, PromiseCheck};
 pub(crate) use sequential::significant;
 pub use sequential::{Sequential, SequentialSettings};
-pub use strangers::{DETECTED_BY, OnStrangers, strangers};
+pub use strangers::OnStrangers;
+pub(crate) use strangers::strangers;
 pub use switch::{Rule, Stopped, Switched};
 
 use crate::error::{Error, Result};
@@ -118,7 +118,7 @@ pub struct Settings {
 
 impl Settings {
     /// The settings of its sequences.
-    pub fn sequences(&self) -> SequentialSettings {
+    pub(crate) fn sequences(&self) -> SequentialSettings {
         let Self { error_rate, max_touches, groups, seed, .. } = *self;
         SequentialSettings { error_rate, max_touches, sequences: groups, seed }
     }
@@ -177,7 +177,7 @@ pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation
     }
     let stopping = settings.sequences();
     let sequential = margins.sequential(&stopping)?;
-    let approaches = margins.hold_approaches().then(|| margins.approaches(&settings.at_approaches, &stopping));
+    let approaches = margins.hold_approaches.then(|| margins.approaches(&settings.at_approaches, &stopping));
     let approaches = approaches.transpose()?;
     let of_object = |position| settings.at.iter().map(|&at| curve.object_accuracy(position, at)).collect();
     let correct: Vec<Vec<Estimate>> = (0..margins.tested.len()).map(of_object).collect();
@@ -200,7 +200,7 @@ impl Margins<'_> {
         let is_own = settings.error_rate.is_none();
         let promise = || self.check_promise(outcomes, sequential.max_touches, &settings.noise, active);
         Evaluation {
-            descriptor: self.descriptor().name(),
+            descriptor: self.descriptor.name(),
             touches: self.touch_count(),
             groups: settings.groups,
             accuracy: accuracies.all,
@@ -210,7 +210,7 @@ impl Margins<'_> {
             false_alarms: if is_own { self.check_alarms(outcomes) } else { None },
             sequential,
             approaches,
-            patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(self.shares()).collect(),
+            patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(self.shares).collect(),
         }
     }
 }

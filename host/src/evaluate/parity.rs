@@ -207,7 +207,7 @@ fn compare_verdicts<'t, const N: usize>(
     let mut draws = 100 * u64::from(stopping.max_touches());
     while let Some(margins) = draw.next()
         && draws > 0
-        && (compiled.verdict() == Verdict::Undecided || full.verdict() == Verdict::Undecided)
+        && (compiled.verdict() == Verdict::Undecided || full.verdict == Verdict::Undecided)
     {
         draws -= 1;
         if let Some((of_full, of_compiled)) = margins {
@@ -215,7 +215,7 @@ fn compare_verdicts<'t, const N: usize>(
             full.push(of_full);
         }
     }
-    Ok(match (compiled.verdict(), full.verdict()) {
+    Ok(match (compiled.verdict(), full.verdict) {
         (a, b) if a == b => (0, 0),
         (
             Verdict::Recognized { object: a, touches: first, .. },

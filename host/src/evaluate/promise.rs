@@ -97,7 +97,7 @@ impl Margins<'_> {
         let sum = |of: fn(&Wrong) -> f64| each.iter().map(of).sum();
         let all = Wrong { given: sum(|of| of.given), wrong: sum(|of| of.wrong), spread: sum(|of| of.spread) };
         let is_above = |of: &Wrong| of.finding_of(promised, each.len()) == Finding::Broken;
-        let named = self.tested_names().iter().zip(&each).filter(|(_, of)| is_above(of));
+        let named = self.tested_names.iter().zip(&each).filter(|(_, of)| is_above(of));
         let Estimate { value, standard_error } = all.estimate();
         Some(AlarmCheck {
             promised,
@@ -139,9 +139,9 @@ impl Margins<'_> {
         }
         // A model that waits for full touches gets no other ones, whatever the data set holds.
         let takes_others = model.trained_touches().counted != Counted::Full;
-        if takes_others && promise.approaches != self.hold_approaches() {
+        if takes_others && promise.approaches != self.hold_approaches {
             let what = |approaches| if approaches { "every approach" } else { "full touches only" };
-            void.push(format!("promised for {}, tested on {}", what(promise.approaches), what(self.hold_approaches())));
+            void.push(format!("promised for {}, tested on {}", what(promise.approaches), what(self.hold_approaches)));
         }
         let (known, tested) = (self.candidate.known_count(), self.tested_outputs());
         if tested < known {
@@ -203,13 +203,13 @@ impl Margins<'_> {
 
     fn wrong_of_names(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, Wrong> {
         let wrong = |object: usize| self.wrong_of(outcomes, |_, named| named == object);
-        let names = self.objects().iter().cloned().enumerate();
+        let names = self.objects.iter().cloned().enumerate();
         names.map(|(object, name)| (name, wrong(object))).filter(|(_, of)| of.given > 0.0).collect()
     }
 
     fn wrong_of_objects(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, Wrong> {
         let wrong = |position: usize| self.wrong_of(outcomes, |touched, _| touched == position);
-        let names = self.tested_names().iter().cloned().enumerate();
+        let names = self.tested_names.iter().cloned().enumerate();
         names.map(|(position, name)| (name, wrong(position))).filter(|(_, of)| of.given > 0.0).collect()
     }
 

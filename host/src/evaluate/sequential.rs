@@ -29,7 +29,7 @@ pub struct SequentialSettings {
 }
 
 /// Results of a recognizer that stops by itself, counted in touches or approaches. Each object is weighted by its prior: equally, unless the model or
-/// [`Margins::expecting`] says otherwise.
+/// weights of the objects say otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sequential {
     /// Error rate that it was asked to keep: the promised rate, or that of the posterior.
@@ -193,7 +193,7 @@ impl Margins<'_> {
         let values = estimates.iter().map(|estimate| estimate.value);
         let weights = (0..).map(|position| self.frequency(position));
         Figure {
-            per_object: self.tested_names().iter().cloned().zip(values).collect(),
+            per_object: self.tested_names.iter().cloned().zip(values).collect(),
             all: Estimate::weighted(estimates.iter().copied().zip(weights)),
         }
     }
@@ -248,7 +248,7 @@ impl Margins<'_> {
         stopping: Stopping,
         approaches: impl Iterator<Item = Option<u32>>,
     ) -> Outcome {
-        let objects = self.objects().len();
+        let objects = self.objects.len();
         let at = |touch: u32| row(touch as usize, objects);
         let outcome = match &self.tested[position].values {
             Values::Compiled(model, values) => {

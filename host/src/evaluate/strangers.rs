@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Numbers of touches by which strangers are counted as detected.
-pub const DETECTED_BY: [usize; 3] = [30, 60, 120];
+const DETECTED_BY: [usize; 3] = [30, 60, 120];
 
 /// The largest share of sequences with used up touches at which a figure is given.
 const USED_UP: f64 = 0.01;
@@ -48,13 +48,13 @@ pub struct OnStrangers {
 ///
 /// # Errors
 /// As [`Margins::sequential`].
-pub fn strangers(
+pub(crate) fn strangers(
     known: (&Margins<'_>, &Sequential),
     strangers: &Margins<'_>,
     settings: &SequentialSettings,
 ) -> Result<OnStrangers> {
     let found = strangers.sequential(settings)?;
-    let names = || strangers.tested_names().iter().cloned();
+    let names = || strangers.tested_names.iter().cloned();
     let limit = usize::try_from(found.max_touches).unwrap_or(usize::MAX);
     let mean = |of: &dyn Fn(&[Outcome]) -> f64| {
         found.outcomes.iter().map(|outcomes| of(outcomes)).sum::<f64>() / found.outcomes.len().max(1) as f64
@@ -88,7 +88,7 @@ pub fn strangers(
             .per_object
             .into_iter()
             .map(|(name, share)| {
-                let own = strangers.tested_names().iter().position(|tested| *tested == name);
+                let own = strangers.tested_names.iter().position(|tested| *tested == name);
                 let outcomes = own.and_then(|own| found.outcomes.get(own)).map_or(&[][..], Vec::as_slice);
                 (name, known_if(used_up(limit)(outcomes), share))
             })

@@ -64,7 +64,7 @@ impl Margins<'_> {
     /// [`Setting`](crate::error::Setting) as [`Margins::sequential`], and `switch` if `nats` is not above
     /// 0; [`EvaluateProblem::NotCompiled`] for an ensemble, [`EvaluateProblem::NothingToSwitch`] for a data set of one
     /// object.
-    pub fn switched(&self, settings: &SequentialSettings, nats: f32) -> Result<Switched> {
+    pub(crate) fn switched(&self, settings: &SequentialSettings, nats: f32) -> Result<Switched> {
         let stopping = self.stopping(settings)?;
         if !(nats.is_finite() && nats > 0.0) {
             return Err(Error::setting("switch", nats, "a number of nats above 0, such as 5"));
@@ -113,7 +113,7 @@ impl Margins<'_> {
         };
         let still = [false, true].map(|forgets| run(forgets, &mut self.rows(position, group, seed)));
         let decided = still[0].approaches;
-        let name = &self.tested_names()[position];
+        let name = &self.tested_names[position];
         let mut random = random::generator(seed, Purpose::Switch, name, u64::try_from(group).unwrap_or(u64::MAX));
         let switched = (decided > 1).then(|| {
             let at = random.random_range(1..decided);
@@ -133,7 +133,7 @@ impl Margins<'_> {
         draws.map(move |draw| {
             let touch = self.approach(position, group, draw)?;
             match &self.tested[position].values {
-                Values::Compiled(_, values) => Some(&values[row(touch as usize, self.objects().len())]),
+                Values::Compiled(_, values) => Some(&values[row(touch as usize, self.objects.len())]),
                 Values::Full(_) => None,
             }
         })

@@ -45,7 +45,7 @@ impl TouchesTogether for Together {
 }
 
 /// The margins of touches in the model's units, one row for each touch, on all threads.
-pub fn margins_of_touches<T: Borrow<Touch> + Sync>(model: &Model<'_>, touches: &[T]) -> Vec<i32> {
+pub(crate) fn margins_of_touches<T: Borrow<Touch> + Sync>(model: &Model<'_>, touches: &[T]) -> Vec<i32> {
     let objects = model.object_count();
     let mut margins = vec![0; touches.len() * objects];
     let tasks = margins.par_chunks_mut(AT_ONCE * objects).zip(touches.par_chunks(AT_ONCE));

@@ -151,7 +151,7 @@ impl Densities {
                 Some(factor * time + late[finger] + noise * normal)
             });
             let first = times.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-            let end = self.late.as_ref().map_or(f64::INFINITY, |late| first + late.window());
+            let end = self.late.as_ref().map_or(f64::INFINITY, |late| first + late.window);
             Observed::of_times(times.map(|time| time.filter(|time| *time <= end)))
         };
         let is_kept = |observed: &Observed| match kept {

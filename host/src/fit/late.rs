@@ -18,7 +18,7 @@ const STEPS: [f64; 5] = [0.75, 0.87, 1.0, 1.15, 1.33];
 #[derive(Debug)]
 pub(super) struct Late {
     /// The recorded stroke as a time, in milliseconds.
-    window: f64,
+    pub(super) window: f64,
     steps: [Step; STEPS.len()],
 }
 
@@ -37,11 +37,6 @@ impl Late {
     /// Tables of simulated approaches that no stroke ended, in milliseconds.
     pub(super) fn new(touches: &[Touch], window: f64) -> Self {
         Self { window, steps: STEPS.map(|step| Step::new(touches, window * step)) }
-    }
-
-    /// The recorded stroke as a time, in milliseconds.
-    pub(super) fn window(&self) -> f64 {
-        self.window
     }
 
     /// Position of a stroke of this many simulated milliseconds among the tables: the lower one, and the share of the next.

@@ -13,14 +13,14 @@ const ODD_SPREAD: f64 = 150.0;
 
 /// Likelihood of one object's touches under a candidate.
 pub(super) struct Explained<'a> {
-    candidate: Hypothesis,
+    pub(super) candidate: Hypothesis,
     smoothed: super::density::Smoothed<'a>,
     shares: [f64; 8],
     /// The stroke: the recorded one as a time, and its effect on the simulated approaches.
     stroke: Option<Stroke>,
     /// The logarithm of the share of approaches that were recorded.
-    recorded: f64,
-    kept: Counted,
+    pub(super) recorded: f64,
+    pub(super) kept: Counted,
     /// [`product`] of each two sets of fingers.
     products: [[f64; 8]; 8],
 }
@@ -38,7 +38,7 @@ impl<'a> Explained<'a> {
     pub(super) fn new(candidate: &Hypothesis, object: &'a Densities, kept: Counted) -> Self {
         let late = object.late.as_ref();
         let stroke =
-            late.map(|late| Stroke { window: late.window(), shares: late.shares(late.window() / candidate.factor) });
+            late.map(|late| Stroke { window: late.window, shares: late.shares(late.window / candidate.factor) });
         let shares = stroke.map_or(object.shares, |stroke| stroke.shares);
         let touched = |fingers: u8| -> f64 { shares[usize::from(fingers)] };
         // An approach is not recorded if every finger that touched missed its contact.
@@ -65,22 +65,9 @@ impl<'a> Explained<'a> {
         self.products[usize::from(touched & FULL)][usize::from(recorded & FULL)]
     }
 
-    pub(super) fn candidate(&self) -> &Hypothesis {
-        &self.candidate
-    }
-
-    pub(super) fn kept(&self) -> Counted {
-        self.kept
-    }
-
     /// The stroke as a time on the recording's clock, in milliseconds; none without one.
     pub(super) fn window(&self) -> Option<f64> {
         self.stroke.map(|stroke| stroke.window)
-    }
-
-    /// The logarithm of the share of approaches that were recorded.
-    pub(super) fn recorded(&self) -> f64 {
-        self.recorded
     }
 
     /// The logarithm of the density of a touch in any pose.

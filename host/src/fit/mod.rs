@@ -39,7 +39,7 @@
 mod advice;
 mod candidate;
 mod density;
-mod error;
+pub(crate) mod error;
 mod late;
 mod layer;
 mod likelihood;
@@ -59,13 +59,12 @@ mod tests;
 mod timer;
 mod touched;
 mod words;
-pub use error::FitProblem;
 pub use outcome::{Fit, GrazingEstimate, Warning};
 pub use suspects::Suspect;
 pub use words::{Estimate, NOT_TOLD, between, offset, offset_between};
 
 use crate::capture;
-use crate::error::{Error, Result};
+use crate::error::{Error, FitProblem, Result};
 use crate::mesh::Object;
 use crate::probe::approach::Probe;
 use crate::probe::noise::Noise;

@@ -153,14 +153,14 @@ fn late_share(after: f64, window: f64, noise: f64) -> f64 {
 pub(super) fn log_density(explained: &Explained<'_>, observed: &Observed, in_pose: &InPose) -> f64 {
     let all = explained.log_density(observed);
     let Some(density) = density(explained, observed, in_pose) else { return all };
-    let posed = density.ln() - explained.recorded();
+    let posed = density.ln() - explained.recorded;
     let most = posed.max(all);
     most + (TRUSTED * (posed - most).exp() + (1.0 - TRUSTED) * (all - most).exp()).ln()
 }
 
 /// The density among the approaches in its pose; none if they all say nothing.
 fn density(explained: &Explained<'_>, observed: &Observed, InPose(approaches): &InPose) -> Option<f64> {
-    let (Hypothesis { factor, late, noise, missed }, kept) = (explained.candidate(), explained.kept());
+    let (Hypothesis { factor, late, noise, missed }, kept) = (&explained.candidate, explained.kept);
     let (mut sum, mut weights) = (0.0, 0.0);
     for Simulated { touched, times, gap } in approaches {
         let seen = |finger: usize| factor * f64::from(times[finger]) + late[finger];

@@ -3,9 +3,8 @@
 //! If the simulated objects would be touched later and no recorded contact is, the hand had stopped at the latest contact or
 //! after it: by about the time of one more contact, at the rate of the simulated ones there.
 
-use super::FitProblem;
 use super::words::Estimate;
-use crate::error::Result;
+use crate::error::{FitProblem, Result};
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Touch;

@@ -16,7 +16,7 @@ pub struct Estimate {
 
 impl Estimate {
     /// The width of the interval; none if it has no end.
-    pub fn width(&self) -> Option<f64> {
+    pub(crate) fn width(&self) -> Option<f64> {
         Some(self.high? - self.low?)
     }
 

@@ -14,7 +14,7 @@ pub const CELLS: usize = 14_336;
 const MANY: usize = 65_536;
 
 /// A locator of the host: with a chip's room for up to 16 objects, with more for more.
-pub trait Locating: Send {
+pub trait Locating: Send + Sync {
     /// Begins another object, with another seed of the choice of approaches.
     fn begin(&mut self, seed: u32);
     /// Takes in the heights of an approach.
@@ -37,6 +37,8 @@ pub trait Locating: Send {
     fn posteriors(&self) -> Vec<f64>;
     /// The next approach; `pose` is how much the pose counts, in 64ths.
     fn choose(&mut self, hand: &Hand, within: u32, pose: u16) -> Approach;
+    /// Number of touches so far.
+    fn touches(&self) -> usize;
     /// Heights that were looked up by the last search, and since.
     fn looked(&self) -> u32;
 }
@@ -118,6 +120,10 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
 
     fn choose(&mut self, hand: &Hand, within: u32, pose: u16) -> Approach {
         self.locator.choose(hand.spacing, hand.stroke.unwrap_or(u32::MAX), within, pose)
+    }
+
+    fn touches(&self) -> usize {
+        self.locator.touches()
     }
 
     fn looked(&self) -> u32 {

@@ -1,6 +1,7 @@
 //! Maps of placements, learned from touches with positions.
 
-use super::{LocateProblem, Settings};
+use super::error::LocateProblem;
+use super::{Maps, Settings};
 use crate::error::{Error, Result};
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, ObjectTouches};
@@ -13,11 +14,11 @@ const TABLE: f64 = 0.3;
 /// Cells without an own sample take the mean of those about them, as far as this, in cells.
 const FILLED: usize = 4;
 /// Two placements of an object are the same where their heights differ by less than this on average, in millimeters.
-const SAME: f64 = 0.8;
+pub(super) const SAME: f64 = 0.8;
 /// Turns that are compared for that.
 const TURNS: usize = 72;
 /// A placement is round where its heights differ from their mean at the same distance by less than this, in millimeters.
-const ROUND: f64 = 0.6;
+const ROUND: f64 = 1.2;
 
 /// A height that a fingertip met, in the placement's frame, in millimeters.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +50,13 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// One with these heights in cells of 1 mm.
+    pub(super) fn of(object: usize, half: [i32; 2], height: impl Fn([i32; 2]) -> f64) -> Self {
+        let heights = places(half).map(height).collect();
+        let (placement, share, cell, known, is_round) = (String::new(), 1.0, 1.0, 1.0, false);
+        Self { object, placement, share, cell, half, heights, known, is_round }
+    }
+
     /// The height of a cell; 0 outside.
     pub(super) fn at(&self, i: i32, j: i32) -> f64 {
         index(self.half, [i, j]).map_or(0.0, |cell| self.heights[cell])
@@ -75,7 +83,7 @@ impl Surface {
     }
 
     /// Mean difference of heights from another's that is turned, over the cells of either.
-    fn differs(&self, other: &Self, turn: f64) -> f64 {
+    pub(super) fn differs(&self, other: &Self, turn: f64) -> f64 {
         let (sin, cos) = turn.sin_cos();
         let (mut sum, mut count) = (0.0, 0.0_f64);
         for ([x, y], height) in self.cells() {
@@ -281,4 +289,21 @@ pub fn probe_of(dataset: &Dataset) -> Result<Probe> {
     let origin = dataset.origin.as_ref();
     let origin = origin.filter(|origin| origin.unit == Length::Millimeter).ok_or(LocateProblem::Unit)?;
     Ok::<_, Error>(origin.probe)
+}
+
+/// The probe that maps were learned with.
+///
+/// # Errors
+/// [`LocateProblem::NoHand`] unless they state one in millimeters.
+pub fn probe_of_maps(maps: &Maps<'_>) -> Result<Probe> {
+    let probe = maps.probe().filter(|probe| probe.length == Length::Millimeter).ok_or(LocateProblem::NoHand)?;
+    Ok(Probe {
+        radius: probe.radius.into(),
+        spacing: probe.spacing.into(),
+        speed: probe.speed.into(),
+        tilt: 0.0,
+        stroke: probe.stroke.map(f64::from),
+        travel: probe.travel.map(f64::from),
+        stroke_tolerance: probe.stroke_tolerance.map(f64::from),
+    })
 }

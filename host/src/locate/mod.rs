@@ -10,20 +10,21 @@
 //! approaches with the chip's own code, and [`calibrate`](fn@calibrate) finds thresholds that keep a promise on approaches to
 //! objects on a simulated table, chosen or at random.
 
-mod error;
+pub(crate) mod error;
 mod follow;
 mod learn;
+mod pose;
 mod promise;
 #[cfg(test)]
 mod tests;
 mod world;
 mod write;
 
-pub use error::LocateProblem;
 pub use follow::{CELLS, Locating, TOUCHES, locating};
-pub use learn::{Surface, learn, probe_of};
-pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, Pose, Seen};
-pub use promise::{Calibrated, Evaluation, Terms, calibrate, evaluate};
+pub use learn::{Surface, learn, probe_of, probe_of_maps};
+pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, Pose, Seen, TESTED};
+pub use pose::{Off, Until};
+pub use promise::{Calibrated, Evaluation, OfObject, Terms, calibrate, evaluate};
 pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};
 pub use write::write;
 
@@ -50,8 +51,11 @@ pub struct Settings {
     pub drift: f64,
     /// Standard deviation of an object's turn in an approach, in degrees.
     pub drift_yaw: f64,
-    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown; 0: never.
-    pub misfit: i16,
+    /// Test for unknown objects: the mean logarithm of the likelihood for each touch of a known object, in 1/64 nat, and how far
+    /// below it may be after one touch. None: no test.
+    pub misfit: Option<(i16, u16)>,
+    /// Factor of the half of poses' intervals, in Q8; 0: 1.
+    pub stretch: u16,
     /// Posterior at which an object is named until the model is calibrated: 1 less this.
     pub error_rate: f64,
     /// Limit of touches.
@@ -70,7 +74,8 @@ impl Default for Settings {
             table_missed: 0.02,
             drift: 0.0,
             drift_yaw: 0.0,
-            misfit: 0,
+            misfit: None,
+            stretch: 0,
             error_rate: 0.01,
             max_touches: 25,
         }

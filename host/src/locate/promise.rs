@@ -1,14 +1,18 @@
 //! Thresholds that keep a promise about located objects, and their test.
 
+use super::error::LocateProblem;
 use super::follow::{Pressed, Pressing};
+use super::pose::{Equivalents, Off, Until};
 use super::world::{Aimed, Drawn, Real, Standing, World};
-use super::{Effort, Hand, LocateProblem, Maps, Seen, locating};
-use crate::calibrate;
+use super::write::{Restated, restated};
+use super::{Effort, Hand, Maps, Seen, TESTED, locating};
+use crate::calibrate::{self, margin_of, odds_of};
 use crate::error::Result;
-use crate::evidence::{self, Follower, Limit, Odds, Sequence};
+use crate::evidence::{self, Follower, Limit, Outcome, Sequence, Totals};
 use crate::probe::approach::Probe;
 use crate::progress::{self, Progress};
 use palpate_onboard::{Familiarity, Stopping};
+use palpate_shared::format::{Promise, PromisedNoise};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -25,6 +29,10 @@ pub struct Terms {
     pub aimed: Aimed,
     /// Noise of hand and table.
     pub real: Real,
+    /// Make a test for unknown objects: no object is named before the eighth touch then.
+    pub unknown: bool,
+    /// Go on until the pose is as sure, beyond the name.
+    pub until: Option<Until>,
     /// How much the pose counts where approaches are chosen, in 64ths.
     pub pose: u16,
     /// Seed of all random numbers.
@@ -58,7 +66,7 @@ pub struct Calibrated {
 }
 
 /// Results of an evaluation on a simulated table.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Evaluation {
     /// Sequences.
     pub sequences: usize,
@@ -72,17 +80,42 @@ pub struct Evaluation {
     pub unknown: usize,
     /// Approaches on average.
     pub mean_approaches: f64,
-    /// Median and 95 % quantile of the distance of right names' first pose from the truth, in millimeters.
+    /// Median and 95 % quantile of the distance of right names' poses from the truth, in millimeters.
     pub off: [f64; 2],
-    /// For each object its name, approaches on average, and wrong names.
-    pub objects: Vec<(String, f64, usize)>,
+    /// Right names, each with a pose.
+    pub poses: usize,
+    /// Poses whose truth is in their intervals, modulo symmetry.
+    pub poses_in_interval: usize,
+    /// Poses within what [`Terms::until`] asks for; all without it.
+    pub poses_within: usize,
+    /// Results for each object.
+    pub objects: Vec<OfObject>,
     /// Heights that an approach looked up on average, and at most.
     pub looked: [u64; 2],
+}
+
+/// Results for an object.
+#[derive(Clone, Debug, Serialize)]
+pub struct OfObject {
+    /// Its name.
+    pub name: String,
+    /// Approaches on average.
+    pub mean_approaches: f64,
+    /// Names given to it.
+    pub given: usize,
+    /// Wrong ones.
+    pub wrong: usize,
+    /// Times that it was called unknown.
+    pub unknown: usize,
 }
 
 /// Finds the loosest threshold that keeps a promise, on sequences of approaches to these objects, each followed by the chip's own
 /// code: Learn-then-Test by fixed-sequence testing, as for all models. Chosen approaches depend on the follower, so they are played
 /// with it.
+///
+/// Before, half as many other sequences say how unlikely touches of a known object may be, where unknown ones are to be found (1 %
+/// of them are less likely at some touch), and by what factor the intervals of poses must be wider to hold 95 % of the poses at which names are sure (split
+/// conformal prediction).
 ///
 /// # Errors
 /// [`LocateProblem`] for maps without a hand or objects that they do not know; [`CalibrateProblem`](crate::error::CalibrateProblem)
@@ -94,13 +127,39 @@ pub fn calibrate(
     terms: &Terms,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
-    let calibrate::Terms { rate, confidence, .. } = terms.promise;
-    let strictest = ((1.0 - rate) / rate).ln() + STRICTER;
-    let sequences = follow(maps, standing, probe, terms, strictest, progress)?;
+    let calibrate::Terms { rate, confidence, per } = terms.promise;
+    let own = ((1.0 - rate) / rate).ln();
+    let plain = Restated { odds: 0, max_touches: terms.max_touches, misfit: None, stretch: 0, promise: None };
+    let bytes = restated(maps, &plain)?;
+    let plain_maps = opened(&bytes)?;
+    let before = Terms { sequences: terms.sequences.div_ceil(2), seed: terms.seed.wrapping_add(1), ..*terms };
+    // Where a test is to decide, sequences are as long as it takes.
+    let least = if terms.unknown { TESTED } else { 1 };
+    let each = play(plain_maps, standing, probe, &before, (odds_of(own), least), progress)?;
+    let misfit = terms.unknown.then(|| misfit(&each));
+    let stated = Restated { misfit, stretch: stretch(&each), ..plain };
+    let bytes = restated(maps, &stated)?;
+    let strictest = own + STRICTER;
+    let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest, progress)?;
     let names: Vec<String> = (0..maps.objects()).map(|object| maps.object_name(object).to_owned()).collect();
     let chosen = calibrate::choose(&sequences, &names, strictest, &terms.promise)?;
-    let odds = chosen.odds.of(0);
-    let model = super::write::restated(maps, odds, terms.max_touches)?;
+    let odds = chosen.odds.strictest();
+    let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+    let promise = Promise {
+        rate,
+        confidence,
+        per,
+        approaches: true,
+        active: terms.aimed == Aimed::Chosen,
+        groups: false,
+        sequences: count(chosen.sequences),
+        given: count(chosen.given),
+        wrong: count(chosen.wrong),
+        mean_thousandths: (chosen.mean_approaches * 1_000.0).round() as u32,
+        max_touches: terms.max_touches,
+        noise: PromisedNoise::default(),
+    };
+    let model = restated(maps, &Restated { odds, promise: Some(promise), ..stated })?;
     Ok(Calibrated {
         model,
         promised: rate,
@@ -110,15 +169,47 @@ pub fn calibrate(
         given: chosen.given,
         wrong: chosen.wrong,
         mean_approaches: chosen.mean_approaches,
-        margin: calibrate::margin_of(odds),
+        margin: margin_of(odds),
     })
 }
 
 /// Nats beyond the posterior's own threshold at which the strictest is.
 const STRICTER: f64 = 4.0;
+/// Share of known objects that may be called unknown.
+const ALARMS: f64 = 0.01;
+
+fn opened(bytes: &[u8]) -> Result<Maps<'_>> {
+    Ok(Maps::new(bytes).map_err(|error| LocateProblem::Refused { error })?)
+}
+
+/// The mean likelihood for each touch, and how far below it all but a share of known objects stay: by a root of the number of
+/// touches, since likelihoods of touches are nearly independent.
+fn misfit(each: &[Played]) -> (i16, u16) {
+    let last: Vec<f64> = each.iter().filter_map(|played| Some(f64::from(*played.fits.last()?))).collect();
+    let mean = last.iter().sum::<f64>() / last.len().max(1) as f64;
+    let below = |played: &Played| {
+        let each =
+            (TESTED..).zip(&played.fits).map(|(touches, fit)| (mean - f64::from(*fit)) * (touches as f64).sqrt());
+        each.fold(0.0, f64::max)
+    };
+    let mut widths: Vec<f64> = each.iter().map(below).collect();
+    widths.sort_by(f64::total_cmp);
+    let place = ((widths.len() as f64 * (1.0 - ALARMS)).ceil() as usize).min(widths.len()).saturating_sub(1);
+    let width = widths.get(place).copied().unwrap_or(0.0);
+    ((mean.round() as i16).min(-1), width.ceil() as u16)
+}
+
+/// The factor in Q8 by which intervals hold 95 % of the poses.
+fn stretch(each: &[Played]) -> u16 {
+    let mut parts: Vec<f64> = each.iter().filter_map(|played| played.in_intervals).collect();
+    parts.sort_by(f64::total_cmp);
+    let place = ((parts.len() + 1) as f64 * 0.95).ceil() as usize;
+    let factor = parts.get(place.saturating_sub(1).min(parts.len().saturating_sub(1))).copied().unwrap_or(1.0);
+    ((factor * 256.0).ceil() as u16).max(1)
+}
 
 /// Follows sequences to a margin.
-pub(super) fn follow(
+fn follow(
     maps: Maps<'_>,
     standing: &[Standing],
     probe: &Probe,
@@ -139,6 +230,59 @@ pub(super) fn follow(
     Ok(each.concat())
 }
 
+/// A sequence that was played to its end.
+#[derive(Clone, Debug)]
+struct Played {
+    outcome: Outcome,
+    /// Likelihoods of the best cell for each touch, from where a test decides.
+    fits: Vec<i32>,
+    /// How far the pose is from the truth; none if the object does not lie like that, or no name was given.
+    off: Option<Off>,
+    /// The same in units of the pose's intervals; far outside if the object does not lie like that.
+    in_intervals: Option<f64>,
+    looked: [u64; 2],
+}
+
+/// Plays sequences until a name is sure, and with [`Terms::until`] its pose.
+fn play(
+    maps: Maps<'_>,
+    standing: &[Standing],
+    probe: &Probe,
+    terms: &Terms,
+    (odds, least): (u64, usize),
+    progress: &dyn Progress,
+) -> Result<Vec<Played>> {
+    let setup = Setup::new(maps, standing, probe, terms)?;
+    let equivalents = Equivalents::new(maps, standing, probe);
+    progress.begin("sequences", Some(terms.sequences as u64));
+    let of = |index: usize| -> Result<Played> {
+        progress::advance(progress, 1)?;
+        let (mut pressed, mut pressing) = setup.sequence(index as u64);
+        let (mut outcome, mut fits, mut pose) = (Outcome::default(), Vec::new(), None);
+        let Ok(_) = evidence::follow(&mut pressed, &mut pressing, |follower, counted| {
+            (outcome.touches, outcome.approaches) = (counted.touches as usize, counted.approaches as usize);
+            let familiarity = follower.familiarity();
+            outcome.unknown = familiarity == Familiarity::Stranger;
+            if counted.touches as usize >= TESTED {
+                fits.push(follower.locating.fit());
+            }
+            let leader = follower.leader();
+            let first = follower.locating.poses(leader).first().copied();
+            let is_sure = terms.until.is_none_or(|until| first.is_some_and(|pose| until.is_met(&pose)));
+            let may_name = familiarity == Familiarity::Known && counted.touches as usize >= least;
+            if may_name && follower.rivals() <= odds && is_sure {
+                (outcome.recognized, pose) = (Some(leader), first);
+            }
+            outcome.unknown || outcome.recognized.is_some() || counted.touches >= terms.max_touches
+        });
+        let off = pose.and_then(|pose| equivalents.off(&pressed.before, &pose));
+        let is_right = outcome.recognized == Some(pressed.class);
+        let in_intervals = pose.filter(|_| is_right).map(|pose| off.map_or(1e3, |off| off.in_intervals(&pose)));
+        Ok(Played { outcome, fits, off, in_intervals, looked: pressing.looked })
+    };
+    (0..terms.sequences).into_par_iter().map(of).collect()
+}
+
 /// Plays sequences to the model's own threshold.
 ///
 /// # Errors
@@ -150,59 +294,59 @@ pub fn evaluate(
     terms: &Terms,
     progress: &dyn Progress,
 ) -> Result<Evaluation> {
-    let setup = Setup::new(maps, standing, probe, terms)?;
-    progress.begin("sequences", Some(terms.sequences as u64));
-    let odds = Odds::All(maps.stopping().odds());
-    let margin = calibrate::margin_of(odds.of(0));
-    let limit = Limit { margin, max_touches: terms.max_touches };
-    let of = |index: usize| -> Result<_> {
-        progress::advance(progress, 1)?;
-        let (mut pressed, mut pressing) = setup.sequence(index as u64);
-        let Ok(found) = evidence::sequences(&mut pressed, &mut pressing, 1, limit);
-        let unknown = pressing.locating.familiarity() == Familiarity::Stranger;
-        let pose = pressing.locating.poses(pressing.leader()).first().copied();
-        let truth = pressed.before;
-        let off = pose.map(|pose| {
-            let [x, y] = pose.position.map(|micrometers| f64::from(micrometers) / 1_000.0);
-            (x - truth.place[0]).hypot(y - truth.place[1])
-        });
-        Ok((found, unknown, off, pressing.looked))
-    };
-    let each = (0..terms.sequences).into_par_iter().map(of).collect::<Result<Vec<_>>>()?;
-    let mut evaluation = Evaluation { sequences: terms.sequences, ..Evaluation::default() };
-    let mut objects: Vec<(String, f64, usize, usize)> =
-        standing.iter().map(|object| (object.name.clone(), 0.0, 0, 0)).collect();
-    let (mut offs, mut approaches, mut looked) = (Vec::new(), 0, [0, 0]);
-    for (index, (found, unknown, off, work)) in each.into_iter().enumerate() {
-        let Some(sequence) = found.first() else { continue };
-        let outcome = sequence.outcome(&odds);
-        let (_, sum, wrong, count) = &mut objects[index % standing.len()];
-        *sum += outcome.approaches as f64;
-        *count += 1;
-        approaches += outcome.approaches;
-        looked = [looked[0] + work[0], looked[1].max(work[1])];
-        match outcome.recognized {
-            Some(_) if outcome.is_wrong(sequence.object) => {
-                evaluation.wrong += 1;
-                *wrong += 1;
-                evaluation.given += 1;
-            }
-            Some(_) => {
-                evaluation.given += 1;
-                offs.extend(off);
-            }
-            None if unknown => evaluation.unknown += 1,
-            None => evaluation.undecided += 1,
-        }
-    }
+    let each = play(maps, standing, probe, terms, (maps.stopping().odds(), 1), progress)?;
+    let class_of = classes(maps, standing);
+    let number = |index: usize| index % standing.len().max(1);
+    let outcome = |(index, played): (usize, &Played)| (class_of[number(index)], played.outcome);
+    let totals = Totals::of(each.iter().enumerate().map(outcome));
+    let mut offs: Vec<f64> =
+        each.iter().filter_map(|played| played.off).map(|Off { millimeters: [x, y], .. }| x.hypot(y)).collect();
     offs.sort_by(f64::total_cmp);
     let quantile = |share: f64| offs.get((offs.len() as f64 * share) as usize).copied().unwrap_or(f64::NAN);
-    evaluation.off = [quantile(0.5), quantile(0.95)];
-    evaluation.mean_approaches = approaches as f64 / terms.sequences.max(1) as f64;
-    evaluation.looked = [looked[0] / (approaches as u64).max(1), looked[1]];
-    evaluation.objects =
-        objects.into_iter().map(|(name, sum, wrong, count)| (name, sum / count.max(1) as f64, wrong)).collect();
-    Ok(evaluation)
+    let right = each.iter().filter(|played| played.in_intervals.is_some()).count();
+    let inside = each.iter().filter(|played| played.in_intervals.is_some_and(|part| part <= 1.0)).count();
+    let near = |off: &Off| {
+        terms.until.is_none_or(|until| {
+            off.degrees <= until.degrees && off.millimeters.iter().all(|off| off.abs() <= until.millimeters)
+        })
+    };
+    let within =
+        each.iter().filter(|played| played.in_intervals.is_some() && played.off.as_ref().is_some_and(near)).count();
+    let approaches: usize = each.iter().map(|played| played.outcome.approaches).sum();
+    let looked: u64 = each.iter().map(|played| played.looked[0]).sum();
+    let of_object = |(object, stands): (usize, &Standing)| {
+        let own = each.iter().enumerate().filter(|(index, _)| number(*index) == object).map(outcome);
+        let totals = Totals::of(own);
+        OfObject {
+            name: stands.name.clone(),
+            mean_approaches: totals.mean_approaches(),
+            given: totals.given,
+            wrong: totals.wrong,
+            unknown: totals.unknown,
+        }
+    };
+    Ok(Evaluation {
+        sequences: totals.sequences,
+        given: totals.given,
+        wrong: totals.wrong,
+        undecided: totals.undecided(),
+        unknown: totals.unknown,
+        mean_approaches: totals.mean_approaches(),
+        off: [quantile(0.5), quantile(0.95)],
+        poses: right,
+        poses_in_interval: inside,
+        poses_within: within,
+        objects: standing.iter().enumerate().map(of_object).collect(),
+        looked: [looked / (approaches as u64).max(1), each.iter().map(|played| played.looked[1]).max().unwrap_or(0)],
+    })
+}
+
+/// Each object's number in the model; beyond all for one that it does not know.
+fn classes(maps: Maps<'_>, standing: &[Standing]) -> Vec<usize> {
+    let class = |object: &Standing| {
+        (0..maps.objects()).find(|&known| maps.object_name(known) == object.name).unwrap_or(usize::MAX)
+    };
+    standing.iter().map(class).collect()
 }
 
 /// Everything that sequences share.
@@ -218,12 +362,9 @@ impl<'s> Setup<'s> {
     fn new(maps: Maps<'s>, standing: &'s [Standing], probe: &'s Probe, terms: &'s Terms) -> Result<Self> {
         let hand = Hand::of(&maps).ok_or(LocateProblem::NoHand)?;
         let range = f64::from(maps.range()) / 1_000.0;
-        let class = |object: &Standing| {
-            (0..maps.objects()).find(|&known| maps.object_name(known) == object.name).unwrap_or(usize::MAX)
-        };
         // A placement's origin stays within the range, with a cell to spare.
         let world = World { standing, probe, real: terms.real, range: range - 1.0, seed: terms.seed };
-        Ok(Self { maps, hand, world, class_of: standing.iter().map(class).collect(), terms })
+        Ok(Self { maps, hand, world, class_of: classes(maps, standing), terms })
     }
 
     fn sequence(&self, index: u64) -> (Pressed<'_>, Pressing<'_>) {

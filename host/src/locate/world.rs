@@ -43,11 +43,28 @@ pub struct Real {
     /// Standard deviation of each fingertip's offset across the row and along it, in millimeters, the same for all approaches of an
     /// object: fingers that are bent.
     pub bent: f64,
+    /// Standard deviation of each fingertip's height, in millimeters, the same for all approaches of an object.
+    pub tips: f64,
+    /// Height of the table in the frame that heights are stated in, in millimeters.
+    pub table: f64,
+    /// Turn of the row of fingers beyond the stated one, in degrees.
+    pub turned: f64,
 }
 
 impl Default for Real {
     fn default() -> Self {
-        Self { height: 0.5, lost: 0.02, position: 0.0, drift: 0.0, drift_yaw: 0.0, size: 1.0, bent: 0.0 }
+        Self {
+            height: 0.5,
+            lost: 0.02,
+            position: 0.0,
+            drift: 0.0,
+            drift_yaw: 0.0,
+            size: 1.0,
+            bent: 0.0,
+            tips: 0.0,
+            table: 0.0,
+            turned: 0.0,
+        }
     }
 }
 
@@ -124,7 +141,11 @@ impl World<'_> {
         let place = [0; 2].map(|_| (2.0 * random.random::<f64>() - 1.0) * self.range);
         let yaw = random.random::<f64>() * std::f64::consts::TAU;
         let bent = [[0; 2]; FINGERS].map(|axes| axes.map(|_| self.real.bent * normal(&mut random)));
-        Drawn { world: *self, truth: Truth { object, placement, place, yaw }, random, bent }
+        let tips = match self.real.tips {
+            0.0 => [0.0; FINGERS],
+            tips => [0; FINGERS].map(|_| tips * normal(&mut random)),
+        };
+        Drawn { world: *self, truth: Truth { object, placement, place, yaw }, random, bent, tips }
     }
 }
 
@@ -136,6 +157,7 @@ pub struct Drawn<'w> {
     pub truth: Truth,
     random: ChaCha8Rng,
     bent: [[f64; 2]; FINGERS],
+    tips: [f64; FINGERS],
 }
 
 impl Drawn<'_> {
@@ -146,14 +168,15 @@ impl Drawn<'_> {
         let (scene, _) = &standing[object].placements[placement];
         let [low, high] = scene.bounds();
         let roll = f64::from(at.roll) / 256.0 * std::f64::consts::TAU;
-        let (row_sin, row_cos) = roll.sin_cos();
+        let (stated_sin, stated_cos) = roll.sin_cos();
+        let (row_sin, row_cos) = (roll + real.turned.to_radians()).sin_cos();
         let stated = [at.x, at.y].map(|micrometers| f64::from(micrometers) / 1_000.0);
         let shift = [0; 3].map(|_| real.position * normal(&mut self.random));
         let (sin, cos) = yaw.sin_cos();
         // The scene is centered on its box; the table is at its lowest point.
         let top = high.z - low.z + 2.0 * probe.radius + 1.0;
         let mut heights = [None; FINGERS];
-        for ((height, bent), finger) in heights.iter_mut().zip(self.bent).zip([-1.0, 0.0, 1.0]) {
+        for (((height, bent), tip), finger) in heights.iter_mut().zip(self.bent).zip(self.tips).zip([-1.0, 0.0, 1.0]) {
             let along = finger * probe.spacing + bent[0];
             let x = stated[0] + shift[0] + along * row_cos - bent[1] * row_sin - place[0];
             let y = stated[1] + shift[1] + along * row_sin + bent[1] * row_cos - place[1];
@@ -162,7 +185,7 @@ impl Drawn<'_> {
             let contact = scene.first_contact(start, DVec3::NEG_Z, probe.radius);
             let met = contact.map_or(0.0, |way| (top - way * real.size - probe.radius).max(0.0));
             let is_lost = self.random.random::<f64>() < real.lost && met > 0.0;
-            *height = (!is_lost).then_some(met + shift[2] + real.height * normal(&mut self.random));
+            *height = (!is_lost).then_some(met + real.table + tip + shift[2] + real.height * normal(&mut self.random));
         }
         let first = heights.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
         // Where every contact was lost, the hand went down to the table.
@@ -174,7 +197,7 @@ impl Drawn<'_> {
             }
             _ => ContactTime::MISSING,
         });
-        let pose = Pose { direction: [0, 0, to_q15(-1.0)], alignment: [row_cos, row_sin, 0.0].map(to_q15) };
+        let pose = Pose { direction: [0, 0, to_q15(-1.0)], alignment: [stated_cos, stated_sin, 0.0].map(to_q15) };
         let position = Position { micrometers: [at.x, at.y, (first * 1_000.0).round() as i32] };
         let mut drift = || real.drift * normal(&mut self.random);
         let moved = [place[0] + drift(), place[1] + drift()];

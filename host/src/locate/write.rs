@@ -1,12 +1,15 @@
 //! Surfaces as the bytes that the chip reads.
 
+use super::Settings;
+use super::error::LocateProblem;
 use super::learn::Surface;
-use super::{LocateProblem, Settings};
-use crate::compile::{OwnedSection, file, restate_header};
+use crate::compile::{OwnedSection, file};
 use crate::error::Result;
 use crate::probe::approach::Probe;
 use palpate_onboard::locate::{BEYOND, DISTANCES, Maps, WIDTHS, WITHIN};
-use palpate_shared::format::{HeaderBuilder, Length, MAPS_LAYOUT, Tag, TrainedProbe};
+use palpate_shared::format::{
+    HEADER_LENGTH, Header, HeaderBuilder, Length, MAPS_LAYOUT, Promise, Section, Tag, TrainedProbe, take_section,
+};
 
 /// 1/16 mm in a millimeter.
 const SIXTEENTHS: f64 = 16.0;
@@ -52,7 +55,7 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
     content.extend(number(settings.range * SIXTEENTHS, 4_096));
     content.extend(number(settings.drift * SIXTEENTHS, 1_023));
     content.extend(number(settings.drift_yaw.to_radians() * 16_384.0, 1_023));
-    content.extend(settings.misfit.to_le_bytes());
+    content.extend(tests(settings.misfit, settings.stretch));
     content.resize(palpate_onboard::locate::MAPS_LENGTH, 0);
     content.extend(records);
     content.extend(likelihoods(settings).into_iter().flat_map(i16::to_le_bytes));
@@ -88,15 +91,58 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
     Ok(bytes)
 }
 
-/// The model with another threshold and limit of touches.
+/// What a calibration states.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Restated {
+    pub(super) odds: u64,
+    pub(super) max_touches: u32,
+    /// See [`Settings::misfit`].
+    pub(super) misfit: Option<(i16, u16)>,
+    /// See [`Settings::stretch`].
+    pub(super) stretch: u16,
+    pub(super) promise: Option<Promise>,
+}
+
+/// The model with other statements.
 ///
 /// # Errors
 /// [`LocateProblem::Refused`] if it could not be read then.
-pub(super) fn restated(maps: Maps<'_>, odds: u64, max_touches: u32) -> Result<Vec<u8>> {
-    let bytes = restate_header(maps.model(), |header| header.with_odds(odds).with_max_touches(max_touches));
+pub(super) fn restated(maps: Maps<'_>, stated: &Restated) -> Result<Vec<u8>> {
+    let Restated { odds, max_touches, misfit, stretch, promise } = *stated;
+    let header = Header::of(maps.model());
+    let length = |length: u32| usize::try_from(length).unwrap_or(usize::MAX);
+    let rest = &maps.model()[HEADER_LENGTH..];
+    let (text, rest) = rest.split_at(length(header.text_length()));
+    let mut own = &rest[..length(header.optional_length())];
+    let mut sections = Vec::new();
+    while let Some(Section { tag, must_understand, content }) = take_section(&mut own) {
+        let mut content = content.to_vec();
+        if tag == Tag::Maps.code() {
+            content[MISFIT..MISFIT + 6].copy_from_slice(&tests(misfit, stretch));
+        }
+        if tag != Tag::Promise.code() {
+            sections.push(OwnedSection { tag, must_understand, content });
+        }
+    }
+    if let Some(promise) = promise {
+        let mut content = Vec::new();
+        promise.write(&mut |part: &[u8]| content.extend_from_slice(part));
+        sections.push(OwnedSection::new(Tag::Promise, false, content));
+    }
+    let header = HeaderBuilder::from(header).with_odds(odds).with_max_touches(max_touches);
+    let bytes = file(header, text.to_vec(), sections, Vec::new())?;
     Maps::new(&bytes).map_err(|error| LocateProblem::Refused { error })?;
     Ok(bytes)
 }
+
+/// The bytes of a test for unknown objects, and of the factor of intervals.
+fn tests(misfit: Option<(i16, u16)>, stretch: u16) -> Vec<u8> {
+    let (mean, width) = misfit.unwrap_or_default();
+    [mean.to_le_bytes(), stretch.to_le_bytes(), width.to_le_bytes()].concat()
+}
+
+/// Place of the misfit in a section of maps.
+const MISFIT: usize = 10;
 
 /// Writes a surface's heights, cells first and then the windows' minima and maxima, and returns how many cells each level has on
 /// each side of its middle.

@@ -17,11 +17,11 @@
 //! let globe = game.add_object("globe", &Mesh::globe(20), 10.0)?;
 //! game.add_model(compiled.model())?;
 //! let mut round = game.round(globe, 1).expect("an object of the game");
-//! while round.players().iter().any(|player| !player.is_done()) {
+//! while round.players.iter().any(|player| !player.is_done()) {
 //!     let approached = game.touch_at_random(&mut round);
 //!     println!("{:?}", approached.touch.times());
 //! }
-//! println!("{:?} after {} approaches", round.players()[0].recognizer().verdict(), round.players()[0].approaches());
+//! println!("{:?} after {} approaches", round.players[0].recognizer.verdict(), round.players[0].approaches);
 //! # Ok(())
 //! # }
 //! ```
@@ -70,15 +70,19 @@ pub struct Round<'m> {
     origin: Origin,
     /// The number of the next sample.
     next: u64,
-    players: Vec<Player<'m>>,
+    /// The models, in the game's order.
+    pub players: Vec<Player<'m>>,
 }
 
 /// A model in a round.
 #[derive(Clone, Debug)]
 pub struct Player<'m> {
-    recognizer: Recognizer<'m, 256>,
-    approaches: u32,
-    refused: Option<Refused>,
+    /// Its recognizer.
+    pub recognizer: Recognizer<'m, 256>,
+    /// Approaches up to its verdict, including those that are not evidence to it.
+    pub approaches: u32,
+    /// Reason why the last approach was no evidence to it, if it was not.
+    pub refused: Option<Refused>,
 }
 
 /// One approach, and its result.
@@ -133,21 +137,6 @@ impl<'m> Game<'m> {
         noise.check()?;
         self.noise = noise;
         Ok(())
-    }
-
-    /// Number of objects.
-    pub fn objects(&self) -> usize {
-        self.objects.len()
-    }
-
-    /// The models.
-    pub fn models(&self) -> &[Model<'m>] {
-        &self.models
-    }
-
-    /// An object's name.
-    pub fn name(&self, object: usize) -> Option<&str> {
-        self.objects.get(object).map(|target| target.name.as_str())
     }
 
     /// An object's surface.
@@ -245,39 +234,12 @@ impl<'m> Game<'m> {
     }
 }
 
-impl<'m> Round<'m> {
-    /// The number of the object that is touched.
-    pub fn object(&self) -> usize {
-        self.object
-    }
-
-    /// The models, in the game's order.
-    pub fn players(&self) -> &[Player<'m>] {
-        &self.players
-    }
-}
-
 impl<'m> Player<'m> {
     fn take(&mut self, touch: &Touch) {
         if !self.is_done() {
             self.approaches = self.approaches.saturating_add(1);
             self.refused = self.recognizer.push(touch).err();
         }
-    }
-
-    /// Its recognizer.
-    pub fn recognizer(&self) -> &Recognizer<'m, 256> {
-        &self.recognizer
-    }
-
-    /// Approaches up to its verdict, including those that are not evidence to it.
-    pub fn approaches(&self) -> u32 {
-        self.approaches
-    }
-
-    /// Reason why the last approach was no evidence to it, if it was not.
-    pub fn refused(&self) -> Option<Refused> {
-        self.refused
     }
 
     /// True if it has a verdict, or gave up.

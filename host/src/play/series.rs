@@ -10,9 +10,11 @@ const MOST_APPROACHES: u64 = 20_000;
 #[derive(Clone, Debug)]
 pub struct Series<'m> {
     seed: u64,
-    rounds: u64,
+    /// Number of rounds finished.
+    pub rounds: u64,
     current: Option<Round<'m>>,
-    scores: Vec<Score>,
+    /// Results of each model, in rounds that all have finished.
+    pub scores: Vec<Score>,
 }
 
 /// Results of one model.
@@ -40,13 +42,13 @@ impl Score {
     }
 
     fn add(&mut self, player: &Player<'_>, object: &str) {
-        let approaches = f64::from(player.approaches());
+        let approaches = f64::from(player.approaches);
         self.rounds += 1;
         self.approaches += approaches;
         self.squares += approaches * approaches;
-        match player.recognizer().verdict() {
+        match player.recognizer.verdict() {
             Verdict::Recognized { object: named, .. } => {
-                self.wrong += u64::from(player.recognizer().model().object_name(named.into()) != object);
+                self.wrong += u64::from(player.recognizer.model().object_name(named.into()) != object);
             }
             _ => self.unnamed += 1,
         }
@@ -56,37 +58,27 @@ impl Score {
 impl<'m> Series<'m> {
     /// A series that has not begun.
     pub fn new(game: &Game<'m>, seed: u64) -> Self {
-        Self { seed, rounds: 0, current: None, scores: vec![Score::default(); game.models().len()] }
-    }
-
-    /// Results of each model, in rounds that all have finished.
-    pub fn scores(&self) -> &[Score] {
-        &self.scores
-    }
-
-    /// Number of rounds finished.
-    pub fn rounds(&self) -> u64 {
-        self.rounds
+        Self { seed, rounds: 0, current: None, scores: vec![Score::default(); game.models.len()] }
     }
 
     /// Goes on until `rounds` are finished, or for about `approaches` approaches. Round k touches object k modulo their
     /// number with a seed of its own.
     pub fn go_on(&mut self, game: &Game<'m>, rounds: u64, approaches: u64) {
-        let objects = game.objects().max(1) as u64;
+        let objects = game.objects.len().max(1) as u64;
         let mut left = approaches;
         while self.rounds < rounds && left > 0 {
             let object = usize::try_from(self.rounds % objects).unwrap_or_default();
             let seed = self.seed.wrapping_add(self.rounds);
             let Some(mut round) = self.current.take().or_else(|| game.round(object, seed)) else { return };
             let is_done =
-                |round: &Round<'_>| round.next >= MOST_APPROACHES || round.players().iter().all(Player::is_done);
+                |round: &Round<'_>| round.next >= MOST_APPROACHES || round.players.iter().all(Player::is_done);
             while left > 0 && !is_done(&round) {
                 game.touch_at_random(&mut round);
                 left -= 1;
             }
             if is_done(&round) {
-                let name = game.name(object).unwrap_or_default();
-                let players = round.players().iter();
+                let name = game.objects.get(object).map_or("", |target| target.name.as_str());
+                let players = round.players.iter();
                 self.scores.iter_mut().zip(players).for_each(|(score, player)| score.add(player, name));
                 self.rounds += 1;
             } else {

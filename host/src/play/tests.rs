@@ -62,19 +62,19 @@ fn a_player_does_what_its_recognizer_does_and_stops_with_the_verdict() {
         let said = alone.push(&approached.touch).err();
         approaches += 1;
         refused += u32::from(said.is_some());
-        let player = &round.players()[0];
-        assert_eq!((player.refused(), player.approaches()), (said, approaches));
-        assert_eq!(player.recognizer().evidence(), alone.evidence());
+        let player = &round.players[0];
+        assert_eq!((player.refused, player.approaches), (said, approaches));
+        assert_eq!(player.recognizer.evidence(), alone.evidence());
     }
     assert!(refused > 0 && refused < approaches);
     let Verdict::Recognized { object: 1, .. } = alone.verdict() else { panic!("{:?}", alone.verdict()) };
-    let player = &round.players()[0];
+    let player = &round.players[0];
     let (posteriors, thresholds) = (player.posteriors(), player.thresholds());
     assert!((posteriors.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     assert!((posteriors[1] - alone.posterior(1).to_f64()).abs() < 1e-6);
     assert!(posteriors[1] >= thresholds[1] && thresholds[1] > 0.9);
     game.touch_at_random(&mut round);
-    assert_eq!(round.players()[0].approaches(), approaches);
+    assert_eq!(round.players[0].approaches, approaches);
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn an_aimed_approach_moves_along_its_line_and_is_none_beside_the_object() {
     ] {
         assert_eq!(game.touch_along(&mut round, point, direction, 0.0), None);
     }
-    assert_eq!(round.players()[0].approaches(), 1);
+    assert_eq!(round.players[0].approaches, 1);
 }
 
 #[test]
@@ -109,11 +109,11 @@ fn a_series_gives_the_same_scores_in_one_go_and_in_small_steps() {
     let mut whole = Series::new(&game, 1);
     whole.go_on(&game, 30, u64::MAX);
     let mut steps = Series::new(&game, 1);
-    while steps.rounds() < 30 {
+    while steps.rounds < 30 {
         steps.go_on(&game, 30, 7);
     }
-    assert_eq!(whole.scores(), steps.scores());
-    let score = whole.scores()[0];
+    assert_eq!(whole.scores, steps.scores);
+    let score = whole.scores[0];
     let (mean, error) = score.mean().unwrap();
     assert!(score.rounds == 30 && mean > 5.0 && mean < 200.0 && error > 0.0 && error < mean, "{score:?}");
 }

@@ -3,8 +3,8 @@
 use super::follow::{self, Policy, Sequence};
 use super::{Pools, Settings, Tried, equally_many, supply};
 use crate::calibrate::{Alarms, OnRecordings, Tally, allowed, binomial_tail, needed};
-use crate::error::{CalibrateProblem, EvaluateProblem, Result};
-use crate::evaluate::{Candidate, EnoughRecorded, OfTouches};
+use crate::error::{CalibrateProblem, EnoughRecorded, EvaluateProblem, Result};
+use crate::evaluate::{Candidate, OfTouches};
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
 

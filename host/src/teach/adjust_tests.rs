@@ -2,6 +2,7 @@ use super::*;
 use crate::compile::{self, CompiledModel};
 use crate::ensemble::train::{self, train};
 use crate::ensemble::{OverTouches, compiled_trained_on};
+use crate::error::TeachProblem;
 use crate::evaluate::{Candidate, Margins};
 use crate::tests::synthetic;
 

@@ -19,7 +19,7 @@ mod balance;
 mod check;
 mod column;
 mod curve;
-mod error;
+pub(crate) mod error;
 mod held_out;
 mod promise;
 mod rows;
@@ -29,7 +29,6 @@ mod tests;
 pub use adjust::{Adjusted, AdjustedObject, Fitness, adjust};
 pub use alone::alone;
 pub use curve::{Curve, Point};
-pub use error::TeachProblem;
 pub use held_out::jitter;
 pub use promise::{Needed, RATE};
 
@@ -147,7 +146,7 @@ pub struct TaughtObject {
 /// Beside outputs that are placements, an object has one output, or one for each placement that its recordings name.
 ///
 /// # Errors
-/// [`TeachProblem`] if the ensemble has leaves of one value or is not over touches, if a name
+/// [`TeachProblem`](crate::error::TeachProblem) if the ensemble has leaves of one value or is not over touches, if a name
 /// is known already, if touches are missing or too few, have no pose, or are not every approach;
 /// [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if probes do;
 /// [`Setting`](crate::error::Setting); [`Error::Cancelled`](crate::Error::Cancelled).

@@ -232,7 +232,7 @@ fn recordings_of_an_object_are_of_all_of_its_placements_unless_they_state_one() 
     let recorded = recorded(&tested, false);
     let only = |weights: Vec<u32>| {
         let margins = Margins::new(Candidate::Compiled(&model), &recorded).unwrap().expecting(weights).unwrap();
-        margins.tested_names().to_vec()
+        margins.tested_names.clone()
     };
     let of = |object: &str| compiled.names().iter().map(|name| u32::from(name.starts_with(object))).collect();
     assert_eq!(only(of("disc")), ["disc"]);

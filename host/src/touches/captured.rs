@@ -90,13 +90,17 @@ fn overlap(a: &Range<u64>, b: &Range<u64>) -> bool {
 /// A checksum of what a touch depends on beside its mesh and its number. What is kept of it (its pose, full touches or all
 /// approaches, what a real probe adds) does not count: data sets that differ in that alone share touches.
 fn settings(origin: &Origin) -> u64 {
-    let Origin { seed, unit, length, probe, aim, scene, .. } = origin;
+    let Origin { seed, unit, length, probe, aim, scene, position, within, .. } = origin;
     // At true size the length means nothing.
     let length = if *unit == Length::Tenth { *length } else { 0.0 };
     let (radius, spacing, tilt) = (probe.radius, probe.spacing, probe.tilt);
     let mut text = format!("{seed} {} {length} {radius} {spacing} {tilt} {}", unit.name(), aim.name());
     if let Some(cone) = scene.cone() {
         text += &format!(" {cone}");
+    }
+    // Approaches with a position are drawn in another way, and end on the table finger by finger.
+    if *position {
+        text += &format!(" position {}", within.map_or("box".into(), |within| within.to_string()));
     }
     CRC.checksum(text.as_bytes())
 }

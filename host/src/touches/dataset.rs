@@ -2,6 +2,7 @@
 
 use super::checksum::checksum;
 use super::files::files;
+use super::text::Alike;
 use super::warning::Warning;
 use super::{Entry, Format, Listing, Log, ObjectTouches, Origin, Recorded, Source, is_log, recording};
 use crate::error::{Error, Place, Result, TouchesProblem};
@@ -67,7 +68,7 @@ impl Dataset {
 
     /// This data set without the contacts that are later than `window` microseconds, such as by the stroke of the probe that a
     /// model is for: what an effector takes for missing.
-    pub fn within(&self, window: Option<u32>) -> Cow<'_, Self> {
+    pub(crate) fn within(&self, window: Option<u32>) -> Cow<'_, Self> {
         match self.touches().any(|touch| hand::late(touch, window).contains(&true)) {
             true => Cow::Owned(self.each(|own| own.changed(|touch| hand::within(touch, window)))),
             false => Cow::Borrowed(self),
@@ -90,7 +91,7 @@ impl Dataset {
         self.objects.iter().flat_map(of).collect()
     }
 
-    /// Adds noise to all touches, made by `robots` robots in turn (see [`ObjectTouches::noisy`]); the origin then states it
+    /// Adds noise to all touches, made by `robots` robots in turn; the origin then states it
     /// too.
     pub fn add_noise(&mut self, noise: &Noise, seed: u64, robots: usize) {
         if noise.is_none() {
@@ -153,7 +154,8 @@ impl Dataset {
     /// # Errors
     /// When the directory cannot be read, holds fewer than two objects or an unfinished capture; when a listed file is
     /// missing, has another number of touches than stated, or is a Parquet file with another checksum; when a file
-    /// holds no touch, and when a line or row is wrong, or a row is of another object (it is named).
+    /// holds no touch, and when a line or row is wrong, or a row is of another object (it is named); when some touches have a
+    /// position and others have none, or `dataset.json` states otherwise.
     pub fn read(directory: &Path) -> Result<Self> {
         let dataset = Self::read_any(directory)?;
         match dataset.objects.as_slice() {
@@ -170,6 +172,7 @@ impl Dataset {
         let dataset = match is_log(directory) {
             true => {
                 let (objects, warnings) = found_in(&[directory.into()])?;
+                alike(&objects)?;
                 Self { warnings, ..Self::new(objects_of(objects)) }
             }
             false => match Listing::read(directory)? {
@@ -212,6 +215,10 @@ impl Dataset {
                 true => recording::read(entry, &path, &mut warnings)?,
                 false => read_listed(entry, listing.origin.format, &path, &mut warnings)?,
             };
+            if touches.first().is_some_and(|touch| touch.position().is_some() != listing.origin.position) {
+                let (has_position, others) = (!listing.origin.position, Listing::STATED);
+                return Err(Error::at(Place::file(&path), TouchesProblem::OtherPosition { has_position, others }));
+            }
             // Of an object whose recording was interrupted before its first touch.
             if may_grow && touches.is_empty() {
                 continue;
@@ -253,6 +260,7 @@ impl Dataset {
             }
             objects.insert(name, found);
         }
+        alike(&objects)?;
         Ok(Self { warnings, ..Self::new(objects_of(objects)) })
     }
 
@@ -275,7 +283,7 @@ impl Dataset {
 
     /// The share of each contact pattern among all touches, in the order of the patterns' codes, each object weighted
     /// equally.
-    pub fn shares(&self) -> [f64; 6] {
+    pub(crate) fn shares(&self) -> [f64; 6] {
         let mut shares = [0.0; 6];
         for touches in self.objects.iter().map(ObjectTouches::touches) {
             let mut counts = [0_usize; 6];
@@ -353,6 +361,16 @@ fn found_in(logs: &[PathBuf]) -> Result<(BTreeMap<String, Found>, Vec<Warning>)>
         warnings.extend(log.skipped());
     }
     Ok((objects, warnings))
+}
+
+/// Refuses objects of which some have positions and others have none.
+fn alike(found: &BTreeMap<String, Found>) -> Result<()> {
+    let mut alike = Alike::default();
+    for Found { touches, file } in found.values() {
+        let admit = |touch: &Touch| alike.admit(*touch).map(drop);
+        touches.touches().iter().try_for_each(admit).map_err(|problem| Error::at(Place::file(file), problem))?;
+    }
+    Ok(())
 }
 
 fn objects_of(found: BTreeMap<String, Found>) -> Vec<ObjectTouches> {
@@ -451,6 +469,22 @@ mod tests {
         }
         std::fs::write(&path, "\n").unwrap();
         assert!(Dataset::read(directory.path()).unwrap_err().to_string().contains("fork.txt: no touches"));
+    }
+
+    #[test]
+    fn objects_with_and_without_positions_are_refused_and_so_are_others_than_the_listing_states() {
+        let directory = captured(Format::Text);
+        let path = directory.path().join("spoon.txt");
+        std::fs::write(&path, "0 0 0 0 0 -1 1 0 0 1 2 3\n".repeat(3)).unwrap();
+        let other = |has_position, others| TouchesProblem::OtherPosition { has_position, others };
+        assert_eq!(problem(directory.path()), other(true, Listing::STATED));
+        let mut listing = Listing::read(directory.path()).unwrap().unwrap();
+        listing.origin.position = true;
+        listing.write(directory.path()).unwrap();
+        assert_eq!(problem(directory.path()), other(false, Listing::STATED));
+        std::fs::remove_file(Listing::path(directory.path())).unwrap();
+        let error = Dataset::read(directory.path()).unwrap_err().to_string();
+        assert!(error.contains("spoon.txt: a position, where the touches before it have none"), "{error}");
     }
 
     #[test]

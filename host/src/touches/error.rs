@@ -7,8 +7,10 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TouchesProblem {
-    /// A line has neither three nor nine fields.
-    #[error("{count} fields where a touch has three times, or three times and six direction cosines")]
+    /// A line has neither three, nor nine, nor twelve fields.
+    #[error(
+        "{count} fields where a touch has three times, three times and six direction cosines, or these and three coordinates"
+    )]
     Fields {
         /// Number of fields.
         count: usize,
@@ -52,6 +54,23 @@ pub enum TouchesProblem {
         there: &'static str,
         /// The vector that is missing.
         missing: &'static str,
+    },
+    /// A position is beyond the range of a touch.
+    #[error("the coordinate {millimeters} mm is farther than the 2147 m that a touch can hold")]
+    FarPosition {
+        /// The coordinate.
+        millimeters: f64,
+    },
+    /// A position without the pose in whose frame it is.
+    #[error("a position without a pose")]
+    PositionWithoutPose,
+    /// A touch has a position and others have none, or the other way round.
+    #[error("{} position, where {others} {}", with(*has_position), if *has_position { "have none" } else { "have one" })]
+    OtherPosition {
+        /// True if this touch has a position.
+        has_position: bool,
+        /// The others.
+        others: &'static str,
     },
     /// A line is not UTF-8.
     #[error("not text (no UTF-8)")]
@@ -362,15 +381,20 @@ impl Problem for TouchesProblem {
             | Self::NegativeTime { .. }
             | Self::LongTime { .. }
             | Self::NotUnit { .. }
+            | Self::FarPosition { .. }
             | Self::NotText => {
                 "Correct the line: three times in seconds, - for a missing contact, and optionally direction and \
-                 alignment."
+                 alignment, and behind them the position in millimeters."
             }
+            Self::PositionWithoutPose => "Give direction and alignment, too.",
+            Self::OtherPosition { .. } => "Give every touch of the data set a position, or none.",
             Self::HalfPose { .. } => "Give both or neither.",
             Self::OtherObject { .. } => "Give each object a file with its name.",
             Self::Row { problem, .. } => match **problem {
                 Self::HalfPose { .. } => "Give both or neither.",
                 Self::OtherObject { .. } => "Give each object a file with its name.",
+                Self::PositionWithoutPose => "Give direction and alignment, too.",
+                Self::OtherPosition { .. } => "Give every touch of the data set a position, or none.",
                 _ => "Correct the row, or capture the object again.",
             },
             Self::NotParquet { .. } | Self::NoColumn { .. } | Self::Column { .. } | Self::NoTouches => {
@@ -450,6 +474,10 @@ fn channels_or_none(channels: &[String]) -> String {
             if more == 0 { format!("it has {shown}") } else { format!("it has {shown} and {more} more") }
         }
     }
+}
+
+fn with(has_position: bool) -> &'static str {
+    if has_position { "a" } else { "no" }
 }
 
 fn with_article(noun: &str) -> String {

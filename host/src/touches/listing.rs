@@ -74,13 +74,13 @@ pub struct Lying {
 
 impl Lying {
     /// The source of its touches.
-    pub fn source(&self) -> Source {
+    pub(crate) fn source(&self) -> Source {
         let millionths = (self.weight * 1e6).round().clamp(0.0, 1e6) as u32;
         Source::Placement { instance: self.instance.clone(), placement: self.name.clone(), millionths }
     }
 
     /// The placement that is a source of touches, if it is one.
-    pub fn of(source: &Source) -> Option<Self> {
+    pub(crate) fn of(source: &Source) -> Option<Self> {
         match source {
             Source::Placement { instance, placement, millionths } => {
                 Some(Self { instance: instance.clone(), name: placement.clone(), weight: f64::from(*millionths) / 1e6 })
@@ -92,7 +92,7 @@ impl Lying {
 
 impl Entry {
     /// Sources of its touches in turn: placements, instances, or none.
-    pub fn sources(&self) -> Vec<Source> {
+    pub(crate) fn sources(&self) -> Vec<Source> {
         match self.placements.is_empty() {
             true => self.instances.iter().cloned().map(Source::Instance).collect(),
             false => self.placements.iter().map(Lying::source).collect(),
@@ -104,8 +104,11 @@ impl Listing {
     /// The file's name.
     pub const FILE: &str = "dataset.json";
 
+    /// The touches as the file states them, for messages.
+    pub(super) const STATED: &str = "the touches that dataset.json states";
+
     /// A listing of objects without touches so far.
-    pub fn new(origin: &Origin, names: impl IntoIterator<Item = String>) -> Self {
+    pub(crate) fn new(origin: &Origin, names: impl IntoIterator<Item = String>) -> Self {
         Self {
             palpate: env!("CARGO_PKG_VERSION").into(),
             complete: false,
@@ -117,7 +120,7 @@ impl Listing {
 
     /// True if a real probe made the touches. Such a data set may grow at any time: what its files hold beyond what is
     /// listed counts, up to the last whole line.
-    pub fn is_recorded(&self) -> bool {
+    pub(crate) fn is_recorded(&self) -> bool {
         !self.recorded.is_empty()
     }
 
@@ -169,7 +172,7 @@ impl Listing {
 
     /// The touches of a listed object, and what each of them is of.
     pub(super) fn with_sources(&self, entry: &Entry, touches: Vec<Touch>) -> Result<ObjectTouches> {
-        let (name, window) = (entry.name.clone(), self.origin.probe.window());
+        let (name, origin) = (entry.name.clone(), &self.origin);
         if self.is_recorded() {
             let recorded = self.recorded.iter().filter(|recorded| recorded.object == name).cloned();
             let mut runs: Vec<_> = recorded.map(|one| (one.touches, Source::Recording(one))).collect();
@@ -180,12 +183,12 @@ impl Listing {
                 runs.push((count, Source::Recording(one)));
             }
             let runs = runs.into_iter().map(|(count, source)| (source, count)).collect();
-            return Ok(ObjectTouches::in_runs(name, touches, runs).of_stroke(window));
+            return Ok(ObjectTouches::in_runs(name, touches, runs).of_origin(origin));
         }
         if entry.counts.is_empty() {
             let meshes = Meshes { checksums: entry.meshes.clone(), millimeters: entry.millimeters };
             let object =
-                ObjectTouches::in_turn(name, touches, &entry.sources(), self.origin.samples().start).of_stroke(window);
+                ObjectTouches::in_turn(name, touches, &entry.sources(), origin.samples().start).of_origin(origin);
             return Ok(object.of_meshes(Some(meshes).filter(|meshes| !meshes.checksums.is_empty())));
         }
         let stated = entry.counts.iter().try_fold(0_u64, |sum, &count| sum.checked_add(count));
@@ -200,11 +203,11 @@ impl Listing {
             return Err(TouchesProblem::BadListing { message }.into());
         }
         let runs = sources.into_iter().zip(entry.counts.iter().copied()).collect();
-        Ok(ObjectTouches::in_runs(name, touches, runs).of_stroke(window))
+        Ok(ObjectTouches::in_runs(name, touches, runs).of_origin(origin))
     }
 
     /// The objects' names.
-    pub fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         self.objects.iter().map(|entry| entry.name.clone()).collect()
     }
 }

@@ -67,11 +67,11 @@ impl Log {
 
     /// Reads a log.
     ///
-    /// Memory: 48 bytes for each touch, up to ten million of them, and that of the largest chunk, at most 256 MiB.
+    /// Memory: 72 bytes for each touch, up to ten million of them, and that of the largest chunk, at most 256 MiB.
     ///
     /// # Errors
     /// When the file cannot be read, is damaged or ends early, has no channel of touches, no touch, or a message on such a
-    /// channel that is none.
+    /// channel that is none; when some touches have a position and others have none.
     pub fn read(path: &Path) -> Result<Self> {
         Self::of(File::open(path).map_err(|error| Error::io(path, "read the touches", error))?, path)
     }
@@ -82,9 +82,13 @@ impl Log {
     /// As [`read`](Self::read).
     pub fn of(bytes: impl Read, path: &Path) -> Result<Self> {
         let (mut touches, mut objects, mut numbers, mut size) = (Vec::new(), Vec::new(), HashMap::new(), 0);
+        let mut alike = text::Alike::default();
         let channels = mcap::read(bytes, path, |Message { time, offset, content }| {
             let Content::Touch(touch, object) = content else { return Ok(()) };
             let wrong = |problem| Err(Error::at(Place::byte(path, offset), problem));
+            if let Err(problem) = alike.admit(touch) {
+                return wrong(problem);
+            }
             if touches.len() == MOST {
                 return wrong(TouchesProblem::TooMany { most: MOST });
             }

@@ -1,8 +1,8 @@
 //! The touches of one object, and what each of them is of.
 
-use super::{Meshes, Recorded};
+use super::{Meshes, Origin, Recorded};
 use crate::probe::hand;
-use crate::probe::noise::Noise;
+use crate::probe::noise::{Noise, Stream};
 use palpate_shared::Touch;
 use std::path::PathBuf;
 
@@ -31,7 +31,7 @@ pub enum Source {
 
 impl Source {
     /// The placement on a table, where it is of one.
-    pub fn placement(&self) -> Option<&str> {
+    pub(crate) fn placement(&self) -> Option<&str> {
         match self {
             Self::Placement { placement, .. } => Some(placement),
             Self::Recording(recorded) => recorded.placement.as_deref(),
@@ -65,6 +65,9 @@ pub struct ObjectTouches {
     /// The stroke of the probe that made them as a time in microseconds: also with noise that is added, a later contact is
     /// missing.
     window: Option<u32>,
+    /// The nominal speed in millimeters per second of the probe that made touches with a position: where noise loses the first
+    /// contact, the hand goes on.
+    speed: Option<f64>,
 }
 
 /// Touches of an object that may be mixed in a sequence: those of one source that one robot made.
@@ -88,6 +91,7 @@ impl ObjectTouches {
             robot_of: Vec::new(),
             meshes: None,
             window: None,
+            speed: None,
         }
     }
 
@@ -108,8 +112,17 @@ impl ObjectTouches {
         }
         // Below the number of the instances.
         let source_of = (0..touches.len() as u64).map(|touch| ((first % count + touch) % count) as u32).collect();
-        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), meshes: None, window: None }
-            .tidied()
+        Self {
+            name: name.into(),
+            touches,
+            sources,
+            source_of,
+            robot_of: Vec::new(),
+            meshes: None,
+            window: None,
+            speed: None,
+        }
+        .tidied()
     }
 
     /// Touches in any order, each with the number of its instance.
@@ -125,7 +138,16 @@ impl ObjectTouches {
         let place = |(_, number): &(Touch, i64)| numbers.partition_point(|other| other < number) as u32;
         let source_of = touches.iter().map(place).collect();
         let sources = numbers.iter().map(|number| Source::Instance(number.to_string())).collect();
-        Self { name: name.into(), touches: all, sources, source_of, robot_of: Vec::new(), meshes: None, window: None }
+        Self {
+            name: name.into(),
+            touches: all,
+            sources,
+            source_of,
+            robot_of: Vec::new(),
+            meshes: None,
+            window: None,
+            speed: None,
+        }
     }
 
     /// Touches of one source after the other: of each as many as are stated, of the last one all the rest.
@@ -143,8 +165,17 @@ impl ObjectTouches {
             sources.push(Source::Object);
             source_of = vec![0; touches.len()];
         }
-        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), meshes: None, window: None }
-            .tidied()
+        Self {
+            name: name.into(),
+            touches,
+            sources,
+            source_of,
+            robot_of: Vec::new(),
+            meshes: None,
+            window: None,
+            speed: None,
+        }
+        .tidied()
     }
 
     /// The touches of several objects, one after the other, as those of one whose sources are all of theirs.
@@ -171,7 +202,7 @@ impl ObjectTouches {
     }
 
     /// Adds more touches of the same object: those of equal sources are of one.
-    pub fn append(&mut self, more: &Self) {
+    pub(crate) fn append(&mut self, more: &Self) {
         self.extend(more, true);
     }
 
@@ -180,7 +211,7 @@ impl ObjectTouches {
             self.meshes = more.meshes.clone().filter(|_| self.is_empty() && may_share);
         }
         if self.is_empty() {
-            self.window = more.window;
+            (self.window, self.speed) = (more.window, more.speed);
         }
         let (before, robots) = (self.touches.len(), self.robot_of.len() + more.robot_of.len());
         if self.source_of.is_empty() {
@@ -238,6 +269,18 @@ impl ObjectTouches {
         Self { window, ..self }
     }
 
+    /// These touches as made by the probe of this origin.
+    #[must_use]
+    pub(crate) fn of_origin(self, origin: &Origin) -> Self {
+        let speed = origin.position.then_some(origin.probe.speed);
+        Self { speed, ..self.of_stroke(origin.probe.window()) }
+    }
+
+    /// The noise of these touches, in any order.
+    pub(crate) fn stream(&self, noise: &Noise, seed: u64) -> Stream {
+        noise.stream(&self.name, self.len(), seed).at_speed(self.speed)
+    }
+
     /// Touches made of these, such as by noise, without contacts later than the stroke.
     pub(crate) fn within_stroke(&self, mut touches: Vec<Touch>) -> Vec<Touch> {
         if self.window.is_some() {
@@ -247,7 +290,7 @@ impl ObjectTouches {
     }
 
     /// The meshes that were touched, if they are known.
-    pub fn meshes(&self) -> Option<&Meshes> {
+    pub(crate) fn meshes(&self) -> Option<&Meshes> {
         self.meshes.as_ref()
     }
 
@@ -304,7 +347,7 @@ impl ObjectTouches {
 
     /// The weights of the object's placements by name, over all of its instances; the greatest first, equal ones by name. They
     /// sum to 1. None if the object was not touched in placements, or a recording states none.
-    pub fn placement_weights(&self) -> Option<Vec<(String, f64)>> {
+    pub(crate) fn placement_weights(&self) -> Option<Vec<(String, f64)>> {
         let mut sums = std::collections::BTreeMap::<&str, f64>::new();
         for (source, weight) in self.source_weights().into_iter().enumerate() {
             *sums.entry(self.placement_of_source(source)?).or_default() += weight;
@@ -414,6 +457,7 @@ impl ObjectTouches {
             robot_of: of(&self.robot_of),
             meshes: self.meshes.clone(),
             window: self.window,
+            speed: self.speed,
         };
         some.tidied()
     }
@@ -438,14 +482,14 @@ impl ObjectTouches {
 
     /// These touches, each changed.
     #[must_use]
-    pub fn changed(&self, change: impl FnMut(&Touch) -> Touch) -> Self {
+    pub(crate) fn changed(&self, change: impl FnMut(&Touch) -> Touch) -> Self {
         Self { touches: self.touches.iter().map(change).collect(), ..self.clone() }
     }
 
     /// The touches with noise, made by `robots` robots in turn within each source. Without a bias robots do not differ, and
     /// their number does not matter; touches that robots made stay those robots'.
     #[must_use]
-    pub fn noisy(&self, noise: &Noise, seed: u64, robots: usize) -> Self {
+    pub(crate) fn noisy(&self, noise: &Noise, seed: u64, robots: usize) -> Self {
         let mut robot_of = self.robot_of.clone();
         if robot_of.is_empty() && noise.has_bias() && robots > 1 {
             let sources = self.sources.len();
@@ -458,7 +502,7 @@ impl ObjectTouches {
                 robot as u32
             }));
         }
-        let stream = noise.stream(&self.name, self.len(), seed);
+        let stream = self.stream(noise, seed);
         let robot = |touch: usize| robot_of.get(touch).copied().unwrap_or(0).into();
         let noisy = self.touches.iter().enumerate().map(|(index, touch)| stream.add(touch, index, robot(index)));
         Self { touches: self.within_stroke(noisy.collect()), robot_of, ..self.clone() }

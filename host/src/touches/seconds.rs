@@ -1,6 +1,6 @@
 //! A touch from numbers, as tables and arrays hold them.
 
-use super::text::{contact_time, unit_vector};
+use super::text::{contact_time, position, unit_vector};
 use crate::error::TouchesProblem;
 use palpate_shared::{ContactTime, Pose, Touch};
 
@@ -27,4 +27,17 @@ pub fn touch_of_seconds(
         (Some(_), None) => Err(TouchesProblem::HalfPose { there: "direction", missing: "alignment" }),
         (None, Some(_)) => Err(TouchesProblem::HalfPose { there: "alignment", missing: "direction" }),
     }
+}
+
+/// The touch with the hand's position, which is in millimeters and is rounded and checked like
+/// [a line of text](super::parse_touch).
+///
+/// # Errors
+/// Describes the wrong number, or says that the touch has no pose.
+pub fn located(touch: Touch, millimeters: [f64; 3]) -> Result<Touch, TouchesProblem> {
+    if let Some(wrong) = millimeters.iter().find(|coordinate| !coordinate.is_finite()) {
+        return Err(TouchesProblem::NotFinite { text: format!("the coordinate {wrong}") });
+    }
+    let position = position(millimeters)?;
+    touch.pose().map(|_| touch.with_position(position)).ok_or(TouchesProblem::PositionWithoutPose)
 }

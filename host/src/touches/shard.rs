@@ -16,7 +16,7 @@ impl Shard {
     pub const WHOLE: Self = Self { number: 1, of: 1 };
 
     /// Range of `samples` samples that belongs to the part.
-    pub fn part(self, samples: u64) -> Range<u64> {
+    pub(crate) fn part(self, samples: u64) -> Range<u64> {
         let before = |number: u64| u64::try_from(u128::from(samples) * u128::from(number) / u128::from(self.of));
         // At most `samples`, so the conversion cannot fail.
         before(self.number - 1).unwrap_or(samples)..before(self.number).unwrap_or(samples)

@@ -20,7 +20,7 @@
 //! # }
 //! ```
 
-mod error;
+pub(crate) mod error;
 mod family;
 pub mod probe;
 #[cfg(test)]
@@ -29,13 +29,12 @@ mod tests;
 use crate::calibrate::{self, Calibrated};
 use crate::compile::{self, Compiled, Core, Layout, Leaf, compile};
 use crate::ensemble::{Ensemble, OverTouches, StatedProbe, train};
-use crate::error::{CalibrateProblem, CompileProblem, Result};
+use crate::error::{CalibrateProblem, CompileProblem, Result, TuneProblem};
 use crate::evaluate::{self, Candidate, Evaluation, Margins};
 use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::touches::Dataset;
 use crate::touches::folds;
-pub use error::TuneProblem;
 use palpate_shared::Descriptor;
 use serde::Serialize;
 use std::collections::BTreeMap;

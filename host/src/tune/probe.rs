@@ -428,7 +428,7 @@ impl Search<'_> {
             undecided: sequential.undecided,
             threshold,
             per_object: sequential.per_object,
-            patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares()).collect(),
+            patterns: ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(margins.shares).collect(),
         })
     }
 

@@ -110,10 +110,12 @@ fn bytes(hex: &str) -> Vec<u8> {
 
 const LITTLE: &str = "00010000 0000000000000000 000000000000d03f 000000000000f87f 01 00000000000000
     000000000000f03f 0000000000000000 0000000000000000 0000000000000000 000000000000f03f 0000000000000000
-    05000000 626f776c00";
+    05000000 626f776c00 01 000000000000
+    000000000000f03f 000000000000e0bf 41b8020af5f4213f";
 const BIG: &str = "00000000 0000000000000000 3fd0000000000000 7ff8000000000000 01 00000000000000
     3ff0000000000000 0000000000000000 0000000000000000 0000000000000000 3ff0000000000000 0000000000000000
-    00000005 626f776c00";
+    00000005 626f776c00 01 000000000000
+    3ff0000000000000 bfe0000000000000 3f21f4f50a02b841";
 
 /// A log with one touch in CDR.
 fn cdr(message_bytes: &[u8]) -> Vec<u8> {
@@ -126,7 +128,7 @@ fn cdr(message_bytes: &[u8]) -> Vec<u8> {
 
 #[test]
 fn cdr_is_read_in_both_orders_of_bytes() {
-    let expected = parse_touch("0 0.25 - 1 0 0 0 1 0").unwrap();
+    let expected = parse_touch("0 0.25 - 1 0 0 0 1 0 1000 -500 0.137").unwrap();
     for hex in [LITTLE, BIG] {
         let whole = bytes(hex);
         // What fills the last word belongs to it.
@@ -155,7 +157,14 @@ fn cdr_is_read_in_both_orders_of_bytes() {
     // No pose: what stands in its place is not looked at.
     let mut without = bytes(LITTLE);
     without[28..84].fill(0);
+    assert!(error(&cdr(&without)).contains("message 1 on /touch: a position without a pose. Give direction"));
+    without[93..].fill(0);
     assert_eq!(read(&cdr(&without)).unwrap().touches()[0].touch, parse_touch("0 0.25 -").unwrap());
+    let mut far = bytes(LITTLE);
+    far[100..108].copy_from_slice(&3e3_f64.to_le_bytes());
+    assert!(error(&cdr(&far)).contains("the coordinate 3000000 mm is farther than the 2147 m"));
+    far[100..108].copy_from_slice(&f64::NAN.to_le_bytes());
+    assert!(error(&cdr(&far)).contains("the coordinate NaN is not finite"), "{}", error(&cdr(&far)));
 }
 
 #[test]
@@ -165,12 +174,41 @@ fn a_definition_counts_without_its_comments_and_another_one_is_refused() {
         file(&[schema, channel(1, 1, "/touch", "cdr"), message(1, 5, &bytes(LITTLE))])
     };
     let bare = "float64[3]   times\nbool has_pose\r\nfloat64[3] direction\nfloat64[3] alignment\nstring object\n\
-                ====\nMSG: another\nint8 x\n";
+                bool has_position\nfloat64[3] position\n====\nMSG: another\nint8 x\n";
     assert_eq!(read(&log(bare)).unwrap().touches().len(), 1);
     let said = error(&log(&TOUCH.replace("float64[3] times", "float32[3] times")));
     assert!(said.contains("/touch (palpate_msgs/msg/Touch) is defined as \"float32[3] times; bool"), "{said}");
     assert!(said.contains("where Palpate has \"float64[3] times; bool has_pose;"), "{said}");
     assert!(VERDICT.contains("float64[] posteriors"));
+}
+
+#[test]
+fn a_log_by_the_definition_of_earlier_versions_is_read() {
+    let before = "float64[3] times\nbool has_pose\nfloat64[3] direction\nfloat64[3] alignment\nstring object\n";
+    let log = |definition: &str, length: usize| {
+        let schema = schema(1, "palpate_msgs/msg/Touch", "ros2msg", definition);
+        file(&[schema, channel(1, 1, "/touch", "cdr"), message(1, 5, &bytes(LITTLE)[..length])])
+    };
+    assert_eq!(read(&log(before, 93)).unwrap().touches()[0].touch, parse_touch("0 0.25 - 1 0 0 0 1 0").unwrap());
+    // Each definition has its own length.
+    assert!(error(&log(before, bytes(LITTLE).len())).contains("31 bytes more than the definition has"));
+    assert!(error(&log(TOUCH, 93)).contains("no touch in CDR: "));
+    assert!(error(&log(&before.replace("string object\n", ""), 93)).contains("is defined as"));
+}
+
+#[test]
+fn a_log_in_which_some_touches_have_a_position_is_refused_at_the_message() {
+    let pose = r#""times": [0, 0.25, null], "pose": {"direction": [0, 0, -1], "alignment": [1, 0, 0]}"#;
+    let with = format!(r#"{{{pose}, "position": [0.001, -0.0000005, 2147.483647]}}"#);
+    let without = format!("{{{pose}}}");
+    let expected = parse_touch("0 0.25 - 0 0 -1 1 0 0 1 -0.001 2147483.647").unwrap();
+    assert_eq!(read(&touches(&[&with])).unwrap().touches()[0].touch, expected);
+    let log = touches(&[&with, &without]);
+    let place = log.windows(9).rposition(|window| window == record_head(&without)).unwrap();
+    let said = error(&log);
+    let begin =
+        format!("robot.mcap: byte {place}: no position, where the touches before it have one. Give every touch");
+    assert!(said.starts_with(&begin), "{said}");
 }
 
 #[test]

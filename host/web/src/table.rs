@@ -142,22 +142,22 @@ impl Table {
     }
 
     pub(crate) fn player(&mut self, model: u32) -> Option<usize> {
-        let player = self.round.as_ref()?.players().get(index(model))?;
-        let recognizer = player.recognizer();
+        let player = self.round.as_ref()?.players.get(index(model))?;
+        let recognizer = &player.recognizer;
         let (verdict, best) = match recognizer.verdict() {
             Verdict::Undecided => (0.0, recognizer.best()),
             Verdict::Recognized { object, .. } => (1.0, object.into()),
             Verdict::Unknown => (2.0, recognizer.best()),
             Verdict::GaveUp => (3.0, recognizer.best()),
         };
-        let refused = match player.refused() {
+        let refused = match player.refused {
             None => 0.0,
             Some(Refused::Pattern(ContactPattern::None)) => 1.0,
             Some(Refused::Pattern(_)) => 2.0,
             Some(Refused::Spread) => 3.0,
             Some(_) => 4.0,
         };
-        let (approaches, touches) = (player.approaches().into(), recognizer.touches().into());
+        let (approaches, touches) = (player.approaches.into(), recognizer.touches().into());
         self.output = vec![verdict, best as f64, approaches, touches, refused];
         self.output.extend(player.posteriors());
         self.output.extend(player.thresholds());
@@ -165,9 +165,9 @@ impl Table {
     }
 
     pub(crate) fn evidence(&mut self, model: u32) -> *const i64 {
-        let player = self.round.as_ref().and_then(|round| round.players().get(index(model)));
+        let player = self.round.as_ref().and_then(|round| round.players.get(index(model)));
         self.evidence = player.map_or_else(Vec::new, |player| {
-            let (evidence, model) = (player.recognizer().evidence(), player.recognizer().model());
+            let (evidence, model) = (player.recognizer.evidence(), player.recognizer.model());
             let prior = |object| i64::from(model.prior(object));
             (0..model.object_count())
                 .map(|object| evidence.get(object).copied().unwrap_or_else(|| prior(object)))
@@ -177,9 +177,9 @@ impl Table {
     }
 
     pub(crate) fn propose(&mut self, model: u32) -> Option<usize> {
-        let player = self.round.as_ref()?.players().get(index(model))?;
+        let player = self.round.as_ref()?.players.get(index(model))?;
         let proposal = player.proposal()?;
-        let Pose { direction, alignment } = player.recognizer().model().plan()?.poses().pose(proposal.pose)?;
+        let Pose { direction, alignment } = player.recognizer.model().plan()?.poses().pose(proposal.pose)?;
         let one = f64::from(Q15_ONE);
         self.output = vec![proposal.pose.into(), f64::from(proposal.score) / 32_768.0];
         self.output.extend([direction, alignment].into_iter().flatten().map(|cosine| f64::from(cosine) / one));
@@ -195,13 +195,13 @@ impl Table {
         let series = self.series.as_mut()?;
         series.go_on(self.game.as_ref()?, rounds.into(), approaches.into());
         self.output = series
-            .scores()
+            .scores
             .iter()
             .flat_map(|score| {
                 let (mean, error) = score.mean().unwrap_or((f64::NAN, f64::NAN));
                 [mean, error, score.wrong as f64, score.unnamed as f64]
             })
             .collect();
-        usize::try_from(series.rounds()).ok()
+        usize::try_from(series.rounds).ok()
     }
 }

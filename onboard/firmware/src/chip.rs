@@ -16,7 +16,6 @@ unsafe extern "C" {
     static __sbss: u32;
     static __ebss: u32;
     static __sheap: u32;
-    static _stack_start: u32;
     // From memory.x.
     static mut _retained_start: u8;
     static _retained_end: u8;
@@ -30,7 +29,7 @@ macro_rules! address {
 }
 
 /// Bytes of (vector table and code, constants, initialized statics, zeroed statics).
-pub fn section_sizes() -> [usize; 4] {
+pub(crate) fn section_sizes() -> [usize; 4] {
     [
         address!(__etext) - address!(__vector_table),
         address!(__erodata) - address!(__srodata),
@@ -47,14 +46,14 @@ const MARGIN: usize = 64;
 
 /// The painted part of the stack.
 #[derive(Clone, Copy)]
-pub struct Painted {
+pub(crate) struct Painted {
     low: usize,
     high: usize,
 }
 
 /// Paints the unused stack below the caller, at most 32 KB of it.
 #[inline(never)]
-pub fn paint_stack() -> Painted {
+pub(crate) fn paint_stack() -> Painted {
     let high = (cortex_m::register::msp::read() as usize - MARGIN) & !3;
     let low = high.saturating_sub(PAINTED).max(address!(__sheap));
     for address in (low..high).step_by(4) {
@@ -67,22 +66,17 @@ pub fn paint_stack() -> Painted {
 
 /// Bytes from the lowest address where the paint has gone to the top of the painted area.
 #[inline(never)]
-pub fn used_stack(area: Painted) -> usize {
+pub(crate) fn used_stack(area: Painted) -> usize {
     // SAFETY: the same words that `paint_stack` wrote.
     let scrubbed = (area.low..area.high).step_by(4).find(|&a| unsafe { read_volatile(a as *const u32) } != PAINT);
     area.high - scrubbed.unwrap_or(area.high)
-}
-
-/// Bytes of stack in use by the caller now, from the top of RAM down.
-pub fn stack_depth() -> usize {
-    address!(_stack_start) - cortex_m::register::msp::read() as usize
 }
 
 /// The memory that keeps its content through a reset, once.
 ///
 /// # Panics
 /// The second time.
-pub fn take_retained() -> &'static mut [u8] {
+fn take_retained() -> &'static mut [u8] {
     static TAKEN: AtomicBool = AtomicBool::new(false);
     // A load and a store, as thumbv6m has no swap; interrupts do not call this.
     assert!(!TAKEN.load(Ordering::Relaxed), "the retained memory is taken once");
@@ -96,7 +90,7 @@ pub fn take_retained() -> &'static mut [u8] {
 /// The memory that keeps its content through a reset, once, with places for two models and two records of these bytes.
 ///
 /// # Panics
-/// As [`take_retained`].
+/// The second time.
 pub fn take_memory(record: usize) -> Memory<'static> {
     // Aligned, as models are read fastest.
     let record = record.next_multiple_of(4);
@@ -108,7 +102,7 @@ pub fn take_memory(record: usize) -> Memory<'static> {
 
 /// The levels of three switches, a bit each. They outlast a reset, as switches do: nothing initializes them.
 #[unsafe(link_section = ".uninit.switches")]
-pub static SWITCHES: AtomicU32 = AtomicU32::new(0);
+pub(crate) static SWITCHES: AtomicU32 = AtomicU32::new(0);
 
 /// The emulated machines' external RAM, 16 MB of it, where QEMU's `-device loader,addr=0x21000000` puts what an image is
 /// to work on. Only for images that run only there.
@@ -145,7 +139,7 @@ unsafe impl cortex_m::interrupt::InterruptNumber for Interrupt {
 }
 
 /// Lets the timer interrupt once, after `cycles`.
-pub fn set_timer(cycles: u32) {
+pub(crate) fn set_timer(cycles: u32) {
     const BASE: usize = 0x4000_0000;
     let (control, value_now, reload, clear) = (0x0, 0x4, 0x8, 0xc);
     for (register, value) in [(control, 0), (clear, 1), (reload, cycles), (value_now, cycles), (control, 0b1001)] {
@@ -155,19 +149,19 @@ pub fn set_timer(cycles: u32) {
 }
 
 /// Lets this interrupt, and no other that was not given this, be interrupted by others.
-pub fn yield_to_others(interrupt: Interrupt) {
+pub(crate) fn yield_to_others(interrupt: Interrupt) {
     // SAFETY: no critical section of the images is made by priorities. Nobody else holds the NVIC.
     unsafe { cortex_m::Peripherals::steal().NVIC.set_priority(interrupt, 0xc0) };
 }
 
 /// Lets an interrupt come.
-pub fn unmask(interrupt: Interrupt) {
+pub(crate) fn unmask(interrupt: Interrupt) {
     // SAFETY: unmasking can break a critical section that was made by masking; the images make theirs with PRIMASK.
     unsafe { cortex_m::peripheral::NVIC::unmask(interrupt) };
 }
 
 /// Holds an interrupt back.
-pub fn mask(interrupt: Interrupt) {
+pub(crate) fn mask(interrupt: Interrupt) {
     cortex_m::peripheral::NVIC::mask(interrupt);
 }
 
@@ -183,15 +177,15 @@ pub fn sleep_unless(busy: impl FnOnce() -> bool) {
 
 /// The registers of a UART (CMSDK APB UART).
 #[derive(Clone, Copy, Debug)]
-pub struct UartRegisters {
+pub(crate) struct UartRegisters {
     base: usize,
 }
 
 impl UartRegisters {
     /// The link's UART.
-    pub const FIRST: Self = Self { base: 0x4000_4000 };
+    pub(crate) const FIRST: Self = Self { base: 0x4000_4000 };
     /// The UART over which a host plays the pins.
-    pub const SECOND: Self = Self { base: 0x4000_5000 };
+    pub(crate) const SECOND: Self = Self { base: 0x4000_5000 };
 
     const DATA: usize = 0x0;
     const STATE: usize = 0x4;
@@ -213,18 +207,18 @@ impl UartRegisters {
     }
 
     /// Transmitter, receiver and the receive interrupt on.
-    pub fn enable(self, baud_divider: u32) {
+    pub(crate) fn enable(self, baud_divider: u32) {
         self.store(Self::BAUD_DIVIDER, baud_divider);
         self.store(Self::CONTROL, 0b1011);
     }
 
     /// A received byte.
-    pub fn read(self) -> Option<u8> {
+    pub(crate) fn read(self) -> Option<u8> {
         (self.load(Self::STATE) & Self::RECEIVE_FULL != 0).then(|| self.load(Self::DATA) as u8)
     }
 
     /// Sends a byte, if the one before is gone.
-    pub fn write(self, byte: u8) -> bool {
+    pub(crate) fn write(self, byte: u8) -> bool {
         let free = self.load(Self::STATE) & Self::TRANSMIT_FULL == 0;
         if free {
             self.store(Self::DATA, u32::from(byte));
@@ -233,7 +227,7 @@ impl UartRegisters {
     }
 
     /// Takes the receive interrupt's cause away.
-    pub fn clear_received(self) {
+    pub(crate) fn clear_received(self) {
         self.store(Self::INTERRUPT, 2);
     }
 }

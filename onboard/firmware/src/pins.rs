@@ -29,7 +29,7 @@ static SIGNALED: AtomicBool = AtomicBool::new(false);
 static SEEN: AtomicU32 = AtomicU32::new(u32::MAX);
 
 /// A pin of the emulated port.
-pub struct Pin(pub u8);
+struct Pin(u8);
 
 impl ErrorType for Pin {
     type Error = Infallible;
@@ -46,7 +46,7 @@ impl InputPin for Pin {
 }
 
 /// The clock that the host plays.
-pub struct PlayedClock;
+struct PlayedClock;
 
 impl Clock for PlayedClock {
     fn micros(&self) -> u32 {

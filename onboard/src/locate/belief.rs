@@ -124,6 +124,11 @@ const ROOTS: [i32; MOST_TOUCHES] = {
     }
     roots
 };
+/// Root of a number of touches in Q4.
+pub(super) fn root(touches: usize) -> i32 {
+    at(&ROOTS, touches.min(MOST_TOUCHES - 1))
+}
+
 /// Heights below this may be of the table after a contact was lost, in 1/16 mm.
 const NEAR: i32 = 24;
 /// Half a turn, in radians in Q14.

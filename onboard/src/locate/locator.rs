@@ -8,6 +8,9 @@ use crate::bytes::at;
 use crate::decide::{CapacityError, Familiarity, Rivals, Stopping, Verdict};
 use palpate_shared::Touch;
 
+/// Touches from which on a test for unknown objects decides.
+pub const TESTED: usize = 8;
+
 /// Bounds on the work of an approach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effort {
@@ -139,8 +142,12 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
     /// The verdict on the touches so far.
     pub fn verdict(&self) -> Verdict {
         let touches = u32::try_from(self.touches).unwrap_or(u32::MAX);
-        let is_sure = self.exhausted.is_none() && self.touches > 0 && self.rivals().q56() <= self.stopping.odds();
-        if self.familiarity() == Familiarity::Stranger {
+        let familiarity = self.familiarity();
+        let is_sure = familiarity == Familiarity::Known
+            && self.exhausted.is_none()
+            && self.touches > 0
+            && self.rivals().q56() <= self.stopping.odds();
+        if familiarity == Familiarity::Stranger {
             Verdict::Unknown
         } else if is_sure {
             let object = u8::try_from(self.leader()).unwrap_or(u8::MAX);
@@ -177,14 +184,15 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
         super::number::power(-self.posteriors.get(object).copied().unwrap_or(NOTHING))
     }
 
-    /// Result of the test of whether the touches fit an object at all: from the third touch, whether the most likely cell is too
-    /// unlikely.
+    /// Result of the test of whether the touches fit an object at all, for maps that state one: doubtful before the eighth touch,
+    /// and then by how likely the most likely cell is. No object is named while it is not known.
     pub fn familiarity(&self) -> Familiarity {
-        let limit = self.maps.misfit();
-        if limit == 0 || self.touches < 3 {
-            return Familiarity::Known;
+        match self.maps.misfit(self.touches) {
+            None => Familiarity::Known,
+            Some(_) if self.touches < TESTED => Familiarity::Doubtful,
+            Some(limit) if self.fit() < limit => Familiarity::Stranger,
+            Some(_) => Familiarity::Known,
         }
-        if self.fit() < limit { Familiarity::Stranger } else { Familiarity::Known }
     }
 
     /// Logarithm of the likelihood of the most likely cell for each touch, in 1/64 nat.

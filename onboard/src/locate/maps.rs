@@ -41,8 +41,12 @@ pub struct Maps<'a> {
     pub(super) roots: u8,
     /// Standard deviation of an object's move in an approach, in 1/16 mm, and of its turn, in radians in Q14.
     pub(super) drift: [i32; 2],
-    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown; 0: never.
+    /// Mean logarithm of the likelihood for each touch of a known object, in 1/64 nat; 0: no test for unknown ones.
     misfit: i16,
+    /// How far below it a known object's may be after one touch; after n touches a root of n-th of that.
+    misfit_width: u16,
+    /// Factor of the half of a pose's intervals, in Q8; 0: 1.
+    stretch: u16,
 }
 
 /// A way in which an object lies on the table, and its map.
@@ -110,7 +114,7 @@ impl<'a> Maps<'a> {
         let (fixed, rest) = content.split_first_chunk::<MAPS_LENGTH>()?;
         let &[shift, roots, placements, _, ref range @ ..] = fixed;
         let (numbers, _) = range.as_chunks::<2>();
-        let &[range, drift, turn, misfit, ..] = numbers else { return None };
+        let &[range, drift, turn, misfit, stretch, width, ..] = numbers else { return None };
         let (records, rest) = rest.split_at_checked(usize::from(placements) * PLACEMENT_LENGTH)?;
         let (likelihoods, heights) = rest.split_at_checked(LIKELIHOODS_LENGTH)?;
         let range = i32::from(u16::from_le_bytes(range));
@@ -123,6 +127,8 @@ impl<'a> Maps<'a> {
             range,
             roots,
             misfit: i16::from_le_bytes(misfit),
+            misfit_width: u16::from_le_bytes(width),
+            stretch: u16::from_le_bytes(stretch),
             drift: [drift, turn].map(|bytes| i32::from(u16::from_le_bytes(bytes))),
         };
         let is_plausible = matches!(shift, 4 | 5)
@@ -187,6 +193,22 @@ impl<'a> Maps<'a> {
             + cells(at(&half, 0))
     }
 
+    /// Farthest point of a placement that is higher than the table, from its origin, in micrometers.
+    pub fn radius(&self, placement: u8) -> i32 {
+        self.placement(placement).radius * 125 / 2
+    }
+
+    /// The height that a fingertip meets at a point in a placement's frame, all in micrometers. Cost: a few dozen instructions.
+    pub fn height(&self, placement: u8, at: [i32; 2]) -> i32 {
+        let [x, y] = at.map(|micrometers| micrometers.clamp(-2_000_000, 2_000_000) * 2 / 125);
+        self.height_at(&self.placement(placement), x, y) * 125 / 2
+    }
+
+    /// Factor of the half of a pose's intervals, in Q8.
+    pub(super) const fn stretch(&self) -> u32 {
+        if self.stretch == 0 { 256 } else { self.stretch as u32 }
+    }
+
     /// The bytes of the whole model.
     pub const fn model(&self) -> &'a [u8] {
         self.model
@@ -202,9 +224,11 @@ impl<'a> Maps<'a> {
         if self.is_fine { 1 } else { 2 }
     }
 
-    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown; 0: never.
-    pub(super) const fn misfit(&self) -> i32 {
-        self.misfit as i32
+    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown after so many touches; none
+    /// without a test for unknown objects.
+    pub(super) fn misfit(&self, touches: usize) -> Option<i32> {
+        let root = super::belief::root(touches).max(1);
+        (self.misfit != 0).then(|| i32::from(self.misfit) - (i32::from(self.misfit_width) << 4) / root)
     }
 
     /// Thresholds that the model states.
@@ -301,7 +325,7 @@ impl<'a> Maps<'a> {
     }
 
     #[inline(always)]
-    fn height(&self, offset: usize) -> u32 {
+    fn count(&self, offset: usize) -> u32 {
         u32::from(at(self.heights, offset))
     }
 
@@ -321,7 +345,7 @@ impl<'a> Maps<'a> {
         if i < 0 || j < 0 || i > 2 * half[0] || j > 2 * half[1] {
             return 0;
         }
-        placement.scaled(self.height(at(&placement.offset, 0).wrapping_add(row(half, i, j))))
+        placement.scaled(self.count(at(&placement.offset, 0).wrapping_add(row(half, i, j))))
     }
 
     /// Least and greatest height within a radius of a point in the placement's frame, all in 1/16 mm.
@@ -346,7 +370,7 @@ impl<'a> Maps<'a> {
                     return [0; 2];
                 }
                 let offset = at(&placement.offset, level).wrapping_add(2 * row([half_x, half_y], i, j));
-                [self.height(offset), self.height(offset.wrapping_add(1))]
+                [self.count(offset), self.count(offset.wrapping_add(1))]
             }
         };
         [placement.scaled(lowest), placement.scaled(highest)]
@@ -357,7 +381,7 @@ impl<'a> Maps<'a> {
     fn nearby(&self, placement: &Placement, x: i32, y: i32, level: usize) -> [u32; 2] {
         let [half, ..] = placement.half;
         let offset = at(&placement.offset, 0);
-        let height = |i: i32, j: i32| self.height(offset.wrapping_add(row(half, i, j)));
+        let height = |i: i32, j: i32| self.count(offset.wrapping_add(row(half, i, j)));
         let mut range = [u32::MAX, 0];
         let mut take = |height: u32| range = [range[0].min(height), range[1].max(height)];
         if self.is_fine || level == 1 {

@@ -113,6 +113,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
             *width = 4 * i32::try_from(bin.unwrap_or(BINS - 1) + 1).unwrap_or(0) + half;
         }
         let micrometers = |sixteenths: i32| sixteenths * 125 / 2;
+        let stretched = |width: u32| width.saturating_mul(self.maps.stretch()) >> 8;
         let [x, y, yaw] = widths;
         let share = (sum.unsigned_abs() << 16).checked_div(all).unwrap_or(0);
         let [low, high, ..] = (fine(best) + mean_yaw).to_le_bytes();
@@ -120,8 +121,8 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
             placement: best.placement,
             position: [micrometers(at_x + mean_x), micrometers(at_y + mean_y)],
             yaw: if is_round { 0 } else { u16::from_le_bytes([low, high]) },
-            within: [x, y].map(|width| micrometers(width).unsigned_abs()),
-            yaw_within: (!is_round).then(|| u16::try_from(yaw << 4).unwrap_or(u16::MAX)),
+            within: [x, y].map(|width| stretched(micrometers(width).unsigned_abs())),
+            yaw_within: (!is_round).then(|| u16::try_from(stretched((yaw << 4).unsigned_abs())).unwrap_or(u16::MAX)),
             share: u32::try_from(share).unwrap_or(u32::MAX),
         }
     }

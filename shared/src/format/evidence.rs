@@ -40,8 +40,6 @@ impl Shifts {
 }
 
 impl<'a> RowEvidence<'a> {
-    /// Bytes before the values.
-    pub const HEAD: usize = 8;
     /// The most values.
     pub const MOST: usize = 129;
     /// The largest start, without its sign: margins stay within it.
@@ -120,8 +118,6 @@ impl<'a> RowEvidence<'a> {
 pub struct Weights<'a>(&'a [u8]);
 
 impl<'a> Weights<'a> {
-    /// Bytes before the weights.
-    pub const HEAD: usize = 2;
     /// The most weights: two for each doubling of a number of 32 bits.
     pub const MOST: usize = 64;
     /// A weight of 1.

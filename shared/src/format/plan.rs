@@ -18,9 +18,6 @@ pub struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// Bytes before the separations.
-    pub const HEADER: usize = 4;
-
     /// Stored where no approach touches anything.
     pub const UNTOUCHED: i8 = i8::MIN;
 
@@ -117,7 +114,7 @@ mod tests {
     #[test]
     fn a_pose_that_never_touches_is_known_and_others_do_not_exist() {
         let mut bytes = section(1, 3);
-        bytes[Plan::HEADER + 5] = Plan::UNTOUCHED.cast_unsigned();
+        bytes[4 + 5] = Plan::UNTOUCHED.cast_unsigned();
         let plan = Plan::from_bytes(&bytes, 3).unwrap();
         let may_touch: Vec<u16> = (0..40).filter(|&pose| plan.may_touch(pose)).collect();
         assert_eq!(may_touch, (0..26).filter(|&pose| pose != 5).collect::<Vec<_>>());

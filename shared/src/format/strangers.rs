@@ -76,9 +76,6 @@ pub struct ObjectMisfit<'a> {
 }
 
 impl<'a> Strangers<'a> {
-    /// Bytes before the test.
-    pub const HEADER: usize = 4;
-
     /// The section's first bytes; a test follows with [`MisfitTerms::to_bytes`] and [`ObjectMisfit::write`] for each object.
     pub const fn header(background: bool, has_test: bool) -> [u8; 4] {
         [background as u8, has_test as u8, 0, 0]

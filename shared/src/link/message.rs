@@ -81,7 +81,7 @@ pub enum Query {
     },
     /// Asks for the counts of the link.
     Statistics,
-    /// Asks for the posteriors of up to [`POSTERIORS`](super::POSTERIORS) objects.
+    /// Asks for the posteriors of up to [`CHUNK`](super::CHUNK) / 8 objects.
     Posteriors {
         /// From this object on.
         first: u8,

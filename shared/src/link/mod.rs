@@ -61,7 +61,7 @@ pub const CHUNK: usize = 128;
 pub const POSE_BYTES: usize = crate::MOST_POSES.div_ceil(8);
 
 /// Posteriors in one answer.
-pub const POSTERIORS: usize = CHUNK / 8;
+pub(crate) const POSTERIORS: usize = CHUNK / 8;
 
 #[cfg(test)]
 mod tests;

@@ -9,7 +9,8 @@ json.mcap       JSON, chunks uncompressed, unit vectors of the pose with every t
 json-lz4.mcap   the same in chunks compressed by LZ4
 json-zstd.mcap  and by Zstandard
 plain.mcap      JSON without chunks, no object named, in the wrong order of log times, no pose
-ros2.mcap       CDR by host/msg, as rosbag2 stores it, in chunks compressed by Zstandard, and verdicts
+ros2.mcap       CDR by host/msg, as rosbag2 stores it, in chunks compressed by Zstandard, and verdicts; the one that is here
+                was made by a definition of the touch without a position
 """
 
 import json
@@ -83,6 +84,7 @@ with open(HERE / "ros2.mcap", "wb") as out:
         writer.write_message("/joints", other, {"data": "x" * i}, time, time)
         times = [math.nan if time is None else time for time in times]
         message = {"times": times, "has_pose": True, "direction": direction, "alignment": alignment, "object": object}
+        message |= {"has_position": False, "position": [0.0] * 3}
         writer.write_message("/touch", touch, message, time + 1, time + 1)
         message = {
             "touch": i + 1,

@@ -1,10 +1,13 @@
 //! Measures recognition of objects with a place on a simulated table: approaches, wrong names, bytes and time, as
 //! docs/measurements/located.md has them.
 //!
-//!     cargo run --release -p palpate-tests --bin located -- [KEY=VALUE ...]
+//!     cargo run --release -p palpate-tests --bin located -- [KEY=VALUE ...] [+ KEY=VALUE ...]...
+//!
+//! After each `+` are the keys of a run beyond the first ones; without one there is one run. `keep=1` takes the model of the run
+//! before, `row=NAME` prints a row of a table, `write=DIRECTORY` writes the files of the firmware's image `located`.
 
 use palpate::calibrate;
-use palpate::locate::{self, Aimed, Approach, Effort, Hand, Maps, Real, Settings, Standing, Truth, World};
+use palpate::locate::{self, Aimed, Approach, Effort, Hand, Maps, Real, Settings, Standing, Truth, Until, World};
 use palpate::mesh::Object;
 use palpate::probe::approach::Probe;
 use palpate::shared::format::{Length, Per};
@@ -15,17 +18,31 @@ use std::collections::HashMap;
 use std::error::Error;
 use std::time::Instant;
 
+/// Keys and values.
+#[derive(Clone, Default)]
+struct Given(HashMap<String, String>);
+
+impl Given {
+    fn number(&self, key: &str, default: f64) -> f64 {
+        self.0.get(key).map_or(default, |value| value.parse().expect("a number"))
+    }
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
-    let given: HashMap<String, String> = std::env::args()
-        .skip(1)
-        .filter_map(|pair| pair.split_once('=').map(|(key, value)| (key.into(), value.into())))
-        .collect();
-    let number = |key: &str, default: f64| given.get(key).map_or(default, |value| value.parse().expect("a number"));
+    let all: Vec<String> = std::env::args().skip(1).collect();
+    let mut groups = all.split(|word| word == "+").map(|words| {
+        words.iter().filter_map(|word| word.split_once('=')).map(|(key, value)| (key.to_owned(), value.to_owned()))
+    });
+    let base = Given(groups.next().into_iter().flatten().collect());
+    let mut runs: Vec<Given> = groups.map(|own| Given(base.0.clone().into_iter().chain(own).collect())).collect();
+    if runs.is_empty() {
+        runs.push(base.clone());
+    }
     let shared = std::env::var("PALPATE_SHARED").unwrap_or_else(|_| "../shared".into());
-    let folder = given.get("objects").cloned().unwrap_or(format!("{shared}/objects"));
+    let folder = base.0.get("objects").cloned().unwrap_or(format!("{shared}/objects"));
     let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 0.0, stroke: Some(20.0), ..Probe::default() };
     let began = Instant::now();
-    let sizes: Vec<f64> = [1.0, 0.8, 0.9, 1.1, 1.2][..number("sizes", 1.0) as usize].to_vec();
+    let sizes: Vec<f64> = [1.0, 0.8, 0.9, 1.1, 1.2][..base.number("sizes", 1.0) as usize].to_vec();
     let mut standing: Vec<Standing> = Vec::new();
     for size in &sizes {
         let objects = meshes(&folder, 100.0 * size)?;
@@ -36,10 +53,25 @@ fn main() -> Result<(), Box<dyn Error>> {
         }));
     }
     standing.sort_by(|a, b| a.name.cmp(&b.name));
-    eprintln!("scenes {:.1} s", began.elapsed().as_secs_f64());
-    let touches = number("touches", 20_000.0) as u64;
-    let dataset = taught(&standing, &probe, touches);
-    let real = Real {
+    // Objects that the model does not know.
+    let unknown = base.0.get("unknown").cloned().unwrap_or_default();
+    let known: Vec<Standing> =
+        standing.iter().filter(|object| !unknown.split(',').any(|name| name == object.name)).cloned().collect();
+    let dataset = taught(&known, &probe, base.number("touches", 20_000.0) as u64);
+    eprintln!("touches {:.1} s", began.elapsed().as_secs_f64());
+    let mut model = Vec::new();
+    for given in &runs {
+        if given.number("keep", 0.0) == 0.0 {
+            model = learned(given, &dataset, &probe)?;
+        }
+        run(given, &mut model, [&standing, &known], &probe)?;
+    }
+    Ok(())
+}
+
+fn real(given: &Given) -> Real {
+    let number = |key: &str, default: f64| given.number(key, default);
+    Real {
         height: number("noise", 0.5),
         lost: number("lost", 0.02),
         position: number("position", 0.0),
@@ -47,36 +79,49 @@ fn main() -> Result<(), Box<dyn Error>> {
         drift_yaw: number("drift", 0.0),
         size: number("size", 1.0),
         bent: number("bent", 0.0),
-    };
+        tips: number("tips", 0.0),
+        table: number("table", 0.0),
+        turned: number("turned", 0.0),
+    }
+}
+
+fn learned(given: &Given, dataset: &Dataset, probe: &Probe) -> Result<Vec<u8>, Box<dyn Error>> {
+    let (number, real) = (|key: &str, default: f64| given.number(key, default), real(given));
     let settings = Settings {
         fine: number("cell", 1.0) < 1.5,
         noise: number("stated", real.height),
         position: number("stated_position", real.position),
         lost: number("stated_lost", 0.02),
+        outliers: number("outliers", 1e-4),
+        table_missed: number("table_missed", 0.02),
         drift: number("stated_drift", real.drift),
         drift_yaw: number("stated_drift", real.drift),
         error_rate: 1.0 - number("threshold", 0.99),
         ..Settings::default()
     };
-    let surfaces = locate::learn(&dataset, &settings)?;
-    for surface in &surfaces {
-        if number("v", 0.0) > 0.0 {
-            println!(
-                "{} {} share {:.3} half {:?} known {:.2} round {}",
-                dataset.objects[surface.object].name,
-                surface.placement,
-                surface.share,
-                surface.half,
-                surface.known,
-                surface.is_round
-            );
+    let surfaces = locate::learn(dataset, &settings)?;
+    if number("v", 0.0) > 0.0 {
+        for surface in &surfaces {
+            let name = &dataset.objects[surface.object].name;
+            let (placement, share, half) = (&surface.placement, surface.share, surface.half);
+            let (known, is_round) = (surface.known, surface.is_round);
+            println!("{name} {placement} share {share:.3} half {half:?} known {known:.2} round {is_round}");
         }
     }
     let names: Vec<String> = dataset.names().into_iter().map(Into::into).collect();
-    let model = locate::write(&surfaces, &names, &probe, &settings)?;
-    eprintln!("maps {:.1} s, {} placements, {} bytes", began.elapsed().as_secs_f64(), surfaces.len(), model.len());
-    let maps = Maps::new(&model).map_err(|error| error.to_string())?;
-    let bounded = ["lookups", "cells"].iter().any(|key| given.contains_key(*key));
+    let model = locate::write(&surfaces, &names, probe, &settings)?;
+    eprintln!("maps: {} placements, {} bytes", surfaces.len(), model.len());
+    Ok(model)
+}
+
+fn run(
+    given: &Given,
+    model: &mut Vec<u8>,
+    [standing, known]: [&[Standing]; 2],
+    probe: &Probe,
+) -> Result<(), Box<dyn Error>> {
+    let number = |key: &str, default: f64| given.number(key, default);
+    let bounded = ["lookups", "cells"].iter().any(|key| given.0.contains_key(*key));
     let bounds = Effort::default();
     let bounds = Effort {
         lookups: number("lookups", bounds.lookups.into()) as u32,
@@ -84,65 +129,77 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..bounds
     };
     let effort = bounded.then_some(bounds);
+    let until = given.0.contains_key("until");
     let terms = locate::Terms {
         promise: calibrate::Terms { rate: number("rate", 0.01), confidence: 0.95, per: Per::Average },
         sequences: number("sequences", 300.0) as usize,
         max_touches: 25,
         aimed: if number("random", 0.0) > 0.0 { Aimed::Random } else { Aimed::Chosen },
-        real,
+        real: real(given),
+        unknown: number("strangers", 0.0) > 0.0,
+        until: until.then(|| Until { millimeters: number("until", 3.0), degrees: number("degrees", 5.0) }),
         pose: number("pose", 10.0) as u16,
         seed: number("seed", 1.0) as u64,
         effort,
     };
-    let mut calibrated = None;
-    if number("calibrate", 0.0) > 0.0 {
-        let found = locate::calibrate(
-            maps,
-            &standing,
-            &probe,
-            &locate::Terms { sequences: number("calibrate", 0.0) as usize, seed: 1000, ..terms },
-            &(),
-        )?;
+    if number("calibrate", 0.0) > 0.0 && number("keep", 0.0) == 0.0 {
+        let maps = Maps::new(model).map_err(|error| error.to_string())?;
+        let terms = locate::Terms { sequences: number("calibrate", 0.0) as usize, seed: 1000, ..terms };
+        let found = locate::calibrate(maps, known, probe, &terms, &())?;
         println!(
             "promise: margin {:.2}, wrong {} of {}, approaches {:.2}",
             found.margin, found.wrong, found.given, found.mean_approaches
         );
-        calibrated = Some(found.model);
+        *model = found.model;
     }
-    let bytes = calibrated.as_ref().unwrap_or(&model);
-    let maps = Maps::new(bytes).map_err(|error| error.to_string())?;
-    if let Some(directory) = given.get("write") {
-        let terms = Terms { effort: bounds, within: maps.range().unsigned_abs() * 2, pose: terms.pose };
-        let world =
-            World { standing: &standing, probe: &probe, real, range: f64::from(maps.range()) / 1e3 - 1.0, seed: 1 };
-        let directory = std::path::Path::new(directory);
+    let maps = Maps::new(model).map_err(|error| error.to_string())?;
+    if let Some(directory) = given.0.get("write") {
+        let within = maps.range().unsigned_abs();
+        let written = Terms { effort: bounds, within: 2 * within, pose: terms.pose };
+        let world = World { standing, probe, real: terms.real, range: f64::from(within) / 1e3 - 1.0, seed: 1 };
+        let bytes = approaches(maps, &world, &written, number("approaches", 1_000.0))?;
         std::fs::create_dir_all(directory)?;
-        std::fs::write(directory.join("located.palpate"), bytes)?;
-        std::fs::write(
-            directory.join("located.bin"),
-            approaches(maps, &world, &terms, number("approaches", 1_000.0))?,
-        )?;
+        std::fs::write(format!("{directory}/located.palpate"), &*model)?;
+        std::fs::write(format!("{directory}/located.bin"), bytes)?;
         return Ok(());
     }
     let began = Instant::now();
-    let found = locate::evaluate(maps, &standing, &probe, &terms, &())?;
+    let found = locate::evaluate(maps, standing, probe, &terms, &())?;
     let seconds = began.elapsed().as_secs_f64();
-    println!(
-        "approaches {:.2}, wrong {} of {}, undecided {}, unknown {}; off {:.1} mm, 95 %: {:.1} mm; lookups {} k, at most {} k; {:.1} ms of wall time per approach",
-        found.mean_approaches,
-        found.wrong,
-        found.given,
-        found.undecided,
-        found.unknown,
-        found.off[0],
-        found.off[1],
-        found.looked[0] / 1000,
-        found.looked[1] / 1000,
-        seconds * 1000.0 / (found.mean_approaches * found.sequences as f64)
-    );
+    let [median, most] = found.off;
+    if let Some(name) = given.0.get("row") {
+        println!(
+            "| {name} | {:.2} | {} of {} | {} | {} | {median:.1} mm, {most:.1} mm | {} of {} |",
+            found.mean_approaches,
+            found.wrong,
+            found.given,
+            found.undecided,
+            found.unknown,
+            if until { found.poses_within } else { found.poses_in_interval },
+            found.poses,
+        );
+    } else {
+        println!(
+            "poses {}: {} in their intervals, {} within; approaches {:.2}, wrong {} of {}, undecided {}, unknown {}; off {median:.1} mm, 95 %: {most:.1} mm; lookups {} k, at most {} k; {:.1} ms of wall time per approach",
+            found.poses,
+            found.poses_in_interval,
+            found.poses_within,
+            found.mean_approaches,
+            found.wrong,
+            found.given,
+            found.undecided,
+            found.unknown,
+            found.looked[0] / 1000,
+            found.looked[1] / 1000,
+            seconds * 1000.0 / (found.mean_approaches * found.sequences as f64)
+        );
+    }
     if number("v", 0.0) > 0.0 {
-        for (name, approaches, wrong) in found.objects {
-            println!("  {name}: {approaches:.1}, {wrong} wrong");
+        for object in found.objects {
+            println!(
+                "  {}: {:.1}, {} wrong, {} unknown",
+                object.name, object.mean_approaches, object.wrong, object.unknown
+            );
         }
     }
     Ok(())

@@ -130,14 +130,11 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         false => on_touches(&arguments, global)?,
     };
     output::write_bytes(&arguments.output, &calibrated.model)?;
-    if global.json {
-        return output::print_json_about(&arguments.output, &calibrated);
-    }
     let placements = match arguments.placement_prior {
         PlacementPrior::Stated => String::new(),
         PlacementPrior::Any => in_each_placement(&calibrated),
     };
-    output::print_about(&arguments.output, &text(&arguments.output, &calibrated, &placements))
+    global.print_about(&arguments.output, &calibrated, || text(&arguments.output, &calibrated, &placements))
 }
 
 /// Calibrates on touches.

@@ -29,6 +29,8 @@ Examples:
                                                    as large as they are
   palpate capture meshes/ -o data --instances      a directory for each object
   palpate capture meshes/ -o data --scene table    as they lie, from above
+  palpate capture meshes/ -o data --scene table --position --probe probe.toml
+                                                   and where the hand was
   palpate capture meshes/ -o part2 --shard 2/8     the second of eight parts")]
 pub(crate) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
@@ -56,6 +58,12 @@ pub(crate) struct Arguments {
     /// With the probe's direction and alignment
     #[arg(long)]
     pose: bool,
+    /// With the hand's position, straight down on a table; all approaches, at true size, with the pose
+    #[arg(long)]
+    position: bool,
+    /// With --position: aims at most so far from the object's middle in x and y [default: its box and 5 mm about it]
+    #[arg(long, value_name = "MM")]
+    within: Option<f64>,
     /// Format: text or parquet [default: text]
     #[arg(long, value_name = "KIND", value_parser = parsed::<Format>)]
     format: Option<Format>,
@@ -70,10 +78,13 @@ pub(crate) struct Arguments {
     add: bool,
 }
 
-pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+pub(crate) fn run(mut arguments: Arguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
     if global.force && (arguments.resume || arguments.add) {
         return Err(Error::setting("force", "given", "it without --resume and --add, which keep what is there"));
+    }
+    if arguments.position {
+        arguments.size.units.imply_true_size();
     }
     let settings = Settings {
         origin: arguments.origin(global.seed)?,
@@ -144,14 +155,27 @@ impl Arguments {
         if !self.add {
             refuse_unstated(&self.size)?;
         }
+        let position = self.position || base.position;
+        if let (true, Some(touches)) = (position, self.touches) {
+            return Err(Error::setting(
+                "touches",
+                touches,
+                "--approaches N with --position, which keeps every approach",
+            ));
+        }
+        if let (true, Some(length)) = (position, self.length) {
+            return Err(Error::setting("length", length, "true sizes with --position (--true-size UNIT)"));
+        }
         Ok(Origin {
             touches: self.approaches.or(self.touches).unwrap_or(base.touches),
             seed: seed.unwrap_or(base.seed),
             length: self.length.unwrap_or(base.length),
             aim: self.aim.unwrap_or(base.aim),
-            scene: self.scene.scene(base.scene)?,
-            pose: self.pose || base.pose,
-            approaches: self.approaches.is_some() || base.approaches,
+            scene: if position { self.scene.straight_down(base.scene)? } else { self.scene.scene(base.scene)? },
+            pose: self.pose || base.pose || position,
+            position,
+            within: self.within.or(base.within),
+            approaches: self.approaches.is_some() || base.approaches || position,
             format: self.format.unwrap_or(base.format),
             shard: self.shard.unwrap_or(base.shard),
             real: self.size.probe.read()?.map_or(base.real, |file| file.real),

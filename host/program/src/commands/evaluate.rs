@@ -137,13 +137,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         unknown: unknown.as_ref().map(|(directory, dataset)| (*directory, dataset)),
     };
     let expecting = |objects: &[String], own: &[f64]| arguments.expected.weights(objects, own);
-    let measured = file.with(|candidate| evaluate::measure(candidate, &dataset, &wanted, &expecting))?;
+    let measured = file.with(|candidate| evaluate::measure(candidate, &dataset, &wanted, expecting))?;
     let evaluated = Evaluated { robots, trained_on, ..measured };
     drop(progress);
-    if global.json {
-        return output::print_json(&evaluated);
-    }
-    output::print(&text(&evaluated))
+    global.print(&evaluated, || text(&evaluated))
 }
 
 /// Evaluates a model on sequences of rows.

@@ -442,10 +442,7 @@ fn write_code(
     let mut written = Vec::new();
     for (extension, text) in compile::emit_code(&compiled.bytes, program, form, &name, &languages)? {
         let path = output.with_extension(extension);
-        output::write_bytes(&path, text.as_bytes())?;
-        if extension == "h" {
-            output::write_bytes(&path.with_file_name(HEADER), palpate_onboard::C_HEADER.as_bytes())?;
-        }
+        write_text(&path, &text)?;
         written.push(path);
     }
     Ok(written)
@@ -455,11 +452,16 @@ fn write_code(
 fn write_source(emitted: Emitted, path: &Path, bytes: &[u8]) -> Result<()> {
     let Emitted::Source(language) = emitted else { return Ok(()) };
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    output::write_bytes(path, compile::emit(&compile::open(bytes)?, &name, language).as_bytes())?;
-    if language == Language::C {
-        output::write_bytes(&path.with_file_name(HEADER), palpate_onboard::C_HEADER.as_bytes())?;
+    write_text(path, &compile::emit(&compile::open(bytes)?, &name, language))
+}
+
+/// Writes source code; in C with the header that reads models beside it.
+fn write_text(path: &Path, text: &str) -> Result<()> {
+    output::write_bytes(path, text.as_bytes())?;
+    match path.extension().is_some_and(|extension| extension == "h") {
+        true => output::write_bytes(&path.with_file_name(HEADER), palpate_onboard::C_HEADER.as_bytes()),
+        false => Ok(()),
     }
-    Ok(())
 }
 
 fn emitted(name: &str) -> Result<Emitted, String> {
@@ -519,11 +521,9 @@ impl Predicts {
     }
 
     fn text(&self) -> String {
-        let what = match self.link {
-            None if self.last_of_ties => "the class with the largest margin, of several the last".into(),
-            None => "the class with the largest margin, of several the first".into(),
-            Some(link) if self.what == "targets" => format!("the targets, each {}", formula(link, 1)),
-            Some(link) => formula(link, self.average.unwrap_or(1)),
+        let what = match self.what {
+            "targets" => format!("the targets, each {}", formula(self.link, 1, false)),
+            _ => formula(self.link, self.average.unwrap_or(1), self.last_of_ties),
         };
         let missing = match self.missing {
             None => String::new(),
@@ -534,8 +534,13 @@ impl Predicts {
     }
 }
 
-/// Formula of a link, from a margin to a value; of trees whose mean is predicted `average` is their number.
-pub(super) fn formula(link: &str, average: u32) -> String {
+/// Prediction of a model over rows: a class if there is no link, otherwise the formula of the link, from a margin to a value.
+/// `average` is the number of trees whose mean is predicted.
+pub(super) fn formula(link: Option<&str>, average: u32, last_of_ties: bool) -> String {
+    let Some(link) = link else {
+        let which = if last_of_ties { "last" } else { "first" };
+        return format!("the class with the largest margin, of several the {which}");
+    };
     let formula = match link {
         "logistic" => "1 / (1 + e^-x)",
         "exponential" => "e^x",

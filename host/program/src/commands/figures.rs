@@ -2,7 +2,7 @@
 
 use palpate::evaluate::{
     ActiveFacts, AlarmCheck, Approaches, Confusion, Evaluated, Evaluation, Finding, OnStrangers, PromiseCheck, Rule,
-    Switched,
+    Sequential, Switched,
 };
 use palpate::wording::{self, count, counted, rate};
 use palpate_shared::DIRECTIONS;
@@ -69,29 +69,20 @@ fn stops(error_rate: f64, promised: Option<f64>) -> String {
 
 /// Names that are wrong more often than the rate that was asked for or promised of all together.
 fn above_text(evaluation: &Evaluation) -> String {
-    let (of, above, error_rate, promised) = match &evaluation.approaches {
-        Some(Approaches { sequential: of, .. }) => {
-            (&of.error_of_given_per_object, &of.above, of.error_rate, of.promised)
-        }
-        None => {
-            let of = &evaluation.sequential;
-            (&of.error_of_given_per_object, &of.above, of.error_rate, of.promised)
-        }
+    let of = evaluation.approaches.as_ref().map_or(&evaluation.sequential, |approaches| &approaches.sequential);
+    let share = |name: &String| {
+        format!("{name} {:.1} %", 100.0 * of.error_of_given_per_object.get(name).copied().unwrap_or(f64::NAN))
     };
-    let share = |name: &String| format!("{name} {:.1} %", 100.0 * of.get(name).copied().unwrap_or(f64::NAN));
-    match (above.is_empty(), promised) {
-        (true, _) => String::new(),
-        (false, promised) => format!(
-            "More than {} are wrong of the names given to: {}.{}\n",
-            rate(error_rate),
-            above.iter().map(share).collect::<Vec<_>>().join(", "),
-            match promised {
-                Some(_) =>
-                    " The promise is of all names together; palpate calibrate --per object makes one of each object.",
-                None => "",
-            }
-        ),
+    if of.above.is_empty() {
+        return String::new();
     }
+    let promise = " The promise is of all names together; palpate calibrate --per object makes one of each object.";
+    format!(
+        "More than {} are wrong of the names given to: {}.{}\n",
+        rate(of.error_rate),
+        of.above.iter().map(share).collect::<Vec<_>>().join(", "),
+        of.promised.map_or("", |_| promise)
+    )
 }
 
 /// The promise, the measurement, the outcome, and what makes the promise void.
@@ -113,14 +104,7 @@ fn promise_text(check: &PromiseCheck) -> String {
         count(check.sequences),
         100.0 * check.error,
         100.0 * check.standard_error,
-        match check.finding {
-            Finding::Kept => "the promise is kept".to_owned(),
-            Finding::Unclear => {
-                format!("{:.2} points above what is promised, which may be chance", 100.0 * check.exceeded_by)
-            }
-            Finding::Broken => format!("the promise is broken by {:.2} points", 100.0 * check.exceeded_by),
-            Finding::Untested => "no name was given, so nothing is known of the promise".to_owned(),
-        }
+        found(check.finding, check.exceeded_by, "no name was given")
     );
     if let Some(noise) = &check.recorded {
         // Writing to a string cannot fail.
@@ -147,6 +131,17 @@ fn promise_text(check: &PromiseCheck) -> String {
     text
 }
 
+/// Finding about a promise, in words; `untested` is why there is none.
+fn found(finding: Finding, above: f64, untested: &str) -> String {
+    let points = 100.0 * above;
+    match finding {
+        Finding::Kept => "the promise is kept".to_owned(),
+        Finding::Unclear => format!("{points:.2} points above what is promised, which may be chance"),
+        Finding::Broken => format!("the promise is broken by {points:.2} points"),
+        Finding::Untested => format!("{untested}, so nothing is known of the promise"),
+    }
+}
+
 /// The promised share of false alarms beside the one that was found.
 fn alarms_text(check: &AlarmCheck) -> String {
     let above = check.above.iter().map(|(name, share)| format!("{name} {:.1} %", 100.0 * share));
@@ -158,64 +153,18 @@ fn alarms_text(check: &AlarmCheck) -> String {
         count(check.sequences),
         100.0 * check.found,
         100.0 * check.standard_error,
-        match check.finding {
-            Finding::Kept => "the promise is kept".to_owned(),
-            Finding::Unclear => {
-                format!(
-                    "{:.2} points above what is promised, which may be chance",
-                    100.0 * (check.found - check.promised)
-                )
-            }
-            Finding::Broken => {
-                format!("the promise is broken by {:.2} points", 100.0 * (check.found - check.promised))
-            }
-            Finding::Untested => "there was no sequence, so nothing is known of the promise".to_owned(),
-        },
+        found(check.finding, check.found - check.promised, "there was no sequence"),
         if above.is_empty() { String::new() } else { format!(" More than promised of: {above}.") }
     )
 }
 
-/// Accuracies in percent: one row per object, one column per number of touches; then the sequential figures.
+/// Figures by touches: rows, then the sequential figures.
 fn table(evaluation: &Evaluation) -> String {
-    let width = evaluation.per_object.keys().map(|name| name.chars().count()).max().unwrap_or(0).max("touches".len());
     let sequential = &evaluation.sequential;
-    let mut text = format!("{:width$}", "touches");
-    // Writing to a string cannot fail.
-    let cells = |text: &mut String, numbers: &mut dyn Iterator<Item = String>| {
-        numbers.for_each(|number| _ = write!(text, " {number:>7}"));
-    };
-    let percent = |share: &f64| format!("{:.1} %", 100.0 * share);
-    cells(&mut text, &mut evaluation.accuracy.keys().map(ToString::to_string));
-    _ = writeln!(text, " {:>9} {:>9} {:>9} {:>9}", "to stop", "wrong", "of names", "undecided");
-    for (name, accuracy) in &evaluation.per_object {
-        _ = write!(text, "{name:width$}");
-        cells(&mut text, &mut accuracy.values().map(percent));
-        let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
-        _ = writeln!(
-            text,
-            " {:>9.1} {:>9} {:>9} {:>9}",
-            of(&sequential.per_object),
-            percent(&of(&sequential.error_per_object)),
-            given(of(&sequential.error_of_given_per_object)),
-            percent(&of(&sequential.undecided_per_object))
-        );
-    }
-    _ = write!(text, "{:width$}", "all");
-    cells(&mut text, &mut evaluation.accuracy.values().map(percent));
-    _ = writeln!(
-        text,
-        " {:>9.1} {:>9} {:>9} {:>9}",
-        sequential.mean_touches,
-        percent(&sequential.error),
-        given(sequential.error_of_given),
-        percent(&sequential.undecided)
-    );
-    _ = write!(text, "{:width$}", "±");
-    cells(&mut text, &mut evaluation.accuracy_standard_error.values().map(percent));
-    _ = writeln!(text, " {:>9.1} {:>9}", sequential.mean().standard_error, percent(&sequential.error_standard_error));
-    _ = write!(
-        text,
-        "\nStopping {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \
+    let spread = Some(&evaluation.accuracy_standard_error);
+    let rows = rows("touches", sequential, (&evaluation.accuracy, &evaluation.per_object), None, spread);
+    format!(
+        "{rows}\nStopping {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \
          {}.\nWrong: of all sequences; of names: of those that got a name.\n{} groups per object of {} touches in all; ± is \
          a standard error.\n",
         stops(sequential.error_rate, sequential.promised),
@@ -226,8 +175,54 @@ fn table(evaluation: &Evaluation) -> String {
         sequential.max_touches,
         count(evaluation.groups),
         count(evaluation.touches),
-    );
-    text
+    )
+}
+
+/// Shares by numbers of touches or approaches.
+type ByNumber = BTreeMap<usize, f64>;
+
+/// Accuracies in percent: one row per object, one column per number of what `head` names; beside them when recognizers stopped
+/// and, if given, the share that was evidence. Below them standard errors, if given.
+fn rows(
+    head: &str,
+    sequential: &Sequential,
+    (accuracy, per_object): (&ByNumber, &BTreeMap<String, ByNumber>),
+    used: Option<(f64, &BTreeMap<String, f64>)>,
+    spread: Option<&ByNumber>,
+) -> String {
+    let width = per_object.keys().map(|name| name.chars().count()).max().unwrap_or(0).max(head.len());
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let row = |name: &str, accuracy: Vec<String>, stops: Vec<String>| {
+        let accuracy = accuracy.iter().map(|cell| format!(" {cell:>7}"));
+        let stops = stops.iter().map(|cell| format!(" {cell:>9}"));
+        format!("{name:width$}{}\n", accuracy.chain(stops).collect::<String>())
+    };
+    let shares = |accuracy: &ByNumber| accuracy.values().copied().map(percent).collect();
+    let stops = |stop: f64, wrong: f64, of_given: f64, undecided: f64, used: Option<f64>| {
+        let own = [format!("{stop:.1}"), percent(wrong), given(of_given), percent(undecided)];
+        own.into_iter().chain(used.map(percent)).collect()
+    };
+    let titles = ["to stop", "wrong", "of names", "undecided"].into_iter().chain(used.map(|_| "used"));
+    let numbers = accuracy.keys().map(ToString::to_string).collect();
+    let mut text = row(head, numbers, titles.map(String::from).collect());
+    for (name, accuracy) in per_object {
+        let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
+        let stops = stops(
+            of(&sequential.per_object),
+            of(&sequential.error_per_object),
+            of(&sequential.error_of_given_per_object),
+            of(&sequential.undecided_per_object),
+            used.map(|(_, used)| of(used)),
+        );
+        text += &row(name, shares(accuracy), stops);
+    }
+    let Sequential { error, error_of_given, undecided, error_standard_error, .. } = *sequential;
+    let (mean, used) = (sequential.mean(), used.map(|(used, _)| used));
+    text += &row("all", shares(accuracy), stops(mean.value, error, error_of_given, undecided, used));
+    let spread = spread.map(|spread| {
+        row("±", shares(spread), vec![format!("{:.1}", mean.standard_error), percent(error_standard_error)])
+    });
+    text + &spread.unwrap_or_default()
 }
 
 /// A share of names given: none where no name was given.
@@ -235,41 +230,15 @@ fn given(share: f64) -> String {
     if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "–".into() }
 }
 
-/// Figures of approaches: one row per object, one column per number of approaches; then the sequential figures.
+/// Figures by approaches: rows, then the sequential figures.
 fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> String {
-    let names = approaches.per_object.keys().map(|name| name.chars().count());
-    let width = names.max().unwrap_or(0).max("approaches".len());
     let sequential = &approaches.sequential;
-    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    let mut text = format!("\n{:width$}", "approaches");
-    // Writing to a string cannot fail.
-    approaches.accuracy.keys().for_each(|at| _ = write!(text, " {at:>7}"));
-    _ = writeln!(text, " {:>9} {:>9} {:>9} {:>9} {:>9}", "to stop", "wrong", "of names", "undecided", "used");
-    let mut line = |name: &str, accuracy: Vec<f64>, [stop, wrong, of_given, undecided, used]: [f64; 5]| {
-        _ = write!(text, "{name:width$}");
-        accuracy.into_iter().for_each(|share| _ = write!(text, " {:>7}", percent(share)));
-        let shares = [percent(wrong), given(of_given), percent(undecided), percent(used)];
-        _ = writeln!(text, " {stop:>9.1} {:>9} {:>9} {:>9} {:>9}", shares[0], shares[1], shares[2], shares[3]);
-    };
-    for (name, accuracy) in &approaches.per_object {
-        let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
-        let stopping = [
-            of(&sequential.per_object),
-            of(&sequential.error_per_object),
-            of(&sequential.error_of_given_per_object),
-            of(&sequential.undecided_per_object),
-            of(&approaches.used_per_object),
-        ];
-        line(name, accuracy.values().copied().collect(), stopping);
-    }
-    let stopping =
-        [sequential.mean().value, sequential.error, sequential.error_of_given, sequential.undecided, approaches.used];
-    line("all", approaches.accuracy.values().copied().collect(), stopping);
-    let shares = patterns.iter().map(|(pattern, share)| format!("{pattern} {}", percent(*share)));
-    _ = writeln!(
-        text,
-        "\nStopping {}: {:.1} approaches on average (± {:.1}), of which {:.1} were evidence, {:.2} % \
-         wrong (± {:.2}), {:.2} % undecided.\nFingers that touched: {}.",
+    let used = Some((approaches.used, &approaches.used_per_object));
+    let rows = rows("approaches", sequential, (&approaches.accuracy, &approaches.per_object), used, None);
+    let shares = patterns.iter().map(|(pattern, share)| format!("{pattern} {:.1} %", 100.0 * share));
+    format!(
+        "\n{rows}\nStopping {}: {:.1} approaches on average (± {:.1}), of which {:.1} were evidence, {:.2} % \
+         wrong (± {:.2}), {:.2} % undecided.\nFingers that touched: {}.\n",
         stops(sequential.error_rate, sequential.promised),
         sequential.mean().value,
         sequential.mean().standard_error,
@@ -278,8 +247,7 @@ fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> 
         100.0 * sequential.error_standard_error,
         100.0 * sequential.undecided,
         shares.collect::<Vec<_>>().join(", "),
-    );
-    text
+    )
 }
 
 /// Figures of an exchanged object: one row per rule.

@@ -83,11 +83,7 @@ pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
     if global.force || suspects.is_empty() {
         output::write_bytes(&arguments.output, found.toml().as_bytes())?;
     }
-    if global.json {
-        output::print_json_about(&arguments.output, &found)?;
-    } else {
-        output::print_about(&arguments.output, &table(&found, arguments.approaches))?;
-    }
+    global.print_about(&arguments.output, &found, || table(&found, arguments.approaches))?;
     if !suspects.is_empty() && !global.force {
         return Err(Error::from(FitProblem::Suspects { suspects }).in_file(&arguments.recorded));
     }

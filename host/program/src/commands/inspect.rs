@@ -6,7 +6,6 @@ use palpate::chip::inspect::{
     TrainedOn, inspect, on_chip,
 };
 use palpate::compile::{CompiledModel, Core, Memory};
-use palpate::output;
 use palpate::wording::{count, counted, rate, scientific};
 use palpate_shared::DIRECTIONS;
 use std::fmt::Write as _;
@@ -37,18 +36,14 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let model = compiled.model();
     let mut inspected = inspect(&model);
     inspected.chip = arguments.chip.map(|core| on_chip(&model, core, arguments.mhz)).transpose()?;
-    if global.json { output::print_json(&inspected) } else { output::print(&text(&inspected)) }
+    global.print(&inspected, || text(&inspected))
 }
 
 /// Prediction of a model over rows, in words.
 fn predicts_text(predicts: &Predicts) -> String {
-    let what = match predicts.link {
-        None if predicts.last_of_ties => "the class with the largest margin, of several the last".into(),
-        None => "the class with the largest margin, of several the first".into(),
-        Some(link) => super::export::formula(link, predicts.average),
-    };
     let of_each = if predicts.what == "targets" { "of each target " } else { "" };
-    let what = format!("{of_each}{what}");
+    let formula = super::export::formula(predicts.link, predicts.average, predicts.last_of_ties);
+    let what = format!("{of_each}{formula}");
     match predicts.missing {
         Some([low, high]) => format!("{what}; features from {low} to {high} are missing"),
         None => what,

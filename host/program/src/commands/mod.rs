@@ -148,6 +148,16 @@ impl Global {
         self.seed.unwrap_or(1)
     }
 
+    /// Prints a result as JSON or as text.
+    fn print(&self, result: &impl serde::Serialize, text: impl FnOnce() -> String) -> Result<()> {
+        if self.json { output::print_json(result) } else { output::print(&text()) }
+    }
+
+    /// Prints a result and what was written to `path`, as [`output::print_about`].
+    fn print_about(&self, path: &Path, result: &impl serde::Serialize, text: impl FnOnce() -> String) -> Result<()> {
+        if self.json { output::print_json_about(path, result) } else { output::print_about(path, &text()) }
+    }
+
     /// Makes the options count that concern the whole process.
     fn apply(&self) -> Result<()> {
         QUIET.store(self.quiet, Ordering::Relaxed);
@@ -175,6 +185,12 @@ static QUIET: AtomicBool = AtomicBool::new(false);
 /// True if neither progress nor remarks are printed.
 fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
+}
+
+/// Prints a line of JSON.
+fn print_line(line: &impl serde::Serialize) -> Result<()> {
+    // Numbers and strings are always JSON.
+    output::print(&format!("{}\n", serde_json::to_string(line).unwrap_or_default()))
 }
 
 /// Prints a remark to stderr, unless `--quiet` is given.

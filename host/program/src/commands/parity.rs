@@ -6,7 +6,6 @@ use palpate::Result;
 use palpate::compile::CompiledModel;
 use palpate::ensemble::Ensemble;
 use palpate::evaluate::parity;
-use palpate::output;
 use palpate::wording::{count, scientific};
 use std::path::Path;
 
@@ -20,18 +19,18 @@ pub(super) fn run(
     let dataset = super::dataset(data)?.matching(&ensemble.objects);
     let parity = parity::parity(ensemble, &compiled.model(), &dataset, sequences, global.seed(), &Bar::new())
         .map_err(|error| error.in_file(model))?;
-    if global.json {
-        return output::print_json(&parity);
-    }
-    output::print(&format!(
-        "{} touches: margins differ by at most {} nats (the model states {}); another best object after {}\n\
+    let text = || {
+        format!(
+            "{} touches: margins differ by at most {} nats (the model states {}); another best object after {}\n\
          {} sequences: {} with another verdict; {} with the same verdict at another touch\n",
-        count(parity.touches),
-        scientific(parity.max_margin_error),
-        scientific(parity.stated_bound),
-        count(parity.best_differs),
-        count(parity.sequences),
-        count(parity.verdict_differs),
-        count(parity.touches_differ)
-    ))
+            count(parity.touches),
+            scientific(parity.max_margin_error),
+            scientific(parity.stated_bound),
+            count(parity.best_differs),
+            count(parity.sequences),
+            count(parity.verdict_differs),
+            count(parity.touches_differ)
+        )
+    };
+    global.print(&parity, text)
 }

@@ -54,9 +54,6 @@ pub(super) fn run(wanted: &Wanted<'_>, global: &Global) -> Result<()> {
     drop(progress);
     output::write_bytes(path, &planned.bytes)?;
     let written = Written { bytes: planned.bytes.len(), planned };
-    if global.json {
-        return output::print_json_about(path, &written);
-    }
     let Written { bytes, planned: Planned { plan_bytes, poses, rolls, left_out, fewest, hardest, .. } } = &written;
     let [first, second] = &hardest.objects;
     let text = format!(
@@ -70,5 +67,5 @@ pub(super) fn run(wanted: &Wanted<'_>, global: &Global) -> Result<()> {
         decimal(hardest.separation, 3),
         count(*fewest),
     );
-    output::print_about(path, &text)
+    global.print_about(path, &written, || text)
 }

@@ -74,8 +74,6 @@ pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
     if let Some(trace) = trace {
         output::write_unmarked(&trace, play::trace(&surfaces, &contenders, &settings, ROUNDS)?.as_bytes())?;
     }
-    if global.json {
-        return output::print_json_about(&output, &serde_json::json!({ "page": output }));
-    }
-    output::print_about(&output, &format!("{}: open it in a browser\n", output.display()))
+    let text = || format!("{}: open it in a browser\n", output.display());
+    global.print_about(&output, &serde_json::json!({ "page": output }), text)
 }

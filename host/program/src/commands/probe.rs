@@ -228,6 +228,13 @@ impl UnitArguments {
         }
     }
 
+    /// Objects keep their true size, in the unit that each mesh states, unless the option says otherwise.
+    pub(crate) fn imply_true_size(&mut self) {
+        if self.true_size.is_empty() {
+            self.true_size.push(MeshUnit::Stated);
+        }
+    }
+
     /// True if objects are touched at their true size.
     pub(crate) fn is_true_size(&self) -> bool {
         !self.true_size.is_empty()

@@ -49,8 +49,8 @@ pub(super) fn run(
             Proved::Code(bytes, code) => check_code(&certificate_read, bytes, code, &ensemble, &file),
         }
         .map_err(in_model)?;
-        let text = proof_text(&proof, &format!("The certificate {} holds", certificate.display()));
-        return if global.json { output::print_json(&proof) } else { output::print(&text) };
+        let what = format!("The certificate {} holds", certificate.display());
+        return global.print(&proof, || proof_text(&proof, &what));
     }
     let written = asked.written.unwrap_or_else(|| Path::new("-"));
     output::admit(written, [asked.model, path].into_iter().chain(asked.rows))?;

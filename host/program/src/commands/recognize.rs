@@ -1,6 +1,7 @@
 use super::Global;
 use super::expected::ExpectedArguments;
 use super::numbers::error_rate;
+use super::recognize_rows::{reset, word};
 use palpate::Result;
 use palpate::chip::Entry;
 use palpate::compile::{self, CompiledModel};
@@ -80,9 +81,7 @@ struct Line<'a> {
 impl Line<'_> {
     fn print(&self, json: bool) -> Result<()> {
         if json {
-            // Numbers and strings are always JSON.
-            let text = serde_json::to_string(self).unwrap_or_default();
-            return output::print(&format!("{text}\n"));
+            return super::print_line(self);
         }
         match &self.refused {
             Some(refused) => output::print(&format!("{:4}  not counted: {refused}\n", self.touch))?,
@@ -248,11 +247,7 @@ impl<'m> Stream<'m> {
 
     /// Begins another object.
     fn reset(&mut self) {
-        match &self.weights {
-            // One of them is above 0.
-            Some(weights) => _ = self.recognizer.reset_to(weights),
-            None => self.recognizer.reset(),
-        }
+        reset(&mut self.recognizer, self.weights.as_deref());
     }
 
     /// Refuses times that no object can give, such as times in milliseconds.
@@ -270,12 +265,7 @@ impl<'m> Stream<'m> {
         let best = self.recognizer.best();
         Line {
             touch: self.recognizer.touches(),
-            verdict: match self.recognizer.verdict() {
-                Verdict::Undecided => "undecided",
-                Verdict::Recognized { .. } => "recognized",
-                Verdict::Unknown => "unknown",
-                Verdict::GaveUp => "gave-up",
-            },
+            verdict: word(self.recognizer.verdict()),
             // Before the first counted touch no object is more likely than the others.
             object: if self.recognizer.touches() == 0 { "" } else { self.model.object_name(best) },
             posterior: self.recognizer.posterior(best).to_f64(),

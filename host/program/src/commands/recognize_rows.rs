@@ -49,6 +49,25 @@ pub(super) struct Asked<'a> {
     pub(super) weights: Option<Vec<u32>>,
 }
 
+/// The word for a verdict.
+pub(super) fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Undecided => "undecided",
+        Verdict::Recognized { .. } => "recognized",
+        Verdict::Unknown => "unknown",
+        Verdict::GaveUp => "gave-up",
+    }
+}
+
+/// Starts a recognizer again, with these weights if there are any.
+pub(super) fn reset(recognizer: &mut Recognizer<'_, 256>, weights: Option<&[u32]>) {
+    match weights {
+        // One of them is above 0.
+        Some(weights) => _ = recognizer.reset_to(weights),
+        None => recognizer.reset(),
+    }
+}
+
 /// Prints the class or the value of each row, or the verdict so far.
 pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_>) -> Result<()> {
     let &Asked { adds_up, sequence, json, ref weights } = asked;
@@ -81,25 +100,15 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
             continue;
         }
         if is_first || !adds_up {
-            match weights {
-                // One of them is above 0.
-                Some(weights) => _ = recognizer.reset_to(weights),
-                None => recognizer.reset(),
-            }
+            reset(&mut recognizer, weights.as_deref());
         }
         recognizer.push_features(&encoded).map_err(|_| EvaluateProblem::OverTouches)?;
         let own = model.predict_class(&encoded, &mut scratch).unwrap_or_default();
         let class = if adds_up { recognizer.best() } else { own };
-        let verdict = match recognizer.verdict() {
-            Verdict::Undecided => "undecided",
-            Verdict::Recognized { .. } => "recognized",
-            Verdict::Unknown => "unknown",
-            Verdict::GaveUp => "gave-up",
-        };
         let line = Line {
             row: number,
             sequence: rows.labels.get(number - 1).map(String::as_str),
-            verdict: (has_classes && adds_up).then_some(verdict),
+            verdict: (has_classes && adds_up).then(|| word(recognizer.verdict())),
             class: has_classes.then(|| model.object_name(class)),
             posterior: has_classes.then(|| recognizer.posterior(class).to_f64()),
             rows: (has_classes && adds_up).then(|| recognizer.touches()),
@@ -130,9 +139,7 @@ fn starts(ids: &[String]) -> Result<BTreeSet<usize>, RowsProblem> {
 
 fn print(line: &Line<'_>, json: bool) -> Result<()> {
     if json {
-        // Numbers and strings are always JSON.
-        let text = serde_json::to_string(line).unwrap_or_default();
-        return output::print(&format!("{text}\n"));
+        return super::print_line(line);
     }
     let row = line.row;
     let sequence = line.sequence.map_or_else(String::new, |sequence| format!("  {sequence}"));

@@ -130,10 +130,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     made.ensemble.save(&arguments.output)?;
     arguments.teach.write_page(made.taught.as_ref())?;
     let trained = Trained::new(&made, seconds)?;
-    match global.json {
-        true => output::print_json_about(&arguments.output, &trained),
-        false => output::print_about(&arguments.output, &text(&arguments.output, &trained, &made)),
-    }
+    global.print_about(&arguments.output, &trained, || text(&arguments.output, &trained, &made))
 }
 
 impl<'m> Trained<'m> {

@@ -7,7 +7,6 @@ use palpate::compile::CompiledModel;
 use palpate::ensemble::{self, OverTouches};
 use palpate::error::{Error, EvaluateProblem, Place, RowsProblem};
 use palpate::evaluate::verify::{Library, Verified, verify};
-use palpate::output;
 use palpate::rows::{read_margins, read_values};
 use palpate::wording::{count, scientific};
 use std::path::PathBuf;
@@ -94,11 +93,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if arguments.prove.is_some() && checked.is_ok() {
         return super::prove::run(&arguments.proof(), Some((&verified, text(&verified))), &options, global);
     }
-    if global.json {
-        output::print_json(&verified)?;
-    } else {
-        output::print(&text(&verified))?;
-    }
+    global.print(&verified, || text(&verified))?;
     checked
 }
 

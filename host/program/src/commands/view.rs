@@ -142,8 +142,6 @@ fn watches(Arguments { model, output, .. }: &Arguments, global: &Global) -> Resu
     let command = shell::command(words.iter().map(AsRef::as_ref));
     let model = model.first().map(CompiledModel::read).transpose()?;
     output::write_bytes(output, watch::page(model.as_ref(), &command)?.as_bytes())?;
-    if global.json {
-        return output::print_json_about(output, &serde_json::json!({ "page": output }));
-    }
-    output::print_about(output, &format!("{}: open it in a browser that has Web Serial\n", output.display()))
+    let text = || format!("{}: open it in a browser that has Web Serial\n", output.display());
+    global.print_about(output, &serde_json::json!({ "page": output }), text)
 }

@@ -209,6 +209,56 @@ fn options_of_a_table_are_refused_where_there_is_none_or_where_they_name_nothing
 }
 
 #[test]
+fn touches_with_a_position_are_captured_straight_down_and_other_combinations_are_refused_by_name() {
+    let directory = meshes();
+    let probe = directory.path().join("probe.toml");
+    std::fs::write(&probe, "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\n").unwrap();
+    let located = ["--position", "--true-size", "mm", "--probe", probe.to_str().unwrap()];
+    let table = [&located[..], &["--scene", "table"]].concat();
+    for (arguments, more, what) in [
+        (&located[..], &[][..], "scene is \"floating\"; use table with --position"),
+        (&table, &["--cone", "30"], "cone is \"30\"; use 0 with --position"),
+        (&table, &["--touches", "30"], "touches is \"30\"; use --approaches N with --position"),
+        (&table, &["--aim", "mass"], "aim is \"mass\"; use --within MM with --position"),
+        (&table, &["--within", "-1"], "within is"),
+        (&table[..1], &["--scene", "table"], "probe is \"not given\""),
+        (&[], &["--within", "30"], "within is \"30\"; use it with --position"),
+    ] {
+        let error = stderr(capture(directory.path(), "out", &[arguments, more].concat()).output().unwrap(), 2);
+        assert!(error.replace('"', "").contains(&what.replace('"', "")), "{more:?}: {error}");
+    }
+    let error = stderr(
+        capture(directory.path(), "out", &["--position", "--scene", "table", "--probe", located[4]]).output().unwrap(),
+        1,
+    );
+    assert!(error.contains("the unit of the mesh is not known") && error.contains("--true-size"), "{error}");
+    stdout(
+        capture(directory.path(), "out", &[&table[..], &["--approaches", "40", "--within", "2"]].concat())
+            .output()
+            .unwrap(),
+    );
+    let out = directory.path().join("out");
+    let listing: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("dataset.json")).unwrap()).unwrap();
+    let settings = &listing["settings"];
+    assert_eq!(settings["scene"], serde_json::json!({"table": {"cone": 0.0}}));
+    assert_eq!([&settings["position"], &settings["pose"], &settings["approaches"]], [true, true, true]);
+    assert_eq!((settings["within"].as_f64(), settings["touches"].as_u64()), (Some(2.0), Some(40)));
+    let lines = std::fs::read_to_string(out.join("globe.txt")).unwrap();
+    assert_eq!(lines.lines().count(), 40);
+    assert!(lines.lines().all(|line| line.split(' ').count() == 12), "{lines}");
+    // What is recorded from such lines states the position too.
+    let mut record = command(["data", "record"]);
+    record.arg(out.join("globe.txt")).arg("-o").arg(directory.path().join("recorded"));
+    record.args(["--object", "globe", "--pose", "--probe", located[4]]);
+    let error = stderr(record.output().unwrap(), 1);
+    assert!(error.contains("globe.txt: a position, where the touches recorded here have none"), "{error}");
+    stdout(record.arg("--position").output().unwrap());
+    let recorded = std::fs::read_to_string(directory.path().join("recorded/globe.txt")).unwrap();
+    assert_eq!(recorded, lines);
+}
+
+#[test]
 fn resuming_with_other_arguments_is_refused() {
     let directory = meshes();
     stdout(capture(directory.path(), "out", &["--touches", "20"]).output().unwrap());

@@ -17,27 +17,35 @@ from importlib.metadata import version as _version
 from ._errors import FileError, InputError, ModelWarning, PalpateError, SettingError
 from ._evaluate import Evaluation, Parity, Sequential, evaluate, parity
 from ._import import compile, to_ensemble
-from ._native import DataSet, Ensemble, Model, Recognizer, Surface, capture, train
+from ._locate import CalibratedMaps, MapsEvaluation
+from ._native import DataSet, Ensemble, Locator, Maps, Model, Recognizer, Surface, capture, train
 from ._stream import Calibrated, Ends, SequenceRecognizer, calibrate, evaluate_sequences
-from ._types import Meshes, Probe, Progress, Touch, Verdict
+from ._types import Located, Meshes, Mode, Probe, Progress, Real, Touch, Verdict
 
 __version__ = _version("palpate")
 
 __all__ = [
     "Calibrated",
+    "CalibratedMaps",
     "DataSet",
     "Ends",
     "Ensemble",
     "Evaluation",
     "FileError",
     "InputError",
+    "Located",
+    "Locator",
+    "Maps",
+    "MapsEvaluation",
     "Meshes",
+    "Mode",
     "Model",
     "ModelWarning",
     "PalpateError",
     "Parity",
     "Probe",
     "Progress",
+    "Real",
     "Recognizer",
     "SequenceRecognizer",
     "Sequential",

@@ -59,6 +59,102 @@ class Probe:
 
 
 @dataclass(frozen=True)
+class Real:
+    """What a hand and a table add to touches: to those that maps expect, and to simulated ones. Deviations are standard ones."""
+
+    height: float = 0.5
+    """Of each finger's height, in millimeters."""
+    lost: float = 0.02
+    """Share of contacts with the object that are lost."""
+    position: float = 0.0
+    """Of the hand's position along each axis, in millimeters."""
+    drift: float = 0.0
+    """Of the object's move along x and y in an approach, in millimeters."""
+    drift_yaw: float = 0.0
+    """Of its turn in an approach, in degrees."""
+    size: float = 1.0
+    """Size of the objects relative to their meshes; maps expect 1."""
+    bent: float = 0.0
+    """Of each fingertip's offset across the row and along it, in millimeters, the same in all approaches to an object; maps
+    expect none: state it as part of `position`."""
+    tips: float = 0.0
+    """Of each fingertip's height, in millimeters, the same in all approaches to an object; maps expect none."""
+    table: float = 0.0
+    """Height of the table in the frame that heights are stated in, in millimeters, and no deviation; maps expect 0."""
+    turned: float = 0.0
+    """Turn of the row of fingers beyond the stated one, in degrees, and no deviation; maps expect 0."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A place where the object may lie. Numbers called `within` are half of a 95 % interval."""
+
+    placement: str
+    """How it lies."""
+    x: float
+    """Place of the placement's origin on the table, in millimeters."""
+    y: float
+    """Place of the placement's origin on the table, in millimeters."""
+    yaw: float | None
+    """Turn from the x axis towards y, in degrees; `None` for what looks the same from all sides."""
+    x_within: float
+    """In millimeters."""
+    y_within: float
+    """In millimeters."""
+    yaw_within: float | None
+    """In degrees."""
+    share: float
+    """Share of the belief in the object that is near here."""
+
+
+@dataclass(frozen=True)
+class Located:
+    """The locator's answer after a touch."""
+
+    state: Literal["undecided", "recognized", "unknown", "gave-up"]
+    """An object was recognized, the touches fit none that the maps know, or the limit of touches was reached."""
+    best: str
+    """The object with the most evidence."""
+    posterior: float
+    """Its posterior."""
+    touches: int
+    """The number of touches taken in."""
+    modes: tuple[Mode, ...]
+    """Where it may lie, at most four places, the most likely one first."""
+
+    @property
+    def decided(self) -> bool:
+        """True if further touches change nothing about the verdict; they may still about the place."""
+        return self.state != "undecided"
+
+    @property
+    def object(self) -> str | None:
+        """The object that was recognized."""
+        return self.best if self.state == "recognized" else None
+
+    @property
+    def placed(self) -> Mode | None:
+        """The most likely place."""
+        return self.modes[0] if self.modes else None
+
+    def is_placed(self, millimeters: float = 3.0, degrees: float = 5.0) -> bool:
+        """True if an object is recognized and its place is known as well as this, with 95 % of the belief."""
+        mode = self.placed
+        if self.object is None or mode is None or mode.share < 0.95:
+            return False
+        turned = mode.yaw_within is None or mode.yaw_within <= degrees
+        return turned and max(mode.x_within, mode.y_within) <= millimeters
+
+    def __str__(self) -> str:
+        mode = self.placed
+        name = self.object or f"{self.state}, perhaps {self.best}"
+        if mode is None:
+            return name
+        yaw = "any" if mode.yaw is None else f"{mode.yaw:.0f}"
+        return f"{name}, {mode.placement}, {mode.x:.1f}, {mode.y:.1f} mm, {yaw}°"
+
+
+@dataclass(frozen=True)
 class Verdict:
     """The recognizer's answer after a touch."""
 

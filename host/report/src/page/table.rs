@@ -59,7 +59,7 @@ impl Cell {
     }
 
     /// Number that the column is sorted by, if this is one.
-    pub fn value(&self) -> Option<f64> {
+    pub(crate) fn value(&self) -> Option<f64> {
         match *self {
             Self::Number(value, _)
             | Self::Spread(value, _, _)
@@ -107,7 +107,7 @@ impl Records {
     ///
     /// # Errors
     /// If the CSV library refuses, which it has no reason to.
-    pub fn csv(&self) -> Result<Vec<u8>> {
+    pub(crate) fn csv(&self) -> Result<Vec<u8>> {
         let spread: Vec<bool> = (0..self.columns.len())
             .map(|c| self.rows.iter().any(|row| matches!(row[c], Cell::Spread(..) | Cell::PercentSpread(..))))
             .collect();
@@ -129,21 +129,6 @@ impl Records {
         }
         Ok(writer.into_inner().map_err(|e| bug(e.to_string()))?)
     }
-}
-
-/// A table in the page.
-#[derive(Clone, Debug)]
-pub struct Table {
-    /// Its anchor, and its file's stem.
-    pub id: String,
-    /// Title of the table.
-    pub title: String,
-    /// Caption: how to read it, and how it was made.
-    pub caption: String,
-    /// The command that remakes it.
-    pub command: String,
-    /// Its contents.
-    pub data: Records,
 }
 
 #[cfg(test)]

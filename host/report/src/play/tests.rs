@@ -143,7 +143,7 @@ fn a_trace_is_what_the_game_computes() {
         for index in 0..100 {
             let touch = game.touch_at_random(&mut round).touch;
             let times = touch.times().map(|time| time.micros().map_or("-".into(), |micros| micros.to_string()));
-            let recognizer = round.players()[0].recognizer();
+            let recognizer = &round.players[0].recognizer;
             let verdict = u8::from(recognizer.verdict() != Verdict::Undecided);
             let evidence = match recognizer.evidence() {
                 [a, b] => format!("{a},{b}"),

@@ -164,7 +164,7 @@ impl Approach {
 
     /// Like [`Self::draw`], with the aim uniform in another box, such as [`Aim::target`] gives, and another clearance than
     /// [`CLEARANCE`].
-    pub fn draw_at(rng: &mut impl Rng, [low, high]: [DVec3; 2], target: [DVec3; 2], tilt: f64, clearance: f64) -> Self {
+    fn draw_at(rng: &mut impl Rng, [low, high]: [DVec3; 2], target: [DVec3; 2], tilt: f64, clearance: f64) -> Self {
         let (center, side) = ((low + high) / 2.0, high - low);
         let start = center + on_sphere(rng) * (side.length() / 2.0 + clearance);
         let [low, high] = target;
@@ -173,8 +173,8 @@ impl Approach {
         Self { start, direction, alignment: row(rng, direction, tilt) }
     }
 
-    /// Draws an approach to this scene, with the aim uniform in the `target`: to a floating object as [`draw_at`](Self::draw_at)
-    /// does, to one on a table as [`draw_above`](Self::draw_above) does.
+    /// Draws an approach to this scene, with the aim uniform in the `target`: to a floating object as `draw_at` does,
+    /// to one on a table as `draw_above` does.
     pub fn draw_to(rng: &mut impl Rng, scene: &Scene, target: [DVec3; 2], tilt: f64, clearance: f64) -> Self {
         match scene.table() {
             None => Self::draw_at(rng, scene.bounds(), target, tilt, clearance),
@@ -185,7 +185,7 @@ impl Approach {
     /// Draws an approach from above. Direction: uniform within `cone` degrees of straight down. Aim: uniform in the `target`; the
     /// middle finger moves to the aim, from the sphere about the box's center with half the box's diagonal plus `clearance` as
     /// its radius. Row: as [`draw_at`](Self::draw_at).
-    pub fn draw_above(
+    fn draw_above(
         rng: &mut impl Rng,
         [low, high]: [DVec3; 2],
         target: [DVec3; 2],
@@ -216,9 +216,12 @@ impl Approach {
     /// Distance that the probe has moved when each finger first touches, in units; none for a finger that never does, or only
     /// after one of them has reached the table.
     pub fn distances(&self, scene: &Scene, probe: &Probe) -> [Option<f64>; FINGERS] {
-        let distances =
-            self.fingers(probe.spacing).map(|finger| scene.first_contact(finger, self.direction, probe.radius));
-        self.above_table(distances, scene, probe)
+        self.above_table(self.each_distance(scene, probe), scene, probe)
+    }
+
+    /// Distances at which each finger touches the object, wherever the others are.
+    pub(super) fn each_distance(&self, scene: &Scene, probe: &Probe) -> [Option<f64>; FINGERS] {
+        self.fingers(probe.spacing).map(|finger| scene.first_contact(finger, self.direction, probe.radius))
     }
 
     /// Distances at which all three fingers touch, or none: as soon as one finger misses, no other is cast.
@@ -267,7 +270,7 @@ pub fn to_q15(cosine: f64) -> i16 {
 }
 
 /// The direction of the row of fingers: perpendicular to the motion, rolled uniformly about it, then tilted.
-fn row(rng: &mut impl Rng, direction: DVec3, tilt: f64) -> DVec3 {
+pub(super) fn row(rng: &mut impl Rng, direction: DVec3, tilt: f64) -> DVec3 {
     let across = direction.any_orthonormal_vector();
     let [roll_cos, roll_sin] = on_circle(rng);
     let row = across * roll_cos + direction.cross(across) * roll_sin;
@@ -276,7 +279,7 @@ fn row(rng: &mut impl Rng, direction: DVec3, tilt: f64) -> DVec3 {
 }
 
 /// Uniform in [0, 1), of 53 bits.
-fn unit(rng: &mut impl Rng) -> f64 {
+pub(super) fn unit(rng: &mut impl Rng) -> f64 {
     rng.random()
 }
 

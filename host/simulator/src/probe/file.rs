@@ -21,6 +21,7 @@
 //! speed_bias = "1%"               # off per robot
 //! pose_noise = "2deg"
 //! pose_bias = "1deg"
+//! position = "1mm"               # off in each coordinate, where touches state the hand's position
 //! grazing = { angle = "30deg", bend = 0.5 } # beyond this angle, fingers bend aside by bend · tan(angle − this)
 //! ```
 //!
@@ -86,6 +87,8 @@ struct Real {
     pose_noise: Option<f64>,
     #[serde(deserialize_with = "angle")]
     pose_bias: Option<f64>,
+    #[serde(deserialize_with = "length")]
+    position: Option<f64>,
     grazing: Option<Aside>,
 }
 
@@ -148,6 +151,7 @@ impl ProbeFile {
             speed_bias: real.speed_bias.unwrap_or_default(),
             pose: real.pose_noise.unwrap_or_default(),
             pose_bias: real.pose_bias.unwrap_or_default(),
+            position: real.position.unwrap_or_default(),
             // Lengths become the times that the probe takes for them.
             grazing: real.grazing.map_or_else(Grazing::default, |Aside { angle, bend }| Grazing {
                 angle: angle.unwrap_or_default(),
@@ -205,6 +209,10 @@ fn shares<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; FINGERS], 
     Ok(shares)
 }
 
+fn length<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    read(deserializer, quantity::length)
+}
+
 fn angle<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
     read(deserializer, quantity::angle)
 }
@@ -230,7 +238,7 @@ mod tests {
         let text = format!(
             "unit = \"mm\"\n{MEASURES}tilt = 0\ntimer = \"1ms\"\n[real]\nspeed_factor = 0.98\noffsets = [0, 0.3, -0.1]\n\
              noise = \"0..5ms\"\ndebounce = \"2ms\"\nmissed = \"2%\"\nspeed_error = \"5%\"\nspeed_bias = \"1%\"\n\
-             pose_noise = \"2deg\"\npose_bias = \"1deg\"\ngrazing = {{ angle = \"30deg\", bend = 0.5 }}\n"
+             pose_noise = \"2deg\"\npose_bias = \"1deg\"\nposition = \"1mm\"\ngrazing = {{ angle = \"30deg\", bend = 0.5 }}\n"
         );
         let file = parse(&text).unwrap();
         assert_eq!((file.unit, file.probe.tilt), (Length::Millimeter, 0.0));
@@ -245,6 +253,7 @@ mod tests {
             speed_bias: 0.01,
             pose: 2.0,
             pose_bias: 1.0,
+            position: 1_000.0,
             grazing: Grazing { angle: 30.0, bend: 5_000.0 },
         };
         assert_eq!(file.real, real);

@@ -65,8 +65,7 @@ pub fn within(touch: &Touch, window: Option<u32>) -> Touch {
     }
     let mut times = touch.times();
     times.iter_mut().zip(late).filter(|(_, late)| *late).for_each(|(time, _)| *time = ContactTime::MISSING);
-    let kept = Touch::new(times);
-    touch.pose().map_or(kept, |pose| kept.with_pose(pose))
+    touch.with_times(times)
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@
 use crate::ensemble::{
     Ensemble, MAX_OBJECTS, Node, Provenance, StatedProbe, TouchOrigin, Trained, check_names, feature_row, inputs,
 };
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, TrainProblem};
 use crate::mesh::BACKGROUND;
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
@@ -24,12 +24,11 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-mod error;
+pub(crate) mod error;
 mod small;
 #[cfg(feature = "xgboost")]
 mod xgboost;
 
-pub use error::TrainProblem;
 pub use small::Small;
 pub(crate) use small::train_each as train_small;
 
@@ -74,7 +73,7 @@ pub struct Settings {
     /// number for each feature of the descriptor, or of its form for full touches.
     pub feature_bins: Option<Vec<usize>>,
     /// Rounds the leaves to whole multiples of a power of two, so that the largest leaf takes at most this many bits
-    /// with its sign; `None` leaves them as the trainer made them. See [`round_leaves`].
+    /// with its sign; `None` leaves them as the trainer made them.
     pub leaf_bits: Option<u32>,
     /// Grows trees with few thresholds and few different leaves, for models of a few KB; `None` grows them for accuracy alone.
     /// Needs [`multi_output`](Self::multi_output). With [`leaf_bits`](Self::leaf_bits) of 8 a model with leaves of one byte is
@@ -288,7 +287,7 @@ pub fn train_with_background(
 /// A 16-bit unit is about 10⁻⁴ nats, far below what a finite number of touches can teach a leaf. In exchange, f32 sums
 /// of leaves are exact in any order while they stay below 2²⁴ units, a compiled model with leaves of that width holds
 /// the very same numbers, and full and compiled model cannot differ.
-pub fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
+pub(crate) fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
     let unit = leaf_unit(ensemble, bits);
     // Multiplying and dividing by a power of two is exact.
     let rounded = |value: &mut f32| *value = (*value / unit).round() * unit;
@@ -300,7 +299,7 @@ pub fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
     }
 }
 
-/// True if [`round_leaves`] to this many bits changes no leaf, so that a compiled model loses nothing in leaves of that width.
+/// True if [rounding](Settings::leaf_bits) to this many bits changes no leaf, so that a compiled model loses nothing in leaves of that width.
 pub fn is_rounded(ensemble: &Ensemble, bits: u32) -> bool {
     let unit = leaf_unit(ensemble, bits);
     leaves(ensemble).all(|value| (value / unit).fract() == 0.0)
@@ -442,7 +441,9 @@ impl<'d> Evidence<'d> {
             let mut touches: Cow<'_, [Touch]> = if settings.noise.is_none() {
                 object.touches().into()
             } else {
-                object.within_stroke(settings.noise.add(&object.name, object.touches(), settings.seed)).into()
+                let stream = object.stream(&settings.noise, settings.seed);
+                let noisy = (0..).zip(object.touches()).map(|(index, touch)| stream.add(touch, index, index as u64));
+                object.within_stroke(noisy.collect()).into()
             };
             if !touches.iter().all(counts) {
                 touches.to_mut().retain(counts);

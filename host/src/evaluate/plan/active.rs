@@ -16,7 +16,7 @@ use std::convert::Infallible;
 /// Every approach is drawn from those of the sequence's object in the proposed pose, none twice in a sequence. Poses that
 /// some object has no test approach in are never proposed, and one whose approaches are used up in a sequence is not
 /// proposed again in it; where none is left, the sequence ends without a verdict.
-pub struct Active {
+pub(crate) struct Active {
     /// For each tested object, for each pool: of its sources, and of robots.
     by_pose: Vec<Vec<ByPose>>,
     /// Poses that may be proposed.
@@ -45,7 +45,7 @@ impl Active {
     /// # Errors
     /// [`EvaluateProblem::NoPlan`] for a model without one, or an ensemble; [`EvaluateProblem::NoApproaches`] and
     /// [`EvaluateProblem::NoPoseOf`] for a data set without approaches or without poses.
-    pub fn new(margins: &Margins<'_>, dataset: &Dataset) -> Result<Self> {
+    pub(crate) fn new(margins: &Margins<'_>, dataset: &Dataset) -> Result<Self> {
         let plan = match margins.candidate {
             Candidate::Full(_) => None,
             Candidate::Compiled(model) => model.plan(),
@@ -67,7 +67,7 @@ impl Active {
     }
 
     /// Conditions of the test.
-    pub fn facts(&self) -> ActiveFacts {
+    pub(crate) fn facts(&self) -> ActiveFacts {
         ActiveFacts {
             rolls: self.poses.rolls(),
             poses: self.candidates.len(),
@@ -119,7 +119,7 @@ impl Margins<'_> {
         let tested = &self.tested[position];
         let Values::Compiled(model, values) = &tested.values else { return None };
         let stock = active.stock(position, group, seed);
-        Some((model, Chosen { active, stock, approaches: &tested.approaches, values, objects: self.objects().len() }))
+        Some((model, Chosen { active, stock, approaches: &tested.approaches, values, objects: self.objects.len() }))
     }
 }
 

@@ -23,7 +23,7 @@ struct Counts {
 ///
 /// # Errors
 /// [`Setting`](crate::error::Setting) as [`evaluate`](crate::evaluate::evaluate()).
-pub fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settings) -> Result<Evaluation> {
+pub(crate) fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settings) -> Result<Evaluation> {
     let Settings { at, at_approaches, groups, seed, .. } = settings;
     let rule = margins.stopping(&settings.sequences())?;
     if at.iter().chain(at_approaches).any(|&at| at == 0) {

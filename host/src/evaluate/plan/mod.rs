@@ -4,8 +4,9 @@ mod active;
 mod figures;
 mod poses;
 
-pub use active::{Active, ActiveFacts};
-pub use figures::evaluate_active;
+pub(super) use active::Active;
+pub use active::ActiveFacts;
+pub(super) use figures::evaluate_active;
 use poses::ByPose;
 
 use super::Candidate;
@@ -153,7 +154,8 @@ fn may_touch(dataset: &Dataset, poses: Poses) -> Vec<bool> {
 /// The fewest approaches of an object in a pose that may touch.
 fn fewest(by_pose: &[ByPose], may_touch: &[bool]) -> Result<usize> {
     let numbers = (0_u16..).zip(may_touch).filter(|(_, may_touch)| **may_touch);
-    let counts = numbers.flat_map(|(pose, _)| by_pose.iter().map(move |by_pose| (by_pose.count(pose), by_pose.name())));
+    let counts =
+        numbers.flat_map(|(pose, _)| by_pose.iter().map(move |by_pose| (by_pose.count(pose), by_pose.name.as_str())));
     match counts.min_by_key(|(count, _)| *count) {
         None => Err(EvaluateProblem::NoTouches.into()),
         Some((found, name)) if found < LEAST_IN_POSE => {
@@ -165,9 +167,9 @@ fn fewest(by_pose: &[ByPose], may_touch: &[bool]) -> Result<usize> {
 
 /// For each pose and each other object the mean of e^(−evidence/2) of an approach to a tested object.
 fn overlaps(margins: &Margins<'_>, position: usize, by_pose: &ByPose) -> Vec<f64> {
-    let (tested, objects) = (&margins.tested[position], margins.objects().len());
+    let (tested, objects) = (&margins.tested[position], margins.objects.len());
     let mut overlaps = Vec::new();
-    for approaches in by_pose.approaches() {
+    for approaches in &by_pose.approaches {
         let mut sums = vec![0.0; objects];
         for &approach in approaches {
             let values = match (&tested.values, tested.approaches[approach as usize]) {

@@ -10,9 +10,10 @@ use std::collections::HashMap;
 /// The approaches of one object, or some of them, by the number of their pose.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct ByPose {
-    name: String,
+    /// The object's name.
+    pub(super) name: String,
     /// For each pose the numbers of its approaches.
-    approaches: Vec<Vec<u32>>,
+    pub(super) approaches: Vec<Vec<u32>>,
 }
 
 impl ByPose {
@@ -30,16 +31,6 @@ impl ByPose {
             approaches[usize::from(pose)].push(number);
         }
         Ok(Self { name: touched.name.clone(), approaches })
-    }
-
-    /// The object's name.
-    pub(super) fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// For each pose the numbers of its approaches.
-    pub(super) fn approaches(&self) -> &[Vec<u32>] {
-        &self.approaches
     }
 
     /// Number of approaches made in a pose; 0 for one that does not exist.

@@ -299,6 +299,10 @@ impl Findings {
             return;
         }
         let of = |number: usize| format!("{number} of {count} touches");
+        let has_position = touches.iter().any(|touch| touch.position().is_some());
+        if origin.is_some_and(|origin| origin.position != has_position) {
+            self.problem(path, TouchesProblem::OtherPosition { has_position, others: Listing::STATED });
+        }
         let partial = touches.iter().filter(|touch| !touch.is_full()).count();
         if partial > 0 && origin.is_some_and(|origin| !origin.approaches) {
             let what = format!("{} miss a contact, but the data set is said to hold full touches only", of(partial));
@@ -326,12 +330,15 @@ impl Findings {
 
     /// Finds problems with objects compared with each other.
     fn together(&mut self, directory: &Path, objects: &[Read]) {
-        let with_pose = |object: &Read| object.touches.iter().filter(|touch| touch.pose().is_some()).count();
-        let (posed, all) =
-            objects.iter().fold((0, 0), |(posed, all), object| (posed + with_pose(object), all + object.touches.len()));
-        if posed > 0 && posed < all {
-            let what = format!("{posed} of {all} touches have a pose and the others have none");
-            self.wrong(directory, what, "Give all of them one, or none.");
+        let touches = || objects.iter().flat_map(|object| &object.touches);
+        let posed = touches().filter(|touch| touch.pose().is_some()).count();
+        let located = touches().filter(|touch| touch.position().is_some()).count();
+        let all = touches().count();
+        for (count, of) in [(posed, "pose"), (located, "position")].into_iter().filter(|(count, _)| *count > 0) {
+            if count < all {
+                let what = format!("{count} of {all} touches have a {of} and the others have none");
+                self.wrong(directory, what, "Give all of them one, or none.");
+            }
         }
         for (index, object) in objects.iter().enumerate() {
             let is_same = |other: &&Read| other.touches.len() >= ENOUGH && other.touches == object.touches;
@@ -361,11 +368,12 @@ fn is_repeated(touches: &[Touch]) -> bool {
     counts.values().all(|&count| count >= 2)
 }
 
-type Key = ([Option<u32>; 3], Option<([i16; 3], [i16; 3])>);
+type Key = ([Option<u32>; 3], Option<([i16; 3], [i16; 3])>, Option<[i32; 3]>);
 
 /// A touch, to be compared with others.
 fn key(touch: &Touch) -> Key {
-    (touch.times().map(|time| time.micros()), touch.pose().map(|pose| (pose.direction, pose.alignment)))
+    let pose = touch.pose().map(|pose| (pose.direction, pose.alignment));
+    (touch.times().map(|time| time.micros()), pose, touch.position().map(|position| position.micrometers))
 }
 
 /// The time between the first and the last contact, in seconds.

@@ -32,6 +32,9 @@ pub struct ObjectSummary {
     pub duplicates: u64,
     /// Number of touches with the probe's pose.
     pub posed: u64,
+    /// Number of touches with the hand's position.
+    #[serde(skip_serializing_if = "is_none")]
+    pub located: u64,
     /// The longest time between two contacts, in seconds.
     pub longest: f64,
     /// Curvature of the full touches, in milliseconds; none without full touches.
@@ -76,11 +79,17 @@ impl ObjectSummary {
             patterns,
             duplicates,
             posed: touches.iter().filter(|touch| touch.pose().is_some()).count() as u64,
+            located: touches.iter().filter(|touch| touch.position().is_some()).count() as u64,
             longest: touches.iter().map(super::last).fold(0.0, f64::max),
             curvature: feature(0),
             slope: feature(1),
         }
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_none(count: &u64) -> bool {
+    *count == 0
 }
 
 /// The quantiles of microseconds, in milliseconds; none of nothing.

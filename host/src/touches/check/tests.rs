@@ -123,6 +123,14 @@ fn what_reads_well_and_trains_badly_is_wrong() {
         .map(|touch| touch.with_pose(palpate_shared::Pose { direction: [0, 0, 32767], alignment: [32767, 0, 0] }))
         .collect();
     wrong(with(&posed, false).path(), "30 of 60 touches have a pose and the others have none");
+    let located = |touch: &Touch| touch.with_position(palpate_shared::Position { micrometers: [1, 2, 3] });
+    let located: Vec<Touch> = posed.iter().map(located).collect();
+    wrong(with(&located, false).path(), "30 of 60 touches have a position and the others have none");
+    wrong(with(&located, true).path(), "a position, where the touches that dataset.json states have none");
+    wrong(
+        with(&[&posed[..1], &located[..]].concat(), false).path(),
+        "spoon.txt:2: a position, where the touches before it",
+    );
     let slow: Vec<Touch> = (1..31).map(|i| Touch::from_micros([0, 3_000_000 * i, 9_000_000])).collect();
     wrong(with(&slow, true).path(), "30 of 30 touches last longer than the 2.73 s");
     let (none, notes) = said(with(&[&spoon[..], &slow[..2]].concat(), true).path());

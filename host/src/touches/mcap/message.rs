@@ -4,7 +4,7 @@ use super::Kind;
 use crate::error::TouchesProblem;
 use crate::touches::listing::is_file_name;
 use crate::touches::logged::{Content, LoggedVerdict};
-use crate::touches::touch_of_seconds;
+use crate::touches::{located, touch_of_seconds};
 use byteorder::{BigEndian, LittleEndian};
 use palpate_shared::{Q15_ONE, Touch};
 use serde::{Deserialize, Serialize, Serializer};
@@ -15,6 +15,8 @@ use std::collections::BTreeMap;
 pub(super) enum Encoding {
     Json,
     Cdr,
+    /// CDR of touches by the definition of earlier versions, which has no position.
+    CdrBefore,
 }
 
 /// `palpate.Touch`.
@@ -23,6 +25,9 @@ pub(super) struct JsonTouch {
     times: [Option<f64>; 3],
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pose: Option<JsonPose>,
+    /// In meters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    position: Option<[f64; 3]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     object: Option<String>,
 }
@@ -72,6 +77,14 @@ struct CdrTouch {
     object: String,
 }
 
+/// What `Touch.msg` has behind these.
+#[derive(Deserialize)]
+struct CdrLocated {
+    touch: CdrTouch,
+    has_position: bool,
+    position: [f64; 3],
+}
+
 /// `Verdict.msg`.
 #[derive(Deserialize)]
 struct CdrVerdict {
@@ -95,14 +108,11 @@ impl Encoding {
                 checked(LoggedVerdict { touch, verdict, object, posterior, refused, posteriors: posteriors.0 })
             }
             (Self::Cdr, Kind::Touch) => {
-                let CdrTouch { times, has_pose, direction, alignment, object } = cdr(data, "touch in CDR")?;
-                touch(JsonTouch {
-                    times: times.map(|time| (!time.is_nan()).then_some(time)),
-                    pose: has_pose.then_some(JsonPose { direction, alignment }),
-                    object: Some(object),
-                })
+                let CdrLocated { touch, has_position, position } = cdr(data, "touch in CDR")?;
+                felt(touch, has_position.then_some(position))
             }
-            (Self::Cdr, Kind::Verdict) => {
+            (Self::CdrBefore, Kind::Touch) => felt(cdr(data, "touch in CDR")?, None),
+            (Self::Cdr | Self::CdrBefore, Kind::Verdict) => {
                 let CdrVerdict { touch, verdict, object, posterior, refused, objects, posteriors } =
                     cdr(data, "verdict in CDR")?;
                 if objects.len() != posteriors.len() {
@@ -143,7 +153,17 @@ fn cdr<T: serde::de::DeserializeOwned>(data: &[u8], what: &'static str) -> Resul
 /// The longest time that a touch can hold, in seconds.
 const LONGEST: f64 = 4294.0;
 
-fn touch(JsonTouch { times, pose, object }: JsonTouch) -> Result<Content, TouchesProblem> {
+fn felt(touched: CdrTouch, position: Option<[f64; 3]>) -> Result<Content, TouchesProblem> {
+    let CdrTouch { times, has_pose, direction, alignment, object } = touched;
+    touch(JsonTouch {
+        times: times.map(|time| (!time.is_nan()).then_some(time)),
+        pose: has_pose.then_some(JsonPose { direction, alignment }),
+        position,
+        object: Some(object),
+    })
+}
+
+fn touch(JsonTouch { times, pose, position, object }: JsonTouch) -> Result<Content, TouchesProblem> {
     let object = object.filter(|object| !object.is_empty());
     if let Some(name) = object.as_ref().filter(|name| !is_file_name(name)) {
         return Err(TouchesProblem::BadName { name: name.clone() });
@@ -153,7 +173,12 @@ fn touch(JsonTouch { times, pose, object }: JsonTouch) -> Result<Content, Touche
     let start = if first > LONGEST && first.is_finite() { first.floor() } else { 0.0 };
     let times = times.map(|time| time.map(|time| time - start));
     let (direction, alignment) = pose.map(|JsonPose { direction, alignment }| (direction, alignment)).unzip();
-    Ok(Content::Touch(touch_of_seconds(times, direction, alignment)?, object))
+    let touch = touch_of_seconds(times, direction, alignment)?;
+    let touch = match position {
+        Some(meters) => located(touch, meters.map(|meters| 1e3 * meters))?,
+        None => touch,
+    };
+    Ok(Content::Touch(touch, object))
 }
 
 fn checked(verdict: LoggedVerdict) -> Result<Content, TouchesProblem> {
@@ -184,6 +209,7 @@ pub(super) fn touch_json(touch: &Touch, object: Option<&str>) -> Result<Vec<u8>,
     serde_json::to_vec(&JsonTouch {
         times: touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e6)),
         pose: touch.pose().map(|pose| JsonPose { direction: unit(pose.direction), alignment: unit(pose.alignment) }),
+        position: touch.position().map(|position| position.micrometers.map(|micrometers| f64::from(micrometers) / 1e6)),
         object: object.map(String::from),
     })
 }

@@ -18,6 +18,8 @@ const STEP: usize = 1 << 16;
 const NAMES: usize = 16 << 20;
 /// An opcode and a length.
 const HEAD: usize = 9;
+/// The end of the definition of a touch that earlier versions did not have.
+const LOCATED: &str = "; bool has_position; float64[3] position";
 /// The latest log time, in nanoseconds: in the year 2262.
 const LATEST: u64 = i64::MAX as u64;
 
@@ -182,11 +184,15 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
                 ("cdr", "ros2msg") => {
                     let expected = super::message::essence(kind.definition().as_bytes());
                     let found = schema.definition.clone().unwrap_or_default();
-                    if found != expected {
+                    let before = expected.strip_suffix(LOCATED).filter(|_| kind == Kind::Touch);
+                    if before == Some(found.as_str()) {
+                        (kind, Encoding::CdrBefore)
+                    } else if found != expected {
                         let found = found.chars().take(300).collect();
                         return Err(TouchesProblem::OtherDefinition { channel: said(), found, expected });
+                    } else {
+                        (kind, Encoding::Cdr)
                     }
-                    (kind, Encoding::Cdr)
                 }
                 (encoding, schema) => {
                     let (channel, encoding, schema) = (said(), encoding.into(), schema.into());

@@ -111,6 +111,10 @@ fn touch_schema() -> Value {
                     "alignment": vector("Unit vector along the row of fingers"),
                 },
             },
+            "position": vector(
+                "Lowest point of the middle fingertip at the first contact, in the table's frame, in meters; left out if it is not \
+                 known"
+            ),
             "object": {"type": "string", "description": "The object that is touched; left out if it is not known"},
         },
     })

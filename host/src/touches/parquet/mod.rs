@@ -1,19 +1,21 @@
 //! Touches as Parquet: smaller and faster to load than text, and read by pandas, Polars, DuckDB and others.
 //!
 //! One row per touch: `object` (string), `t1`, `t2`, `t3` (seconds, null where a finger never touched), `direction` and
-//! `alignment` (lists of three, null where unknown). Row groups of about a million rows.
+//! `alignment` (lists of three, null where unknown), and where the touches have one `position` (a list of three whole numbers,
+//! in micrometers). Row groups of about a million rows.
 
 #[cfg(test)]
 mod tests;
 
 use super::dataset::name_of;
-use super::touch_of_seconds;
+use super::text::Alike;
+use super::{located, touch_of_seconds};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use bytes::Bytes;
 use palpate_shared::{Pose, Q15_ONE, Touch};
 use parquet::basic::Compression;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
-use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, FloatType};
+use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 use parquet::file::properties::WriterProperties;
@@ -43,19 +45,30 @@ message touches {
   OPTIONAL GROUP alignment (LIST) { REPEATED GROUP list { REQUIRED FLOAT element; } }
 }";
 
-/// Writes touches of one object, as they come, to `file`.
+/// The last column, of touches with a position.
+const POSITION: &str = "  OPTIONAL GROUP position (LIST) { REPEATED GROUP list { REQUIRED INT32 element; } }
+}";
+
+/// Writes touches of one object, as they come, to `file`. Either all have a position or none has one.
 ///
 /// # Errors
-/// What the touches end with, or that the file, called `path` in the message, cannot be written.
+/// What the touches end with, that some have a position and others have none, or that the file, called `path` in the message, cannot be written.
 pub fn write(path: &Path, file: &File, object: &str, touches: impl Iterator<Item = Result<Touch>>) -> Result<()> {
     let wrong = |error| write_error(path, error);
-    let schema = Arc::new(parquet::schema::parser::parse_message_type(SCHEMA).map_err(wrong)?);
+    let mut alike = Alike::default();
+    let mut touches =
+        touches.map(|touch| alike.admit(touch?).map_err(|problem| Error::at(Place::file(path), problem))).peekable();
+    let has_position = touches.peek().is_some_and(|touch| touch.as_ref().is_ok_and(|touch| touch.position().is_some()));
+    let schema = match has_position {
+        true => SCHEMA.trim_end_matches('}').to_owned() + POSITION,
+        false => SCHEMA.into(),
+    };
+    let schema = Arc::new(parquet::schema::parser::parse_message_type(&schema).map_err(wrong)?);
     let properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_created_by(format!("palpate {}", env!("CARGO_PKG_VERSION")))
         .build();
     let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties)).map_err(wrong)?;
-    let mut touches = touches.peekable();
     while touches.peek().is_some() {
         let group = touches.by_ref().take(GROUP).collect::<Result<Vec<_>>>()?;
         let mut columns = writer.next_row_group().map_err(wrong)?;
@@ -90,6 +103,12 @@ fn write_group(
             }
         })?;
     }
+    if touches.first().is_some_and(|touch| touch.position().is_some()) {
+        column::<Int32Type>(columns, touches, |touch, values, levels| {
+            values.extend(touch.position().into_iter().flat_map(|position| position.micrometers));
+            levels.extend([(2, 0), (2, 1), (2, 1)]);
+        })?;
+    }
     Ok(())
 }
 
@@ -115,7 +134,7 @@ fn column<T: DataType>(
     column.close()
 }
 
-/// Reads the touches of a file with columns `t1`, `t2`, `t3`, and, where known, `direction` and `alignment`. A column
+/// Reads the touches of a file with columns `t1`, `t2`, `t3`, and, where known, `direction`, `alignment` and `position`. A column
 /// `object` names the object that the file is called after, or is null.
 ///
 /// # Errors
@@ -170,10 +189,10 @@ fn read_touches(file: Bounded, object: &str) -> Result<Vec<Touch>, TouchesProble
     let length = file.length;
     let reader = SerializedFileReader::new(file).map_err(|error| not_parquet(&error))?;
     check_ranges(reader.metadata(), length)?;
-    let mut touches = Vec::new();
+    let (mut touches, mut alike) = (Vec::new(), Alike::default());
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group).map_err(|error| not_parquet(&error))?;
-        read_group(group.as_ref(), object, &mut touches)?;
+        read_group(group.as_ref(), object, &mut touches, &mut alike)?;
     }
     Ok(touches)
 }
@@ -243,11 +262,17 @@ impl ChunkReader for Bounded {
     }
 }
 
-fn read_group(group: &dyn RowGroupReader, object: &str, touches: &mut Vec<Touch>) -> Result<(), TouchesProblem> {
+fn read_group(
+    group: &dyn RowGroupReader,
+    object: &str,
+    touches: &mut Vec<Touch>,
+    alike: &mut Alike,
+) -> Result<(), TouchesProblem> {
     let mut names = Column::open(group, "object")?;
     let time = |name| Column::open(group, name)?.ok_or(TouchesProblem::NoColumn { name });
     let mut times = [time("t1")?, time("t2")?, time("t3")?];
     let [mut direction, mut alignment] = [Column::open(group, "direction")?, Column::open(group, "alignment")?];
+    let mut position = Column::open(group, "position")?;
     loop {
         let mut rows = Vec::with_capacity(times.len());
         for column in &mut times {
@@ -259,9 +284,10 @@ fn read_group(group: &dyn RowGroupReader, object: &str, touches: &mut Vec<Touch>
         let vectors =
             |column: &mut Option<Column>| column.as_mut().map_or_else(|| Ok(vec![None; count]), Column::rows::<3>);
         let (directions, alignments) = (vectors(&mut direction)?, vectors(&mut alignment)?);
+        let positions = vectors(&mut position)?;
         let names = names.as_mut().map_or_else(|| Ok(vec![None; count]), Column::names)?;
-        if [middle.len(), last.len(), directions.len(), alignments.len(), names.len()].iter().any(|&rows| rows != count)
-        {
+        let lengths = [middle.len(), last.len(), directions.len(), alignments.len(), positions.len(), names.len()];
+        if lengths.iter().any(|&rows| rows != count) {
             return Err(not_parquet(&"columns of different length"));
         }
         if count == 0 {
@@ -274,11 +300,20 @@ fn read_group(group: &dyn RowGroupReader, object: &str, touches: &mut Vec<Touch>
             return Err(TouchesProblem::Row { row: (touches.len() + index) as u64 + 1, problem: Box::new(problem) });
         }
         let times = first.iter().zip(middle).zip(last);
-        for (((first, middle), last), (direction, alignment)) in times.zip(directions.iter().zip(&alignments)) {
+        let vectors = directions.iter().zip(&alignments).zip(positions);
+        for (((first, middle), last), ((direction, alignment), position)) in times.zip(vectors) {
             let row = touches.len() as u64 + 1;
             let times = [*first, *middle, *last].map(|time| time.map(|[seconds]| seconds));
             let touch = touch_of_seconds(times, *direction, *alignment);
-            touches.push(touch.map_err(|problem| TouchesProblem::Row { row, problem: Box::new(problem) })?);
+            let touch = touch.and_then(|touch| match position {
+                Some(micrometers) => located(touch, micrometers.map(|micrometers| micrometers / 1e3)),
+                None => Ok(touch),
+            });
+            touches.push(
+                touch
+                    .and_then(|touch| alike.admit(touch))
+                    .map_err(|problem| TouchesProblem::Row { row, problem: Box::new(problem) })?,
+            );
         }
     }
 }
@@ -341,7 +376,17 @@ impl Column {
         if lists != (N > 1) {
             return Err(format!("does not hold {N} numbers per row"));
         }
+        let are_whole = self.name == "position";
         let (values, definition, repetition) = match &mut self.reader {
+            ColumnReader::Int32ColumnReader(reader) if are_whole => {
+                let (values, definition, repetition) = records(reader)?;
+                (values.into_iter().map(f64::from).collect(), definition, repetition)
+            }
+            ColumnReader::Int64ColumnReader(reader) if are_whole => {
+                let (values, definition, repetition) = records(reader)?;
+                (values.into_iter().map(|value| value as f64).collect(), definition, repetition)
+            }
+            _ if are_whole => return Err("does not hold whole numbers".into()),
             ColumnReader::DoubleColumnReader(reader) => records(reader)?,
             ColumnReader::FloatColumnReader(reader) => {
                 let (values, definition, repetition) = records(reader)?;

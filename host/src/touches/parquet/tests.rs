@@ -1,5 +1,5 @@
 use super::*;
-use palpate_shared::ContactTime;
+use palpate_shared::{ContactTime, Position};
 
 fn round_trip(touches: &[Touch]) -> Result<Vec<Touch>> {
     let directory = tempfile::tempdir().unwrap();
@@ -19,6 +19,71 @@ fn touches_with_and_without_pose_and_contacts_survive() {
         Touch::from_micros([7, 0, 7]).with_pose(pose),
     ];
     assert_eq!(round_trip(&mixed).unwrap(), mixed);
+}
+
+#[test]
+fn positions_survive_to_the_micrometer_and_rows_with_and_without_are_not_mixed() {
+    let pose = Pose { direction: [0, 0, -Q15_ONE], alignment: [Q15_ONE, 0, 0] };
+    let at = |micrometers| Touch::from_micros([0, 1, 2]).with_pose(pose).with_position(Position { micrometers });
+    let many: Vec<Touch> = (0..BATCH as i32 + 9).map(|i| at([i32::MIN + i, i32::MAX - i, -i])).collect();
+    assert!(round_trip(&many).unwrap() == many);
+    let without = Touch::from_micros([0, 1, 2]).with_pose(pose);
+    let error = round_trip(&[at([1, 2, 3]), without]).unwrap_err().to_string();
+    assert!(error.contains("cup.parquet: no position, where the touches before it have one"), "{error}");
+    let error = round_trip(&[without, at([1, 2, 3])]).unwrap_err().to_string();
+    assert!(error.contains("cup.parquet: a position, where the touches before it have none"), "{error}");
+    // A file without positions has no such column.
+    assert!(SCHEMA.len() > 100 && !SCHEMA.contains("position"));
+}
+
+/// A file of two touches down on a table, `cup.parquet`, with another column of positions.
+fn with_positions<T: DataType>(element: &str, values: &[T::T], levels: [&[i16]; 2]) -> Result<Vec<Touch>> {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("cup.parquet");
+    let list = |name, element| {
+        format!("OPTIONAL GROUP {name} (LIST) {{ REPEATED GROUP list {{ REQUIRED {element} element; }} }}")
+    };
+    let [direction, alignment] = ["direction", "alignment"].map(|name| list(name, "FLOAT"));
+    let position = list("position", element);
+    let schema = format!(
+        "message touches {{ REQUIRED DOUBLE t1; REQUIRED DOUBLE t2; REQUIRED DOUBLE t3; {direction} {alignment} {position} }}"
+    );
+    let file = File::create(&path).unwrap();
+    let schema = Arc::new(parquet::schema::parser::parse_message_type(&schema).unwrap());
+    let mut writer = SerializedFileWriter::new(&file, schema, Arc::default()).unwrap();
+    let mut columns = writer.next_row_group().unwrap();
+    for _ in 0..3 {
+        let mut times = columns.next_column().unwrap().unwrap();
+        times.typed::<DoubleType>().write_batch(&[0.5, 0.5], None, None).unwrap();
+        times.close().unwrap();
+    }
+    for vector in [[0.0, 0.0, -1.0], [1.0, 0.0, 0.0]] {
+        let mut column = columns.next_column().unwrap().unwrap();
+        let values = [vector, vector].concat();
+        column.typed::<FloatType>().write_batch(&values, Some(&[2; 6]), Some(&[0, 1, 1, 0, 1, 1])).unwrap();
+        column.close().unwrap();
+    }
+    let mut column = columns.next_column().unwrap().unwrap();
+    column.typed::<T>().write_batch(values, Some(levels[0]), Some(levels[1])).unwrap();
+    column.close().unwrap();
+    columns.close().unwrap();
+    writer.close().unwrap();
+    read(&path)
+}
+
+#[test]
+fn positions_in_parquet_are_whole_micrometers_in_range_of_all_rows() {
+    use parquet::data_type::Int64Type;
+    let both: [&[i16]; 2] = [&[2; 6], &[0, 1, 1, 0, 1, 1]];
+    let read = with_positions::<Int64Type>("INT64", &[1, -2, 3, 4, 5, 6], both).unwrap();
+    assert_eq!(read[0].position(), Some(Position { micrometers: [1, -2, 3] }));
+    let error = with_positions::<Int64Type>("INT64", &[1, 2, 3, 4, 5, 1 << 31], both).unwrap_err().to_string();
+    assert!(error.contains("row 2: the coordinate 2147483.648 mm is farther than"), "{error}");
+    let error = with_positions::<DoubleType>("DOUBLE", &[1.0; 6], both).unwrap_err().to_string();
+    assert!(error.contains("column position: does not hold whole numbers"), "{error}");
+    let one = [&[2, 2, 2, 0][..], &[0, 1, 1, 0]];
+    let error = with_positions::<Int32Type>("INT32", &[1, 2, 3], one).unwrap_err().to_string();
+    assert!(error.contains("cup.parquet: row 2: no position, where the touches before it have one"), "{error}");
 }
 
 #[test]

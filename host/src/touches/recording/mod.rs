@@ -160,11 +160,6 @@ impl Recording {
         Ok(touches)
     }
 
-    /// Origin of the touches.
-    pub fn origin(&self) -> &Origin {
-        &self.listing.origin
-    }
-
     /// The object's name.
     pub fn object(&self) -> &str {
         &self.recorded.object
@@ -214,10 +209,20 @@ impl Recording {
         self.listing.origin.pose && touch.pose().is_none()
     }
 
+    /// Refuses a touch without the position that the touches of this data set are recorded with, or with one that they lack.
+    fn check_position(&self, touch: &Touch) -> Result<()> {
+        let has_position = touch.position().is_some();
+        match has_position == self.listing.origin.position {
+            true => Ok(()),
+            false => Err(TouchesProblem::OtherPosition { has_position, others: "the touches recorded here" }.into()),
+        }
+    }
+
     /// Adds a touch. When this returns, the touch is on the disk.
     ///
     /// # Errors
-    /// [`TouchesProblem::NoPose`] if it lacks its pose; [`TouchesProblem::LaterThanStroke`] if a contact is
+    /// [`TouchesProblem::NoPose`] if it lacks its pose; [`TouchesProblem::OtherPosition`] if it lacks its position, or has one
+    /// where the others have none; [`TouchesProblem::LaterThanStroke`] if a contact is
     /// later than the stroke that the data set states; when the file cannot be written.
     pub fn add(&mut self, touch: &Touch) -> Result<()> {
         self.append(std::slice::from_ref(touch))?;
@@ -245,6 +250,7 @@ impl Recording {
         if touches.iter().any(|touch| self.lacks_pose(touch)) {
             return Err(TouchesProblem::NoPose.into());
         }
+        touches.iter().try_for_each(|touch| self.check_position(touch))?;
         let probe = &self.listing.origin.probe;
         let latest = probe.latest();
         let is_late = |touch: &&Touch| latest.is_some_and(|latest| f64::from(touch.spread()) > latest);
@@ -354,9 +360,11 @@ fn differences(there: &Origin, here: &Origin) -> Vec<String> {
     );
     let pairs = numbers(there).into_iter().zip(numbers(here)).filter(|(there, here)| there != here);
     differences.extend(pairs.map(|((name, there), (_, here))| format!("{name} is {there} there and {here} here")));
-    if there.pose != here.pose {
-        let said = |pose| if pose { "with" } else { "without" };
-        differences.push(format!("{} the pose there and {} it here", said(there.pose), said(here.pose)));
+    for (what, there, here) in [("pose", there.pose, here.pose), ("position", there.position, here.position)] {
+        let said = |is_there| if is_there { "with" } else { "without" };
+        if there != here {
+            differences.push(format!("{} the {what} there and {} it here", said(there), said(here)));
+        }
     }
     differences
 }

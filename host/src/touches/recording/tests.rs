@@ -199,6 +199,16 @@ fn touches_of_another_probe_or_scale_or_without_their_pose_are_not_added() {
     let pose = palpate_shared::Pose { direction: [0, 0, -32767], alignment: [32767, 0, 0] };
     recording.add(&touch(0).with_pose(pose)).unwrap();
     assert_eq!(read(posed.path()).objects[0].touches(), [touch(0).with_pose(pose)]);
+    let position = palpate_shared::Position { micrometers: [1, -2, 3] };
+    let located = touch(0).with_pose(pose).with_position(position);
+    let other = |has_position| TouchesProblem::OtherPosition { has_position, others: "the touches recorded here" };
+    assert_eq!(problem(&recording.add(&located).unwrap_err()), &other(true));
+    let directory = tempfile::tempdir().unwrap();
+    let origin = Origin { position: true, ..origin };
+    let mut recording = Recording::open(directory.path(), "fork", Some(&origin), "", noon()).unwrap();
+    assert_eq!(problem(&recording.add(&touch(0).with_pose(pose)).unwrap_err()), &other(false));
+    recording.add(&located).unwrap();
+    assert_eq!(read(directory.path()).objects[0].touches(), [located]);
 }
 
 #[test]

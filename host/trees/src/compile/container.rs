@@ -3,7 +3,7 @@
 use super::write::count;
 use crate::error::Result;
 use palpate_onboard::Model;
-use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, Header, HeaderBuilder, Section, Tag, checksum};
+use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, HeaderBuilder, Section, Tag, checksum};
 
 /// An optional section of a model's file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -79,16 +79,6 @@ impl Container {
 /// [`CompileProblem::TooLarge`](crate::error::CompileProblem::TooLarge) for more than 4 GB.
 pub fn file(header: HeaderBuilder, text: Vec<u8>, sections: Vec<OwnedSection>, content: Vec<u8>) -> Result<Vec<u8>> {
     Container { header, text, sections, content }.bytes()
-}
-
-/// A model's file with another header, whose lengths must be the same.
-pub fn restate_header(model: &[u8], change: impl FnOnce(HeaderBuilder) -> HeaderBuilder) -> Vec<u8> {
-    let mut bytes = model.to_vec();
-    let header = change(HeaderBuilder::from(Header::of(model)));
-    bytes.iter_mut().zip(header.bytes()).for_each(|(to, from)| *to = *from);
-    bytes.truncate(model.len().saturating_sub(CHECKSUM_LENGTH));
-    bytes.extend(checksum(&bytes).to_le_bytes());
-    bytes
 }
 
 /// Bytes of sections, in their order.

@@ -64,7 +64,7 @@ mod trees;
 mod write;
 
 pub use budget::compile_within;
-pub use container::{OwnedSection, file, restate_header};
+pub use container::{OwnedSection, file};
 pub use cost::{Core, Instructions, Memory};
 pub use early::{EarlyExit, EarlyExitFound};
 pub use emit::{Language, emit, emit_code};

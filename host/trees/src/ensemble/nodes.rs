@@ -14,7 +14,7 @@ pub struct Threshold {
 
 impl Threshold {
     /// The test `x <= value`.
-    pub const fn at_or_below(value: f64) -> Self {
+    pub(crate) const fn at_or_below(value: f64) -> Self {
         Self { value, inclusive: true }
     }
 

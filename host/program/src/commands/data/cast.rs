@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     output::refuse_input(path, [&arguments.mesh, &arguments.casts])?;
     output::write_unmarked(path, text.as_bytes())?;
     let agreement = cast::agreement(&lines, &times);
-    if global.json { output::print_json_about(path, &agreement) } else { output::print_about(path, &table(&agreement)) }
+    global.print_about(path, &agreement, || table(&agreement))
 }
 
 fn table(sets: &[Agreement]) -> String {

@@ -6,7 +6,7 @@ use crate::commands::train::descriptor;
 use palpate::Result;
 use palpate::compare::Settings;
 use palpate::error::{Error, Place, TouchesProblem};
-use palpate::output;
+use palpate::touches::Origin;
 use palpate::touches::check::{Check, ObjectSummary, Quantiles, Summary};
 use palpate_shared::Descriptor;
 use palpate_shared::format::Length;
@@ -47,10 +47,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
         return super::compare::run(&arguments.directory, simulated, &settings, global);
     }
     let check = Check::of(&arguments.directory)?;
-    match global.json {
-        true => output::print_json(&check)?,
-        false => output::print(&text(&check))?,
-    }
+    global.print(&check, || text(&check))?;
     match check.wrong() {
         0 => Ok(()),
         count => Err(Error::at(Place::file(&arguments.directory), TouchesProblem::WouldTrainWrong { count })),
@@ -110,7 +107,11 @@ fn summary(summary: &Summary) -> String {
                 probe.speed,
                 probe.tilt,
                 origin.seed,
-                if origin.approaches { "every approach" } else { "full touches only" }
+                match origin {
+                    Origin { position: true, .. } => "every approach, with the hand's position",
+                    Origin { approaches: true, .. } => "every approach",
+                    _ => "full touches only",
+                }
             );
         }
     }

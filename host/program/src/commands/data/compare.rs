@@ -4,7 +4,6 @@ use crate::commands::progress::Bar;
 use crate::commands::{Global, checked, dataset, remark};
 use palpate::Result;
 use palpate::compare::{Comparison, Cost, Settings, Share, compare};
-use palpate::output;
 use palpate::touches::{Captured, Dataset};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -24,7 +23,7 @@ pub(super) fn run(directory: &Path, simulated: &Path, settings: &Settings, globa
     }
     let compared = compare(&recorded, &simulated, settings, &Bar::new())
         .map_err(|error| if error.exit_code() == 1 { error.in_file(directory) } else { error })?;
-    if global.json { output::print_json(&compared) } else { output::print(&text(&compared)) }
+    global.print(&compared, || text(&compared))
 }
 
 /// A share in percent with its interval.

@@ -12,7 +12,7 @@ use std::time::SystemTime;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-A line is a touch: three contact times in seconds on any clock, - for a finger that did not touch, and if you like the probe's direction and alignment (six numbers). Lines `- - -` for approaches that touched nothing are recorded too; a chip reports those if it is told when an approach is over (GP5 on a Pico). SOURCE may also be a robot's log (MCAP), of which the touches of NAME are taken, or a chip, whose touches are added as soon as it reports them, until Ctrl-C; if the cable is pulled, this waits for it.
+A line is a touch: three contact times in seconds on any clock, - for a finger that did not touch, and if you like the probe's direction and alignment (six numbers), and behind them the hand's position in millimeters (three). Lines `- - -` for approaches that touched nothing are recorded too; a chip reports those if it is told when an approach is over (GP5 on a Pico). SOURCE may also be a robot's log (MCAP), of which the touches of NAME are taken, or a chip, whose touches are added as soon as it reports them, until Ctrl-C; if the cable is pulled, this waits for it.
 
 On a table the object may be called after its placement, as `palpate capture --scene table` names it; without it the touches may be of any.
 
@@ -48,6 +48,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     let Arguments { source, output: directory, object, record, .. } = arguments;
     output::refuse_stdout(directory)?;
     if is_chip(source) {
+        if record.has_position() {
+            return Err(Error::setting("position", "given", "a file of lines or a log: a chip reports none"));
+        }
         let port = source.parse()?;
         let recording = record.open(directory, object, source, SystemTime::now())?;
         let from = (&arguments.line, &port, global.seed());
@@ -68,13 +71,11 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     for touch in &touches {
         counts[touch.times().iter().filter(|time| !time.is_missing()).count()] += 1;
     }
-    if global.json {
-        let all = recording.all_touches();
-        return output::print_json(&serde_json::json!({
-            "object": object, "touches": touches.len(), "all_touches": all, "contacts": counts,
-        }));
-    }
-    output::print(&summary(&recording, directory, counts))
+    let all = recording.all_touches();
+    let result = serde_json::json!({
+        "object": object, "touches": touches.len(), "all_touches": all, "contacts": counts,
+    });
+    global.print(&result, || summary(&recording, directory, counts))
 }
 
 /// True if a source is a chip rather than a file of touches.

@@ -206,12 +206,7 @@ impl<'c> Printer<'c> {
     fn new(chip: &'c ChipModel, json: bool, journal: Option<&Path>) -> Result<Self> {
         let mut journal = journal.map(Journal::create).transpose()?;
         if let Some(journal) = &mut journal {
-            let info = chip.info;
-            journal.write(&Entry::Model {
-                objects: chip.names.clone(),
-                length: info.length,
-                checksum: info.checksum,
-            })?;
+            journal.write(&Entry::model(chip))?;
         }
         Ok(Self { chip, json, journal, start: Instant::now(), object: None })
     }
@@ -219,11 +214,7 @@ impl<'c> Printer<'c> {
     fn model(&self, port: &Port) -> Result<()> {
         let info = self.chip.info;
         if self.json {
-            return print_json(&Entry::Model {
-                objects: self.chip.names.clone(),
-                length: info.length,
-                checksum: info.checksum,
-            });
+            return print_json(&Entry::model(self.chip));
         }
         let descriptor = info.descriptor().map_or("other features", |descriptor| descriptor.name());
         print(&format!(

@@ -3,11 +3,12 @@
 use super::LineOptions;
 use crate::commands::probe::ProbeArguments;
 use crate::commands::remark;
-use palpate::Result;
 use palpate::chip::{Port, RecordEvent, RecordSummary, record};
 use palpate::output::{print, print_json};
 use palpate::touches::{Listing, Origin, Recording};
+use palpate::{Error, Result};
 use palpate_shared::Touch;
+use palpate_shared::format::Length;
 use palpate_shared::link::{Decision, FaultKind, Refusal, VerdictMessage};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -21,23 +22,35 @@ pub(crate) struct RecordArguments {
     /// With the probe's direction and alignment; refuses touches without
     #[arg(long)]
     pose: bool,
+    /// With the hand's position, in the table's frame; refuses touches without
+    #[arg(long)]
+    position: bool,
 }
 
 impl RecordArguments {
+    /// True if positions are to be recorded.
+    pub(crate) fn has_position(&self) -> bool {
+        self.position
+    }
+
     /// Opens the data set; its warnings go to stderr.
     ///
     /// # Errors
     /// As [`Recording::open`], and when the probe file cannot be used.
     pub(crate) fn open(&self, directory: &Path, object: &str, source: &str, began: SystemTime) -> Result<Recording> {
-        let origin = match self.probe.read()? {
-            Some(file) => Some(Origin::recorded(file.probe, file.unit, self.pose)),
+        let (probe, unit) = match self.probe.read()? {
+            Some(file) => (file.probe, file.unit),
             None => {
                 let there = Listing::read(directory)?.map(|listing| listing.origin);
                 let base = there.unwrap_or_default();
-                Some(Origin::recorded(base.probe, base.unit, self.pose))
+                (base.probe, base.unit)
             }
         };
-        let recording = Recording::open(directory, object, origin.as_ref(), source, began)?;
+        if self.position && unit != Length::Millimeter {
+            return Err(Error::setting("position", "given", "it with --probe FILE whose unit is mm"));
+        }
+        let origin = Origin { position: self.position, ..Origin::recorded(probe, unit, self.pose || self.position) };
+        let recording = Recording::open(directory, object, Some(&origin), source, began)?;
         recording.warnings().iter().for_each(|warning| remark(&format!("palpate: warning: {warning}")));
         Ok(recording)
     }

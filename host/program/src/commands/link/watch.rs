@@ -27,11 +27,7 @@ fn watch(arguments: &Arguments, port: &Port, global: &Global) -> Result<()> {
     let (mut connection, loaded) = arguments.open(port, global.seed())?;
     let chip = connection.model()?;
     let mut display = Display::open(port.to_string(), global.json)?;
-    display.take(Entry::Model {
-        objects: chip.names.clone(),
-        length: chip.info.length,
-        checksum: chip.info.checksum,
-    })?;
+    display.take(Entry::model(&chip))?;
     let start = Instant::now();
     let mut each = |connection: &mut Connection, update: Update| {
         let asks = matches!(&update, Update::Touch { posteriors: None, .. } | Update::Event(..));
@@ -111,8 +107,7 @@ impl Display {
     fn take(&mut self, entry: Entry) -> Result<()> {
         self.status.take(&entry);
         if self.json {
-            // Numbers and strings are always JSON.
-            print(&format!("{}\n", serde_json::to_string(&entry).unwrap_or_default()))?;
+            crate::commands::print_line(&entry)?;
         } else if self.screen.is_none() {
             print(&format!("{entry}\n"))?;
         }

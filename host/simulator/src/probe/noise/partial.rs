@@ -9,7 +9,7 @@ use std::str::FromStr;
 /// Some settings of [`Noise`], as one text of `key=value` with commas between them; the others are left open.
 ///
 /// The keys are those of `[real]` in a probe file: `noise`, `timer`, `debounce`, `missed`, `bent`, `speed_factor`,
-/// `speed_error`, `speed_bias`, `pose_noise` and `pose_bias`. Fingers that bend aside have no
+/// `speed_error`, `speed_bias`, `pose_noise`, `pose_bias` and `position`. Fingers that bend aside have no
 /// key: only a capture adds that, from a probe file. `missed` and `bent` also take a value for each finger, such as
 /// `bent=3ms/0ms/-1ms`; `bent` says how much earlier a finger touches. `none`, which comes first, sets everything to
 /// nothing. [`Display`](fmt::Display) writes a text that reads as the same.
@@ -45,6 +45,8 @@ pub struct PartialNoise {
     pub pose: Option<f64>,
     /// See [`Noise::pose_bias`].
     pub pose_bias: Option<f64>,
+    /// See [`Noise::position`].
+    pub position: Option<f64>,
 }
 
 /// A text that is not noise: the key, its value, and what to write instead.
@@ -72,13 +74,14 @@ impl From<Noise> for PartialNoise {
             speed_bias: Some(noise.speed_bias),
             pose: Some(noise.pose),
             pose_bias: Some(noise.pose_bias),
+            position: Some(noise.position),
         }
     }
 }
 
 impl PartialNoise {
     /// All keys, in the order in which they are written.
-    pub const KEYS: [&str; 10] = [
+    pub const KEYS: [&str; 11] = [
         "noise",
         "timer",
         "debounce",
@@ -89,6 +92,7 @@ impl PartialNoise {
         "speed_bias",
         "pose_noise",
         "pose_bias",
+        "position",
     ];
 
     /// The settings that are given, and `base` where they are open.
@@ -105,6 +109,7 @@ impl PartialNoise {
             speed_bias: self.speed_bias.unwrap_or(base.speed_bias),
             pose: self.pose.unwrap_or(base.pose),
             pose_bias: self.pose_bias.unwrap_or(base.pose_bias),
+            position: self.position.unwrap_or(base.position),
             grazing: if self.is_whole() { super::Grazing::default() } else { base.grazing },
         }
     }
@@ -127,6 +132,7 @@ impl PartialNoise {
             "speed_bias" => self.speed_bias.is_some(),
             "pose_noise" => self.pose.is_some(),
             "pose_bias" => self.pose_bias.is_some(),
+            "position" => self.position.is_some(),
             _ => false,
         }
     }
@@ -154,7 +160,8 @@ impl PartialNoise {
             "speed_error" => self.speed_error = Some(quantity::share(value).map_err(bad)?),
             "speed_bias" => self.speed_bias = Some(quantity::share(value).map_err(bad)?),
             "pose_noise" => self.pose = Some(quantity::angle(value).map_err(bad)?),
-            _ => self.pose_bias = Some(quantity::angle(value).map_err(bad)?),
+            "pose_bias" => self.pose_bias = Some(quantity::angle(value).map_err(bad)?),
+            _ => self.position = Some(quantity::length(value).map_err(bad)?),
         }
         // Ranges are those of any noise.
         match self.over(Noise::default()).check() {
@@ -254,7 +261,8 @@ fn value_of(noise: &Noise, key: &str) -> String {
         "speed_error" => share(noise.speed_error),
         "speed_bias" => share(noise.speed_bias),
         "pose_noise" => format!("{}deg", noise.pose),
-        _ => format!("{}deg", noise.pose_bias),
+        "pose_bias" => format!("{}deg", noise.pose_bias),
+        _ => length(noise.position),
     }
 }
 
@@ -264,6 +272,15 @@ fn duration(micros: f64) -> String {
     match signed(&text) {
         Ok(read) if read == micros => text,
         _ => format!("{micros}us"),
+    }
+}
+
+/// Micrometers as millimeters, where that reads back as the same.
+fn length(micrometers: f64) -> String {
+    let text = format!("{}mm", micrometers / 1e3);
+    match quantity::length(&text) {
+        Ok(read) if read == micrometers => text,
+        _ => format!("{micrometers}um"),
     }
 }
 
@@ -299,6 +316,7 @@ mod tests {
             ("speed_error=5%", PartialNoise { speed_error: Some(0.05), ..PartialNoise::default() }),
             ("speed-bias=0.1", PartialNoise { speed_bias: Some(0.1), ..PartialNoise::default() }),
             ("pose-noise=5deg", PartialNoise { pose: Some(5.0), ..PartialNoise::default() }),
+            ("position=0.5mm", PartialNoise { position: Some(500.0), ..PartialNoise::default() }),
             (" pose_bias = 1.5° ", PartialNoise { pose_bias: Some(1.5), ..PartialNoise::default() }),
         ] {
             assert_eq!(read(text), expected, "{text}");
@@ -312,7 +330,7 @@ mod tests {
     fn what_is_written_reads_as_the_same_to_the_last_bit() {
         for text in [
             "noise=0ms..5ms,timer=1ms,debounce=2ms,missed=2%,bent=3ms/0ms/-0.5ms,speed_factor=0.98",
-            "speed_error=5%,speed_bias=10%,pose_noise=5deg,pose_bias=1.5deg",
+            "speed_error=5%,speed_bias=10%,pose_noise=5deg,pose_bias=1.5deg,position=0.3mm",
             "none",
             "none,timer=1ms",
             "missed=1%/2%/0%",
@@ -334,6 +352,7 @@ mod tests {
                 speed_bias: 0.9 * number(),
                 pose: 180.0 * number(),
                 pose_bias: number(),
+                position: 1e4 * number(),
                 grazing: super::super::Grazing::default(),
             };
             let given = PartialNoise::from(noise);
@@ -362,6 +381,8 @@ mod tests {
             ("speed_factor=nan", "speed_factor is \"nan\"; use a number greater than 0"),
             ("speed_error=95%", "speed_error is \"95%\"; use a share from 0 to 0.9"),
             ("pose_noise=5", "pose_noise is \"5\"; use an angle such as 5deg"),
+            ("position=1", "position is \"1\"; use a length such as 1mm"),
+            ("position=-1mm", "position is \"-1mm\"; use a length"),
             ("pose_bias=181deg", "pose_bias is \"181deg\"; use degrees from 0 to 180"),
             ("timer=1ms,timer=2ms", "timer is \"2ms\"; use each key once"),
             ("timer=1ms,none", "real is \"none\"; use settings"),

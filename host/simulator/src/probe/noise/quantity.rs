@@ -1,4 +1,4 @@
-//! Quantities as users write them: durations, angles and shares, each with its unit.
+//! Quantities as users write them: durations, lengths, angles and shares, each with its unit.
 
 use crate::error::{ProbeProblem, Result};
 
@@ -13,6 +13,16 @@ pub fn duration(text: &str) -> Result<f64, ProbeProblem> {
     found
         .and_then(|(text, unit)| number(text, unit))
         .ok_or_else(|| bad(text, "a duration such as 5ms, 300us or 0.005s"))
+}
+
+/// A length of at least 0 such as `1mm` or `300um`, in micrometers.
+///
+/// # Errors
+/// [`ProbeProblem::BadQuantity`].
+pub fn length(text: &str) -> Result<f64, ProbeProblem> {
+    let units = [("um", 1.0), ("mm", 1e3)];
+    let found = units.into_iter().find_map(|(name, unit)| Some((text.trim().strip_suffix(name)?, unit)));
+    found.and_then(|(text, unit)| number(text, unit)).ok_or_else(|| bad(text, "a length such as 1mm or 300um"))
 }
 
 /// An angle of at least 0 such as `5deg` or `5°`, in degrees.
@@ -53,6 +63,7 @@ mod tests {
     #[test]
     fn quantities_have_units() {
         assert_eq!((duration("5ms"), duration("300us"), duration("0.005 s")), (Ok(5e3), Ok(300.0), Ok(5e3)));
+        assert_eq!((length("0.5mm"), length("300um")), (Ok(500.0), Ok(300.0)));
         assert_eq!((angle("5deg"), angle("0.5°")), (Ok(5.0), Ok(0.5)));
         assert_eq!((share("2%"), share("0.02"), share("2 %")), (Ok(0.02), Ok(0.02), Ok(0.02)));
     }
@@ -62,6 +73,9 @@ mod tests {
         for text in ["5", "ms", "-1ms", "1e999s", "5 m", ""] {
             let problem = duration(text).unwrap_err();
             assert!(problem.fix().contains("5ms"), "{text}: {problem}");
+        }
+        for text in ["5", "mm", "-1mm", "1m", "nanmm"] {
+            assert!(length(text).unwrap_err().fix().contains("1mm"), "{text}");
         }
         for text in ["5", "deg", "-1deg", "5rad"] {
             assert!(angle(text).unwrap_err().fix().contains("5deg"), "{text}");

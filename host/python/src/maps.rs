@@ -1,0 +1,582 @@
+//! Objects on a table: maps of them, and where one lies.
+
+use crate::arrays::ARRAY_LIKE;
+use crate::capture::Meshes;
+use crate::cells::{OpenedLocator, OpenedMaps};
+use crate::data::DataSet;
+use crate::failure::Failure;
+use crate::objects::{self, Probe, Real, class};
+use crate::recognizer::numbers;
+use crate::work::{Callback, long};
+use palpate::calibrate::{self, Per};
+use palpate::capture::{self, Settings as Capture};
+use palpate::compile;
+use palpate::error::{Error, LocateProblem, Place, TouchesProblem};
+use palpate::locate::{self, Aimed, Approach, Hand, Seen, Settings, Terms, Until};
+use palpate::mesh::Object;
+use palpate::onboard::Verdict;
+use palpate::onboard::locate::Contact;
+use palpate::output;
+use palpate::shared::format::Length;
+use palpate::touches::{Dataset, Origin, Surroundings, located, touch_of_seconds};
+use pyo3::inspect::PyStaticExpr;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyBytes, PyType};
+use pyo3::{Borrowed, intern, type_hint_identifier};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Height maps of objects as they lie on a table: the model of a `Locator`.
+///
+/// >>> import palpate
+/// >>> probe = palpate.Probe(radius=1.5, spacing=15, speed=100, tilt=0, stroke=20)
+/// >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10, approaches=10_000)
+/// >>> maps.objects
+/// ['bowl', 'mouse']
+/// >>> maps.placements[0]
+/// ('bowl', '+z')
+/// >>> palpate.Maps(maps.to_bytes()).size == maps.size
+/// True
+#[pyo3::pyclass(frozen, module = "palpate._native")]
+pub(crate) struct Maps {
+    opened: Arc<OpenedMaps>,
+}
+
+impl Maps {
+    fn of(bytes: Vec<u8>) -> palpate::Result<Self> {
+        let opened = OpenedMaps::try_new(bytes, |bytes| {
+            locate::Maps::new(bytes).map_err(|error| Error::from(LocateProblem::Refused { error }))
+        })?;
+        Ok(Self { opened: Arc::new(opened) })
+    }
+
+    fn maps(&self) -> &locate::Maps<'_> {
+        self.opened.borrow_dependent()
+    }
+
+    fn learned(dataset: &Dataset, settings: &Settings) -> palpate::Result<Self> {
+        let surfaces = locate::learn(dataset, settings)?;
+        let names: Vec<String> = dataset.names().into_iter().map(Into::into).collect();
+        Self::of(locate::write(&surfaces, &names, &locate::probe_of(dataset)?, settings)?)
+    }
+}
+
+/// Settings as Python states them.
+fn settings(Real(real): &Real, cell: f64, range: f64, error_rate: f64, max_touches: u32) -> palpate::Result<Settings> {
+    if cell != 1.0 && cell != 2.0 {
+        return Err(Error::setting("cell", cell, "1 or 2, in millimeters"));
+    }
+    let settings = Settings {
+        fine: cell < 2.0,
+        range,
+        noise: real.height,
+        position: real.position,
+        lost: real.lost,
+        drift: real.drift,
+        drift_yaw: real.drift_yaw,
+        error_rate,
+        max_touches,
+        ..Settings::default()
+    };
+    settings.check()?;
+    Ok(settings)
+}
+
+/// Objects at their true size.
+fn sized(meshes: Meshes, millimeters: Option<f64>) -> palpate::Result<Vec<Object>> {
+    let mut objects = meshes.objects(false)?;
+    objects.iter_mut().for_each(|object| object.millimeters = object.millimeters.or(millimeters));
+    Ok(objects)
+}
+
+/// Sequences that are played on a simulated table.
+struct Played {
+    objects: Meshes,
+    millimeters: Option<f64>,
+    terms: Terms,
+}
+
+impl Played {
+    fn play<T>(
+        self,
+        maps: &locate::Maps<'_>,
+        progress: &dyn palpate::progress::Progress,
+        with: impl FnOnce(&[locate::Standing], &palpate::probe::approach::Probe, &Terms) -> palpate::Result<T>,
+    ) -> palpate::Result<T> {
+        let objects = sized(self.objects, self.millimeters)?;
+        let probe = locate::probe_of_maps(maps)?;
+        let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, progress)?;
+        with(&standing, &probe, &self.terms)
+    }
+}
+
+fn aimed(name: &str) -> palpate::Result<Aimed> {
+    match name {
+        "chosen" => Ok(Aimed::Chosen),
+        "random" => Ok(Aimed::Random),
+        other => Err(Error::setting("aimed", other, "chosen or random")),
+    }
+}
+
+/// A value as Python's own: numbers, names and lists.
+fn raw<'py>(py: Python<'py>, value: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(value).unwrap_or_default();
+    py.import("json")?.call_method1("loads", (text,))
+}
+
+#[pyo3::pymethods]
+impl Maps {
+    /// Maps in memory; `content` is checked.
+    #[new]
+    fn new(content: Vec<u8>) -> Result<Self, Failure> {
+        Ok(Self::of(content)?)
+    }
+
+    /// Reads maps that `save` or the program wrote.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> Result<Self, Failure> {
+        Ok(py.detach(|| {
+            let bytes = std::fs::read(&path).map_err(|source| Error::io(&path, "read the maps", source))?;
+            Self::of(bytes).map_err(|error| match error.problem::<LocateProblem>() {
+                Some(problem) => Error::at(Place::File(path), problem.clone()),
+                None => error,
+            })
+        })?)
+    }
+
+    /// Learns maps from touches with positions, simulated (`capture` with `position`) or recorded.
+    ///
+    /// `real` is what is known of hand and table, `cell` the side of a map's cells (1 or 2 mm), `range` half of the side of the
+    /// square about the table's origin in which objects are looked for, in millimeters.
+    #[staticmethod]
+    #[pyo3(signature = (data, *, real=None, cell=1.0, range=30.0, error_rate=0.01, max_touches=25))]
+    fn learn(
+        py: Python<'_>,
+        data: Bound<'_, DataSet>,
+        real: Option<Real>,
+        cell: f64,
+        range: f64,
+        error_rate: f64,
+        max_touches: u32,
+    ) -> Result<Self, Failure> {
+        let settings = settings(&real.unwrap_or_default(), cell, range, error_rate, max_touches)?;
+        let dataset = Arc::clone(&data.get().dataset);
+        long(py, None, |_| Self::learned(&dataset, &settings))
+    }
+
+    /// Maps of meshes, without a data set on the disk: each placement is touched in a simulation, then `learn` does the rest.
+    ///
+    /// `meshes` are as for `capture`, at their true size: `millimeters` is the length of a unit of those that state none. The
+    /// `probe` is in millimeters.
+    #[staticmethod]
+    #[pyo3(signature = (meshes, *, probe, millimeters=None, approaches=200_000, real=None, cell=1.0, range=30.0, error_rate=0.01,
+        max_touches=25, seed=1, progress=None))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    fn of_meshes(
+        py: Python<'_>,
+        meshes: Meshes,
+        probe: Probe,
+        millimeters: Option<f64>,
+        approaches: u64,
+        real: Option<Real>,
+        cell: f64,
+        range: f64,
+        error_rate: f64,
+        max_touches: u32,
+        seed: u64,
+        progress: Option<Callback>,
+    ) -> Result<Self, Failure> {
+        let settings = settings(&real.unwrap_or_default(), cell, range, error_rate, max_touches)?;
+        let Probe(probe) = probe;
+        let origin = Origin {
+            touches: approaches,
+            seed,
+            unit: Length::Millimeter,
+            probe,
+            scene: Surroundings::Table { cone: 0.0 },
+            pose: true,
+            position: true,
+            approaches: true,
+            ..Origin::default()
+        };
+        long(py, progress.as_ref(), |progress| {
+            let (dataset, _) = capture::in_memory(&sized(meshes, millimeters)?, &Capture::from(origin), progress)?;
+            Self::learned(&dataset, &settings)
+        })
+    }
+
+    /// Finds the loosest threshold at which at most a share of `error_rate` of the names is wrong, with a probability of
+    /// `confidence`, on sequences of approaches to these meshes on a simulated table.
+    ///
+    /// `aimed` says how approaches are aimed, and so of which the promise is: "chosen" ones, as by `Locator.next`, or "random" ones
+    /// about the place believed in. `real` is what the simulated hand and table add. `until` goes on until the place is as sure, such as
+    /// (3.0, 5.0) for 3 mm and 5 degrees.
+    #[pyo3(signature = (meshes, *, millimeters=None, error_rate=0.01, confidence=0.95, sequences=1000, max_touches=25,
+        aimed="chosen", real=None, pose=10, until=None, seed=1, progress=None))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    fn calibrate<'py>(
+        &self,
+        py: Python<'py>,
+        meshes: Meshes,
+        millimeters: Option<f64>,
+        error_rate: f64,
+        confidence: f64,
+        sequences: usize,
+        max_touches: u32,
+        aimed: &str,
+        real: Option<Real>,
+        pose: u16,
+        until: Option<(f64, f64)>,
+        seed: u64,
+        progress: Option<Callback>,
+    ) -> Result<objects::CalibratedMaps<'py>, Failure> {
+        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let promise = calibrate::Terms { rate: error_rate, confidence, per: Per::Average };
+        let terms = terms(promise, sequences, max_touches, aimed, real, pose, until, seed)?;
+        let played = Played { objects: meshes, millimeters, terms };
+        let maps = *self.maps();
+        let found = long(py, progress.as_ref(), |progress| {
+            played.play(&maps, progress, |standing, probe, terms| {
+                locate::calibrate(maps, standing, probe, terms, progress)
+            })
+        })?;
+        let raw = raw(py, &found)?;
+        let maps = Self::of(found.model)?;
+        let class = CLASS.import(py, "palpate._locate", "CalibratedMaps")?;
+        Ok(objects::CalibratedMaps(class.call1((maps, raw))?))
+    }
+
+    /// Plays sequences of approaches to these meshes on a simulated table, other ones than those of `calibrate` if the seed is
+    /// another, to the maps' own threshold. The arguments are as for `calibrate`.
+    #[pyo3(signature = (meshes, *, millimeters=None, sequences=1000, max_touches=25, aimed="chosen", real=None, pose=10,
+        until=None, seed=2, progress=None))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        meshes: Meshes,
+        millimeters: Option<f64>,
+        sequences: usize,
+        max_touches: u32,
+        aimed: &str,
+        real: Option<Real>,
+        pose: u16,
+        until: Option<(f64, f64)>,
+        seed: u64,
+        progress: Option<Callback>,
+    ) -> Result<objects::MapsEvaluation<'py>, Failure> {
+        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let promise = calibrate::Terms { rate: 0.01, confidence: 0.95, per: Per::Average };
+        let terms = terms(promise, sequences, max_touches, aimed, real, pose, until, seed)?;
+        let played = Played { objects: meshes, millimeters, terms };
+        let maps = *self.maps();
+        let found = long(py, progress.as_ref(), |progress| {
+            played.play(&maps, progress, |standing, probe, terms| {
+                locate::evaluate(maps, standing, probe, terms, progress)
+            })
+        })?;
+        let class = CLASS.import(py, "palpate._locate", "MapsEvaluation")?;
+        Ok(objects::MapsEvaluation(class.call1((raw(py, &found)?,))?))
+    }
+
+    /// Writes the maps, whole or not at all. A file that Palpate did not write is not replaced.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> Result<(), Failure> {
+        Ok(py.detach(|| output::write_bytes(&path, self.maps().model()))?)
+    }
+
+    /// The maps' bytes, for the chip.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, self.maps().model())
+    }
+
+    /// The arguments that a pickle holds.
+    fn __getnewargs__<'py>(&self, py: Python<'py>) -> (Bound<'py, PyBytes>,) {
+        (self.to_bytes(py),)
+    }
+
+    /// The size of the maps in bytes.
+    #[getter]
+    fn size(&self) -> usize {
+        self.maps().model().len()
+    }
+
+    /// The objects' names.
+    #[getter]
+    fn objects(&self) -> Vec<String> {
+        (0..self.maps().objects()).map(|object| self.maps().object_name(object).to_owned()).collect()
+    }
+
+    /// The placements, each with its object's name first. Equal ones of an object are one.
+    #[getter]
+    fn placements(&self) -> Vec<(String, String)> {
+        let maps = self.maps();
+        let of = |placement: u8| {
+            let object = maps.object_name(maps.object_of(placement).into()).to_owned();
+            (object, maps.placement_name(placement).to_owned())
+        };
+        (0..=u8::MAX).take(maps.placements()).map(of).collect()
+    }
+
+    /// The hand that they were learned with, in millimeters.
+    #[getter]
+    fn probe(&self) -> Result<Probe, Failure> {
+        Ok(Probe(locate::probe_of_maps(self.maps())?))
+    }
+
+    /// Half of the side of the square about the table's origin in which objects are looked for, in millimeters.
+    #[getter]
+    fn range(&self) -> f64 {
+        f64::from(self.maps().range()) / 1e3
+    }
+
+    fn __repr__(&self) -> String {
+        let maps = self.maps();
+        format!("Maps({} bytes, {} placements of {} objects)", maps.model().len(), maps.placements(), maps.objects())
+    }
+}
+
+fn terms(
+    promise: calibrate::Terms,
+    sequences: usize,
+    max_touches: u32,
+    name: &str,
+    real: Option<Real>,
+    pose: u16,
+    until: Option<(f64, f64)>,
+    seed: u64,
+) -> palpate::Result<Terms> {
+    let (aimed, Real(real)) = (aimed(name)?, real.unwrap_or_default());
+    let until = until.map(|(millimeters, degrees)| Until { millimeters, degrees });
+    Ok(Terms { promise, sequences, max_touches, aimed, real, pose, until, seed, effort: None })
+}
+
+/// Three numbers, NaN or `None` where one is missing.
+pub(crate) struct Three([Option<f64>; 3]);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Three {
+    type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = type_hint_identifier!("palpate._types", "Touch");
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        let (numbers, count) = numbers::<3>(object)?;
+        if count != 3 {
+            return Err(pyo3::exceptions::PyValueError::new_err(format!("{count} numbers, where 3 are needed")));
+        }
+        Ok(Self(numbers.map(|number| Some(number).filter(|number| !number.is_nan()))))
+    }
+}
+
+impl Three {
+    /// All three of them.
+    fn all(&self) -> [f64; 3] {
+        self.0.map(|number| number.unwrap_or(f64::NAN))
+    }
+}
+
+/// Direction of the row of fingers: a unit vector, or degrees from the x axis.
+pub(crate) struct Row([f64; 3]);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Row {
+    type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = ARRAY_LIKE;
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(degrees) = object.extract::<f64>() {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            return Ok(Self([cos, sin, 0.0]));
+        }
+        let vector: Three = object.extract()?;
+        Ok(Self(vector.all()))
+    }
+}
+
+/// Recognizes what lies on a table, and where, from touches of a hand that comes straight down and knows where it is; by the code
+/// that runs on the chip.
+///
+/// >>> import palpate
+/// >>> probe = palpate.Probe(radius=1.5, spacing=15, speed=100, tilt=0, stroke=20)
+/// >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10, approaches=10_000)
+/// >>> locator = palpate.Locator(maps)
+/// >>> x, y, roll = locator.next()
+/// >>> located = locator.push_heights((None, 20.0, 17.0), x, y, roll, lowest=0.0)
+/// >>> located.state, located.touches
+/// ('undecided', 1)
+#[pyo3::pyclass(module = "palpate._native")]
+pub(crate) struct Locator {
+    cell: OpenedLocator,
+    hand: Hand,
+    /// Half of the side of the square in which the middle finger may go, in micrometers.
+    within: u32,
+    pose: u16,
+    seed: u32,
+    next: Option<Approach>,
+}
+
+#[pyo3::pymethods]
+impl Locator {
+    /// It stops when the maps say so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`. `pose` is how much
+    /// where the object lies counts in the choice of approaches, in 64ths, `within` how far from the table's origin the middle
+    /// finger may go in x and y, in millimeters (twice the maps' range), `seed` that of the choice.
+    #[new]
+    #[pyo3(signature = (maps, *, error_rate=None, max_touches=None, pose=10, within=None, seed=1))]
+    fn new(
+        maps: Bound<'_, Maps>,
+        error_rate: Option<f64>,
+        max_touches: Option<u32>,
+        pose: u16,
+        within: Option<f64>,
+        seed: u32,
+    ) -> Result<Self, Failure> {
+        let opened = &maps.get().opened;
+        let maps = *opened.borrow_dependent();
+        let own = maps.stopping();
+        let limit = max_touches.unwrap_or(own.max_touches());
+        if !(1..=locate::TOUCHES as u32).contains(&limit) {
+            return Err(Error::setting("max_touches", limit, format!("1 to {}", locate::TOUCHES)).into());
+        }
+        let stopping = compile::stopping(error_rate.unwrap_or(own.error_rate()), limit)?;
+        let stopping = if error_rate.is_none() { own.with_max_touches(limit) } else { stopping };
+        let within = within.unwrap_or(f64::from(maps.range()) * 2e-3);
+        if !(0.0..=1_000.0).contains(&within) {
+            return Err(Error::setting("within", within, "a number of millimeters from 0 to 1000").into());
+        }
+        let hand = Hand::of(&maps).ok_or(Error::from(LocateProblem::NoHand))?;
+        let mut cell = OpenedLocator::new(Arc::clone(opened), |opened| {
+            locate::locating(*opened.borrow_dependent(), stopping, None)
+        });
+        cell.with_dependent_mut(|_, locating| locating.begin(seed));
+        Ok(Self { cell, hand, within: (within * 1e3) as u32, pose, seed, next: None })
+    }
+
+    /// Takes in a touch: three contact times in seconds on any clock, `None` or NaN for a finger that touched nothing, neither
+    /// object nor table; `position`, x, y and z in millimeters of the middle fingertip's lowest point at the first contact (or of
+    /// the approach where there was none), 0 being the table; and `alignment`, the direction from the first finger to the third,
+    /// a unit vector or degrees from the x axis, such as the roll that `next` gave.
+    fn push<'py>(
+        &mut self,
+        py: Python<'py>,
+        times: Three,
+        position: Three,
+        alignment: Row,
+    ) -> Result<objects::Located<'py>, Failure> {
+        let Three(times) = times;
+        let touch = touch_of_seconds(times, Some([0.0, 0.0, -1.0]), Some(alignment.0))
+            .and_then(|touch| located(touch, position.all()))
+            .map_err(Error::from)?;
+        let seen = self.hand.seen(&touch).ok_or(Error::from(TouchesProblem::PositionWithoutPose))?;
+        self.take(py, seen)
+    }
+
+    /// Takes in the heights above the table that three fingertips met, in millimeters, `None` or NaN for a finger that met nothing.
+    /// `x` and `y` are the middle finger's, `alignment` is as for `push`, and `lowest` is the height down to which the hand went,
+    /// 0 or less where it would have met the table.
+    #[pyo3(signature = (heights, x, y, alignment, *, lowest=0.0))]
+    fn push_heights<'py>(
+        &mut self,
+        py: Python<'py>,
+        heights: Three,
+        x: f64,
+        y: f64,
+        alignment: Row,
+        lowest: f64,
+    ) -> Result<objects::Located<'py>, Failure> {
+        let Row([across, along, _]) = alignment;
+        let micrometers = |millimeters: f64| (millimeters * 1e3).round() as i32;
+        let spacing = f64::from(self.hand.spacing);
+        let contact = |height: Option<f64>| height.map_or(Contact::Nothing, |height| Contact::At(micrometers(height)));
+        if let Some(wrong) = [x, y, across, along, lowest].into_iter().find(|number| !number.is_finite()) {
+            return Err(Error::setting("x, y, alignment or lowest", wrong, "finite numbers").into());
+        }
+        let row = [across, along].map(|share| (share * spacing).round() as i32);
+        let Three(heights) = heights;
+        let seen = Seen::new([x, y].map(micrometers), row, heights.map(contact), micrometers(lowest));
+        self.take(py, seen)
+    }
+
+    /// Where to touch next: x and y of the middle finger in millimeters, and the roll of the row of fingers in degrees from the x
+    /// axis. The same until another touch is taken in.
+    fn next(&mut self) -> (f64, f64, f64) {
+        let (hand, within, pose, seed) = (self.hand, self.within, self.pose, self.seed);
+        let next = self.next.unwrap_or_else(|| {
+            self.cell.with_dependent_mut(|_, locating| match locating.touches() {
+                // In the middle, as in a calibration.
+                0 => Approach { roll: seed.to_le_bytes()[0].wrapping_mul(101), ..Approach::default() },
+                _ => locating.choose(&hand, within, pose),
+            })
+        });
+        self.next = Some(next);
+        (f64::from(next.x) / 1e3, f64::from(next.y) / 1e3, f64::from(next.roll) * 360.0 / 256.0)
+    }
+
+    /// The verdict after the last touch.
+    #[getter]
+    fn located<'py>(&self, py: Python<'py>) -> Result<objects::Located<'py>, Failure> {
+        self.say(py)
+    }
+
+    /// The number of touches taken in since the last `reset`.
+    #[getter]
+    fn touches(&self) -> usize {
+        self.cell.borrow_dependent().touches()
+    }
+
+    /// The posterior of each object so far.
+    #[getter]
+    fn posteriors(&self) -> std::collections::HashMap<String, f64> {
+        let maps = self.cell.borrow_owner().borrow_dependent();
+        let posteriors = self.cell.borrow_dependent().posteriors().into_iter().enumerate();
+        posteriors.map(|(object, posterior)| (maps.object_name(object).to_owned(), posterior)).collect()
+    }
+
+    /// Forgets all touches, for the next object.
+    fn reset(&mut self) {
+        self.seed = self.seed.wrapping_add(1);
+        (self.next, _) = (None, self.cell.with_dependent_mut(|_, locating| locating.begin(self.seed)));
+    }
+}
+
+impl Locator {
+    fn take<'py>(&mut self, py: Python<'py>, seen: Seen) -> Result<objects::Located<'py>, Failure> {
+        py.detach(|| self.cell.with_dependent_mut(|_, locating| locating.push(seen)));
+        self.next = None;
+        self.say(py)
+    }
+
+    fn say<'py>(&self, py: Python<'py>) -> Result<objects::Located<'py>, Failure> {
+        static LOCATED: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        static MODE: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let (maps, locating) = (self.cell.borrow_owner().borrow_dependent(), self.cell.borrow_dependent());
+        let state = match locating.verdict() {
+            Verdict::Recognized { .. } => intern!(py, "recognized"),
+            Verdict::Unknown => intern!(py, "unknown"),
+            Verdict::GaveUp => intern!(py, "gave-up"),
+            _ => intern!(py, "undecided"),
+        };
+        let leader = locating.leader();
+        let degrees = |turn: u16| f64::from(turn) * 360.0 / 65_536.0;
+        let mode = class(py, "Mode", &MODE)?;
+        let mut modes = Vec::new();
+        for pose in locating.poses(leader) {
+            let [x, y] = pose.position.map(|micrometers| f64::from(micrometers) / 1e3);
+            let [x_within, y_within] = pose.within.map(|micrometers| f64::from(micrometers) / 1e3);
+            let turned = pose.yaw_within.map(|within| (degrees(pose.yaw), degrees(within)));
+            let share = f64::from(pose.share) / 65_536.0;
+            let (yaw, yaw_within) = turned.unzip();
+            let placement = maps.placement_name(pose.placement);
+            modes.push(mode.call1((placement, x, y, yaw, x_within, y_within, yaw_within, share))?);
+        }
+        let posterior = 1.0 / (1.0 + locating.rivals() as f64 / (1_u64 << 56) as f64);
+        let modes = pyo3::types::PyTuple::new(py, modes)?;
+        let made = class(py, "Located", &LOCATED)?.call1((
+            state,
+            maps.object_name(leader),
+            posterior,
+            locating.touches(),
+            modes,
+        ))?;
+        Ok(objects::Located(made))
+    }
+}

@@ -1,0 +1,165 @@
+"""Objects on a table: maps of them, and where they lie."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import palpate
+import pytest
+
+PROBE = palpate.Probe(radius=1.5, spacing=15.0, speed=100.0, tilt=0.0, stroke=20.0)
+OBJECTS = ["bowl", "mouse"]
+UNIT = 10.0  # millimeters
+
+
+@pytest.fixture(scope="module")
+def maps() -> palpate.Maps:
+    return palpate.Maps.of_meshes(OBJECTS, probe=PROBE, millimeters=UNIT, approaches=40_000)
+
+
+@pytest.fixture(scope="module")
+def touches() -> palpate.DataSet:
+    return palpate.capture(OBJECTS, touches=20, probe=PROBE, millimeters=UNIT, position=True, seed=3)
+
+
+def moved(
+    data: palpate.DataSet, touch: int, place: tuple[float, float], yaw: float
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """A touch of a placement as one of the object that lies elsewhere on the table."""
+    assert data.position is not None and data.alignment is not None
+    cos, sin = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    return data.times[touch], turn @ data.position[touch] + [*place, 0.0], turn @ data.alignment[touch].astype(float)
+
+
+def follow(locator: palpate.Locator, data: palpate.DataSet, rows: npt.NDArray[np.intp]) -> palpate.Located:
+    locator.reset()
+    for row in rows:
+        located = locator.push(*moved(data, int(row), (12.0, -7.0), 40.0))
+        if located.is_placed():
+            break
+    return located
+
+
+def test_an_object_is_named_and_located(maps: palpate.Maps, touches: palpate.DataSet) -> None:
+    locator = palpate.Locator(maps)
+    for number, name in enumerate(OBJECTS):
+        # Sources are placements in turn; the first one is the most frequent.
+        rows = np.flatnonzero((touches.objects == number) & (touches.instances == 0))
+        located = follow(locator, touches, rows)
+        assert located.object == located.best == name and located.posterior > 0.98, located
+        mode = located.placed
+        assert mode is not None
+        # To three of the half widths.
+        assert abs(mode.x - 12.0) < 3 * mode.x_within and abs(mode.y + 7.0) < 3 * mode.y_within
+        if mode.yaw is not None:
+            assert mode.yaw_within is not None
+            assert abs((mode.yaw - 40.0 + 180.0) % 360.0 - 180.0) < 3 * mode.yaw_within
+        assert str(located).startswith(f"{name}, {mode.placement}, ")
+        assert locator.located == located and locator.touches == located.touches
+        assert max(locator.posteriors, key=lambda name: locator.posteriors[name]) == name
+
+
+def test_times_and_heights_say_the_same(maps: palpate.Maps) -> None:
+    times, heights = palpate.Locator(maps), palpate.Locator(maps)
+    by_times = times.push((0.03, None, 0.0), (5.0, 2.0, 25.0), 30.0)
+    by_heights = heights.push_heights((22.0, math.nan, 25.0), 5.0, 2.0, 30.0, lowest=5.0)
+    assert by_times == by_heights and by_times.touches == 1
+    times.reset()
+    row = (math.cos(math.radians(30.0)), math.sin(math.radians(30.0)), 0.0)
+    assert times.push((0.03, None, 0.0), np.array([5.0, 2.0, 25.0]), row) == by_heights
+    times.reset()
+    assert times.touches == 0 and not times.located.decided
+
+
+def test_the_next_approach_stays_the_same_and_within_the_region(maps: palpate.Maps) -> None:
+    locator = palpate.Locator(maps, within=20.0)
+    assert locator.next()[:2] == (0.0, 0.0)
+    for height in (12.0, 9.0, 15.0):
+        x, y, roll = locator.next()
+        assert locator.next() == (x, y, roll)
+        assert abs(x) <= 20.0 and abs(y) <= 20.0 and 0.0 <= roll < 360.0
+        locator.push_heights((height, height, None), x, y, roll)
+
+
+def test_maps_are_bytes_files_and_pickles(maps: palpate.Maps, tmp_path: Path) -> None:
+    path = tmp_path / "maps.palpate"
+    maps.save(path)
+    for other in (palpate.Maps.load(path), palpate.Maps(maps.to_bytes()), pickle.loads(pickle.dumps(maps))):
+        assert other.to_bytes() == maps.to_bytes() == path.read_bytes()
+    assert maps.objects == OBJECTS and {name for name, _ in maps.placements} == set(OBJECTS)
+    assert maps.probe == PROBE and maps.range == 30.0
+    assert repr(maps).startswith(f"Maps({maps.size} bytes, ")
+    path.write_bytes(maps.to_bytes()[:-1])
+    with pytest.raises(palpate.InputError, match=r"maps.palpate"):
+        palpate.Maps.load(path)
+    with pytest.raises(palpate.FileError):
+        palpate.Maps.load(tmp_path / "none.palpate")
+
+
+def test_maps_learn_from_recorded_touches_as_from_meshes(touches: palpate.DataSet) -> None:
+    captured = palpate.capture(OBJECTS, touches=5000, probe=PROBE, millimeters=UNIT, position=True)
+    assert palpate.Maps.learn(captured).to_bytes() == (
+        palpate.Maps.of_meshes(OBJECTS, probe=PROBE, millimeters=UNIT, approaches=5000).to_bytes()
+    )
+    # As arrays from elsewhere: an object that lies in one way.
+    assert captured.position is not None and captured.position.shape == (len(captured), 3)
+    one = (captured.objects == 0) & (captured.instances == 0)
+    assert captured.direction is not None and captured.alignment is not None
+    taught = palpate.DataSet.from_arrays(
+        captured.times[one],
+        np.zeros(one.sum(), dtype=int),
+        ["bowl"],
+        direction=captured.direction[one],
+        alignment=captured.alignment[one],
+        position=captured.position[one],
+        probe=PROBE,
+    )
+    learned = palpate.Maps.learn(taught, cell=2.0)
+    assert learned.placements == [("bowl", "")] and learned.size < palpate.Maps.learn(taught).size
+    with pytest.raises(palpate.PalpateError, match="position|true size"):
+        palpate.Maps.learn(palpate.capture(["bowl"], touches=10))
+
+
+def test_thresholds_keep_a_promise_on_a_simulated_table(maps: palpate.Maps) -> None:
+    calibrated = maps.calibrate(OBJECTS, millimeters=UNIT, error_rate=0.05, sequences=120)
+    assert calibrated.error <= 0.05 and calibrated.sequences == 120 and calibrated.mean_approaches < 6
+    assert calibrated.maps.objects == OBJECTS
+    found = calibrated.maps.evaluate(OBJECTS, millimeters=UNIT, sequences=40)
+    assert found.error <= 0.1 and found.mean_approaches < 6 and found.off[0] <= found.off[1] < 10
+    assert found.undecided < 0.2
+    random = calibrated.maps.evaluate(OBJECTS, millimeters=UNIT, sequences=10, aimed="random", real=palpate.Real(lost=0.1))
+    assert random.raw["sequences"] == 10
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"cell": 3.0}, "cell is 3"),
+        ({"range": 200.0}, "range is 200"),
+        ({"real": palpate.Real(height=9.0)}, "noise is 9"),
+        ({"max_touches": 99}, "max_touches is 99"),
+    ],
+)
+def test_settings_out_of_range_are_named(settings: dict[str, object], message: str) -> None:
+    with pytest.raises(palpate.SettingError, match=message):
+        palpate.Maps.of_meshes(["bowl"], probe=PROBE, millimeters=UNIT, **settings)  # type: ignore[arg-type]
+
+
+def test_wrong_touches_are_refused(maps: palpate.Maps) -> None:
+    locator = palpate.Locator(maps)
+    with pytest.raises(ValueError, match="2 numbers, where 3 are needed"):
+        locator.push((0.0, 0.1), (0.0, 0.0, 0.0), 0.0)
+    with pytest.raises(palpate.PalpateError, match="coordinate NaN"):
+        locator.push((0.0, 0.1, 0.0), (0.0, None, 0.0), 0.0)
+    with pytest.raises(palpate.SettingError, match="lowest"):
+        locator.push_heights((0.0, 0.1, 0.0), 0.0, 0.0, 0.0, lowest=math.inf)
+    with pytest.raises(palpate.SettingError, match="aimed is best"):
+        maps.evaluate(OBJECTS, millimeters=UNIT, aimed="best")
+    with pytest.raises(palpate.PalpateError, match="true size|unit"):
+        palpate.Maps.of_meshes(["bowl"], probe=PROBE)
+    assert locator.touches == 0

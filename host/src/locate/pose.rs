@@ -1,0 +1,117 @@
+//! Poses against the truth, modulo symmetry, and how wide their intervals must be.
+
+use super::learn::{SAME, Surface};
+use super::world::{Standing, Truth};
+use super::{Maps, Pose};
+use crate::probe::approach::Probe;
+use crate::probe::scene::Scene;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// A pose that is sure enough to end on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Until {
+    /// Half of the 95 % intervals of x and y at most, in millimeters.
+    pub millimeters: f64,
+    /// Half of the 95 % interval of the yaw at most, in degrees.
+    pub degrees: f64,
+}
+
+impl Until {
+    /// True if a pose is as sure: one mode, and its intervals.
+    pub fn is_met(&self, pose: &Pose) -> bool {
+        let most = self.millimeters * 1_000.0;
+        pose.within.iter().all(|&within| f64::from(within) <= most)
+            && pose.yaw_within.is_none_or(|within| f64::from(within) / 65_536.0 * 360.0 <= self.degrees)
+            && f64::from(pose.share) >= 0.95 * 65_536.0
+    }
+}
+
+/// How far a pose is from the truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Off {
+    /// Along x and y, in millimeters.
+    pub millimeters: [f64; 2],
+    /// In degrees; 0 for what is round.
+    pub degrees: f64,
+}
+
+impl Off {
+    /// Largest of its parts, each in units of the half of the pose's interval.
+    pub(super) fn in_intervals(&self, pose: &Pose) -> f64 {
+        let [x, y] = self.millimeters.map(|off| off.abs() * 1_000.0);
+        let [within_x, within_y] = pose.within.map(f64::from);
+        let yaw = pose.yaw_within.map_or(0.0, |within| self.degrees.abs() / (f64::from(within) / 65_536.0 * 360.0));
+        (x / within_x).max(y / within_y).max(yaw)
+    }
+}
+
+/// Turns by which a placement on the table looks like one of the maps.
+pub(super) struct Equivalents {
+    /// For each object and placement that stands, and each placement of the maps, turns in radians.
+    turns: Vec<Vec<Vec<Vec<f64>>>>,
+}
+
+/// Turns that are compared.
+const TURNS: usize = 120;
+
+impl Equivalents {
+    /// Compares all placements. Cost: some seconds for a hundred of them.
+    pub(super) fn new(maps: Maps<'_>, standing: &[Standing], probe: &Probe) -> Self {
+        let known: Vec<Surface> = (0..maps.placements()).map(|index| of_maps(maps, index)).collect();
+        let of = |object: &Standing| {
+            let own = |scene: &Scene| {
+                let surface = pressed(scene, probe);
+                let like = |known: &Surface| {
+                    if maps.object_name(known.object) != object.name {
+                        return Vec::new();
+                    }
+                    let turns = (0..TURNS).map(|turn| turn as f64 / TURNS as f64 * TAU);
+                    turns.filter(|turn| surface.differs(known, *turn) < LIKE).collect()
+                };
+                known.iter().map(like).collect()
+            };
+            object.placements.iter().map(|(scene, _)| own(scene)).collect()
+        };
+        Self { turns: standing.par_iter().map(of).collect() }
+    }
+
+    /// How far a pose is from the nearest equivalent of the truth; none if the object does not lie like that.
+    pub(super) fn off(&self, truth: &Truth, pose: &Pose) -> Option<Off> {
+        let turns = self.turns.get(truth.object)?.get(truth.placement)?.get(usize::from(pose.placement))?;
+        let [x, y] = pose.position.map(|micrometers| f64::from(micrometers) / 1_000.0);
+        let yaw = f64::from(pose.yaw) / 65_536.0 * TAU;
+        let degrees = |turn: f64| {
+            let apart = (yaw - truth.yaw - turn).rem_euclid(TAU);
+            apart.min(TAU - apart).to_degrees()
+        };
+        let least = turns.iter().map(|turn| degrees(*turn)).min_by(f64::total_cmp)?;
+        let degrees = if pose.yaw_within.is_none() { 0.0 } else { least };
+        Some(Off { millimeters: [x - truth.place[0], y - truth.place[1]], degrees })
+    }
+}
+
+/// Two maps are the same where their heights differ by less than this on average, in millimeters: the learned one has noise.
+const LIKE: f64 = 1.5 * SAME;
+
+/// The surface of a placement of the maps, in cells of 1 mm.
+fn of_maps(maps: Maps<'_>, index: usize) -> Surface {
+    let placement = u8::try_from(index).unwrap_or(u8::MAX);
+    let reach = (maps.radius(placement) / 1_000 + 3).min(250);
+    let height = |[i, j]: [i32; 2]| f64::from(maps.height(placement, [i * 1_000, j * 1_000])) / 1_000.0;
+    Surface::of(usize::from(maps.object_of(placement)), [reach; 2], height)
+}
+
+/// The surface that fingertips would meet, in cells of 1 mm.
+fn pressed(scene: &Scene, probe: &Probe) -> Surface {
+    let [low, high] = scene.bounds();
+    let reach = [high.x, high.y].map(|half| (half + probe.radius).ceil() as i32 + 1);
+    let start = high.z + 2.0 * probe.radius;
+    let height = |[i, j]: [i32; 2]| {
+        let from = DVec3::new(f64::from(i), f64::from(j), start);
+        let way = scene.first_contact(from, DVec3::NEG_Z, probe.radius);
+        way.map_or(0.0, |way| (start - way - probe.radius - low.z).max(0.0))
+    };
+    Surface::of(0, reach, height)
+}
