@@ -125,6 +125,7 @@ impl Maps {
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> Result<Self, Failure> {
         Ok(py.detach(|| {
+            std::fs::metadata(&path).map_err(|source| Error::io(&path, "read the maps", source))?;
             let trees = || Error::at(Place::File(path.clone()), LocateProblem::Trees);
             let file = MapsFile::read(&path)?.ok_or_else(trees)?;
             Self::of(file.maps().model().to_vec())
@@ -221,7 +222,7 @@ impl Maps {
     ) -> Result<objects::CalibratedMaps<'py>, Failure> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let promise = calibrate::Terms { rate: error_rate, confidence, per: Per::Average };
-        let terms = Terms { unknown, ..terms(promise, sequences, max_touches, aimed, real, pose, until, seed)? };
+        let terms = Terms { promise, unknown, ..terms(sequences, max_touches, aimed, real, pose, until, seed)? };
         let played = Played { objects: meshes, millimeters, terms };
         let maps = *self.maps();
         let found = long(py, progress.as_ref(), |progress| {
@@ -255,8 +256,7 @@ impl Maps {
         progress: Option<Callback>,
     ) -> Result<objects::MapsEvaluation<'py>, Failure> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let promise = calibrate::Terms { rate: 0.01, confidence: 0.95, per: Per::Average };
-        let terms = terms(promise, sequences, max_touches, aimed, real, pose, until, seed)?;
+        let terms = terms(sequences, max_touches, aimed, real, pose, until, seed)?;
         let played = Played { objects: meshes, millimeters, terms };
         let maps = *self.maps();
         let found = long(py, progress.as_ref(), |progress| {
@@ -330,8 +330,8 @@ impl Maps {
     }
 }
 
+/// Terms with a promise of 1 %.
 fn terms(
-    promise: calibrate::Terms,
     sequences: usize,
     max_touches: u32,
     name: &str,
@@ -342,6 +342,7 @@ fn terms(
 ) -> palpate::Result<Terms> {
     let (aimed, Real(real)) = (aimed(name)?, real.unwrap_or_default());
     let until = until.map(|(millimeters, degrees)| Until { millimeters, degrees });
+    let promise = calibrate::Terms { rate: 0.01, confidence: 0.95, per: Per::Average };
     Ok(Terms { promise, sequences, max_touches, aimed, real, pose, until, unknown: false, seed, effort: None })
 }
 
