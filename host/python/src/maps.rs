@@ -12,7 +12,7 @@ use palpate::calibrate::{self, Per};
 use palpate::capture::{self, Settings as Capture};
 use palpate::compile;
 use palpate::error::{Error, LocateProblem, Place, TouchesProblem};
-use palpate::locate::{self, Aimed, Approach, Hand, Seen, Settings, Terms, Until};
+use palpate::locate::{self, Aimed, Approach, Hand, MapsFile, Promised, Seen, Settings, Terms, Until};
 use palpate::mesh::Object;
 use palpate::onboard::Verdict;
 use palpate::onboard::locate::Contact;
@@ -57,8 +57,7 @@ impl Maps {
 
     fn learned(dataset: &Dataset, settings: &Settings) -> palpate::Result<Self> {
         let surfaces = locate::learn(dataset, settings)?;
-        let names: Vec<String> = dataset.names().into_iter().map(Into::into).collect();
-        Self::of(locate::write(&surfaces, &names, &locate::probe_of(dataset)?, settings)?)
+        Self::of(locate::write(&surfaces, &dataset.names(), &locate::probe_of(dataset)?, settings)?)
     }
 }
 
@@ -67,18 +66,7 @@ fn settings(Real(real): &Real, cell: f64, range: f64, error_rate: f64, max_touch
     if cell != 1.0 && cell != 2.0 {
         return Err(Error::setting("cell", cell, "1 or 2, in millimeters"));
     }
-    let settings = Settings {
-        fine: cell < 2.0,
-        range,
-        noise: real.height,
-        position: real.position,
-        lost: real.lost,
-        drift: real.drift,
-        drift_yaw: real.drift_yaw,
-        error_rate,
-        max_touches,
-        ..Settings::default()
-    };
+    let settings = Settings { fine: cell < 2.0, range, error_rate, max_touches, ..Settings::default() }.expecting(real);
     settings.check()?;
     Ok(settings)
 }
@@ -137,11 +125,10 @@ impl Maps {
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> Result<Self, Failure> {
         Ok(py.detach(|| {
-            let bytes = std::fs::read(&path).map_err(|source| Error::io(&path, "read the maps", source))?;
-            Self::of(bytes).map_err(|error| match error.problem::<LocateProblem>() {
-                Some(problem) => Error::at(Place::File(path), problem.clone()),
-                None => error,
-            })
+            std::fs::metadata(&path).map_err(|source| Error::io(&path, "read the maps", source))?;
+            let trees = || Error::at(Place::File(path.clone()), LocateProblem::Trees);
+            let file = MapsFile::read(&path)?.ok_or_else(trees)?;
+            Self::of(file.maps().model().to_vec())
         })?)
     }
 
@@ -235,7 +222,7 @@ impl Maps {
     ) -> Result<objects::CalibratedMaps<'py>, Failure> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let promise = calibrate::Terms { rate: error_rate, confidence, per: Per::Average };
-        let terms = Terms { unknown, ..terms(promise, sequences, max_touches, aimed, real, pose, until, seed)? };
+        let terms = Terms { promise, unknown, ..terms(sequences, max_touches, aimed, real, pose, until, seed)? };
         let played = Played { objects: meshes, millimeters, terms };
         let maps = *self.maps();
         let found = long(py, progress.as_ref(), |progress| {
@@ -269,8 +256,7 @@ impl Maps {
         progress: Option<Callback>,
     ) -> Result<objects::MapsEvaluation<'py>, Failure> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let promise = calibrate::Terms { rate: 0.01, confidence: 0.95, per: Per::Average };
-        let terms = terms(promise, sequences, max_touches, aimed, real, pose, until, seed)?;
+        let terms = terms(sequences, max_touches, aimed, real, pose, until, seed)?;
         let played = Played { objects: meshes, millimeters, terms };
         let maps = *self.maps();
         let found = long(py, progress.as_ref(), |progress| {
@@ -306,7 +292,7 @@ impl Maps {
     /// The objects' names.
     #[getter]
     fn objects(&self) -> Vec<String> {
-        (0..self.maps().objects()).map(|object| self.maps().object_name(object).to_owned()).collect()
+        locate::names(self.maps())
     }
 
     /// The placements, each with its object's name first. Equal ones of an object are one.
@@ -326,6 +312,12 @@ impl Maps {
         Ok(Probe(locate::hand(self.maps())?))
     }
 
+    /// The promise that a calibration gave: its rate, of which aims it is, and what it rests on; `None` without one.
+    #[getter]
+    fn promise<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        Promised::of(self.maps()).map(|promised| raw(py, &promised)).transpose()
+    }
+
     /// Half of the side of the square about the table's origin in which objects are looked for, in millimeters.
     #[getter]
     fn range(&self) -> f64 {
@@ -338,8 +330,8 @@ impl Maps {
     }
 }
 
+/// Terms with a promise of 1 %.
 fn terms(
-    promise: calibrate::Terms,
     sequences: usize,
     max_touches: u32,
     name: &str,
@@ -350,6 +342,7 @@ fn terms(
 ) -> palpate::Result<Terms> {
     let (aimed, Real(real)) = (aimed(name)?, real.unwrap_or_default());
     let until = until.map(|(millimeters, degrees)| Until { millimeters, degrees });
+    let promise = calibrate::Terms { rate: 0.01, confidence: 0.95, per: Per::Average };
     Ok(Terms { promise, sequences, max_touches, aimed, real, pose, until, unknown: false, seed, effort: None })
 }
 
@@ -533,12 +526,25 @@ impl Locator {
         posteriors.map(|(object, posterior)| (maps.object_name(object).to_owned(), posterior)).collect()
     }
 
-    /// Forgets all touches, for the next object.
-    fn reset(&mut self) {
+    /// Forgets all touches, for the next object. `weights` say how often each object lies there, in any unit.
+    #[pyo3(signature = (weights=None))]
+    fn reset(&mut self, weights: Option<Vec<u32>>) -> Result<(), Failure> {
+        let objects = self.cell.borrow_owner().borrow_dependent().objects();
+        let is_wrong = |weights: &&Vec<u32>| weights.len() != objects || weights.iter().all(|&weight| weight == 0);
+        if weights.as_ref().filter(is_wrong).is_some() {
+            let allowed = format!("{objects} of them, one above 0 at least");
+            return Err(Error::setting("weights", "all 0, or too many or few", allowed).into());
+        }
         self.seed = self.seed.wrapping_add(1);
         self.next = None;
         let seed = self.seed;
-        self.cell.with_dependent_mut(|_, locating| locating.begin(seed));
+        self.cell.with_dependent_mut(|_, locating| {
+            locating.begin(seed);
+            if let Some(weights) = weights {
+                locating.begin_of(&weights);
+            }
+        });
+        Ok(())
     }
 }
 

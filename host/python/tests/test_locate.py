@@ -70,8 +70,10 @@ def test_times_and_heights_say_the_same(maps: palpate.Maps) -> None:
     times.reset()
     row = (math.cos(math.radians(30.0)), math.sin(math.radians(30.0)), 0.0)
     assert times.push((0.03, None, 0.0), np.array([5.0, 2.0, 25.0]), row) == by_heights
-    times.reset()
-    assert times.touches == 0 and not times.located.decided
+    times.reset([0, 5])
+    assert times.touches == 0 and not times.located.decided and times.located.best == "mouse"
+    with pytest.raises(palpate.SettingError, match="weights"):
+        times.reset([0, 0])
 
 
 def test_the_next_approach_stays_the_same_and_within_the_region(maps: palpate.Maps) -> None:
@@ -126,7 +128,8 @@ def test_maps_learn_from_recorded_touches_as_from_meshes(touches: palpate.DataSe
 def test_thresholds_keep_a_promise_on_a_simulated_table(maps: palpate.Maps) -> None:
     calibrated = maps.calibrate(OBJECTS, millimeters=UNIT, error_rate=0.05, sequences=120)
     assert calibrated.error <= 0.05 and calibrated.sequences == 120 and calibrated.mean_approaches < 6
-    assert calibrated.maps.objects == OBJECTS
+    assert calibrated.maps.objects == OBJECTS and maps.promise is None
+    assert calibrated.maps.promise is not None and calibrated.maps.promise["aimed"] == "chosen"
     found = calibrated.maps.evaluate(OBJECTS, millimeters=UNIT, sequences=40)
     assert found.error <= 0.1 and found.mean_approaches < 6 and found.off[0] <= found.off[1] < 10
     assert found.undecided < 0.2

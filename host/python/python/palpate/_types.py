@@ -138,12 +138,18 @@ class Located:
         return self.modes[0] if self.modes else None
 
     def is_placed(self, millimeters: float = 3.0, degrees: float = 5.0) -> bool:
-        """True if an object is recognized and its place is known as well as this, with 95 % of the belief."""
+        """True if an object is recognized and its place is known as well as this, with 95 % of the belief; it may be turned as it
+        looks the same."""
         mode = self.placed
-        if self.object is None or mode is None or mode.share < 0.95:
+        if self.object is None or mode is None:
             return False
+        there = [
+            other.share
+            for other in self.modes
+            if other.placement == mode.placement and max(abs(other.x - mode.x), abs(other.y - mode.y)) <= millimeters
+        ]
         turned = mode.yaw_within is None or mode.yaw_within <= degrees
-        return turned and max(mode.x_within, mode.y_within) <= millimeters
+        return turned and max(mode.x_within, mode.y_within) <= millimeters and sum(there) >= 0.95
 
     def __str__(self) -> str:
         mode = self.placed
