@@ -27,7 +27,9 @@ fn main() -> ! {
     let terms = Terms::from_bytes(terms);
     let Ok(maps) = Maps::new(MODEL) else { fail() };
     let (Some(hand), Some(peripherals)) = (Hand::of(&maps), cortex_m::Peripherals::take()) else { fail() };
-    let Ok(mut locator) = OnChip::new(maps, maps.stopping(), terms.effort, 1) else { fail() };
+    // Borrowed where it was made: moved, it would take its RAM twice.
+    let mut made = OnChip::new(maps, maps.stopping(), terms.effort, 1);
+    let Ok(locator) = &mut made else { fail() };
     let mut meter = Meter::new(peripherals.SYST);
     let (mut count, mut named, mut different, mut all, mut most, mut stack) = (0, 0, 0, 0, 0, 0);
     for approach in approaches.as_chunks::<{ TOUCH + LENGTH }>().0 {
@@ -36,14 +38,14 @@ fn main() -> ! {
         let mut result = None;
         let mut instructions = 0;
         let used = meter::stack(|| {
-            let push = || located::push(&mut locator, &touch, hand, &terms);
+            let push = || located::push(locator, &touch, hand, &terms);
             (result, instructions) = meter.once(push);
         });
         let Some(found) = result else { fail() };
         count += 1;
         all += instructions;
         (most, stack) = (u64::max(most, instructions), usize::max(stack, used));
-        different += u32::from(located::record(&locator, &found) != *expected);
+        different += u32::from(located::record(locator, &found) != *expected);
         if count <= PRINTED {
             print(&maps, &found, instructions);
         }
