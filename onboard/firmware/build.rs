@@ -36,7 +36,7 @@ const BENCH: [&str; 19] = [
     "located.bin",
 ];
 
-/// Copies the benchmark's files from the directory in `PALPATE_BENCH`; without one they are empty, and the benchmark
+/// Copies the benchmarks' files from the directory in `PALPATE_BENCH`; those that are not there are empty, and their benchmark
 /// says so.
 fn models(out: &Path) -> io::Result<()> {
     println!("cargo::rerun-if-env-changed=PALPATE_BENCH");
@@ -44,7 +44,7 @@ fn models(out: &Path) -> io::Result<()> {
     let source = env::var_os("PALPATE_BENCH").map(PathBuf::from);
     for name in BENCH {
         match &source {
-            Some(directory) if directory.join(name).exists() || !name.starts_with("located") => {
+            Some(directory) if directory.join(name).exists() => {
                 let file = directory.join(name);
                 println!("cargo::rerun-if-changed={}", file.display());
                 fs::copy(file, out.join(name))?;

@@ -14,7 +14,8 @@ pub const TESTED: usize = 8;
 /// Bounds on the work of an approach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effort {
-    /// Heights that are looked up until a search ends, each about 160 instructions on a Cortex-M4F. 450,000 serve ten objects.
+    /// Heights that are looked up until a search ends. Each is about 330 instructions on a Cortex-M4F, built for size; passes over
+    /// the cells and a choice are about 35 million more. 450,000 serve ten objects.
     pub lookups: u32,
     /// Cells that are kept, if there is room for as many.
     pub cells: u32,
@@ -64,6 +65,8 @@ pub struct Locator<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: 
 impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'m, CELLS, TOUCHES, OBJECTS> {
     /// A locator without a touch, which stops as `stopping` says. The seed is of the choice of approaches.
     ///
+    /// Cost: as [`reset`](Self::reset).
+    ///
     /// # Errors
     /// [`CapacityError`] for more objects than there is room for.
     pub fn new(maps: Maps<'m>, stopping: Stopping, effort: Effort, seed: u32) -> Result<Self, CapacityError> {
@@ -102,7 +105,8 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
     }
 
     /// Begins another object: one of those that have a weight, which says how often each is met. Like [`reset`](Self::reset);
-    /// changes nothing and returns false unless one of as many weights as there are objects is above 0.
+    /// changes nothing and returns false unless one of as many weights as there are objects is above 0. Cost: as
+    /// [`reset`](Self::reset).
     pub fn reset_to(&mut self, weights: &[u32]) -> bool {
         if weights.len() != self.maps.objects() || weights.iter().all(|&weight| weight == 0) {
             return false;
@@ -129,7 +133,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
 
     /// Takes in the heights of an approach.
     ///
-    /// Cost: a search, at most about 200 instructions for each of [`Effort::lookups`]. Cannot fail: once there is no more room for
+    /// Cost: a search, about as much as [`Effort::lookups`] says. Cannot fail: once there is no more room for
     /// touches, the verdict is [`Verdict::GaveUp`] unless an object has been named.
     pub fn push_seen(&mut self, seen: Seen) -> Verdict {
         let Some(slot) = self.seen.get_mut(self.touches) else { return self.verdict() };
@@ -139,7 +143,8 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
         self.verdict()
     }
 
-    /// The verdict on the touches so far.
+    /// The verdict on the touches so far. Cost: a few dozen instructions for each object, and a pass over the kept cells where the
+    /// maps have a test for unknown objects. Cannot fail, like all that follows.
     pub fn verdict(&self) -> Verdict {
         let touches = u32::try_from(self.touches).unwrap_or(u32::MAX);
         let familiarity = self.familiarity();
@@ -159,7 +164,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
         }
     }
 
-    /// The object with the most evidence.
+    /// The object with the most evidence. Cost: a few instructions for each object.
     pub fn leader(&self) -> usize {
         let objects = self.posteriors.iter().take(self.maps.objects()).enumerate();
         objects
@@ -170,7 +175,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
             .0
     }
 
-    /// Sum of the weights of all other objects, that of the leader being 1.
+    /// Sum of the weights of all other objects, that of the leader being 1. Cost: a few dozen instructions for each object.
     pub fn rivals(&self) -> Rivals {
         let leader = self.leader();
         let objects = self.posteriors.iter().take(self.maps.objects()).enumerate();
@@ -179,7 +184,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
         Rivals::from_q56(odds(at(&self.posteriors, leader) - others))
     }
 
-    /// Posterior of an object in Q16.
+    /// Posterior of an object in Q16; 0 for one that is not there. Cost: a few instructions.
     pub fn posterior(&self, object: usize) -> u32 {
         super::number::power(-self.posteriors.get(object).copied().unwrap_or(NOTHING))
     }
@@ -195,7 +200,8 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
         }
     }
 
-    /// Logarithm of the likelihood of the most likely cell for each touch, in 1/64 nat.
+    /// Logarithm of the likelihood of the most likely cell for each touch, in 1/64 nat. Cost: a pass over the kept cells, a few
+    /// instructions for each.
     pub fn fit(&self) -> i32 {
         let best = self.cells().iter().max_by_key(|cell| cell.likely);
         let prior = best.map_or(0, |cell| self.prior(cell.placement, &self.maps.placement(cell.placement), FINEST));
@@ -243,7 +249,8 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// The hand that the maps were learned with; none if they do not state it, or not in millimeters.
+    /// The hand that the maps were learned with; none if they do not state it, or not in millimeters. Cost: a few dozen
+    /// instructions, some in f32. Cannot fail.
     pub fn of(maps: &Maps<'_>) -> Option<Self> {
         let probe = maps.probe()?;
         if probe.length != palpate_shared::format::Length::Millimeter {
@@ -258,7 +265,8 @@ impl Hand {
         })
     }
 
-    /// Heights that a touch met; none without a position, or from another direction than straight down.
+    /// Heights that a touch met; none without a position, or from another direction than straight down. Cost: about a hundred
+    /// instructions. Cannot fail.
     pub fn seen(&self, touch: &Touch) -> Option<Seen> {
         let (pose, position) = (touch.pose()?, touch.position()?);
         let [_, _, down] = pose.direction;
