@@ -50,7 +50,7 @@ fn touched(objects: &[Object], touches: u64) -> Dataset {
 fn model(settings: &Settings) -> Vec<u8> {
     let dataset = touched(&objects(), 60_000);
     let surfaces = learn(&dataset, settings).unwrap();
-    let names: Vec<String> = dataset.names().into_iter().map(Into::into).collect();
+    let names: Vec<String> = dataset.names();
     write(&surfaces, &names, &probe(), settings).unwrap()
 }
 

@@ -4,7 +4,7 @@
 //!     cargo run --release -p palpate-tests --bin located -- [KEY=VALUE ...] [+ KEY=VALUE ...]...
 //!
 //! After each `+` are the keys of a run beyond the first ones; without one there is one run. `keep=1` takes the model of the run
-//! before, `row=NAME` prints a row of a table.
+//! before, `row=NAME` prints a row of a table, `write=DIRECTORY` writes the files of the firmware's image `located`.
 
 use palpate::calibrate;
 use palpate::locate::{self, Aimed, Approach, Effort, Hand, Maps, Real, Settings, Standing, Truth, Until, World};
@@ -108,7 +108,7 @@ fn learned(given: &Given, dataset: &Dataset, probe: &Probe) -> Result<Vec<u8>, B
             println!("{name} {placement} share {share:.3} half {half:?} known {known:.2} round {is_round}");
         }
     }
-    let names: Vec<String> = dataset.names().into_iter().map(Into::into).collect();
+    let names: Vec<String> = dataset.names();
     let model = locate::write(&surfaces, &names, probe, &settings)?;
     eprintln!("maps: {} placements, {} bytes", surfaces.len(), model.len());
     Ok(model)
@@ -154,15 +154,13 @@ fn run(
     }
     let maps = Maps::new(model).map_err(|error| error.to_string())?;
     if let Some(directory) = given.0.get("write") {
-        let bounds = Terms { effort: bounds, within: maps.range().unsigned_abs() * 2, pose: terms.pose };
-        let world = World { standing, probe, real: terms.real, range: f64::from(maps.range()) / 1e3 - 1.0, seed: 1 };
-        let directory = std::path::Path::new(directory);
+        let within = maps.range().unsigned_abs();
+        let written = Terms { effort: bounds, within: 2 * within, pose: terms.pose };
+        let world = World { standing, probe, real: terms.real, range: f64::from(within) / 1e3 - 1.0, seed: 1 };
+        let bytes = approaches(maps, &world, &written, number("approaches", 1_000.0))?;
         std::fs::create_dir_all(directory)?;
-        std::fs::write(directory.join("located.palpate"), &*model)?;
-        std::fs::write(
-            directory.join("located.bin"),
-            approaches(maps, &world, &bounds, number("approaches", 1_000.0))?,
-        )?;
+        std::fs::write(format!("{directory}/located.palpate"), &*model)?;
+        std::fs::write(format!("{directory}/located.bin"), bytes)?;
         return Ok(());
     }
     let began = Instant::now();

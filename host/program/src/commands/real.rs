@@ -24,7 +24,7 @@ struct Real {
 
 #[derive(Clone, Debug)]
 enum Given {
-    Settings(PartialNoise),
+    Settings(Box<PartialNoise>),
     File(PathBuf),
 }
 
@@ -48,7 +48,7 @@ impl RealArguments {
     pub(crate) fn on_table(&self, base: Noise) -> Result<Noise> {
         let noise = match self.real.as_ref().map(|real| &real.given) {
             None => base,
-            Some(Given::Settings(settings)) => settings.over(base),
+            Some(Given::Settings(settings)) => (**settings).over(base),
             Some(Given::File(path)) => ProbeFile::read(path)?.real,
         };
         match self.real.as_ref().map(|real| &real.given) {
@@ -75,7 +75,7 @@ fn real(text: &str) -> Result<Real, String> {
     let is_file = path.extension().is_some_and(|extension| extension == "toml") || path.is_file();
     let given = match is_file {
         true => Given::File(path.into()),
-        false => Given::Settings(text.parse().map_err(wrong)?),
+        false => Given::Settings(Box::new(text.parse().map_err(wrong)?)),
     };
     Ok(Real { text: text.into(), given })
 }

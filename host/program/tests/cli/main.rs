@@ -11,6 +11,7 @@ mod fit;
 mod formats;
 mod goldens;
 mod help;
+mod locate;
 #[cfg(feature = "mcap")]
 mod mcap;
 mod mesh;

@@ -1,0 +1,158 @@
+//! Maps from touches with a position, through every command that takes them.
+
+use crate::{command, fails, json, palpate, succeeds};
+use serde_json::Value;
+use std::path::Path;
+
+/// A box with these sides in millimeters, as an OBJ file.
+fn brick(directory: &Path, name: &str, sides: [f64; 3]) {
+    let corner = |corner: usize| {
+        let [x, y, z] = [0, 1, 2].map(|axis| if corner >> axis & 1 == 0 { 0.0 } else { sides[axis] });
+        format!("v {x} {y} {z}\n")
+    };
+    let faces = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+    std::fs::write(directory.join(format!("{name}.obj")), (0..8).map(corner).collect::<String>() + faces).unwrap();
+}
+
+/// Two boxes, touches of them with positions, and a model of maps.
+fn located() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    std::fs::create_dir(at.join("meshes")).unwrap();
+    brick(&at.join("meshes"), "brick", [60.0, 40.0, 30.0]);
+    brick(&at.join("meshes"), "slab", [70.0, 50.0, 10.0]);
+    let probe = "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\ntilt = 0\nstroke = 20\n";
+    std::fs::write(at.join("probe.toml"), probe).unwrap();
+    run(at, "capture meshes -o data --scene table --position --probe probe.toml --true-size mm --approaches 6000");
+    run(at, "train data -o maps.palpate --maps cell=2mm,range=20mm");
+    directory
+}
+
+fn run(at: &Path, words: &str) -> String {
+    succeeds(at, &words.split_whitespace().collect::<Vec<_>>())
+}
+
+fn refused(at: &Path, words: &str, code: i32, expected: &str) {
+    fails(at, &words.split_whitespace().collect::<Vec<_>>(), code, expected);
+}
+
+/// The lines that a stream of touches gives.
+fn recognized(at: &Path, words: &str, lines: &str) -> Vec<Value> {
+    std::fs::write(at.join("lines.txt"), lines).unwrap();
+    let printed = run(at, &format!("recognize {words} lines.txt"));
+    printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+#[test]
+fn objects_are_located_with_maps_from_a_capture_to_a_verdict() {
+    let directory = located();
+    let at = directory.path();
+    let trained =
+        json(palpate(at, &["train", "data", "-o", "again.palpate", "--maps", "cell=2mm,range=20mm", "--json"]));
+    let bytes = std::fs::read(at.join("maps.palpate")).unwrap();
+    assert_eq!(std::fs::read(at.join("again.palpate")).unwrap(), bytes);
+    assert_eq!((trained["objects"].as_u64(), trained["bytes"].as_u64()), (Some(2), Some(bytes.len() as u64)));
+    // A box lies on three kinds of sides.
+    let placements = trained["placements"].as_array().unwrap();
+    assert!((2..=6).contains(&placements.len()), "{trained}");
+
+    let inspected = json(palpate(at, &["inspect", "maps.palpate", "--json"]));
+    assert_eq!(inspected["placements"].as_array().unwrap().len(), placements.len());
+    assert_eq!((inspected["cell"].as_u64(), inspected["range"].as_f64()), (Some(2), Some(20.0)));
+    assert!(inspected["promise"].is_null() && inspected["approach"]["ram"].as_u64().unwrap() > 100_000);
+    let text = run(at, "inspect maps.palpate");
+    assert!(text.contains("brick/") && text.contains("noise of 5 ms, 2 % of contacts missed"), "{text}");
+
+    let words = "calibrate maps.palpate --objects meshes --true-size mm --error-rate 20% --sequences 100";
+    let said = run(at, &format!("{words} -o sure.palpate"));
+    assert!(said.contains("It holds for chosen approaches, for noise of 5 ms, 2 % of contacts missed"), "{said}");
+    let random = json(palpate(
+        at,
+        &format!("{words} -o random.palpate --aimed random --real none,noise=2ms,drift=1mm/1deg --json")
+            .split(' ')
+            .collect::<Vec<_>>(),
+    ));
+    assert_eq!(random["aimed"], "random");
+    assert!(random["noise"].as_str().unwrap().contains("moves by 1 mm and 1° per approach"), "{random}");
+    for (model, aimed) in [("sure", "chosen"), ("random", "random")] {
+        let promise = &json(palpate(at, &["inspect", &format!("{model}.palpate"), "--json"]))["promise"];
+        assert_eq!((promise["aimed"].as_str(), promise["error_rate"].as_f64()), (Some(aimed), Some(0.2)));
+    }
+    let evaluate = "evaluate sure.palpate --objects meshes --true-size mm --sequences 60";
+    let evaluated = json(palpate(at, &format!("{evaluate} --json").split(' ').collect::<Vec<_>>()));
+    assert!(evaluated["given"].as_u64().unwrap() > 40, "{evaluated}");
+    assert_eq!((evaluated["aimed"].as_str(), evaluated["promise"]["aimed"].as_str()), (Some("chosen"), Some("chosen")));
+    assert!(evaluated["off"][0].as_f64().unwrap() < 10.0, "{evaluated}");
+    let random = run(at, &format!("{evaluate} --aimed random"));
+    assert!(random.contains("Void here: it was made for chosen approaches."), "{random}");
+}
+
+#[test]
+fn each_touch_gives_a_verdict_a_place_and_the_next_approach_until_an_object_is_named() {
+    let directory = located();
+    let at = directory.path();
+    let listing: Value = serde_json::from_slice(&std::fs::read(at.join("data/dataset.json")).unwrap()).unwrap();
+    let placements = listing["objects"][0]["placements"].as_array().unwrap().len();
+    let text = std::fs::read_to_string(at.join("data/brick.txt")).unwrap();
+    // Touches of one placement, in its own frame: at the origin, turned by nothing.
+    let lines: String = text.lines().step_by(placements).take(30).map(|line| format!("{line}\n")).collect();
+    let said = recognized(at, "maps.palpate --next", &lines);
+    let end = said.iter().position(|line| line["verdict"] != "undecided").unwrap();
+    assert_eq!((said[end]["verdict"].as_str(), said[end]["object"].as_str()), (Some("recognized"), Some("brick")));
+    assert!(said[end]["next"].is_null() && end < 25, "{end}");
+    for line in &said[..end] {
+        let next = ["x", "y", "roll"].map(|key| line["next"][key].as_f64().unwrap());
+        assert!(next[0].abs() <= 40.0 && next[1].abs() <= 40.0 && next[2] < 360.0, "{line}");
+        assert!(line["pose"]["share"].as_f64().unwrap() <= 1.0 && line["modes"].is_array(), "{line}");
+    }
+    assert_eq!(said[end + 1]["touch"], 1, "another object begins");
+    let only = recognized(at, "maps.palpate --next --only slab", lines.lines().next().unwrap());
+    assert_eq!(only[0]["object"], "slab");
+    let plain = run(at, "recognize maps.palpate lines.txt --json");
+    assert!(plain.contains("\"verdict\":") && !plain.contains("\"pose\":"), "{plain}");
+    refused(at, "recognize maps.palpate lines.txt --max-touches 99", 2, "--max-touches is 99");
+}
+
+#[test]
+fn maps_and_trees_are_refused_where_the_other_is_needed_with_what_to_do() {
+    let directory = located();
+    let at = directory.path();
+    run(at, "capture bowl mouse -o free --touches 300");
+    run(at, "train free -o e.json --trees rounds=2,depth=2");
+    run(at, "export e.json -o trees.palpate");
+    let line = "0 0 0 0 0 -1 1 0 0 1 2 3\n";
+    std::fs::write(at.join("located.txt"), line).unwrap();
+    std::fs::write(at.join("plain.txt"), "0 0 0\n").unwrap();
+    std::fs::write(at.join("deep.txt"), "0 0 900 0 0 -1 1 0 0 1 2 3\n").unwrap();
+    for (words, code, expected) in [
+        ("train data -o x.palpate --trees depth=3", 2, "--trees is given. Use it with touches without a position"),
+        ("train data -o x.palpate --preset paper", 2, "--preset is given"),
+        ("train data -o x.palpate --maps range=500mm", 2, "--maps is range=500. Use a number of millimeters"),
+        ("train data -o x.palpate --real debounce=2ms", 1, "a simulated table has other noise"),
+        ("train free -o x.palpate --maps cell=2mm", 2, "--maps is given. Use it with touches that have a position"),
+        ("train free -o x.palpate --real drift=1mm/1deg", 2, "--real is drift"),
+        ("recognize maps.palpate plain.txt", 1, "plain.txt:1: the touch has no position. A model of maps needs twelve"),
+        ("recognize maps.palpate deep.txt", 1, "below the table. Give times in seconds"),
+        ("recognize maps.palpate located.txt --active", 2, "--active is given"),
+        ("recognize trees.palpate located.txt", 1, "located.txt:1: touches with a position"),
+        ("recognize trees.palpate plain.txt --next", 2, "--next is given. Use it with a model of maps"),
+        ("evaluate maps.palpate data", 1, "maps.palpate: a model of maps, not of trees"),
+        ("evaluate trees.palpate data", 1, "data: touches with a position"),
+        ("calibrate trees.palpate data -o x.palpate", 1, "data: touches with a position"),
+        ("calibrate maps.palpate data -o x.palpate", 1, "maps.palpate: a model of maps"),
+        ("calibrate trees.palpate --objects meshes -o x.palpate", 1, "trees.palpate: a model of trees"),
+        (
+            "calibrate trees.palpate free -o x.palpate --true-size mm",
+            2,
+            "--objects is not given. Use it with --true-size",
+        ),
+        ("calibrate maps.palpate --objects meshes/brick.obj --true-size mm -o x.palpate", 1, "slab is not among"),
+        ("inspect maps.palpate --chip m4f", 2, "--chip is"),
+        ("verify maps.palpate data", 1, "maps"),
+    ] {
+        refused(at, words, code, expected);
+    }
+    let output =
+        command("calibrate maps.palpate data --objects meshes -o x.palpate".split(' ')).current_dir(at).output();
+    assert_eq!(output.unwrap().status.code(), Some(2));
+}
