@@ -1,5 +1,5 @@
 #!/bin/sh
-# Tables of docs/measurements/located.md and docs/guide/locate.md: located.sh [PART...]
+# Recognition of objects on a table with their place, measured: located.sh [PART...]
 #
 #   aims      the aims: approaches, wrong names, places, cells of 1 mm and 2 mm, noise of several kinds, aims at random
 #   parts     what each part of the likelihood brings: it is left out

@@ -143,11 +143,11 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 ///
 /// `touches` full touches of each object are kept, or with `approaches` that many approaches whether fingers touch or not;
 /// `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a table in each of their placements, and
-/// approaches come within that many degrees of straight down. `position` keeps where the hand was, too, of all approaches straight
-/// down to objects of true size on a table; `within` is how far from an object's middle they aim at most. The same `seed` gives the same touches on any number of `threads`, and
-/// the same as the program's. `shard` is "K/N" for a part. With `instances` a directory inside a directory is one object.
-/// With `out` the touches are written there, as "text" or "parquet", as `palpate capture` does: `resume`, `add` and `force`
-/// are its options.
+/// approaches come within that many degrees of straight down. `position` keeps where the hand was, too, of all approaches
+/// straight down to objects of true size on a table; `within` is how far from an object's middle they aim at most. The same
+/// `seed` gives the same touches on any number of `threads`, and the same as the program's. `shard` is "K/N" for a part. With
+/// `instances` a directory inside a directory is one object. With `out` the touches are written there, as "text" or "parquet",
+/// as `palpate capture` does: `resume`, `add` and `force` are its options.
 ///
 /// `progress` is called with a stage, the steps done and their number. Ctrl-C stops the call.
 ///

@@ -196,10 +196,10 @@ impl Maps {
     /// Finds the loosest threshold at which at most a share of `error_rate` of the names is wrong, with a probability of
     /// `confidence`, on sequences of approaches to these meshes on a simulated table.
     ///
-    /// `aimed` says how approaches are aimed, and so of which the promise is: "chosen" ones, as by `Locator.next`, or "random" ones
-    /// about the place believed in. `real` is what the simulated hand and table add. `until` goes on until the place is as sure, such as
-    /// (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing is named before the
-    /// eighth approach then.
+    /// `aimed` says how approaches are aimed, and so of which the promise is: "chosen" ones, as by `Locator.next`, or "random"
+    /// ones about the place believed in. `real` is what the simulated hand and table add. `until` goes on until the place is as
+    /// sure, such as (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing
+    /// is named before the eighth approach then.
     #[pyo3(signature = (meshes, *, millimeters=None, error_rate=0.01, confidence=0.95, sequences=1000, max_touches=25,
         aimed="chosen", real=None, pose=10, until=None, unknown=false, seed=1, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]

@@ -18,7 +18,7 @@ UNIT = 10.0  # millimeters
 
 @pytest.fixture(scope="module")
 def maps() -> palpate.Maps:
-    return palpate.Maps.of_meshes(OBJECTS, probe=PROBE, millimeters=UNIT, approaches=40_000)
+    return palpate.Maps.of_meshes(OBJECTS, probe=PROBE, millimeters=UNIT, approaches=20_000)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def follow(locator: palpate.Locator, data: palpate.DataSet, rows: npt.NDArray[np
     locator.reset()
     for row in rows[:30]:
         located = locator.push(*moved(data, int(row), (12.0, -7.0), 40.0))
-        if located.is_placed():
+        if located.decided:
             break
     return located
 
@@ -52,11 +52,10 @@ def test_an_object_is_named_and_located(maps: palpate.Maps, touches: palpate.Dat
         rows = np.flatnonzero((touches.objects == number) & (touches.instances == 0))
         located = follow(locator, touches, rows)
         assert located.object == located.best == name and located.posterior > 0.98, located
-        mode = next(mode for mode in located.modes if mode.yaw is None or abs((mode.yaw - 40 + 180) % 360 - 180) < 15)
-        # To three of the half widths.
-        assert abs(mode.x - 12.0) < 3 * mode.x_within and abs(mode.y + 7.0) < 3 * mode.y_within
-        mode = located.modes[0]
-        assert mode == located.placed
+        mode = located.placed
+        assert mode is not None and mode == located.modes[0]
+        # Where it lies, or where it looks the same so far.
+        assert any(math.hypot(mode.x - 12.0, mode.y + 7.0) < 6.0 for mode in located.modes)
         assert str(located).startswith(f"{name}, {mode.placement}, ")
         assert locator.located == located and locator.touches == located.touches
         assert max(locator.posteriors, key=lambda name: locator.posteriors[name]) == name

@@ -1,5 +1,4 @@
-//! Measures recognition of objects with a place on a simulated table: approaches, wrong names, bytes and time, as
-//! docs/measurements/located.md has them.
+//! Measures recognition of objects with a place on a simulated table: approaches, wrong names, bytes and time.
 //!
 //!     cargo run --release -p palpate-tests --bin located -- [KEY=VALUE ...] [+ KEY=VALUE ...]...
 //!

@@ -6,11 +6,12 @@ from _typeshed import SupportsGetItem
 from numpy import float32, float64, int16
 from numpy.typing import ArrayLike, NDArray
 from os import PathLike
-from palpate._types import Meshes, Probe, Progress, Touch, Verdict
+from palpate._locate import CalibratedMaps, MapsEvaluation
+from palpate._types import Located, Meshes, Probe, Progress, Real, Touch, Verdict
 from pandas import DataFrame
-from typing import SupportsFloat, SupportsIndex, final
+from typing import Any, SupportsFloat, SupportsIndex, final
 
-__all__ = ["DataSet", "Ensemble", "Model", "Recognizer", "Surface", "calibrate", "capture", "checksums", "compile", "evaluate", "evaluate_sequences", "parity", "sources", "train"]
+__all__ = ["DataSet", "Ensemble", "Locator", "Maps", "Model", "Recognizer", "Surface", "calibrate", "capture", "checksums", "compile", "evaluate", "evaluate_sequences", "parity", "sources", "train"]
 
 @final
 class DataSet:
@@ -61,13 +62,14 @@ class DataSet:
         32767), NaN where one is missing: for training with another library. The code is the chip's.
         """
     @staticmethod
-    def from_arrays(times: ArrayLike, objects: ArrayLike, names: SupportsGetItem[int, str], *, direction: ArrayLike | None = None, alignment: ArrayLike | None = None, probe: Probe | None = None, approaches: bool = False, instances: ArrayLike | None = None) -> DataSet:
+    def from_arrays(times: ArrayLike, objects: ArrayLike, names: SupportsGetItem[int, str], *, direction: ArrayLike | None = None, alignment: ArrayLike | None = None, position: ArrayLike | None = None, probe: Probe | None = None, approaches: bool = False, instances: ArrayLike | None = None) -> DataSet:
         """
         A data set of touches from elsewhere.
 
         `times` has three contact times per touch, in seconds on any clock, NaN for a finger that did not touch; they are
         rounded to microseconds, and the earliest becomes 0. `objects` says which of the `names` each touch is of.
-        `direction` and `alignment` are unit vectors. Without a `probe` nothing is known about it. `instances` are numbers
+        `direction` and `alignment` are unit vectors, `position` where the hand was at the first contact, on a table, in
+        millimeters (the `probe` is in millimeters then). Without a `probe` nothing is known about it. `instances` are numbers
         that say which mesh, or recording, of its object each touch is of, where objects have several: a sequence is of one.
         """
     @property
@@ -96,6 +98,11 @@ class DataSet:
         The object of each touch, as its position in the names.
         """
     @property
+    def position(self, /) -> NDArray[float64] | None:
+        """
+        The position of the hand at each touch, in millimeters; `None` if no touch has one.
+        """
+    @property
     def probe(self, /) -> Probe | None:
         """
         The probe that made the touches, if known.
@@ -118,7 +125,7 @@ class DataSet:
         """
     def to_pandas(self, /) -> DataFrame:
         """
-        The touches as a table: object (a category), t1, t2 and t3, and, if known, direction and alignment.
+        The touches as a table: object (a category), t1, t2 and t3, and, if known, direction, alignment and position.
         The columns are those of the arrays, without copies. Needs pandas.
         """
     def to_parquet(self, /, directory: str | PathLike[str]) -> None:
@@ -212,6 +219,164 @@ class Ensemble:
     def trees(self, /) -> int:
         """
         The number of trees.
+        """
+
+@final
+class Locator:
+    """
+    Recognizes what lies on a table, and where, from touches of a hand that comes straight down and knows where it is; by the code
+    that runs on the chip.
+
+    >>> import palpate
+    >>> probe = palpate.Probe(radius=1.5, spacing=15, speed=100, tilt=0, stroke=20)
+    >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10, approaches=10_000)
+    >>> locator = palpate.Locator(maps)
+    >>> x, y, roll = locator.next()
+    >>> located = locator.push_heights((None, 20.0, 17.0), x, y, roll, lowest=0.0)
+    >>> located.state, located.touches
+    ('undecided', 1)
+    """
+    def __new__(cls, /, maps: Maps, *, error_rate: SupportsFloat | SupportsIndex | None = None, max_touches: SupportsIndex | None = None, pose: SupportsIndex = 10, within: SupportsFloat | SupportsIndex | None = None, seed: SupportsIndex = 1) -> Locator:
+        """
+        It stops when the maps say so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`. `pose` is how much
+        where the object lies counts in the choice of approaches, in 64ths, `within` how far from the table's origin the middle
+        finger may go in x and y, in millimeters (twice the maps' range), `seed` that of the choice.
+        """
+    @property
+    def located(self, /) -> Located:
+        """
+        The verdict after the last touch.
+        """
+    def next(self, /) -> tuple[float, float, float]:
+        """
+        Where to touch next: x and y of the middle finger in millimeters, and the roll of the row of fingers in degrees from the x
+        axis. The same until another touch is taken in.
+        """
+    @property
+    def posteriors(self, /) -> dict[str, float]:
+        """
+        The posterior of each object so far.
+        """
+    def push(self, /, times: Touch, position: Touch, alignment: ArrayLike) -> Located:
+        """
+        Takes in a touch: three contact times in seconds on any clock, `None` or NaN for a finger that touched nothing, neither
+        object nor table; `position`, x, y and z in millimeters of the middle fingertip's lowest point at the first contact (or of
+        the approach where there was none), 0 being the table; and `alignment`, the direction from the first finger to the third,
+        a unit vector or degrees from the x axis, such as the roll that `next` gave.
+        """
+    def push_heights(self, /, heights: Touch, x: SupportsFloat | SupportsIndex, y: SupportsFloat | SupportsIndex, alignment: ArrayLike, *, lowest: SupportsFloat | SupportsIndex = 0.0) -> Located:
+        """
+        Takes in the heights above the table that three fingertips met, in millimeters, `None` or NaN for a finger that met nothing.
+        `x` and `y` are the middle finger's, `alignment` is as for `push`, and `lowest` is the height down to which the hand went,
+        0 or less where it would have met the table.
+        """
+    def reset(self, /, weights: SupportsGetItem[int, SupportsIndex] | None = None) -> None:
+        """
+        Forgets all touches, for the next object. `weights` say how often each object lies there, in any unit.
+        """
+    @property
+    def touches(self, /) -> int:
+        """
+        The number of touches taken in since the last `reset`.
+        """
+
+@final
+class Maps:
+    """
+    Height maps of objects as they lie on a table: the model of a `Locator`.
+
+    >>> import palpate
+    >>> probe = palpate.Probe(radius=1.5, spacing=15, speed=100, tilt=0, stroke=20)
+    >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10, approaches=10_000)
+    >>> maps.objects
+    ['bowl', 'mouse']
+    >>> maps.placements[0]
+    ('bowl', '+z')
+    >>> palpate.Maps(maps.to_bytes()).size == maps.size
+    True
+    """
+    def __getnewargs__(self, /) -> tuple[bytes]:
+        """
+        The arguments that a pickle holds.
+        """
+    def __new__(cls, /, content: SupportsGetItem[int, SupportsIndex]) -> Maps:
+        """
+        Maps in memory; `content` is checked.
+        """
+    def __repr__(self, /) -> str: ...
+    def calibrate(self, /, meshes: Meshes, *, millimeters: SupportsFloat | SupportsIndex | None = None, error_rate: SupportsFloat | SupportsIndex = 0.01, confidence: SupportsFloat | SupportsIndex = 0.95, sequences: SupportsIndex = 1000, max_touches: SupportsIndex = 25, aimed: str = "chosen", real: Real | None = None, pose: SupportsIndex = 10, until: tuple[SupportsFloat | SupportsIndex, SupportsFloat | SupportsIndex] | None = None, unknown: bool = False, seed: SupportsIndex = 1, progress: Progress | None = None) -> CalibratedMaps:
+        """
+        Finds the loosest threshold at which at most a share of `error_rate` of the names is wrong, with a probability of
+        `confidence`, on sequences of approaches to these meshes on a simulated table.
+
+        `aimed` says how approaches are aimed, and so of which the promise is: "chosen" ones, as by `Locator.next`, or "random"
+        ones about the place believed in. `real` is what the simulated hand and table add. `until` goes on until the place is as
+        sure, such as (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing
+        is named before the eighth approach then.
+        """
+    def evaluate(self, /, meshes: Meshes, *, millimeters: SupportsFloat | SupportsIndex | None = None, sequences: SupportsIndex = 1000, max_touches: SupportsIndex = 25, aimed: str = "chosen", real: Real | None = None, pose: SupportsIndex = 10, until: tuple[SupportsFloat | SupportsIndex, SupportsFloat | SupportsIndex] | None = None, seed: SupportsIndex = 2, progress: Progress | None = None) -> MapsEvaluation:
+        """
+        Plays sequences of approaches to these meshes on a simulated table, other ones than those of `calibrate` if the seed is
+        another, to the maps' own threshold. The arguments are as for `calibrate`.
+        """
+    @staticmethod
+    def learn(data: DataSet, *, real: Real | None = None, cell: SupportsFloat | SupportsIndex = 1.0, range: SupportsFloat | SupportsIndex = 30.0, error_rate: SupportsFloat | SupportsIndex = 0.01, max_touches: SupportsIndex = 25) -> Maps:
+        """
+        Learns maps from touches with positions, simulated (`capture` with `position`) or recorded.
+
+        `real` is what is known of hand and table, `cell` the side of a map's cells (1 or 2 mm), `range` half of the side of the
+        square about the table's origin in which objects are looked for, in millimeters.
+        """
+    @staticmethod
+    def load(path: str | PathLike[str]) -> Maps:
+        """
+        Reads maps that `save` or the program wrote.
+        """
+    @property
+    def objects(self, /) -> list[str]:
+        """
+        The objects' names.
+        """
+    @staticmethod
+    def of_meshes(meshes: Meshes, *, probe: Probe, millimeters: SupportsFloat | SupportsIndex | None = None, approaches: SupportsIndex = 200000, real: Real | None = None, cell: SupportsFloat | SupportsIndex = 1.0, range: SupportsFloat | SupportsIndex = 30.0, error_rate: SupportsFloat | SupportsIndex = 0.01, max_touches: SupportsIndex = 25, seed: SupportsIndex = 1, progress: Progress | None = None) -> Maps:
+        """
+        Maps of meshes, without a data set on the disk: each placement is touched in a simulation, then `learn` does the rest.
+
+        `meshes` are as for `capture`, at their true size: `millimeters` is the length of a unit of those that state none. The
+        `probe` is in millimeters.
+        """
+    @property
+    def placements(self, /) -> list[tuple[str, str]]:
+        """
+        The placements, each with its object's name first. Equal ones of an object are one.
+        """
+    @property
+    def probe(self, /) -> Probe:
+        """
+        The hand that they were learned with, in millimeters.
+        """
+    @property
+    def promise(self, /) -> Any | None:
+        """
+        The promise that a calibration gave: its rate, of which aims it is, and what it rests on; `None` without one.
+        """
+    @property
+    def range(self, /) -> float:
+        """
+        Half of the side of the square about the table's origin in which objects are looked for, in millimeters.
+        """
+    def save(self, /, path: str | PathLike[str]) -> None:
+        """
+        Writes the maps, whole or not at all. A file that Palpate did not write is not replaced.
+        """
+    @property
+    def size(self, /) -> int:
+        """
+        The size of the maps in bytes.
+        """
+    def to_bytes(self, /) -> bytes:
+        """
+        The maps' bytes, for the chip.
         """
 
 @final
@@ -413,7 +578,7 @@ def calibrate(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], 
     Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
     """
 
-def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", cone: SupportsFloat | SupportsIndex | None = None, length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, shard: str = "1/1", out: str | PathLike[str] | None = None, format: str = "text", resume: bool = False, add: bool = False, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
+def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", cone: SupportsFloat | SupportsIndex | None = None, position: bool = False, within: SupportsFloat | SupportsIndex | None = None, length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, shard: str = "1/1", out: str | PathLike[str] | None = None, format: str = "text", resume: bool = False, add: bool = False, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
     """
     Touches objects with a simulated probe.
 
@@ -424,10 +589,11 @@ def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsInd
 
     `touches` full touches of each object are kept, or with `approaches` that many approaches whether fingers touch or not;
     `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a table in each of their placements, and
-    approaches come within that many degrees of straight down. The same `seed` gives the same touches on any number of `threads`, and
-    the same as the program's. `shard` is "K/N" for a part. With `instances` a directory inside a directory is one object.
-    With `out` the touches are written there, as "text" or "parquet", as `palpate capture` does: `resume`, `add` and `force`
-    are its options.
+    approaches come within that many degrees of straight down. `position` keeps where the hand was, too, of all approaches
+    straight down to objects of true size on a table; `within` is how far from an object's middle they aim at most. The same
+    `seed` gives the same touches on any number of `threads`, and the same as the program's. `shard` is "K/N" for a part. With
+    `instances` a directory inside a directory is one object. With `out` the touches are written there, as "text" or "parquet",
+    as `palpate capture` does: `resume`, `add` and `force` are its options.
 
     `progress` is called with a stage, the steps done and their number. Ctrl-C stops the call.
 
