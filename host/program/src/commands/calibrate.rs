@@ -100,18 +100,8 @@ const PROMISE: [&str; 10] = [
 ];
 
 /// The options that approaches on a simulated table have no use for.
-const TOUCHES: [&str; 10] = [
-    "directory",
-    "recorded",
-    "per",
-    "placement_prior",
-    "active",
-    "plan",
-    "strangers",
-    "background",
-    "label",
-    "probe",
-];
+const TOUCHES: [&str; 10] =
+    ["directory", "recorded", "per", "placement_prior", "active", "plan", "strangers", "background", "label", "probe"];
 
 /// Shares of the placements of objects for which a promise holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

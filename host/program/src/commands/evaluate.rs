@@ -86,19 +86,8 @@ pub(crate) struct Arguments {
 }
 
 /// The options that approaches on a simulated table have no use for.
-const TOUCHES: [&str; 11] = [
-    "directory",
-    "label",
-    "unknown",
-    "at",
-    "error_rate",
-    "confusion",
-    "active",
-    "switch",
-    "probe",
-    "only",
-    "prior",
-];
+const TOUCHES: [&str; 11] =
+    ["directory", "label", "unknown", "at", "error_rate", "confusion", "active", "switch", "probe", "only", "prior"];
 
 impl Arguments {
     /// True if there is an option for sequences of touches or rows.

@@ -1,6 +1,5 @@
 use super::Global;
 use super::chips::{core, instructions};
-use palpate::{Error, Result};
 use palpate::chip::inspect::{
     Defaults, Feature, Inspected, Noise, OnChip, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches,
     TrainedOn, inspect, on_chip,
@@ -9,6 +8,7 @@ use palpate::compile::{CompiledModel, Core, Memory};
 use palpate::locate::MapsFile;
 use palpate::output;
 use palpate::wording::{count, counted, rate, scientific};
+use palpate::{Error, Result};
 use palpate_shared::DIRECTIONS;
 use std::fmt::Write as _;
 use std::path::PathBuf;

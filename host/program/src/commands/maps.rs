@@ -206,7 +206,8 @@ mod tests {
 
     #[test]
     fn settings_that_are_given_replace_those_of_the_noise() {
-        let set = |text: &str| text.parse::<MapSettings>().unwrap().over(Settings { lost: 0.05, ..Settings::default() });
+        let set =
+            |text: &str| text.parse::<MapSettings>().unwrap().over(Settings { lost: 0.05, ..Settings::default() });
         let all = set("cell=2mm,range=20mm,noise=1mm,lost=1%,position=500um,drift=1mm/2deg");
         assert_eq!((all.fine, all.range, all.noise, all.lost), (false, 20.0, 1.0, 0.01));
         assert_eq!((all.position, all.drift, all.drift_yaw), (0.5, 1.0, 2.0));

@@ -130,7 +130,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::RawFeatures));
     }
     if arguments.next {
-        let allowed = "it with a model of maps (palpate train on touches with a position); of a plan --active says the next";
+        let allowed =
+            "it with a model of maps (palpate train on touches with a position); of a plan --active says the next";
         return Err(Error::setting("next", "given", allowed));
     }
     if arguments.active && model.plan().is_none() {

@@ -83,11 +83,7 @@ impl From<Approach> for Next {
 /// Recognizes objects by touches with a position.
 pub(super) fn run(file: &MapsFile, arguments: &Arguments, global: &Global) -> Result<()> {
     let maps = file.maps();
-    let of_trees = [
-        ("features", arguments.features),
-        ("active", arguments.active),
-        ("mcap", arguments.mcap.is_some()),
-    ];
+    let of_trees = [("features", arguments.features), ("active", arguments.active), ("mcap", arguments.mcap.is_some())];
     if let Some((option, _)) = of_trees.iter().find(|(_, is_given)| *is_given) {
         let allowed = "it with a model of trees; a model of maps says with --next where to touch next";
         return Err(Error::setting(option, "given", allowed));

@@ -232,7 +232,11 @@ fn inspected_text(inspected: &Inspected<'_>) -> String {
     line("noise", inspected.noise.clone());
     line(
         "stopping",
-        format!("{} nats ahead of all others, at most {} approaches", decimal(inspected.margin, 2), inspected.max_touches),
+        format!(
+            "{} nats ahead of all others, at most {} approaches",
+            decimal(inspected.margin, 2),
+            inspected.max_touches
+        ),
     );
     if let Some(promise) = &inspected.promise {
         line(

@@ -141,9 +141,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         super::refuse_located(recorded, path)?;
     }
     let made = match (dataset.zip(arguments.directory.as_ref()), recorded) {
-        (Some((dataset, directory)), recorded) => {
-            simulated(&arguments, global, directory, dataset, recorded.as_ref())?
-        }
+        (Some((dataset, directory)), recorded) => simulated(&arguments, global, directory, dataset, recorded.as_ref())?,
         (None, recorded) => alone(&arguments, global, recorded.unwrap_or_default())?,
     };
     arguments.teach.check_page(made.taught.as_ref())?;
@@ -224,7 +222,11 @@ fn maps(arguments: &Arguments, dataset: &Dataset, global: &Global) -> Result<()>
         ("trees", arguments.trees.is_some()),
     ];
     if let Some((option, _)) = of_trees.iter().find(|(_, is_given)| *is_given) {
-        return Err(Error::setting(option, "given", "it with touches without a position; of these maps are made (--maps)"));
+        return Err(Error::setting(
+            option,
+            "given",
+            "it with touches without a position; of these maps are made (--maps)",
+        ));
     }
     let file = arguments.probe.read()?;
     arguments.probe.of_dataset(file.as_ref(), dataset)?;

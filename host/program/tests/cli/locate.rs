@@ -47,7 +47,8 @@ fn recognized(at: &Path, words: &str, lines: &str) -> Vec<Value> {
 fn objects_are_located_with_maps_from_a_capture_to_a_verdict() {
     let directory = located();
     let at = directory.path();
-    let trained = json(palpate(at, &["train", "data", "-o", "again.palpate", "--maps", "cell=2mm,range=20mm", "--json"]));
+    let trained =
+        json(palpate(at, &["train", "data", "-o", "again.palpate", "--maps", "cell=2mm,range=20mm", "--json"]));
     let bytes = std::fs::read(at.join("maps.palpate")).unwrap();
     assert_eq!(std::fs::read(at.join("again.palpate")).unwrap(), bytes);
     assert_eq!((trained["objects"].as_u64(), trained["bytes"].as_u64()), (Some(2), Some(bytes.len() as u64)));
@@ -140,13 +141,18 @@ fn maps_and_trees_are_refused_where_the_other_is_needed_with_what_to_do() {
         ("calibrate trees.palpate data -o x.palpate", 1, "data: touches with a position"),
         ("calibrate maps.palpate data -o x.palpate", 1, "maps.palpate: a model of maps"),
         ("calibrate trees.palpate --objects meshes -o x.palpate", 1, "trees.palpate: a model of trees"),
-        ("calibrate trees.palpate free -o x.palpate --true-size mm", 2, "--objects is not given. Use it with --true-size"),
+        (
+            "calibrate trees.palpate free -o x.palpate --true-size mm",
+            2,
+            "--objects is not given. Use it with --true-size",
+        ),
         ("calibrate maps.palpate --objects meshes/brick.obj --true-size mm -o x.palpate", 1, "slab is not among"),
         ("inspect maps.palpate --chip m4f", 2, "--chip is"),
         ("verify maps.palpate data", 1, "maps"),
     ] {
         refused(at, words, code, expected);
     }
-    let output = command("calibrate maps.palpate data --objects meshes -o x.palpate".split(' ')).current_dir(at).output();
+    let output =
+        command("calibrate maps.palpate data --objects meshes -o x.palpate".split(' ')).current_dir(at).output();
     assert_eq!(output.unwrap().status.code(), Some(2));
 }

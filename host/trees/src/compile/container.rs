@@ -3,7 +3,9 @@
 use super::write::count;
 use crate::error::Result;
 use palpate_onboard::Model;
-use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, Header, HeaderBuilder, Section, Tag, checksum, take_section};
+use palpate_shared::format::{
+    CHECKSUM_LENGTH, HEADER_LENGTH, Header, HeaderBuilder, Section, Tag, checksum, take_section,
+};
 
 /// An optional section of a model's file.
 #[derive(Clone, Debug, PartialEq, Eq)]

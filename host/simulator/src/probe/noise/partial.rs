@@ -172,8 +172,7 @@ impl PartialNoise {
                 let example = "a length and an angle such as 1mm/1deg";
                 let parts = value.split_once('/').ok_or(ProbeProblem::BadQuantity { text: value.into(), example });
                 let (moved, turned) = parts.map_err(bad)?;
-                self.drift =
-                    Some([quantity::length(moved).map_err(bad)?, quantity::angle(turned).map_err(bad)?]);
+                self.drift = Some([quantity::length(moved).map_err(bad)?, quantity::angle(turned).map_err(bad)?]);
             }
         }
         // Ranges are those of any noise.
