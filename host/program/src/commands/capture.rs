@@ -58,7 +58,7 @@ pub(crate) struct Arguments {
     /// With the probe's direction and alignment
     #[arg(long)]
     pose: bool,
-    /// With the hand's position, straight down on a table; all approaches, at true size, with the pose
+    /// With the hand's position, in the table's frame; approaches come straight down, and all are kept, at true size
     #[arg(long)]
     position: bool,
     /// With --position: aims at most so far from the object's middle in x and y [default: its box and 5 mm about it]

@@ -89,6 +89,7 @@ const NUMBERS: &[(&str, &str)] = &[
     ("Finger 2", "the number of a finger"),
     ("Finger 3", "the number of a finger"),
     ("half of the sequences within", "a median"),
+    ("half within {} mm", "a median"),
     ("more than one sequence of a hundred", "strangers::USED_UP"),
 ];
 
@@ -168,7 +169,7 @@ const RELATIONS: &[(&str, &str)] = &[
 ];
 
 /// Files of texts that say results; all others hold help, and examples of what to write.
-const OF_RESULTS: [&str; 18] = [
+const OF_RESULTS: [&str; 20] = [
     "figures",
     "sequences",
     "strangers",
@@ -186,6 +187,8 @@ const OF_RESULTS: [&str; 18] = [
     "evaluate",
     "fit",
     "inspect",
+    "maps",
+    "table",
     "tune",
 ];
 
