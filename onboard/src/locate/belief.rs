@@ -196,17 +196,16 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
     }
 
     /// Likelihood of a cell; less than `least` may be of some of the touches alone.
-    fn likely(&mut self, cell: &Cell, least: i32) -> i32 {
+    fn likely(&mut self, cell: &Cell, placement: &Placement, least: i32) -> i32 {
         let seen = self.seen.get(..self.touches).unwrap_or_default();
-        let placement = self.maps.placement(cell.placement);
-        let priors = [cell.level, FINEST].map(|level| self.prior(cell.placement, &placement, level));
-        self.maps.likely(cell, &placement, priors, seen, least, &mut self.looked)
+        let priors = [cell.level, FINEST].map(|level| self.prior(cell.placement, placement, level));
+        self.maps.likely(cell, placement, priors, seen, least, &mut self.looked)
     }
 
     /// Puts a cell into the pool, which has room, or drops it.
-    fn put(&mut self, mut cell: Cell) {
+    fn put(&mut self, mut cell: Cell, placement: &Placement) {
         let least = self.best - CUT;
-        let likely = self.likely(&cell, least);
+        let likely = self.likely(&cell, placement, least);
         cell.likely = i16::try_from(likely).unwrap_or(i16::MIN);
         let has_room = self.count < self.room();
         match self.pool.get_mut(self.count) {
@@ -273,14 +272,15 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         (self.count, self.best, self.looked, self.exhausted) = (0, NOTHING, 0, None);
         self.dropped = [NOTHING; OBJECTS];
         if let Some(before) = before.filter(|cell| self.touches > 1 && self.object_prior(cell.placement) > NOTHING) {
-            self.best = self.likely(&before, NOTHING);
+            self.best = self.likely(&before, &self.maps.placement(before.placement), NOTHING);
         }
         let roots = self.maps.roots;
         for placement in 0..u8::try_from(self.maps.placements()).unwrap_or(u8::MAX) {
             if self.object_prior(placement) == NOTHING {
                 continue;
             }
-            let yaws = if self.maps.placement(placement).is_round { 1 } else { YAWS };
+            let map = self.maps.placement(placement);
+            let yaws = if map.is_round { 1 } else { YAWS };
             for root in 0..u32::from(yaws) * u32::from(roots) * u32::from(roots) {
                 if self.looked > self.effort.lookups {
                     self.exhausted = Some(Exhausted::Lookups);
@@ -292,7 +292,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
                 let number = |value: u32| u8::try_from(value).unwrap_or(0);
                 let (rest, roots) = (root / u32::from(yaws), u32::from(roots));
                 let (yaw, x, y) = (number(root % u32::from(yaws)), number(rest % roots), number(rest / roots));
-                self.put(Cell { placement, yaw, x, y, level: 0, likely: 0 });
+                self.put(Cell { placement, yaw, x, y, level: 0, likely: 0 }, &map);
             }
         }
         let mut total;
@@ -336,16 +336,12 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         if let Some(slot) = self.pool.get_mut(index) {
             *slot = last;
         }
-        let turns = if self.maps.placement(cell.placement).is_round { 1 } else { 2 };
+        let map = self.maps.placement(cell.placement);
+        let turns = if map.is_round { 1 } else { 2 };
         for part in 0..4 * turns {
             let (yaw, part) = (part % turns, part / turns);
-            self.put(Cell {
-                yaw: turns * cell.yaw + yaw,
-                x: 2 * cell.x + (part & 1),
-                y: 2 * cell.y + (part >> 1),
-                level: cell.level + 1,
-                ..*cell
-            });
+            let (x, y) = (2 * cell.x + (part & 1), 2 * cell.y + (part >> 1));
+            self.put(Cell { yaw: turns * cell.yaw + yaw, x, y, level: cell.level + 1, ..*cell }, &map);
         }
     }
 
