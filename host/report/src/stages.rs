@@ -228,8 +228,8 @@ fn sections(context: &Context, measured: &Measured, summary: &published::Summary
         shown(&measured.noisy, |of| noise::section(context, of))?,
         shown(&measured.limit, |of| limit::section(context, of))?,
         shown(&measured.sequences, |of| sequential::section(context, of))?,
-        shown(&measured.calibration, |of| calibration::section(of))?,
-        shown(&measured.promises, |of| promises::section(of))?,
+        shown(&measured.calibration, calibration::section)?,
+        shown(&measured.promises, promises::section)?,
         shown(&measured.members, |of| cost::section(of))?,
         shown(&measured.recorded, |of| recorded::section(context, of))?,
     ];
