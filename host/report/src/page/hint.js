@@ -13,7 +13,9 @@
       scroll.previousElementSibling.remove();
     }
   };
-  const watch = new ResizeObserver(() => document.querySelectorAll(".scroll").forEach(hint));
+  // In the next frame: what a hint moves would be seen as a change of size within this one.
+  const all = () => requestAnimationFrame(() => document.querySelectorAll(".scroll").forEach(hint));
+  const watch = new ResizeObserver(all);
   // Whichever of the two changes its size.
   document.querySelectorAll(".scroll, .scroll > table").forEach((part) => watch.observe(part));
 })();
