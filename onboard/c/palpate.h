@@ -810,8 +810,8 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
     }
     rest = 0xffffffffu;
     end = bytes + length;
-    /* Counted, since compilers that know the symbol at a model's end take a pointer before it for one outside an array. */
-    for (p = bytes, length -= 4; length != 0; p++, length--) {
+    /* A compiler that knows the symbol at a model's end takes a pointer before it for one outside of an array. */
+    for (p = bytes; p + 4 != end; p++) {
         rest = palpate_crc_(rest, PALPATE_BYTE(p));
     }
     if (~rest != palpate_u32_(p)) {

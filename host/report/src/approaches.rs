@@ -7,7 +7,7 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::capture;
 use palpate::compile;
 use palpate::ensemble::{Ensemble, train};
@@ -203,18 +203,18 @@ pub(super) fn section(context: &Context, by_approach: &ByApproach) -> Result<Sec
         decimal(full, 1),
         decimal(contacts, 1)
     ));
-    section.figure(figure(by_approach)?);
-    section.figure(ways_table(context, by_approach)?);
-    section.figure(objects_table(context, by_approach));
+    section.figure(figure(context, by_approach)?);
+    section.table(ways_table(context, by_approach)?);
+    section.table(objects_table(context, by_approach));
     section.text(format!(
         "A miss is evidence only if the robot aims as the simulation does. The next table tests that assumption with a \
          robot that aims better and avoids {} of the misses. {}",
         wording::rate(AVOIDED),
         aimed_better(by_approach)
     ));
-    section.figure(misses_table(by_approach));
+    section.table(misses_table(context, by_approach));
     match &by_approach.sizes {
-        Some(sizes) => section.figure(sizes_table(context, sizes, by_approach.probes)),
+        Some(sizes) => section.table(sizes_table(context, sizes, by_approach.probes)),
         None => section.text(
             "How objects compare at their true sizes was not measured: the unit of these meshes is not known. \
              `--true-size mm --probe probe.toml` states it.",
@@ -223,7 +223,7 @@ pub(super) fn section(context: &Context, by_approach: &ByApproach) -> Result<Sec
     Ok(section)
 }
 
-fn figure(by_approach: &ByApproach) -> Result<Figure> {
+fn figure(context: &Context, by_approach: &ByApproach) -> Result<Figure> {
     let most = *AT.last().unwrap_or(&1) as f64;
     let mut chart =
         Chart::new("approaches", Axis::logarithmic(AT[0] as f64, most), "accuracy", Axis::share()).sized(660, 420);
@@ -242,9 +242,14 @@ fn figure(by_approach: &ByApproach) -> Result<Figure> {
             data.push([name.into(), Cell::count(at), way.at(at)]);
         }
     }
-    Ok(Figure::new("approaches-accuracy", "Accuracy against approaches", data)
-        .panels([chart.svg()?])
-        .caption("Before the first usable contact, a group counts as not recognized."))
+    Ok(Figure {
+        id: "approaches-accuracy".into(),
+        title: "Accuracy against approaches".into(),
+        caption: "Before the first usable contact, a group counts as not recognized.".into(),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
 fn columns(first: &str) -> Vec<String> {
@@ -259,7 +264,7 @@ fn row(name: &str, way: &Way) -> Vec<Cell> {
     std::iter::once(name.into()).chain(TABLE_AT.iter().map(|&at| way.at(at))).chain(way.stopping()).collect()
 }
 
-fn ways_table(context: &Context, by_approach: &ByApproach) -> Result<Figure> {
+fn ways_table(context: &Context, by_approach: &ByApproach) -> Result<Table> {
     let mut columns = columns("way");
     columns.extend(["share of approaches used".into(), "bytes".into()]);
     let mut data = Records::new(columns);
@@ -275,12 +280,18 @@ fn ways_table(context: &Context, by_approach: &ByApproach) -> Result<Figure> {
     let taken = taken.map(|(train, (all, &approaches))| {
         (approaches as f64 * train.len() as f64 / all.len().max(1) as f64).round() as u64
     });
-    Ok(Figure::new("approaches-ways", "Waiting for full touches, and using every contact", data).caption(format!(
-        "The first two were trained on {} full touches of each object. {} Each gives up after its model's limit of \
-         touches.",
-        wording::count(train.objects.first().map_or(0, |object| object.len())),
-        training_cost(&context.names(), &taken.collect::<Vec<_>>(), context.settings.approaches)
-    )))
+    Ok(Table {
+        id: "approaches-ways".into(),
+        title: "Waiting for full touches, and using every contact".into(),
+        caption: format!(
+            "The first two were trained on {} full touches of each object. {} Each gives up after its model's limit of \
+             touches.",
+            wording::count(train.objects.first().map_or(0, |object| object.len())),
+            training_cost(&context.names(), &taken.collect::<Vec<_>>(), context.settings.approaches)
+        ),
+        command: context.settings.command.clone(),
+        data,
+    })
 }
 
 /// The share of approaches that are full touches, from the object with the fewest to the one with the most.
@@ -332,7 +343,7 @@ fn aimed_better(by_approach: &ByApproach) -> String {
     )
 }
 
-fn objects_table(context: &Context, by_approach: &ByApproach) -> Figure {
+fn objects_table(context: &Context, by_approach: &ByApproach) -> Table {
     let patterns = ContactPattern::ALL.iter().map(|pattern| pattern.name().to_owned());
     let more = ["approaches, full touches", "approaches, every contact", "approaches, misses too"];
     let columns = std::iter::once("object".to_owned()).chain(patterns).chain(more.map(String::from));
@@ -344,24 +355,36 @@ fn objects_table(context: &Context, by_approach: &ByApproach) -> Figure {
         });
         data.push(std::iter::once(name.into()).chain(shares.map(|share| Cell::Percent(share, 1))).chain(approaches));
     }
-    Figure::new("approaches-objects", "Contact patterns, and approaches to a verdict", data).caption(
-        "The share of each contact pattern among an object's approaches, and the number of approaches for each way.",
-    )
+    Table {
+        id: "approaches-objects".into(),
+        title: "Contact patterns, and approaches to a verdict".into(),
+        caption:
+            "The share of each contact pattern among an object's approaches, and the number of approaches for each way."
+                .into(),
+        command: context.settings.command.clone(),
+        data,
+    }
 }
 
-fn misses_table(by_approach: &ByApproach) -> Figure {
+fn misses_table(context: &Context, by_approach: &ByApproach) -> Table {
     let mut data = Records::new(columns("way and aim"));
     let better = format!("{} of misses avoided", wording::rate(AVOIDED));
     for (way, aimed) in [CONTACTS, ALL].into_iter().zip(&by_approach.aimed) {
         data.push(row(&format!("{}, as simulated", WAYS[way]), &by_approach.ways[way]));
         data.push(row(&format!("{}, {better}", WAYS[way]), aimed));
     }
-    Figure::new("approaches-misses", "Misses as evidence", data).caption(
-        "The same models, tested on approaches of a robot that aims as in training and of one that aims better.",
-    )
+    Table {
+        id: "approaches-misses".into(),
+        title: "Misses as evidence".into(),
+        caption:
+            "The same models, tested on approaches of a robot that aims as in training and of one that aims better."
+                .into(),
+        command: context.settings.command.clone(),
+        data,
+    }
 }
 
-fn sizes_table(context: &Context, sizes: &[Way; 2], probes: Option<[Probe; 2]>) -> Figure {
+fn sizes_table(context: &Context, sizes: &[Way; 2], probes: Option<[Probe; 2]>) -> Table {
     let mut data = Records::new(columns("size of the objects"));
     let scaled = match context.settings.capture.unit {
         Length::Tenth => context.settings.capture.length,
@@ -370,8 +393,13 @@ fn sizes_table(context: &Context, sizes: &[Way; 2], probes: Option<[Probe; 2]>) 
     for (name, way) in [format!("scaled to {scaled} units"), "true size".to_owned()].iter().zip(sizes) {
         data.push(row(name, way));
     }
-    Figure::new("approaches-sizes", "Scaled to one size, and at true size", data)
-        .caption(sizes_caption(&probes.unwrap_or_default()))
+    Table {
+        id: "approaches-sizes".into(),
+        title: "Scaled to one size, and at true size".into(),
+        caption: sizes_caption(&probes.unwrap_or_default()),
+        command: context.settings.command.clone(),
+        data,
+    }
 }
 
 /// The probes that touched objects of one size, and of their true sizes.

@@ -7,7 +7,7 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke, Svg};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::calibrate;
 use palpate::compile::{self, Restated, restate};
 use palpate::error::Result;
@@ -124,7 +124,7 @@ fn reliability(title: &str, bins: &[ReliabilityBin], color: RGBColor) -> Result<
 }
 
 /// The figure and the table.
-pub(super) fn section(calibration: &Calibration) -> Result<Section> {
+pub(super) fn section(context: &Context, calibration: &Calibration) -> Result<Section> {
     let mut section = Section::new("calibration", "Calibration");
     section.text(format!(
         "Calibration: of the objects with a posterior of 90 %, nine in ten should be right. {} groups per object from \
@@ -150,11 +150,18 @@ pub(super) fn section(calibration: &Calibration) -> Result<Section> {
             }
         }
     }
-    section.figure(Figure::new("reliability", "Reliability diagrams", data).panels(panels).caption(
-        "On the dashed line the posterior equals the accuracy; above it the model is underconfident, below it \
-         overconfident. Bars are 95 % intervals (Wilson); gray columns show how many of the groups are in \
-         each bin.",
-    ));
+    section.figure(Figure {
+        id: "reliability".into(),
+        title: "Reliability diagrams".into(),
+        caption:
+            "On the dashed line the posterior equals the accuracy; above it the model is underconfident, below it \
+                  overconfident. Bars are 95 % intervals (Wilson); gray columns show how many of the groups are in \
+                  each bin."
+                .into(),
+        command: context.settings.command.clone(),
+        panels,
+        data,
+    });
     let mut data = Records::new(
         std::iter::once("method".to_string())
             .chain(AT.iter().map(|at| format!("after {at} {}", if *at == 1 { "touch" } else { "touches" }))),
@@ -163,10 +170,13 @@ pub(super) fn section(calibration: &Calibration) -> Result<Section> {
         let errors = calibration.error[method].iter().map(|&error| Cell::Percent(error, 2));
         data.push(std::iter::once((*name).into()).chain(errors));
     }
-    section.figure(
-        Figure::new("calibration", "Expected calibration error", data)
-            .caption(format!("The mean distance between posterior and accuracy, over {BINS} bins of equal width.")),
-    );
+    section.table(Table {
+        id: "calibration".into(),
+        title: "Expected calibration error".into(),
+        caption: format!("The mean distance between posterior and accuracy, over {BINS} bins of equal width."),
+        command: context.settings.command.clone(),
+        data,
+    });
     Ok(section)
 }
 

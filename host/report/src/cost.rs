@@ -8,7 +8,7 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::compile::{self, Leaf};
 use palpate::ensemble::train;
 use palpate::ensemble::{Ensemble, OverTouches};
@@ -171,26 +171,33 @@ fn frontier(members: &[Member]) -> Vec<&Member> {
 }
 
 /// The figure and the table.
-pub(super) fn section(members: &[Member]) -> Result<Section> {
+pub(super) fn section(context: &Context, members: &[Member]) -> Result<Section> {
     let mut section = Section::new("cost", "Speed against error");
     section.text(format!(
         "A family of models, trained on the first fold and tested on the large capture. Nanoseconds are of this machine, \
          one thread. {}",
         members.first().map_or_else(String::new, |member| member.instructions.explanation())
     ));
-    section.figure(figure(members, "cost-bytes", "bytes", |member| member.bytes as f64)?);
-    section.figure(figure(members, "cost-time", "nanoseconds per touch, this machine", |m| m.nanoseconds)?);
+    section.figure(figure(context, members, "cost-bytes", "bytes", |member| member.bytes as f64)?);
+    section.figure(figure(context, members, "cost-time", "nanoseconds per touch, this machine", |m| m.nanoseconds)?);
     section.figure(figure(
+        context,
         members,
         "cost-work",
         &format!("instructions per touch, Cortex-M4F ({})", sources(members)[0]),
         |m| m.instructions.m4f.number as f64,
     )?);
-    section.figure(table(members));
+    section.table(table(context, members));
     Ok(section)
 }
 
-fn figure(members: &[Member], id: &str, unit: &str, cost: impl Fn(&Member) -> f64) -> Result<Figure> {
+fn figure(
+    context: &Context,
+    members: &[Member],
+    id: &str,
+    unit: &str,
+    cost: impl Fn(&Member) -> f64,
+) -> Result<Figure> {
     let all = || members.iter().map(&cost);
     let low = members.iter().map(|member| member.at_10).fold(1.0, f64::min);
     let high = members.iter().map(|member| member.at_10).fold(0.0, f64::max);
@@ -242,10 +249,17 @@ fn figure(members: &[Member], id: &str, unit: &str, cost: impl Fn(&Member) -> f6
             Cell::Percent(at.1, 2),
         ]);
     }
-    Ok(Figure::new(id, format!("Accuracy against {unit}"), data).panels([chart.svg()?]).caption(
-        "Dashed: the frontier, the best accuracy up to each cost. Points are named where there is room; the table \
-         below has all of them.",
-    ))
+    Ok(Figure {
+        id: id.into(),
+        title: format!("Accuracy against {unit}"),
+        caption:
+            "Dashed: the frontier, the best accuracy up to each cost. Points are named where there is room; the table \
+                  below has all of them."
+                .into(),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
 /// Sources of the instructions on a Cortex-M4F and on a Cortex-M0+.
@@ -255,7 +269,7 @@ fn sources(members: &[Member]) -> [&'static str; 2] {
     })
 }
 
-fn table(members: &[Member]) -> Figure {
+fn table(context: &Context, members: &[Member]) -> Table {
     let [m4f, m0_plus] = sources(members);
     let chips = [("M4F", m4f), ("M0+", m0_plus)].map(|(chip, source)| format!("instructions, {chip} ({source})"));
     let mut data = Records::new([
@@ -292,12 +306,18 @@ fn table(members: &[Member]) -> Figure {
             member.to_1_percent.map_or(Cell::Missing, Cell::count),
         ]);
     }
-    Figure::new("cost", "The family", data).caption(format!(
-        "The frontier is of bytes and accuracy after ten touches{}.",
-        best.first().map_or_else(String::new, |member| {
-            format!("; the smallest model on it has {} bytes", count(member.bytes))
-        })
-    ))
+    Table {
+        id: "cost".into(),
+        title: "The family".into(),
+        caption: format!(
+            "The frontier is of bytes and accuracy after ten touches{}.",
+            best.first().map_or_else(String::new, |member| {
+                format!("; the smallest model on it has {} bytes", count(member.bytes))
+            })
+        ),
+        command: context.settings.command.clone(),
+        data,
+    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
@@ -122,7 +122,7 @@ pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
     section.figure(overall(context, folds)?);
     section.figure(objects(context, folds)?);
     section.figure(confusions(context, folds)?);
-    section.figure(recall(context, folds));
+    section.table(recall(context, folds));
     Ok(section)
 }
 
@@ -155,14 +155,19 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
         chart.marks.push(Mark::Spread { points: spread, color });
         chart.series(name, color, shape, &points);
     }
-    Ok(Figure::new("accuracy", "Groups recognized, mean over folds (the paper's figure 8a)", data)
-        .panels([chart.svg()?])
-        .caption(format!(
+    Ok(Figure {
+        id: "accuracy".into(),
+        title: "Groups recognized, mean over folds (the paper's figure 8a)".into(),
+        caption: format!(
             "Bars are one standard deviation over folds, of {} groups per object. The CSV also has the same over {} \
              groups per object. A dash (–) means that an object's test touches make fewer than {LEAST_GROUPS} distinct \
              groups.",
             context.settings.groups, context.settings.many_groups
-        )))
+        ),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
 fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
@@ -192,9 +197,14 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
         }
         panels.push(chart.svg()?);
     }
-    Ok(Figure::new("accuracy-objects", "The same for each object (figure 8b)", data)
-        .panels(panels)
-        .caption("Mean over folds; the CSV has the standard deviations."))
+    Ok(Figure {
+        id: "accuracy-objects".into(),
+        title: "The same for each object (figure 8b)".into(),
+        caption: "Mean over folds; the CSV has the standard deviations.".into(),
+        command: context.settings.command.clone(),
+        panels,
+        data,
+    })
 }
 
 fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
@@ -208,15 +218,22 @@ fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
         panels.push(confusion::drawn(title, &names, &shares, color)?);
         confusion::push_matrix(&mut data, method, &names, &shares);
     }
-    Ok(Figure::new("confusion", "Confusion matrix after ten touches (figure 9)", data).panels(panels).caption(format!(
+    Ok(Figure {
+        id: "confusion".into(),
+        title: "Confusion matrix after ten touches (figure 9)".into(),
+        caption: format!(
             "Percentage of the groups of an object (row) that were recognized as another (column), all folds together, {} \
              groups per object and fold, the same as those of the accuracy over many groups. Shares below half a percent are \
              blank.",
             count(context.settings.many_groups)
-        )))
+        ),
+        command: context.settings.command.clone(),
+        panels,
+        data,
+    })
 }
 
-fn recall(context: &Context, folds: &[Fold]) -> Figure {
+fn recall(context: &Context, folds: &[Fold]) -> Table {
     let mut data = Records::new([
         "object",
         "recall, paper's method",
@@ -238,8 +255,14 @@ fn recall(context: &Context, folds: &[Fold]) -> Figure {
         mean(&|k| ours[k].0),
         mean(&|k| ours[k].1),
     ]);
-    Figure::new("recall", "Recall and precision after ten touches", data).caption(
-        "From the matrices above. With equally many groups of each object, mean recall is the accuracy. Click a \
-         heading to sort.",
-    )
+    Table {
+        id: "recall".into(),
+        title: "Recall and precision after ten touches".into(),
+        caption:
+            "From the matrices above. With equally many groups of each object, mean recall is the accuracy. Click a \
+                  heading to sort."
+                .into(),
+        command: context.settings.command.clone(),
+        data,
+    }
 }

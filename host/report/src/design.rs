@@ -4,7 +4,7 @@ use crate::page::axis::{Axis, number};
 use crate::page::chart::{Chart, Mark, Shape, Stroke, Svg};
 use crate::page::color;
 use crate::page::document::{Figure, Page, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::probe::approach::Aim;
 use palpate::tune::probe::{Design, Trial};
@@ -17,13 +17,13 @@ use palpate_shared::format::Length;
 /// If a chart cannot be drawn.
 pub fn page(design: &Design, command: &str) -> Result<Page> {
     let mut result = Section::new("result", "The result");
-    result.text(assumed(design)).figure(compared(design)).figure(by_aim(design));
+    result.text(assumed(design)).table(compared(design, command)).table(by_aim(design, command));
     let mut trade = Section::new("spacing", "Cost of another spacing");
-    trade.figure(by_spacing(design)?);
+    trade.figure(by_spacing(design, command)?);
     let mut strokes = Section::new("stroke", "Cost of a shorter stroke");
-    strokes.figure(by_stroke(design)?);
+    strokes.figure(by_stroke(design, command)?);
     let mut tried = Section::new("tried", "What was tried");
-    tried.figure(rounds(design));
+    tried.table(rounds(design, command));
     Ok(Page {
         title: "The best probe to build".into(),
         summary: format!(
@@ -39,7 +39,6 @@ pub fn page(design: &Design, command: &str) -> Result<Page> {
             }
         ),
         sections: vec![result, trade, strokes, tried],
-        command: command.into(),
         facts: vec![("Command".into(), command.into()), ("palpate".into(), env!("CARGO_PKG_VERSION").into())],
         files: false,
     })
@@ -142,27 +141,39 @@ fn row(name: &str, trial: &Trial) -> Vec<Cell> {
     row
 }
 
-fn compared(design: &Design) -> Figure {
+fn compared(design: &Design, command: &str) -> Table {
     let mut data = Records::new(std::iter::once("probe").chain(COLUMNS.into_iter().skip(1)));
     data.push(row("best", &design.best));
     data.push(row("published", &design.published));
-    Figure::new("best", "The best probe and the published one", data).caption(
-        "Mean number of approaches to a verdict, with its standard error over the drawn sequences; the shares of \
-         wrong verdicts and of sequences without one; the share of approaches with each contact pattern.",
-    )
+    Table {
+        id: "best".into(),
+        title: "The best probe and the published one".into(),
+        caption:
+            "Mean number of approaches to a verdict, with its standard error over the drawn sequences; the shares of \
+                  wrong verdicts and of sequences without one; the share of approaches with each contact pattern."
+                .into(),
+        command: command.into(),
+        data,
+    }
 }
 
 /// The best of the first round for each aim: what it is worth to know where the object's middle is.
-fn by_aim(design: &Design) -> Figure {
+fn by_aim(design: &Design, command: &str) -> Table {
     let mut data = Records::new(COLUMNS);
     let round = design.rounds.first().map_or(&[][..], Vec::as_slice);
     let of = |aim: Aim| round.iter().find(|trial| trial.aim == aim);
     Aim::ALL.into_iter().filter_map(of).for_each(|trial| data.push(row("coarse", trial)));
-    Figure::new("aims", "Benefit of aiming", data).caption(format!(
+    Table {
+        id: "aims".into(),
+        title: "Benefit of aiming".into(),
+        caption: format!(
             "The best probe of the coarse round for each aim that was tried: {}. A robot that cannot aim well should search \
              with --search aim=box.",
             aims(round)
-        ))
+        ),
+        command: command.into(),
+        data,
+    }
 }
 
 /// The aims that were tried, in words.
@@ -176,17 +187,23 @@ fn aims(round: &[Trial]) -> String {
     tried.iter().map(about).collect::<Vec<_>>().join(", ")
 }
 
-fn rounds(design: &Design) -> Figure {
+fn rounds(design: &Design, command: &str) -> Table {
     let mut data = Records::new(COLUMNS);
     let all = design.rounds.iter().chain([&design.by_spacing]);
     for (name, round) in ROUNDS.into_iter().zip(all) {
         round.iter().for_each(|trial| data.push(row(name, trial)));
     }
-    Figure::new("trials", "All probes tried", data).caption(format!(
-        "Approaches to each object that a model was trained on: {}. Fewer approaches make weaker models, so compare \
-         within a round only.",
-        trained_on(design)
-    ))
+    Table {
+        id: "trials".into(),
+        title: "All probes tried".into(),
+        caption: format!(
+            "Approaches to each object that a model was trained on: {}. Fewer approaches make weaker models, so compare \
+             within a round only.",
+            trained_on(design)
+        ),
+        command: command.into(),
+        data,
+    }
 }
 
 /// The rounds, and the approaches that a model of each was trained on.
@@ -245,7 +262,7 @@ fn far(design: &Design) -> f64 {
     2.0 * design.by_stroke.iter().filter_map(|trial| trial.probe.stroke).fold(0.5, f64::max)
 }
 
-fn by_stroke(design: &Design) -> Result<Figure> {
+fn by_stroke(design: &Design, command: &str) -> Result<Figure> {
     let line = &design.by_stroke;
     let far = far(design);
     let place = |trial: &Trial| trial.probe.stroke.unwrap_or(far);
@@ -259,13 +276,20 @@ fn by_stroke(design: &Design) -> Result<Figure> {
         None => format!(" A hand that goes on past the object is drawn at {}.", number(far, 1)),
         Some(_) => String::new(),
     };
-    Ok(Figure::new("strokes", "Approaches against stroke, for each object", data).panels([panel]).caption(format!(
+    Ok(Figure {
+        id: "strokes".into(),
+        title: "Approaches against stroke, for each object".into(),
+        caption: format!(
             "The best probe with hands that stop earlier: a contact that would come later than the stroke is missing.{past}{}",
             unreached(line)
-        )))
+        ),
+        command: command.into(),
+        panels: vec![panel],
+        data,
+    })
 }
 
-fn by_spacing(design: &Design) -> Result<Figure> {
+fn by_spacing(design: &Design, command: &str) -> Result<Figure> {
     let line = &design.by_spacing;
     let spacings = || line.iter().map(|trial| trial.probe.spacing);
     let axis = Axis::linear(spacings().fold(f64::INFINITY, f64::min), spacings().fold(0.0, f64::max), 6);
@@ -273,9 +297,16 @@ fn by_spacing(design: &Design) -> Result<Figure> {
     let best = design.best.probe.spacing;
     let (data, panel) =
         curve(design, line, |trial| trial.probe.spacing, Curve { column: "spacing", axis: (label, axis), best })?;
-    Ok(Figure::new("approaches", "Approaches against spacing, for each object", data).panels([panel]).caption(format!(
-        "Radius, tilt and aim are those of the best probe, whose spacing the vertical line marks. One stopping rule \
-         for all objects: the error rate is that of all together.{}",
-        unreached(line)
-    )))
+    Ok(Figure {
+        id: "approaches".into(),
+        title: "Approaches against spacing, for each object".into(),
+        caption: format!(
+            "Radius, tilt and aim are those of the best probe, whose spacing the vertical line marks. One stopping rule \
+             for all objects: the error rate is that of all together.{}",
+            unreached(line)
+        ),
+        command: command.into(),
+        panels: vec![panel],
+        data,
+    })
 }

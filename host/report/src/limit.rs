@@ -8,7 +8,7 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::compile;
 use palpate::ensemble::Ensemble;
 use palpate::ensemble::train;
@@ -178,12 +178,12 @@ pub(super) fn section(context: &Context, limit: &Limit) -> Result<Section> {
         "The limit holds for the paper's descriptor too: the row of fingers is rolled at random, so a touch and its mirror \
          image are equally likely for every object, and the curvature descriptor keeps all but the mirror image.",
     );
-    section.figure(figure(limit)?);
-    section.figure(table(context, limit));
+    section.figure(figure(context, limit)?);
+    section.table(table(context, limit));
     Ok(section)
 }
 
-fn figure(limit: &Limit) -> Result<Figure> {
+fn figure(context: &Context, limit: &Limit) -> Result<Figure> {
     let mut chart =
         Chart::new("touches", Axis::logarithmic(1.0, MOST as f64), "accuracy", Axis::share()).sized(620, 400);
     let mut data = Records::new(["model", "touches", "accuracy"]);
@@ -200,12 +200,17 @@ fn figure(limit: &Limit) -> Result<Figure> {
     let few = |index| -> Vec<(f64, f64)> { marked.iter().map(|&n| points(index)[n - 1]).collect() };
     chart.series("ours", color::OURS, Shape::Disc, &few(OURS));
     chart.series("paper", color::PAPER, Shape::Ring, &few(PAPER));
-    Ok(Figure::new("limit-curves", "Accuracy against touches, and the best possible", data)
-        .panels([chart.svg()?])
-        .caption(format!("{} groups per object, the same for all.", count(limit.groups))))
+    Ok(Figure {
+        id: "limit-curves".into(),
+        title: "Accuracy against touches, and the best possible".into(),
+        caption: format!("{} groups per object, the same for all.", count(limit.groups)),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
-fn table(context: &Context, limit: &Limit) -> Figure {
+fn table(context: &Context, limit: &Limit) -> Table {
     let columns = AT.iter().map(|n| format!("at {n}"));
     let mut data = Records::new(
         std::iter::once("model".to_string())
@@ -220,10 +225,16 @@ fn table(context: &Context, limit: &Limit) -> Figure {
         let interval = if index == limit.best { Cell::Missing } else { format!("{low} to {high}").into() };
         data.push(std::iter::once(name.into()).chain(accuracies).chain([Cell::Number(gap * 100.0, 1), interval]));
     }
-    Figure::new("limit", "Gaps to the limit", data).caption(format!(
-        "Accuracies on the same {} groups per object; gaps are paired over groups. One standard error of an accuracy \
-         is at most {} points.",
-        count(limit.groups),
-        crate::page::axis::number(50.0 / ((limit.groups * context.objects.len()) as f64).sqrt(), 1)
-    ))
+    Table {
+        id: "limit".into(),
+        title: "Gaps to the limit".into(),
+        caption: format!(
+            "Accuracies on the same {} groups per object; gaps are paired over groups. One standard error of an accuracy \
+             is at most {} points.",
+            count(limit.groups),
+            crate::page::axis::number(50.0 / ((limit.groups * context.objects.len()) as f64).sqrt(), 1)
+        ),
+        command: context.settings.command.clone(),
+        data,
+    }
 }

@@ -7,7 +7,7 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
@@ -168,12 +168,16 @@ pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
     section.figure(overall(context, folds)?);
     section.figure(objects(context, folds)?);
     section.figure(confusions(context, folds)?);
-    section.figure(
-        Figure::new("noise-kinds", "Accuracy after ten touches under other noise", other_kinds(folds)).caption(
-            "Other errors of a sensor, a timer or a robot, one at a time and then together. A robot's own error is \
-             the same for all touches of a group.",
-        ),
-    );
+    section.table(Table {
+        id: "noise-kinds".into(),
+        title: "Accuracy after ten touches under other noise".into(),
+        caption:
+            "Other errors of a sensor, a timer or a robot, one at a time and then together. A robot's own error is the \
+                  same for all touches of a group."
+                .into(),
+        command: context.settings.command.clone(),
+        data: other_kinds(folds),
+    });
     Ok(section)
 }
 
@@ -216,13 +220,17 @@ fn signal(context: &Context) -> Result<Figure> {
         let stroke = if index % 2 == 0 { Stroke::Solid } else { Stroke::Dashed };
         chart.line(name, color::series(index), stroke, points);
     }
-    Ok(Figure::new("signal-to-noise", "Signal-to-noise ratio of each object (figure 10)", data)
-        .panels([chart.svg()?])
-        .caption(
-            "The signal of a touch is the sum of its three contact times, its noise the sum of three independent ones \
-             of this deviation, before the earliest time is subtracted; the ratio is of mean squares, over all \
-             captured touches. The paper does not say if noise is taken before or after the subtraction.",
-        ))
+    Ok(Figure {
+        id: "signal-to-noise".into(),
+        title: "Signal-to-noise ratio of each object (figure 10)".into(),
+        caption: "The signal of a touch is the sum of its three contact times, its noise the sum of three independent ones of \
+                  this deviation, before the earliest time is subtracted; the ratio is of mean squares, over all captured \
+                  touches. The paper does not say if noise is taken before or after the subtraction."
+            .into(),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
 /// Mean over folds, for each level, of what `of` takes from a fold's accuracies of objects.
@@ -296,9 +304,14 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
         chart.marks.push(Mark::Dots { points: raw, color: COLORS[method], shape: SHAPES[method] });
         chart.line(name, COLORS[method], Stroke::Solid, &smooth);
     }
-    Ok(Figure::new("noise", "Accuracy after ten touches against noise, over all objects (figure 12)", data)
-        .panels([chart.svg()?])
-        .caption(smoothed_by(context.settings.deviations().len())))
+    Ok(Figure {
+        id: "noise".into(),
+        title: "Accuracy after ten touches against noise, over all objects (figure 12)".into(),
+        caption: smoothed_by(context.settings.deviations().len()),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
 fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
@@ -326,9 +339,14 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
         }
         panels.push(chart.svg()?);
     }
-    Ok(Figure::new("noise-objects", "The same for each object (figure 11)", data)
-        .panels(panels)
-        .caption("Thin lines are measured, thick ones smoothed."))
+    Ok(Figure {
+        id: "noise-objects".into(),
+        title: "The same for each object (figure 11)".into(),
+        caption: "Thin lines are measured, thick ones smoothed.".into(),
+        command: context.settings.command.clone(),
+        panels,
+        data,
+    })
 }
 
 fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
@@ -341,13 +359,14 @@ fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
         panels.push(confusion::drawn(name, &names, &shares, COLORS[method])?);
         push_matrix(&mut data, name, &names, &shares);
     }
-    Ok(Figure::new(
-        "noise-confusion",
-        format!("Confusion matrix after ten touches with noise of {} ms (figure 13)", NOISE / 1e3),
+    Ok(Figure {
+        id: "noise-confusion".into(),
+        title: format!("Confusion matrix after ten touches with noise of {} ms (figure 13)", NOISE / 1e3),
+        caption: "Percentage of an object's groups (row) that were recognized as another (column).".into(),
+        command: context.settings.command.clone(),
+        panels,
         data,
-    )
-    .panels(panels)
-    .caption("Percentage of an object's groups (row) that were recognized as another (column)."))
+    })
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use crate::page::chart::{Chart, Mark, Stroke};
 use crate::page::color;
 use crate::page::document::{Block, Figure, Picture, Section};
 use crate::page::render;
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::mesh::facts::Facts;
 use palpate::mesh::{Instance, Object};
@@ -56,11 +56,17 @@ pub(super) fn section(context: &Context) -> Result<Section> {
             Cell::Percent(touches as f64 / approaches.max(1) as f64, 1),
         ]);
     }
-    section.figure(Figure::new("objects-table", "What was captured", data).caption(format!(
-        "An approach is a full touch when all fingers touch. {} This capture took {} s.",
-        touched_by(&context.settings.capture),
-        decimal(captured.seconds, 1)
-    )));
+    section.table(Table {
+        id: "objects-table".into(),
+        title: "What was captured".into(),
+        caption: format!(
+            "An approach is a full touch when all fingers touch. {} This capture took {} s.",
+            touched_by(&context.settings.capture),
+            decimal(captured.seconds, 1)
+        ),
+        command: context.settings.command.clone(),
+        data,
+    });
     Ok(section)
 }
 
@@ -137,19 +143,20 @@ fn densities(context: &Context) -> Result<Figure> {
         chart.marks.push(Mark::Vertical(0.0));
         panels.push(chart.svg()?);
     }
-    Ok(Figure::new(
-        "curvature",
-        "Curvature of each object under the probe: densities of the descriptor (figure 6)",
+    Ok(Figure {
+        id: "curvature".into(),
+        title: "Curvature of each object under the probe: densities of the descriptor (figure 6)".into(),
+        caption: format!(
+            "κ = t₁ − 2·t₂ + t₃, the contact times of the three fingers; Gaussian kernel density with Silverman's \
+             bandwidth, each scaled to its own peak. The vertical line marks zero, a flat surface. Positive: convex (the \
+             middle finger touches early); negative: concave. The paper's caption has these two the other way around, and \
+             its formula, (t₁ − t₂) − (t₂ − t₃), has them as here.{}",
+            beyond(captured.data.names().iter().map(String::as_str).zip(&values), reach)
+        ),
+        command: context.settings.command.clone(),
+        panels,
         data,
-    )
-    .panels(panels)
-    .caption(format!(
-        "κ = t₁ − 2·t₂ + t₃, the contact times of the three fingers; Gaussian kernel density with Silverman's \
-         bandwidth, each scaled to its own peak. The vertical line marks zero, a flat surface. Positive: convex \
-         (the middle finger touches early); negative: concave. The paper's caption has these two the other way \
-         around, and its formula, (t₁ − t₂) − (t₂ − t₃), has them as here.{}",
-        beyond(captured.data.names().iter().map(String::as_str).zip(&values), reach)
-    )))
+    })
 }
 
 /// The share of touches beyond the ends of the axes, of the object that has most of them there; nothing where that is

@@ -8,7 +8,7 @@ use crate::page::axis::{Axis, short_number};
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::calibrate::{self, Limit, Odds, Per, Sequence, Terms, choose, follow, margin_of, odds_of};
 use palpate::compile;
 use palpate::error::{CalibrateProblem, Result};
@@ -216,7 +216,7 @@ fn of_objects(sequences: &[Sequence], names: &[String], odds: [&Option<Odds>; 2]
 }
 
 /// The figure and the tables.
-pub(super) fn section(promises: &Promises) -> Result<Section> {
+pub(super) fn section(context: &Context, promises: &Promises) -> Result<Section> {
     let [found, tested] = promises.sequences;
     let mut section = Section::new("promises", "Promises");
     section.text(format!(
@@ -230,9 +230,9 @@ pub(super) fn section(promises: &Promises) -> Result<Section> {
         wording::count(tested),
         uncalibrated(&promises.rates)
     ));
-    section.figure(figure(promises)?);
-    section.figure(table(promises));
-    section.figure(objects(promises));
+    section.figure(figure(context, promises)?);
+    section.table(table(context, promises));
+    section.table(objects(context, promises));
     Ok(section)
 }
 
@@ -249,7 +249,7 @@ fn uncalibrated(rates: &[Promised]) -> String {
     )
 }
 
-fn figure(promises: &Promises) -> Result<Figure> {
+fn figure(context: &Context, promises: &Promises) -> Result<Figure> {
     let ticks = RATES.map(|rate| (rate, format!("{} %", short_number(rate * 100.0)))).to_vec();
     let (low, high) = (RATES[RATES.len() - 1] * 0.3, RATES[0] * 1.5);
     let axis = || Axis::logarithmic(low, high).with_ticks(ticks.clone());
@@ -275,13 +275,18 @@ fn figure(promises: &Promises) -> Result<Figure> {
         let points: Vec<(f64, f64)> = visible().map(|(rate, stopped)| (*rate, stopped.error)).collect();
         chart.series(name, color, shape, &points);
     }
-    Ok(Figure::new("promises-kept", "Promised and measured error rates", data).panels([chart.svg()?]).caption(
-        "On the dashed line the measured error rate equals the promised one; above it, the promise is broken. \
-         Bars are 95 % intervals (Wilson).",
-    ))
+    Ok(Figure {
+        id: "promises-kept".into(),
+        title: "Promised and measured error rates".into(),
+        caption: "On the dashed line the measured error rate equals the promised one; above it, the promise is broken. Bars are 95 % intervals (Wilson)."
+            .into(),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
-fn table(promises: &Promises) -> Figure {
+fn table(context: &Context, promises: &Promises) -> Table {
     let mut data = Records::new([
         "promised",
         "uncalibrated",
@@ -315,13 +320,18 @@ fn table(promises: &Promises) -> Figure {
             touches(promised.object),
         ]);
     }
-    Figure::new("promises-table", "What promises cost", data).caption(
-        "A dash (–) marks a rate that these sequences are too few to promise. A promise per object has one \
-         threshold, strict enough for the object that is mistaken most often.",
-    )
+    Table {
+        id: "promises-table".into(),
+        title: "What promises cost".into(),
+        caption: "A dash (–) marks a rate that these sequences are too few to promise. A promise per object has one \
+                  threshold, strict enough for the object that is mistaken most often."
+            .into(),
+        command: context.settings.command.clone(),
+        data,
+    }
 }
 
-fn objects(promises: &Promises) -> Figure {
+fn objects(context: &Context, promises: &Promises) -> Table {
     let mut data = Records::new([
         "object",
         "touches, on average",
@@ -340,10 +350,16 @@ fn objects(promises: &Promises) -> Figure {
         });
         data.push(std::iter::once(object.name.as_str().into()).chain(cells));
     }
-    Figure::new("promises-objects", format!("A promise of {} for each object", wording::rate(SHOWN)), data).caption(
-        "Mistaken: share of wrong names among those given to the object. Named wrongly: share of wrong ones when \
-         its name is given. Dashes: too few sequences for the promise.",
-    )
+    Table {
+        id: "promises-objects".into(),
+        title: format!("A promise of {} for each object", wording::rate(SHOWN)),
+        caption:
+            "Mistaken: share of wrong names among those given to the object. Named wrongly: share of wrong ones when \
+                  its name is given. Dashes: too few sequences for the promise."
+                .into(),
+        command: context.settings.command.clone(),
+        data,
+    }
 }
 
 #[cfg(test)]

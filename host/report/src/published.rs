@@ -8,8 +8,7 @@ use super::measured::Measured;
 use super::noise;
 use super::sequential::Sequences;
 use super::statistics::{mean_deviation, paired_difference};
-use crate::page::document::Figure;
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::ensemble::{Ensemble, train};
 use palpate::error::Result;
 use palpate::wording::{count, counted, decimal};
@@ -145,7 +144,7 @@ pub(super) fn summary(context: &Context, measured: &Measured) -> Summary {
 
 /// The table that the report opens with: accuracies over groups of test touches of the folds. None where no fold was
 /// tested.
-pub(super) fn table(context: &Context, summary: &Summary, measured: &Measured) -> Result<Option<Figure>> {
+pub(super) fn table(context: &Context, summary: &Summary, measured: &Measured) -> Result<Option<Table>> {
     let mut data = Records::new(["measure", "paper, as published", "paper's method here", "ours here"]);
     let spread = |(value, deviation): (f64, f64)| Cell::PercentSpread(value, deviation, 1);
     let percent = |value| Cell::Percent(value, 1);
@@ -190,7 +189,10 @@ pub(super) fn table(context: &Context, summary: &Summary, measured: &Measured) -
     if tested.is_empty() {
         return Ok(None);
     }
-    Ok(Some(Figure::new("published", "Accuracy and recall", data).caption(format!(
+    Ok(Some(Table {
+        id: "published".into(),
+        title: "Accuracy and recall".into(),
+        caption: format!(
             "The paper is the publication of the method that is compared with ours. {} The paper's meshes are not ours: it used \
              ten ShapeNet models that are not available here, so its numbers cannot be compared with the others directly; the \
              columns beside them share their objects and touches. Published: ± over the paper's folds, of \
@@ -199,7 +201,10 @@ pub(super) fn table(context: &Context, summary: &Summary, measured: &Measured) -
             method(&context.models()?.paper, settings.paper_rounds),
             count(settings.many_groups),
             tested.join(", ")
-        ))))
+        ),
+        command: settings.command.clone(),
+        data,
+    }))
 }
 
 /// The trees of the paper's method as it is measured here, compared with the published ones.
@@ -240,7 +245,7 @@ fn difference((mean, low, high): (f64, Option<f64>, Option<f64>)) -> String {
 }
 
 /// Figures that the large capture gives: the limit, and touches until sure. None where neither was measured.
-pub(super) fn large(context: &Context, summary: &Summary, measured: &Measured) -> Option<Figure> {
+pub(super) fn large(context: &Context, summary: &Summary, measured: &Measured) -> Option<Table> {
     let (mut columns, mut rows, mut groups) = (vec!["measure", "paper's method", "ours"], Vec::new(), Vec::new());
     if let Some(limit) = &measured.limit {
         columns.push("limit");
@@ -272,12 +277,18 @@ pub(super) fn large(context: &Context, summary: &Summary, measured: &Measured) -
         Some(_) => " The limit is the best that any classifier could do, as far as it can be estimated.",
         None => "",
     };
-    Some(Figure::new("published-large", "On the large capture", data).caption(format!(
+    Some(Table {
+        id: "published-large".into(),
+        title: "On the large capture".into(),
+        caption: format!(
             "Of the first fold's models, on the {} full touches of each object of a separate capture that none was trained on: \
              {}.{limit}",
             count(limit::tested(context.settings)),
             groups.join(", ")
-        )))
+        ),
+        command: context.settings.command.clone(),
+        data,
+    })
 }
 
 /// Summary in a sentence for each way of testing.

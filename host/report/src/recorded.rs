@@ -5,7 +5,7 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::capture;
 use palpate::compare::{self, Comparison, Cost, ObjectComparison, Share};
 use palpate::error::{EvaluateProblem, Result};
@@ -58,7 +58,7 @@ pub(super) fn section(context: &Context, compared: &Comparison) -> Result<Sectio
             cost.confusions(),
             cost.promise.map(|promise| promise.sentence()).unwrap_or_default()
         ));
-        section.figure(cost_figure(cost)?);
+        section.figure(cost_figure(context, cost)?);
     }
     section.text(format!(
         "Recorded touches of {} objects were compared with simulated ones of the same objects{}. A classifier trained \
@@ -67,9 +67,9 @@ pub(super) fn section(context: &Context, compared: &Comparison) -> Result<Sectio
         if context.settings.real.is_none() { String::new() } else { format!(", made with {}", context.settings.real) },
         with_interval(told),
     ));
-    section.figure(told_figure(compared)?);
-    section.figure(features_figure(compared)?);
-    section.figure(words(compared));
+    section.figure(told_figure(context, compared)?);
+    section.figure(features_figure(context, compared)?);
+    section.table(words(context, compared));
     Ok(section)
 }
 
@@ -77,7 +77,7 @@ fn with_interval(share: &Share) -> String {
     format!("{} ({} to {})", percent(share.value, 1), decimal(100.0 * share.low, 1), percent(share.high, 1))
 }
 
-fn told_figure(compared: &Comparison) -> Result<Figure> {
+fn told_figure(context: &Context, compared: &Comparison) -> Result<Figure> {
     let mut rows: Vec<(&str, &Share)> =
         compared.objects.iter().map(|own| (own.name.as_str(), &own.told_apart)).collect();
     rows.push(("all", &compared.told_apart));
@@ -105,16 +105,21 @@ fn told_figure(compared: &Comparison) -> Result<Figure> {
             Cell::Percent(share.high, 1),
         ]);
     }
-    Ok(Figure::new("recorded-told-apart", "Accuracy of distinguishing recorded from simulated touches", data)
-        .panels([chart.svg()?])
-        .caption(
+    Ok(Figure {
+        id: "recorded-told-apart".into(),
+        title: "Accuracy of distinguishing recorded from simulated touches".into(),
+        caption:
             "With intervals of 95 %. An interval that contains 50 % shows no difference between recorded and simulated \
-             touches.",
-        ))
+             touches."
+                .into(),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
 /// Percentiles of every feature of every object, recorded beside simulated.
-fn features_figure(compared: &Comparison) -> Result<Figure> {
+fn features_figure(context: &Context, compared: &Comparison) -> Result<Figure> {
     let names: Vec<&str> = compared
         .objects
         .first()
@@ -146,10 +151,17 @@ fn features_figure(compared: &Comparison) -> Result<Figure> {
         }
         panels.push(chart.svg()?);
     }
-    Ok(Figure::new("recorded-features", "Features of recorded and of simulated touches", data).panels(panels).caption(
-        "Recorded touches are left of each name, simulated ones right of it: the median, the middle half, and all \
-         but the outer tenth.",
-    ))
+    Ok(Figure {
+        id: "recorded-features".into(),
+        title: "Features of recorded and of simulated touches".into(),
+        caption:
+            "Recorded touches are left of each name, simulated ones right of it: the median, the middle half, and all \
+                  but the outer tenth."
+                .into(),
+        command: context.settings.command.clone(),
+        panels,
+        data,
+    })
 }
 
 /// Times are shown in milliseconds, cosines as they are.
@@ -165,7 +177,7 @@ fn is_time(feature: &str) -> bool {
     !(feature.starts_with("direction") || feature.starts_with("alignment"))
 }
 
-fn words(compared: &Comparison) -> Figure {
+fn words(context: &Context, compared: &Comparison) -> Table {
     let mut data =
         Records::new(["object", "recorded", "simulated", "classifier accuracy", "features", "contact patterns"]);
     for own in &compared.objects {
@@ -185,14 +197,20 @@ fn words(compared: &Comparison) -> Figure {
             if patterns.is_empty() { "alike".into() } else { patterns.join("; ").into() },
         ]);
     }
-    Figure::new("recorded-words", "Recorded and simulated touches, object by object", data).caption(format!(
-        "Features by themselves, and contact patterns that differ by more than {} points. A classifier sees them \
-         together.",
-        100.0 * DIFFERENT
-    ))
+    Table {
+        id: "recorded-words".into(),
+        title: "Recorded and simulated touches, object by object".into(),
+        caption: format!(
+            "Features by themselves, and contact patterns that differ by more than {} points. A classifier sees them \
+             together.",
+            100.0 * DIFFERENT
+        ),
+        command: context.settings.command.clone(),
+        data,
+    }
 }
 
-fn cost_figure(cost: &Cost) -> Result<Figure> {
+fn cost_figure(context: &Context, cost: &Cost) -> Result<Figure> {
     let most = cost.simulated.keys().last().copied().unwrap_or(2) as f64;
     let mut chart = Chart::new("approaches", Axis::linear(0.0, most, 6), "accuracy", Axis::share());
     let mut data = Records::new(["touches", "approaches", "accuracy", "low", "high"]);
@@ -207,7 +225,12 @@ fn cost_figure(cost: &Cost) -> Result<Figure> {
             data.push([[name.into(), Cell::count(*at)].to_vec(), shares.to_vec()].concat());
         }
     }
-    Ok(Figure::new("recorded-cost", "A model trained on simulated touches, on simulated and on recorded ones", data)
-        .panels([chart.svg()?])
-        .caption("The distance between the curves is the cost of the simulation's errors."))
+    Ok(Figure {
+        id: "recorded-cost".into(),
+        title: "A model trained on simulated touches, on simulated and on recorded ones".into(),
+        caption: "The distance between the curves is the cost of the simulation's errors.".into(),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }

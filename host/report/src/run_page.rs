@@ -4,7 +4,7 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Block, Figure, Page, Picture, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::wording::count;
 
@@ -51,11 +51,17 @@ pub fn run_page(results: &RunResults) -> Result<Page> {
     section.blocks.push(Block::Pictures(results.pictures.clone()));
     sections.push(section);
     let mut section = Section::new("result", "The result");
-    section.figure(Figure::new("summary", "The paper's method and ours", results.table.clone()).caption(format!(
-        "The first two wait for full touches and were trained on the same; the last takes every approach with at least \
-         one contact as evidence. All are tested on the same approaches, which none was trained on. {}",
-        results.note
-    )));
+    section.table(Table {
+        id: "summary".into(),
+        title: "The paper's method and ours".into(),
+        caption: format!(
+            "The first two wait for full touches and were trained on the same; the last takes every approach with at least \
+             one contact as evidence. All are tested on the same approaches, which none was trained on. {}",
+            results.note
+        ),
+        command: results.command.clone(),
+        data: results.table.clone(),
+    });
     sections.push(section);
     let mut section = Section::new("accuracy", "Accuracy, touch by touch");
     section.figure(curves(results)?);
@@ -69,7 +75,6 @@ pub fn run_page(results: &RunResults) -> Result<Page> {
             models("a compiled model", "compiled models", results.methods.iter().map(|method| method.bytes))
         ),
         sections,
-        command: results.command.clone(),
         facts: results.facts.clone(),
         files: false,
     })
@@ -119,12 +124,16 @@ fn curves(results: &RunResults) -> Result<Figure> {
             ]);
         }
     }
-    Ok(Figure::new("accuracy-curves", "Share of groups recognized after a fixed number of touches", data)
-        .panels([chart.svg()?])
-        .caption(
-            "Each group holds touches of one object, drawn at random from touches that training never saw; all \
-             objects are weighted equally. Bars are 95 % confidence intervals.",
-        ))
+    Ok(Figure {
+        id: "accuracy-curves".into(),
+        title: "Share of groups recognized after a fixed number of touches".into(),
+        caption: "Each group holds touches of one object, drawn at random from touches that training never saw; all \
+                  objects are weighted equally. Bars are 95 % confidence intervals."
+            .into(),
+        command: results.command.clone(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
 fn objects(results: &RunResults) -> Result<Figure> {
@@ -150,9 +159,14 @@ fn objects(results: &RunResults) -> Result<Figure> {
         }
         panels.push(chart.svg()?);
     }
-    Ok(Figure::new("accuracy-objects", "The same for each object", data)
-        .panels(panels)
-        .caption("Percentages are of groups of touches of that object alone."))
+    Ok(Figure {
+        id: "accuracy-objects".into(),
+        title: "The same for each object".into(),
+        caption: "Percentages are of groups of touches of that object alone.".into(),
+        command: results.command.clone(),
+        panels,
+        data,
+    })
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use super::statistics::quantile;
 use crate::page::axis::{Axis, number};
 use crate::page::chart::{Chart, Mark, Stroke};
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::compile;
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins, SequentialSettings};
@@ -116,7 +116,7 @@ pub(super) fn section(context: &Context, sequences: &Sequences) -> Result<Sectio
         wording::count(sequences.most)
     ));
     section.figure(trade(context, sequences)?);
-    section.figure(table(sequences));
+    section.table(table(context, sequences));
     section.figure(distributions(context, sequences)?);
     Ok(section)
 }
@@ -166,19 +166,20 @@ fn trade(context: &Context, sequences: &Sequences) -> Result<Figure> {
             ]);
         }
     }
-    Ok(Figure::new(
-        "sequential-trade",
-        format!("Errors against touches, for thresholds from {} to {}", RATES[0], RATES[RATES.len() - 1]),
+    Ok(Figure {
+        id: "sequential-trade".into(),
+        title: format!("Errors against touches, for thresholds from {} to {}", RATES[0], RATES[RATES.len() - 1]),
+        caption:
+            "Both axes are logarithmic. Solid: stopping when sure; dashed: a fixed number. Bars are 95 % intervals \
+                  (Wilson)."
+                .into(),
+        command: context.settings.command.clone(),
+        panels: vec![chart.svg()?],
         data,
-    )
-    .panels([chart.svg()?])
-    .caption(
-        "Both axes are logarithmic. Solid: stopping when sure; dashed: a fixed number. Bars are 95 % intervals \
-         (Wilson).",
-    ))
+    })
 }
 
-fn table(sequences: &Sequences) -> Figure {
+fn table(context: &Context, sequences: &Sequences) -> Table {
     let mut data = Records::new([
         "threshold",
         "paper: touches",
@@ -205,11 +206,17 @@ fn table(sequences: &Sequences) -> Figure {
         });
         data.push(std::iter::once(Cell::Number(*rate, 3)).chain(cells));
     }
-    Figure::new("sequential", "Thresholds", data).caption(format!(
+    Table {
+        id: "sequential".into(),
+        title: "Thresholds".into(),
+        caption: format!(
             "Errors include undecided sequences. {} ± is one standard error; a dash (–) means that no fixed number up to the \
              longest group makes as few errors.",
             above_thresholds(&sequences.methods)
-        ))
+        ),
+        command: context.settings.command.clone(),
+        data,
+    }
 }
 
 /// Thresholds at which each method errs more often than they say, as a sentence for each.
@@ -262,9 +269,14 @@ fn distributions(context: &Context, sequences: &Sequences) -> Result<Figure> {
         }
         panels.push(chart.svg()?);
     }
-    Ok(Figure::new("sequential-objects", format!("Touches used until sure, threshold {DRAWN}"), data)
-        .panels(panels)
-        .caption(format!("Share of sequences in bins of {width} touches; beside the method's name, its mean.")))
+    Ok(Figure {
+        id: "sequential-objects".into(),
+        title: format!("Touches used until sure, threshold {DRAWN}"),
+        caption: format!("Share of sequences in bins of {width} touches; beside the method's name, its mean."),
+        command: context.settings.command.clone(),
+        panels,
+        data,
+    })
 }
 
 fn floats(values: &[usize]) -> Vec<f64> {

@@ -181,7 +181,7 @@ impl Settings {
         }
     }
 
-    /// Settings for all figures in less than a minute.
+    /// Settings for all figures on less data: the report says what they shorten.
     pub fn quick(sources: Vec<String>, seed: u64) -> Self {
         Self {
             quick: true,

@@ -9,8 +9,8 @@ use super::{
     sequential,
 };
 use crate::error::ReportProblem;
-use crate::page::document::{Figure, Page, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::document::{Page, Section};
+use crate::page::table::{Cell, Records, Table};
 use palpate::capture;
 use palpate::compile;
 use palpate::ensemble::train;
@@ -160,7 +160,6 @@ pub fn report(
     let page = Page {
         title: "Recognizing objects by touch".into(),
         summary: sentence.clone(),
-        command: settings.command.clone(),
         sections,
         facts: facts(settings, &stages, began.elapsed().as_secs_f64()),
         files: true,
@@ -211,9 +210,9 @@ fn sections(context: &Context, measured: &Measured, summary: &published::Summary
         first.warning(format!("the figures are of meshes that should be repaired first: {}.{why}", damaged.join(", ")));
     }
     for table in [published::table(context, summary, measured)?, published::large(context, summary, measured)] {
-        table.map(|table| first.figure(table));
+        table.map(|table| first.table(table));
     }
-    shortened(context.settings).map(|table| first.figure(table));
+    shortened(context.settings).map(|table| first.table(table));
     let mut sections = vec![first];
     sections.retain(|section| !section.blocks.is_empty());
     if context.settings.parts.contains(&Part::Objects) {
@@ -228,9 +227,9 @@ fn sections(context: &Context, measured: &Measured, summary: &published::Summary
         shown(&measured.noisy, |of| noise::section(context, of))?,
         shown(&measured.limit, |of| limit::section(context, of))?,
         shown(&measured.sequences, |of| sequential::section(context, of))?,
-        shown(&measured.calibration, calibration::section)?,
-        shown(&measured.promises, promises::section)?,
-        shown(&measured.members, |of| cost::section(of))?,
+        shown(&measured.calibration, |of| calibration::section(context, of))?,
+        shown(&measured.promises, |of| promises::section(context, of))?,
+        shown(&measured.members, |of| cost::section(context, of))?,
         shown(&measured.recorded, |of| recorded::section(context, of))?,
     ];
     sections.extend(all.into_iter().flatten());
@@ -238,14 +237,18 @@ fn sections(context: &Context, measured: &Measured, summary: &published::Summary
 }
 
 /// Numbers that a quick report shortens; none of a full one.
-fn shortened(settings: &Settings) -> Option<Figure> {
+fn shortened(settings: &Settings) -> Option<Table> {
     let numbers = settings.shortened();
     let mut data = Records::new(["number", "here", "in a full report"]);
     for &(name, here, full) in &numbers {
         data.push([name.into(), Cell::count(here), Cell::count(full)]);
     }
-    (!numbers.is_empty()).then(|| {
-        Figure::new("shortened", "What --quick shortens", data).caption("All other numbers are those of a full report.")
+    (!numbers.is_empty()).then(|| Table {
+        id: "shortened".into(),
+        title: "What --quick shortens".into(),
+        caption: "All other numbers are those of a full report.".into(),
+        command: settings.command.clone(),
+        data,
     })
 }
 

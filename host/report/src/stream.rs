@@ -4,7 +4,7 @@ use crate::page::axis::{Axis, number};
 use crate::page::chart::{Chart, Mark, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Page, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::evaluate::Finding;
 use palpate::stream::{Evaluated, Grown, Point};
@@ -19,13 +19,13 @@ const MOST_CLASSES: usize = 8;
 /// If a chart cannot be drawn.
 pub fn page(evaluated: &Evaluated, command: &str) -> Result<Page> {
     let mut rows = Section::new("rows", "Rows to a verdict");
-    rows.text(promise(evaluated)).figure(curves(evaluated)?).text(fewer(evaluated));
+    rows.text(promise(evaluated)).figure(curves(evaluated, command)?).text(fewer(evaluated));
     let mut confusion = Section::new("confusion", "Confusion");
-    confusion.figure(matrix(evaluated));
+    confusion.table(matrix(evaluated, command));
     let mut sections = vec![rows, confusion];
     if let Some(grown) = &evaluated.grown {
         let mut one = Section::new("one", "One sequence");
-        one.figure(posteriors(evaluated, grown)?);
+        one.figure(posteriors(evaluated, grown, command)?);
         sections.push(one);
     }
     let groups = evaluated.groups.map_or_else(String::new, |groups| format!(" of {groups} groups"));
@@ -38,7 +38,6 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Page> {
             number(evaluated.mean_rows, 1),
         ),
         sections,
-        command: command.into(),
         facts: vec![("Command".into(), command.into()), ("palpate".into(), env!("CARGO_PKG_VERSION").into())],
         files: false,
     })
@@ -89,7 +88,7 @@ fn shown(evaluated: &Evaluated, error: f64) -> f64 {
     error.max(0.5 / evaluated.sequences.max(1) as f64)
 }
 
-fn curves(evaluated: &Evaluated) -> Result<Figure> {
+fn curves(evaluated: &Evaluated, command: &str) -> Result<Figure> {
     let comparison = &evaluated.comparison;
     let early: Vec<Point> = comparison.early.iter().copied().filter(|point| point.named > 0.0).collect();
     let all = [("early stopping", &early), ("fixed number", &comparison.fixed), ("majority vote", &comparison.vote)];
@@ -121,26 +120,37 @@ fn curves(evaluated: &Evaluated) -> Result<Figure> {
     let own = (evaluated.mean_rows, shown(evaluated, evaluated.error));
     chart.marks.push(Mark::Dots { points: vec![own], color: color::INK, shape: Shape::Square });
     chart.marks.push(Mark::Note { at: own, text: "this model".into(), color: color::INK });
-    Ok(Figure::new("rows-to-a-verdict", "Wrong names against rows", data).panels([chart.svg()?]).caption(
-        "Early stopping at thresholds from strict to loose, the same for all names; the class with the most \
-         evidence after a fixed number of rows, and the class that most of as many rows are recognized as, each \
-         row taken alone. A sequence with fewer rows uses all that it has. Zero errors are drawn as half an error \
-         (the axis is logarithmic). The square is this model, with its own thresholds.",
-    ))
+    Ok(Figure {
+        id: "rows-to-a-verdict".into(),
+        title: "Wrong names against rows".into(),
+        caption: "Early stopping at thresholds from strict to loose, the same for all names; the class with the most evidence after \
+                  a fixed number of rows, and the class that most of as many rows are recognized as, each row taken alone. A \
+                  sequence with fewer rows uses all that it has. Zero errors are drawn as half an error (the axis is logarithmic). \
+             The square is this model, with its own thresholds."
+            .into(),
+        command: command.into(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
-fn matrix(evaluated: &Evaluated) -> Figure {
+fn matrix(evaluated: &Evaluated, command: &str) -> Table {
     let head = std::iter::once("class".to_owned()).chain(evaluated.names.iter().cloned()).chain(["no name".to_owned()]);
     let mut data = Records::new(head);
     for (name, counts) in evaluated.names.iter().zip(&evaluated.confusion) {
         let row = std::iter::once(name.as_str().into()).chain(counts.iter().map(|&count| Cell::count(count)));
         data.push(row);
     }
-    Figure::new("confusion", "Sequences of each class, by the name that they were given", data)
-        .caption("Row by row the class, column by column the name.")
+    Table {
+        id: "confusion".into(),
+        title: "Sequences of each class, by the name that they were given".into(),
+        caption: "Row by row the class, column by column the name.".into(),
+        command: command.into(),
+        data,
+    }
 }
 
-fn posteriors(evaluated: &Evaluated, grown: &Grown) -> Result<Figure> {
+fn posteriors(evaluated: &Evaluated, grown: &Grown, command: &str) -> Result<Figure> {
     let rows = grown.posteriors.len().max(2);
     let mut chart = Chart::new("rows", Axis::linear(1.0, rows as f64, 8), "posterior", Axis::share()).sized(760, 380);
     let mut data = Records::new(["rows", "class", "posterior"]);
@@ -167,9 +177,14 @@ fn posteriors(evaluated: &Evaluated, grown: &Grown) -> Result<Figure> {
     let longer = grown
         .longer
         .map_or_else(String::new, |share| format!(" Of the sequences with a name, {} take longer.", percent(share, 0)));
-    Ok(Figure::new("one-sequence", format!("The evidence of one sequence of {} as it grows", name(grown.class)), data)
-        .panels([chart.svg()?])
-        .caption(format!("{ended} Later rows are shown as if there had been no verdict.{longer}")))
+    Ok(Figure {
+        id: "one-sequence".into(),
+        title: format!("The evidence of one sequence of {} as it grows", name(grown.class)),
+        caption: format!("{ended} Later rows are shown as if there had been no verdict.{longer}"),
+        command: command.into(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Page, Section};
-use crate::page::table::{Cell, Records};
+use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::teach::{self, LEAST, Needed, Taught, TaughtObject};
 use palpate::wording::{count, percent, rate};
@@ -20,9 +20,9 @@ pub fn page(taught: &Taught, command: &str) -> Result<Page> {
          was held out. A constant is added to an object's margin with every touch, so that misses and false \
          recognitions are equally frequent.",
     );
-    result.figure(objects(taught)).text(promise(taught));
+    result.table(objects(taught, command)).text(promise(taught));
     let mut more = Section::new("more", "Benefit of more approaches");
-    more.figure(curve(taught)?);
+    more.figure(curve(taught, command)?);
     taught.objects.iter().for_each(|object| {
         more.text(more_approaches(object));
     });
@@ -31,13 +31,12 @@ pub fn page(taught: &Taught, command: &str) -> Result<Page> {
         title: "Learned from recorded touches".into(),
         summary: format!("{}: figures after {} approaches.", names.join(", "), taught.approaches),
         sections: vec![result, more],
-        command: command.into(),
         facts: vec![("Command".into(), command.into()), ("palpate".into(), env!("CARGO_PKG_VERSION").into())],
         files: false,
     })
 }
 
-fn objects(taught: &Taught) -> Figure {
+fn objects(taught: &Taught, command: &str) -> Table {
     let mut data = Records::new([
         "object",
         "approaches",
@@ -63,15 +62,21 @@ fn objects(taught: &Taught) -> Figure {
     let others = taught
         .others
         .map_or_else(String::new, |others| format!(" Of the other objects {} are recognized.", percent(others, 1)));
-    Figure::new("taught", "Objects and how they were smoothed", data).caption(format!(
-        "Shares of groups of {} approaches; false recognitions of an object are summed over all other objects. \
-         Jitter is in multiples of {}.{others}",
-        taught.approaches,
-        teach::jitter(1.0)
-    ))
+    Table {
+        id: "taught".into(),
+        title: "Objects and how they were smoothed".into(),
+        caption: format!(
+            "Shares of groups of {} approaches; false recognitions of an object are summed over all other objects. \
+             Jitter is in multiples of {}.{others}",
+            taught.approaches,
+            teach::jitter(1.0)
+        ),
+        command: command.into(),
+        data,
+    }
 }
 
-fn curve(taught: &Taught) -> Result<Figure> {
+fn curve(taught: &Taught, command: &str) -> Result<Figure> {
     let mut data = Records::new(["object", "approaches", "recognized", "error"]);
     let points = || taught.objects.iter().flat_map(|object| &object.curve.points);
     for object in &taught.objects {
@@ -99,12 +104,19 @@ fn curve(taught: &Taught) -> Result<Figure> {
         let line: Vec<(f64, f64)> = measured.chain([expected]).collect();
         chart.series(&object.name, color::series(index), Shape::Disc, &line);
     }
-    Ok(Figure::new("learning-curve", "Errors against approaches", data).panels([chart.svg()?]).caption(format!(
-        "The mean of the share of groups of {} approaches that are missed, and of those of other objects that are \
-         taken for the object, on touches that were held out. The last point of each line is not measured: it \
-         extrapolates the errors to twice as many approaches by a power law.",
-        taught.approaches
-    )))
+    Ok(Figure {
+        id: "learning-curve".into(),
+        title: "Errors against approaches".into(),
+        caption: format!(
+            "The mean of the share of groups of {} approaches that are missed, and of those of other objects that are \
+             taken for the object, on touches that were held out. The last point of each line is not measured: it \
+             extrapolates the errors to twice as many approaches by a power law.",
+            taught.approaches
+        ),
+        command: command.into(),
+        panels: vec![chart.svg()?],
+        data,
+    })
 }
 
 /// Says in a sentence if more approaches to an object would help.

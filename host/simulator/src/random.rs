@@ -78,8 +78,26 @@ mod tests {
 
     #[test]
     fn purposes_of_one_seed_share_no_stream() {
-        // The compiler keeps their numbers apart.
-        let purposes = [Purpose::Folds, Purpose::Noise, Purpose::Groups, Purpose::Fit];
+        use Purpose::*;
+        let purposes = [
+            Folds,
+            Noise,
+            Sensor,
+            Robot,
+            Groups,
+            Sequences,
+            View,
+            Casts,
+            Approaches,
+            Calibration,
+            Active,
+            Switch,
+            Misfit,
+            Capture,
+            Fit,
+            Teach,
+            Synthetic,
+        ];
         let draw = |purpose| generator(1, purpose, "fork", 0).random::<u64>();
         assert_eq!(purposes.map(draw).into_iter().collect::<BTreeSet<_>>().len(), purposes.len());
     }

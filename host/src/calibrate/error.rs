@@ -1,10 +1,15 @@
 //! Problems with calibrating.
 
-use super::recorded::{GROWN, GROWTH, LIKELY};
 use super::terms::Terms;
 use super::walk::{Tally, allowed, binomial_tail};
 use crate::error::Problem;
 use palpate_base::wording::two_digits;
+
+/// The probability with which a forecast number of approaches is enough, if the simulation is right.
+pub(super) const LIKELY: f64 = 0.8;
+/// The factor between numbers of approaches that a forecast tries, and how many it tries.
+pub(super) const GROWTH: f64 = 1.05;
+pub(super) const GROWN: i32 = 160;
 
 /// Problems with calibrating.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

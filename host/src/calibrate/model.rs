@@ -133,7 +133,7 @@ pub(crate) fn calibrate_from(
 /// loosest one at which it passes with nearly the greatest probability, up to where a calibration that knows nothing begins.
 ///
 /// # Errors
-/// Errors as those of [`calibrate`], except for a rate that is not kept.
+/// Errors of [`calibrate`], except for a rate that is not kept.
 #[cfg(feature = "train")]
 pub(crate) fn begin(
     model: &Model<'_>,

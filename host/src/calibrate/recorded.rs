@@ -15,7 +15,7 @@
 
 use super::calibrated::Calibrated;
 use super::choose::{By, steps, summary, tallies};
-use super::error::{Enough, Forecast};
+use super::error::{Enough, Forecast, GROWN, GROWTH, LIKELY};
 use super::model::{Material, OfRecorded, STRICTEST, Settings, add_noise, finished, noise_seed};
 use super::temperature::temperature;
 use super::terms::Terms;
@@ -29,8 +29,6 @@ use crate::touches::{Dataset, Source};
 use palpate_base::wording::two_digits;
 use palpate_onboard::Model;
 
-/// The probability with which a forecast number of approaches is enough, if the simulation is right.
-pub(super) const LIKELY: f64 = 0.8;
 /// Share of the greatest probability of passing from which on the strictest first threshold is taken.
 const AS_LIKELY: f64 = 0.95;
 /// A probability below which recordings that make too few names are not tested at all.
@@ -38,9 +36,6 @@ const HOPELESS: f64 = 0.01;
 /// Error rates that a forecast tries.
 const RATES: [f64; 17] =
     [0.001, 0.002, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.4];
-/// The factor between numbers of approaches that a forecast tries, and how many it tries.
-pub(super) const GROWTH: f64 = 1.05;
-pub(super) const GROWN: i32 = 160;
 
 /// Sets a model's thresholds, as [`calibrate`](fn@super::calibrate) does, for touches like the `recorded` ones: thresholds are
 /// found on `simulated` sequences, to which the noise of `settings` is added, and tested on the recorded ones, which have

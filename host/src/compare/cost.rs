@@ -1,5 +1,6 @@
 //! The accuracy that a model trained on simulated touches loses on recorded ones.
 
+use super::entry::Entry;
 use super::promise::{Promised, promised};
 use super::{Settings, Share, counterparts};
 use crate::ensemble::{object_of, train};
@@ -142,30 +143,6 @@ pub(super) fn cost(
         confused: confused(&margins, [&tested, recorded], &entries, settings)?,
         promise: promised(&model, [&test, recorded], &entries, settings.seed, progress)?,
     }))
-}
-
-/// A recorded object, and the outputs of the model that its touches may be of: one or, where they state no placement, several,
-/// each with its share.
-pub(super) struct Entry {
-    pub(super) name: String,
-    pub(super) outputs: Vec<(String, f64)>,
-}
-
-impl Entry {
-    fn new(name: &str, outputs: Vec<(String, f64)>) -> Self {
-        Self { name: name.to_owned(), outputs }
-    }
-
-    /// The share of tested touches of this name, recorded or simulated, in the object's.
-    fn share_of(&self, name: &str) -> f64 {
-        let own = self.outputs.iter().find(|(output, _)| output == name).map(|(_, share)| *share);
-        own.unwrap_or(f64::from(u8::from(self.name == name)))
-    }
-
-    /// The true object, regardless of its placement.
-    fn object(&self, has_placements: bool) -> &str {
-        if has_placements && self.outputs.len() == 1 { object_of(&self.name) } else { &self.name }
-    }
 }
 
 /// The confusions that are more frequent on the second data set's touches than on the first's: by [`MORE`], and by two

@@ -10,6 +10,7 @@
 //! simulated touches support is kept.
 
 mod cost;
+mod entry;
 mod features;
 mod promise;
 

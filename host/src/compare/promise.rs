@@ -1,6 +1,6 @@
 //! A promise that is made on simulated touches, and kept or broken on recorded ones.
 
-use super::cost::Entry;
+use super::entry::Entry;
 use crate::calibrate::{self, Limit, Odds, Sequence, Tally, TouchSupply, binomial_tail, calibrate, follow, odds_of};
 use crate::compile::{self, compile};
 use crate::ensemble::Ensemble;

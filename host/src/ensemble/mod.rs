@@ -34,7 +34,7 @@ pub fn load(path: impl AsRef<Path>) -> Result<Ensemble> {
 /// Reads an ensemble as [`load`] does, with facts that the file does not state.
 ///
 /// # Errors
-/// Errors as those of [`Ensemble::load_with`] and of [`load`].
+/// Errors of [`Ensemble::load_with`] and of [`load`].
 pub fn load_with(path: impl AsRef<Path>, options: &Options<'_>) -> Result<Ensemble> {
     let path = path.as_ref();
     checked(path, Ensemble::load_with(path, &Options { schemas: SCHEMAS, ..*options })?)
@@ -43,7 +43,7 @@ pub fn load_with(path: impl AsRef<Path>, options: &Options<'_>) -> Result<Ensemb
 /// Reads an ensemble from a file's bytes as [`load_with`] does; `path` is for errors only.
 ///
 /// # Errors
-/// Errors as those of [`load_with`], except for reading the file.
+/// Errors of [`load_with`], except for reading the file.
 pub fn read(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
     checked(path, import::read(path, bytes, &Options { schemas: SCHEMAS, ..*options })?)
 }

@@ -79,7 +79,7 @@ pub struct Confusion {
 /// names and the model's own weights; `None` leaves these.
 ///
 /// # Errors
-/// As [`evaluate`] and [`Margins::new`]; [`EvaluateProblem`](crate::error::EvaluateProblem) for a plan or strangers that cannot
+/// Errors of [`evaluate`] and [`Margins::new`]; [`EvaluateProblem`](crate::error::EvaluateProblem) for a plan or strangers that cannot
 /// be evaluated; [`Setting`](crate::error::Setting) `at` for more touches than
 /// enough groups can be drawn of.
 pub fn measure(

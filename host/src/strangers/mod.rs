@@ -15,8 +15,7 @@
 //! no kind, each weighted by how nearly the object leads it. B + C/n is taken at n = 40 for all n, so that one matrix for
 //! each object does; measured, that detects as many strangers as the exact ratio.
 //!
-//! `calibrate --strangers` says how many strangers a test detects and how many known objects it calls unknown; without the
-//! pose a fork where a spoon is known is hardly told from it.
+//! `calibrate --strangers` says how many strangers a test detects, and how many known objects it calls unknown.
 
 mod fixed;
 mod follow;

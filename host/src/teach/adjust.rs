@@ -90,7 +90,8 @@ struct Material {
 /// is chosen by cross-validation: the largest gain over the given leaves, less two standard errors.
 ///
 /// # Errors
-/// As [`teach`](fn@super::teach); [`TeachProblem::NotKnown`](crate::error::TeachProblem::NotKnown) for an object that the ensemble does
+/// Errors of [`teach`](fn@super::teach); [`TeachProblem::NotKnown`](crate::error::TeachProblem::NotKnown) for an object
+/// that the ensemble does
 /// not know.
 pub fn adjust(
     ensemble: &Ensemble,

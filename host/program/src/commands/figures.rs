@@ -237,7 +237,7 @@ fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> 
     let rows = rows("approaches", sequential, (&approaches.accuracy, &approaches.per_object), used, None);
     let shares = patterns.iter().map(|(pattern, share)| format!("{pattern} {:.1} %", 100.0 * share));
     format!(
-        "\n{rows}\nStopping {}: {:.1} approaches on average (± {:.1}), of which {:.1} were evidence, {:.2} % \
+        "\n{rows}\nStopping {}: {:.1} approaches on average (± {:.1}), {:.1} of them evidence, {:.2} % \
          wrong (± {:.2}), {:.2} % undecided.\nFingers that touched: {}.\n",
         stops(sequential.error_rate, sequential.promised),
         sequential.mean().value,

@@ -1,7 +1,7 @@
 use super::Global;
 use super::expected::ExpectedArguments;
 use super::numbers::error_rate;
-use super::recognize_rows::{reset, word};
+use super::recognize_rows::{reset, verdict_name};
 use palpate::Result;
 use palpate::chip::Entry;
 use palpate::compile::{self, CompiledModel};
@@ -311,7 +311,7 @@ impl<'m> Stream<'m> {
         let best = self.recognizer.best();
         Line {
             touch: self.recognizer.touches(),
-            verdict: word(self.recognizer.verdict()),
+            verdict: verdict_name(self.recognizer.verdict()),
             // Before the first counted touch no object is more likely than the others.
             object: if self.recognizer.touches() == 0 { "" } else { self.model.object_name(best) },
             posterior: self.recognizer.posterior(best).to_f64(),

@@ -49,8 +49,8 @@ pub(super) struct Asked<'a> {
     pub(super) weights: Option<Vec<u32>>,
 }
 
-/// The word for a verdict.
-pub(super) fn word(verdict: Verdict) -> &'static str {
+/// Name of a verdict in results.
+pub(super) fn verdict_name(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Undecided => "undecided",
         Verdict::Recognized { .. } => "recognized",
@@ -108,7 +108,7 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
         let line = Line {
             row: number,
             sequence: rows.labels.get(number - 1).map(String::as_str),
-            verdict: (has_classes && adds_up).then(|| word(recognizer.verdict())),
+            verdict: (has_classes && adds_up).then(|| verdict_name(recognizer.verdict())),
             class: has_classes.then(|| model.object_name(class)),
             posterior: has_classes.then(|| recognizer.posterior(class).to_f64()),
             rows: (has_classes && adds_up).then(|| recognizer.touches()),

@@ -1,6 +1,6 @@
 //! A page of sections: one HTML file with its style, script, drawings and pictures inside.
 
-use super::table::{Cell, Records};
+use super::table::{Cell, Records, Table};
 use super::{chart::Svg, html};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -12,33 +12,24 @@ use std::path::{Path, PathBuf};
 /// The page's style.
 pub(crate) const STYLE: &str = include_str!("page.css");
 
-/// A figure: drawings side by side, with the numbers behind them. One without drawings shows its numbers: a table.
+/// A figure: one or more drawings side by side, with the numbers behind them.
 #[derive(Clone, Debug)]
-pub(crate) struct Figure {
+pub struct Figure {
     /// Its anchor, and its files' stem.
-    pub(crate) id: String,
-    title: String,
-    caption: String,
-    panels: Vec<Svg>,
-    data: Records,
+    pub id: String,
+    /// Title of the figure.
+    pub title: String,
+    /// Caption: how to read it, and how it was made.
+    pub caption: String,
+    /// The command that remakes it.
+    pub command: String,
+    /// Its drawings, at least one.
+    pub panels: Vec<Svg>,
+    /// The numbers drawn.
+    pub data: Records,
 }
 
 impl Figure {
-    /// A table without a caption.
-    pub(crate) fn new(id: &str, title: impl Into<String>, data: Records) -> Self {
-        Self { id: id.into(), title: title.into(), caption: String::new(), panels: Vec::new(), data }
-    }
-
-    /// Draws the numbers.
-    pub(crate) fn panels(self, panels: impl IntoIterator<Item = Svg>) -> Self {
-        Self { panels: panels.into_iter().collect(), ..self }
-    }
-
-    /// States how to read it, and how it was made.
-    pub(crate) fn caption(self, caption: impl Into<String>) -> Self {
-        Self { caption: caption.into(), ..self }
-    }
-
     /// All panels in one drawing on white, in rows of at most 1,160 pixels.
     pub(crate) fn whole_svg(&self) -> Svg {
         let cell = |size: fn(&Svg) -> u32| self.panels.iter().map(size).max().unwrap_or(1);
@@ -60,13 +51,15 @@ impl Figure {
 
 /// Part of a section.
 #[derive(Clone, Debug)]
-pub(crate) enum Block {
+pub enum Block {
     /// A paragraph.
     Text(String),
     /// A paragraph about what may make the figures wrong.
     Warning(String),
-    /// A figure or a table.
+    /// A figure.
     Figure(Figure),
+    /// A table.
+    Table(Table),
     /// A paragraph that is a link to a file beside the page: the file's name, and what the link says.
     Link(String, String),
     /// Small pictures, each with a name and a line below it.
@@ -86,36 +79,42 @@ pub struct Picture {
 
 /// A heading with what belongs below it.
 #[derive(Clone, Debug)]
-pub(crate) struct Section {
+pub struct Section {
     /// Its anchor.
-    pub(crate) id: String,
+    pub id: String,
     /// Its heading.
-    pub(crate) title: String,
+    pub title: String,
     /// Contents of the section.
-    pub(crate) blocks: Vec<Block>,
+    pub blocks: Vec<Block>,
 }
 
 impl Section {
     /// An empty section.
-    pub(crate) fn new(id: &str, title: &str) -> Self {
+    pub fn new(id: &str, title: &str) -> Self {
         Self { id: id.to_string(), title: title.to_string(), blocks: Vec::new() }
     }
 
     /// Adds a paragraph.
-    pub(crate) fn text(&mut self, text: impl Into<String>) -> &mut Self {
+    pub fn text(&mut self, text: impl Into<String>) -> &mut Self {
         self.blocks.push(Block::Text(text.into()));
         self
     }
 
     /// Adds a paragraph about what may make the figures wrong.
-    pub(crate) fn warning(&mut self, text: impl Into<String>) -> &mut Self {
+    pub fn warning(&mut self, text: impl Into<String>) -> &mut Self {
         self.blocks.push(Block::Warning(text.into()));
         self
     }
 
-    /// Adds a figure or a table.
-    pub(crate) fn figure(&mut self, figure: Figure) -> &mut Self {
+    /// Adds a figure.
+    pub fn figure(&mut self, figure: Figure) -> &mut Self {
         self.blocks.push(Block::Figure(figure));
+        self
+    }
+
+    /// Adds a table.
+    pub fn table(&mut self, table: Table) -> &mut Self {
+        self.blocks.push(Block::Table(table));
         self
     }
 }
@@ -124,24 +123,30 @@ impl Section {
 #[derive(Clone, Debug)]
 pub struct Page {
     /// Its title.
-    pub(crate) title: String,
+    pub title: String,
     /// One or two sentences below the title.
-    pub(crate) summary: String,
-    /// The command that remakes its figures and tables.
-    pub(crate) command: String,
+    pub summary: String,
     /// The sections, in order.
-    pub(crate) sections: Vec<Section>,
+    pub sections: Vec<Section>,
     /// The footer: settings and version, as name and value.
-    pub(crate) facts: Vec<(String, String)>,
+    pub facts: Vec<(String, String)>,
     /// True if the files of figures and tables are written next to the page and linked.
-    pub(crate) files: bool,
+    pub files: bool,
 }
 
 impl Page {
-    /// All figures and tables, in order.
-    pub(crate) fn figures(&self) -> impl Iterator<Item = &Figure> {
-        let blocks = self.sections.iter().flat_map(|section| &section.blocks);
-        blocks.filter_map(|block| if let Block::Figure(figure) = block { Some(figure) } else { None })
+    /// All figures, in order.
+    pub fn figures(&self) -> impl Iterator<Item = &Figure> {
+        self.blocks().filter_map(|block| if let Block::Figure(figure) = block { Some(figure) } else { None })
+    }
+
+    /// All tables, in order.
+    pub fn tables(&self) -> impl Iterator<Item = &Table> {
+        self.blocks().filter_map(|block| if let Block::Table(table) = block { Some(table) } else { None })
+    }
+
+    fn blocks(&self) -> impl Iterator<Item = &Block> {
+        self.sections.iter().flat_map(|section| &section.blocks)
     }
 
     /// The page as HTML.
@@ -186,10 +191,11 @@ impl Page {
         let mut files = Vec::new();
         if self.files {
             for figure in self.figures() {
-                if !figure.panels.is_empty() {
-                    files.push((format!("{}.svg", figure.id), figure.whole_svg().text.into_bytes()));
-                }
+                files.push((format!("{}.svg", figure.id), figure.whole_svg().text.into_bytes()));
                 files.push((format!("{}.csv", figure.id), figure.data.csv()?));
+            }
+            for table in self.tables() {
+                files.push((format!("{}.csv", table.id), table.data.csv()?));
             }
         }
         let before = if self.files { std::fs::read_to_string(path).unwrap_or_default() } else { String::new() };
@@ -213,18 +219,22 @@ impl Page {
             Block::Text(text) => html! { p { (marked(text)) } },
             Block::Warning(text) => html! { p.warning { strong { "Warning: " } (marked(text)) } },
             Block::Link(file, text) => html! { p { a href=(file) { (text) } } },
-            Block::Figure(figure) => {
-                let is_table = figure.panels.is_empty();
-                html! {
-                    figure.table[is_table] id=(figure.id) {
-                        h3 { (figure.title) }
-                        @if is_table { (rows(&figure.data, &figure.title)) } @else {
-                            div.panels { @for panel in &figure.panels { (drawing(panel, &figure.title)) } }
-                        }
-                        figcaption { (marked(&figure.caption)) (self.origin(&figure.id, !is_table)) }
+            Block::Figure(figure) => html! {
+                figure id=(figure.id) {
+                    h3 { (figure.title) }
+                    div.panels {
+                        @for panel in &figure.panels { (drawing(panel, &figure.title)) }
                     }
+                    figcaption { (marked(&figure.caption)) (self.origin(&figure.id, &figure.command, true)) }
                 }
-            }
+            },
+            Block::Table(table) => html! {
+                figure.table id=(table.id) {
+                    h3 { (table.title) }
+                    (rows(&table.data, &table.title))
+                    figcaption { (marked(&table.caption)) (self.origin(&table.id, &table.command, false)) }
+                }
+            },
             Block::Pictures(pictures) => html! {
                 div.pictures {
                     @for Picture { name, png, line } in pictures {
@@ -239,10 +249,10 @@ impl Page {
     }
 
     /// The command that remakes a figure or table, and links to its numbers.
-    fn origin(&self, id: &str, drawn: bool) -> Markup {
+    fn origin(&self, id: &str, command: &str, drawn: bool) -> Markup {
         html! {
             div.origin {
-                @if !self.command.is_empty() { code { (self.command) } }
+                @if !command.is_empty() { code { (command) } }
                 @if self.files {
                     " " a href={ (id) ".csv" } { (id) ".csv" }
                     @if drawn { " " a href={ (id) ".svg" } { (id) ".svg" } }
@@ -313,11 +323,16 @@ mod tests {
         let mut section = Section::new("one", "One & only");
         let mut data = Records::new(["name", "value"]);
         data.push(["<b>".into(), Cell::Number(2.0, 0)]);
-        section.figure(Figure::new("t", "T", data).caption("See `palpate calibrate <model>`."));
+        section.table(Table {
+            id: "t".into(),
+            title: "T".into(),
+            caption: "See `palpate calibrate <model>`.".into(),
+            command: "palpate report a b".into(),
+            data,
+        });
         let page = Page {
             title: "A <page>".into(),
             summary: String::new(),
-            command: "palpate report a b".into(),
             sections: vec![section],
             facts: vec![("seed".into(), "1".into())],
             files: true,
@@ -346,15 +361,8 @@ mod tests {
         let page = |columns: [&str; 2]| {
             let mut section = Section::new("one", "One");
             let data = Records::new(columns);
-            section.figure(Figure::new("t", "T", data));
-            Page {
-                title: "A".into(),
-                summary: String::new(),
-                command: String::new(),
-                sections: vec![section],
-                facts: Vec::new(),
-                files: true,
-            }
+            section.table(Table { id: "t".into(), title: "T".into(), caption: "".into(), command: "".into(), data });
+            Page { title: "A".into(), summary: String::new(), sections: vec![section], facts: Vec::new(), files: true }
         };
         std::fs::write(&csv, "mine,yours\n").unwrap();
         let error = page(["name", "value"]).write(&path).unwrap_err();
@@ -376,7 +384,14 @@ mod tests {
     fn panels_are_tiled_into_one_drawing() {
         let text = "<svg width=\"500\" height=\"100\"></svg>\n".into();
         let panel = Svg { text, width: 500, height: 100, narrow: None };
-        let figure = Figure::new("f", String::new(), Records::default()).panels(vec![panel; 3]);
+        let figure = Figure {
+            id: "f".into(),
+            title: String::new(),
+            caption: String::new(),
+            command: String::new(),
+            panels: vec![panel; 3],
+            data: Records::default(),
+        };
         let whole = figure.whole_svg();
         assert_eq!((whole.width, whole.height), (1000, 200));
         assert!(whole.text.contains("<svg x=\"500\" y=\"0\"") && whole.text.contains("<svg x=\"0\" y=\"100\""));

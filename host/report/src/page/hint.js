@@ -13,7 +13,9 @@
       scroll.previousElementSibling.remove();
     }
   };
-  const watch = new ResizeObserver(() => document.querySelectorAll(".scroll").forEach(hint));
+  // Afterward: what a hint moves would be seen as a change of size while sizes are observed.
+  const all = () => setTimeout(() => document.querySelectorAll(".scroll").forEach(hint));
+  const watch = new ResizeObserver(all);
   // Whichever of the two changes its size.
   document.querySelectorAll(".scroll, .scroll > table").forEach((part) => watch.observe(part));
 })();

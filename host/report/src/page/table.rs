@@ -131,6 +131,21 @@ impl Records {
     }
 }
 
+/// A table in the page.
+#[derive(Clone, Debug)]
+pub struct Table {
+    /// Its anchor, and its file's stem.
+    pub id: String,
+    /// Title of the table.
+    pub title: String,
+    /// Caption: how to read it, and how it was made.
+    pub caption: String,
+    /// The command that remakes it.
+    pub command: String,
+    /// Its contents.
+    pub data: Records,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,7 +1,6 @@
 //! The file of a model around its content: header, text, optional sections, checksum. The content here is trees or tables.
 
-use super::write::count;
-use crate::error::Result;
+use crate::error::{CompileProblem, Error, Result};
 use palpate_onboard::Model;
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, HeaderBuilder, Section, Tag, checksum};
 
@@ -89,4 +88,13 @@ pub(super) fn bytes_of<'s>(sections: impl IntoIterator<Item = &'s OwnedSection>)
         section.write(&mut |part| bytes.extend_from_slice(part));
     }
     bytes
+}
+
+/// A length in the header.
+pub(super) fn count(number: usize) -> Result<u32> {
+    u32::try_from(number).map_err(|_| too_large())
+}
+
+pub(super) fn too_large() -> Error {
+    CompileProblem::TooLarge.into()
 }

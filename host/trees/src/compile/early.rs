@@ -7,7 +7,7 @@
 //! Where to look is chosen by the rows: every place costs a comparison of all margins, and groups of trees of its own.
 
 use super::forest::{Branch, Branches, Forest, each_leaf};
-use super::lower::Lowered;
+use super::lowered::Lowered;
 use super::quantize::Scale;
 use crate::ensemble::Output;
 use crate::rows::{Encoder, Rows};

@@ -4,7 +4,7 @@ use super::cells::Cells;
 use super::code::{Form, Program, Statements};
 use super::early::{self, EarlyExit, EarlyExitFound};
 use super::forest::Forest;
-use super::lower::Lowered;
+use super::lowered::Lowered;
 use super::parts::Parts;
 use super::rounding;
 use super::share::Sharing;

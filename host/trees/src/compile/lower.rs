@@ -1,36 +1,16 @@
-//! A forest lowered to what all layouts of trees encode: merged trees, their scale, ranks and order. A layout is costed from
-//! it without a byte being written.
+//! Lowers a forest, costs a layout without a byte being written, and writes one.
 
 use super::axes::{Axes, visit};
 use super::cost::{Instructions, Shape};
 use super::early;
 use super::forest::{Forest, each_leaf};
+use super::lowered::Lowered;
 use super::merge::{Merged, Source, merge};
 use super::parts::Parts;
 use super::quantize::Scale;
 use super::share::{Sharing, share};
-use super::trees::{self, Leaves, Run, Sections};
+use super::trees::{self, Leaves, Sections};
 use palpate_shared::format::{Axis, EarlyExit, Group, HEADER_LENGTH, Layout, LeafType, MAX_COMPLETE_DEPTH};
-
-/// A lowered forest.
-pub(super) struct Lowered<'f> {
-    pub(super) leaf: LeafType,
-    /// Trees that are walked: fewer than the ensemble's, with the same sums, where there are such.
-    pub(super) forest: Forest<'f>,
-    /// Scale of the trees that are walked.
-    pub(super) scale: Scale,
-    /// Starting values of the margins: in units, or f32 bits.
-    pub(super) base: Vec<i32>,
-    /// Trees of the ensemble that each one stands for.
-    pub(super) sources: Vec<Source>,
-    pub(super) axes: Axes,
-    /// The trees in their order, in groups.
-    pub(super) runs: Vec<Run>,
-    /// Places where a walk for a class alone may end.
-    pub(super) exits: Vec<EarlyExit>,
-    /// Scale of the ensemble's own trees.
-    pub(super) rounding: Scale,
-}
 
 impl<'f> Lowered<'f> {
     /// Lowers a forest for leaves of one type; `None` where they do not fit it.

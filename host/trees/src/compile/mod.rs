@@ -49,6 +49,7 @@ mod forest;
 mod groups;
 mod layout;
 mod lower;
+mod lowered;
 mod merge;
 mod model;
 mod parts;
@@ -81,7 +82,7 @@ use crate::error::{Error, Result};
 use code::{Form, Program, Statements};
 use forest::Forest;
 use layout::Layouts;
-use lower::Lowered;
+use lowered::Lowered;
 use palpate_onboard::Stopping;
 
 /// Settings of compilation.

@@ -2,7 +2,7 @@
 
 use super::axes::{Axes, cuts_bytes, visit};
 use super::forest::{Branch, Forest, Split, each_leaf};
-use super::lower::Lowered;
+use super::lowered::{Lowered, Run};
 use super::quantize::Scale;
 use crate::ensemble::Output;
 use palpate_shared::format::{Axis, Group, Layout, LeafType};
@@ -44,20 +44,6 @@ pub(super) struct Sections {
     pub(super) axes: Vec<Axis>,
     pub(super) cuts: Vec<u8>,
     pub(super) nodes: Vec<u8>,
-}
-
-/// Trees that share a group, in order.
-pub(super) struct Run {
-    pub(super) object: Option<u8>,
-    shift: u8,
-    pub(super) trees: Vec<usize>,
-}
-
-impl Run {
-    /// Levels of its trees as complete trees.
-    pub(super) fn depth(&self, forest: &Forest<'_>) -> usize {
-        self.trees.iter().map(|&tree| forest.trees[tree].depth).max().unwrap_or(0).max(1)
-    }
 }
 
 /// Groups of trees. Integers add up in any order, so trees are sorted by shift, object and depth; f32 leaves keep the

@@ -1,7 +1,7 @@
 //! Header and sections of a model of trees or tables.
 
 use super::Settings;
-use super::container::{Container, OwnedSection, bytes_of};
+use super::container::{Container, OwnedSection, bytes_of, count, too_large};
 use super::forest::Forest;
 use super::parts::Parts;
 use crate::ensemble::{Ensemble, Node, Output};
@@ -192,13 +192,4 @@ pub(super) fn hash(ensemble: &Ensemble) -> u64 {
 
 fn byte(number: usize) -> Result<u8> {
     u8::try_from(number).map_err(|_| too_large())
-}
-
-/// A length in the header.
-pub(super) fn count(number: usize) -> Result<u32> {
-    u32::try_from(number).map_err(|_| too_large())
-}
-
-fn too_large() -> Error {
-    CompileProblem::TooLarge.into()
 }

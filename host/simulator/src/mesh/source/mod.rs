@@ -276,7 +276,7 @@ pub fn objects_of_instances(sources: &[String]) -> Result<Vec<Object>> {
 /// The objects of all `sources` as [`objects`](fn@objects) finds them, neither made nor read; sorted by name.
 ///
 /// # Errors
-/// Errors as those of [`objects`](fn@objects), except for errors inside a file.
+/// Errors of [`objects`](fn@objects), except for errors inside a file.
 pub fn files(sources: &[String]) -> Result<Vec<Source>> {
     found(sources, Search::default()).map(|(found, _)| found)
 }

@@ -2,7 +2,7 @@
 
 use super::super::axes::Axes;
 use super::super::forest::Branch;
-use super::super::lower::Lowered;
+use super::super::lowered::Lowered;
 use super::super::quantize::Scale;
 use super::Form;
 use super::columns::{Column, Columns};

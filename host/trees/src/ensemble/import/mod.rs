@@ -72,7 +72,7 @@ impl Ensemble {
 /// Memory: some 50 bytes for each byte of the file at most.
 ///
 /// # Errors
-/// Errors as those of [`Ensemble::load_with`], except for reading the file.
+/// Errors of [`Ensemble::load_with`], except for reading the file.
 pub fn read(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
     let mut ensemble = read_as_it_is(path, bytes, options)?;
     if options.missing.is_some()

@@ -1,0 +1,41 @@
+//! A forest lowered to what all layouts of trees encode: merged trees, their scale, ranks and order.
+
+use super::axes::Axes;
+use super::forest::Forest;
+use super::merge::Source;
+use super::quantize::Scale;
+use palpate_shared::format::{EarlyExit, LeafType};
+
+/// A lowered forest.
+pub(super) struct Lowered<'f> {
+    pub(super) leaf: LeafType,
+    /// Trees that are walked: fewer than the ensemble's, with the same sums, where there are such.
+    pub(super) forest: Forest<'f>,
+    /// Scale of the trees that are walked.
+    pub(super) scale: Scale,
+    /// Starting values of the margins: in units, or f32 bits.
+    pub(super) base: Vec<i32>,
+    /// Trees of the ensemble that each one stands for.
+    pub(super) sources: Vec<Source>,
+    pub(super) axes: Axes,
+    /// The trees in their order, in groups.
+    pub(super) runs: Vec<Run>,
+    /// Places where a walk for a class alone may end.
+    pub(super) exits: Vec<EarlyExit>,
+    /// Scale of the ensemble's own trees.
+    pub(super) rounding: Scale,
+}
+
+/// Trees that share a group, in order.
+pub(super) struct Run {
+    pub(super) object: Option<u8>,
+    pub(super) shift: u8,
+    pub(super) trees: Vec<usize>,
+}
+
+impl Run {
+    /// Levels of its trees as complete trees.
+    pub(super) fn depth(&self, forest: &Forest<'_>) -> usize {
+        self.trees.iter().map(|&tree| forest.trees[tree].depth).max().unwrap_or(0).max(1)
+    }
+}
