@@ -2,7 +2,7 @@
 
 use super::Global;
 use super::recognize::{Arguments, Event, Line};
-use super::recognize_rows::word;
+use super::recognize_rows::verdict_name;
 use super::table::POSE;
 use palpate::error::LocateProblem;
 use palpate::locate::{self, Approach, Hand, Locating, Maps, MapsFile, Pose};
@@ -177,7 +177,7 @@ impl<'m> Stream<'m> {
         let posterior = self.locating.posteriors().get(leader).copied().unwrap_or(0.0);
         let line = Line {
             touch: self.touches,
-            verdict: word(verdict),
+            verdict: verdict_name(verdict),
             object: if self.touches == 0 { "" } else { self.maps.object_name(leader) },
             posterior,
             refused,
