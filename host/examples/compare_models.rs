@@ -14,6 +14,7 @@ use palpate::evaluate::{Candidate, Margins, Settings, evaluate};
 use palpate::mesh::{Mesh, Object};
 use palpate::onboard::Model;
 use palpate::touches::{Dataset, Origin, folds};
+use palpate::with;
 use std::error::Error;
 use std::path::Path;
 
@@ -23,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         None => example_touches()?,
     };
     let split = folds::split(&dataset, 0.25, 1)?;
-    let settings = Settings { at: vec![1, 5, 10, 20], groups: 500, ..Settings::default() };
+    let settings = with!(Settings::default(), at = vec![1, 5, 10, 20], groups = 500);
     println!("{:10} {:>8} {:>28}   stops after", "method", "bytes", "accuracy at 1, 5, 10, 20");
     for (name, preset) in [("published", train::Settings::paper()), ("compact", train::Settings::compact())] {
         let ensemble = train(&split.train, &preset, &())?;

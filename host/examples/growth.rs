@@ -25,6 +25,7 @@ use palpate::evaluate::{Candidate, Margins, SequentialSettings};
 use palpate::mesh::builtin;
 use palpate::onboard::Model;
 use palpate::touches::{Dataset, ObjectTouches, Origin};
+use palpate::with;
 use std::error::Error;
 use std::time::Instant;
 
@@ -111,8 +112,8 @@ impl Way {
         let mut parts = words.split(':');
         let (rounds, depth) = parts.next().and_then(|part| part.split_once('x')).ok_or("ROUNDSxDEPTH first")?;
         let (rounds, depth) = (rounds.parse()?, depth.parse()?);
-        let mut settings = train::Settings { rounds, depth, ..train::Settings::compact() };
-        let mut compile = compile::Settings { max_touches: LIMIT, error_rate: ERROR_RATE, ..Default::default() };
+        let mut settings = with!(train::Settings::compact(), rounds = rounds, depth = depth);
+        let mut compile = with!(compile::Settings::default(), max_touches = LIMIT, error_rate = ERROR_RATE);
         for part in parts {
             match part.split_once('=').unwrap_or((part, "")) {
                 ("eta", value) => settings.eta = value.parse()?,

@@ -11,6 +11,7 @@ use palpate::ensemble::{Ensemble, Inputs, Output, Provenance};
 use palpate::rows::{RowSequence, SequenceColumns, Sequences};
 use palpate::stream::{self, Wanted};
 use palpate::trees::train::{Parameters, Rows, train};
+use palpate::with;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeSet;
@@ -98,7 +99,7 @@ fn report(name: &str, all: &Sequences, names: &[String], rate: f64) -> Result<()
     let ensemble =
         Ensemble { inputs: Inputs::unnamed(width), objects, base_margins, trees, origin: Provenance::default() };
     let bytes = compile(&ensemble, &Settings::default())?.bytes;
-    let settings = stream::Settings { rate, ..stream::Settings::default() };
+    let settings = with!(stream::Settings::default(), rate = rate);
     let found = stream::calibrate(&compile::open(&bytes)?, &calibrated, &settings, &())?;
     let sure = compile::open(&found.model)?;
     let evaluated = stream::evaluate(&sure, &unseen, &Wanted::default())?;

@@ -134,7 +134,7 @@ mod tests;
 
 pub use error::{Error, Result};
 pub use glam;
-pub use palpate_base::{output, progress, wording};
+pub use palpate_base::{output, progress, with, wording};
 pub use palpate_onboard as onboard;
 pub use palpate_shared as shared;
 pub use palpate_simulator::{self as simulator, in_order, mesh, probe, random};

@@ -5,6 +5,7 @@ use crate::replay::groups_and_splits;
 use crate::sections::{trained, with_sections};
 use crate::vectors::{Cut, Run};
 use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::with;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
     Axis, Counted, EarlyExit, Group, HEADER_LENGTH, Header, Held, Length, Link, MUST_UNDERSTAND, MisfitTerms,
@@ -46,7 +47,7 @@ pub fn model(layout: Layout, leaf: Leaf, each: bool) -> Vec<u8> {
     // Tables by contact pattern have no other descriptor.
     let descriptor = if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { Descriptor::Curvature };
     let shape = Shape { descriptor, objects: 3, trees: 4, depth: 2, each, thresholds: 6, leaf: 1.0 };
-    let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
+    let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout));
     compile(&random::ensemble(shape, 5), &settings).expect("a small ensemble").bytes
 }
 
@@ -55,7 +56,7 @@ pub fn shared(layout: Layout, is_wide: bool) -> Vec<u8> {
     let trees = if is_wide { 80 } else { 4 };
     let shape =
         Shape { descriptor: Descriptor::Curvature, objects: 3, trees, depth: 2, each: true, thresholds: 6, leaf: 1.0 };
-    let settings = Settings { leaf: Leaf::I8, layout: Some(layout), shared_leaves: Some(true), ..Settings::default() };
+    let settings = with!(Settings::default(), leaf = Leaf::I8, layout = Some(layout), shared_leaves = Some(true));
     let ensemble = random::ensemble(shape, 5);
     let ensemble = if is_wide { ensemble } else { random::with_few_leaves(ensemble, 5) };
     compile(&ensemble, &settings).expect("a small ensemble").bytes

@@ -3,6 +3,7 @@
 use palpate::compile::{self, Settings, compile};
 use palpate::rows::{Encoder, RowSequence, Rows, Sequences, feature_names};
 use palpate::stream;
+use palpate::with;
 use palpate_onboard::Model;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
@@ -54,7 +55,7 @@ pub fn streams(rows: usize) -> Vec<Stream> {
             }
         };
         let ensemble = ensemble.expect("an ensemble");
-        let plain = compile(&ensemble, &Settings { max_touches: 9, ..Settings::default() }).expect("a model").bytes;
+        let plain = compile(&ensemble, &with!(Settings::default(), max_touches = 9)).expect("a model").bytes;
         let model = compile::open(&plain).expect("a model");
         let csv = path.with_extension("rows.csv");
         let names = feature_names(&model);
@@ -62,7 +63,7 @@ pub fn streams(rows: usize) -> Vec<Stream> {
         let table = Rows::read(&csv, &names, None).expect("rows");
         let mut rng = SmallRng::seed_from_u64(number as u64);
         let sequences = sequences(&model, &table, 900, &mut rng);
-        let settings = stream::Settings { rate: 0.1, ..stream::Settings::default() };
+        let settings = with!(stream::Settings::default(), rate = 0.1);
         let bytes = stream::calibrate(&model, &sequences, &settings, &()).expect("a calibrated model").model;
         let more = self::sequences(&model, &table, rows.div_ceil(LENGTH), &mut rng);
         let encoder = Encoder::of(&model);

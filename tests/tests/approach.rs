@@ -1,6 +1,7 @@
 //! Proposals of the next approach, and the weight of recent touches against the evidence.
 
 use palpate::compile::{Leaf, Restated, Settings, compile, restate};
+use palpate::with;
 use palpate_onboard::station::{NoStorage, Station, serve};
 use palpate_onboard::{Forgetting, Model, Proposal, Recognizer, Stopping, Verdict};
 use palpate_shared::format::{Plan, Tag};
@@ -21,7 +22,7 @@ fn model(objects: usize) -> Vec<u8> {
         thresholds: 100,
         leaf: 0.1,
     };
-    compile(&random::ensemble(shape, 1), &Settings { leaf: Leaf::I16, ..Settings::default() }).unwrap().bytes
+    compile(&random::ensemble(shape, 1), &with!(Settings::default(), leaf = Leaf::I16)).unwrap().bytes
 }
 
 /// The model with a plan of random separations; every pose whose number is 3 modulo 10 never touches.

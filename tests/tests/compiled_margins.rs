@@ -2,6 +2,7 @@
 
 use palpate::compile::{Compiled, Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node, OverTouches};
+use palpate::with;
 use palpate_onboard::Model;
 use palpate_shared::format::f32_key;
 use palpate_shared::{Descriptor, Touch};
@@ -34,12 +35,12 @@ fn hold(ensemble: &Ensemble, compiled: &Compiled, touches: &[Touch]) {
 
 fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
     let layouts = std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
-    let settings = |layout| Settings { leaf, layout, ..Settings::default() };
+    let settings = |layout| with!(Settings::default(), leaf = leaf, layout = layout);
     let plain = layouts.map(settings);
     // Of those that walk trees, one with shared leaves.
     let walked = [Layout::Compact, Layout::Complete, Layout::Wide];
     let shared = walked.get(ensemble.trees.len() % walked.len()).copied();
-    let shared = shared.map(|layout| Settings { shared_leaves: Some(true), ..settings(Some(layout)) });
+    let shared = shared.map(|layout| with!(settings(Some(layout)), shared_leaves = Some(true)));
     plain.chain(shared).filter_map(|settings| compile(ensemble, &settings).ok()).collect()
 }
 
@@ -126,7 +127,7 @@ proptest! {
         let mut margins = vec![0.0; shape.objects];
         let mut models = 0;
         for layout in [None, Some(Layout::Compact), Some(Layout::Wide), Some(Layout::Complete), Some(Layout::Grid)] {
-            let settings = Settings { leaf: Leaf::F32, layout, ..Settings::default() };
+            let settings = with!(Settings::default(), leaf = Leaf::F32, layout = layout);
             let Ok(compiled) = compile(&ensemble, &settings) else { continue };
             models += 1;
             let model = Model::new(&compiled.bytes).unwrap();

@@ -2,6 +2,7 @@
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
+use palpate::with;
 use palpate_onboard::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
 use palpate_shared::{Descriptor, Touch};
 use palpate_tests::abuse::snapshot;
@@ -32,7 +33,7 @@ fn steps(steps: &[f32], margins: &[&[f32]]) -> Ensemble {
 }
 
 fn compiled(ensemble: &Ensemble, leaf: Leaf) -> Vec<u8> {
-    compile(ensemble, &Settings { leaf, layout: Some(Layout::Compact), ..Settings::default() }).unwrap().bytes
+    compile(ensemble, &with!(Settings::default(), leaf = leaf, layout = Some(Layout::Compact))).unwrap().bytes
 }
 
 /// The object that was recognized, and after how many touches.
@@ -133,7 +134,7 @@ fn leaves_beyond_reason_are_refused_with_the_place() {
     for value in [1e30, -1e30, f32::MAX, f32::INFINITY, f32::NAN] {
         for leaf in [Leaf::I8, Leaf::I16, Leaf::F32] {
             let ensemble = steps(&[500.0], &[&[5.0, -5.0], &[value, 5.0]]);
-            let error = compile(&ensemble, &Settings { leaf, ..Settings::default() }).unwrap_err();
+            let error = compile(&ensemble, &with!(Settings::default(), leaf = leaf)).unwrap_err();
             let message = error.to_string();
             assert!(message.contains("margin of the object 0") || message.contains("tree 0: leaf 2"), "{message}");
             assert_eq!(error.exit_code(), 1);
@@ -252,7 +253,7 @@ fn snapshots_of_other_models_and_damaged_ones_are_refused_and_change_nothing() {
 
 #[test]
 fn priors_count_once() {
-    let settings = Settings { priors: Some(vec![0.9, 0.1]), ..Settings::default() };
+    let settings = with!(Settings::default(), priors = Some(vec![0.9, 0.1]));
     let bytes = compile(&steps(&[500.0], &[&[0.0, 0.0], &[0.0, 3.0]]), &settings).unwrap().bytes;
     let model = Model::new(&bytes).unwrap();
     let mut recognizer: Recognizer<2> = Recognizer::new(&model, stopping(0.01, 60)).unwrap();

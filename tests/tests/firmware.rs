@@ -6,6 +6,7 @@
 use palpate::chip::{Connection, Emulator, Faults, Steps, Summary, Update, stream};
 use palpate::compile::{Leaf, Settings, compile};
 use palpate::touches::{Dataset, ObjectTouches, Source};
+use palpate::with;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::format::{Counted, Trained, TrainedTouches};
 use palpate_shared::link::{
@@ -51,8 +52,7 @@ fn model(descriptor: Descriptor, seed: u64) -> Vec<u8> {
         needs_pose: descriptor.needs_pose(),
         largest_spread: 1_000_000,
     };
-    let compiled =
-        compile(&random::ensemble(shape, seed), &Settings { leaf: Leaf::I8, ..Settings::default() }).unwrap();
+    let compiled = compile(&random::ensemble(shape, seed), &with!(Settings::default(), leaf = Leaf::I8)).unwrap();
     trained(&compiled.bytes, &Trained { touches: Some(touches), ..Trained::default() })
 }
 

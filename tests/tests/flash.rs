@@ -5,6 +5,7 @@
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_write};
 use palpate::compile::{Leaf, Settings, compile};
+use palpate::with;
 use palpate_onboard::station::{
     FlashError, FlashStorage, MappedFlash, Place, ServeError, Station, Storage, record_length, serve,
 };
@@ -31,7 +32,7 @@ fn model(seed: u64) -> &'static [u8] {
         thresholds: 40,
         leaf: 0.3,
     };
-    let settings = Settings { leaf: Leaf::I8, ..Settings::default() };
+    let settings = with!(Settings::default(), leaf = Leaf::I8);
     compile(&random::ensemble(shape, seed), &settings).unwrap().bytes.leak()
 }
 

@@ -2,6 +2,7 @@
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
+use palpate::with;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::{ContactTime, Descriptor, Touch};
 
@@ -47,7 +48,7 @@ fn over_patterns() -> Ensemble {
 
 /// Compiles with the version and the ensemble's hash, which may change with a release, set to zero.
 fn body(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> String {
-    let compiled = compile(ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap();
+    let compiled = compile(ensemble, &with!(Settings::default(), leaf = leaf, layout = Some(layout))).unwrap();
     let version = env!("CARGO_PKG_VERSION");
     let text = 96;
     assert_eq!(&compiled.bytes[text + 1..text + 1 + version.len()], version.as_bytes());
@@ -57,7 +58,7 @@ fn body(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> String {
 
 #[test]
 fn the_header_is_pinned() {
-    let settings = Settings { leaf: Leaf::I8, layout: Some(Layout::Complete), ..Settings::default() };
+    let settings = with!(Settings::default(), leaf = Leaf::I8, layout = Some(Layout::Complete));
     let compiled = compile(&ensemble(), &settings).unwrap();
     let mut header = compiled.bytes[..96].to_vec();
     header[72..80].fill(0);
@@ -75,7 +76,7 @@ fn the_sections_of_every_layout_are_pinned() {
 #[test]
 fn the_sections_of_tables_by_contact_pattern_are_pinned_and_read_as_worked_out_by_hand() {
     assert_eq!(body(&over_patterns(), Leaf::I8, Layout::Patterns), PATTERNS);
-    let settings = Settings { leaf: Leaf::I8, layout: Some(Layout::Patterns), ..Settings::default() };
+    let settings = with!(Settings::default(), leaf = Leaf::I8, layout = Some(Layout::Patterns));
     let compiled = compile(&over_patterns(), &settings).unwrap();
     let model = Model::new(&compiled.bytes).unwrap();
     let (some, missing) = (ContactTime::from_micros, ContactTime::MISSING);
@@ -99,7 +100,7 @@ fn the_sections_of_tables_by_contact_pattern_are_pinned_and_read_as_worked_out_b
 
 #[test]
 fn tables_by_contact_pattern_with_other_axes_are_refused() {
-    let settings = Settings { leaf: Leaf::I8, layout: Some(Layout::Patterns), ..Settings::default() };
+    let settings = with!(Settings::default(), leaf = Leaf::I8, layout = Some(Layout::Patterns));
     let compiled = compile(&over_patterns(), &settings).unwrap().bytes;
     let axes = compiled.windows(4).position(|axis| axis == [1, 1, 4, 1]).unwrap();
     let refused = |change: &dyn Fn(&mut Vec<u8>)| {
@@ -120,7 +121,7 @@ fn tables_by_contact_pattern_with_other_axes_are_refused() {
 #[test]
 fn the_sections_of_a_model_with_shared_leaves_are_pinned() {
     let settings =
-        Settings { leaf: Leaf::I8, layout: Some(Layout::Compact), shared_leaves: Some(true), ..Settings::default() };
+        with!(Settings::default(), leaf = Leaf::I8, layout = Some(Layout::Compact), shared_leaves = Some(true));
     let compiled = compile(&ensemble(), &settings).unwrap();
     let at = 97 + env!("CARGO_PKG_VERSION").len();
     let body = &compiled.bytes[at..compiled.bytes.len() - 4];
@@ -141,10 +142,10 @@ fn a_golden_model_gives_the_margins_worked_out_by_hand() {
         (Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::MISSING]), [1.625, -1.5]),
     ];
     let compiled = SECTIONS.map(|(leaf, layout, _)| {
-        compile(&ensemble(), &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap().bytes
+        compile(&ensemble(), &with!(Settings::default(), leaf = leaf, layout = Some(layout))).unwrap().bytes
     });
     let shared = [Layout::Compact, Layout::Complete, Layout::Wide].map(|layout| {
-        let settings = Settings { layout: Some(layout), shared_leaves: Some(true), ..Settings::default() };
+        let settings = with!(Settings::default(), layout = Some(layout), shared_leaves = Some(true));
         compile(&ensemble(), &settings).unwrap().bytes
     });
     for bytes in compiled.iter().chain(&shared).chain([&palpate_tests::unaligned::model()]) {

@@ -1,6 +1,7 @@
 //! Bytes that are not a model are refused, and bytes that pass can be walked.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::with;
 use palpate_onboard::{Batch, Model, ModelError, Recognizer, Stopping};
 use palpate_shared::format::{Counted, HEADER_LENGTH, Trained, TrainedNoise, TrainedTouches, checksum};
 use palpate_shared::{Descriptor, Patterns};
@@ -34,7 +35,7 @@ fn models() -> Vec<Vec<u8>> {
                 let descriptor =
                     if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { shape.descriptor };
                 let ensemble = random::ensemble(Shape { each, descriptor, ..shape }, 5);
-                let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
+                let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout));
                 models.push(compile(&ensemble, &settings).unwrap().bytes);
                 // The same with optional sections.
                 models.push(trained(models.last().unwrap(), &TRAINED));
@@ -187,7 +188,7 @@ fn changed_bytes_that_are_accepted_give_the_same_margins_at_every_address_and_al
     let mut rng = SmallRng::seed_from_u64(1);
     let shape = Shape { thresholds: 200, trees: 60, ..Shape::SMALL };
     let many = [Layout::Compact, Layout::Complete, Layout::Grid].map(|layout| {
-        let settings = Settings { leaf: Leaf::I16, layout: Some(layout), ..Settings::default() };
+        let settings = with!(Settings::default(), leaf = Leaf::I16, layout = Some(layout));
         compile(&random::ensemble(shape, 6), &settings).unwrap().bytes
     });
     let models: Vec<Vec<u8>> = models().into_iter().step_by(2).chain(many).collect();

@@ -2,6 +2,7 @@
 //! by name.
 
 use palpate::compile::{Leaf, Settings, compile};
+use palpate::with;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
@@ -19,7 +20,7 @@ const TRAINED: Trained = Trained {
 
 fn model(descriptor: Descriptor) -> Vec<u8> {
     let shape = Shape { descriptor, objects: 3, trees: 5, depth: 3, each: true, thresholds: 20, leaf: 0.5 };
-    compile(&random::ensemble(shape, 1), &Settings { leaf: Leaf::I16, ..Settings::default() }).unwrap().bytes
+    compile(&random::ensemble(shape, 1), &with!(Settings::default(), leaf = Leaf::I16)).unwrap().bytes
 }
 
 /// A model with one section of any tag and content.

@@ -7,6 +7,7 @@ use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node};
 use palpate::evaluate::parity::{Parity, parity};
 use palpate::touches::{Dataset, ObjectTouches, Origin, Source};
+use palpate::with;
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
 use palpate_tests::random;
@@ -18,7 +19,7 @@ const SEQUENCES: usize = 10_000;
 
 /// Bytes of a compiled model.
 fn size(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> usize {
-    compile(ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() }).unwrap().bytes.len()
+    compile(ensemble, &with!(Settings::default(), leaf = leaf, layout = Some(layout))).unwrap().bytes.len()
 }
 
 /// Touches of the built-in objects, without poses and with them; captured only once, as all tests need them.
@@ -50,7 +51,7 @@ fn spread(dataset: &Dataset, count: usize) -> Dataset {
 }
 
 fn hold(ensemble: &Ensemble, dataset: &Dataset, count: usize) -> (Parity, Parity) {
-    let compiled = compile(ensemble, &Settings { leaf: Leaf::I16, ..Settings::default() }).unwrap();
+    let compiled = compile(ensemble, &with!(Settings::default(), leaf = Leaf::I16)).unwrap();
     let model = Model::new(&compiled.bytes).unwrap();
     let touches = parity(ensemble, &model, &spread(dataset, count), 0, 1, &()).unwrap();
     let sequences = parity(ensemble, &model, dataset, SEQUENCES, 1, &()).unwrap();
@@ -73,7 +74,7 @@ fn the_published_methods_margins_stay_within_a_bound_that_is_near_and_its_verdic
 fn the_compact_methods_margins_and_verdicts_are_the_full_models_own() {
     for descriptor in [Descriptor::Curvature, Descriptor::Oriented] {
         let dataset = captured(true);
-        let ensemble = train(dataset, &train::Settings { descriptor, ..train::Settings::compact() }, &()).unwrap();
+        let ensemble = train(dataset, &with!(train::Settings::compact(), descriptor = descriptor), &()).unwrap();
         let (touches, sequences) = hold(&ensemble, dataset, FEWER);
         assert_eq!((touches.stated_bound, touches.max_margin_error, touches.best_differs), (0.0, 0.0, 0));
         assert_eq!((sequences.verdict_differs, sequences.touches_differ), (0, 0));
@@ -83,7 +84,7 @@ fn the_compact_methods_margins_and_verdicts_are_the_full_models_own() {
 #[test]
 fn leaves_that_were_not_rounded_in_training_stay_within_a_bound_that_is_near() {
     let dataset = captured(true);
-    let settings = train::Settings { descriptor: Descriptor::Oriented, leaf_bits: None, ..train::Settings::compact() };
+    let settings = with!(train::Settings::compact(), descriptor = Descriptor::Oriented, leaf_bits = None);
     let (touches, sequences) = hold(&train(dataset, &settings, &()).unwrap(), dataset, FEWER);
     assert!(touches.max_margin_error > 0.0 && touches.max_margin_error <= touches.stated_bound);
     assert!(touches.stated_bound <= 4.0 * touches.max_margin_error);
@@ -97,7 +98,7 @@ fn a_thousand_one_output_trees_take_six_bytes_a_split_and_forty_multi_output_tre
     let nodes = one.trees.iter().flat_map(|tree| &tree.nodes);
     let splits = nodes.filter(|node| matches!(node, Node::Split { .. })).count();
     assert!(one.trees.len() == 1000 && size(one, Leaf::I16, Layout::Compact) <= 6 * splits, "{splits} splits");
-    let each = train(dataset, &train::Settings { rounds: 40, depth: 5, ..train::Settings::compact() }, &()).unwrap();
+    let each = train(dataset, &with!(train::Settings::compact(), rounds = 40, depth = 5), &()).unwrap();
     let bytes = size(&each, Leaf::I8, Layout::Complete);
     assert!(each.trees.len() == 40 && bytes <= 17_000, "{bytes} bytes");
 }

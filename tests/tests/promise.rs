@@ -2,6 +2,7 @@
 //! are exact.
 
 use palpate::compile::{Leaf, Restated, RestatedSection, Settings, compile, restate};
+use palpate::with;
 use palpate_onboard::{Model, ModelError, NothingExpected, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict};
 use palpate_shared::format::{OddsByObject, Per, Promise, PromisedNoise, Tag, Temperature, TrainedNoise};
 use palpate_shared::{Descriptor, Touch};
@@ -20,7 +21,7 @@ fn plain() -> Vec<u8> {
         thresholds: 30,
         leaf: 0.5,
     };
-    compile(&random::ensemble(shape, 1), &Settings { leaf: Leaf::I16, ..Settings::default() }).unwrap().bytes
+    compile(&random::ensemble(shape, 1), &with!(Settings::default(), leaf = Leaf::I16)).unwrap().bytes
 }
 
 /// Full touches, which such a model takes.

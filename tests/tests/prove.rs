@@ -5,6 +5,7 @@ use palpate::ensemble::{Ensemble, Inputs, Node, Tree};
 use palpate::error::ProofProblem;
 use palpate::prove::{Certificate, check, moves, prove};
 use palpate::rows::Encoder;
+use palpate::with;
 use palpate_onboard::Model;
 use palpate_shared::format::{Header, Tag, checksum};
 use palpate_shared::{Descriptor, MISSING_FEATURE};
@@ -49,7 +50,7 @@ fn models(ensemble: &Ensemble, scales: Option<Vec<f32>>) -> Vec<Vec<u8>> {
     let layouts = || std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
     let all = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
     let compiled = all.filter_map(|(leaf, layout)| {
-        compile(ensemble, &Settings { leaf, layout, scales: scales.clone(), ..Settings::default() }).ok()
+        compile(ensemble, &with!(Settings::default(), leaf = leaf, layout = layout, scales = scales.clone())).ok()
     });
     compiled.map(|compiled| compiled.bytes).collect()
 }
@@ -61,7 +62,11 @@ fn early_exits(ensemble: &Ensemble, scales: Option<Vec<f32>>) -> Vec<Vec<u8>> {
         .flat_map(|leaf| [Layout::Complete, Layout::Compact, Layout::Wide].map(|layout| (leaf, layout)));
     let compiled = all.filter_map(|(leaf, layout)| {
         let (layout, early_exit) = (Some(layout), Some(EarlyExit::Always));
-        compile(ensemble, &Settings { leaf, layout, early_exit, scales: scales.clone(), ..Settings::default() }).ok()
+        compile(
+            ensemble,
+            &with!(Settings::default(), leaf = leaf, layout = layout, early_exit = early_exit, scales = scales.clone()),
+        )
+        .ok()
     });
     compiled.map(|compiled| compiled.bytes).collect()
 }
@@ -269,7 +274,7 @@ fn random_changes_of_large_models_that_change_a_margin_are_refused_in_both_ways(
 #[test]
 fn another_ensemble_is_refused_with_the_tree_and_the_rows() {
     let ensemble = random::ensemble(Shape::SMALL, 1);
-    let bytes = compile(&ensemble, &Settings { layout: Some(Layout::Compact), ..Settings::default() }).unwrap().bytes;
+    let bytes = compile(&ensemble, &with!(Settings::default(), layout = Some(Layout::Compact))).unwrap().bytes;
     let mut other = ensemble.clone();
     let threshold = other.trees[2].nodes.iter_mut().find_map(|node| match node {
         Node::Split { threshold, .. } => Some(threshold),
@@ -313,7 +318,7 @@ fn a_certificate_with_a_wrong_line_says_which() {
 #[test]
 fn certificates_with_absurd_numbers_are_refused() {
     let ensemble = random::ensemble(Shape::SMALL, 1);
-    let bytes = compile(&ensemble, &Settings { layout: Some(Layout::Compact), ..Settings::default() }).unwrap().bytes;
+    let bytes = compile(&ensemble, &with!(Settings::default(), layout = Some(Layout::Compact))).unwrap().bytes;
     let (_, certificate) = prove(&bytes, &ensemble, FILE).unwrap();
     let tree = certificate.trees[0].clone();
     let with = |change: &dyn Fn(&mut Certificate)| {
@@ -341,7 +346,7 @@ fn certificates_with_absurd_numbers_are_refused() {
 fn trees_deeper_than_any_ensemble_are_refused_and_not_walked() {
     let shape = Shape { descriptor: Descriptor::Oriented, depth: 13, trees: 1, thresholds: 4_000, ..Shape::SMALL };
     let ensemble = random::ensemble(shape, 3);
-    let mut bytes = compile(&ensemble, &Settings { layout: Some(Layout::Wide), ..Settings::default() }).unwrap().bytes;
+    let mut bytes = compile(&ensemble, &with!(Settings::default(), layout = Some(Layout::Wide))).unwrap().bytes;
     let header = Header::of(&bytes);
     let (splits, leaves) = (header.nodes_length() as usize, header.leaves_length() as usize);
     let body = bytes.len() - 4;
@@ -370,7 +375,7 @@ fn thousands_of_merged_trees_are_proved() {
     ensemble.trees.retain(|tree| tree.nodes.len() == 3);
     assert!(ensemble.trees.len() > 2_000, "{}", ensemble.trees.len());
     for leaf in [Leaf::I8, Leaf::I16] {
-        let settings = Settings { leaf, layout: Some(Layout::Compact), ..Settings::default() };
+        let settings = with!(Settings::default(), leaf = leaf, layout = Some(Layout::Compact));
         let bytes = compile(&ensemble, &settings).unwrap().bytes;
         let (proof, certificate) = prove(&bytes, &ensemble, FILE).unwrap();
         assert!(20 * proof.trees < ensemble.trees.len(), "{} trees", proof.trees);

@@ -2,6 +2,7 @@
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs};
+use palpate::with;
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::format::{Counted, Trained, TrainedTouches};
 use palpate_shared::{ContactPattern, ContactTime, Descriptor, Patterns, Pose, Touch};
@@ -10,7 +11,7 @@ use palpate_tests::sections::trained;
 
 fn model(descriptor: Descriptor) -> Vec<u8> {
     let shape = Shape { descriptor, objects: 3, trees: 5, depth: 3, each: true, thresholds: 20, leaf: 0.5 };
-    compile(&random::ensemble(shape, 1), &Settings { leaf: Leaf::I16, ..Settings::default() }).unwrap().bytes
+    compile(&random::ensemble(shape, 1), &with!(Settings::default(), leaf = Leaf::I16)).unwrap().bytes
 }
 
 /// Result of a recognizer for a touch; checks that it changed nothing if it refused it.
@@ -95,7 +96,7 @@ fn a_model_that_needs_a_pose_refuses_touches_without_one() {
 
 #[test]
 fn a_model_over_rows_refuses_touches_and_one_over_touches_refuses_rows() {
-    let settings = Settings { leaf: Leaf::F32, layout: Some(Layout::Wide), ..Settings::default() };
+    let settings = with!(Settings::default(), leaf = Leaf::F32, layout = Some(Layout::Wide));
     let shape = Shape {
         descriptor: Descriptor::Curvature,
         objects: 3,

@@ -2,6 +2,7 @@
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node, OverTouches};
+use palpate::with;
 use palpate_onboard::{Batch, Model};
 use palpate_shared::format::{Header, checksum};
 use palpate_shared::{Descriptor, MISSING_FEATURE};
@@ -30,7 +31,7 @@ fn models(ensemble: &Ensemble) -> Vec<Vec<u8>> {
     let layouts = || std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
     let settings = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
     let compiled = settings.filter_map(|(leaf, layout)| {
-        let settings = Settings { leaf, layout, ..Settings::default() };
+        let settings = with!(Settings::default(), leaf = leaf, layout = layout);
         compile(ensemble, &settings).ok()
     });
     compiled.map(|compiled| compiled.bytes).collect()

@@ -5,6 +5,7 @@
 use palpate::chip::{Connection, Emulator, Port, Steps, Update, stream};
 use palpate::compile::{Leaf, Settings, compile};
 use palpate::touches::{Dataset, ObjectTouches, Source};
+use palpate::with;
 use palpate_onboard::Model;
 use palpate_onboard::station::{Memory, record_length, serve};
 use palpate_shared::Descriptor;
@@ -78,7 +79,7 @@ fn soak_between_two_processes_neither_drifts_nor_grows_nor_loses_a_frame() {
         thresholds: 200,
         leaf: 0.02,
     };
-    let settings = Settings { leaf: Leaf::I16, ..Settings::default() };
+    let settings = with!(Settings::default(), leaf = Leaf::I16);
     let bytes = compile(&random::ensemble(shape, 1), &settings).unwrap().bytes;
     let model = Model::new(&bytes).unwrap();
 

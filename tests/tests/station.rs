@@ -3,6 +3,7 @@
 
 use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate::compile::{Leaf, Settings, compile};
+use palpate::with;
 use palpate_onboard::station::{
     ERRORS_IN_A_ROW, Memory, NoStorage, RecordsTooShort, ServeError, Station, record_length, serve,
 };
@@ -40,7 +41,7 @@ fn model(seed: u64) -> Vec<u8> {
         thresholds: 100,
         leaf: 0.05,
     };
-    let settings = Settings { leaf: Leaf::I16, ..Settings::default() };
+    let settings = with!(Settings::default(), leaf = Leaf::I16);
     trained(&compile(&random::ensemble(shape, seed), &settings).unwrap().bytes, &CONTACTS)
 }
 

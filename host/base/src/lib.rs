@@ -15,3 +15,14 @@ pub mod progress;
 pub mod wording;
 
 pub use error::{Error, Result};
+
+/// A value with some of its fields replaced, `with!(Noise::default(), time = 0.1)`: the literal with `..` that other crates
+/// cannot write of a type that may get more fields.
+#[macro_export]
+macro_rules! with {
+    ($base:expr $(, $field:ident = $value:expr)+ $(,)?) => {{
+        let mut value = $base;
+        $(value.$field = $value;)+
+        value
+    }};
+}

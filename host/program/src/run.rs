@@ -17,6 +17,7 @@ use palpate::probe::noise::Noise;
 use palpate::progress::{self, Progress};
 use palpate::touches::folds::{self, Split};
 use palpate::touches::{Dataset, Listing, ObjectTouches, Origin};
+use palpate::with;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_report::error::ReportProblem;
 use palpate_report::play::{self, Contender, Expected};
@@ -234,8 +235,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let names: BTreeSet<&str> = objects.iter().map(|object| object.name.as_str()).collect();
     let is_same = |listing: &Listing| listing.objects.iter().map(|entry| entry.name.as_str()).eq(names.iter().copied());
     let force = settings.capture.force || settings.replace || Listing::read(&data)?.as_ref().is_some_and(is_same);
-    let captured =
-        capture::capture(objects, &capture::Settings { force, ..settings.capture.clone() }, &data, progress)?;
+    let captured = capture::capture(objects, &with!(settings.capture.clone(), force = force), &data, progress)?;
     let seed = settings.capture.origin.seed;
     stages.end("capture of full touches");
     let mut split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
@@ -245,7 +245,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
         Origin { touches: settings.approaches, approaches: true, seed: seed.wrapping_add(1), ..origin.clone() };
     let directory = out.join("approaches");
     let force = settings.capture.force || settings.replace || Listing::read(&directory)?.as_ref().is_some_and(is_same);
-    let approach_settings = capture::Settings { origin, force, ..settings.capture.clone() };
+    let approach_settings = with!(settings.capture.clone(), origin = origin, force = force);
     let approached = capture::capture(objects, &approach_settings, &directory, progress)?;
     stages.end("capture of approaches");
     let mut approaches = folds::split(&Dataset::read(&directory)?, settings.test_share, seed)?;
@@ -257,11 +257,11 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let job = Job { settings, objects, approaches: &approaches.test, kept: &kept, out, progress };
     stages.end("reading and dividing touches");
     let mut method = |name, files, preset, split| Trial::new(name, files, preset, split, job, &mut stages);
-    let compact = train::Settings { seed, probe, noise: settings.noise, ..train::Settings::compact() };
-    let full = train::Settings { counted: Some(Counted::Full), ..compact.clone() };
-    let contacts = train::Settings { counted: Some(Counted::Contacts), ..compact };
+    let compact = with!(train::Settings::compact(), seed = seed, probe = probe, noise = settings.noise);
+    let full = with!(compact.clone(), counted = Some(Counted::Full));
+    let contacts = with!(compact, counted = Some(Counted::Contacts));
     let paper =
-        method("the paper's method", "paper", train::Settings { seed, probe, ..train::Settings::paper() }, &split)?;
+        method("the paper's method", "paper", with!(train::Settings::paper(), seed = seed, probe = probe), &split)?;
     let full = method("ours on full touches", "full", full, &split)?;
     let ours = method("ours on every contact", "ensemble", contacts, &approaches)?;
     let model = compile::open(&ours.compiled.bytes)?;
@@ -353,7 +353,7 @@ impl Trial {
         let train_seconds = stages.end(format!("{name}: training"));
         progress::check(progress)?;
         progress.begin(&format!("compiling and testing {name}"), None);
-        let compile = compile::Settings { error_rate: settings.error_rate, ..compile::Settings::default() };
+        let compile = with!(compile::Settings::default(), error_rate = settings.error_rate);
         let mut compiled = compile::compile(&ensemble, &compile)?;
         stages.end(format!("{name}: compiling"));
         let calibration = calibrated(&compiled.bytes, split, &job)?;
@@ -369,29 +369,31 @@ impl Trial {
         let seed = settings.capture.origin.seed;
         let mut evaluation = evaluate::evaluate(
             &margins,
-            &evaluate::Settings {
-                at: AT.into_iter().filter(|&at| distinct_groups(fewest, at) >= LEAST_GROUPS).collect(),
-                at_approaches: Vec::new(),
-                groups: settings.groups,
-                error_rate: None,
-                max_touches: None,
-                seed,
-                noise: settings.noise,
-            },
+            &with!(
+                evaluate::Settings::default(),
+                at = AT.into_iter().filter(|&at| distinct_groups(fewest, at) >= LEAST_GROUPS).collect(),
+                at_approaches = Vec::new(),
+                groups = settings.groups,
+                error_rate = None,
+                max_touches = None,
+                seed = seed,
+                noise = settings.noise
+            ),
         )?;
         let approached = Margins::new(Candidate::Compiled(&model), approaches)?;
         let fewest_approaches = approached.fewest_approaches();
         let by_approach = evaluate::evaluate(
             &approached,
-            &evaluate::Settings {
-                at: Vec::new(),
-                at_approaches: AT_APPROACHES.into_iter().filter(|&at| at <= fewest_approaches).collect(),
-                groups: settings.groups,
-                error_rate: None,
-                max_touches: None,
-                seed,
-                noise: settings.noise,
-            },
+            &with!(
+                evaluate::Settings::default(),
+                at = Vec::new(),
+                at_approaches = AT_APPROACHES.into_iter().filter(|&at| at <= fewest_approaches).collect(),
+                groups = settings.groups,
+                error_rate = None,
+                max_touches = None,
+                seed = seed,
+                noise = settings.noise
+            ),
         )?;
         evaluation.approaches = by_approach.approaches;
         let curve = margins.curve(MOST.min(largest_group(fewest)), settings.groups, seed)?;
@@ -423,13 +425,13 @@ fn calibrated(bytes: &[u8], split: &Split, job: &Job<'_>) -> Result<Result<Calib
     // Neither training nor tests use these seeds.
     let seed = origin.seed.wrapping_add(if approaches { 3 } else { 2 });
     let origin = Origin { approaches, seed, ..origin.clone() };
-    let terms = calibrate::Settings {
-        rate: settings.error_rate,
-        sequences: settings.sequences,
-        noise: settings.noise,
-        seed,
-        ..calibrate::Settings::default()
-    };
+    let terms = with!(
+        calibrate::Settings::default(),
+        rate = settings.error_rate,
+        sequences = settings.sequences,
+        noise = settings.noise,
+        seed = seed
+    );
     let kept = &mut *job.kept.borrow_mut();
     match calibrate::calibrate_fresh(&compile::open(bytes)?, job.objects, &origin, &terms, kept, job.progress) {
         Err(error) => match error.problem() {

@@ -10,7 +10,7 @@ use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::capture;
 use palpate::compile;
-use palpate::ensemble::{Ensemble, train};
+use palpate::ensemble::Ensemble;
 use palpate::error::Result;
 use palpate::evaluate::{Approaches, Candidate, Margins, SequentialSettings};
 use palpate::mesh::Object;
@@ -19,6 +19,7 @@ use palpate::probe::scene::Scene;
 use palpate::progress;
 use palpate::touches::{Dataset, Origin};
 use palpate::tune::probe::{median_length, scaled_probe};
+use palpate::with;
 use palpate::wording::{self, decimal, list, percent};
 use palpate_shared::ContactPattern;
 use palpate_shared::format::{Counted, Length};
@@ -104,7 +105,7 @@ pub(super) fn measure(context: &Context) -> Result<ByApproach> {
     let settings = context.settings;
     let origin = Origin { approaches: true, ..settings.capture.clone() };
     let [train, test] = approaches(context, context.all_scenes(), &origin)?;
-    let recipe = |counted| train::Settings { counted: Some(counted), ..context.ours() };
+    let recipe = |counted| with!(context.ours(), counted = Some(counted));
     let contacts = context.train(&train, &recipe(Counted::Contacts))?;
     let all = context.train(&train, &recipe(Counted::All))?;
     let models = context.models()?;
@@ -417,7 +418,7 @@ mod tests {
 
     #[test]
     fn the_probes_of_both_sizes_are_those_that_touched() {
-        let true_size = Probe { radius: 2.0, spacing: 20.0, speed: 130.0, ..Probe::default() };
+        let true_size = with!(Probe::default(), radius = 2.0, spacing = 20.0, speed = 130.0);
         let said = sizes_caption(&[Probe::default(), true_size]);
         assert!(
             said.contains("Scaled, fingers of radius 0.15 units") && said.contains("true size fingers of radius 2 mm"),

@@ -13,6 +13,7 @@ use palpate::probe::scene::Scene;
 use palpate::progress::{self, Progress};
 use palpate::touches::folds::{self, Split};
 use palpate::touches::{Dataset, ObjectTouches, Origin};
+use palpate::with;
 use palpate_shared::Touch;
 use rayon::prelude::*;
 use std::cell::OnceCell;
@@ -127,17 +128,17 @@ impl<'a> Context<'a> {
 
     /// Training settings of the paper's method.
     pub(super) fn paper(&self) -> train::Settings {
-        train::Settings { rounds: self.settings.paper_rounds, seed: self.settings.seed, ..train::Settings::paper() }
+        with!(train::Settings::paper(), rounds = self.settings.paper_rounds, seed = self.settings.seed)
     }
 
     /// Training settings of ours.
     pub(super) fn ours(&self) -> train::Settings {
-        train::Settings { seed: self.settings.seed, ..train::Settings::compact() }
+        with!(train::Settings::compact(), seed = self.settings.seed)
     }
 
     /// Training settings of ours for noise.
     pub(super) fn ours_for_noise(&self) -> train::Settings {
-        train::Settings { noise: self.settings.noise, ..self.ours() }
+        with!(self.ours(), noise = self.settings.noise)
     }
 
     /// The objects, ready to be touched: the scenes of each object's instances.
@@ -194,7 +195,7 @@ pub(super) fn get_or_try<T>(cell: &OnceCell<T>, make: impl FnOnce() -> Result<T>
 /// The bytes of an ensemble compiled with its leaves in f32: its f32 margins rounded to whole units, which are far finer
 /// than any difference that decides, and several times faster to compute than by the trainer's own trees.
 pub(super) fn compiled_f32(ensemble: &Ensemble) -> Result<compile::Compiled> {
-    compile::compile(ensemble, &compile::Settings { leaf: compile::Leaf::F32, ..compile::Settings::default() })
+    compile::compile(ensemble, &with!(compile::Settings::default(), leaf = compile::Leaf::F32))
 }
 
 #[cfg(test)]

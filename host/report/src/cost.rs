@@ -10,10 +10,10 @@ use crate::page::color;
 use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::compile::{self, Leaf};
-use palpate::ensemble::train;
 use palpate::ensemble::{Ensemble, OverTouches};
 use palpate::error::{CompileProblem, Error, Result};
 use palpate::evaluate::{Candidate, Margins, parity};
+use palpate::with;
 use palpate::wording::count;
 use palpate_onboard::Model;
 use palpate_shared::Touch;
@@ -80,7 +80,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
         &[None],
     )?;
     for (rounds, depth, bins) in FAMILY {
-        let mut family = train::Settings { rounds, depth, bins, ..context.ours() };
+        let mut family = with!(context.ours(), rounds = rounds, depth = depth, bins = bins);
         if rounds < 30 {
             // Few trees have to learn faster.
             family.eta = 0.6;
@@ -100,7 +100,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
 fn fitting(ensemble: &Ensemble, leaf: Leaf, layout: Option<compile::Layout>) -> Result<Option<compile::Compiled>> {
     match compile::compile(
         ensemble,
-        &compile::Settings { leaf, layout, shared_leaves: Some(false), ..compile::Settings::default() },
+        &with!(compile::Settings::default(), leaf = leaf, layout = layout, shared_leaves = Some(false)),
     ) {
         Ok(compiled) => Ok(Some(compiled)),
         Err(error) if is_unfit(&error) => Ok(None),

@@ -11,10 +11,10 @@ use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::compile;
 use palpate::ensemble::Ensemble;
-use palpate::ensemble::train;
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins};
 use palpate::touches::Dataset;
+use palpate::with;
 use palpate::wording::{count, decimal};
 use palpate_shared::Descriptor;
 use serde::{Deserialize, Serialize};
@@ -95,13 +95,8 @@ fn half(data: &Dataset) -> Dataset {
 /// Estimates the limit and tests the first fold's models on the same groups.
 pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
     let settings = context.settings;
-    let large_ensemble = train::Settings {
-        rounds: settings.limit_rounds,
-        depth: DEPTH,
-        eta: 0.1,
-        min_child_weight: 100.0,
-        ..context.ours()
-    };
+    let large_ensemble =
+        with!(context.ours(), rounds = settings.limit_rounds, depth = DEPTH, eta = 0.1, min_child_weight = 100.0);
     let halved = half(&large.train);
     let (density, width) = density_model(Descriptor::Curvature, &large.train, &large.held)?;
     let (density_half, _) = density_model(Descriptor::Curvature, &halved, &large.held)?;

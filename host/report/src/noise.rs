@@ -15,6 +15,7 @@ use palpate::evaluate::{Candidate, Margins, add_noise};
 use palpate::probe::noise::{self, Noise};
 use palpate::touches::folds::Split;
 use palpate::touches::{Dataset, ObjectTouches};
+use palpate::with;
 use palpate::wording::{count, counted};
 use plotters::style::RGBColor;
 use serde::{Deserialize, Serialize};
@@ -41,14 +42,14 @@ fn kinds() -> [Noise; 9] {
     let timer = 1_000.0;
     [
         none,
-        Noise { timer, ..none },
-        Noise { debounce: 2_000.0, ..none },
-        Noise { missed: [0.02; 3], ..none },
-        Noise { bent: [3_000.0, 0.0, 0.0], ..none },
-        Noise { speed_error: 0.05, ..none },
-        Noise { speed_bias: 0.01, ..none },
-        Noise { speed_bias: 0.1, ..none },
-        Noise { debounce: 2_000.0, timer, speed_bias: 0.02, ..Noise::gaussian(1_000.0) },
+        with!(none, timer = timer),
+        with!(none, debounce = 2_000.0),
+        with!(none, missed = [0.02; 3]),
+        with!(none, bent = [3_000.0, 0.0, 0.0]),
+        with!(none, speed_error = 0.05),
+        with!(none, speed_bias = 0.01),
+        with!(none, speed_bias = 0.1),
+        with!(Noise::gaussian(1_000.0), debounce = 2_000.0, timer = timer, speed_bias = 0.02),
     ]
 }
 

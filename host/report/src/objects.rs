@@ -179,6 +179,7 @@ fn beyond<'a>(values: impl Iterator<Item = (&'a str, &'a Vec<f64>)>, reach: f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate::with;
 
     #[test]
     fn the_caption_of_a_capture_states_the_probe_and_the_sizes_of_the_settings() {
@@ -188,7 +189,7 @@ mod tests {
             "{published}"
         );
         let probe =
-            Probe { radius: 2.0, spacing: 20.0, speed: 130.0, tilt: 5.0, stroke: Some(7.0), ..Probe::default() };
+            with!(Probe::default(), radius = 2.0, spacing = 20.0, speed = 130.0, tilt = 5.0, stroke = Some(7.0));
         let own = touched_by(&Origin { unit: Length::Millimeter, probe, ..Origin::default() });
         assert_eq!(
             own,

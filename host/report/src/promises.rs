@@ -14,6 +14,7 @@ use palpate::compile;
 use palpate::error::{CalibrateProblem, Result};
 use palpate::probe::scene::Scene;
 use palpate::touches::Origin;
+use palpate::with;
 use palpate::wording;
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
@@ -146,13 +147,13 @@ fn sequences(context: &Context, model: &Model<'_>, seed: u64, kept: &mut calibra
     let names = context.names();
     let objects: Vec<(&str, &[Scene])> =
         names.iter().map(String::as_str).zip(context.all_scenes().iter().map(Vec::as_slice)).collect();
-    let settings = calibrate::Settings {
-        rate: RATES[RATES.len() - 1],
-        sequences: context.settings.promise_sequences,
-        max_touches: Some(MAX_TOUCHES),
-        seed,
-        ..calibrate::Settings::default()
-    };
+    let settings = with!(
+        calibrate::Settings::default(),
+        rate = RATES[RATES.len() - 1],
+        sequences = context.settings.promise_sequences,
+        max_touches = Some(MAX_TOUCHES),
+        seed = seed
+    );
     let origin = Origin { seed, approaches: false, ..context.settings.capture.clone() };
     let captured = calibrate::fresh(model, &objects, &origin, &settings, kept, context.progress)?;
     // The model's objects are the context's, in the same order.

@@ -11,6 +11,7 @@ use palpate::compare::{self, Comparison, Cost, ObjectComparison, Share};
 use palpate::error::{EvaluateProblem, Result};
 use palpate::progress;
 use palpate::touches::{Dataset, Origin, checksum, files};
+use palpate::with;
 use palpate::wording::{decimal, percent};
 use std::path::Path;
 
@@ -36,7 +37,7 @@ pub(super) fn measure(context: &Context, directory: &Path) -> Result<Comparison>
         return Err(palpate::Error::from(EvaluateProblem::Incomparable { detail }).in_file(directory));
     }
     let groups = settings.sequences;
-    let compared = compare::Settings { groups, seed: settings.seed, ..Default::default() };
+    let compared = with!(compare::Settings::default(), groups = groups, seed = settings.seed);
     compare::compare(&recorded, &simulated, &compared, context.progress)
 }
 

@@ -282,6 +282,7 @@ fn facts(settings: &Settings, stages: &[(String, f64)], seconds: f64) -> Vec<(St
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate::with;
 
     use palpate::mesh::{Mesh, obj, source};
     use palpate::output::write_whole;
@@ -403,7 +404,7 @@ mod tests {
             }
         }
         let place = tempfile::tempdir().unwrap();
-        let probe = Probe { radius: 0.1, spacing: 1.25, speed: 20.0, tilt: 5.0, ..Probe::default() };
+        let probe = with!(Probe::default(), radius = 0.1, spacing = 1.25, speed = 20.0, tilt = 5.0);
         let capture = Origin { probe, ..Origin::default() };
         let settings = Settings { capture, ..tiny(meshes(&place.path().join("meshes"))) };
         let directory = place.path().join("report");

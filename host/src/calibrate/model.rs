@@ -31,6 +31,7 @@ pub(crate) const STRICTEST: [f64; 2] = [2.5, 10.0];
 
 /// Settings of a promise, and of the touches that it rests on.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// The error rate: wrong names of those that are given.
     pub rate: f64,

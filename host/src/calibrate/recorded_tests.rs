@@ -7,6 +7,7 @@ use crate::probe::noise::Noise;
 use crate::tests::repetitions::{assert_rare, repetitions};
 use crate::tests::synthetic;
 use crate::touches::{Dataset, ObjectTouches, Recorded, Source};
+use crate::with;
 use palpate_onboard::Model;
 
 const OBJECTS: usize = 3;
@@ -24,7 +25,7 @@ fn simulated(count: usize, seed: u64) -> Dataset {
 /// Recordings of a robot, which are not what the simulation says. Its hand is faster, and its contacts are noisy.
 fn recorded(count: usize, seed: u64) -> Dataset {
     let mut dataset = simulated(count, seed);
-    dataset.add_noise(&Noise { speed: 1.12, ..Noise::gaussian(8_000.0) }, seed, 1);
+    dataset.add_noise(&with!(Noise::gaussian(8_000.0), speed = 1.12), seed, 1);
     dataset
 }
 

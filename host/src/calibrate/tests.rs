@@ -9,6 +9,7 @@ use crate::random::{Purpose, generator};
 use crate::tests::repetitions::{assert_rare, repetitions};
 use crate::tests::synthetic;
 use crate::touches::{Dataset, ObjectTouches};
+use crate::with;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use rand::RngExt;
 use std::collections::BTreeSet;
@@ -76,7 +77,7 @@ fn in_turns(used: Vec<Vec<u32>>, count: u32) -> Vec<BTreeSet<u32>> {
 
 /// The same touches, made by `robots` robots in turn, whose biases change nothing.
 fn of_robots(mut dataset: Dataset, robots: usize) -> Dataset {
-    dataset.add_noise(&Noise { pose_bias: 1.0, ..Noise::default() }, 1, robots);
+    dataset.add_noise(&with!(Noise::default(), pose_bias = 1.0), 1, robots);
     dataset
 }
 
@@ -470,7 +471,7 @@ fn the_same_seed_gives_the_same_model_on_any_number_of_threads() {
 #[test]
 fn noise_is_stated_and_a_bias_makes_every_sequence_a_robots() {
     let compiled = model();
-    let noise = Noise { speed_bias: 0.02, ..Noise::gaussian(1_000.0) };
+    let noise = with!(Noise::gaussian(1_000.0), speed_bias = 0.02);
     let settings = Settings { rate: 0.2, max_touches: Some(20), noise, ..Settings::default() };
     let calibrated = calibrate(&compiled.model(), fresh(4_000, 2), &settings, &()).unwrap();
     assert_eq!(Noise::of_promise(&calibrated.promise.noise), noise);

@@ -5,6 +5,7 @@ use crate::mesh::Mesh;
 use crate::probe::Probe;
 use crate::probe::noise::Noise;
 use crate::touches::{Captured, Dataset, Format, Surroundings};
+use crate::with;
 use glam::DVec3;
 use palpate_shared::{Q15_ONE, Touch};
 
@@ -23,7 +24,7 @@ fn brick() -> Object {
 }
 
 fn probe() -> Probe {
-    Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 5.0, ..Probe::default() }
+    with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 5.0)
 }
 
 fn origin(touches: u64) -> Origin {
@@ -99,7 +100,7 @@ fn a_square_about_the_middle_may_be_aimed_at_instead_of_the_box() {
 #[test]
 fn contacts_later_than_the_stroke_are_missing_and_a_short_travel_meets_nothing() {
     let origin = origin(1_000);
-    let short = Origin { probe: Probe { stroke: Some(12.0), ..probe() }, ..origin.clone() };
+    let short = Origin { probe: with!(probe(), stroke = Some(12.0)), ..origin.clone() };
     let (whole, short) = (captured(origin.clone()), captured(short));
     let mut cut = 0;
     for (whole, short) in whole.touches().zip(short.touches()) {
@@ -112,7 +113,7 @@ fn contacts_later_than_the_stroke_are_missing_and_a_short_travel_meets_nothing()
     }
     assert!(cut > 100, "{cut}");
     // The start is half of the longest side above the top: a travel of 10 mm ends 20 mm above it.
-    let high = captured(Origin { probe: Probe { travel: Some(10.0), ..probe() }, ..origin.clone() });
+    let high = captured(Origin { probe: with!(probe(), travel = Some(10.0)), ..origin.clone() });
     let (object, sides) = (&high.objects[0], sides(&origin));
     for (index, touch) in object.touches().iter().enumerate() {
         let side = sides[object.source_of(index)];
@@ -124,7 +125,7 @@ fn contacts_later_than_the_stroke_are_missing_and_a_short_travel_meets_nothing()
 
 #[test]
 fn noise_and_lost_contacts_are_added_and_the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
-    let real = Noise { position: 1_000.0, missed: [0.05; 3], ..Noise::gaussian(5_000.0) };
+    let real = with!(Noise::gaussian(5_000.0), position = 1_000.0, missed = [0.05; 3]);
     for format in Format::ALL.into_iter().filter(|format| format.is_built_in()) {
         let origin = Origin { real, format, ..origin(700) };
         let directories = [1, 3].map(|threads| {

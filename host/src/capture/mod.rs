@@ -56,6 +56,7 @@ pub use sample::Sampler;
 
 /// Settings of a capture, and its treatment of existing files.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// Origin of the touches.
     pub origin: Origin,

@@ -5,6 +5,7 @@ use crate::error::MeshProblem;
 use crate::mesh::Mesh;
 use crate::probe::noise::Noise;
 use crate::touches::{Captured, Dataset, Listing, Surroundings, folds};
+use crate::with;
 use glam::DVec3;
 
 /// A flat object, and one that lies in several ways.
@@ -172,7 +173,7 @@ fn samples_are_of_instances_and_placements_in_turn_and_the_data_set_names_them()
 fn parts_and_copies_of_a_data_set_keep_the_placements_and_their_weights() {
     let (settings, place) = (Settings::from(origin(600)), tempfile::tempdir().unwrap());
     let whole = in_memory(&[of_instances(), objects()[0].clone()], &settings, &()).unwrap().0;
-    let noisy = whole.each(|object| object.noisy(&Noise { speed_bias: 0.1, ..Noise::default() }, 1, 2));
+    let noisy = whole.each(|object| object.noisy(&with!(Noise::default(), speed_bias = 0.1), 1, 2));
     let folds::Split { train, test } = folds::split(&whole, 0.3, 1).unwrap();
     let thinned = whole.each(|object| object.thinned(100));
     let doubled = whole.each(|object| {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::with;
 
 use crate::mesh::Mesh;
 use crate::probe::approach::Probe;
@@ -180,11 +181,11 @@ fn wrong_settings_are_wrong_arguments() {
         Settings { threads: Some(0), ..settings() },
         with(Origin { length: 0.0, ..origin(9) }),
         with(Origin { length: f64::INFINITY, ..origin(9) }),
-        with(Origin { probe: Probe { radius: -0.15, ..probe }, ..origin(9) }),
-        with(Origin { probe: Probe { spacing: f64::NAN, ..probe }, ..origin(9) }),
-        with(Origin { probe: Probe { speed: 0.0, ..probe }, ..origin(9) }),
-        with(Origin { probe: Probe { speed: 1e-3, ..probe }, ..origin(9) }),
-        with(Origin { probe: Probe { tilt: 90.0, ..probe }, ..origin(9) }),
+        with(Origin { probe: with!(probe, radius = -0.15), ..origin(9) }),
+        with(Origin { probe: with!(probe, spacing = f64::NAN), ..origin(9) }),
+        with(Origin { probe: with!(probe, speed = 0.0), ..origin(9) }),
+        with(Origin { probe: with!(probe, speed = 1e-3), ..origin(9) }),
+        with(Origin { probe: with!(probe, tilt = 90.0), ..origin(9) }),
     ] {
         let directory = tempfile::tempdir().unwrap();
         assert_eq!(capture(&objects(), &wrong, directory.path(), &()).unwrap_err().exit_code(), 2, "{wrong:?}");
@@ -469,7 +470,7 @@ fn touches_of_an_object_are_of_its_instances_in_turn() {
 #[test]
 fn an_object_at_its_true_size_is_scaled_to_millimeters() {
     let unit = Length::Millimeter;
-    let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, ..Probe::default() };
+    let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0);
     let origin = Origin { unit, probe, ..origin(50) };
     let mut object = Object::new("globe", Mesh::globe(12));
     let problem = |result: Result<Vec<Vec<Scene>>>| result.unwrap_err().problem::<CaptureProblem>().cloned();
@@ -505,9 +506,9 @@ fn a_stroke_takes_away_late_contacts_and_changes_nothing_else() {
         let origin = Origin { approaches: true, pose: true, probe, real, ..origin(600) };
         in_memory(&objects(), &with(origin), &()).unwrap().0
     };
-    let short = Probe { stroke: Some(1.0), ..Probe::default() };
+    let short = with!(Probe::default(), stroke = Some(1.0));
     // Noise pushes contacts over the end of the stroke, too.
-    for real in [Noise::default(), Noise { missed: [0.3, 0.0, 0.0], ..Noise::gaussian(20_000.0) }] {
+    for real in [Noise::default(), with!(Noise::gaussian(20_000.0), missed = [0.3, 0.0, 0.0])] {
         let (whole, cut) = (approaches(Probe::default(), real), approaches(short, real));
         let expected = whole.each(|own| own.changed(|touch| hand::within(touch, Some(100_000)))).objects;
         let of = |object: &ObjectTouches| object.touches().to_vec();
@@ -527,7 +528,7 @@ fn a_stroke_takes_away_late_contacts_and_changes_nothing_else() {
 #[test]
 fn a_capture_counts_by_finger_what_the_hand_did_not_reach() {
     let directory = tempfile::tempdir().unwrap();
-    let probe = Probe { stroke: Some(1.0), travel: Some(9.0), ..Probe::default() };
+    let probe = with!(Probe::default(), stroke = Some(1.0), travel = Some(9.0));
     let settings = with(Origin { approaches: true, probe, ..origin(600) });
     let summary = capture(&objects(), &settings, directory.path(), &()).unwrap();
     let scenes = scenes(&objects().iter().collect::<Vec<_>>(), &settings.origin, &()).unwrap();

@@ -33,6 +33,7 @@ use std::collections::BTreeMap;
 
 /// Settings of a comparison of data sets.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// The features that touches are compared by, and that the model is trained on.
     pub descriptor: Descriptor,
@@ -361,6 +362,7 @@ fn told_apart([recorded, simulated]: [&ObjectTouches; 2], counted: Counted, sett
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::with;
 
     use crate::probe::noise::Noise;
     use crate::tests::synthetic;
@@ -397,7 +399,7 @@ mod tests {
         let kept = promise(&one);
         assert_eq!(kept.finding, Finding::Kept, "{kept:?}");
         assert!(kept.names > 100.0 && kept.recorded.unwrap() <= kept.rate, "{kept:?}");
-        let bent = promise(&shifted(&one, &Noise { bent: [0.0, 40_000.0, 0.0], ..Noise::default() }));
+        let bent = promise(&shifted(&one, &with!(Noise::default(), bent = [0.0, 40_000.0, 0.0])));
         assert_eq!(bent.finding, Finding::Broken, "{bent:?}");
         assert!(bent.recorded > bent.simulated, "{bent:?}");
     }
@@ -405,7 +407,7 @@ mod tests {
     #[test]
     fn a_bent_finger_is_told_apart_and_costs_approaches() {
         let [one, other] = [1, 2].map(|seed| synthetic::dataset(&[300, 300, 300], seed));
-        let bent = shifted(&one, &Noise { bent: [0.0, 40_000.0, 0.0], ..Noise::default() });
+        let bent = shifted(&one, &with!(Noise::default(), bent = [0.0, 40_000.0, 0.0]));
         let compared = compare(&bent, &other, &quick(), &()).unwrap();
         assert!(compared.told_apart.low > 0.6, "{:?}", compared.told_apart);
         let worst = |own: &ObjectComparison| own.features.iter().any(|own| own.words().contains("larger"));

@@ -1,6 +1,7 @@
 use super::*;
 use crate::ensemble::{Inputs, Node, Output, Provenance, StatedProbe, Tree, inputs};
 use crate::error::CompileProblem;
+use crate::with;
 use palpate_shared::{ContactTime, Descriptor, Touch};
 
 fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
@@ -39,7 +40,7 @@ fn chain(splits: usize, feature: impl Fn(usize) -> usize) -> Vec<Node> {
 }
 
 fn with(layout: Option<Layout>, leaf: Leaf) -> Settings {
-    Settings { layout, leaf, ..Settings::default() }
+    with!(Settings::default(), layout = layout, leaf = leaf)
 }
 
 fn refusal(ensemble: &Ensemble, settings: &Settings) -> CompileProblem {

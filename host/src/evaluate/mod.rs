@@ -98,6 +98,7 @@ pub const LEAST_GROUPS: u64 = 200;
 
 /// Settings of an evaluation.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// Numbers of touches after which accuracy is wanted.
     pub at: Vec<usize>,

@@ -29,13 +29,14 @@ mod tests {
     use crate::ensemble::train::{Settings, train};
     use crate::evaluate::{Candidate, Margins};
     use crate::tests::synthetic;
+    use crate::with;
     use std::collections::BTreeSet;
 
     #[test]
     fn every_group_is_of_one_robots_touches() {
         let mut dataset = synthetic::dataset(&[1_000, 760], 1);
         let ensemble = train(&dataset, &Settings { rounds: 2, ..Settings::compact() }, &()).unwrap();
-        let noise = Noise { speed_bias: 0.05, ..Noise::default() };
+        let noise = with!(Noise::default(), speed_bias = 0.05);
         let robots = add_noise(&mut dataset, &noise, 1).unwrap();
         assert_eq!(robots, 3);
         let margins = Margins::new(Candidate::Full(&ensemble), &dataset).unwrap();
@@ -60,7 +61,7 @@ mod tests {
         let names = ["a", "b", "c", "d"].map(String::from);
         let object = &dataset.objects[1];
         dataset.objects[1] = ObjectTouches::in_turn(object.name.clone(), object.touches().to_vec(), &names, 0);
-        let bias = Noise { pose_bias: 1.0, ..Noise::default() };
+        let bias = with!(Noise::default(), pose_bias = 1.0);
         for (robots, turns) in [(1, [1, 4]), (3, [3, 12]), (2, [2, 4])] {
             let mut of_robots = dataset.clone();
             of_robots.add_noise(&bias, 1, robots);

@@ -5,6 +5,7 @@ use crate::ensemble::{Ensemble, OverTouches};
 use crate::error::Setting;
 use crate::tests::synthetic;
 use crate::touches::Dataset;
+use crate::with;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::format::Counted;
@@ -15,7 +16,7 @@ fn ensemble() -> Ensemble {
 }
 
 fn compiled(ensemble: &Ensemble) -> Vec<u8> {
-    compile(ensemble, &compile::Settings { leaf: Leaf::I16, ..compile::Settings::default() }).unwrap().bytes
+    compile(ensemble, &with!(compile::Settings::default(), leaf = Leaf::I16)).unwrap().bytes
 }
 
 fn test_touches() -> Dataset {

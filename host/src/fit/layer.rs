@@ -22,6 +22,7 @@ use crate::probe::sweep::Contact;
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use crate::touches::Origin;
+use crate::with;
 use nalgebra::{Matrix2, SMatrix, SymmetricEigen};
 use palpate_shared::Touch;
 use rand_distr::{Distribution, Exp1};
@@ -132,7 +133,7 @@ pub(super) const MOST_ANGLE: f64 = 80.0;
 
 fn real_of([angle, bend]: Numbers) -> Noise {
     let grazing = Grazing { angle: (10.0 * angle).clamp(0.0, MOST_ANGLE), bend: 1e3 * bend.clamp(-4.0, 8.0).exp2() };
-    Noise { grazing, ..Noise::default() }
+    with!(Noise::default(), grazing = grazing)
 }
 
 /// Recordings and approaches to their objects.

@@ -66,11 +66,11 @@ pub use words::{Estimate, NOT_TOLD, between, offset, offset_between};
 use crate::capture;
 use crate::error::{Error, FitProblem, Result};
 use crate::mesh::Object;
-use crate::probe::approach::Probe;
 use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, ObjectTouches, Origin};
+use crate::with;
 use candidate::Hypothesis;
 use density::Densities;
 use layer::Layer;
@@ -87,6 +87,7 @@ use touched::Touched;
 
 /// Settings of a fit.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// The probe as it should be, the objects' size, and where its approaches aim. How many touches, the seed, the format
     /// and what a real probe adds make no difference.
@@ -268,7 +269,7 @@ struct Simulated {
 impl Simulated {
     fn new(touched: Vec<Touched>, layer: Layer, settings: &Settings, progress: &dyn Progress) -> Result<Self> {
         // What the hand does not reach is left out later, when a candidate says how fast it is.
-        let probe = Probe { stroke: None, stroke_tolerance: None, ..settings.origin.probe };
+        let probe = with!(settings.origin.probe, stroke = None, stroke_tolerance = None);
         let (touches, seed) = (settings.approaches, settings.seed);
         let origin = Origin { approaches: true, touches, seed, real: layer.real, probe, ..settings.origin.clone() };
         progress.begin("touching", Some(touched.len() as u64));

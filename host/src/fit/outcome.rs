@@ -11,6 +11,7 @@ use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::hand;
 use crate::probe::noise::{Grazing, Noise};
 use crate::touches::Surroundings;
+use crate::with;
 use palpate_shared::format::Counted;
 use palpate_shared::format::Length;
 use serde::Serialize;
@@ -118,11 +119,11 @@ pub(super) fn outcome(
         [0, 1, 2].map(|finger: usize| estimate(4 + finger, false, &|candidate: &Hypothesis| candidate.missed[finger]));
     let stroke = evidence.stroke.estimated;
     let written = |length: f64| (1e4 * length).round() / 1e4;
-    let probe = Probe {
-        stroke: stroke.map(|stroke| written(stroke.value)).or(settings.origin.probe.stroke),
-        stroke_tolerance: stroke.map(|stroke| written(tolerance(&stroke))).or(settings.origin.probe.stroke_tolerance),
-        ..settings.origin.probe
-    };
+    let probe = with!(
+        settings.origin.probe,
+        stroke = stroke.map(|stroke| written(stroke.value)).or(settings.origin.probe.stroke),
+        stroke_tolerance = stroke.map(|stroke| written(tolerance(&stroke))).or(settings.origin.probe.stroke_tolerance)
+    );
     let layered = |of: &dyn Fn(&Noise) -> f64| {
         let [low, high] = [0, 1].map(|end: usize| layer.ends.as_ref().map(|ends| of(&ends[end])));
         Estimate { value: of(&layer.real), low, high }
@@ -169,23 +170,23 @@ impl Fit {
     /// Noise that the real probe adds to touches: the likeliest values.
     pub fn real(&self) -> Noise {
         let [middle, third] = self.late.map(|late| -1e3 * late.value);
-        Noise {
-            deviation: (1e3 * self.noise.value).into(),
-            timer: 1e3 * self.timer.unwrap_or(0.0),
-            missed: self.missed.map_or([0.0; FINGERS], |missed| missed.map(|share| share.value)),
-            bent: [0.0, middle, third],
-            speed: self.speed_factor.value,
-            grazing: self.grazing.map_or_else(Grazing::default, |GrazingEstimate { angle, bend }| Grazing {
+        with!(
+            Noise::default(),
+            deviation = (1e3 * self.noise.value).into(),
+            timer = 1e3 * self.timer.unwrap_or(0.0),
+            missed = self.missed.map_or([0.0; FINGERS], |missed| missed.map(|share| share.value)),
+            bent = [0.0, middle, third],
+            speed = self.speed_factor.value,
+            grazing = self.grazing.map_or_else(Grazing::default, |GrazingEstimate { angle, bend }| Grazing {
                 angle: angle.value,
                 bend: 1e3 * bend.value,
-            }),
-            ..Noise::default()
-        }
+            })
+        )
     }
 
     /// The probe as the text of a `probe.toml`, with the intervals as comments.
     pub fn toml(&self) -> String {
-        let Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance } = self.probe;
+        let Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance, .. } = self.probe;
         let unit = match self.unit {
             Length::Tenth => "# A unit is a tenth of the object's longest side.\nunit = \"unit\"\n",
             Length::Millimeter => "unit = \"mm\"\n",

@@ -3,8 +3,10 @@
 use super::*;
 
 use crate::mesh::builtin;
+use crate::probe::approach::Probe;
 use crate::probe::noise::Grazing;
 use crate::touches::{ObjectTouches, Recorded, Source, Surroundings};
+use crate::with;
 use palpate_shared::ContactTime;
 use std::sync::LazyLock;
 
@@ -175,7 +177,7 @@ fn a_plate_that_repeats_better_or_worse_than_touches_tells_offsets_and_leaves_th
 #[test]
 fn fingers_that_bend_aside_are_found_and_rigid_ones_are_not_said_to_bend() {
     let grazing = Grazing { angle: 20.0, bend: 10_000.0 };
-    let real = Noise { grazing, ..Noise::default() };
+    let real = with!(Noise::default(), grazing = grazing);
     let one =
         |object: &Object| ObjectTouches::new(&object.name, approaches_of(object, 300, 21, &BENT, real), Source::Object);
     let soft = Dataset::new(objects().iter().map(one).collect());
@@ -420,7 +422,7 @@ fn a_stroke_is_found_and_contacts_later_than_it_bend_no_estimate() {
 fn a_stated_stroke_is_kept_and_recordings_of_another_are_refused_with_both() {
     let short = stopped(&recorded(&objects(), 400, 1, &BENT), 300);
     let stating = |stroke: f64| {
-        let probe = Probe { stroke: Some(stroke), ..Probe::default() };
+        let probe = with!(Probe::default(), stroke = Some(stroke));
         let origin = Origin { probe, ..Origin::default() };
         fit(&short, &objects(), None, &Settings { origin, ..settings() }, &())
     };

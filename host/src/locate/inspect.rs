@@ -7,6 +7,7 @@ use crate::calibrate;
 use crate::error::{Error, Place, Result};
 use crate::probe::approach::Probe;
 use crate::probe::noise::Noise;
+use crate::with;
 use palpate_onboard::locate::Locator;
 use palpate_shared::format::{Header, MAGIC, MAPS_LAYOUT, TrainedProbe};
 use serde::Serialize;
@@ -58,15 +59,16 @@ pub fn hand(maps: &Maps<'_>) -> Result<Probe> {
     let TrainedProbe { radius, spacing, speed, stroke, travel, stroke_tolerance, .. } = stated;
     // Decimals of a file are not those of its rounding to f32.
     let exact = |length: f32| length.to_string().parse().unwrap_or(f64::from(length));
-    Ok(Probe {
-        radius: exact(radius),
-        spacing: exact(spacing),
-        speed: exact(speed),
-        tilt: 0.0,
-        stroke: stroke.map(exact),
-        travel: travel.map(exact),
-        stroke_tolerance: stroke_tolerance.map(exact),
-    })
+    Ok(with!(
+        Probe::default(),
+        radius = exact(radius),
+        spacing = exact(spacing),
+        speed = exact(speed),
+        tilt = 0.0,
+        stroke = stroke.map(exact),
+        travel = travel.map(exact),
+        stroke_tolerance = stroke_tolerance.map(exact)
+    ))
 }
 
 /// Noise that the likelihoods of maps are for.

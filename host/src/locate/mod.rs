@@ -34,6 +34,7 @@ use crate::error::{Error, Result};
 
 /// Settings of a model of maps.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// Cells of 1 mm, otherwise of 2 mm: a quarter of the bytes.
     pub fine: bool,

@@ -6,10 +6,11 @@ use crate::capture;
 use crate::mesh::{Mesh, Object};
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, Origin, Surroundings};
+use crate::with;
 use palpate_shared::format::{Length, Per};
 
 fn probe() -> Probe {
-    Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 0.0, stroke: Some(20.0), ..Probe::default() }
+    with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0))
 }
 
 /// A long box without corners, and one that is round from above.

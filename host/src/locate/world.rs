@@ -10,6 +10,7 @@ use crate::probe::scene::Scene;
 use crate::progress::Progress;
 use crate::random::{self, Purpose};
 use crate::touches::{Origin, Surroundings};
+use crate::with;
 use glam::DVec3;
 use palpate_onboard::locate::Approach;
 use palpate_shared::format::Length;
@@ -78,7 +79,7 @@ impl Real {
     pub fn of(noise: &Noise, speed: f64) -> Result<Self> {
         let real = Self::like(noise, speed);
         let Noise { deviation, timer, position, drift, .. } = *noise;
-        let known = Noise { deviation, timer, position, drift, ..real.noise(speed) };
+        let known = with!(real.noise(speed), deviation = deviation, timer = timer, position = position, drift = drift);
         if known == *noise { Ok(real) } else { Err(LocateProblem::Noise.into()) }
     }
 
@@ -103,12 +104,12 @@ impl Real {
     pub fn noise(&self, speed: f64) -> Noise {
         // Rounded as a promise states it.
         let whole = |number: f64| (number * 1e3).round();
-        Noise {
-            missed: [self.lost; FINGERS],
-            position: whole(self.position),
-            drift: [whole(self.drift), whole(self.drift_yaw) / 1e3],
-            ..Noise::gaussian(whole(self.height / speed * 1e3))
-        }
+        with!(
+            Noise::gaussian(whole(self.height / speed * 1e3)),
+            missed = [self.lost; FINGERS],
+            position = whole(self.position),
+            drift = [whole(self.drift), whole(self.drift_yaw) / 1e3]
+        )
     }
 }
 

@@ -2,6 +2,7 @@ use super::*;
 use crate::capture;
 use crate::compile::{self, compile};
 use crate::ensemble::{self, Ensemble, Node, Output, Tree, inputs};
+use crate::with;
 
 use palpate_shared::Descriptor;
 
@@ -36,7 +37,7 @@ fn game(model: &[u8]) -> Game<'_> {
 fn the_approaches_of_a_round_are_the_samples_of_a_capture_with_its_seed_and_noise() {
     let bytes = model();
     let mut game = game(&bytes);
-    let noise = Noise { bent: [0.0, 2_000.0, 0.0], ..Noise::switch() };
+    let noise = with!(Noise::switch(), bent = [0.0, 2_000.0, 0.0]);
     game.set_noise(noise).unwrap();
     let origin = Origin { approaches: true, pose: true, seed: 7, ..Origin::default() };
     let scene = std::slice::from_ref(game.scene(0).unwrap());
@@ -124,7 +125,7 @@ fn what_cannot_be_played_with_is_refused() {
     let mut game = game(&bytes);
     assert!(game.add_object("nothing", &Mesh::default(), 10.0).is_err());
     assert!(game.add_object("small", &Mesh::globe(4), 0.0).is_err());
-    assert!(game.set_noise(Noise { timer: -1.0, ..Noise::default() }).is_err());
+    assert!(game.set_noise(with!(Noise::default(), timer = -1.0)).is_err());
     assert!(game.round(2, 1).is_none());
     let mut round = game.round(0, 1).unwrap();
     assert_eq!(game.touch_as_planned(&mut round, 0), None);
@@ -143,7 +144,7 @@ fn what_cannot_be_played_with_is_refused() {
 
 #[test]
 fn a_finger_that_the_hand_does_not_reach_is_missing_with_the_reason() {
-    let probe = crate::probe::Probe { stroke: Some(1.0), travel: Some(9.0), ..Default::default() };
+    let probe = with!(crate::probe::Probe::default(), stroke = Some(1.0), travel = Some(9.0));
     let mut game = Game::new(&Origin { probe, ..Origin::default() });
     game.add_object("disc", &Mesh::globe(12).stretched([1.0, 1.0, 0.1]), 10.0).unwrap();
     let origin = Origin { approaches: true, pose: true, seed: 7, probe, ..Origin::default() };

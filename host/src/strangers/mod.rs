@@ -67,6 +67,7 @@ const NAT: f64 = 65_536.0;
 
 /// Requirements on a test.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// Rule for holding names back.
     pub held: Held,

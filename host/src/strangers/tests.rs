@@ -1,6 +1,7 @@
 use super::*;
 use crate::compile::{Settings as Compilation, compile};
 use crate::ensemble::train::{self, train, train_with_background};
+use crate::with;
 
 use crate::evaluate::{self, Margins, SequentialSettings};
 use crate::tests::repetitions::{assert_rare, repetitions};
@@ -252,11 +253,7 @@ fn both_shares_promised_are_kept_in_all_but_one_of_twenty_calibrations() {
 /// Touches of the known objects as a robot makes them of which the simulation knows nothing.
 fn of_robot(count: usize, seed: u64) -> Dataset {
     let mut dataset = of(0..KNOWN, count, seed);
-    dataset.add_noise(
-        &crate::probe::noise::Noise { speed: 1.25, ..crate::probe::noise::Noise::gaussian(10_000.0) },
-        seed,
-        1,
-    );
+    dataset.add_noise(&with!(crate::probe::noise::Noise::gaussian(10_000.0), speed = 1.25), seed, 1);
     dataset
 }
 

@@ -13,6 +13,7 @@ use palpate_trees::rows::{RowSequence, Sequences};
 
 /// Settings of a promise.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// The error rate: wrong names of those that are given.
     pub rate: f64,

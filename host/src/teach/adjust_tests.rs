@@ -5,6 +5,7 @@ use crate::ensemble::{OverTouches, compiled_trained_on};
 use crate::error::TeachProblem;
 use crate::evaluate::{Candidate, Margins};
 use crate::tests::synthetic;
+use crate::with;
 
 fn quick() -> train::Settings {
     train::Settings { rounds: 8, depth: 4, min_child_weight: 5.0, ..train::Settings::compact() }
@@ -17,7 +18,7 @@ fn few_groups() -> Settings {
 /// Touches of a robot that the simulation knows nothing about: it is faster, and its contacts are noisy.
 fn of_robot(counts: &[usize], seed: u64) -> Dataset {
     let mut dataset = synthetic::dataset(counts, seed);
-    dataset.add_noise(&Noise { speed: 1.5, ..Noise::gaussian(15_000.0) }, seed, 1);
+    dataset.add_noise(&with!(Noise::gaussian(15_000.0), speed = 1.5), seed, 1);
     dataset
 }
 

@@ -10,6 +10,7 @@ use crate::in_order::in_order;
 use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
+use crate::with;
 use palpate_shared::{Descriptor, Touch};
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
@@ -63,12 +64,12 @@ pub(super) struct Material {
 
 /// Noise that stands for what few touches have not shown: 30 % and 10 ms on times, 8° on the pose, times `factor`.
 pub fn jitter(factor: f64) -> Noise {
-    Noise {
-        deviation: (10_000.0 * factor).into(),
-        speed_error: (0.3 * factor).min(0.9),
-        pose: 8.0 * factor,
-        ..Noise::default()
-    }
+    with!(
+        Noise::default(),
+        deviation = (10_000.0 * factor).into(),
+        speed_error = (0.3 * factor).min(0.9),
+        pose = 8.0 * factor
+    )
 }
 
 /// `touches`, repeated under jitter: touch i is a copy of touch i modulo their number.

@@ -67,6 +67,7 @@ pub const LEAST: usize = 20;
 
 /// Settings of teaching.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// Approaches after which errors are balanced and counted; fewer where fewer were recorded.
     pub approaches: usize,

@@ -12,6 +12,7 @@ use crate::evaluate::{Candidate, Margins};
 use crate::probe::noise::Noise;
 use crate::tests::repetitions::repetitions;
 use crate::tests::synthetic;
+use crate::with;
 use palpate_shared::{Descriptor, Pose, Q15_ONE};
 use rand_distr::{Distribution, StandardNormal};
 
@@ -357,7 +358,7 @@ fn another_probe_and_a_missing_pose_are_refused() {
         *dataset = dataset.each(|object| object.changed(|touch| touch.with_pose(pose)));
     };
     let origin = |spacing| {
-        let probe = crate::probe::approach::Probe { spacing, ..Default::default() };
+        let probe = with!(crate::probe::approach::Probe::default(), spacing = spacing);
         Some(crate::touches::Origin { probe, approaches: true, ..Default::default() })
     };
     with_pose(&mut known);

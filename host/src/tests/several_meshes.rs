@@ -15,6 +15,7 @@ use crate::probe::noise::Noise;
 use crate::tests::repetitions::{assert_rare, repetitions};
 use crate::tests::synthetic;
 use crate::touches::{Dataset, ObjectTouches, Source, folds};
+use crate::with;
 use crate::{strangers, teach, tune};
 use palpate_onboard::Stopping;
 use palpate_shared::format::Held;
@@ -233,7 +234,7 @@ fn figures_of_a_part_of_the_touches_are_those_of_fresh_ones() {
     stated.write(directory.path(), crate::touches::Format::Text, None).unwrap();
     agree("a copy", measured(candidate, &Dataset::read(directory.path()).unwrap()), fresh);
     // With noise too, whose robots differ.
-    let noise = Noise { speed_bias: 0.1, ..Noise::gaussian(5_000.0) };
+    let noise = with!(Noise::gaussian(5_000.0), speed_bias = 0.1);
     let [mut noisy, mut other] = [stated, FRESH.clone()];
     evaluate::add_noise(&mut noisy, &noise, 1).unwrap();
     evaluate::add_noise(&mut other, &noise, 2).unwrap();

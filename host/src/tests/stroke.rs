@@ -12,13 +12,14 @@ use crate::mesh::{Mesh, Object};
 use crate::probe::{Probe, hand};
 use crate::strangers;
 use crate::touches::{Dataset, ObjectTouches, Origin, Recorded, Source};
+use crate::with;
 use palpate_shared::Touch;
 
 /// Two objects whose contacts come up to a second apart.
 fn captured(stroke: Option<f64>, seed: u64) -> Dataset {
     let objects = [("rod", [1.0, 0.15, 0.15]), ("slab", [1.0, 0.6, 0.2])]
         .map(|(name, shape)| Object::new(name, Mesh::globe(12).stretched(shape)));
-    let probe = Probe { stroke, ..Probe::default() };
+    let probe = with!(Probe::default(), stroke = stroke);
     let origin = Origin { touches: 3_000, approaches: true, seed, probe, ..Origin::default() };
     in_memory(&objects, &origin.into(), &()).unwrap().0
 }
@@ -35,7 +36,7 @@ fn recorded(dataset: &Dataset, stroke: Option<f64>) -> Dataset {
         let source = Source::Recording(Recorded { object: own.name.clone(), ..Recorded::default() });
         ObjectTouches::new(&own.name, own.touches().to_vec(), source)
     };
-    let probe = Probe { stroke, ..Probe::default() };
+    let probe = with!(Probe::default(), stroke = stroke);
     let origin = Origin::recorded(probe, palpate_shared::format::Length::Tenth, false);
     Dataset { origin: Some(origin), ..Dataset::new(dataset.objects.iter().map(one).collect()) }
 }
@@ -114,7 +115,7 @@ fn stretched(touch: &palpate_shared::Touch) -> palpate_shared::Touch {
 fn estimated() -> Ensemble {
     let dataset = captured(Some(2.0), 1);
     let probe = StatedProbe::of(&dataset).map(|stated| {
-        let probe = Probe { stroke_tolerance: Some(0.3), ..stated.probe };
+        let probe = with!(stated.probe, stroke_tolerance = Some(0.3));
         StatedProbe { probe, ..stated }
     });
     let recipe = train::Settings { rounds: 3, probe, ..train::Settings::compact() };

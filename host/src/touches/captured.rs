@@ -139,6 +139,7 @@ mod tests {
     use super::*;
     use crate::capture::{Settings, in_memory};
     use crate::mesh::{Mesh, Object};
+    use crate::with;
 
     fn captured(width: f32, origin: Origin) -> Captured {
         let objects = [("globe", 1.0), ("disc", width)]
@@ -158,7 +159,7 @@ mod tests {
         assert_eq!(trained.shared(&captured(0.5, origin(20, "1/2"))), ["disc", "globe"]);
         assert!(trained.shared(&captured(0.5, origin(20, "2/2"))).is_empty());
         assert!(trained.shared(&captured(0.5, Origin { seed: 2, ..origin(10, "1/1") })).is_empty());
-        let probe = crate::probe::approach::Probe { spacing: 1.6, ..Default::default() };
+        let probe = with!(crate::probe::approach::Probe::default(), spacing = 1.6);
         assert!(trained.shared(&captured(0.5, Origin { probe, ..origin(10, "1/1") })).is_empty());
     }
 

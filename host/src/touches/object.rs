@@ -522,6 +522,7 @@ impl ObjectTouches {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::with;
 
     fn touches(count: u32) -> Vec<Touch> {
         (0..count).map(|touch| Touch::from_micros([0, touch, 9])).collect()
@@ -619,7 +620,7 @@ mod tests {
 
     #[test]
     fn pools_are_of_one_source_and_one_robot() {
-        let noise = Noise { speed_bias: 0.1, ..Noise::default() };
+        let noise = with!(Noise::default(), speed_bias = 0.1);
         for (instances, robots, pools) in [(1, 3, 3), (4, 1, 4), (4, 2, 4), (4, 3, 12), (1, 1, 1)] {
             let object = ObjectTouches::in_turn("cup", touches(240), &names(instances), 0).noisy(&noise, 1, robots);
             let found = object.pools();
@@ -641,7 +642,7 @@ mod tests {
         let object = ObjectTouches::in_runs("cup", touches(9), runs);
         let pools = object.pools();
         assert_eq!((pools[0].touches.len(), pools[1].touches.as_slice()), (7, &[7, 8][..]));
-        let bias = Noise { speed_bias: 0.1, ..Noise::default() };
+        let bias = with!(Noise::default(), speed_bias = 0.1);
         assert_eq!(object.noisy(&bias, 1, 4).pools().iter().map(|pool| pool.source).collect::<Vec<_>>(), [0, 1, 0, 1]);
     }
 }

@@ -141,6 +141,7 @@ fn write_parquet(path: &Path, _: &str, _: &[palpate_shared::Touch]) -> Result<()
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::with;
 
     use crate::probe::noise::Noise;
     use crate::touches::{ObjectTouches, Origin, Recorded, folds, parse_touch};
@@ -246,7 +247,7 @@ mod tests {
         let unknown = Dataset { origin: None, ..instances.clone() };
         assert_eq!(refused(&unknown), TouchesProblem::Unsaid { name: "cup".into(), sources: 2 });
         let mut robots = instances;
-        robots.add_noise(&Noise { speed_bias: 0.1, ..Noise::default() }, 1, 3);
+        robots.add_noise(&with!(Noise::default(), speed_bias = 0.1), 1, 3);
         assert_eq!(refused(&robots), TouchesProblem::OfRobots { name: "cup".into() });
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
     }

@@ -35,12 +35,14 @@ use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
 use crate::touches::Dataset;
 use crate::touches::folds;
+use crate::with;
 use palpate_shared::Descriptor;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Limits that a model has to fit, and settings for measuring candidates.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// Features that a touch is turned into.
     pub descriptor: Descriptor,
@@ -266,13 +268,13 @@ fn compiled_models<'e>(
     for &leaf in if is_small { &[Leaf::I8][..] } else { &[Leaf::I8, Leaf::I16] } {
         let mut measured: Option<Row> = None;
         for &layout in layouts {
-            let how = compile::Settings {
-                leaf,
-                layout: Some(layout),
-                shared_leaves: Some(is_small),
-                error_rate: settings.error_rate,
-                ..compile::Settings::default()
-            };
+            let how = with!(
+                compile::Settings::default(),
+                leaf = leaf,
+                layout = Some(layout),
+                shared_leaves = Some(is_small),
+                error_rate = settings.error_rate
+            );
             let Some(compiled) = unless_unfit(compile(ensemble, &how))? else { continue };
             let row = match &measured {
                 Some(row) => Row {

@@ -31,6 +31,7 @@ use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
 use crate::touches::{Dataset, Origin};
+use crate::with;
 use palpate_shared::format::{Counted, Length};
 use palpate_shared::{ContactPattern, Descriptor};
 use serde::Serialize;
@@ -54,6 +55,7 @@ const ODDS: [f64; 2] = [-16.0, -0.05];
 
 /// Space of probes to search, and settings for measuring each.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// Unit of lengths: units, a tenth of the object's longest side, or millimeters, where objects have their true
     /// sizes.
@@ -154,7 +156,14 @@ impl Settings {
         for (&spacing, &radius) in corners {
             for tilt in [*self.tilt.start(), *self.tilt.end()] {
                 let stroke = self.stroke.as_ref().map(|stroke| *stroke.start());
-                let probe = Probe { radius, spacing, speed: self.speed, tilt, stroke, ..Probe::default() };
+                let probe = with!(
+                    Probe::default(),
+                    radius = radius,
+                    spacing = spacing,
+                    speed = self.speed,
+                    tilt = tilt,
+                    stroke = stroke
+                );
                 probe.check(if self.unit == Length::Tenth { LENGTH } else { 1.0 })?;
             }
         }
@@ -176,12 +185,21 @@ pub fn median_length(objects: &[Object]) -> Option<f64> {
 /// The probe scaled so that a unit becomes `unit`; lengths are rounded to hundredths.
 pub fn scaled_probe(probe: &Probe, unit: f64) -> Probe {
     let scaled = |length: f64| hundredths(length * unit);
-    let Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance } = *probe;
+    let Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance, .. } = *probe;
     let [radius, spacing, speed] = [radius, spacing, speed].map(scaled);
     let [stroke, travel, stroke_tolerance] = [stroke, travel, stroke_tolerance].map(|length| length.map(scaled));
     // A length of nothing is none.
     let stroke_tolerance = stroke_tolerance.filter(|length| *length > 0.0);
-    Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance }
+    with!(
+        Probe::default(),
+        radius = radius,
+        spacing = spacing,
+        speed = speed,
+        tilt = tilt,
+        stroke = stroke,
+        travel = travel,
+        stroke_tolerance = stroke_tolerance
+    )
 }
 
 /// A probe that was tried, and its results.
@@ -301,12 +319,12 @@ pub fn design(objects: &[Object], settings: &Settings, progress: &dyn Progress) 
     spacings.push(best.probe.spacing);
     spacings.sort_by(f64::total_cmp);
     spacings.dedup();
-    let line = spacings.into_iter().map(|spacing| (Probe { spacing, ..best.probe }, best.aim)).collect();
+    let line = spacings.into_iter().map(|spacing| (with!(best.probe, spacing = spacing), best.aim)).collect();
     let mut by_spacing = search.try_all(line, settings.approaches)?;
     let best = by_spacing[0].clone();
     by_spacing.sort_by(|a, b| a.probe.spacing.total_cmp(&b.probe.spacing));
     let by_stroke = search.by_stroke(&best)?;
-    let published = Probe { speed: settings.speed, stroke: search.stroke(), ..settings.published };
+    let published = with!(settings.published, speed = settings.speed, stroke = search.stroke());
     let published = search.attempt(published, Aim::Box, settings.approaches)?;
     Ok(Design {
         best,
@@ -341,7 +359,14 @@ impl Search<'_> {
             for radius in steps(&settings.radius, 2) {
                 for tilt in steps(&settings.tilt, 2) {
                     let stroke = self.stroke();
-                    let probe = Probe { radius, spacing, speed: settings.speed, tilt, stroke, ..Probe::default() };
+                    let probe = with!(
+                        Probe::default(),
+                        radius = radius,
+                        spacing = spacing,
+                        speed = settings.speed,
+                        tilt = tilt,
+                        stroke = stroke
+                    );
                     plans.extend(settings.aims.iter().map(|&aim| (probe, aim)));
                 }
             }
@@ -362,7 +387,7 @@ impl Search<'_> {
             None => USUAL_STROKES.map(|stroke| hundredths(stroke * unit)).into(),
         };
         strokes.retain(|stroke| Some(*stroke) != best.probe.stroke);
-        let with = |stroke: &f64| (Probe { stroke: Some(*stroke), ..best.probe }, best.aim);
+        let with = |stroke: &f64| (with!(best.probe, stroke = Some(*stroke)), best.aim);
         let mut trials = self.try_all(strokes.iter().map(with).collect(), self.settings.approaches)?;
         trials.sort_by(|a, b| {
             a.probe.stroke.unwrap_or(f64::INFINITY).total_cmp(&b.probe.stroke.unwrap_or(f64::INFINITY))
@@ -379,9 +404,9 @@ impl Search<'_> {
         let radii = neighbors(&steps(&self.settings.radius, 2), radius);
         let tilts = neighbors(&steps(&self.settings.tilt, 2), tilt);
         let kept = ranked.iter().take(KEPT.min(ranked.len().div_ceil(2))).map(|trial| (trial.probe, trial.aim));
-        kept.chain(spacings.into_iter().map(|spacing| (Probe { spacing, ..best.probe }, best.aim)))
-            .chain(radii.into_iter().map(|radius| (Probe { radius, ..best.probe }, best.aim)))
-            .chain(tilts.into_iter().map(|tilt| (Probe { tilt, ..best.probe }, best.aim)))
+        kept.chain(spacings.into_iter().map(|spacing| (with!(best.probe, spacing = spacing), best.aim)))
+            .chain(radii.into_iter().map(|radius| (with!(best.probe, radius = radius), best.aim)))
+            .chain(tilts.into_iter().map(|tilt| (with!(best.probe, tilt = tilt), best.aim)))
             .collect()
     }
 

@@ -2,6 +2,7 @@ use super::*;
 use crate::ensemble::OverTouches;
 use crate::error::Setting;
 use crate::tests::synthetic;
+use crate::with;
 
 fn quick() -> Settings {
     Settings { groups: 60, max_bytes: Some(6_000), ..Settings::default() }
@@ -113,7 +114,7 @@ fn a_limit_of_instructions_holds_on_the_processor_that_it_is_for() {
 
 #[test]
 fn the_model_states_the_probe_of_the_touches() {
-    let probe = crate::probe::approach::Probe { spacing: 2.0, ..Default::default() };
+    let probe = with!(crate::probe::approach::Probe::default(), spacing = 2.0);
     let settings = Settings { probe: Some(StatedProbe { probe, ..StatedProbe::default() }), ..quick() };
     let tuned = tune(&synthetic::dataset(&[300, 300], 3), &settings, &()).unwrap();
     assert_eq!(compile::open(&tuned.model).unwrap().header().spacing(), 2.0);

@@ -11,6 +11,7 @@ use palpate::probe::{Aim, Probe};
 use palpate::shared::format::Length;
 use palpate::shared::{ContactPattern, Pose, Q15_ONE, Touch};
 use palpate::touches::Origin;
+use palpate::with;
 use std::cell::RefCell;
 
 /// State that the functions work on.
@@ -51,7 +52,15 @@ impl Table {
         let [radius, spacing, speed, tilt, ..] = measures;
         let [.., stroke, travel] = measures.map(|length| (length > 0.0).then_some(length));
         let aim = *Aim::ALL.get(index(aim))?;
-        let probe = Probe { radius, spacing, speed, tilt, stroke, travel, ..Probe::default() };
+        let probe = with!(
+            Probe::default(),
+            radius = radius,
+            spacing = spacing,
+            speed = speed,
+            tilt = tilt,
+            stroke = stroke,
+            travel = travel
+        );
         let origin = Origin { unit, aim, probe, ..Origin::default() };
         *self = Self { game: Some(Game::new(&origin)), ..Self::default() };
         Some(0)
@@ -96,19 +105,19 @@ impl Table {
             return None;
         };
         let &[speed, speed_error, speed_bias, pose, pose_bias] = rest else { return None };
-        let noise = Noise {
-            deviation: Deviation { least, largest },
-            timer,
-            debounce,
-            missed: [missed; 3],
-            bent: [first, middle, last],
-            speed,
-            speed_error,
-            speed_bias,
-            pose,
-            pose_bias,
-            ..Noise::default()
-        };
+        let noise = with!(
+            Noise::default(),
+            deviation = Deviation { least, largest },
+            timer = timer,
+            debounce = debounce,
+            missed = [missed; 3],
+            bent = [first, middle, last],
+            speed = speed,
+            speed_error = speed_error,
+            speed_bias = speed_bias,
+            pose = pose,
+            pose_bias = pose_bias
+        );
         self.game.as_mut()?.set_noise(noise).ok().map(|()| 0)
     }
 

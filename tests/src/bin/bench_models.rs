@@ -19,6 +19,7 @@ use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node, Output};
 use palpate::touches::Dataset;
 use palpate::touches::folds::{self, Split};
+use palpate::with;
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::{Descriptor, Touch};
 use palpate_tests::identity;
@@ -36,11 +37,11 @@ fn main() -> Result<()> {
         Some(run) => palpate::ensemble::load(run.join("paper.json"))?,
         None => ensemble(None, train::Settings::paper(), Descriptor::Times)?,
     };
-    let compact = |rounds, depth, bins| train::Settings { rounds, depth, bins, ..train::Settings::compact() };
+    let compact = |rounds, depth, bins| with!(train::Settings::compact(), rounds = rounds, depth = depth, bins = bins);
     let each100 = ensemble(trained, compact(100, 6, 256), Descriptor::Curvature)?;
     let each40 = ensemble(trained, compact(40, 5, 256), Descriptor::Curvature)?;
     let deep = ensemble(trained, compact(20, 7, 256), Descriptor::Curvature)?;
-    let few = train::Settings { rounds: 20, depth: 3, ..train::Settings::paper() };
+    let few = with!(train::Settings::paper(), rounds = 20, depth = 3);
     let shallow = ensemble(trained, few, Descriptor::Times)?;
     let table = ensemble(trained, compact(60, 6, 64), Descriptor::Curvature)?;
     let models = [
@@ -61,7 +62,7 @@ fn main() -> Result<()> {
     write(&out.join("touches.bin"), &touches.iter().flat_map(times).collect::<Vec<u8>>())?;
     let mut estimates = Vec::new();
     for (name, ensemble, leaf, layout) in models {
-        let compiled = compile(ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() })?;
+        let compiled = compile(ensemble, &with!(Settings::default(), leaf = leaf, layout = Some(layout)))?;
         println!(
             "{name:16} {:7} bytes, {:6} splits, {:.2} bytes per split, {} instructions per touch by the stated model",
             compiled.bytes.len(),

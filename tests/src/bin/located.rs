@@ -11,6 +11,7 @@ use palpate::mesh::Object;
 use palpate::probe::approach::Probe;
 use palpate::shared::format::{Length, Per};
 use palpate::touches::{Dataset, ObjectTouches, Origin, Source};
+use palpate::with;
 use palpate_onboard::Verdict;
 use palpate_tests::located::{self, OnChip, Terms};
 use std::collections::HashMap;
@@ -39,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let shared = std::env::var("PALPATE_SHARED").unwrap_or_else(|_| "../shared".into());
     let folder = base.0.get("objects").cloned().unwrap_or(format!("{shared}/objects"));
-    let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 0.0, stroke: Some(20.0), ..Probe::default() };
+    let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
     let began = Instant::now();
     let sizes: Vec<f64> = [1.0, 0.8, 0.9, 1.1, 1.2][..base.number("sizes", 1.0) as usize].to_vec();
     let mut standing: Vec<Standing> = Vec::new();
@@ -86,18 +87,18 @@ fn real(given: &Given) -> Real {
 
 fn learned(given: &Given, dataset: &Dataset, probe: &Probe) -> Result<Vec<u8>, Box<dyn Error>> {
     let (number, real) = (|key: &str, default: f64| given.number(key, default), real(given));
-    let settings = Settings {
-        fine: number("cell", 1.0) < 1.5,
-        noise: number("stated", real.height),
-        position: number("stated_position", real.position),
-        lost: number("stated_lost", 0.02),
-        outliers: number("outliers", 1e-4),
-        table_missed: number("table_missed", 0.02),
-        drift: number("stated_drift", real.drift),
-        drift_yaw: number("stated_drift", real.drift),
-        error_rate: 1.0 - number("threshold", 0.99),
-        ..Settings::default()
-    };
+    let settings = with!(
+        Settings::default(),
+        fine = number("cell", 1.0) < 1.5,
+        noise = number("stated", real.height),
+        position = number("stated_position", real.position),
+        lost = number("stated_lost", 0.02),
+        outliers = number("outliers", 1e-4),
+        table_missed = number("table_missed", 0.02),
+        drift = number("stated_drift", real.drift),
+        drift_yaw = number("stated_drift", real.drift),
+        error_rate = 1.0 - number("threshold", 0.99)
+    );
     let surfaces = locate::learn(dataset, &settings)?;
     if number("v", 0.0) > 0.0 {
         for surface in &surfaces {

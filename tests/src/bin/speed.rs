@@ -23,6 +23,7 @@ use palpate::probe::scene::Scene;
 use palpate::probe::sweep::Surface;
 use palpate::probe::sweep::precision::{self, DoubleWithoutReject, SingleAfterReject};
 use palpate::touches::{Dataset, Origin};
+use palpate::with;
 use palpate_onboard::{Model, exp2_negative};
 use palpate_shared::Touch;
 use std::hint::black_box;
@@ -134,9 +135,9 @@ fn models(rounds: usize, models: &[(String, &Ensemble, Compiled)], test: &Datase
 
 /// Types of leaves compared.
 fn leaves(rounds: usize, trained: &Dataset, test: &Dataset) -> Result<()> {
-    let ensemble = train(trained, &train::Settings { leaf_bits: None, ..train::Settings::compact() }, &())?;
+    let ensemble = train(trained, &with!(train::Settings::compact(), leaf_bits = None), &())?;
     let compiled = [Leaf::F32, Leaf::I16, Leaf::I8].map(|leaf| {
-        let settings = compile::Settings { leaf, layout: Some(Layout::Complete), ..compile::Settings::default() };
+        let settings = with!(compile::Settings::default(), leaf = leaf, layout = Some(Layout::Complete));
         Ok((format!("leaves as {}", leaf.name()), &ensemble, compile(&ensemble, &settings)?))
     });
     models(rounds, &compiled.into_iter().collect::<Result<Vec<_>>>()?, test)
@@ -145,13 +146,12 @@ fn leaves(rounds: usize, trained: &Dataset, test: &Dataset) -> Result<()> {
 /// Sizes of tables compared.
 fn tables(rounds: usize, trained: &Dataset, test: &Dataset) -> Result<()> {
     let ensembles = [16, 32, 64, 128, 256].map(|bins| {
-        let settings =
-            train::Settings { feature_bins: Some(vec![bins; 2]), leaf_bits: None, ..train::Settings::compact() };
+        let settings = with!(train::Settings::compact(), feature_bins = Some(vec![bins; 2]), leaf_bits = None);
         Ok((bins, train(trained, &settings, &())?))
     });
     let ensembles = ensembles.into_iter().collect::<Result<Vec<_>>>()?;
     let compiled = ensembles.iter().map(|(bins, ensemble)| {
-        let settings = compile::Settings { leaf: Leaf::I8, layout: Some(Layout::Grid), ..compile::Settings::default() };
+        let settings = with!(compile::Settings::default(), leaf = Leaf::I8, layout = Some(Layout::Grid));
         Ok((format!("table of {bins} × {bins} bins, i8"), ensemble, compile(ensemble, &settings)?))
     });
     models(rounds, &compiled.collect::<Result<Vec<_>>>()?, test)

@@ -6,6 +6,7 @@
 
 use palpate::compile::{EarlyExit, Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node};
+use palpate::with;
 use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict, exp2_negative};
 use palpate_shared::format::{Counted, Outputs, PatternShares, Trained, TrainedTouches, checksum, f32_key};
 use palpate_shared::{ContactTime, Descriptor, MISSING_FEATURE, Patterns, Pose, Touch};
@@ -68,7 +69,7 @@ fn compiled(shape: Shape, seed: u64, leaf: Leaf, layout: Layout) -> Vec<u8> {
     // Tables by contact pattern have no other descriptor.
     let descriptor = if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { shape.descriptor };
     let ensemble = random::ensemble(Shape { descriptor, ..shape }, seed);
-    compile(&ensemble, &Settings { leaf, layout: Some(layout), ..Settings::default() }).expect("it fits").bytes
+    compile(&ensemble, &with!(Settings::default(), leaf = leaf, layout = Some(layout))).expect("it fits").bytes
 }
 
 /// Touches that reach all over a model, and those at the limits of features.
@@ -270,7 +271,7 @@ fn rows(text: &mut String) {
         (Layout::Complete, Leaf::F32),
     ] {
         let ensemble = imported(random::ensemble(SHAPE, 14), 5);
-        let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
+        let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout));
         let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
         play_rows(text, &format!("rows of f32 features, {} {}", layout.name(), leaf.name()), &bytes, true);
         play_rows(text, &format!("rows of whole features, {}", layout.name()), &changed(&bytes, 13, &[0]), false);
@@ -279,7 +280,7 @@ fn rows(text: &mut String) {
     let values: Vec<u8> = (0..33).map(|value| 7 * value).collect();
     let table = [&(-(1_i32 << 17)).to_le_bytes()[..], &[3, 10, 2, 32], &values].concat();
     let sections = [section(4 | 1 << 15, &[&[4, 0][..], &weights].concat()), section(16 | 1 << 15, &table)].concat();
-    let settings = Settings { leaf: Leaf::I16, layout: Some(Layout::Compact), ..Settings::default() };
+    let settings = with!(Settings::default(), leaf = Leaf::I16, layout = Some(Layout::Compact));
     let bytes = compile(&imported(random::ensemble(SHAPE, 14), 5), &settings).expect("it fits").bytes;
     play_rows(text, "rows whose evidence is weighed, by a table", &with_sections(&bytes, &sections), true);
 }
@@ -328,7 +329,7 @@ fn early_exits(text: &mut String) {
     ] {
         let ensemble = imported(random::ensemble(Shape { trees: 24, each, ..SHAPE }, 26), 5);
         let early_exit = Some(EarlyExit::Always);
-        let settings = Settings { leaf, layout: Some(layout), early_exit, ..Settings::default() };
+        let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout), early_exit = early_exit);
         let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
         play_rows(text, &format!("early exit, {} {}", layout.name(), leaf.name()), &bytes, true);
     }
@@ -352,7 +353,7 @@ fn together(text: &mut String) {
         ("a temperature", [0, 0, 0, 1, 2], &[], &temperature[..]),
         ("one object of all outputs", [0; 5], &[], &[]),
     ] {
-        let settings = Settings { leaf: Leaf::I8, error_rate: 0.05, max_touches: 8, ..Settings::default() };
+        let settings = with!(Settings::default(), leaf = Leaf::I8, error_rate = 0.05, max_touches = 8);
         let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
         let sections = [&all[..], between, after, &outputs(objects)].concat();
         play(text, &format!("outputs together: {name}"), &with_sections(&bytes, &sections), &random::touches(8, 28));
@@ -392,7 +393,13 @@ fn decisions(text: &mut String) {
     let ensemble = random::ensemble(Shape { leaf: 0.6, ..SHAPE }, 16);
     for (error_rate, max_touches) in [(0.3, 3), (0.01, 200), (1e-9, 200), (1e-15, 6)] {
         let priors = Some(vec![0.5, 0.3, 0.2]);
-        let settings = Settings { leaf: Leaf::I8, error_rate, max_touches, priors, ..Settings::default() };
+        let settings = with!(
+            Settings::default(),
+            leaf = Leaf::I8,
+            error_rate = error_rate,
+            max_touches = max_touches,
+            priors = priors
+        );
         let bytes = stated(&compile(&ensemble, &settings).expect("it fits").bytes, ALL);
         play(text, &format!("error rate {error_rate}, at most {max_touches} touches"), &bytes, &touches(20, 17));
     }
@@ -404,7 +411,7 @@ fn decisions(text: &mut String) {
             values.fill(first);
         }
     }
-    let settings = Settings { leaf: Leaf::I8, error_rate: 0.49, max_touches: 4, ..Settings::default() };
+    let settings = with!(Settings::default(), leaf = Leaf::I8, error_rate = 0.49, max_touches = 4);
     let bytes = stated(&compile(&level, &settings).expect("it fits").bytes, ALL);
     play(text, "objects that are level", &bytes, &touches(6, 18));
     // Sums that are not finite numbers, or beyond the range of margins.
@@ -454,7 +461,7 @@ fn shared_leaves(text: &mut String) {
     let compiled = |shape: Shape, different: Option<usize>, leaf, layout| {
         let ensemble = random::ensemble(shape, 23);
         let ensemble = different.map_or(ensemble.clone(), |most| random::with_few_leaves(ensemble, most));
-        let settings = Settings { leaf, layout: Some(layout), shared_leaves: Some(true), ..Settings::default() };
+        let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout), shared_leaves = Some(true));
         stated(&compile(&ensemble, &settings).expect("it fits").bytes, ALL)
     };
     for layout in [Layout::Compact, Layout::Complete, Layout::Wide] {

@@ -18,6 +18,7 @@ use palpate::probe::noise::Noise;
 use palpate::strangers;
 use palpate::stream::{self, StrangerTest};
 use palpate::touches::Dataset;
+use palpate::with;
 use palpate::wording::{self, count, decimal};
 use palpate_shared::format::Held;
 use std::fmt::Write as _;
@@ -179,16 +180,17 @@ fn on_touches(arguments: &Arguments, directory: &PathBuf, global: &Global) -> Re
     let recorded = arguments.recorded.as_ref().map(|recorded| untrained(&compiled, recorded)).transpose()?;
     let file = arguments.probe.read()?;
     arguments.probe.of_dataset(file.as_ref(), &dataset)?;
-    let settings = Settings {
-        rate: arguments.error_rate,
-        per: arguments.placement_prior.per(arguments.per, &compiled)?,
-        confidence: arguments.confidence,
-        sequences: arguments.drawn(),
-        max_touches: arguments.max_touches,
-        noise: arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?)?,
-        active: arguments.active,
-        seed: global.seed(),
-    };
+    let settings = with!(
+        Settings::default(),
+        rate = arguments.error_rate,
+        per = arguments.placement_prior.per(arguments.per, &compiled)?,
+        confidence = arguments.confidence,
+        sequences = arguments.drawn(),
+        max_touches = arguments.max_touches,
+        noise = arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?)?,
+        active = arguments.active,
+        seed = global.seed()
+    );
     // Recorded touches hold the noise of their probe.
     let unlike = calibrate::unlike_training(&compiled.model(), &dataset.real().and(&settings.noise));
     if let Some(unlike) = unlike.filter(|_| !dataset.is_recorded()) {
@@ -211,7 +213,7 @@ fn on_touches(arguments: &Arguments, directory: &PathBuf, global: &Global) -> Re
         return calibrated.map_err(wrong);
     };
     let sequences = settings.sequences;
-    let test = strangers::Settings { sequences, ..test(held, arguments, global) };
+    let test = with!(test(held, arguments, global), sequences = sequences);
     let shapes = arguments.strangers.shapes(&dataset)?;
     let (model, recorded) = (compiled.model(), recorded.as_ref());
     let both = strangers::calibrate_with_promise(&model, &dataset, recorded, &shapes, &test, &settings, &Bar::new());
@@ -221,7 +223,7 @@ fn on_touches(arguments: &Arguments, directory: &PathBuf, global: &Global) -> Re
 
 /// The test for what the model does not know, with the confidence and the seed of the promise.
 fn test(held: Held, arguments: &Arguments, global: &Global) -> strangers::Settings {
-    strangers::Settings { held, confidence: arguments.confidence, seed: global.seed(), ..Default::default() }
+    with!(strangers::Settings::default(), held = held, confidence = arguments.confidence, seed = global.seed())
 }
 
 /// Calibrates on sequences of rows.
@@ -241,15 +243,16 @@ fn on_rows(arguments: &Arguments, rows: &PathBuf, global: &Global) -> Result<Cal
         let others = background.map(|path| sequences::others(path, &model, &columns)).transpose()?;
         StrangerTest::new(test(held, arguments, global), &model, others.as_ref())
     };
-    let settings = stream::Settings {
-        rate: arguments.error_rate,
-        per: arguments.per,
-        confidence: arguments.confidence,
-        sequences: arguments.drawn(),
-        max_rows: arguments.max_touches,
-        strangers: arguments.strangers.held().map(strangers).transpose()?,
-        seed: global.seed(),
-    };
+    let settings = with!(
+        stream::Settings::default(),
+        rate = arguments.error_rate,
+        per = arguments.per,
+        confidence = arguments.confidence,
+        sequences = arguments.drawn(),
+        max_rows = arguments.max_touches,
+        strangers = arguments.strangers.held().map(strangers).transpose()?,
+        seed = global.seed()
+    );
     stream::calibrate(&model, &found, &settings, &Bar::new()).map_err(|error| error.in_file(rows))
 }
 

@@ -10,6 +10,7 @@ use palpate::mesh::facts::Facts;
 use palpate::output;
 use palpate::probe::approach::Aim;
 use palpate::touches::{Format, Listing, Origin, Shard};
+use palpate::with;
 use palpate::wording::{count, decimal};
 use palpate::{Error, Result};
 use std::fmt::Write as _;
@@ -86,13 +87,14 @@ pub(crate) fn run(mut arguments: Arguments, global: &Global) -> Result<()> {
     if arguments.position {
         arguments.size.units.imply_true_size();
     }
-    let settings = Settings {
-        origin: arguments.origin(global.seed)?,
-        resume: arguments.resume,
-        add: arguments.add,
-        force: global.force,
-        threads: global.threads,
-    };
+    let settings = with!(
+        Settings::default(),
+        origin = arguments.origin(global.seed)?,
+        resume = arguments.resume,
+        add = arguments.add,
+        force = global.force,
+        threads = global.threads
+    );
     settings.check()?;
     let mut objects = arguments.size.objects(&arguments.sources, settings.origin.seed)?;
     arguments.scene.weigh(&mut objects)?;

@@ -12,6 +12,7 @@ use palpate::output;
 use palpate::probe::approach::Aim;
 use palpate::probe::noise::Noise;
 use palpate::tune::probe::{Design, Settings, Trial, design};
+use palpate::with;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 use std::fmt::Write as _;
@@ -170,22 +171,22 @@ impl DesignArguments {
             false => Settings::default(),
         };
         let Search { spacing, radius, tilt, stroke, aims, speed } = self.search.clone();
-        Ok(Settings {
-            spacing: spacing.unwrap_or_else(|| usual.spacing.clone()),
-            radius: radius.unwrap_or_else(|| usual.radius.clone()),
-            tilt: tilt.unwrap_or(TILT),
-            stroke,
-            aims: aims.unwrap_or_else(|| Aim::ALL.into()),
-            speed: speed.unwrap_or(usual.speed),
-            noise: self.noise()?,
-            descriptor: self.descriptor,
-            counted: self.evidence,
-            error_rate: self.error_rate,
-            approaches: self.approaches,
-            sequences: self.sequences,
-            seed,
-            ..usual
-        })
+        Ok(with!(
+            usual.clone(),
+            spacing = spacing.unwrap_or_else(|| usual.spacing.clone()),
+            radius = radius.unwrap_or_else(|| usual.radius.clone()),
+            tilt = tilt.unwrap_or(TILT),
+            stroke = stroke,
+            aims = aims.unwrap_or_else(|| Aim::ALL.into()),
+            speed = speed.unwrap_or(usual.speed),
+            noise = self.noise()?,
+            descriptor = self.descriptor,
+            counted = self.evidence,
+            error_rate = self.error_rate,
+            approaches = self.approaches,
+            sequences = self.sequences,
+            seed = seed
+        ))
     }
 
     /// The command that remakes the page, with every option that changes it.

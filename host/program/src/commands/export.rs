@@ -14,6 +14,7 @@ use palpate::error::Error;
 use palpate::output;
 use palpate::rows::scales::{self, Effect, Merged};
 use palpate::rows::{Rows, notes};
+use palpate::with;
 use palpate_shared::format::{Link, MAGIC};
 use std::fmt::Write as _;
 use std::fs::File;
@@ -202,23 +203,23 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let (layout, forms) = arguments.code()?;
     let usual = match ensemble.inputs {
         // Where leaves were rounded to one byte, two hold nothing more.
-        Inputs::Computed(_) if train::is_rounded(&ensemble, 8) => Settings { leaf: Leaf::I8, ..Settings::default() },
+        Inputs::Computed(_) if train::is_rounded(&ensemble, 8) => with!(Settings::default(), leaf = Leaf::I8),
         Inputs::Computed(_) => compile::for_touches(ensemble.objects.len()),
         Inputs::Rows(_) => Settings::default(),
     };
-    let settings = Settings {
-        leaf: arguments.leaf.unwrap_or(usual.leaf),
-        layout,
-        forms,
-        goal: arguments.layout.goal(),
-        shared_leaves: arguments.shared_leaves.0,
-        error_rate: arguments.error_rate,
-        max_touches: arguments.max_touches,
-        scales,
-        priors: arguments.prior.of(&ensemble.objects, &shares_of(&ensemble)?)?,
-        early_exit: early_exit(&arguments, &ensemble)?,
-        ..Settings::default()
-    };
+    let settings = with!(
+        Settings::default(),
+        leaf = arguments.leaf.unwrap_or(usual.leaf),
+        layout = layout,
+        forms = forms,
+        goal = arguments.layout.goal(),
+        shared_leaves = arguments.shared_leaves.0,
+        error_rate = arguments.error_rate,
+        max_touches = arguments.max_touches,
+        scales = scales,
+        priors = arguments.prior.of(&ensemble.objects, &shares_of(&ensemble)?)?,
+        early_exit = early_exit(&arguments, &ensemble)?
+    );
     let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {
         1 => error.in_file(&arguments.ensemble),
         _ => error,

@@ -6,6 +6,7 @@ use palpate::locate::{self, Maps, Real, Settings, Surface};
 use palpate::output;
 use palpate::probe::noise::{Noise, quantity};
 use palpate::touches::Dataset;
+use palpate::with;
 use palpate::wording::{count, decimal, percent};
 use palpate::{Error, Result};
 use std::fmt::Write as _;
@@ -78,16 +79,16 @@ impl MapSettings {
     /// The settings that are given, and `base` where they are open.
     fn over(&self, base: Settings) -> Settings {
         let or = |given: Option<f64>, own: f64| given.map_or(own, |micrometers| micrometers / 1e3);
-        Settings {
-            fine: self.fine.unwrap_or(base.fine),
-            range: or(self.range, base.range),
-            noise: or(self.noise, base.noise),
-            lost: self.lost.unwrap_or(base.lost),
-            position: or(self.position, base.position),
-            drift: self.drift.map_or(base.drift, |[moved, _]| moved / 1e3),
-            drift_yaw: self.drift.map_or(base.drift_yaw, |[_, turned]| turned),
-            ..base
-        }
+        with!(
+            base.clone(),
+            fine = self.fine.unwrap_or(base.fine),
+            range = or(self.range, base.range),
+            noise = or(self.noise, base.noise),
+            lost = self.lost.unwrap_or(base.lost),
+            position = or(self.position, base.position),
+            drift = self.drift.map_or(base.drift, |[moved, _]| moved / 1e3),
+            drift_yaw = self.drift.map_or(base.drift_yaw, |[_, turned]| turned)
+        )
     }
 }
 
@@ -206,8 +207,7 @@ mod tests {
 
     #[test]
     fn settings_that_are_given_replace_those_of_the_noise() {
-        let set =
-            |text: &str| text.parse::<MapSettings>().unwrap().over(Settings { lost: 0.05, ..Settings::default() });
+        let set = |text: &str| text.parse::<MapSettings>().unwrap().over(with!(Settings::default(), lost = 0.05));
         let all = set("cell=2mm,range=20mm,noise=1mm,lost=1%,position=500um,drift=1mm/2deg");
         assert_eq!((all.fine, all.range, all.noise, all.lost), (false, 20.0, 1.0, 0.01));
         assert_eq!((all.position, all.drift, all.drift_yaw), (0.5, 1.0, 2.0));

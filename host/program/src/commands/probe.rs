@@ -8,11 +8,11 @@ use palpate::error::{CaptureProblem, ProbeProblem};
 use palpate::mesh::facts::sides;
 use palpate::mesh::source::{self, Search};
 use palpate::mesh::{BACKGROUND, Object, builtin};
-use palpate::probe::Probe;
 use palpate::probe::file::ProbeFile;
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
 use palpate::touches::{Dataset, Origin};
+use palpate::with;
 use palpate::{Error, Result};
 use palpate_shared::format::Length;
 use std::cell::OnceCell;
@@ -78,8 +78,7 @@ impl ProbeArguments {
         StatedProbe::compare_with([&name, "the data set"], Some(given.trained()), u32::MAX, dataset)?;
         // Recordings need not state the stroke that a file states.
         let stroke = given.probe.stroke.filter(|_| dataset.is_recorded());
-        let own =
-            own.map(|own| StatedProbe { probe: Probe { stroke: own.probe.stroke.or(stroke), ..own.probe }, ..own });
+        let own = own.map(|own| StatedProbe { probe: with!(own.probe, stroke = own.probe.stroke.or(stroke)), ..own });
         Ok(own.or(Some(given)))
     }
 

@@ -91,6 +91,7 @@ fn wrong(problem: BadNoise) -> String {
 mod tests {
     use super::*;
     use clap::Parser;
+    use palpate::with;
 
     #[derive(Parser)]
     struct Program {
@@ -119,7 +120,7 @@ mod tests {
         let path = directory.path().join("probe.toml");
         std::fs::write(&path, "radius = 1\nspacing = 2\nspeed = 3\n[real]\nmissed = \"2%\"\n").unwrap();
         let given = parsed(&["--real", path.to_str().unwrap()]);
-        assert_eq!(given.over(Noise::switch()).unwrap(), Noise { missed: [0.02; 3], ..Noise::default() });
+        assert_eq!(given.over(Noise::switch()).unwrap(), with!(Noise::default(), missed = [0.02; 3]));
         std::fs::remove_file(&path).unwrap();
         assert!(given.over(Noise::switch()).unwrap_err().to_string().contains("probe.toml"));
     }

@@ -7,6 +7,7 @@ use palpate::Result;
 use palpate::output::{print, print_json, refuse_stdout};
 use palpate::probe::noise::{Grazing, Noise};
 use palpate::touches::Origin;
+use palpate::with;
 use palpate_report::{self, Existing, Part, Settings};
 use std::path::PathBuf;
 
@@ -68,7 +69,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
                     "Where noise is added to touches, fingers do not bend aside; in the comparison with recordings they do.",
                 );
             }
-            given.over(Noise { grazing: Grazing::default(), ..real })?
+            given.over(with!(real, grazing = Grazing::default()))?
         }
         None if given.is_given() => given.over(Noise::default())?,
         None => settings.noise,

@@ -13,6 +13,7 @@ use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::teach::{self, Adjusted, Taught};
 use palpate::touches::{Dataset, ObjectTouches};
+use palpate::with;
 use palpate::wording::{count, decimal, percent};
 use palpate::{Error, Result};
 use palpate_onboard::Refused;
@@ -242,7 +243,7 @@ fn simulated(
 ) -> Result<Made> {
     let file = arguments.probe.read()?;
     let probe = arguments.probe.of_dataset(file.as_ref(), &dataset)?;
-    let mut settings = Settings { probe, ..arguments.settings(global, &dataset) };
+    let mut settings = with!(arguments.settings(global, &dataset), probe = probe);
     settings.noise = arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, settings.noise)?)?;
     let background = arguments.background.as_deref().map(Dataset::read_any).transpose()?.map(super::checked);
     let in_directory = |error: Error| match error.exit_code() {
@@ -268,7 +269,7 @@ fn simulated(
     }
     // An ensemble that is there states what it was trained for.
     let noise = arguments.teach.extend.is_none().then_some(settings.noise);
-    let how = teach::Settings { noise, ..teaching(&settings) };
+    let how = with!(teaching(&settings), noise = noise);
     // An output is an object, or a placement of one.
     let is_of = |own: &str, name: &str| own == name || own.rsplit_once('/').is_some_and(|(object, _)| object == name);
     let [old, new] = [true, false]
@@ -305,7 +306,7 @@ fn alone(arguments: &Arguments, global: &Global, recorded: Dataset) -> Result<Ma
     }
     let file = arguments.probe.read()?;
     let probe = arguments.probe.of_dataset(file.as_ref(), &recorded)?;
-    let settings = Settings { probe, noise: Noise::default(), ..arguments.settings(global, &recorded) };
+    let settings = with!(arguments.settings(global, &recorded), probe = probe, noise = Noise::default());
     let (ensemble, taught) = teach::alone(&recorded, &settings, &teaching(&settings), &Bar::new())?;
     Ok(Made { ensemble, dataset: recorded, taught: Some(taught), adjusted: None, is_clean: false, settings })
 }
@@ -313,7 +314,7 @@ fn alone(arguments: &Arguments, global: &Global, recorded: Dataset) -> Result<Ma
 /// Settings for teaching objects to an ensemble of such a training.
 fn teaching(settings: &Settings) -> teach::Settings {
     let Settings { seed, threads, leaf_bits, .. } = *settings;
-    teach::Settings { seed, threads, leaf_bits, ..teach::Settings::default() }
+    with!(teach::Settings::default(), seed = seed, threads = threads, leaf_bits = leaf_bits)
 }
 
 /// Cost of noise, as a line; nothing where the training had noise.
@@ -353,15 +354,15 @@ impl Arguments {
             Preset::Compact => Settings::compact_for(self.descriptor.unwrap_or(Descriptor::Curvature), outputs),
             Preset::Paper => Settings::paper(),
         };
-        let settings = Settings {
-            descriptor: self.descriptor.unwrap_or(preset.descriptor),
-            counted: self.evidence.or(preset.counted),
-            seed: global.seed(),
-            threads: global.threads,
-            probe: None,
-            outputs: self.outputs.unwrap_or(Outputs::Placements),
-            ..preset
-        };
+        let settings = with!(
+            preset.clone(),
+            descriptor = self.descriptor.unwrap_or(preset.descriptor),
+            counted = self.evidence.or(preset.counted),
+            seed = global.seed(),
+            threads = global.threads,
+            probe = None,
+            outputs = self.outputs.unwrap_or(Outputs::Placements)
+        );
         self.trees.as_ref().map_or_else(|| settings.clone(), |trees| trees.over(settings.clone()))
     }
 }

@@ -1,6 +1,7 @@
 //! The option for how trees are grown: `rounds=100,depth=6,eta=0.3`.
 
 use palpate::ensemble::train::{Engine, Settings, Small};
+use palpate::with;
 use std::str::FromStr;
 
 /// Settings of trees, as one text; those that are left open are a preset's.
@@ -75,22 +76,22 @@ impl Trees {
 
     /// The settings that are given, and `preset` where they are open.
     pub(crate) fn over(&self, preset: Settings) -> Settings {
-        Settings {
-            multi_output: self.multi_output.unwrap_or(preset.multi_output),
-            rounds: self.rounds.unwrap_or(preset.rounds),
-            depth: self.depth.unwrap_or(preset.depth),
-            eta: self.eta.unwrap_or(preset.eta),
-            min_child_weight: self.min_child_weight.unwrap_or(preset.min_child_weight),
-            bins: if let [bins] = self.bins[..] { bins } else { preset.bins },
-            feature_bins: (self.bins.len() > 1).then(|| self.bins.clone()),
-            leaf_bits: self.leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
-            small: self.different_leaves.map(|leaves| {
+        with!(
+            preset.clone(),
+            multi_output = self.multi_output.unwrap_or(preset.multi_output),
+            rounds = self.rounds.unwrap_or(preset.rounds),
+            depth = self.depth.unwrap_or(preset.depth),
+            eta = self.eta.unwrap_or(preset.eta),
+            min_child_weight = self.min_child_weight.unwrap_or(preset.min_child_weight),
+            bins = if let [bins] = self.bins[..] { bins } else { preset.bins },
+            feature_bins = (self.bins.len() > 1).then(|| self.bins.clone()),
+            leaf_bits = self.leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
+            small = self.different_leaves.map(|leaves| {
                 let threshold_cost = self.threshold_cost.unwrap_or(Small::default().threshold_cost);
                 Small { leaves, threshold_cost }
             }),
-            trainer: self.trainer.unwrap_or(preset.trainer),
-            ..preset
-        }
+            trainer = self.trainer.unwrap_or(preset.trainer)
+        )
     }
 }
 

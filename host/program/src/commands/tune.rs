@@ -9,6 +9,7 @@ use palpate::compile::{self, Core};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::tune::{self, Row, Settings, Tuned};
+use palpate::with;
 use palpate_shared::Descriptor;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -67,17 +68,18 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let file = arguments.probe.read()?;
     let tuned = tune::tune(
         &dataset,
-        &Settings {
-            descriptor: arguments.descriptor,
-            max_bytes: arguments.max_bytes,
-            max_instructions: arguments.max_instructions,
-            core: arguments.chip,
-            probe: arguments.probe.of_dataset(file.as_ref(), &dataset)?,
-            noise: arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?)?,
-            error_rate: arguments.error_rate,
-            groups: arguments.sequences,
-            seed: global.seed(),
-        },
+        &with!(
+            Settings::default(),
+            descriptor = arguments.descriptor,
+            max_bytes = arguments.max_bytes,
+            max_instructions = arguments.max_instructions,
+            core = arguments.chip,
+            probe = arguments.probe.of_dataset(file.as_ref(), &dataset)?,
+            noise = arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?)?,
+            error_rate = arguments.error_rate,
+            groups = arguments.sequences,
+            seed = global.seed()
+        ),
         &Bar::new(),
     )?;
     if let Some(path) = &arguments.ensemble {

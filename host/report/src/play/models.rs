@@ -14,6 +14,7 @@ use palpate::probe::noise::Noise;
 use palpate::probe::scene::Scene;
 use palpate::progress::{self, Progress};
 use palpate::touches::{Dataset, ObjectTouches, Origin};
+use palpate::with;
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
@@ -60,10 +61,16 @@ pub fn train(objects: &[Object], training: &Training, progress: &dyn Progress) -
     let full = captured("full", origin.clone())?;
     let approaches = captured("approaches", approached(origin.touches.saturating_mul(3), 1))?;
     let seed = origin.seed;
-    let preset = |preset: Settings| Settings { seed, probe: Some(StatedProbe::from(origin)), ..preset };
+    let preset = |preset: Settings| with!(preset, seed = seed, probe = Some(StatedProbe::from(origin)));
     let compact = |descriptor, counted, leaf_bits| {
         let counted = Some(counted);
-        preset(Settings { descriptor, counted, leaf_bits: Some(leaf_bits), noise: *noise, ..Settings::compact() })
+        preset(with!(
+            Settings::compact(),
+            descriptor = descriptor,
+            counted = counted,
+            leaf_bits = Some(leaf_bits),
+            noise = *noise
+        ))
     };
     let methods = [
         (preset(Settings::paper()), &full),
@@ -75,7 +82,7 @@ pub fn train(objects: &[Object], training: &Training, progress: &dyn Progress) -
     for (settings, dataset) in methods {
         let ensemble = trainer::train(dataset, &settings, progress)?;
         progress::check(progress)?;
-        let settings = compile::Settings { error_rate: ERROR_RATE, ..compile::Settings::default() };
+        let settings = with!(compile::Settings::default(), error_rate = ERROR_RATE);
         let mut bytes = compile(&ensemble, &settings)?.bytes;
         if ensemble.descriptor().is_some_and(Descriptor::needs_pose) {
             let dataset = captured("plan", approached(PLANNED, 4))?;
@@ -96,13 +103,13 @@ fn promising(
     noise: &Noise,
     progress: &dyn Progress,
 ) -> Result<Vec<u8>> {
-    let terms = calibrate::Settings {
-        rate: ERROR_RATE,
-        sequences: SEQUENCES,
-        noise: *noise,
-        seed: fresh.seed,
-        ..calibrate::Settings::default()
-    };
+    let terms = with!(
+        calibrate::Settings::default(),
+        rate = ERROR_RATE,
+        sequences = SEQUENCES,
+        noise = *noise,
+        seed = fresh.seed
+    );
     match calibrate_fresh(&compile::open(&bytes)?, objects, fresh, &terms, &mut calibrate::Fresh::default(), progress) {
         Ok(calibrated) => Ok(calibrated.model),
         Err(error) if error.problem::<CalibrateProblem>().is_some() => Ok(bytes),

@@ -18,6 +18,7 @@ pub const CLEARANCE: f64 = 5.0;
 /// The probe's dimensions and motion.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Probe {
     /// The fingers' radius, in units.
     pub radius: f64,

@@ -47,6 +47,7 @@ pub enum Engine {
 
 /// Settings of training. Parameters have XGBoost's names and meanings.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// Features that a touch is turned into. With partial touches its form for those is used
     /// ([`Descriptor::for_contacts`]), without them its form for full touches.

@@ -4,6 +4,7 @@ use crate::ensemble::OverTouches;
 use crate::error::{EnsembleProblem, NameProblem, Setting};
 use crate::tests::synthetic;
 use crate::touches::{ObjectTouches, Source};
+use crate::with;
 use palpate_shared::ContactTime;
 
 fn quick() -> Settings {
@@ -131,7 +132,7 @@ fn the_most_objects_that_can_be_trained_can_be_saved_loaded_and_compiled() {
 #[test]
 fn an_ensemble_states_the_probe_and_knows_its_touches_again_after_saving() {
     let dataset = synthetic::dataset(&[60, 60], 8);
-    let probe = crate::probe::approach::Probe { spacing: 2.0, ..Default::default() };
+    let probe = with!(crate::probe::approach::Probe::default(), spacing = 2.0);
     let probe = Some(StatedProbe { probe, length: 12.5, ..StatedProbe::default() });
     let stated = train(&dataset, &Settings { probe, ..quick() }, &()).unwrap();
     let silent = train(&dataset, &quick(), &()).unwrap();
@@ -312,7 +313,7 @@ fn an_object_without_a_touch_that_counts_is_named() {
 #[test]
 fn a_stroke_is_the_largest_spread_of_the_ensemble_and_of_every_compiled_model() {
     let mut dataset = approaches();
-    let probe = crate::probe::Probe { stroke: Some(0.05), travel: Some(20.0), ..Default::default() };
+    let probe = with!(crate::probe::Probe::default(), stroke = Some(0.05), travel = Some(20.0));
     dataset.origin = Some(crate::touches::Origin { probe, approaches: true, ..Default::default() });
     dataset = dataset.each(|own| own.clone().of_stroke(probe.window()));
     let noise = Noise::gaussian(2_000.0);

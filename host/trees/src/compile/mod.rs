@@ -87,6 +87,7 @@ use palpate_onboard::Stopping;
 
 /// Settings of compilation.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// Type that leaves are stored as.
     pub leaf: Leaf,

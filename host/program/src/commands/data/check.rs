@@ -8,6 +8,7 @@ use palpate::compare::Settings;
 use palpate::error::{Error, Place, TouchesProblem};
 use palpate::touches::Origin;
 use palpate::touches::check::{Check, ObjectSummary, Quantiles, Summary};
+use palpate::with;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Length;
 use std::fmt::Write as _;
@@ -43,7 +44,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     if let Some(simulated) = &arguments.simulated {
         let (descriptor, groups) = (arguments.descriptor, arguments.sequences);
-        let settings = Settings { descriptor, groups, seed: global.seed(), ..Settings::default() };
+        let settings = with!(Settings::default(), descriptor = descriptor, groups = groups, seed = global.seed());
         return super::compare::run(&arguments.directory, simulated, &settings, global);
     }
     let check = Check::of(&arguments.directory)?;

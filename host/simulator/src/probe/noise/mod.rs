@@ -40,6 +40,7 @@ use std::str::FromStr;
 /// adds nothing.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
 pub struct Noise {
     /// Gaussian noise of every contact time: its standard deviation, or a range that each touch draws it from.
     pub deviation: Deviation,

@@ -4,6 +4,7 @@ use crate::compile::{self, Layout, Leaf, compile};
 use crate::ensemble::OverTouches;
 use crate::error::Setting;
 use crate::tests::synthetic;
+use crate::with;
 use palpate_shared::{Descriptor, Touch};
 use std::collections::BTreeSet;
 
@@ -49,9 +50,9 @@ fn no_more_leaves_differ_than_were_asked_for_and_a_model_of_bytes_is_exact() {
         let ensemble = train(&dataset(1), &settings(leaves), &()).unwrap();
         assert_eq!(ensemble.trees.len(), 10);
         assert!(different_leaves(&ensemble) <= leaves);
-        let how = compile::Settings { leaf: Leaf::I8, shared_leaves: Some(true), ..compile::Settings::default() };
+        let how = with!(compile::Settings::default(), leaf = Leaf::I8, shared_leaves = Some(true));
         for layout in [Layout::Complete, Layout::Compact] {
-            let compiled = compile(&ensemble, &compile::Settings { layout: Some(layout), ..how.clone() }).unwrap();
+            let compiled = compile(&ensemble, &with!(how.clone(), layout = Some(layout))).unwrap();
             assert_eq!(compiled.margin_error, 0.0);
             assert_eq!(compiled.shared_leaves, Some(different_leaves(&ensemble)));
         }
