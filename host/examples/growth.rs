@@ -112,7 +112,7 @@ impl Way {
         let mut parts = words.split(':');
         let (rounds, depth) = parts.next().and_then(|part| part.split_once('x')).ok_or("ROUNDSxDEPTH first")?;
         let (rounds, depth) = (rounds.parse()?, depth.parse()?);
-        let mut settings = with!(train::Settings::compact(), rounds = rounds, depth = depth);
+        let mut settings = with!(train::Settings::compact(), rounds, depth);
         let mut compile = with!(compile::Settings::default(), max_touches = LIMIT, error_rate = ERROR_RATE);
         for part in parts {
             match part.split_once('=').unwrap_or((part, "")) {

@@ -99,7 +99,7 @@ fn report(name: &str, all: &Sequences, names: &[String], rate: f64) -> Result<()
     let ensemble =
         Ensemble { inputs: Inputs::unnamed(width), objects, base_margins, trees, origin: Provenance::default() };
     let bytes = compile(&ensemble, &Settings::default())?.bytes;
-    let settings = with!(stream::Settings::default(), rate = rate);
+    let settings = with!(stream::Settings::default(), rate);
     let found = stream::calibrate(&compile::open(&bytes)?, &calibrated, &settings, &())?;
     let sure = compile::open(&found.model)?;
     let evaluated = stream::evaluate(&sure, &unseen, &Wanted::default())?;

@@ -20,7 +20,7 @@ pub const MANY: usize = 50;
 /// where nearly all of a model is leaves, and two bytes for fewer.
 pub fn for_touches(objects: usize) -> Settings {
     let leaf = if objects > MANY { Leaf::I8 } else { Leaf::I16 };
-    with!(Settings::default(), leaf = leaf)
+    with!(Settings::default(), leaf)
 }
 
 /// Compiles an ensemble. The model states the ensemble's own probe, or the published one where the ensemble states none.
@@ -52,7 +52,7 @@ fn stated(ensemble: &Ensemble, settings: &Settings) -> Result<Settings> {
         Some(outputs) => Some(priors(outputs, settings.priors.as_deref())?),
         None => settings.priors.clone(),
     };
-    Ok(with!(settings.clone(), stated = stated, priors = priors))
+    Ok(with!(settings.clone(), stated, priors))
 }
 
 /// Priors of outputs: those of their objects, or of the outputs themselves, and the outputs' shares.

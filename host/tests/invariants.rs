@@ -46,9 +46,9 @@ proptest! {
     #[test]
     fn doubling_the_speed_halves_the_times(seed: u64, speed in 0.1..1e3_f64) {
         let approach = approach(seed, 10.0);
-        let probe = with!(Probe::default(), speed = speed);
+        let probe = with!(Probe::default(), speed);
         let distances = approach.distances(&OBJECT, &probe);
-        let micros = |speed| approach.touch(distances, &with!(probe, speed = speed)).times().map(|time| time.micros());
+        let micros = |speed| approach.touch(distances, &with!(probe, speed)).times().map(|time| time.micros());
         for (once, twice) in micros(speed).into_iter().zip(micros(2.0 * speed)) {
             prop_assert_eq!(once.is_some(), twice.is_some());
             if let Some((once, twice)) = once.zip(twice) {

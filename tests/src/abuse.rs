@@ -47,7 +47,7 @@ pub fn model(layout: Layout, leaf: Leaf, each: bool) -> Vec<u8> {
     // Tables by contact pattern have no other descriptor.
     let descriptor = if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { Descriptor::Curvature };
     let shape = Shape { descriptor, objects: 3, trees: 4, depth: 2, each, thresholds: 6, leaf: 1.0 };
-    let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout));
+    let settings = with!(Settings::default(), leaf, layout = Some(layout));
     compile(&random::ensemble(shape, 5), &settings).expect("a small ensemble").bytes
 }
 

@@ -35,7 +35,7 @@ fn hold(ensemble: &Ensemble, compiled: &Compiled, touches: &[Touch]) {
 
 fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
     let layouts = std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
-    let settings = |layout| with!(Settings::default(), leaf = leaf, layout = layout);
+    let settings = |layout| with!(Settings::default(), leaf, layout);
     let plain = layouts.map(settings);
     // Of those that walk trees, one with shared leaves.
     let walked = [Layout::Compact, Layout::Complete, Layout::Wide];
@@ -127,7 +127,7 @@ proptest! {
         let mut margins = vec![0.0; shape.objects];
         let mut models = 0;
         for layout in [None, Some(Layout::Compact), Some(Layout::Wide), Some(Layout::Complete), Some(Layout::Grid)] {
-            let settings = with!(Settings::default(), leaf = Leaf::F32, layout = layout);
+            let settings = with!(Settings::default(), leaf = Leaf::F32, layout);
             let Ok(compiled) = compile(&ensemble, &settings) else { continue };
             models += 1;
             let model = Model::new(&compiled.bytes).unwrap();

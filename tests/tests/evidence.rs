@@ -33,7 +33,7 @@ fn steps(steps: &[f32], margins: &[&[f32]]) -> Ensemble {
 }
 
 fn compiled(ensemble: &Ensemble, leaf: Leaf) -> Vec<u8> {
-    compile(ensemble, &with!(Settings::default(), leaf = leaf, layout = Some(Layout::Compact))).unwrap().bytes
+    compile(ensemble, &with!(Settings::default(), leaf, layout = Some(Layout::Compact))).unwrap().bytes
 }
 
 /// The object that was recognized, and after how many touches.
@@ -134,7 +134,7 @@ fn leaves_beyond_reason_are_refused_with_the_place() {
     for value in [1e30, -1e30, f32::MAX, f32::INFINITY, f32::NAN] {
         for leaf in [Leaf::I8, Leaf::I16, Leaf::F32] {
             let ensemble = steps(&[500.0], &[&[5.0, -5.0], &[value, 5.0]]);
-            let error = compile(&ensemble, &with!(Settings::default(), leaf = leaf)).unwrap_err();
+            let error = compile(&ensemble, &with!(Settings::default(), leaf)).unwrap_err();
             let message = error.to_string();
             assert!(message.contains("margin of the object 0") || message.contains("tree 0: leaf 2"), "{message}");
             assert_eq!(error.exit_code(), 1);

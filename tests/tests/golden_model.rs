@@ -48,7 +48,7 @@ fn over_patterns() -> Ensemble {
 
 /// Compiles with the version and the ensemble's hash, which may change with a release, set to zero.
 fn body(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> String {
-    let compiled = compile(ensemble, &with!(Settings::default(), leaf = leaf, layout = Some(layout))).unwrap();
+    let compiled = compile(ensemble, &with!(Settings::default(), leaf, layout = Some(layout))).unwrap();
     let version = env!("CARGO_PKG_VERSION");
     let text = 96;
     assert_eq!(&compiled.bytes[text + 1..text + 1 + version.len()], version.as_bytes());
@@ -142,7 +142,7 @@ fn a_golden_model_gives_the_margins_worked_out_by_hand() {
         (Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::MISSING]), [1.625, -1.5]),
     ];
     let compiled = SECTIONS.map(|(leaf, layout, _)| {
-        compile(&ensemble(), &with!(Settings::default(), leaf = leaf, layout = Some(layout))).unwrap().bytes
+        compile(&ensemble(), &with!(Settings::default(), leaf, layout = Some(layout))).unwrap().bytes
     });
     let shared = [Layout::Compact, Layout::Complete, Layout::Wide].map(|layout| {
         let settings = with!(Settings::default(), layout = Some(layout), shared_leaves = Some(true));

@@ -35,7 +35,7 @@ fn models() -> Vec<Vec<u8>> {
                 let descriptor =
                     if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { shape.descriptor };
                 let ensemble = random::ensemble(Shape { each, descriptor, ..shape }, 5);
-                let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout));
+                let settings = with!(Settings::default(), leaf, layout = Some(layout));
                 models.push(compile(&ensemble, &settings).unwrap().bytes);
                 // The same with optional sections.
                 models.push(trained(models.last().unwrap(), &TRAINED));

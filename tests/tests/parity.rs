@@ -19,7 +19,7 @@ const SEQUENCES: usize = 10_000;
 
 /// Bytes of a compiled model.
 fn size(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> usize {
-    compile(ensemble, &with!(Settings::default(), leaf = leaf, layout = Some(layout))).unwrap().bytes.len()
+    compile(ensemble, &with!(Settings::default(), leaf, layout = Some(layout))).unwrap().bytes.len()
 }
 
 /// Touches of the built-in objects, without poses and with them; captured only once, as all tests need them.
@@ -74,7 +74,7 @@ fn the_published_methods_margins_stay_within_a_bound_that_is_near_and_its_verdic
 fn the_compact_methods_margins_and_verdicts_are_the_full_models_own() {
     for descriptor in [Descriptor::Curvature, Descriptor::Oriented] {
         let dataset = captured(true);
-        let ensemble = train(dataset, &with!(train::Settings::compact(), descriptor = descriptor), &()).unwrap();
+        let ensemble = train(dataset, &with!(train::Settings::compact(), descriptor), &()).unwrap();
         let (touches, sequences) = hold(&ensemble, dataset, FEWER);
         assert_eq!((touches.stated_bound, touches.max_margin_error, touches.best_differs), (0.0, 0.0, 0));
         assert_eq!((sequences.verdict_differs, sequences.touches_differ), (0, 0));

@@ -50,7 +50,7 @@ fn models(ensemble: &Ensemble, scales: Option<Vec<f32>>) -> Vec<Vec<u8>> {
     let layouts = || std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
     let all = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
     let compiled = all.filter_map(|(leaf, layout)| {
-        compile(ensemble, &with!(Settings::default(), leaf = leaf, layout = layout, scales = scales.clone())).ok()
+        compile(ensemble, &with!(Settings::default(), leaf, layout, scales = scales.clone())).ok()
     });
     compiled.map(|compiled| compiled.bytes).collect()
 }
@@ -62,11 +62,7 @@ fn early_exits(ensemble: &Ensemble, scales: Option<Vec<f32>>) -> Vec<Vec<u8>> {
         .flat_map(|leaf| [Layout::Complete, Layout::Compact, Layout::Wide].map(|layout| (leaf, layout)));
     let compiled = all.filter_map(|(leaf, layout)| {
         let (layout, early_exit) = (Some(layout), Some(EarlyExit::Always));
-        compile(
-            ensemble,
-            &with!(Settings::default(), leaf = leaf, layout = layout, early_exit = early_exit, scales = scales.clone()),
-        )
-        .ok()
+        compile(ensemble, &with!(Settings::default(), leaf, layout, early_exit, scales = scales.clone())).ok()
     });
     compiled.map(|compiled| compiled.bytes).collect()
 }
@@ -375,7 +371,7 @@ fn thousands_of_merged_trees_are_proved() {
     ensemble.trees.retain(|tree| tree.nodes.len() == 3);
     assert!(ensemble.trees.len() > 2_000, "{}", ensemble.trees.len());
     for leaf in [Leaf::I8, Leaf::I16] {
-        let settings = with!(Settings::default(), leaf = leaf, layout = Some(Layout::Compact));
+        let settings = with!(Settings::default(), leaf, layout = Some(Layout::Compact));
         let bytes = compile(&ensemble, &settings).unwrap().bytes;
         let (proof, certificate) = prove(&bytes, &ensemble, FILE).unwrap();
         assert!(20 * proof.trees < ensemble.trees.len(), "{} trees", proof.trees);

@@ -31,7 +31,7 @@ fn models(ensemble: &Ensemble) -> Vec<Vec<u8>> {
     let layouts = || std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
     let settings = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
     let compiled = settings.filter_map(|(leaf, layout)| {
-        let settings = with!(Settings::default(), leaf = leaf, layout = layout);
+        let settings = with!(Settings::default(), leaf, layout);
         compile(ensemble, &settings).ok()
     });
     compiled.map(|compiled| compiled.bytes).collect()

@@ -16,13 +16,15 @@ pub mod wording;
 
 pub use error::{Error, Result};
 
-/// A value with some of its fields replaced, `with!(Noise::default(), time = 0.1)`: the literal with `..` that other crates
-/// cannot write of a type that may get more fields.
+/// A value with some of its fields replaced, `with!(Noise::default(), time = 0.1, missed)`: the literal with `..` that other
+/// crates cannot write of a type that may get more fields.
 #[macro_export]
 macro_rules! with {
-    ($base:expr $(, $field:ident = $value:expr)+ $(,)?) => {{
+    (@ $field:ident) => { $field };
+    (@ $field:ident $value:expr) => { $value };
+    ($base:expr $(, $field:ident $(= $value:expr)?)+ $(,)?) => {{
         let mut value = $base;
-        $(value.$field = $value;)+
+        $(value.$field = $crate::with!(@ $field $($value)?);)+
         value
     }};
 }

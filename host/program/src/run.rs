@@ -235,7 +235,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let names: BTreeSet<&str> = objects.iter().map(|object| object.name.as_str()).collect();
     let is_same = |listing: &Listing| listing.objects.iter().map(|entry| entry.name.as_str()).eq(names.iter().copied());
     let force = settings.capture.force || settings.replace || Listing::read(&data)?.as_ref().is_some_and(is_same);
-    let captured = capture::capture(objects, &with!(settings.capture.clone(), force = force), &data, progress)?;
+    let captured = capture::capture(objects, &with!(settings.capture.clone(), force), &data, progress)?;
     let seed = settings.capture.origin.seed;
     stages.end("capture of full touches");
     let mut split = folds::split(&Dataset::read(&data)?, settings.test_share, seed)?;
@@ -245,7 +245,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
         Origin { touches: settings.approaches, approaches: true, seed: seed.wrapping_add(1), ..origin.clone() };
     let directory = out.join("approaches");
     let force = settings.capture.force || settings.replace || Listing::read(&directory)?.as_ref().is_some_and(is_same);
-    let approach_settings = with!(settings.capture.clone(), origin = origin, force = force);
+    let approach_settings = with!(settings.capture.clone(), origin, force);
     let approached = capture::capture(objects, &approach_settings, &directory, progress)?;
     stages.end("capture of approaches");
     let mut approaches = folds::split(&Dataset::read(&directory)?, settings.test_share, seed)?;
@@ -257,11 +257,10 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let job = Job { settings, objects, approaches: &approaches.test, kept: &kept, out, progress };
     stages.end("reading and dividing touches");
     let mut method = |name, files, preset, split| Trial::new(name, files, preset, split, job, &mut stages);
-    let compact = with!(train::Settings::compact(), seed = seed, probe = probe, noise = settings.noise);
+    let compact = with!(train::Settings::compact(), seed, probe, noise = settings.noise);
     let full = with!(compact.clone(), counted = Some(Counted::Full));
     let contacts = with!(compact, counted = Some(Counted::Contacts));
-    let paper =
-        method("the paper's method", "paper", with!(train::Settings::paper(), seed = seed, probe = probe), &split)?;
+    let paper = method("the paper's method", "paper", with!(train::Settings::paper(), seed, probe), &split)?;
     let full = method("ours on full touches", "full", full, &split)?;
     let ours = method("ours on every contact", "ensemble", contacts, &approaches)?;
     let model = compile::open(&ours.compiled.bytes)?;
@@ -376,7 +375,7 @@ impl Trial {
                 groups = settings.groups,
                 error_rate = None,
                 max_touches = None,
-                seed = seed,
+                seed,
                 noise = settings.noise
             ),
         )?;
@@ -391,7 +390,7 @@ impl Trial {
                 groups = settings.groups,
                 error_rate = None,
                 max_touches = None,
-                seed = seed,
+                seed,
                 noise = settings.noise
             ),
         )?;
@@ -430,7 +429,7 @@ fn calibrated(bytes: &[u8], split: &Split, job: &Job<'_>) -> Result<Result<Calib
         rate = settings.error_rate,
         sequences = settings.sequences,
         noise = settings.noise,
-        seed = seed
+        seed
     );
     let kept = &mut *job.kept.borrow_mut();
     match calibrate::calibrate_fresh(&compile::open(bytes)?, job.objects, &origin, &terms, kept, job.progress) {

@@ -13,6 +13,7 @@ use palpate::mesh::{Mesh, Object};
 use palpate::probe::approach::Aim;
 use palpate::shared::format::Length;
 use palpate::touches::{Origin, Surroundings};
+use palpate::with;
 use pyo3::exceptions::PyTypeError;
 use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
@@ -205,7 +206,7 @@ pub(crate) fn capture(
         shard: shard.parse().map_err(Error::from)?,
         ..Origin::default()
     };
-    let settings = Settings { origin, resume, add, force, threads };
+    let settings = with!(Settings::default(), origin, resume, add, force, threads);
     settings.check()?;
     long(py, progress.as_ref(), |progress| {
         let mut objects = meshes.objects(instances)?;

@@ -13,6 +13,7 @@ use palpate::error::{Error, EvaluateProblem};
 use palpate::rows::{Features, notes};
 use palpate::shared::Descriptor;
 use palpate::shared::format::{Counted, Link, Prediction};
+use palpate::with;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -264,28 +265,28 @@ pub(crate) fn train(
         Small { leaves, threshold_cost }
     });
     let dataset = &data.get().dataset;
-    let settings = Settings {
-        descriptor: descriptor.transpose()?.unwrap_or(preset.descriptor),
-        counted: counted.transpose()?.or(preset.counted),
-        rounds: rounds.unwrap_or(preset.rounds),
-        depth: depth.unwrap_or(preset.depth),
-        eta: eta.unwrap_or(preset.eta),
-        min_child_weight: min_child_weight.unwrap_or(preset.min_child_weight),
-        bins: bins.unwrap_or(preset.bins),
-        leaf_bits: leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
-        small: small.or(preset.small),
-        multi_output: multi_output.unwrap_or(preset.multi_output),
-        noise: noise_of(noise, timer)?,
-        outputs: match outputs {
+    let settings = with!(
+        preset.clone(),
+        descriptor = descriptor.transpose()?.unwrap_or(preset.descriptor),
+        counted = counted.transpose()?.or(preset.counted),
+        rounds = rounds.unwrap_or(preset.rounds),
+        depth = depth.unwrap_or(preset.depth),
+        eta = eta.unwrap_or(preset.eta),
+        min_child_weight = min_child_weight.unwrap_or(preset.min_child_weight),
+        bins = bins.unwrap_or(preset.bins),
+        leaf_bits = leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
+        small = small.or(preset.small),
+        multi_output = multi_output.unwrap_or(preset.multi_output),
+        noise = noise_of(noise, timer)?,
+        outputs = match outputs {
             "placements" => Outputs::Placements,
             "objects" => Outputs::Objects,
             other => return Err(Error::setting("outputs", other, "placements or objects").into()),
         },
         seed,
         threads,
-        probe: StatedProbe::of(dataset),
-        ..preset
-    };
+        probe = StatedProbe::of(dataset)
+    );
     let background = background.as_ref().map(|background| &background.get().dataset);
     let ensemble = long(py, progress.as_ref(), |progress| match background {
         None => library::train(dataset, &settings, progress),

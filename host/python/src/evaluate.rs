@@ -13,6 +13,7 @@ use palpate::error::Error;
 use palpate::evaluate::{
     self as library, Candidate, LEAST_GROUPS, Margins, Settings, add_noise, parity::parity as compare,
 };
+use palpate::with;
 use pyo3::prelude::*;
 
 /// A model of either kind.
@@ -61,7 +62,8 @@ pub(crate) fn evaluate(
         let at = at.unwrap_or_else(|| usual.at.into_iter().filter(|&at| enough(margins.distinct_groups(at))).collect());
         let fewest = margins.fewest_approaches();
         let at_approaches = at_approaches.into_iter().filter(|&at| at <= fewest).collect();
-        let settings = Settings { at, at_approaches, groups, error_rate, max_touches, seed, noise: stated };
+        let settings =
+            with!(Settings::default(), at, at_approaches, groups, error_rate, max_touches, seed, noise = stated);
         library::evaluate(&margins, &settings)
     })?;
     json(&evaluation)

@@ -19,6 +19,7 @@ use palpate::onboard::locate::Contact;
 use palpate::output;
 use palpate::shared::format::Length;
 use palpate::touches::{Dataset, Origin, Surroundings, located, touch_of_seconds};
+use palpate::with;
 use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -66,7 +67,7 @@ fn settings(Real(real): &Real, cell: f64, range: f64, error_rate: f64, max_touch
     if cell != 1.0 && cell != 2.0 {
         return Err(Error::setting("cell", cell, "1 or 2, in millimeters"));
     }
-    let settings = Settings { fine: cell < 2.0, range, error_rate, max_touches, ..Settings::default() }.expecting(real);
+    let settings = with!(Settings::default(), fine = cell < 2.0, range, error_rate, max_touches).expecting(real);
     settings.check()?;
     Ok(settings)
 }

@@ -16,6 +16,7 @@ use palpate::output;
 use palpate::rows::{Encoder, Features, feature_names, notes};
 use palpate::shared::{Descriptor, Touch};
 use palpate::touches::touch_of_seconds;
+use palpate::with;
 use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -390,14 +391,15 @@ pub(crate) fn compile(
             return Err(Error::setting(name, format!("a list of {found}"), format!("a list of {wanted}")).into());
         }
     }
-    let settings = Settings {
-        leaf: Leaf::ALL
-            .iter()
-            .copied()
-            .find(|known| known.name() == leaf)
-            .ok_or_else(|| Error::setting("leaf", leaf, "i8, i16 or f32"))?,
-        layout: layout.transpose()?,
-        goal: match goal {
+    let settings = with!(
+        Settings::default(),
+        leaf = Leaf::ALL.iter().copied().find(|known| known.name() == leaf).ok_or_else(|| Error::setting(
+            "leaf",
+            leaf,
+            "i8, i16 or f32"
+        ))?,
+        layout = layout.transpose()?,
+        goal = match goal {
             "balanced" => Goal::Balanced(Core::M4F),
             "speed" => Goal::Speed,
             "size" => Goal::Size,
@@ -406,9 +408,8 @@ pub(crate) fn compile(
         error_rate,
         max_touches,
         priors,
-        scales,
-        ..Settings::default()
-    };
+        scales
+    );
     let compiled = py.detach(|| match max_bytes {
         None => library::compile(ensemble, &settings),
         Some(most) => library::compile_within(ensemble, &settings, most),

@@ -2,6 +2,7 @@
 
 use palpate::locate::Real as Deviations;
 use palpate::probe::approach::Probe as Measures;
+use palpate::with;
 use pyo3::Borrowed;
 use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
@@ -65,7 +66,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Probe {
         let length = |name: &str| object.getattr(name)?.extract::<Option<f64>>();
         let (stroke, travel, stroke_tolerance) = (length("stroke")?, length("travel")?, length("stroke_tolerance")?);
         let (speed, tilt) = (number("speed")?, number("tilt")?);
-        Ok(Self(Measures { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance }))
+        Ok(Self(with!(Measures::default(), radius, spacing, speed, tilt, stroke, travel, stroke_tolerance)))
     }
 }
 
@@ -78,7 +79,7 @@ impl<'py> IntoPyObject<'py> for Probe {
 
     fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let Measures { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance } = self.0;
+        let Measures { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance, .. } = self.0;
         class(py, "Probe", &CLASS)?.call1((radius, spacing, speed, tilt, stroke, travel, stroke_tolerance))
     }
 }

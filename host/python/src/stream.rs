@@ -13,6 +13,7 @@ use palpate::rows::{Features, RowOf, Sequences, SequencesBuilder};
 use palpate::shared::format::Held;
 use palpate::strangers;
 use palpate::stream::{self, Settings, StrangerTest, Wanted};
+use palpate::with;
 use pyo3::prelude::*;
 
 /// Sequences of an array's rows.
@@ -85,11 +86,11 @@ pub(crate) fn calibrate(
     let calibrated = long(py, progress.as_ref(), |progress| {
         let strangers = held
             .map(|held| {
-                let test = strangers::Settings { held, confidence, seed, ..Default::default() };
+                let test = with!(strangers::Settings::default(), held, confidence, seed);
                 StrangerTest::new(test, opened, others.as_ref())
             })
             .transpose()?;
-        let settings = Settings { rate: error_rate, per, confidence, max_rows, strangers, seed, ..Settings::default() };
+        let settings = with!(Settings::default(), rate = error_rate, per, confidence, max_rows, strangers, seed);
         stream::calibrate(opened, &rows, &settings, progress)
     })?;
     let text = json(&calibrated);

@@ -80,7 +80,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
         &[None],
     )?;
     for (rounds, depth, bins) in FAMILY {
-        let mut family = with!(context.ours(), rounds = rounds, depth = depth, bins = bins);
+        let mut family = with!(context.ours(), rounds, depth, bins);
         if rounds < 30 {
             // Few trees have to learn faster.
             family.eta = 0.6;
@@ -98,10 +98,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
 /// # Errors
 /// Whatever else is wrong with the ensemble.
 fn fitting(ensemble: &Ensemble, leaf: Leaf, layout: Option<compile::Layout>) -> Result<Option<compile::Compiled>> {
-    match compile::compile(
-        ensemble,
-        &with!(compile::Settings::default(), leaf = leaf, layout = layout, shared_leaves = Some(false)),
-    ) {
+    match compile::compile(ensemble, &with!(compile::Settings::default(), leaf, layout, shared_leaves = Some(false))) {
         Ok(compiled) => Ok(Some(compiled)),
         Err(error) if is_unfit(&error) => Ok(None),
         Err(error) => Err(error),

@@ -42,14 +42,14 @@ fn kinds() -> [Noise; 9] {
     let timer = 1_000.0;
     [
         none,
-        with!(none, timer = timer),
+        with!(none, timer),
         with!(none, debounce = 2_000.0),
         with!(none, missed = [0.02; 3]),
         with!(none, bent = [3_000.0, 0.0, 0.0]),
         with!(none, speed_error = 0.05),
         with!(none, speed_bias = 0.01),
         with!(none, speed_bias = 0.1),
-        with!(Noise::gaussian(1_000.0), debounce = 2_000.0, timer = timer, speed_bias = 0.02),
+        with!(Noise::gaussian(1_000.0), debounce = 2_000.0, timer, speed_bias = 0.02),
     ]
 }
 

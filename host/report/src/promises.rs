@@ -152,7 +152,7 @@ fn sequences(context: &Context, model: &Model<'_>, seed: u64, kept: &mut calibra
         rate = RATES[RATES.len() - 1],
         sequences = context.settings.promise_sequences,
         max_touches = Some(MAX_TOUCHES),
-        seed = seed
+        seed
     );
     let origin = Origin { seed, approaches: false, ..context.settings.capture.clone() };
     let captured = calibrate::fresh(model, &objects, &origin, &settings, kept, context.progress)?;

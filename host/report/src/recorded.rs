@@ -37,7 +37,7 @@ pub(super) fn measure(context: &Context, directory: &Path) -> Result<Comparison>
         return Err(palpate::Error::from(EvaluateProblem::Incomparable { detail }).in_file(directory));
     }
     let groups = settings.sequences;
-    let compared = with!(compare::Settings::default(), groups = groups, seed = settings.seed);
+    let compared = with!(compare::Settings::default(), groups, seed = settings.seed);
     compare::compare(&recorded, &simulated, &compared, context.progress)
 }
 

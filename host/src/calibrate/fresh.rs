@@ -211,7 +211,7 @@ mod tests {
         ];
         let scenes = |origin: &Origin| capture::scenes(&objects.each_ref(), origin, &()).unwrap();
         for (approaches, stroke) in [(false, None), (true, None), (true, Some(0.5))] {
-            let probe = with!(Probe::default(), stroke = stroke);
+            let probe = with!(Probe::default(), stroke);
             let origin = Origin { touches: 1_000, approaches, probe, ..Origin::default() };
             let (dataset, _) = capture::in_memory(&objects, &origin.clone().into(), &()).unwrap();
             let settings = train::Settings { rounds: 8, depth: 3, eta: 0.3, ..train::Settings::compact() };

@@ -40,7 +40,7 @@ fn chain(splits: usize, feature: impl Fn(usize) -> usize) -> Vec<Node> {
 }
 
 fn with(layout: Option<Layout>, leaf: Leaf) -> Settings {
-    with!(Settings::default(), layout = layout, leaf = leaf)
+    with!(Settings::default(), layout, leaf)
 }
 
 fn refusal(ensemble: &Ensemble, settings: &Settings) -> CompileProblem {

@@ -133,7 +133,7 @@ pub(super) const MOST_ANGLE: f64 = 80.0;
 
 fn real_of([angle, bend]: Numbers) -> Noise {
     let grazing = Grazing { angle: (10.0 * angle).clamp(0.0, MOST_ANGLE), bend: 1e3 * bend.clamp(-4.0, 8.0).exp2() };
-    with!(Noise::default(), grazing = grazing)
+    with!(Noise::default(), grazing)
 }
 
 /// Recordings and approaches to their objects.

@@ -177,7 +177,7 @@ fn a_plate_that_repeats_better_or_worse_than_touches_tells_offsets_and_leaves_th
 #[test]
 fn fingers_that_bend_aside_are_found_and_rigid_ones_are_not_said_to_bend() {
     let grazing = Grazing { angle: 20.0, bend: 10_000.0 };
-    let real = with!(Noise::default(), grazing = grazing);
+    let real = with!(Noise::default(), grazing);
     let one =
         |object: &Object| ObjectTouches::new(&object.name, approaches_of(object, 300, 21, &BENT, real), Source::Object);
     let soft = Dataset::new(objects().iter().map(one).collect());

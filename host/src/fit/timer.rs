@@ -109,7 +109,7 @@ mod tests {
     fn touches(count: u32, timer: f64) -> Vec<Touch> {
         let spread = |index: u32| Touch::from_micros([0, 7_919 * index % 90_001, 104_729 * index % 210_011]);
         let touches: Vec<Touch> = (1..=count).map(spread).collect();
-        with!(Noise::gaussian(1_500.0), timer = timer).add("plate", &touches, 1)
+        with!(Noise::gaussian(1_500.0), timer).add("plate", &touches, 1)
     }
 
     #[test]

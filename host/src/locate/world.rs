@@ -79,7 +79,7 @@ impl Real {
     pub fn of(noise: &Noise, speed: f64) -> Result<Self> {
         let real = Self::like(noise, speed);
         let Noise { deviation, timer, position, drift, .. } = *noise;
-        let known = with!(real.noise(speed), deviation = deviation, timer = timer, position = position, drift = drift);
+        let known = with!(real.noise(speed), deviation, timer, position, drift);
         if known == *noise { Ok(real) } else { Err(LocateProblem::Noise.into()) }
     }
 

@@ -358,7 +358,7 @@ fn another_probe_and_a_missing_pose_are_refused() {
         *dataset = dataset.each(|object| object.changed(|touch| touch.with_pose(pose)));
     };
     let origin = |spacing| {
-        let probe = with!(crate::probe::approach::Probe::default(), spacing = spacing);
+        let probe = with!(crate::probe::approach::Probe::default(), spacing);
         Some(crate::touches::Origin { probe, approaches: true, ..Default::default() })
     };
     with_pose(&mut known);

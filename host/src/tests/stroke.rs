@@ -19,7 +19,7 @@ use palpate_shared::Touch;
 fn captured(stroke: Option<f64>, seed: u64) -> Dataset {
     let objects = [("rod", [1.0, 0.15, 0.15]), ("slab", [1.0, 0.6, 0.2])]
         .map(|(name, shape)| Object::new(name, Mesh::globe(12).stretched(shape)));
-    let probe = with!(Probe::default(), stroke = stroke);
+    let probe = with!(Probe::default(), stroke);
     let origin = Origin { touches: 3_000, approaches: true, seed, probe, ..Origin::default() };
     in_memory(&objects, &origin.into(), &()).unwrap().0
 }
@@ -36,7 +36,7 @@ fn recorded(dataset: &Dataset, stroke: Option<f64>) -> Dataset {
         let source = Source::Recording(Recorded { object: own.name.clone(), ..Recorded::default() });
         ObjectTouches::new(&own.name, own.touches().to_vec(), source)
     };
-    let probe = with!(Probe::default(), stroke = stroke);
+    let probe = with!(Probe::default(), stroke);
     let origin = Origin::recorded(probe, palpate_shared::format::Length::Tenth, false);
     Dataset { origin: Some(origin), ..Dataset::new(dataset.objects.iter().map(one).collect()) }
 }

@@ -270,7 +270,7 @@ fn compiled_models<'e>(
         for &layout in layouts {
             let how = with!(
                 compile::Settings::default(),
-                leaf = leaf,
+                leaf,
                 layout = Some(layout),
                 shared_leaves = Some(is_small),
                 error_rate = settings.error_rate

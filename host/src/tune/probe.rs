@@ -156,14 +156,7 @@ impl Settings {
         for (&spacing, &radius) in corners {
             for tilt in [*self.tilt.start(), *self.tilt.end()] {
                 let stroke = self.stroke.as_ref().map(|stroke| *stroke.start());
-                let probe = with!(
-                    Probe::default(),
-                    radius = radius,
-                    spacing = spacing,
-                    speed = self.speed,
-                    tilt = tilt,
-                    stroke = stroke
-                );
+                let probe = with!(Probe::default(), radius, spacing, speed = self.speed, tilt, stroke);
                 probe.check(if self.unit == Length::Tenth { LENGTH } else { 1.0 })?;
             }
         }
@@ -190,16 +183,7 @@ pub fn scaled_probe(probe: &Probe, unit: f64) -> Probe {
     let [stroke, travel, stroke_tolerance] = [stroke, travel, stroke_tolerance].map(|length| length.map(scaled));
     // A length of nothing is none.
     let stroke_tolerance = stroke_tolerance.filter(|length| *length > 0.0);
-    with!(
-        Probe::default(),
-        radius = radius,
-        spacing = spacing,
-        speed = speed,
-        tilt = tilt,
-        stroke = stroke,
-        travel = travel,
-        stroke_tolerance = stroke_tolerance
-    )
+    with!(Probe::default(), radius, spacing, speed, tilt, stroke, travel, stroke_tolerance)
 }
 
 /// A probe that was tried, and its results.
@@ -319,7 +303,7 @@ pub fn design(objects: &[Object], settings: &Settings, progress: &dyn Progress) 
     spacings.push(best.probe.spacing);
     spacings.sort_by(f64::total_cmp);
     spacings.dedup();
-    let line = spacings.into_iter().map(|spacing| (with!(best.probe, spacing = spacing), best.aim)).collect();
+    let line = spacings.into_iter().map(|spacing| (with!(best.probe, spacing), best.aim)).collect();
     let mut by_spacing = search.try_all(line, settings.approaches)?;
     let best = by_spacing[0].clone();
     by_spacing.sort_by(|a, b| a.probe.spacing.total_cmp(&b.probe.spacing));
@@ -359,14 +343,7 @@ impl Search<'_> {
             for radius in steps(&settings.radius, 2) {
                 for tilt in steps(&settings.tilt, 2) {
                     let stroke = self.stroke();
-                    let probe = with!(
-                        Probe::default(),
-                        radius = radius,
-                        spacing = spacing,
-                        speed = settings.speed,
-                        tilt = tilt,
-                        stroke = stroke
-                    );
+                    let probe = with!(Probe::default(), radius, spacing, speed = settings.speed, tilt, stroke);
                     plans.extend(settings.aims.iter().map(|&aim| (probe, aim)));
                 }
             }
@@ -404,9 +381,9 @@ impl Search<'_> {
         let radii = neighbors(&steps(&self.settings.radius, 2), radius);
         let tilts = neighbors(&steps(&self.settings.tilt, 2), tilt);
         let kept = ranked.iter().take(KEPT.min(ranked.len().div_ceil(2))).map(|trial| (trial.probe, trial.aim));
-        kept.chain(spacings.into_iter().map(|spacing| (with!(best.probe, spacing = spacing), best.aim)))
-            .chain(radii.into_iter().map(|radius| (with!(best.probe, radius = radius), best.aim)))
-            .chain(tilts.into_iter().map(|tilt| (with!(best.probe, tilt = tilt), best.aim)))
+        kept.chain(spacings.into_iter().map(|spacing| (with!(best.probe, spacing), best.aim)))
+            .chain(radii.into_iter().map(|radius| (with!(best.probe, radius), best.aim)))
+            .chain(tilts.into_iter().map(|tilt| (with!(best.probe, tilt), best.aim)))
             .collect()
     }
 

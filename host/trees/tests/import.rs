@@ -49,7 +49,7 @@ fn load(path: &Path) -> Ensemble {
 }
 
 fn compiled(ensemble: &Ensemble, leaf: Leaf) -> Vec<u8> {
-    compile::compile(ensemble, &with!(Settings::default(), leaf = leaf, goal = Goal::Size)).unwrap().bytes
+    compile::compile(ensemble, &with!(Settings::default(), leaf, goal = Goal::Size)).unwrap().bytes
 }
 
 fn best(margins: &[f64]) -> usize {
@@ -397,7 +397,7 @@ fn whole_numbers_that_f32_does_not_hold_are_compared_as_lightgbm_does_where_they
     let margins: Vec<f64> = numbers(&directory().join(format!("{name}.margins.csv")), 0, || f64::NAN).concat();
     let expected: Vec<usize> = margins.iter().map(|margin| usize::from(*margin > 0.0)).collect();
     let classes = |scales: Option<Vec<f32>>| {
-        let settings = with!(Settings::default(), leaf = Leaf::F32, scales = scales);
+        let settings = with!(Settings::default(), leaf = Leaf::F32, scales);
         let bytes = compile::compile(&ensemble, &settings).unwrap().bytes;
         let model = compile::open(&bytes).unwrap();
         let Predicted::Classes(classes) = predict(Candidate::Compiled(&model), &rows.concat(), 4, false).unwrap()
@@ -553,7 +553,7 @@ fn models_with_categories_are_proved_in_every_layout_and_verified_at_every_categ
         for (leaf, layout) in
             [Leaf::I16, Leaf::F32].into_iter().flat_map(|leaf| Layout::OF_DATA.iter().map(move |&own| (leaf, own)))
         {
-            let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout));
+            let settings = with!(Settings::default(), leaf, layout = Some(layout));
             let Ok(compiled) = compile::compile(&ensemble, &settings) else { continue };
             layouts += 1;
             let (_, certificate) = prove(&compiled.bytes, &ensemble, &file).unwrap_or_else(|e| panic!("{name}: {e}"));
@@ -585,7 +585,7 @@ fn categories_as_whole_numbers_of_a_scaled_model_go_where_the_library_sends_them
         let ensemble = load(&path);
         let rows: Vec<Vec<f32>> = numbers(&directory().join(format!("{name}.rows.csv")), 1, || f32::NAN);
         let scales = Some(vec![1e4, 1e4, 1.0, 1e4]);
-        let settings = with!(Settings::default(), leaf = Leaf::F32, scales = scales);
+        let settings = with!(Settings::default(), leaf = Leaf::F32, scales);
         // A threshold of CatBoost's for missing values is no whole number of units.
         let Ok(compile::Compiled { bytes, .. }) = compile::compile(&ensemble, &settings) else { continue };
         scaled += 1;
@@ -664,7 +664,7 @@ fn every_model_is_proved_with_every_leaf_in_every_layout_and_in_whole_units() {
         {
             for scales in [None, Some(scales::fit(&ensemble, &table))] {
                 let is_scaled = scales.is_some();
-                let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout), scales = scales);
+                let settings = with!(Settings::default(), leaf, layout = Some(layout), scales);
                 let compiled = match compile::compile(&ensemble, &settings) {
                     Ok(compiled) => compiled,
                     // One number stands for a missing value in every feature, of whatever scale.
@@ -714,7 +714,7 @@ fn trees_of_one_split_whose_thresholds_fall_together_in_whole_units_are_proved()
         origin: Provenance::default(),
     };
     for scales in [None, Some(vec![10.0])] {
-        let settings = with!(Settings::default(), layout = Some(Layout::Complete), scales = scales);
+        let settings = with!(Settings::default(), layout = Some(Layout::Complete), scales);
         let bytes = compile::compile(&ensemble, &settings).unwrap().bytes;
         let (_, certificate) = prove(&bytes, &ensemble, b"").unwrap();
         check(&certificate, &bytes, &ensemble, b"").unwrap();
@@ -783,9 +783,9 @@ fn every_candidate_of_every_model_costs_what_it_takes_once_it_is_written_and_the
     let mut counts = std::collections::BTreeMap::new();
     for ((name, ensemble), &leaf) in all.iter().flat_map(|own| Leaf::ALL.iter().map(move |leaf| (own, leaf))) {
         let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding) as f32;
-        let settings = with!(Settings::default(), leaf = leaf, forms = Form::ALL.into());
+        let settings = with!(Settings::default(), leaf, forms = Form::ALL.into());
         for goal in [Goal::Size, Goal::Speed, Goal::Balanced(Core::M4F)] {
-            let chosen = compile::compile(ensemble, &with!(settings.clone(), goal = goal)).unwrap();
+            let chosen = compile::compile(ensemble, &with!(settings.clone(), goal)).unwrap();
             let best = best_for(goal, &chosen.candidates);
             let written = chosen.code.as_ref().map_or(0, |(program, form)| program.cost(*form).bytes);
             assert_eq!((chosen.layout, chosen.instructions), (best.layout, best.instructions), "{name}, {leaf:?}");

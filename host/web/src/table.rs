@@ -52,15 +52,7 @@ impl Table {
         let [radius, spacing, speed, tilt, ..] = measures;
         let [.., stroke, travel] = measures.map(|length| (length > 0.0).then_some(length));
         let aim = *Aim::ALL.get(index(aim))?;
-        let probe = with!(
-            Probe::default(),
-            radius = radius,
-            spacing = spacing,
-            speed = speed,
-            tilt = tilt,
-            stroke = stroke,
-            travel = travel
-        );
+        let probe = with!(Probe::default(), radius, spacing, speed, tilt, stroke, travel);
         let origin = Origin { unit, aim, probe, ..Origin::default() };
         *self = Self { game: Some(Game::new(&origin)), ..Self::default() };
         Some(0)
@@ -108,15 +100,15 @@ impl Table {
         let noise = with!(
             Noise::default(),
             deviation = Deviation { least, largest },
-            timer = timer,
-            debounce = debounce,
+            timer,
+            debounce,
             missed = [missed; 3],
             bent = [first, middle, last],
-            speed = speed,
-            speed_error = speed_error,
-            speed_bias = speed_bias,
-            pose = pose,
-            pose_bias = pose_bias
+            speed,
+            speed_error,
+            speed_bias,
+            pose,
+            pose_bias
         );
         self.game.as_mut()?.set_noise(noise).ok().map(|()| 0)
     }

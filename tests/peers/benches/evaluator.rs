@@ -16,6 +16,7 @@ use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::train;
 use palpate::ensemble::{Ensemble, Node, Output, OverTouches, Tree, feature_row, inputs};
 use palpate::touches::Dataset;
+use palpate::with;
 use palpate_onboard::{Batch, Model};
 use palpate_peers::{QUICK, paired};
 use palpate_shared::Touch;
@@ -34,7 +35,7 @@ fn main() {
     let data = std::env::var_os("PALPATE_BENCH_DATA").map(|data| Dataset::read(data.as_ref()).expect("touches"));
     let touches = touches(data.as_ref());
     let paper = train::Settings::paper();
-    let compact = train::Settings { rounds: 100, ..train::Settings::compact() };
+    let compact = with!(train::Settings::compact(), rounds = 100);
     for (name, settings) in
         [("1000 one-output trees, depth 6, times", paper), ("100 multi-output trees, depth 6, curvature", compact)]
     {
@@ -60,7 +61,7 @@ fn compare(name: &str, ensemble: &Ensemble, touches: &[Touch]) {
         (Leaf::I16, Layout::Compact),
         (Leaf::I16, Layout::Grid),
     ] {
-        let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
+        let settings = with!(Settings::default(), leaf, layout = Some(layout));
         let Ok(compiled) = compile(ensemble, &settings) else { continue };
         let model = Model::new(&compiled.bytes).expect("a valid model");
         for (touch, expected) in touches.iter().zip(&expected) {
@@ -119,7 +120,7 @@ fn all_at_once(ensemble: &Ensemble, touches: &[Touch], rows: &[Vec<f32>], hessbo
         (Leaf::F32, Layout::Complete),
         (Leaf::I16, Layout::Compact),
     ] {
-        let settings = Settings { leaf, layout: Some(layout), ..Settings::default() };
+        let settings = with!(Settings::default(), leaf, layout = Some(layout));
         let Ok(compiled) = compile(ensemble, &settings) else { continue };
         let model = Model::new(&compiled.bytes).expect("a valid model");
         let mut singly = vec![0; objects * touches.len()];

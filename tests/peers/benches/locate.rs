@@ -7,6 +7,7 @@ use palpate::probe::approach::Probe;
 use palpate::shared::Touch;
 use palpate::shared::format::Length;
 use palpate::touches::{Dataset, ObjectTouches, Origin, Source};
+use palpate::with;
 use palpate_onboard::Verdict;
 use palpate_peers::{QUICK, clock};
 use rand::rngs::ChaCha8Rng;
@@ -34,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let length = object.instances().filter_map(|instance| object.true_length(instance)).fold(0.0, f64::max);
         object.millimeters = Some(100.0 / length);
     }
-    let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 0.0, stroke: Some(20.0), ..Probe::default() };
+    let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
     let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, &())?;
     let settings = Settings::default();
     let surfaces = locate::learn(&taught(&standing, &probe, if *QUICK { 4_000 } else { 60_000 }), &settings)?;

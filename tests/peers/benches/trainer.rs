@@ -17,6 +17,7 @@ use hessboost::prelude::{Objective, Trainer, TrainingParams, TreeMethod};
 use palpate::ensemble::train::{BASE_MARGIN, Settings, train};
 use palpate::ensemble::{Node, Output, Tree, feature_row};
 use palpate::touches::{Dataset, ObjectTouches, Source};
+use palpate::with;
 use palpate_peers::{QUICK, paired};
 use palpate_shared::format::Counted;
 use palpate_shared::{ContactTime, Descriptor, Touch};
@@ -39,7 +40,7 @@ fn main() {
         let touches = dataset.touches().count();
         for (name, settings) in presets() {
             for threads in [1, 2] {
-                let settings = Settings { threads: (threads > 1).then_some(threads), ..settings.clone() };
+                let settings = with!(settings.clone(), threads = (threads > 1).then_some(threads));
                 println!("\n{name}, {touches} touches, {threads} threads");
                 if threads == 1 { pool.install(|| compare(dataset, &settings)) } else { compare(dataset, &settings) }
             }
@@ -49,12 +50,10 @@ fn main() {
 
 /// Models trained: both presets, on full touches and on every contact.
 fn presets() -> Vec<(&'static str, Settings)> {
-    let each = Settings { leaf_bits: None, counted: Some(Counted::Full), ..Settings::compact() };
-    let one = Settings { rounds: 20, ..Settings::paper() };
-    let contacts = |settings: &Settings| Settings {
-        descriptor: Descriptor::ContactsCurvature,
-        counted: Some(Counted::Contacts),
-        ..settings.clone()
+    let each = with!(Settings::compact(), leaf_bits = None, counted = Some(Counted::Full));
+    let one = with!(Settings::paper(), rounds = 20);
+    let contacts = |settings: &Settings| {
+        with!(settings.clone(), descriptor = Descriptor::ContactsCurvature, counted = Some(Counted::Contacts))
     };
     vec![
         ("30 trees of all objects, full touches", each.clone()),

@@ -37,7 +37,7 @@ fn main() -> Result<()> {
         Some(run) => palpate::ensemble::load(run.join("paper.json"))?,
         None => ensemble(None, train::Settings::paper(), Descriptor::Times)?,
     };
-    let compact = |rounds, depth, bins| with!(train::Settings::compact(), rounds = rounds, depth = depth, bins = bins);
+    let compact = |rounds, depth, bins| with!(train::Settings::compact(), rounds, depth, bins);
     let each100 = ensemble(trained, compact(100, 6, 256), Descriptor::Curvature)?;
     let each40 = ensemble(trained, compact(40, 5, 256), Descriptor::Curvature)?;
     let deep = ensemble(trained, compact(20, 7, 256), Descriptor::Curvature)?;
@@ -62,7 +62,7 @@ fn main() -> Result<()> {
     write(&out.join("touches.bin"), &touches.iter().flat_map(times).collect::<Vec<u8>>())?;
     let mut estimates = Vec::new();
     for (name, ensemble, leaf, layout) in models {
-        let compiled = compile(ensemble, &with!(Settings::default(), leaf = leaf, layout = Some(layout)))?;
+        let compiled = compile(ensemble, &with!(Settings::default(), leaf, layout = Some(layout)))?;
         println!(
             "{name:16} {:7} bytes, {:6} splits, {:.2} bytes per split, {} instructions per touch by the stated model",
             compiled.bytes.len(),

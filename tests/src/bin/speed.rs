@@ -137,7 +137,7 @@ fn models(rounds: usize, models: &[(String, &Ensemble, Compiled)], test: &Datase
 fn leaves(rounds: usize, trained: &Dataset, test: &Dataset) -> Result<()> {
     let ensemble = train(trained, &with!(train::Settings::compact(), leaf_bits = None), &())?;
     let compiled = [Leaf::F32, Leaf::I16, Leaf::I8].map(|leaf| {
-        let settings = with!(compile::Settings::default(), leaf = leaf, layout = Some(Layout::Complete));
+        let settings = with!(compile::Settings::default(), leaf, layout = Some(Layout::Complete));
         Ok((format!("leaves as {}", leaf.name()), &ensemble, compile(&ensemble, &settings)?))
     });
     models(rounds, &compiled.into_iter().collect::<Result<Vec<_>>>()?, test)

@@ -69,7 +69,7 @@ fn compiled(shape: Shape, seed: u64, leaf: Leaf, layout: Layout) -> Vec<u8> {
     // Tables by contact pattern have no other descriptor.
     let descriptor = if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { shape.descriptor };
     let ensemble = random::ensemble(Shape { descriptor, ..shape }, seed);
-    compile(&ensemble, &with!(Settings::default(), leaf = leaf, layout = Some(layout))).expect("it fits").bytes
+    compile(&ensemble, &with!(Settings::default(), leaf, layout = Some(layout))).expect("it fits").bytes
 }
 
 /// Touches that reach all over a model, and those at the limits of features.
@@ -271,7 +271,7 @@ fn rows(text: &mut String) {
         (Layout::Complete, Leaf::F32),
     ] {
         let ensemble = imported(random::ensemble(SHAPE, 14), 5);
-        let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout));
+        let settings = with!(Settings::default(), leaf, layout = Some(layout));
         let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
         play_rows(text, &format!("rows of f32 features, {} {}", layout.name(), leaf.name()), &bytes, true);
         play_rows(text, &format!("rows of whole features, {}", layout.name()), &changed(&bytes, 13, &[0]), false);
@@ -329,7 +329,7 @@ fn early_exits(text: &mut String) {
     ] {
         let ensemble = imported(random::ensemble(Shape { trees: 24, each, ..SHAPE }, 26), 5);
         let early_exit = Some(EarlyExit::Always);
-        let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout), early_exit = early_exit);
+        let settings = with!(Settings::default(), leaf, layout = Some(layout), early_exit);
         let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
         play_rows(text, &format!("early exit, {} {}", layout.name(), leaf.name()), &bytes, true);
     }
@@ -393,13 +393,7 @@ fn decisions(text: &mut String) {
     let ensemble = random::ensemble(Shape { leaf: 0.6, ..SHAPE }, 16);
     for (error_rate, max_touches) in [(0.3, 3), (0.01, 200), (1e-9, 200), (1e-15, 6)] {
         let priors = Some(vec![0.5, 0.3, 0.2]);
-        let settings = with!(
-            Settings::default(),
-            leaf = Leaf::I8,
-            error_rate = error_rate,
-            max_touches = max_touches,
-            priors = priors
-        );
+        let settings = with!(Settings::default(), leaf = Leaf::I8, error_rate, max_touches, priors);
         let bytes = stated(&compile(&ensemble, &settings).expect("it fits").bytes, ALL);
         play(text, &format!("error rate {error_rate}, at most {max_touches} touches"), &bytes, &touches(20, 17));
     }
@@ -461,7 +455,7 @@ fn shared_leaves(text: &mut String) {
     let compiled = |shape: Shape, different: Option<usize>, leaf, layout| {
         let ensemble = random::ensemble(shape, 23);
         let ensemble = different.map_or(ensemble.clone(), |most| random::with_few_leaves(ensemble, most));
-        let settings = with!(Settings::default(), leaf = leaf, layout = Some(layout), shared_leaves = Some(true));
+        let settings = with!(Settings::default(), leaf, layout = Some(layout), shared_leaves = Some(true));
         stated(&compile(&ensemble, &settings).expect("it fits").bytes, ALL)
     };
     for layout in [Layout::Compact, Layout::Complete, Layout::Wide] {

@@ -213,7 +213,7 @@ fn on_touches(arguments: &Arguments, directory: &PathBuf, global: &Global) -> Re
         return calibrated.map_err(wrong);
     };
     let sequences = settings.sequences;
-    let test = with!(test(held, arguments, global), sequences = sequences);
+    let test = with!(test(held, arguments, global), sequences);
     let shapes = arguments.strangers.shapes(&dataset)?;
     let (model, recorded) = (compiled.model(), recorded.as_ref());
     let both = strangers::calibrate_with_promise(&model, &dataset, recorded, &shapes, &test, &settings, &Bar::new());
@@ -223,7 +223,7 @@ fn on_touches(arguments: &Arguments, directory: &PathBuf, global: &Global) -> Re
 
 /// The test for what the model does not know, with the confidence and the seed of the promise.
 fn test(held: Held, arguments: &Arguments, global: &Global) -> strangers::Settings {
-    with!(strangers::Settings::default(), held = held, confidence = arguments.confidence, seed = global.seed())
+    with!(strangers::Settings::default(), held, confidence = arguments.confidence, seed = global.seed())
 }
 
 /// Calibrates on sequences of rows.

@@ -176,7 +176,7 @@ impl DesignArguments {
             spacing = spacing.unwrap_or_else(|| usual.spacing.clone()),
             radius = radius.unwrap_or_else(|| usual.radius.clone()),
             tilt = tilt.unwrap_or(TILT),
-            stroke = stroke,
+            stroke,
             aims = aims.unwrap_or_else(|| Aim::ALL.into()),
             speed = speed.unwrap_or(usual.speed),
             noise = self.noise()?,
@@ -185,7 +185,7 @@ impl DesignArguments {
             error_rate = self.error_rate,
             approaches = self.approaches,
             sequences = self.sequences,
-            seed = seed
+            seed
         ))
     }
 

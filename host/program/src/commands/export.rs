@@ -210,13 +210,13 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let settings = with!(
         Settings::default(),
         leaf = arguments.leaf.unwrap_or(usual.leaf),
-        layout = layout,
-        forms = forms,
+        layout,
+        forms,
         goal = arguments.layout.goal(),
         shared_leaves = arguments.shared_leaves.0,
         error_rate = arguments.error_rate,
         max_touches = arguments.max_touches,
-        scales = scales,
+        scales,
         priors = arguments.prior.of(&ensemble.objects, &shares_of(&ensemble)?)?,
         early_exit = early_exit(&arguments, &ensemble)?
     );

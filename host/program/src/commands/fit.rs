@@ -78,7 +78,7 @@ pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
     let mut objects = arguments.size.objects(&arguments.sources, global.seed())?;
     arguments.scene.weigh(&mut objects)?;
     let plate = arguments.plate.as_deref().map(read_touches).transpose()?;
-    let settings = with!(Settings::default(), origin = origin, approaches = arguments.approaches, seed = global.seed());
+    let settings = with!(Settings::default(), origin, approaches = arguments.approaches, seed = global.seed());
     let found = fit(&recorded, &objects, plate.as_deref(), &settings, &Bar::new())?;
     let suspects: Vec<String> = found.suspects.iter().map(ToString::to_string).collect();
     if global.force || suspects.is_empty() {

@@ -243,7 +243,7 @@ fn simulated(
 ) -> Result<Made> {
     let file = arguments.probe.read()?;
     let probe = arguments.probe.of_dataset(file.as_ref(), &dataset)?;
-    let mut settings = with!(arguments.settings(global, &dataset), probe = probe);
+    let mut settings = with!(arguments.settings(global, &dataset), probe);
     settings.noise = arguments.real.over(arguments.probe.noise(file.as_ref(), &dataset, settings.noise)?)?;
     let background = arguments.background.as_deref().map(Dataset::read_any).transpose()?.map(super::checked);
     let in_directory = |error: Error| match error.exit_code() {
@@ -269,7 +269,7 @@ fn simulated(
     }
     // An ensemble that is there states what it was trained for.
     let noise = arguments.teach.extend.is_none().then_some(settings.noise);
-    let how = with!(teaching(&settings), noise = noise);
+    let how = with!(teaching(&settings), noise);
     // An output is an object, or a placement of one.
     let is_of = |own: &str, name: &str| own == name || own.rsplit_once('/').is_some_and(|(object, _)| object == name);
     let [old, new] = [true, false]
@@ -306,7 +306,7 @@ fn alone(arguments: &Arguments, global: &Global, recorded: Dataset) -> Result<Ma
     }
     let file = arguments.probe.read()?;
     let probe = arguments.probe.of_dataset(file.as_ref(), &recorded)?;
-    let settings = with!(arguments.settings(global, &recorded), probe = probe, noise = Noise::default());
+    let settings = with!(arguments.settings(global, &recorded), probe, noise = Noise::default());
     let (ensemble, taught) = teach::alone(&recorded, &settings, &teaching(&settings), &Bar::new())?;
     Ok(Made { ensemble, dataset: recorded, taught: Some(taught), adjusted: None, is_clean: false, settings })
 }
@@ -314,7 +314,7 @@ fn alone(arguments: &Arguments, global: &Global, recorded: Dataset) -> Result<Ma
 /// Settings for teaching objects to an ensemble of such a training.
 fn teaching(settings: &Settings) -> teach::Settings {
     let Settings { seed, threads, leaf_bits, .. } = *settings;
-    with!(teach::Settings::default(), seed = seed, threads = threads, leaf_bits = leaf_bits)
+    with!(teach::Settings::default(), seed, threads, leaf_bits)
 }
 
 /// Cost of noise, as a line; nothing where the training had noise.

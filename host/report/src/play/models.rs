@@ -61,16 +61,10 @@ pub fn train(objects: &[Object], training: &Training, progress: &dyn Progress) -
     let full = captured("full", origin.clone())?;
     let approaches = captured("approaches", approached(origin.touches.saturating_mul(3), 1))?;
     let seed = origin.seed;
-    let preset = |preset: Settings| with!(preset, seed = seed, probe = Some(StatedProbe::from(origin)));
+    let preset = |preset: Settings| with!(preset, seed, probe = Some(StatedProbe::from(origin)));
     let compact = |descriptor, counted, leaf_bits| {
         let counted = Some(counted);
-        preset(with!(
-            Settings::compact(),
-            descriptor = descriptor,
-            counted = counted,
-            leaf_bits = Some(leaf_bits),
-            noise = *noise
-        ))
+        preset(with!(Settings::compact(), descriptor, counted, leaf_bits = Some(leaf_bits), noise = *noise))
     };
     let methods = [
         (preset(Settings::paper()), &full),

@@ -44,7 +44,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     if let Some(simulated) = &arguments.simulated {
         let (descriptor, groups) = (arguments.descriptor, arguments.sequences);
-        let settings = with!(Settings::default(), descriptor = descriptor, groups = groups, seed = global.seed());
+        let settings = with!(Settings::default(), descriptor, groups, seed = global.seed());
         return super::compare::run(&arguments.directory, simulated, &settings, global);
     }
     let check = Check::of(&arguments.directory)?;
