@@ -172,13 +172,17 @@ pub(super) enum Event<'e> {
 impl Arguments {
     /// Hands on the touches of the file; of lines each before the next is waited for.
     pub(super) fn each(&self, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
-        let path = &self.file;
-        if path.as_os_str() == "-" {
-            return each(std::io::stdin().lock(), Path::new("standard input"), take);
-        }
-        let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
-        each(touches, path, take)
+        each_of(&self.file, take)
     }
+}
+
+/// Hands on the touches of a file, or of standard input.
+pub(super) fn each_of(path: &Path, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
+    if path.as_os_str() == "-" {
+        return each(std::io::stdin().lock(), Path::new("standard input"), take);
+    }
+    let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
+    each(touches, path, take)
 }
 
 fn each(touches: impl Read, path: &Path, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
