@@ -1,6 +1,7 @@
 //! A located approach as a step of evidence, and an object's cells as a follower.
 
 use super::world::{Aimed, Drawn, Truth};
+use crate::error::{Error, Result};
 use crate::evidence::{Follower, Sequence, Sequences, Supplier};
 use palpate_onboard::locate::{Approach, Effort, Hand, Locator, Maps, Pose, Seen};
 use palpate_onboard::{Familiarity, Stopping, Verdict};
@@ -134,6 +135,19 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
 
     fn looked(&self) -> u32 {
         self.locator.looked()
+    }
+}
+
+/// Half the side of the square about the table's origin in which the middle finger may go, in micrometers, from a statement in
+/// millimeters; by default twice the range of the maps. The outer fingers reach beyond it by their distance from the middle one.
+///
+/// # Errors
+/// [`Setting`](crate::error::Setting) unless it is from 0 to 1,000 mm.
+pub fn workspace(maps: &Maps<'_>, within: Option<f64>) -> Result<u32> {
+    match within {
+        None => Ok(2 * maps.range().unsigned_abs()),
+        Some(millimeters) if (0.0..=1_000.0).contains(&millimeters) => Ok((millimeters * 1e3) as u32),
+        Some(other) => Err(Error::setting("within", other, "a number of millimeters from 0 to 1000")),
     }
 }
 

@@ -491,6 +491,28 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
 
     #[test]
+    fn the_middle_finger_is_never_sent_out_of_the_workspace(
+        touches in 0_usize..4,
+        place in [-40_f64..40.0, -40.0..40.0],
+        yaw in 0_f64..6.3,
+        within in prop_oneof![0_u32..200, 0_u32..60_000, Just(u32::MAX)],
+        spacing in prop_oneof![Just(SPACING), any::<u32>()],
+        seed in any::<u32>(),
+    ) {
+        let bytes = model(&[WEDGE, CYLINDER], 0);
+        let maps = Maps::new(&bytes).unwrap();
+        let effort = Effort { lookups: 40_000, candidates: 16, ..Effort::default() };
+        let mut locator = Locator::<1024, 32, 2>::new(maps, maps.stopping(), effort, seed).unwrap();
+        for number in 0..=touches {
+            let at = locator.choose(spacing, STROKE, within, 20);
+            prop_assert!(at.x.unsigned_abs() <= within && at.y.unsigned_abs() <= within, "{at:?} of {within}");
+            // Where it was said not to go, touches count too.
+            let elsewhere = Approach { x: at.x + 9_000 * number as i32, ..at };
+            locator.push_seen(met(wedge, elsewhere, place, yaw));
+        }
+    }
+
+    #[test]
     fn random_records_and_likelihoods_under_a_right_checksum_are_refused_or_read(
         records in prop::collection::vec(any::<u8>(), 2 * PLACEMENT_LENGTH),
         kept in prop::collection::vec(any::<bool>(), 2 * PLACEMENT_LENGTH),

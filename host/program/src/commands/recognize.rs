@@ -59,6 +59,9 @@ pub(crate) struct Arguments {
     /// With a model of maps: print each touch's verdict, place and next approach as JSON
     #[arg(long, conflicts_with_all = ["features", "active", "mcap"])]
     pub(super) next: bool,
+    /// With --next: the middle finger is sent at most so far from the table's origin in x and y [default: twice the maps' range]
+    #[arg(long, value_name = "MM", requires = "next")]
+    pub(super) within: Option<f64>,
     /// Follow the model's plan of approaches; says after each touch where to touch next
     #[arg(long)]
     pub(super) active: bool,

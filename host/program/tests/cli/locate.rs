@@ -106,6 +106,17 @@ fn each_touch_gives_a_verdict_a_place_and_the_next_approach_until_an_object_is_n
         assert!(line["pose"]["share"].as_f64().unwrap() <= 1.0 && line["modes"].is_array(), "{line}");
     }
     assert_eq!(said[end + 1]["touch"], 1, "another object begins");
+    // Never out of the workspace.
+    for line in recognized(at, "maps.palpate --next --within 7.5", &lines) {
+        let next = ["x", "y"].map(|key| line["next"][key].as_f64().unwrap_or(0.0).abs());
+        assert!(next[0] <= 7.5 && next[1] <= 7.5, "{line}");
+    }
+    refused(
+        at,
+        "recognize maps.palpate lines.txt --next --within 2000",
+        2,
+        "--within is 2000. Use a number of millimeters",
+    );
     let only = recognized(at, "maps.palpate --next --only slab", lines.lines().next().unwrap());
     assert_eq!(only[0]["object"], "slab");
     let plain = run(at, "recognize maps.palpate lines.txt --json");
