@@ -584,6 +584,7 @@ impl Locator {
             posterior,
             locating.touches(),
             modes,
+            locating.met_table_alone(),
         ))?;
         Ok(objects::Located(made))
     }

@@ -40,6 +40,8 @@ pub trait Locating: Send + Sync {
     fn posteriors(&self) -> Vec<f64>;
     /// The next approach; `pose` is how much the pose counts, in 64ths.
     fn choose(&mut self, hand: &Hand, within: u32, pose: u16) -> Approach;
+    /// True if no finger of any touch so far met more than the table.
+    fn met_table_alone(&self) -> bool;
     /// Number of touches so far.
     fn touches(&self) -> usize;
     /// Heights that were looked up by the last search, and since.
@@ -129,6 +131,10 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
         self.locator.choose(hand.spacing, hand.stroke.unwrap_or(u32::MAX), within, pose)
     }
 
+    fn met_table_alone(&self) -> bool {
+        self.locator.met_table_alone()
+    }
+
     fn touches(&self) -> usize {
         self.locator.touches()
     }
@@ -194,8 +200,8 @@ impl Follower for Pressing<'_> {
     }
 
     fn rivals(&self) -> u64 {
-        // Exhausted: no name.
-        if self.locating.is_exhausted() { 1 << 56 } else { self.locating.rivals() }
+        // No name.
+        if self.locating.is_exhausted() || self.locating.met_table_alone() { 1 << 56 } else { self.locating.rivals() }
     }
 
     fn familiarity(&self) -> Familiarity {

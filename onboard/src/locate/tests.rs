@@ -331,6 +331,23 @@ fn what_fits_no_object_is_unknown() {
 }
 
 #[test]
+fn on_an_empty_table_nothing_but_the_table_is_met() {
+    let bytes = model(&[WEDGE, CYLINDER], 0);
+    let mut locator = locator(Maps::new(&bytes).unwrap());
+    let empty: Heights = |_, _| 0.0;
+    assert!(!locator.met_table_alone());
+    assert_eq!(touch(&mut locator, empty, [0.0; 2], 0.0, 1), Verdict::GaveUp);
+    // The cylinder is easier to miss than the wedge, and yet it is not named.
+    assert!(locator.met_table_alone() && locator.rivals().q56() <= locator.stopping.odds());
+    // Also where contacts are missing, and heights are a little wrong; not where an object was met once.
+    for (contact, alone) in [(Contact::Nothing, true), (Contact::At(1_300), true), (Contact::At(3_000), false)] {
+        locator.reset();
+        locator.push_seen(Seen::new([0; 2], [15_000, 0], [Contact::At(0), contact, Contact::At(-900)], -20_000));
+        assert_eq!(locator.met_table_alone(), alone, "{contact:?}");
+    }
+}
+
+#[test]
 fn the_forty_first_touch_is_one_too_many() {
     let bytes = model(&PINS, 0);
     let maps = Maps::new(&bytes).unwrap();

@@ -81,6 +81,9 @@ pub(super) struct Line<'a> {
     /// Reason why the touch was not counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) refused: Option<String>,
+    /// True where a sequence ends without a name, and nothing but the table was met.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub(super) table_alone: bool,
     /// The approach that helps most.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) next: Option<Entry>,
@@ -93,6 +96,9 @@ impl Line<'_> {
         }
         match &self.refused {
             Some(refused) => output::print(&format!("{:4}  not counted: {refused}\n", self.touch))?,
+            None if self.table_alone => {
+                output::print(&format!("{:4}  {:10}  nothing but the table was met\n", self.touch, self.verdict))?
+            }
             None => output::print(&format!(
                 "{:4}  {:10}  {} {:.4}\n",
                 self.touch, self.verdict, self.object, self.posterior
@@ -323,6 +329,7 @@ impl<'m> Stream<'m> {
             object: if self.recognizer.touches() == 0 { "" } else { self.model.object_name(best) },
             posterior: self.recognizer.posterior(best).to_f64(),
             refused,
+            table_alone: false,
             next: self.next(),
         }
     }

@@ -183,6 +183,7 @@ impl<'m> Stream<'m> {
             object: if self.touches == 0 { "" } else { self.maps.object_name(leader) },
             posterior,
             refused,
+            table_alone: matches!(verdict, Verdict::Unknown | Verdict::GaveUp) && self.locating.met_table_alone(),
             next: None,
         };
         let Some(within) = self.within else { return line.print(self.json) };

@@ -125,6 +125,32 @@ fn each_touch_gives_a_verdict_a_place_and_the_next_approach_until_an_object_is_n
 }
 
 #[test]
+fn on_an_empty_table_it_is_said_that_nothing_but_the_table_was_met() {
+    let directory = located();
+    let at = directory.path();
+    let words =
+        "calibrate maps.palpate --objects meshes --true-size mm --error-rate 20% --sequences 100 --detect-unknown";
+    run(at, &format!("{words} -o sure.palpate"));
+    // All over the table, with the row along x.
+    let press = |number: i32| {
+        let (x, y) = (number % 5 * 15 - 30, number / 5 * 12 - 24);
+        format!("0 0 {} 0 0 -1 1 0 0 {x} {y} 0\n", if number == 3 { "-" } else { "0" })
+    };
+    let presses: String = (0..25).map(press).collect();
+    let said = recognized(at, "sure.palpate --next", &presses);
+    let end = said.iter().find(|line| line["verdict"] != "undecided").unwrap();
+    assert!(["unknown", "gave-up"].map(Value::from).contains(&end["verdict"]) && end["table_alone"] == true, "{end}");
+    assert!(said[0].get("table_alone").is_none());
+    let text = run(at, "recognize sure.palpate lines.txt");
+    assert!(text.contains("  nothing but the table was met\n"), "{text}");
+    // A finger that met something else once.
+    let met = format!("0 0.1 0.1 0 0 -1 1 0 0 29 29 10\n{presses}");
+    let said = recognized(at, "sure.palpate --next", &met);
+    let end = said.iter().find(|line| line["verdict"] != "undecided").unwrap();
+    assert!(end.get("table_alone").is_none(), "{end}");
+}
+
+#[test]
 fn maps_and_trees_are_refused_where_the_other_is_needed_with_what_to_do() {
     let directory = located();
     let at = directory.path();
