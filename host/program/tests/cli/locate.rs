@@ -185,7 +185,7 @@ fn maps_and_trees_are_refused_where_the_other_is_needed_with_what_to_do() {
         ),
         ("calibrate maps.palpate --objects meshes/brick.obj --true-size mm -o x.palpate", 1, "slab is not among"),
         ("inspect maps.palpate --chip m4f", 2, "--chip is"),
-        ("verify maps.palpate data", 1, "maps"),
+        ("verify maps.palpate e.json data", 1, "maps.palpate: a model of maps"),
     ] {
         refused(at, words, code, expected);
     }
