@@ -415,7 +415,8 @@ pub(crate) struct Locator {
 impl Locator {
     /// It stops when the maps say so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`. `pose` is how much
     /// where the object lies counts in the choice of approaches, in 64ths, `within` how far from the table's origin the middle
-    /// finger may go in x and y, in millimeters (twice the maps' range), `seed` that of the choice.
+    /// finger is sent in x and y, in millimeters (twice the maps' range; the outer ones reach beyond it by their distance from
+    /// it), `seed` that of the choice.
     #[new]
     #[pyo3(signature = (maps, *, error_rate=None, max_touches=None, pose=10, within=None, seed=1))]
     fn new(
@@ -435,16 +436,13 @@ impl Locator {
         }
         let stopping = compile::stopping(error_rate.unwrap_or(own.error_rate()), limit)?;
         let stopping = if error_rate.is_none() { own.with_max_touches(limit) } else { stopping };
-        let within = within.unwrap_or(f64::from(maps.range()) * 2e-3);
-        if !(0.0..=1_000.0).contains(&within) {
-            return Err(Error::setting("within", within, "a number of millimeters from 0 to 1000").into());
-        }
+        let within = locate::workspace(&maps, within)?;
         let hand = Hand::of(&maps).ok_or(Error::from(LocateProblem::NoHand))?;
         let mut cell = OpenedLocator::new(Arc::clone(opened), |opened| {
             locate::locating(*opened.borrow_dependent(), stopping, None)
         });
         cell.with_dependent_mut(|_, locating| locating.begin(seed));
-        Ok(Self { cell, hand, within: (within * 1e3) as u32, pose, seed, next: None })
+        Ok(Self { cell, hand, within, pose, seed, next: None })
     }
 
     /// Takes in a touch: three contact times in seconds on any clock, `None` or NaN for a finger that touched nothing, neither
@@ -587,6 +585,7 @@ impl Locator {
             posterior,
             locating.touches(),
             modes,
+            locating.met_table_alone(),
         ))?;
         Ok(objects::Located(made))
     }

@@ -85,6 +85,17 @@ def test_the_next_approach_stays_the_same_and_within_the_region(maps: palpate.Ma
         locator.push_heights((height, height, None), x, y, roll)
 
 
+def test_on_an_empty_table_nothing_but_the_table_is_met(maps: palpate.Maps) -> None:
+    locator = palpate.Locator(maps, error_rate=1e-6, max_touches=3)
+    assert not locator.located.table_alone
+    while not locator.located.decided:
+        located = locator.push_heights((0.4, None, -0.2), *locator.next())
+        assert located.table_alone
+    assert str(locator.located) == "gave-up, nothing but the table was met"
+    locator.reset()
+    assert not locator.push_heights((12.0, 0.0, 0.0), *locator.next()).table_alone
+
+
 def test_maps_are_bytes_files_and_pickles(maps: palpate.Maps, tmp_path: Path) -> None:
     path = tmp_path / "maps.palpate"
     maps.save(path)

@@ -64,6 +64,46 @@ pub enum LocateProblem {
         /// Distance.
         millimeters: f64,
     },
+    /// A hand comes from another direction.
+    #[error("it does not come straight down")]
+    NotDown,
+    /// A finger met the bare table too rarely.
+    #[error("finger {finger} met the table in only {presses} presses, of at least {least}")]
+    FewPresses {
+        /// Finger, from 1.
+        finger: usize,
+        /// Number of presses.
+        presses: usize,
+        /// Number of presses needed.
+        least: usize,
+    },
+    /// Presses met something else than the bare table.
+    #[error(
+        "a contact is {:.1} mm {} the table, and {aside} of {contacts} contacts are not with it",
+        off.abs(),
+        if *off > 0.0 { "above" } else { "below" }
+    )]
+    NotBare {
+        /// Distance of the farthest contact.
+        off: f64,
+        /// Number of contacts with something else.
+        aside: usize,
+        /// Number of all.
+        contacts: usize,
+    },
+    /// Presses do not show the slope of the table.
+    #[error("from these presses the slope of the table cannot be told from offsets of the fingertips")]
+    OnePlace,
+    /// The table is not level.
+    #[error("the table rises by {rise:.1} mm in {reach:.0} mm, toward {toward:.0}° from the x axis")]
+    Slanted {
+        /// Rise.
+        rise: f64,
+        /// Distance.
+        reach: f64,
+        /// Direction.
+        toward: f64,
+    },
     /// Meshes were given for a model of trees.
     #[error("a model of trees, not of maps")]
     Trees,
@@ -102,12 +142,19 @@ impl Problem for LocateProblem {
             Self::Refused { .. } => "Train it again; models of trees are for `recognize` without positions.",
             Self::NoHand => "Train it on a data set whose probe is in millimeters.",
             Self::Nowhere => {
-                "A model of maps needs twelve columns: times, direction, alignment, and the hand's position in millimeters."
+                "Give twelve columns: times, direction, alignment, and the hand's position in millimeters."
             }
             Self::Below { .. } => "Give times in seconds, and the position in millimeters above the table.",
+            Self::NotDown => "Come straight down, and state the direction in the table's frame.",
+            Self::FewPresses { .. } => "Record 20 presses, and look for a finger that often stays open.",
+            Self::NotBare { .. } => "Press beside the object, on one level table.",
+            Self::OnePlace => "Press all over the table, and turn the hand by half a turn after each press.",
+            Self::Slanted { .. } => "Level the table, or turn the frame of positions so that z is 0 all over it.",
             Self::Trees => "Give a directory of touches, or a model that was trained on touches with a position.",
             Self::Noise => "Use noise, timer, missed (one share for all fingers), position and drift.",
-            Self::Missing { .. } | Self::Unknown { .. } => "Give the objects that the model was trained on, all of them and no others.",
+            Self::Missing { .. } | Self::Unknown { .. } => {
+                "Give the objects that the model was trained on, all of them and no others."
+            }
         }
         .into()
     }

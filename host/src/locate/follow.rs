@@ -1,6 +1,7 @@
 //! A located approach as a step of evidence, and an object's cells as a follower.
 
 use super::world::{Aimed, Drawn, Truth};
+use crate::error::{Error, Result};
 use crate::evidence::{Follower, Sequence, Sequences, Supplier};
 use palpate_onboard::locate::{Approach, Effort, Hand, Locator, Maps, Pose, Seen};
 use palpate_onboard::{Familiarity, Stopping, Verdict};
@@ -39,6 +40,8 @@ pub trait Locating: Send + Sync {
     fn posteriors(&self) -> Vec<f64>;
     /// The next approach; `pose` is how much the pose counts, in 64ths.
     fn choose(&mut self, hand: &Hand, within: u32, pose: u16) -> Approach;
+    /// True if no finger of any touch so far met more than the table.
+    fn met_table_alone(&self) -> bool;
     /// Number of touches so far.
     fn touches(&self) -> usize;
     /// Heights that were looked up by the last search, and since.
@@ -128,12 +131,29 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
         self.locator.choose(hand.spacing, hand.stroke.unwrap_or(u32::MAX), within, pose)
     }
 
+    fn met_table_alone(&self) -> bool {
+        self.locator.met_table_alone()
+    }
+
     fn touches(&self) -> usize {
         self.locator.touches()
     }
 
     fn looked(&self) -> u32 {
         self.locator.looked()
+    }
+}
+
+/// Half the side of the square about the table's origin in which the middle finger may go, in micrometers, from a statement in
+/// millimeters; by default twice the range of the maps. The outer fingers reach beyond it by their distance from the middle one.
+///
+/// # Errors
+/// [`Setting`](crate::error::Setting) unless it is from 0 to 1,000 mm.
+pub fn workspace(maps: &Maps<'_>, within: Option<f64>) -> Result<u32> {
+    match within {
+        None => Ok(2 * maps.range().unsigned_abs()),
+        Some(millimeters) if (0.0..=1_000.0).contains(&millimeters) => Ok((millimeters * 1e3) as u32),
+        Some(other) => Err(Error::setting("within", other, "a number of millimeters from 0 to 1000")),
     }
 }
 
@@ -180,8 +200,8 @@ impl Follower for Pressing<'_> {
     }
 
     fn rivals(&self) -> u64 {
-        // Exhausted: no name.
-        if self.locating.is_exhausted() { 1 << 56 } else { self.locating.rivals() }
+        // No name.
+        if self.locating.is_exhausted() || self.locating.met_table_alone() { 1 << 56 } else { self.locating.rivals() }
     }
 
     fn familiarity(&self) -> Familiarity {

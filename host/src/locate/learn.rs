@@ -3,7 +3,7 @@
 use super::Settings;
 use super::error::LocateProblem;
 use crate::error::{Error, Result};
-use crate::probe::approach::Probe;
+use crate::probe::approach::{FINGERS, Probe};
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
@@ -22,10 +22,10 @@ const ROUND: f64 = 1.2;
 
 /// A height that a fingertip met, in the placement's frame, in millimeters.
 #[derive(Clone, Copy, Debug)]
-struct Met {
-    x: f64,
-    y: f64,
-    height: f64,
+pub(super) struct Met {
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) height: f64,
 }
 
 /// The heights of a placement on a grid about its origin.
@@ -142,8 +142,10 @@ fn of_object(object: usize, touches: &ObjectTouches, probe: &Probe, settings: &S
         };
         let mut met = Vec::new();
         for touch in (0..touches.len()).filter(is_own) {
-            heights(&touches.touches()[touch], probe, &mut met)
+            let heights = heights(&touches.touches()[touch], probe)
                 .ok_or_else(|| LocateProblem::NoPosition { object: touches.name.clone(), touch: touch + 1 })?;
+            let above = |own: Met| Met { height: own.height.max(0.0), ..own };
+            met.extend(heights.into_iter().flatten().map(above));
         }
         let named = Surface { object, placement, share, ..surface(&met, settings.cell()) };
         if named.top() <= TABLE {
@@ -161,19 +163,18 @@ fn of_object(object: usize, touches: &ObjectTouches, probe: &Probe, settings: &S
     Ok(surfaces)
 }
 
-/// Adds the heights that a touch met; none without a position or pose.
-fn heights(touch: &Touch, probe: &Probe, met: &mut Vec<Met>) -> Option<()> {
+/// Heights that the fingers of a touch met; none without a position or pose.
+pub(super) fn heights(touch: &Touch, probe: &Probe) -> Option<[Option<Met>; FINGERS]> {
     let (pose, position) = (touch.pose()?, touch.position()?);
     let [x, y, z] = position.micrometers.map(|micrometers| f64::from(micrometers) / 1_000.0);
     let one = f64::from(palpate_shared::Q15_ONE);
     let row = pose.alignment.map(|share| f64::from(share) / one * probe.spacing);
-    for (time, finger) in touch.times().into_iter().zip([-1.0, 0.0, 1.0]) {
-        if let Some(micros) = time.micros() {
-            let height = z + finger * row[2] - f64::from(micros) * 1e-6 * probe.speed;
-            met.push(Met { x: x + finger * row[0], y: y + finger * row[1], height: height.max(0.0) });
-        }
-    }
-    Some(())
+    let times = touch.times();
+    Some(std::array::from_fn(|number| {
+        let (micros, finger) = (times[number].micros()?, number as f64 - 1.0);
+        let height = z + finger * row[2] - f64::from(micros) * 1e-6 * probe.speed;
+        Some(Met { x: x + finger * row[0], y: y + finger * row[1], height })
+    }))
 }
 
 /// The surface that heights were met on: in each cell their median.
@@ -275,7 +276,7 @@ fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
-fn median(heights: &mut [f64]) -> Option<f64> {
+pub(super) fn median(heights: &mut [f64]) -> Option<f64> {
     heights.sort_unstable_by(f64::total_cmp);
     let (low, high) = (heights.get(heights.len().checked_sub(1)? / 2)?, heights.get(heights.len() / 2)?);
     Some((low + high) / 2.0)

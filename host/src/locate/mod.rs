@@ -16,17 +16,21 @@ mod inspect;
 mod learn;
 mod pose;
 mod promise;
+#[cfg(feature = "train")]
+mod table;
 #[cfg(test)]
 mod tests;
 mod world;
 mod write;
 
-pub use follow::{CELLS, Locating, TOUCHES, locating};
+pub use follow::{CELLS, Locating, TOUCHES, locating, workspace};
 pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspect, names, stated};
 pub use learn::{Surface, learn, probe_of};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, Pose, Seen, TESTED};
 pub use pose::{Off, Until};
 pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, calibrate, evaluate};
+#[cfg(feature = "train")]
+pub use table::{BareTable, LEAST_PRESSES, Measured, REACH, bare_table};
 pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};
 pub use write::write;
 

@@ -130,7 +130,7 @@ pub(super) fn root(touches: usize) -> i32 {
 }
 
 /// Heights below this may be of the table after a contact was lost, in 1/16 mm.
-const NEAR: i32 = 24;
+pub(super) const NEAR: i32 = 24;
 /// Half a turn, in radians in Q14.
 const HALF_TURN: i32 = 51_472;
 

@@ -101,6 +101,8 @@ fn model(placed: &[Placed], misfit: i16) -> Vec<u8> {
     let mut content = vec![4, 4, placed.len() as u8, 0, 224, 1, 0, 0, 0, 0];
     content.extend(misfit.to_le_bytes());
     content.extend([0, 1, 232, 3]);
+    // Noise of half a millimeter, and 2 % of lost contacts.
+    content.extend([25, 0, 200, 0]);
     assert_eq!(content.len(), MAPS_LENGTH);
     content.extend(records);
     content.extend(likelihoods().into_iter().flat_map(i16::to_le_bytes));
@@ -329,6 +331,23 @@ fn what_fits_no_object_is_unknown() {
 }
 
 #[test]
+fn on_an_empty_table_nothing_but_the_table_is_met() {
+    let bytes = model(&[WEDGE, CYLINDER], 0);
+    let mut locator = locator(Maps::new(&bytes).unwrap());
+    let empty: Heights = |_, _| 0.0;
+    assert!(!locator.met_table_alone());
+    assert_eq!(touch(&mut locator, empty, [0.0; 2], 0.0, 1), Verdict::GaveUp);
+    // The cylinder is easier to miss than the wedge, and yet it is not named.
+    assert!(locator.met_table_alone() && locator.rivals().q56() <= locator.stopping.odds());
+    // Also where contacts are missing, and heights are a little wrong; not where an object was met once.
+    for (contact, alone) in [(Contact::Nothing, true), (Contact::At(1_300), true), (Contact::At(3_000), false)] {
+        locator.reset();
+        locator.push_seen(Seen::new([0; 2], [15_000, 0], [Contact::At(0), contact, Contact::At(-900)], -20_000));
+        assert_eq!(locator.met_table_alone(), alone, "{contact:?}");
+    }
+}
+
+#[test]
 fn the_forty_first_touch_is_one_too_many() {
     let bytes = model(&PINS, 0);
     let maps = Maps::new(&bytes).unwrap();
@@ -487,6 +506,28 @@ fn every_changed_byte_under_a_right_checksum_is_refused_or_read() {
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_middle_finger_is_never_sent_out_of_the_workspace(
+        touches in 0_usize..4,
+        place in [-40_f64..40.0, -40.0..40.0],
+        yaw in 0_f64..6.3,
+        within in prop_oneof![0_u32..200, 0_u32..60_000, Just(u32::MAX)],
+        spacing in prop_oneof![Just(SPACING), any::<u32>()],
+        seed in any::<u32>(),
+    ) {
+        let bytes = model(&[WEDGE, CYLINDER], 0);
+        let maps = Maps::new(&bytes).unwrap();
+        let effort = Effort { lookups: 40_000, candidates: 16, ..Effort::default() };
+        let mut locator = Locator::<1024, 32, 2>::new(maps, maps.stopping(), effort, seed).unwrap();
+        for number in 0..=touches {
+            let at = locator.choose(spacing, STROKE, within, 20);
+            prop_assert!(at.x.unsigned_abs() <= within && at.y.unsigned_abs() <= within, "{at:?} of {within}");
+            // Where it was said not to go, touches count too.
+            let elsewhere = Approach { x: at.x + 9_000 * number as i32, ..at };
+            locator.push_seen(met(wedge, elsewhere, place, yaw));
+        }
+    }
 
     #[test]
     fn random_records_and_likelihoods_under_a_right_checksum_are_refused_or_read(

@@ -59,6 +59,9 @@ pub(crate) struct Arguments {
     /// With a model of maps: print each touch's verdict, place and next approach as JSON
     #[arg(long, conflicts_with_all = ["features", "active", "mcap"])]
     pub(super) next: bool,
+    /// With --next: the middle finger is sent at most so far from the table's origin in x and y [default: twice the maps' range]
+    #[arg(long, value_name = "MM", requires = "next")]
+    pub(super) within: Option<f64>,
     /// Follow the model's plan of approaches; says after each touch where to touch next
     #[arg(long)]
     pub(super) active: bool,
@@ -78,6 +81,9 @@ pub(super) struct Line<'a> {
     /// Reason why the touch was not counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) refused: Option<String>,
+    /// True where a sequence ends without a name, and nothing but the table was met.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub(super) table_alone: bool,
     /// The approach that helps most.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) next: Option<Entry>,
@@ -90,6 +96,9 @@ impl Line<'_> {
         }
         match &self.refused {
             Some(refused) => output::print(&format!("{:4}  not counted: {refused}\n", self.touch))?,
+            None if self.table_alone => {
+                output::print(&format!("{:4}  {:10}  nothing but the table was met\n", self.touch, self.verdict))?
+            }
             None => output::print(&format!(
                 "{:4}  {:10}  {} {:.4}\n",
                 self.touch, self.verdict, self.object, self.posterior
@@ -172,13 +181,17 @@ pub(super) enum Event<'e> {
 impl Arguments {
     /// Hands on the touches of the file; of lines each before the next is waited for.
     pub(super) fn each(&self, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
-        let path = &self.file;
-        if path.as_os_str() == "-" {
-            return each(std::io::stdin().lock(), Path::new("standard input"), take);
-        }
-        let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
-        each(touches, path, take)
+        each_of(&self.file, take)
     }
+}
+
+/// Hands on the touches of a file, or of standard input.
+pub(super) fn each_of(path: &Path, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
+    if path.as_os_str() == "-" {
+        return each(std::io::stdin().lock(), Path::new("standard input"), take);
+    }
+    let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
+    each(touches, path, take)
 }
 
 fn each(touches: impl Read, path: &Path, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
@@ -316,6 +329,7 @@ impl<'m> Stream<'m> {
             object: if self.recognizer.touches() == 0 { "" } else { self.model.object_name(best) },
             posterior: self.recognizer.posterior(best).to_f64(),
             refused,
+            table_alone: false,
             next: self.next(),
         }
     }

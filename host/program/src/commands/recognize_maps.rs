@@ -101,7 +101,8 @@ pub(super) fn run(file: &MapsFile, arguments: &Arguments, global: &Global) -> Re
     let names = locate::names(&maps);
     let weights = arguments.expected.weights(&names, &vec![1.0; names.len()])?;
     let hand = Hand::of(&maps).ok_or(LocateProblem::NoHand).map_err(Error::from)?;
-    let mut stream = Stream::new(maps, hand, stopping, weights, arguments.next, global);
+    let within = locate::workspace(&maps, arguments.within)?;
+    let mut stream = Stream::new(maps, hand, stopping, weights, arguments.next.then_some(within), global);
     stream.begin();
     arguments.each(&mut |event| stream.take(event))
 }
@@ -112,7 +113,8 @@ struct Stream<'m> {
     hand: Hand,
     locating: Box<dyn Locating + 'm>,
     weights: Option<Vec<u32>>,
-    asks: bool,
+    /// Workspace of the next approach, where that is asked for.
+    within: Option<u32>,
     json: bool,
     seed: u32,
     touches: u32,
@@ -124,12 +126,12 @@ impl<'m> Stream<'m> {
         hand: Hand,
         stopping: Stopping,
         weights: Option<Vec<u32>>,
-        asks: bool,
+        within: Option<u32>,
         global: &Global,
     ) -> Self {
         let locating = locate::locating(maps, stopping, None);
         let seed = u32::try_from(global.seed()).unwrap_or(1);
-        Self { maps, hand, locating, weights, asks, json: global.json, seed, touches: 0 }
+        Self { maps, hand, locating, weights, within, json: global.json, seed, touches: 0 }
     }
 
     /// Begins another object.
@@ -181,15 +183,13 @@ impl<'m> Stream<'m> {
             object: if self.touches == 0 { "" } else { self.maps.object_name(leader) },
             posterior,
             refused,
+            table_alone: matches!(verdict, Verdict::Unknown | Verdict::GaveUp) && self.locating.met_table_alone(),
             next: None,
         };
-        if !self.asks {
-            return line.print(self.json);
-        }
+        let Some(within) = self.within else { return line.print(self.json) };
         let poses = if self.touches == 0 { Vec::new() } else { self.locating.poses(leader) };
         let mut modes = poses.into_iter().map(|pose| Mode::of(&self.maps, pose)).collect::<Vec<_>>().into_iter();
         let pose = modes.next();
-        let within = self.maps.range().unsigned_abs() * 2;
         let next = (verdict == Verdict::Undecided).then(|| self.locating.choose(&self.hand, within, POSE).into());
         let placement = pose.as_ref().map_or("", |pose| pose.placement);
         let located = Located { line, placement, pose, modes: modes.collect(), next };

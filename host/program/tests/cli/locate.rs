@@ -106,11 +106,48 @@ fn each_touch_gives_a_verdict_a_place_and_the_next_approach_until_an_object_is_n
         assert!(line["pose"]["share"].as_f64().unwrap() <= 1.0 && line["modes"].is_array(), "{line}");
     }
     assert_eq!(said[end + 1]["touch"], 1, "another object begins");
+    // Never out of the workspace.
+    for line in recognized(at, "maps.palpate --next --within 7.5", &lines) {
+        let next = ["x", "y"].map(|key| line["next"][key].as_f64().unwrap_or(0.0).abs());
+        assert!(next[0] <= 7.5 && next[1] <= 7.5, "{line}");
+    }
+    refused(
+        at,
+        "recognize maps.palpate lines.txt --next --within 2000",
+        2,
+        "--within is 2000. Use a number of millimeters",
+    );
     let only = recognized(at, "maps.palpate --next --only slab", lines.lines().next().unwrap());
     assert_eq!(only[0]["object"], "slab");
     let plain = run(at, "recognize maps.palpate lines.txt --json");
     assert!(plain.contains("\"verdict\":") && !plain.contains("\"pose\":"), "{plain}");
     refused(at, "recognize maps.palpate lines.txt --max-touches 99", 2, "--max-touches is 99");
+}
+
+#[test]
+fn on_an_empty_table_it_is_said_that_nothing_but_the_table_was_met() {
+    let directory = located();
+    let at = directory.path();
+    let words =
+        "calibrate maps.palpate --objects meshes --true-size mm --error-rate 20% --sequences 100 --detect-unknown";
+    run(at, &format!("{words} -o sure.palpate"));
+    // All over the table, with the row along x.
+    let press = |number: i32| {
+        let (x, y) = (number % 5 * 15 - 30, number / 5 * 12 - 24);
+        format!("0 0 {} 0 0 -1 1 0 0 {x} {y} 0\n", if number == 3 { "-" } else { "0" })
+    };
+    let presses: String = (0..25).map(press).collect();
+    let said = recognized(at, "sure.palpate --next", &presses);
+    let end = said.iter().find(|line| line["verdict"] != "undecided").unwrap();
+    assert!(["unknown", "gave-up"].map(Value::from).contains(&end["verdict"]) && end["table_alone"] == true, "{end}");
+    assert!(said[0].get("table_alone").is_none());
+    let text = run(at, "recognize sure.palpate lines.txt");
+    assert!(text.contains("  nothing but the table was met\n"), "{text}");
+    // A finger that met something else once.
+    let met = format!("0 0.1 0.1 0 0 -1 1 0 0 29 29 10\n{presses}");
+    let said = recognized(at, "sure.palpate --next", &met);
+    let end = said.iter().find(|line| line["verdict"] != "undecided").unwrap();
+    assert!(end.get("table_alone").is_none(), "{end}");
 }
 
 #[test]
@@ -131,7 +168,7 @@ fn maps_and_trees_are_refused_where_the_other_is_needed_with_what_to_do() {
         ("train data -o x.palpate --real debounce=2ms", 1, "a simulated table has other noise"),
         ("train free -o x.palpate --maps cell=2mm", 2, "--maps is given. Use it with touches that have a position"),
         ("train free -o x.palpate --real drift=1mm/1deg", 2, "--real is drift"),
-        ("recognize maps.palpate plain.txt", 1, "plain.txt:1: the touch has no position. A model of maps needs twelve"),
+        ("recognize maps.palpate plain.txt", 1, "plain.txt:1: the touch has no position. Give twelve"),
         ("recognize maps.palpate deep.txt", 1, "below the table. Give times in seconds"),
         ("recognize maps.palpate located.txt --active", 2, "--active is given"),
         ("recognize trees.palpate located.txt", 1, "located.txt:1: touches with a position"),
@@ -148,11 +185,62 @@ fn maps_and_trees_are_refused_where_the_other_is_needed_with_what_to_do() {
         ),
         ("calibrate maps.palpate --objects meshes/brick.obj --true-size mm -o x.palpate", 1, "slab is not among"),
         ("inspect maps.palpate --chip m4f", 2, "--chip is"),
-        ("verify maps.palpate data", 1, "maps"),
+        ("verify maps.palpate e.json data", 1, "maps.palpate: a model of maps"),
     ] {
         refused(at, words, code, expected);
     }
     let output =
         command("calibrate maps.palpate data --objects meshes -o x.palpate".split(' ')).current_dir(at).output();
     assert_eq!(output.unwrap().status.code(), Some(2));
+}
+
+#[test]
+fn presses_on_the_bare_table_measure_it_and_the_fingertips() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    std::fs::write(at.join("nominal.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\ntilt = 0\n")
+        .unwrap();
+    // The table at .8 mm; the first fingertip stands out by .6 mm, and the third one stands back by .9 mm.
+    let press = |number: i32| {
+        let (turn, x, y) = (1 - 2 * (number % 2), number * 7 % 41 - 20, number * 11 % 37 - 18);
+        format!("0 0.006 0.015 0 0 -1 {turn} 0 0 {x} {y} 1.4\n")
+    };
+    let presses: String = (0..20).map(press).collect();
+    std::fs::write(at.join("presses.txt"), &presses).unwrap();
+    let words = "probe fit presses.txt -o hand.toml --probe nominal.toml";
+    let found = json(palpate(at, &format!("{words} --json").split(' ').collect::<Vec<_>>()));
+    let number = |path: &str| (found.pointer(path).and_then(Value::as_f64).unwrap() * 100.0).round();
+    assert_eq!(["/height/value", "/tips/0/value", "/tips/1/value", "/noise"].map(number), [80.0, 60.0, -90.0, 0.0]);
+    assert_eq!((found["contacts"].as_u64(), found["lost"].as_u64()), (Some(60), Some(0)));
+    let said = run(at, words);
+    assert!(said.starts_with("20 presses on a bare table: 60 contacts with it, 0 missing, 0 left out\n"), "{said}");
+    assert!(
+        said.contains("first fingertip stands out       0.60  0.00\n") && said.ends_with("Wrote hand.toml\n"),
+        "{said}"
+    );
+    let file = std::fs::read_to_string(at.join("hand.toml")).unwrap();
+    assert!(file.contains("\noffsets = [0.600, 0.0, -0.900]"), "{file}");
+    brick(at, "brick", [60.0, 40.0, 30.0]);
+    run(at, "capture brick.obj -o data --scene table --position --probe hand.toml --true-size mm --approaches 20");
+
+    let few: String = presses.lines().take(9).map(|line| format!("{line}\n")).collect();
+    std::fs::write(at.join("few.txt"), few).unwrap();
+    std::fs::write(at.join("plain.txt"), "0 0 0\n").unwrap();
+    for (words, code, expected) in [
+        (
+            "few.txt -o x.toml --probe nominal.toml",
+            1,
+            "few.txt: finger 1 met the table in only 9 presses, of at least 10",
+        ),
+        ("plain.txt -o x.toml --probe nominal.toml", 1, "plain.txt:1: the touch has no position. Give twelve columns"),
+        ("presses.txt -o x.toml", 2, "--probe is not in millimeters. Use a file that states it in millimeters"),
+        (
+            "data -o x.toml --probe nominal.toml",
+            2,
+            "SOURCE is not given. Use objects, or instead of the directory a file",
+        ),
+    ] {
+        refused(at, &format!("probe fit {words}"), code, expected);
+    }
+    assert!(!at.join("x.toml").exists());
 }

@@ -240,7 +240,8 @@ class Locator:
         """
         It stops when the maps say so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`. `pose` is how much
         where the object lies counts in the choice of approaches, in 64ths, `within` how far from the table's origin the middle
-        finger may go in x and y, in millimeters (twice the maps' range), `seed` that of the choice.
+        finger is sent in x and y, in millimeters (twice the maps' range; the outer ones reach beyond it by their distance from
+        it), `seed` that of the choice.
         """
     @property
     def located(self, /) -> Located:

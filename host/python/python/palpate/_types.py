@@ -121,6 +121,8 @@ class Located:
     """The number of touches taken in."""
     modes: tuple[Mode, ...]
     """Where it may lie, at most four places, the most likely one first."""
+    table_alone: bool = False
+    """True if no finger met more than the table so far: if the state is "unknown" or "gave-up", there is probably no object."""
 
     @property
     def decided(self) -> bool:
@@ -153,6 +155,8 @@ class Located:
 
     def __str__(self) -> str:
         mode = self.placed
+        if self.table_alone and self.state in ("unknown", "gave-up"):
+            return f"{self.state}, nothing but the table was met"
         name = self.object or f"{self.state}, perhaps {self.best}"
         if mode is None:
             return name
