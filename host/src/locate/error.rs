@@ -64,6 +64,9 @@ pub enum LocateProblem {
         /// Distance.
         millimeters: f64,
     },
+    /// A touch came from another direction than straight down.
+    #[error("it does not come straight down")]
+    Slanted,
     /// Meshes were given for a model of trees.
     #[error("a model of trees, not of maps")]
     Trees,
@@ -105,6 +108,7 @@ impl Problem for LocateProblem {
                 "A model of maps needs twelve columns: times, direction, alignment, and the hand's position in millimeters."
             }
             Self::Below { .. } => "Give times in seconds, and the position in millimeters above the table.",
+            Self::Slanted => "Come straight down: the z of its direction is at most -0.95.",
             Self::Trees => "Give a directory of touches, or a model that was trained on touches with a position.",
             Self::Noise => "Use noise, timer, missed (one share for all fingers), position and drift.",
             Self::Missing { .. } | Self::Unknown { .. } => "Give the objects that the model was trained on, all of them and no others.",
