@@ -262,7 +262,7 @@ fn spoken(names: &[String], message: &VerdictMessage) -> Step {
         verdict.object = names.get(usize::from(object)).cloned().unwrap_or_default();
         verdict.posterior = message.detail.map_or(f64::NAN, |detail| probability(detail.posterior()));
     }
-    Step { verdict, evidence: None, approach: None }
+    Step { verdict, ..Step::default() }
 }
 
 fn is_refused(error: &Error) -> bool {

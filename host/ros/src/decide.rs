@@ -1,15 +1,18 @@
 //! From touches to verdicts, without DDS: messages in, messages out.
 
-use crate::wire::{Approach, Evidence, Expected, Touch, Verdict, unit_vectors};
+use crate::place::{Placed, Placing};
+use crate::served::Served;
+use crate::wire::{self, Approach, Evidence, Expected, Touch, Verdict, unit_vectors};
 use palpate::compile::CompiledModel;
-use palpate::onboard::{Model, Recognizer, Stopping, Verdict as Decision};
+use palpate::onboard::shared::Touch as Felt;
+use palpate::onboard::{Recognizer, Stopping, Verdict as Decision};
 use std::sync::Arc;
 
 /// Room for the objects of any model.
 type Recognizing<'m> = Recognizer<'m, 256>;
 
 self_cell::self_cell!(
-    /// A recognizer and its model.
+    /// A recognizer and its model: a follower of touches in any pose.
     struct Opened {
         owner: Arc<CompiledModel>,
         #[covariant]
@@ -27,12 +30,11 @@ pub(crate) struct Thresholds {
 }
 
 impl Thresholds {
-    /// Stopping rule for a recognizer of `model`.
+    /// Stopping rule for a model whose own is `own`.
     ///
     /// # Errors
     /// The number that is out of range, and the range.
-    pub(crate) fn stopping(self, model: &Model<'_>) -> Result<Stopping, String> {
-        let own = Stopping::from_model(model);
+    pub(crate) fn over(self, own: Stopping) -> Result<Stopping, String> {
         let max_touches = match u32::try_from(self.max_touches) {
             Ok(0) => own.max_touches(),
             Ok(most) => most,
@@ -54,6 +56,10 @@ pub(crate) struct Step {
     pub(crate) evidence: Option<Evidence>,
     /// Next approach, for a model with a plan, while nothing is decided.
     pub(crate) approach: Option<Approach>,
+    /// Place of the object, after a touch, for a model of maps.
+    pub(crate) placed: Option<Placed>,
+    /// Next approach, for a model of maps, while nothing is decided.
+    pub(crate) next_pose: Option<wire::Pose>,
 }
 
 impl Step {
@@ -66,11 +72,34 @@ impl Step {
 /// The verdict while nothing is decided.
 pub(crate) const UNDECIDED: &str = "undecided";
 
+/// Follows the touches of one object.
+pub(crate) trait Following {
+    /// The model's objects.
+    fn names(&self) -> Vec<String>;
+    /// The objects that can be named, each once.
+    fn known(&self) -> Vec<String>;
+    /// Begins another object, of those that have a weight if there are weights.
+    fn begin(&mut self, weights: Option<&[u32]>);
+    /// Takes in a touch.
+    ///
+    /// # Errors
+    /// Why it is not counted; nothing changes then.
+    fn push(&mut self, felt: &Felt) -> Result<(), String>;
+    fn verdict(&self) -> Decision;
+    fn touches(&self) -> u32;
+    /// The likeliest object.
+    fn best(&self) -> usize;
+    fn posteriors(&self) -> Vec<f64>;
+    /// Adds where to touch next, and where the object is.
+    fn complete(&self, step: &mut Step);
+}
+
 /// Recognizes objects, one after another.
 ///
 /// Another object begins after a verdict, when the name in the messages changes, and when [`Decider::reset`] is called.
 pub(crate) struct Decider {
-    opened: Opened,
+    model: Served,
+    following: Box<dyn Following>,
     /// Weights of the last reset, for all objects until the next.
     expected: Option<Vec<u32>>,
     /// Object named by the last message.
@@ -82,13 +111,15 @@ impl Decider {
     ///
     /// # Errors
     /// Why the model or the thresholds cannot be used.
-    pub(crate) fn new(model: Arc<CompiledModel>, thresholds: Thresholds) -> Result<Self, String> {
-        check(&model)?;
-        let opened = Opened::try_new(model, |file| {
-            let model = file.model();
-            Recognizer::new(&model, thresholds.stopping(&model)?).map_err(|error| error.to_string())
-        })?;
-        Ok(Self { opened, expected: None, object: String::new() })
+    pub(crate) fn new(model: Served, thresholds: Thresholds) -> Result<Self, String> {
+        let stopping = model.stopping(thresholds)?;
+        let following: Box<dyn Following> = match model.clone() {
+            Served::Trees(model) => Box::new(Opened::try_new(model, |file| {
+                Recognizer::new(&file.model(), stopping).map_err(|error| error.to_string())
+            })?),
+            Served::Maps(maps) => Box::new(Placing::new(maps, stopping)?),
+        };
+        Ok(Self { model, following, expected: None, object: String::new() })
     }
 
     /// This model under other thresholds, without touches; priors of the last reset stay.
@@ -96,7 +127,7 @@ impl Decider {
     /// # Errors
     /// The threshold that cannot be used.
     pub(crate) fn under(&self, thresholds: Thresholds) -> Result<Self, String> {
-        let mut decider = Self::new(Arc::clone(self.opened.borrow_owner()), thresholds)?;
+        let mut decider = Self::new(self.model.clone(), thresholds)?;
         decider.expected.clone_from(&self.expected);
         decider.begin();
         Ok(decider)
@@ -104,15 +135,7 @@ impl Decider {
 
     /// The model's objects.
     pub(crate) fn names(&self) -> Vec<String> {
-        self.opened.borrow_owner().names()
-    }
-
-    /// The objects that can be named, each once.
-    fn known(&self) -> Vec<String> {
-        let mut names = self.names();
-        names.truncate(self.recognizer().model().known_count());
-        names.dedup();
-        names
+        self.following.names()
     }
 
     /// Takes in a touch. One that cannot be counted changes nothing, and the verdict says why.
@@ -121,15 +144,13 @@ impl Decider {
             Ok(felt) => felt,
             Err(problem) => return self.refused(problem.to_string()),
         };
-        if message.object != self.object || self.recognizer().verdict() != Decision::Undecided {
+        if message.object != self.object || self.following.verdict() != Decision::Undecided {
             self.object.clone_from(&message.object);
             self.begin();
         }
-        // A little later than the stroke is missing, as on the chip.
-        let felt = palpate::evaluate::delivered(self.recognizer().model(), &felt);
-        match self.opened.with_dependent_mut(|_, recognizer| recognizer.push(&felt)) {
-            Ok(_) => self.step(),
-            Err(refused) => self.refused(refused.to_string()),
+        match self.following.push(&felt) {
+            Ok(()) => self.step(),
+            Err(refused) => self.refused(refused),
         }
     }
 
@@ -138,23 +159,14 @@ impl Decider {
     /// # Errors
     /// Why not; nothing changes then.
     pub(crate) fn reset(&mut self, expected: &Expected) -> Result<Step, String> {
-        self.expected = weights(expected, &self.known())?;
+        self.expected = weights(expected, &self.following.known())?;
         self.begin();
         Ok(self.step())
     }
 
     /// Begins another object.
     fn begin(&mut self) {
-        let expected = self.expected.as_deref();
-        self.opened.with_dependent_mut(|_, recognizer| match expected {
-            // There is a weight above 0: `weights` refuses others.
-            Some(weights) if recognizer.reset_to(weights).is_ok() => {}
-            _ => recognizer.reset(),
-        });
-    }
-
-    fn recognizer(&self) -> &Recognizing<'_> {
-        self.opened.borrow_dependent()
+        self.following.begin(self.expected.as_deref());
     }
 
     fn refused(&self, reason: String) -> Step {
@@ -165,22 +177,25 @@ impl Decider {
 
     /// Messages about the touches so far.
     pub(crate) fn step(&self) -> Step {
-        let recognizer = self.recognizer();
-        let (touch, objects) = (recognizer.touches(), self.names());
-        let posteriors: Vec<f64> = (0..objects.len()).map(|object| recognizer.posterior(object).to_f64()).collect();
+        let following = &self.following;
+        let (touch, objects, posteriors) = (following.touches(), following.names(), following.posteriors());
         let evidence = Some(Evidence { touch, objects: objects.clone(), nats: behind(&posteriors) });
-        let (verdict, best) = match recognizer.verdict() {
-            Decision::Undecided => (UNDECIDED, recognizer.best()),
+        let (verdict, best) = match following.verdict() {
+            Decision::Undecided => (UNDECIDED, following.best()),
             Decision::Recognized { object, .. } => ("recognized", object.into()),
-            Decision::Unknown => ("unknown", recognizer.best()),
-            Decision::GaveUp => ("gave-up", recognizer.best()),
-        };
-        let approach = match verdict {
-            UNDECIDED => self.approach(),
-            _ => None,
+            Decision::Unknown => ("unknown", following.best()),
+            Decision::GaveUp => ("gave-up", following.best()),
         };
         let verdict = Verdict { touch, verdict: verdict.into(), objects, ..Verdict::default() };
-        Step { verdict: with_best(verdict, best, posteriors), evidence, approach }
+        let mut step = Step { verdict: with_best(verdict, best, posteriors), evidence, ..Step::default() };
+        following.complete(&mut step);
+        step
+    }
+}
+
+impl Opened {
+    fn recognizer(&self) -> &Recognizing<'_> {
+        self.borrow_dependent()
     }
 
     fn approach(&self) -> Option<Approach> {
@@ -190,6 +205,55 @@ impl Decider {
         let (direction, alignment) = unit_vectors(&poses.pose(proposal.pose)?);
         let score = f64::from(proposal.score) / f64::from(1 << 15);
         Some(Approach { touch: recognizer.touches(), pose: proposal.pose, direction, alignment, score })
+    }
+}
+
+impl Following for Opened {
+    fn names(&self) -> Vec<String> {
+        self.borrow_owner().names()
+    }
+
+    fn known(&self) -> Vec<String> {
+        let mut names = self.names();
+        names.truncate(self.recognizer().model().known_count());
+        names.dedup();
+        names
+    }
+
+    fn begin(&mut self, weights: Option<&[u32]>) {
+        self.with_dependent_mut(|_, recognizer| match weights {
+            // There is a weight above 0: `weights` refuses others.
+            Some(weights) if recognizer.reset_to(weights).is_ok() => {}
+            _ => recognizer.reset(),
+        });
+    }
+
+    fn push(&mut self, felt: &Felt) -> Result<(), String> {
+        // A little later than the stroke is missing, as on the chip.
+        let felt = palpate::evaluate::delivered(self.recognizer().model(), felt);
+        let pushed = self.with_dependent_mut(|_, recognizer| recognizer.push(&felt));
+        pushed.map(|_| ()).map_err(|refused| refused.to_string())
+    }
+
+    fn verdict(&self) -> Decision {
+        self.recognizer().verdict()
+    }
+
+    fn touches(&self) -> u32 {
+        self.recognizer().touches()
+    }
+
+    fn best(&self) -> usize {
+        self.recognizer().best()
+    }
+
+    fn posteriors(&self) -> Vec<f64> {
+        let recognizer = self.recognizer();
+        (0..self.names().len()).map(|object| recognizer.posterior(object).to_f64()).collect()
+    }
+
+    fn complete(&self, step: &mut Step) {
+        step.approach = if step.is_decided() { None } else { self.approach() };
     }
 }
 
@@ -207,17 +271,6 @@ pub(crate) fn with_best(mut verdict: Verdict, best: usize, posteriors: Vec<f64>)
 pub(crate) fn behind(posteriors: &[f64]) -> Vec<f64> {
     let most = posteriors.iter().copied().fold(0.0, f64::max);
     posteriors.iter().map(|posterior| (posterior / most).ln()).collect()
-}
-
-/// Refuses a model that is not over touches.
-///
-/// # Errors
-/// The kind of the model.
-pub(crate) fn check(model: &CompiledModel) -> Result<(), String> {
-    match model.model().descriptor() {
-        Some(_) => Ok(()),
-        None => Err("the model is over rows of features, not touches: give one that `palpate run` made".into()),
-    }
 }
 
 /// A weight for each of `names`; none if nothing is expected.
@@ -263,7 +316,7 @@ mod tests {
     }
 
     fn decider() -> Decider {
-        Decider::new(household(), Thresholds::default()).unwrap()
+        Decider::new(Served::Trees(household()), Thresholds::default()).unwrap()
     }
 
     fn touch(times: [f64; 3]) -> Touch {
@@ -389,7 +442,7 @@ mod tests {
         let sections = vec![(Tag::Plan, Some((false, plan)))];
         let planned = restate(&household().model(), &Restated { sections, ..Restated::default() }).unwrap();
         let planned = Arc::new(CompiledModel::from_bytes(planned).unwrap());
-        let mut decider = Decider::new(planned, Thresholds::default()).unwrap();
+        let mut decider = Decider::new(Served::Trees(planned), Thresholds::default()).unwrap();
         let (direction, alignment) = unit_vectors(&poses.pose(7).unwrap());
         let expected = |touch| Approach { touch, pose: 7, direction, alignment, score: 100.0 / 128.0 };
         assert_eq!(decider.step().approach, Some(expected(0)));

@@ -6,6 +6,8 @@ mod decide;
 mod node;
 mod open;
 mod participant;
+mod place;
+mod served;
 mod switches;
 mod wire;
 
@@ -15,21 +17,21 @@ use clap::{CommandFactory, Parser, ValueEnum};
 use decide::Thresholds;
 use open::Options;
 use palpate::chip::Port;
-use palpate::compile::CompiledModel;
 use ros2_client::{NodeName, ServiceMapping};
+use served::Served;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
 
 /// A ROS 2 node that recognizes objects by touch; needs no ROS installation
 #[derive(Parser)]
 #[command(
     version,
     after_help = "\
-Topics under the node's name: touch, switch/first, switch/middle and switch/last in; verdict, verdict_text, evidence, next_approach and measured_touch out. Service: reset. Action: recognize. Parameters: model, error_rate, max_touches. docs/guide/ros.md describes them.
+Topics under the node's name: touch, switch/first, switch/middle and switch/last in; verdict, verdict_text, evidence, next_approach, measured_touch, and from a model of maps pose, placement and next_pose out. Service: reset. Action: recognize. Parameters: model, error_rate, max_touches, frame_id. docs/guide/ros.md describes them.
 
 Examples:
   palpate-ros model.palpate
+  palpate-ros maps.palpate --frame-id table
   palpate-ros --port /dev/ttyACM0
   palpate-ros model.palpate --namespace /left --error-rate 0.001"
 )]
@@ -49,6 +51,9 @@ struct Arguments {
     /// Touches after which to give up; 0: the model's own limit
     #[arg(long, value_name = "N", default_value = "0", conflicts_with = "port")]
     max_touches: i64,
+    /// The frame of poses: that of the positions of touches, for a model of maps
+    #[arg(long, value_name = "FRAME", default_value = "table", value_parser = clap::builder::NonEmptyStringValueParser::new())]
+    frame_id: String,
     /// The node's name
     #[arg(long, default_value = "palpate")]
     name: String,
@@ -87,10 +92,10 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: Arguments) -> Result<(), String> {
-    let model = arguments.model.map(CompiledModel::read).transpose().map_err(|error| error.to_string())?;
+    let model = arguments.model.as_deref().map(Served::read).transpose()?;
     let thresholds = Thresholds { error_rate: arguments.error_rate, max_touches: arguments.max_touches };
     let wrong = match &model {
-        Some(model) => thresholds.stopping(&model.model()).err(),
+        Some(model) => model.stopping(thresholds).err(),
         None => None,
     };
     let wrong = wrong.or_else(|| NodeName::new(&arguments.namespace, &arguments.name).err().map(|e| e.to_string()));
@@ -107,8 +112,10 @@ fn run(arguments: Arguments) -> Result<(), String> {
             Middleware::Fastdds => ServiceMapping::Enhanced,
             Middleware::Cyclonedds => ServiceMapping::Cyclone,
         },
-        model: model.map(Arc::new),
+        path: arguments.model.unwrap_or_default(),
+        model,
         thresholds,
+        frame_id: arguments.frame_id,
         chip: arguments.port.map(|port| (port, arguments.baud)),
     };
     node::run(options, signals)

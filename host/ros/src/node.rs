@@ -5,14 +5,16 @@ use crate::clients::{AllClients, Clients};
 use crate::decide::{Decider, Step, Thresholds, UNDECIDED};
 use crate::open::{Actions, Change, Inputs, Options, Outputs, open, parameters, text};
 use crate::participant;
+use crate::place::Placed;
+use crate::served::Served;
 use crate::switches::Switches;
 use crate::wire::{
-    Bool, DiagnosticArray, DiagnosticStatus, Expected, Header, KeyValue, Recognized, ResetDone, Text, Touch, Verdict,
+    Bool, DiagnosticArray, DiagnosticStatus, Expected, Header, KeyValue, Recognized, ResetDone, Stamped, Text, Touch,
+    Verdict,
 };
 use async_channel::{Receiver, Sender};
 use async_signal::{Signal, Signals};
 use futures::stream::{self, LocalBoxStream, SelectAll, StreamExt};
-use palpate::compile::CompiledModel;
 use palpate::onboard::effector::{Scale, Settings};
 use palpate::onboard::shared::Touch as Felt;
 use ros2_client::action::{CancelHandle, ExecutingGoalHandle, GoalEndStatus, NewGoalHandle};
@@ -94,7 +96,8 @@ pub(crate) fn run(options: Options, signals: Signals) -> Result<(), String> {
             (Recognizing::Here(Decider::new(model, options.thresholds)?), stream::pending().boxed_local())
         }
         Some((port, baud)) => {
-            let (orders, heard) = chip::start(port, baud, options.model.clone());
+            let model = options.model.clone().map(Served::for_chip).transpose()?;
+            let (orders, heard) = chip::start(port, baud, model);
             (
                 Recognizing::Chip {
                     orders,
@@ -111,8 +114,9 @@ pub(crate) fn run(options: Options, signals: Signals) -> Result<(), String> {
         inputs: &inputs,
         outputs: &outputs,
         recognizing,
-        switches: Switches::new(settings(options.model.as_deref())),
+        switches: Switches::new(settings(options.model.as_ref())),
         thresholds: options.thresholds,
+        frame_id: options.frame_id,
         goal: None,
         finished,
         counts: Counts::default(),
@@ -127,8 +131,12 @@ pub(crate) fn run(options: Options, signals: Signals) -> Result<(), String> {
 }
 
 /// Times of the effector for a model.
-fn settings(model: Option<&CompiledModel>) -> Settings {
-    model.map_or_else(Settings::default, |model| Settings::default().for_model(&model.model(), &Scale::IDENTITY))
+fn settings(model: Option<&Served>) -> Settings {
+    match model {
+        Some(Served::Trees(model)) => Settings::default().for_model(&model.model(), &Scale::IDENTITY),
+        // Switches do not know where the hand is.
+        Some(Served::Maps(_)) | None => Settings::default(),
+    }
 }
 
 /// Everything that can happen, as it happens.
@@ -204,6 +212,7 @@ struct Running<'n> {
     recognizing: Recognizing,
     switches: Switches,
     thresholds: Thresholds,
+    frame_id: String,
     goal: Option<Goal>,
     finished: Sender<Finished>,
     counts: Counts,
@@ -328,6 +337,12 @@ impl Running<'_> {
     }
 
     async fn say(&self, step: Step) {
+        let header = || Header { stamp: Time::now(), frame_id: self.frame_id.clone() };
+        // Before the verdict: who acts on it knows where the object is.
+        if let Some(Placed { placement, pose }) = step.placed {
+            self.send(&self.outputs.placements, Text { data: placement }).await;
+            self.send(&self.outputs.poses, Stamped { header: header(), pose }).await;
+        }
         self.send(&self.outputs.texts, Text { data: step.verdict.to_string() }).await;
         self.send(&self.outputs.verdicts, step.verdict).await;
         if let Some(evidence) = step.evidence {
@@ -335,6 +350,9 @@ impl Running<'_> {
         }
         if let Some(approach) = step.approach {
             self.send(&self.outputs.approaches, approach).await;
+        }
+        if let Some(pose) = step.next_pose {
+            self.send(&self.outputs.next_poses, Stamped { header: header(), pose }).await;
         }
     }
 
@@ -409,6 +427,10 @@ impl Running<'_> {
         match change {
             Change::ErrorRate(error_rate) => self.thresholds.error_rate = error_rate,
             Change::MaxTouches(max_touches) => self.thresholds.max_touches = max_touches,
+            Change::FrameId(frame_id) => {
+                self.frame_id = frame_id;
+                return;
+            }
             Change::Model(_) => {}
         }
         // What was touched counts under other thresholds, or another model, no more.
@@ -419,7 +441,12 @@ impl Running<'_> {
                 Decider::new(model, self.thresholds)
             }
             (Recognizing::Here(decider), _) => decider.under(self.thresholds),
-            (Recognizing::Chip { .. }, Change::Model(model)) => return self.order(Order::Load(model)),
+            (Recognizing::Chip { .. }, Change::Model(model)) => {
+                return match model.for_chip() {
+                    Ok(model) => self.order(Order::Load(model)),
+                    Err(reason) => self.problem(reason),
+                };
+            }
             (Recognizing::Chip { .. }, _) => return,
         };
         match decider {

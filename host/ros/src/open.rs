@@ -1,12 +1,13 @@
 //! The node's interface: topics with their quality of service, a service, an action and parameters.
 
-use crate::decide::{Thresholds, check};
+use crate::decide::Thresholds;
+use crate::served::Served;
 use crate::wire::{
-    Approach, Bool, DiagnosticArray, Evidence, Expected, PACKAGE, Recognized, ResetDone, Text, Touch, Verdict,
+    Approach, Bool, DiagnosticArray, Evidence, Expected, PACKAGE, Pose, PoseWithCovariance, Recognized, ResetDone,
+    Stamped, Text, Touch, Verdict,
 };
 use async_channel::Sender;
 use palpate::chip::Port;
-use palpate::compile::CompiledModel;
 use palpate::onboard::effector::Finger;
 use ros2_client::action::{ActionServerQosPolicies, AsyncActionServer};
 use ros2_client::qos::{Durability, History};
@@ -16,8 +17,7 @@ use ros2_client::{
 };
 use serde::Serialize;
 use std::fmt::Display;
-use std::path::PathBuf;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
 
 /// Touches and edges that wait while others are taken in.
 const QUEUE: usize = 1_000;
@@ -30,17 +30,22 @@ pub(crate) struct Options {
     /// Also hear publishers that do not repeat lost messages.
     pub(crate) best_effort: bool,
     pub(crate) services: ServiceMapping,
-    pub(crate) model: Option<Arc<CompiledModel>>,
+    /// The model's path; empty without one.
+    pub(crate) path: PathBuf,
+    pub(crate) model: Option<Served>,
     pub(crate) thresholds: Thresholds,
+    /// The frame of poses.
+    pub(crate) frame_id: String,
     /// The chip that recognizes; without one this program does.
     pub(crate) chip: Option<(Port, u32)>,
 }
 
 /// A parameter that was changed.
 pub(crate) enum Change {
-    Model(Arc<CompiledModel>),
+    Model(Served),
     ErrorRate(f64),
     MaxTouches(i64),
+    FrameId(String),
 }
 
 pub(crate) type Actions = AsyncActionServer<Expected, Recognized, Recognized>;
@@ -60,6 +65,10 @@ pub(crate) struct Outputs {
     pub(crate) texts: Publisher<Text>,
     pub(crate) evidence: Publisher<Evidence>,
     pub(crate) approaches: Publisher<Approach>,
+    /// Place and placement of the object, and the next approach, by a model of maps.
+    pub(crate) poses: Publisher<Stamped<PoseWithCovariance>>,
+    pub(crate) placements: Publisher<Text>,
+    pub(crate) next_poses: Publisher<Stamped<Pose>>,
     /// Touches of switches, and of a chip's own fingers.
     pub(crate) measured: Publisher<Touch>,
     pub(crate) diagnostics: Publisher<DiagnosticArray>,
@@ -68,14 +77,15 @@ pub(crate) struct Outputs {
 /// The node's parameters; those that can be set are sent to `changed`.
 pub(crate) fn parameters(options: &Options, changed: Sender<Change>) -> NodeOptions {
     let has_chip = options.chip.is_some();
-    let path = options.model.as_ref().and_then(|model| model.path()).unwrap_or(&PathBuf::new()).display().to_string();
+    let path = options.path.display().to_string();
     let model = options.model.clone();
-    let change = move |name: &str, value: &ParameterValue| change(name, value, has_chip, model.as_deref());
+    let change = move |name: &str, value: &ParameterValue| change(name, value, has_chip, model.as_ref());
     let validate = change.clone();
     NodeOptions::new()
         .declare_parameter("model", ParameterValue::String(path))
         .declare_parameter("error_rate", ParameterValue::Double(options.thresholds.error_rate))
         .declare_parameter("max_touches", ParameterValue::Integer(options.thresholds.max_touches))
+        .declare_parameter("frame_id", ParameterValue::String(options.frame_id.clone()))
         .parameter_validator(Box::new(move |name, value| validate(name, value).map(|_| ())))
         .parameter_set_action(Box::new(move |name, value| {
             let change = change(name, value)?;
@@ -92,21 +102,23 @@ fn change(
     name: &str,
     value: &ParameterValue,
     has_chip: bool,
-    model: Option<&CompiledModel>,
+    model: Option<&Served>,
 ) -> Result<Option<Change>, String> {
     let thresholds = |thresholds: Thresholds| match model {
         _ if has_chip && thresholds != Thresholds::default() => {
             Err("the chip stops as its model says: calibrate the model and load it".into())
         }
-        Some(model) => thresholds.stopping(&model.model()).map(|_| ()),
+        Some(model) => model.stopping(thresholds).map(|_| ()),
         None => Ok(()),
     };
     match (name, value) {
         ("model", ParameterValue::String(path)) if path.is_empty() && has_chip => Ok(None),
         ("model", ParameterValue::String(path)) => {
-            let model = CompiledModel::read(path).map_err(text)?;
-            check(&model)?;
-            Ok(Some(Change::Model(Arc::new(model))))
+            let model = Served::read(Path::new(path))?;
+            if has_chip {
+                model.clone().for_chip()?;
+            }
+            Ok(Some(Change::Model(model)))
         }
         ("error_rate", &ParameterValue::Double(error_rate)) => {
             thresholds(Thresholds { error_rate, ..Thresholds::default() })?;
@@ -116,6 +128,10 @@ fn change(
             thresholds(Thresholds { max_touches, ..Thresholds::default() })?;
             Ok(Some(Change::MaxTouches(max_touches)))
         }
+        ("frame_id", ParameterValue::String(frame)) if frame.is_empty() => {
+            Err("frame_id is the name of a frame, such as table".into())
+        }
+        ("frame_id", ParameterValue::String(frame)) => Ok(Some(Change::FrameId(frame.clone()))),
         _ => Err(format!("{name} is not a parameter of this type")),
     }
 }
@@ -162,11 +178,16 @@ pub(crate) fn open(node: &mut Node, options: &Options) -> Result<(Inputs, Output
 
     let diagnostics = Name::new("/", "diagnostics").map_err(text)?;
     let array = MessageTypeName::new("diagnostic_msgs", "DiagnosticArray");
+    let line = || MessageTypeName::new("std_msgs", "String");
+    let of_geometry = |kind| MessageTypeName::new("geometry_msgs", kind);
     let outputs = Outputs {
         verdicts: publish_on(node, &name("verdict")?, of("Verdict"), &latched)?,
-        texts: publish_on(node, &name("verdict_text")?, MessageTypeName::new("std_msgs", "String"), &latched)?,
+        texts: publish_on(node, &name("verdict_text")?, line(), &latched)?,
         evidence: publish_on(node, &name("evidence")?, of("Evidence"), &latched)?,
         approaches: publish_on(node, &name("next_approach")?, of("Approach"), &latched)?,
+        poses: publish_on(node, &name("pose")?, of_geometry("PoseWithCovarianceStamped"), &latched)?,
+        placements: publish_on(node, &name("placement")?, line(), &latched)?,
+        next_poses: publish_on(node, &name("next_pose")?, of_geometry("PoseStamped"), &latched)?,
         measured: publish_on(node, &name("measured_touch")?, of("Touch"), &reliable)?,
         diagnostics: publish_on(node, &diagnostics, array, &reliable)?,
     };

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import messages
 import numpy
 import pytest
 from cyclonedds.idl import IdlStruct
@@ -53,6 +54,23 @@ def test_a_definition_gives_the_same_bytes(file, part, message):
         return kind(**fields)
 
     assert bytes(store.serialize_cdr(made(name, values(message)), name)) == message.serialize()
+
+
+@pytest.mark.parametrize("name", ["PoseStamped", "PoseWithCovarianceStamped"])
+def test_a_pose_gives_the_same_bytes(name):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    packages = {"Time": "builtin_interfaces", "Header": "std_msgs"}
+    theirs = lambda kind: store.types[f"{packages.get(kind, 'geometry_msgs')}/msg/{kind}"]
+
+    def made(of, numbers):
+        pose = of("Pose")(of("Point")(2.0, -0.5, 0.0), of("Quaternion")(0.0, 0.0, 1.0, 0.0))
+        pose = of("PoseWithCovariance")(pose, numbers) if "Covariance" in name else pose
+        return of(name)(of("Header")(of("Time")(7, 9), "table"), pose)
+
+    covariance = numpy.arange(36.0)
+    mine = made(lambda kind: getattr(messages, kind), covariance.tolist())
+    serialized = store.serialize_cdr(made(theirs, covariance), f"geometry_msgs/msg/{name}")
+    assert bytes(serialized) == mine.serialize()
 
 
 def test_every_definition_has_an_example():

@@ -1,5 +1,6 @@
 """palpate-ros beside Cyclone DDS."""
 
+import math
 import os
 import random
 import signal
@@ -348,6 +349,67 @@ def test_parameters_change_the_model_and_the_thresholds(tmp_path):
         copy.write_bytes(open(MODEL, "rb").read())
         assert set("model", ParameterValue(4, string_value=str(copy))).successful
         assert take(verdicts, 1)[0].touch == 0
+
+
+@pytest.fixture
+def maps(tmp_path):
+    """A model of maps of a bar and a puck."""
+    path = tmp_path / "maps.palpate"
+    subprocess.run([os.environ["PALPATE_MAPS"], path], check=True)
+    return path
+
+
+def press(place, yaw, at):
+    """The touch of a hand that comes down at a pose on the bar."""
+    roll = 2 * math.atan2(at.orientation.z, at.orientation.w)
+    heights = []
+    for along in (-0.015, 0, 0.015):
+        x, y = at.position.x + along * math.cos(roll) - place[0], at.position.y + along * math.sin(roll) - place[1]
+        u, v = math.cos(yaw) * x + math.sin(yaw) * y, math.cos(yaw) * y - math.sin(yaw) * x
+        heights.append(0.025 if abs(u) <= 0.02 and abs(v) <= 0.008 else 0.0)
+    first = max(heights)
+    times = [NAN if first - height > 0.02 else (first - height) / 0.1 for height in heights]
+    down, row = [0.0, 0.0, -1.0], [math.cos(roll), math.sin(roll), 0.0]
+    return Touch(times, True, down, row, "", True, [at.position.x, at.position.y, first])
+
+
+def test_a_hand_that_knows_where_it_is_learns_what_lies_where(maps):
+    place, yaw = (0.012, -0.007), math.pi / 6
+    with Node(maps, "--frame-id", "tray") as node:
+        peer, last = Peer(node), qos(latched=True)
+        verdicts, next_poses = peer.latched("verdict", Verdict), peer.reader("next_pose", PoseStamped, qos=last)
+        poses, placements = peer.reader("pose", PoseWithCovarianceStamped), peer.reader("placement", String)
+        touches = peer.writer("touch", Touch)
+        [middle] = take(next_poses, 1)
+        assert (middle.header.frame_id, middle.pose.position) == ("tray", Point(0, 0, 0))
+        touches.write(Touch(LEVEL))
+        assert "no position" in take(verdicts, 1)[0].refused
+        [there], verdict = take(next_poses, 1), None
+        while verdict is None or verdict.verdict == "undecided":
+            there = there if verdict is None else take(next_poses, 1)[0]
+            touches.write(press(place, yaw, there.pose))
+            [verdict] = take(verdicts, 1)
+        assert (verdict.verdict, verdict.object, verdict.refused) == ("recognized", "bar", "")
+        pose = take(poses, verdict.touch)[-1]
+        assert pose.header.frame_id == "tray" and {line.data for line in take(placements, verdict.touch)} == {"flat"}
+        at, covariance = pose.pose.pose.position, pose.pose.covariance
+        assert abs(at.x - place[0]) < 3 * covariance[0] ** 0.5 < 0.015
+        assert abs(at.y - place[1]) < 3 * covariance[7] ** 0.5 < 0.015
+        assert [index for index, number in enumerate(covariance) if number] == [0, 7, 35]
+        parameters = Service(peer, "set_parameters", SetParametersRequest, SetParametersResponse)
+        for frame in ("", "table"):
+            value = ParameterValue(4, string_value=frame)
+            [result] = parameters.call(SetParametersRequest([Parameter("frame_id", value)])).results
+            assert result.successful == bool(frame)
+        touches.write(press(place, yaw, middle.pose))
+        assert take(verdicts, 1)[0].touch == 1 and take(poses, 1)[0].header.frame_id == "table"
+
+
+def test_a_model_of_maps_is_not_for_a_chip(maps, chip):
+    ended = subprocess.run(
+        [os.environ["PALPATE_ROS"], maps, "--port", chip.address], capture_output=True, text=True, timeout=30
+    )
+    assert ended.returncode == 1 and "a chip does not load a model of maps" in ended.stderr
 
 
 class Client:

@@ -145,7 +145,9 @@ impl Problem for LocateProblem {
                 "Give twelve columns: times, direction, alignment, and the hand's position in millimeters."
             }
             Self::Below { .. } => "Give times in seconds, and the position in millimeters above the table.",
-            Self::NotDown => "Come straight down, and state the direction in the table's frame.",
+            Self::NotDown => {
+                "Come straight down, and state the direction in the table's frame: its z is at most -0.95."
+            }
             Self::FewPresses { .. } => "Record 20 presses, and look for a finger that often stays open.",
             Self::NotBare { .. } => "Press beside the object, on one level table.",
             Self::OnePlace => "Press all over the table, and turn the hand by half a turn after each press.",

@@ -1,10 +1,12 @@
 //! A located approach as a step of evidence, and an object's cells as a follower.
 
+use super::error::LocateProblem;
 use super::world::{Aimed, Drawn, Truth};
 use crate::error::{Error, Result};
 use crate::evidence::{Follower, Sequence, Sequences, Supplier};
 use palpate_onboard::locate::{Approach, Effort, Hand, Locator, Maps, Pose, Seen};
 use palpate_onboard::{Familiarity, Stopping, Verdict};
+use palpate_shared::Touch;
 use std::convert::Infallible;
 
 /// Room for touches.
@@ -13,6 +15,26 @@ pub const TOUCHES: usize = 32;
 pub const CELLS: usize = 14_336;
 /// Cells and objects on a host that follows many objects.
 const MANY: usize = 65_536;
+/// Share of the pose in what the next approach is to tell, in 64ths.
+pub const POSE: u16 = 10;
+/// Distance below the table at which a finger cannot have stopped, in millimeters.
+const BELOW: f64 = 15.0;
+
+/// Heights that a touch met.
+///
+/// # Errors
+/// [`LocateProblem::Nowhere`] without a position, [`LocateProblem::Below`] for one that cannot be of a hand above a table, and
+/// [`LocateProblem::NotDown`].
+pub fn seen(hand: &Hand, touch: &Touch) -> Result<Seen, LocateProblem> {
+    let position = touch.position().ok_or(LocateProblem::Nowhere)?;
+    let last = touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or(0);
+    let way = f64::from(last) * 1e-6 * f64::from(hand.speed) / 1e3;
+    let below = way - f64::from(position.micrometers[2]) / 1e3;
+    if below > BELOW {
+        return Err(LocateProblem::Below { millimeters: below });
+    }
+    hand.seen(touch).ok_or(LocateProblem::NotDown)
+}
 
 /// A locator of the host: with a chip's room for up to 16 objects, with more for more.
 pub trait Locating: Send + Sync {

@@ -23,7 +23,7 @@ mod tests;
 mod world;
 mod write;
 
-pub use follow::{CELLS, Locating, TOUCHES, locating, workspace};
+pub use follow::{CELLS, Locating, POSE, TOUCHES, locating, seen, workspace};
 pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspect, names, stated};
 pub use learn::{Surface, learn, probe_of};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, Pose, Seen, TESTED};

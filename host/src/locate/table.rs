@@ -186,7 +186,7 @@ impl BareTable {
 
     /// The probe as the text of a `probe.toml`, with its fingertips and noise.
     pub fn toml(&self, probe: &Probe) -> String {
-        let Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance } = probe;
+        let Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance, .. } = probe;
         let [first, third] = self.tips;
         let mut text = format!(
             "# Found by `palpate probe fit` from {} presses on a bare table, {:.3} ± {:.3} mm high.\n\
@@ -214,19 +214,15 @@ impl BareTable {
 mod tests {
     use super::*;
     use crate::random::{Purpose, generator};
+    use crate::with;
     use palpate_shared::{ContactTime, Pose, Position};
     use rand::RngExt;
     use rand_distr::{Distribution, StandardNormal};
+    use std::sync::LazyLock;
 
-    const PROBE: Probe = Probe {
-        radius: 1.5,
-        spacing: 15.0,
-        speed: 100.0,
-        tilt: 0.0,
-        stroke: Some(20.0),
-        travel: None,
-        stroke_tolerance: None,
-    };
+    static PROBE: LazyLock<Probe> = LazyLock::new(|| {
+        with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0))
+    });
 
     /// A hand whose fingertips stand out by `tips` on a table at this height with these slopes, or on the heights that `meets` says.
     struct Robot {
@@ -365,7 +361,7 @@ mod tests {
     fn the_probe_file_states_the_fingertips() {
         let found = bare_table(&Robot { noise: [0.05, 0.0], ..ROBOT }.presses(40, 1), &PROBE).unwrap();
         let file = crate::probe::file::ProbeFile::parse(&found.toml(&PROBE), "hand.toml".as_ref()).unwrap();
-        assert_eq!(file.probe, PROBE);
+        assert_eq!(file.probe, *PROBE);
         let out = file.real.bent.map(|time| time * PROBE.speed / 1e6);
         assert!((out[0] - 0.6).abs() < 0.05 && out[1] == 0.0 && (out[2] + 0.9).abs() < 0.05, "{out:?}");
     }

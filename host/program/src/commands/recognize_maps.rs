@@ -3,13 +3,11 @@
 use super::Global;
 use super::recognize::{Arguments, Event, Line};
 use super::recognize_rows::verdict_name;
-use super::table::POSE;
 use palpate::error::LocateProblem;
-use palpate::locate::{self, Approach, Hand, Locating, Maps, MapsFile, Pose};
+use palpate::locate::{self, Approach, Hand, Locating, Maps, MapsFile, POSE, Pose};
 use palpate::output;
 use palpate::{Error, Result, compile};
 use palpate_onboard::{Stopping, Verdict};
-use palpate_shared::Touch;
 
 /// What an object is and where, after a touch.
 #[derive(serde::Serialize)]
@@ -148,29 +146,20 @@ impl<'m> Stream<'m> {
             self.begin();
             return Ok(());
         };
-        self.check(touch).map_err(|problem| Error::at(place, problem))?;
-        let refused = match self.hand.seen(touch) {
-            Some(seen) => {
+        let refused = match locate::seen(&self.hand, touch) {
+            Ok(seen) => {
                 self.touches += 1;
                 self.locating.push(seen);
                 None
             }
-            None => Some("it does not come straight down".to_owned()),
+            Err(aslant @ LocateProblem::NotDown) => Some(aslant.to_string()),
+            Err(problem) => return Err(Error::at(place, problem)),
         };
         self.print(refused)?;
         if self.locating.verdict() != Verdict::Undecided {
             self.begin();
         }
         Ok(())
-    }
-
-    /// Refuses a touch without a position, and one that cannot be of a hand above a table.
-    fn check(&self, touch: &Touch) -> Result<(), LocateProblem> {
-        let position = touch.position().ok_or(LocateProblem::Nowhere)?;
-        let last = touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or(0);
-        let way = f64::from(last) * 1e-6 * f64::from(self.hand.speed) / 1e3;
-        let below = way - millimeters(position.micrometers[2]);
-        if below > BELOW { Err(LocateProblem::Below { millimeters: below }) } else { Ok(()) }
     }
 
     fn print(&mut self, refused: Option<String>) -> Result<()> {
@@ -197,6 +186,3 @@ impl<'m> Stream<'m> {
         output::print(&format!("{}\n", serde_json::to_string(&located).unwrap_or_default()))
     }
 }
-
-/// Distance below the table at which a finger cannot have stopped, in millimeters.
-const BELOW: f64 = 15.0;

@@ -9,7 +9,7 @@ use palpate::calibrate;
 use palpate::error::LocateProblem;
 use palpate::evaluate::Finding;
 use palpate::locate::{
-    self, Aimed, Calibrated, Evaluation, Inspected, MapsFile, Promised, Real, Standing, Terms, Until,
+    self, Aimed, Calibrated, Evaluation, Inspected, MapsFile, POSE, Promised, Real, Standing, Terms, Until,
 };
 use palpate::output;
 use palpate::probe::Probe;
@@ -137,9 +137,6 @@ impl TableArguments {
         }
     }
 }
-
-/// Share of the pose in what chosen approaches are to tell, in 64ths.
-pub(super) const POSE: u16 = 10;
 
 #[derive(serde::Serialize)]
 struct Evaluated<'e> {
