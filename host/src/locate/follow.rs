@@ -87,6 +87,8 @@ pub fn locating<'m>(maps: Maps<'m>, stopping: Stopping, effort: Option<Effort>) 
     }
 }
 
+// On its own in the stack: a page has room for a chip's locator, not for the large one's.
+#[inline(never)]
 fn of<'m, const CELLS: usize, const OBJECTS: usize>(
     maps: Maps<'m>,
     stopping: Stopping,

@@ -4,6 +4,7 @@ use super::*;
 use crate::calibrate;
 use crate::capture;
 use crate::mesh::{Mesh, Object};
+use crate::play::Hidden;
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, Origin, Surroundings};
 use crate::with;
@@ -85,6 +86,33 @@ fn an_object_is_named_and_found_in_a_few_approaches_chosen_or_at_random() {
     let until = Some(Until { millimeters: 6.0, degrees: 10.0 });
     let sure = evaluate(maps, &standing, &probe(), &Terms { until, ..terms(40) }, &()).unwrap();
     assert!(sure.poses_within * 10 >= sure.poses * 9 && sure.poses >= 30, "{sure:?}");
+}
+
+#[test]
+fn an_object_that_lies_hidden_is_found_among_its_ghosts() {
+    let bytes = model(&Settings { fine: false, ..Settings::default() });
+    let maps = Maps::new(&bytes).unwrap();
+    let objects = objects();
+    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
+    let world = World { standing: &standing, probe: &probe(), real: Real::default(), range: 28.0, seed: 3 };
+    let mut hidden = Hidden::new(&world, maps, 0).unwrap();
+    assert!(hidden.ghosts().is_empty());
+    let first = hidden.choose();
+    assert_eq!([first.x, first.y], [0; 2]);
+    for _ in 0..10 {
+        let at = hidden.choose();
+        assert!(at.x.abs() <= 60_000 && at.y.abs() <= 60_000, "{at:?}");
+        let pressed = hidden.press(at).unwrap();
+        let heights: Vec<f64> = pressed.heights.into_iter().flatten().collect();
+        assert!(heights.iter().all(|height| (pressed.lowest - 3.0..45.0).contains(height)), "{pressed:?}");
+    }
+    let (ghosts, truth) = (hidden.ghosts(), hidden.truth());
+    assert_eq!((ghosts[0].object, truth.object), (0, 0));
+    assert!(ghosts.iter().map(|ghost| ghost.share).sum::<f64>() <= 1.001);
+    let is_near = |(found, place): (&i32, f64)| (f64::from(*found) / 1_000.0 - place).abs() < 12.0;
+    assert!(ghosts[0].pose.position.iter().zip(truth.place).all(is_near), "{ghosts:?}, {truth:?}");
+    while hidden.press(Approach::default()).is_some() {}
+    assert_eq!(hidden.locating.touches(), TOUCHES);
 }
 
 #[test]

@@ -171,9 +171,9 @@ pub struct World<'w> {
     pub seed: u64,
 }
 
-impl World<'_> {
+impl<'w> World<'w> {
     /// Draws an object that stands on the table: object after object in turn, everything else by chance.
-    pub fn draw(&self, index: u64) -> Drawn<'_> {
+    pub fn draw(&self, index: u64) -> Drawn<'w> {
         let mut random = random::generator(self.seed, Purpose::Table, "", index);
         let object = usize::try_from(index).unwrap_or(0) % self.standing.len().max(1);
         let placements = &self.standing[object].placements;

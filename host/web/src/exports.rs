@@ -101,6 +101,46 @@ export! {
         with(|table| number(table.propose(model)))
     }
 
+    /// Lays an object on the table: a placement of this weight, its rotation (9 numbers, column by column) and name in the input.
+    /// Puts the vertices out as they lie about the placement's origin, in millimeters. Returns how many numbers.
+    fn lay(object: u32, weight: f64) -> i32 {
+        with(|table| number(table.lay(object, weight)))
+    }
+
+    /// Opens the maps of the input, which are compressed, for the objects that were laid on the table, all of them in their order.
+    /// The noise: of heights and of the position in millimeters, the share of lost contacts, and drift in millimeters and degrees.
+    fn open_maps(height: f64, position: f64, lost: f64, drift: f64, turn: f64) -> i32 {
+        with(|table| number(table.open_maps([height, position, lost, drift, turn])))
+    }
+
+    /// Hides an object at a place that the seed determines.
+    fn hide(object: u32, seed: u32) -> i32 {
+        with(|table| number(table.hide(object, seed)))
+    }
+
+    /// Puts out the approach that tells most: x and y in millimeters, and the roll in 1/256 turn.
+    fn choose() -> i32 {
+        with(|table| number(table.choose()))
+    }
+
+    /// Presses straight down, at a place in millimeters with a roll in 1/256 turn. Puts out the height of each finger's contact, NaN
+    /// for one that met nothing, and how low the hand went; −1 and nothing else if there is no room for another touch.
+    fn press(x: f64, y: f64, roll: u32) -> i32 {
+        with(|table| number(table.press(x, y, roll)))
+    }
+
+    /// Puts out what is believed: verdict (as of `player`), the leader, touches, each object's posterior; then for each pose that
+    /// the object may have, likeliest first: object, placement among those laid, x, y, yaw (NaN for any), share of all belief, halves
+    /// of the 95 % intervals of x, y and yaw. Lengths are in millimeters and angles in radians. Returns how many poses.
+    fn belief() -> i32 {
+        with(|table| number(table.belief()))
+    }
+
+    /// Puts out the truth: object, placement among those laid, x, y, yaw.
+    fn truth() -> i32 {
+        with(|table| number(table.truth()))
+    }
+
     /// Begins a series of rounds.
     fn begin_series(seed: u32) -> i32 {
         with(|table| number(table.begin_series(seed)))

@@ -7,4 +7,5 @@
 //! `build` compiles it into `host/report/assets/play/palpate.wasm`, which the program puts into its pages.
 
 mod exports;
+mod press;
 mod table;

@@ -1,7 +1,9 @@
 //! State of the table: one game, one round, one series, and the memory that the script shares.
 
+use crate::press::Press;
 use palpate::compile::open;
 use palpate::glam::DVec3;
+use palpate::locate::Standing;
 use palpate::mesh::Mesh;
 use palpate::onboard::{Refused, Verdict};
 use palpate::play::{Approached, Game, Round, Series, decompress, unpack};
@@ -17,12 +19,16 @@ use std::cell::RefCell;
 /// State that the functions work on.
 #[derive(Default)]
 pub(crate) struct Table {
-    input: Vec<u8>,
+    pub(crate) input: Vec<u8>,
     /// Numbers for the script.
     pub(crate) output: Vec<f64>,
     evidence: Vec<i64>,
     /// Meshes of the game's objects, in their own units.
-    meshes: Vec<Mesh>,
+    pub(crate) meshes: Vec<Mesh>,
+    /// Longest side of each.
+    pub(crate) lengths: Vec<f64>,
+    /// The game on a table.
+    pub(crate) press: Press,
     game: Option<Game<'static>>,
     round: Option<Round<'static>>,
     series: Option<Series<'static>>,
@@ -37,7 +43,7 @@ pub(crate) fn with<T>(act: impl FnOnce(&mut Table) -> T) -> T {
     TABLE.with_borrow_mut(act)
 }
 
-fn index(number: u32) -> usize {
+pub(crate) fn index(number: u32) -> usize {
     usize::try_from(number).unwrap_or(usize::MAX)
 }
 
@@ -54,15 +60,19 @@ impl Table {
         let aim = *Aim::ALL.get(index(aim))?;
         let probe = with!(Probe::default(), radius, spacing, speed, tilt, stroke, travel);
         let origin = Origin { unit, aim, probe, ..Origin::default() };
-        *self = Self { game: Some(Game::new(&origin)), ..Self::default() };
+        let press = Press { probe, ..Press::default() };
+        *self = Self { press, game: Some(Game::new(&origin)), ..Self::default() };
         Some(0)
     }
 
     pub(crate) fn add_object(&mut self, name: u32, length: f64) -> Option<usize> {
         let (name, mesh) = self.input.split_at_checked(index(name))?;
         let mesh = unpack(mesh)?;
-        let object = self.game.as_mut()?.add_object(std::str::from_utf8(name).ok()?, &mesh, length).ok()?;
+        let name = std::str::from_utf8(name).ok()?;
+        let object = self.game.as_mut()?.add_object(name, &mesh, length).ok()?;
         self.meshes.push(mesh);
+        self.lengths.push(length);
+        self.press.standing.push(Standing { name: name.into(), placements: Vec::new() });
         Some(object)
     }
 

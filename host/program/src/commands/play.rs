@@ -3,17 +3,23 @@
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::real::RealArguments;
+use super::scene::SceneArguments;
 use super::{Global, shell};
 use palpate::compile::CompiledModel;
+use palpate::locate::Real;
 use palpate::output;
+use palpate::probe::Probe;
 use palpate::probe::noise::Noise;
-use palpate::touches::Origin;
+use palpate::touches::{Origin, Surroundings};
 use palpate::{Error, Result};
 use palpate_report::play::{self, Settings, Training};
 use std::path::PathBuf;
 
 /// Full touches of each object that models are trained on, and three times as many approaches.
 const TOUCHES: u64 = 10_000;
+
+/// Approaches to each object on a table that maps are learned from.
+const PRESSED: u64 = 50_000;
 
 /// Rounds of 100 approaches in a trace.
 const ROUNDS: u64 = 10;
@@ -74,6 +80,48 @@ pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
     if let Some(trace) = trace {
         output::write_unmarked(&trace, play::trace(&surfaces, &contenders, &settings, ROUNDS)?.as_bytes())?;
     }
+    let text = || format!("{}: open it in a browser\n", output.display());
+    global.print_about(&output, &serde_json::json!({ "page": output }), text)
+}
+
+/// Makes the page of a table.
+pub(super) fn on_table(wanted: Wanted, scene: &SceneArguments, global: &Global) -> Result<()> {
+    let Wanted { mut sources, model, output, touches, trace, mut size, real } = wanted;
+    scene.straight_down(Surroundings::Table { cone: 0.0 })?;
+    if !model.is_empty() {
+        return Err(Error::setting("model", "given", "it without --scene table: the page's maps are learned for it"));
+    }
+    if trace.is_some() {
+        return Err(Error::setting("trace", "given", "it without --scene table"));
+    }
+    let (touches, seed) = (touches.unwrap_or(PRESSED), global.seed());
+    if touches < 100 {
+        return Err(Error::setting("touches", touches, "100 or more"));
+    }
+    if sources.is_empty() {
+        sources.push("builtin".into());
+    }
+    output::admit(&output, sources.iter().map(PathBuf::from).collect::<Vec<_>>().iter())?;
+    let words = [size.words(), scene.words(), real.words()].concat();
+    size.units.imply_unit();
+    // The guide's hand, unless a file states another.
+    let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 0.0, stroke: Some(20.0), ..Probe::default() };
+    let origin = size.origin(Origin { touches, seed, probe, ..Origin::default() })?;
+    let mut objects = size.objects(&sources, seed)?;
+    if !(2..=play::MOST_OBJECTS).contains(&objects.len()) {
+        let allowed = format!("2 to {} objects with --scene table", play::MOST_OBJECTS);
+        return Err(Error::setting("number of objects", objects.len(), allowed));
+    }
+    scene.weigh(&mut objects)?;
+    let stated = size.probe.read()?.map(|file| file.real).filter(|real| !real.is_none());
+    let noise = real.on_table(stated.unwrap_or_else(|| Real::default().noise(origin.probe.speed)))?;
+    let command = ["palpate", "view", "--play"].into_iter().chain(sources.iter().map(String::as_str));
+    let output_words =
+        ["-o", &output.to_string_lossy(), "--seed", &seed.to_string(), "--touches", &touches.to_string()]
+            .map(str::to_owned);
+    let command = shell::command(command.chain(output_words.iter().chain(&words).map(String::as_str)));
+    let page = play::table(&objects, &Settings { origin, noise, command }, &Bar::new())?;
+    output::write_bytes(&output, page.as_bytes())?;
     let text = || format!("{}: open it in a browser\n", output.display());
     global.print_about(&output, &serde_json::json!({ "page": output }), text)
 }

@@ -234,6 +234,13 @@ impl UnitArguments {
         }
     }
 
+    /// Objects keep their true size; a mesh that states no unit is in the built-in objects', unless the option says otherwise.
+    pub(crate) fn imply_unit(&mut self) {
+        if self.true_size.is_empty() {
+            self.true_size.push(MeshUnit::Unstated(10.0));
+        }
+    }
+
     /// True if objects are touched at their true size.
     pub(crate) fn is_true_size(&self) -> bool {
         !self.true_size.is_empty()

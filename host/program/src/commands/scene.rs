@@ -62,6 +62,15 @@ impl SceneArguments {
         }
     }
 
+    /// The options as words of a command line, to repeat them.
+    pub(crate) fn words(&self) -> Vec<String> {
+        let weights =
+            self.placements.iter().map(|Weight { object, placement, weight }| format!("{object}/{placement}={weight}"));
+        let weights: Vec<String> = weights.collect();
+        let placements = (!weights.is_empty()).then(|| ["--placements".into(), weights.join(",")]);
+        ["--scene".into(), "table".into()].into_iter().chain(placements.into_iter().flatten()).collect()
+    }
+
     /// Gives objects the weights of their placements.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ use std::path::PathBuf;
 #[command(group(ArgGroup::new("recognizes").args(["play", "port"])), after_help = "\
 Pages work in any browser, without a network. The inside of a surface is orange; a mesh that shows orange from outside is inside out, or has holes.
 
-With --play the page lets you touch several objects, and models recognize them. Without --model four are trained for it, which takes about a minute. With --port it shows what a chip at the reader's computer touches and recognizes, where the browser has Web Serial.
+With --play the page lets you touch several objects, and models recognize them. Without --model four are trained for it, which takes about a minute. With --scene table, too, one of the objects lies hidden on a table, and a hand that knows where it is finds out what it is and where it lies. With --port it shows what a chip at the reader's computer touches and recognizes, where the browser has Web Serial.
 
 Examples:
   palpate view bowl -o bowl.html                a built-in object
@@ -31,6 +31,8 @@ Examples:
   palpate view fork -o fork.html --scene table  as it lies on a table
   palpate view --play -o play.html              ten objects, four models
   palpate view --play --model models/household.palpate -o play.html
+  palpate view --play --scene table -o table.html
+                                                ten objects on a table
   palpate view --port -o chip.html              a chip, without a program")]
 pub(crate) struct Arguments {
     /// A built-in object's name, a mesh (OBJ, STL, PLY, glTF, COLLADA) or scan (PLY, PCD, XYZ); with --play several, or directories
@@ -39,7 +41,7 @@ pub(crate) struct Arguments {
     /// Where to write; the page
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// Touches of each object; to show [default: 24], or with --play to train on [default: 10000]
+    /// Touches of each object; to show [default: 24], or with --play to train on [default: 10000; on a table 50000]
     #[arg(long, value_name = "N", value_parser = super::numbers::count)]
     touches: Option<u64>,
     /// Approaches to show in which a finger missed
@@ -83,11 +85,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     }
     let scene = arguments.scene.scene(Surroundings::Floating)?;
     if arguments.play {
-        if !scene.is_floating() {
-            return Err(Error::setting("scene", "table", "it without --play: the game's objects float"));
-        }
-        let Arguments { sources, model, output, touches, trace, size, real, .. } = arguments;
-        return play::run(play::Wanted { sources, model, output, touches, trace, size, real }, global);
+        let Arguments { sources, model, output, touches, trace, size, real, scene: on, .. } = arguments;
+        let wanted = play::Wanted { sources, model, output, touches, trace, size, real };
+        return if scene.is_floating() { play::run(wanted, global) } else { play::on_table(wanted, &on, global) };
     }
     let Arguments { sources, output, touches, misses, size, real, .. } = &arguments;
     let [source] = &sources[..] else {

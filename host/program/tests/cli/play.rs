@@ -45,6 +45,31 @@ fn a_page_without_a_model_trains_four_and_says_what_each_is_expected_to_cost() {
 }
 
 #[test]
+fn a_page_of_a_table_holds_maps_of_its_objects_and_says_what_they_were_learned_from() {
+    let directory = tempfile::tempdir().unwrap();
+    let page = directory.path().join("table.html");
+    let made = |arguments: &[&str]| {
+        let mut command = command(["view", "--play", "--scene", "table", "--touches", "4000", "-o"]);
+        command.arg(&page).args(arguments).output().unwrap()
+    };
+    stdout(made(&["bowl", "mouse", "--placements", "bowl/+z=1", "--real", "missed=5%"]));
+    let text = std::fs::read_to_string(&page).unwrap();
+    assert!(text.contains("from 4,000 simulated approaches") && text.contains("5 % of contacts to be lost"));
+    assert!(text.contains("\"maps\":") && text.contains("\"name\":\"mouse\""));
+    std::fs::remove_file(&page).unwrap();
+    for (wrong, said) in [
+        (&["bowl"][..], "2 to 16 objects"),
+        (&["bowl", "mouse", "--model", household().to_str().unwrap()], "model"),
+        (&["bowl", "mouse", "--trace", "trace.txt"], "trace"),
+        (&["bowl", "mouse", "--cone", "30"], "cone"),
+        (&["bowl", "mouse", "--real", "debounce=1ms"], "noise"),
+    ] {
+        let error = String::from_utf8(made(wrong).stderr).unwrap();
+        assert!(error.contains(said) && !page.exists(), "{wrong:?}: {error}");
+    }
+}
+
+#[test]
 fn what_cannot_be_played_with_writes_no_page() {
     let directory = tempfile::tempdir().unwrap();
     let page = directory.path().join("play.html");

@@ -1,4 +1,55 @@
 "use strict";
+// The page's data and game; without a game the page says why.
+function openPage() {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  try {
+    return { data, game: openGame(data) };
+  } catch (error) {
+    document.getElementById("failure").textContent = typeof WebAssembly === "object"
+      ? `This page cannot be played here: ${error.message}.`
+      : "This browser does not offer WebAssembly, so objects cannot be touched here. Any browser of the last years does.";
+    for (const control of document.querySelectorAll("button, select, input")) control.disabled = true;
+    return { data };
+  }
+}
+function percent(share) {
+  return (100 * share).toFixed(share > 0.9995 ? 2 : 1);
+}
+// A row of a table, with a heading in one column.
+function rowOf(texts, heading, kind = "") {
+  const row = document.createElement("tr");
+  texts.forEach((text, column) => {
+    const cell = document.createElement(heading === column ? "th" : "td");
+    if (heading === column) cell.scope = "row";
+    cell.textContent = text;
+    cell.className = kind;
+    row.append(cell);
+  });
+  return row;
+}
+// One bar for each label in the table of bars. Returns what shows posteriors, their thresholds, and which leads and is named.
+function openBars(labels) {
+  const bars = labels.map((label) => {
+    const row = rowOf([label, "", ""], 0);
+    const track = Object.assign(document.createElement("div"), { className: "track" });
+    const bar = Object.assign(document.createElement("div"), { className: "bar" });
+    const line = Object.assign(document.createElement("div"), { className: "line" });
+    track.setAttribute("aria-hidden", "true");
+    track.append(bar, line);
+    row.cells[1].append(track);
+    row.cells[2].className = "number";
+    return { row, bar, line };
+  });
+  document.getElementById("bars").tBodies[0].replaceChildren(...bars.map(({ row }) => row));
+  return (posteriors, thresholds, leader, isNamed) => bars.forEach(({ row, bar, line }, index) => {
+    bar.style.width = `${100 * posteriors[index]}%`;
+    line.style.left = `${100 * thresholds[index]}%`;
+    row.cells[2].textContent = percent(posteriors[index]);
+    row.classList.toggle("leads", index === leader);
+    row.classList.toggle("named", isNamed && index === leader);
+  });
+}
+
 // The game of data: compiles the page's WebAssembly, puts objects and models on the table, and returns what can be done.
 // The module imports nothing, so it can do nothing but compute.
 function openGame(data) {
@@ -54,7 +105,7 @@ function openGame(data) {
   };
   const VERDICTS = ["undecided", "recognized", "unknown", "gave up"];
   return {
-    exports,
+    exports, put, bytes, taken, sure, number,
     setNoise,
     vertices: (object) => Float32Array.from(taken(sure(exports.vertices(number(object)), "an object"))),
     triangles: (object) => Uint32Array.from(taken(sure(exports.triangles(number(object)), "an object"))),

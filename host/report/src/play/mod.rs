@@ -6,10 +6,12 @@
 
 mod models;
 mod surfaces;
+mod table;
 mod trace;
 
 pub use models::{Training, expect, train};
 pub use surfaces::{Surface, surfaces};
+pub use table::{MOST_OBJECTS, table};
 pub use trace::trace;
 
 use crate::page::PageProblem;
@@ -164,7 +166,12 @@ fn data(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
             "expected": contender.expected,
         })).collect::<Vec<_>>(),
     });
-    let text = serde_json::to_string(&data).map_err(|error| PageProblem::Scene { reason: error.to_string() })?;
+    safe(&data)
+}
+
+/// Data as text that is safe inside a script element.
+fn safe(data: &serde_json::Value) -> Result<String> {
+    let text = serde_json::to_string(data).map_err(|error| PageProblem::Scene { reason: error.to_string() })?;
     // In a script element only `<` could end the data early.
     Ok(text.replace('<', "\\u003c"))
 }

@@ -1,32 +1,12 @@
 "use strict";
 (() => {
-  const data = JSON.parse(document.getElementById("data").textContent);
+  const { data, game } = openPage();
+  if (!game) return;
   const element = (id) => document.getElementById(id);
-  let game;
-  try {
-    game = openGame(data);
-  } catch (error) {
-    element("failure").textContent = typeof WebAssembly === "object"
-      ? `This page cannot be played here: ${error.message}.`
-      : "This browser does not offer WebAssembly, so objects cannot be touched here. Any browser of the last years does.";
-    for (const control of document.querySelectorAll("button, select, input")) control.disabled = true;
-    return;
-  }
   const noise = structuredClone(data.noise);
   const random = (below) => Math.floor(Math.random() * below);
-  const percent = (share) => (100 * share).toFixed(share > 0.9995 ? 2 : 1);
   const milliseconds = (micros) => (micros === null ? "–" : (micros / 1000).toFixed(1));
   const fill = (row, texts) => texts.forEach((text, column) => { row.cells[column].textContent = text; });
-  const rowOf = (texts, heading) => {
-    const row = document.createElement("tr");
-    texts.forEach((text, column) => {
-      const cell = document.createElement(heading === column ? "th" : "td");
-      if (heading === column) cell.scope = "row";
-      cell.textContent = text;
-      row.append(cell);
-    });
-    return row;
-  };
 
   // What is on the table.
   let object = 0, secret = false, model = 0, approaches = 0;
@@ -38,21 +18,10 @@
   const shape = () => (shapes[object] ??= [game.vertices(object), game.triangles(object)]);
 
   // One bar for each object that the shown model can name.
-  let bars = [];
+  let bars;
   const showModel = () => {
     const { objects, known } = data.models[model];
-    bars = objects.slice(0, known).map((label) => {
-      const row = rowOf([label, "", ""], 0);
-      const track = Object.assign(document.createElement("div"), { className: "track" });
-      const bar = Object.assign(document.createElement("div"), { className: "bar" });
-      const line = Object.assign(document.createElement("div"), { className: "line" });
-      track.setAttribute("aria-hidden", "true");
-      track.append(bar, line);
-      row.cells[1].append(track);
-      row.cells[2].className = "number";
-      return { row, bar, line };
-    });
-    element("bars").tBodies[0].replaceChildren(...bars.map(({ row }) => row));
+    bars = openBars(objects.slice(0, known));
   };
   const said = ({ verdict, best }, index) => {
     if (verdict === "recognized") return data.models[index].objects[best];
@@ -61,14 +30,7 @@
   const showBars = () => {
     const player = game.player(model);
     const { objects } = data.models[model];
-    bars.forEach(({ row, bar, line }, index) => {
-      const posterior = player.posteriors[index];
-      bar.style.width = `${100 * posterior}%`;
-      line.style.left = `${100 * player.thresholds[index]}%`;
-      row.cells[2].textContent = percent(posterior);
-      row.classList.toggle("leads", player.touches > 0 && index === player.best);
-      row.classList.toggle("named", player.verdict === "recognized" && index === player.best);
-    });
+    bars(player.posteriors, player.thresholds, player.touches > 0 ? player.best : null, player.verdict === "recognized");
     const count = `${player.approaches} approach${player.approaches === 1 ? "" : "es"}, ${player.touches} of them evidence`;
     element("verdict").textContent = {
       undecided: player.touches === 0 ? `Undecided: nothing is known yet. ${count}.`

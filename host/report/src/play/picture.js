@@ -89,11 +89,11 @@ function openPicture(data, touch) {
   };
 
   // Where each finger starts and ends: one that misses goes on beyond the object, as far as the hand does.
-  const paths = ({ start, direction, alignment, distances }) => [-1, 0, 1].map((place, finger) => {
+  const paths = ({ start, direction, alignment, distances, most = Infinity }) => [-1, 0, 1].map((place, finger) => {
     const from = vector(start).addScaledVector(vector(alignment), place * spacing);
     const contacts = distances.filter((distance) => distance !== null);
     const end = contacts.length ? Math.min(...contacts) + (stroke ?? Infinity) : (travel ?? Infinity);
-    const way = distances[finger] ?? Math.min(-2 * from.dot(vector(direction)), end);
+    const way = distances[finger] ?? Math.min(-2 * from.dot(vector(direction)), end, most);
     return [from, from.clone().addScaledVector(vector(direction), way)];
   });
   // Moves the fingers to their contacts, all at the same speed, within 0.6 s; at once where that is asked for.
@@ -142,10 +142,11 @@ function openPicture(data, touch) {
   const propose = (proposal) => {
     planned.visible = Boolean(proposal);
     if (proposal) {
-      const reach = 0.9 * box.high.clone().sub(box.low).length() / 2 + spacing;
+      const reach = proposal.reach ?? 0.9 * box.high.clone().sub(box.low).length() / 2 + spacing;
+      const middle = vector(proposal.at ?? [0, 0, 0]);
       const ends = [-1, 0, 1].map((place) => {
         const aside = vector(proposal.alignment).multiplyScalar(place * spacing);
-        return [1, 0.55].map((far) => vector(proposal.direction).multiplyScalar(-far * reach).add(aside));
+        return [1, 0.55].map((far) => vector(proposal.direction).multiplyScalar(-far * reach).add(aside).add(middle));
       });
       stretch(plan, ends);
       ends.forEach(([from], finger) => heads[finger].position.copy(from));
@@ -155,5 +156,5 @@ function openPicture(data, touch) {
 
   view.onClick(({ ray }) => touch(ray.origin.toArray(), ray.direction.toArray()));
   view.open();
-  return { show, reveal, clear, approach, propose };
+  return { view, show, reveal, clear, approach, propose };
 }
