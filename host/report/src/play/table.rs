@@ -13,6 +13,7 @@ use palpate::play::compress;
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
 use palpate::touches::{Origin, Surroundings};
+use palpate::with;
 use palpate::wording::count;
 use palpate_shared::format::Length;
 
@@ -43,7 +44,7 @@ pub fn table(objects: &[Object], settings: &Settings, progress: &dyn Progress) -
     };
     let shown: Vec<Object> = surfaces.iter().zip(&objects).map(own).collect();
     let real = Real::of(&settings.noise, origin.probe.speed)?;
-    let maps = locate::Settings { fine: false, ..locate::Settings::default() }.expecting(&real);
+    let maps = with!(locate::Settings::default(), fine = false).expecting(&real);
     let (dataset, _) = in_memory(&shown, &origin.clone().into(), progress)?;
     let learned = locate::learn(&dataset, &maps)?;
     let bytes = locate::write(&learned, &dataset.names(), &origin.probe, &maps)?;
