@@ -11,6 +11,7 @@ use palpate::output;
 use palpate::probe::Probe;
 use palpate::probe::noise::Noise;
 use palpate::touches::{Origin, Surroundings};
+use palpate::with;
 use palpate::{Error, Result};
 use palpate_report::play::{self, Settings, Training};
 use std::path::PathBuf;
@@ -105,7 +106,7 @@ pub(super) fn on_table(wanted: Wanted, scene: &SceneArguments, global: &Global) 
     let words = [size.words(), scene.words(), real.words()].concat();
     size.units.imply_unit();
     // The guide's hand, unless a file states another.
-    let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 0.0, stroke: Some(20.0), ..Probe::default() };
+    let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
     let origin = size.origin(Origin { touches, seed, probe, ..Origin::default() })?;
     let mut objects = size.objects(&sources, seed)?;
     if !(2..=play::MOST_OBJECTS).contains(&objects.len()) {
