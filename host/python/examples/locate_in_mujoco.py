@@ -221,7 +221,7 @@ def main():
     add("--degrees", type=robot.positive, default=5, help="half of the yaw's [5]")
     add("--table-friction", type=robot.amount, default=0.5, metavar="MU", help="of the object on the table [0.5]")
     own, rest = parser.parse_known_args()
-    # What a robot's fingers lose at slopes and edges is expected by the maps.
+    # The maps expect contacts that a robot's fingers lose at slopes and edges.
     real = palpate.Real(height=0.6, lost=0.05, position=0.7, drift=0.3, drift_yaw=0.3)
     options = robot.arguments().parse_args(["-o", ".", "--stroke", "2", *rest], namespace=own)
     meshes = own.meshes

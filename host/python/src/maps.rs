@@ -313,7 +313,7 @@ impl Maps {
         Ok(Probe(locate::hand(self.maps())?))
     }
 
-    /// The promise that a calibration gave: its rate, of which aims it is, and what it rests on; `None` without one.
+    /// Promise of a calibration: its rate, the aims that it holds for, and its evidence; `None` without one.
     #[getter]
     fn promise<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         Promised::of(self.maps()).map(|promised| raw(py, &promised)).transpose()

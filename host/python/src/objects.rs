@@ -42,7 +42,7 @@ macro_rules! handed_out {
 handed_out! {
     /// A verdict.
     Verdict is "palpate._types"."Verdict";
-    /// What a locator says.
+    /// Result of a locator.
     Located is "palpate._types"."Located";
     /// Maps that keep a promise.
     CalibratedMaps is "palpate._locate"."CalibratedMaps";
@@ -84,7 +84,7 @@ impl<'py> IntoPyObject<'py> for Probe {
     }
 }
 
-/// What a hand and a table add to touches.
+/// Noise that a hand and a table add to touches.
 #[derive(Default)]
 pub(crate) struct Real(pub(crate) Deviations);
 

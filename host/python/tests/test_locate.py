@@ -54,7 +54,7 @@ def test_an_object_is_named_and_located(maps: palpate.Maps, touches: palpate.Dat
         assert located.object == located.best == name and located.posterior > 0.98, located
         mode = located.placed
         assert mode is not None and mode == located.modes[0]
-        # Where it lies, or where it looks the same so far.
+        # Its place, or one that looks the same so far.
         assert any(math.hypot(mode.x - 12.0, mode.y + 7.0) < 6.0 for mode in located.modes)
         assert str(located).startswith(f"{name}, {mode.placement}, ")
         assert locator.located == located and locator.touches == located.touches
@@ -116,7 +116,7 @@ def test_maps_learn_from_recorded_touches_as_from_meshes(touches: palpate.DataSe
     assert palpate.Maps.learn(captured).to_bytes() == (
         palpate.Maps.of_meshes(OBJECTS, probe=PROBE, millimeters=UNIT, approaches=5000).to_bytes()
     )
-    # As arrays from elsewhere: an object that lies in one way.
+    # Arrays from elsewhere: an object that lies in one way.
     assert captured.position is not None and captured.position.shape == (len(captured), 3)
     one = (captured.objects == 0) & (captured.instances == 0)
     assert captured.direction is not None and captured.alignment is not None

@@ -195,7 +195,7 @@ pub(super) struct Pressing<'m> {
 }
 
 impl Pressing<'_> {
-    /// Where the most likely cell is, in millimeters.
+    /// Place of the most likely cell, in millimeters.
     fn believed(&self) -> Option<[f64; 2]> {
         let pose = self.locating.poses(self.locating.leader()).into_iter().next()?;
         Some(pose.position.map(|micrometers| f64::from(micrometers) / 1_000.0))
@@ -242,7 +242,7 @@ pub(super) struct Pressed<'w> {
     pub(super) seen: Seen,
     /// Half of the square that random approaches are aimed in, in millimeters.
     pub(super) reach: f64,
-    /// What stood where at the last approach.
+    /// The object and its place at the last approach.
     pub(super) before: Truth,
 }
 

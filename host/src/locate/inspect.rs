@@ -144,7 +144,7 @@ pub struct Promised {
     pub error_rate: f64,
     /// The probability that it is kept.
     pub confidence: f64,
-    /// How approaches were aimed.
+    /// The aim of approaches.
     pub aimed: Aimed,
     /// Sequences that it rests on.
     pub sequences: u32,

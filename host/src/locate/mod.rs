@@ -1,4 +1,4 @@
-//! What an object is and where it lies on a table, from touches of a hand that knows where it is.
+//! Recognition of an object and its place on a table, from touches of a hand whose position is known.
 //!
 //! ```text
 //! touches with positions ──learn──► surfaces ──write──► maps ──► locator ──► verdict, poses, next approach

@@ -35,7 +35,7 @@ impl Until {
     }
 }
 
-/// How far a pose is from the truth.
+/// Distance of a pose from the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Off {
     /// Along x and y, in millimeters.
@@ -84,7 +84,7 @@ impl Equivalents {
         Self { turns: standing.par_iter().map(of).collect() }
     }
 
-    /// How far a pose is from the nearest equivalent of the truth; none if the object does not lie like that.
+    /// Distance of a pose from the nearest equivalent of the truth; none if the object lies in another way.
     pub(super) fn off(&self, truth: &Truth, pose: &Pose) -> Option<Off> {
         let turns = self.turns.get(truth.object)?.get(truth.placement)?.get(usize::from(pose.placement))?;
         let [x, y] = pose.position.map(|micrometers| f64::from(micrometers) / 1_000.0);

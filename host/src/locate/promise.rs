@@ -26,7 +26,7 @@ pub struct Terms {
     pub sequences: usize,
     /// Limit of approaches.
     pub max_touches: u32,
-    /// How approaches are aimed; a promise is of one way alone.
+    /// The aim of approaches; a promise holds for one kind of aim alone.
     pub aimed: Aimed,
     /// Noise of hand and table.
     pub real: Real,
@@ -34,7 +34,7 @@ pub struct Terms {
     pub unknown: bool,
     /// Go on until the pose is as sure, beyond the name.
     pub until: Option<Until>,
-    /// How much the pose counts where approaches are chosen, in 64ths.
+    /// Weight of the pose where approaches are chosen, in 64ths.
     pub pose: u16,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -52,7 +52,7 @@ pub struct Calibrated {
     pub promised: f64,
     /// The probability that it is kept.
     pub confidence: f64,
-    /// How approaches are aimed.
+    /// The aim of approaches.
     pub aimed: Aimed,
     /// Sequences that it rests on.
     pub sequences: usize,
@@ -109,7 +109,7 @@ pub struct Tested {
     pub promised: Promised,
     /// Wrong names of those given.
     pub error: f64,
-    /// Whether it was kept.
+    /// True if it was kept.
     pub finding: Finding,
 }
 
@@ -265,9 +265,9 @@ struct Played {
     outcome: Outcome,
     /// Likelihoods of the best cell for each touch, from where a test decides.
     fits: Vec<i32>,
-    /// How far the pose is from the truth; none if the object does not lie like that, or no name was given.
+    /// Distance of the pose from the truth; none if the object lies in another way, or no name was given.
     off: Option<Off>,
-    /// The same in units of the pose's intervals; far outside if the object does not lie like that.
+    /// This distance in units of the pose's intervals; far outside if the object lies in another way.
     in_intervals: Option<f64>,
     looked: [u64; 2],
 }

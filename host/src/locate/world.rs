@@ -113,11 +113,11 @@ impl Real {
     }
 }
 
-/// How approaches are aimed.
+/// The aim of approaches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Aimed {
-    /// Where they tell most.
+    /// At the place that tells most.
     Chosen,
     /// At random about the most likely place.
     Random,
@@ -198,7 +198,7 @@ impl<'w> World<'w> {
 #[derive(Debug)]
 pub struct Drawn<'w> {
     world: World<'w>,
-    /// What stands where.
+    /// An object and its place.
     pub truth: Truth,
     random: ChaCha8Rng,
     bent: [[f64; 2]; FINGERS],
@@ -251,7 +251,7 @@ impl Drawn<'_> {
         Touch::new(times).with_pose(pose).with_position(position)
     }
 
-    /// The same with the object at another place.
+    /// This world with the object at another place.
     #[must_use]
     pub fn at(self, truth: Truth) -> Self {
         Self { truth, ..self }

@@ -92,7 +92,7 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
     Ok(bytes)
 }
 
-/// What a calibration states.
+/// Statement of a calibration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Restated {
     pub(super) odds: u64,

@@ -17,7 +17,7 @@ pub struct Hidden<'w> {
     pub locating: Box<dyn Locating + 'w>,
 }
 
-/// What the fingers of an approach met.
+/// Contacts of an approach's fingers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pressed {
     /// Height of each finger's contact above the table, as sensed, in millimeters; none for one that met nothing.
@@ -50,7 +50,7 @@ impl<'w> Hidden<'w> {
         })
     }
 
-    /// What lies where.
+    /// An object and its place.
     pub const fn truth(&self) -> Truth {
         self.drawn.truth
     }

@@ -43,7 +43,7 @@ pub struct Maps<'a> {
     pub(super) drift: [i32; 2],
     /// Mean logarithm of the likelihood for each touch of a known object, in 1/64 nat; 0: no test for unknown ones.
     misfit: i16,
-    /// How far below it a known object's may be after one touch; after n touches a root of n-th of that.
+    /// Distance below it that a known object's may have after one touch; divided by the root of n after n touches.
     misfit_width: u16,
     /// Factor of the half of a pose's intervals, in Q8; 0: 1.
     stretch: u16,
@@ -60,9 +60,9 @@ pub(super) struct Placement {
     scale: u32,
     /// Farthest point that is higher than the table, from the origin, in 1/16 mm.
     pub(super) radius: i32,
-    /// Of each level, cells on each side of the middle one.
+    /// Cells on each side of the middle one, for each level.
     half: [[i32; 2]; LEVELS],
-    /// Of each level, the place of its heights.
+    /// Place of its heights, for each level.
     offset: [usize; LEVELS],
 }
 

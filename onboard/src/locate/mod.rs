@@ -1,4 +1,4 @@
-//! Which object lies on a table, and where: from touches of a hand that comes straight down and whose position is known.
+//! Recognition of an object on a table and of its place: from touches of a hand that comes straight down at a known position.
 //!
 //! ```text
 //! Touch with a position ──► heights of three fingers ──► cells of (placement, yaw, x, y) ──► Verdict, Pose

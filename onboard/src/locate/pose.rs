@@ -1,4 +1,4 @@
-//! Where the object lies.
+//! The object's place.
 
 use super::belief::{Cell, YAWS, turn};
 use super::locator::Locator;
@@ -6,7 +6,7 @@ use super::locator::Locator;
 /// A mode of the pose: where an object's origin is on the table, how it is turned, and how sure that is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pose {
-    /// How the object lies.
+    /// The object's placement.
     pub placement: u8,
     /// Place of the placement's origin, in micrometers.
     pub position: [i32; 2],
@@ -27,7 +27,7 @@ const TURNED_APART: i32 = 16;
 const BINS: usize = 64;
 
 impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_, CELLS, TOUCHES, OBJECTS> {
-    /// Where an object lies: its most likely poses, best first, as many as there is room for; returns their number. Cells within
+    /// Places of an object: its most likely poses, best first, as many as there is room for; returns their number. Cells within
     /// 10 mm and 22.5° of the most likely one are of a mode. An interval holds 95 % of a mode's weight.
     ///
     /// Cost: for each pose a few passes over the kept cells, about 100 instructions for each. Cannot fail.
@@ -133,7 +133,7 @@ fn fine(cell: &Cell) -> i32 {
     ((2 * i32::from(cell.yaw) + 1) * 32_768) / (i32::from(YAWS) << cell.level)
 }
 
-/// Difference of two angles, of which `whole` are a turn: between minus and plus half a turn.
+/// Difference of two angles in units of a turn divided by `whole`: between minus and plus half a turn.
 fn turned(one: i32, other: i32, whole: i32) -> i32 {
     let apart = one - other;
     (apart + whole + whole / 2).rem_euclid(whole) - whole / 2

@@ -3,7 +3,7 @@
 /// Farthest position that is kept, in 1/16 mm: 2 m.
 const FARTHEST: i64 = 32_000;
 
-/// What a finger met.
+/// Contact of a finger.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Contact {
     /// Nothing, down to the lowest point of the approach.

@@ -41,7 +41,7 @@ impl RealArguments {
         Err(Error::setting("real", "drift=…", "it with maps: objects move between approaches to a simulated table"))
     }
 
-    /// The same for approaches on a table, where objects may move.
+    /// Noise of approaches on a table, where objects may move.
     ///
     /// # Errors
     /// If its probe file cannot be read; [`ProbeProblem::OnlyCaptured`] for fingers that bend aside.

@@ -9,7 +9,7 @@ use palpate::output;
 use palpate::{Error, Result, compile};
 use palpate_onboard::{Stopping, Verdict};
 
-/// What an object is and where, after a touch.
+/// Verdict and place after a touch.
 #[derive(serde::Serialize)]
 struct Located<'m> {
     #[serde(flatten)]

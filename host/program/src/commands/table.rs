@@ -146,7 +146,7 @@ struct Evaluated<'e> {
     evaluation: &'e Evaluation,
 }
 
-/// How approaches are aimed, in words.
+/// The aim of approaches, in words.
 fn how(aimed: Aimed) -> &'static str {
     match aimed {
         Aimed::Chosen => "chosen approaches",

@@ -13,7 +13,7 @@ use palpate_onboard::locate::{Hand, Locator, Maps};
 
 const MODEL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/bench/located.palpate"));
 const APPROACHES: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/bench/located.bin"));
-/// Where the stack begins: the end of the RAM in `mps2.x`.
+/// Start of the stack: the end of the RAM in `mps2.x`.
 const STACK: u32 = 0x2004_0000;
 /// Approaches whose results are printed.
 const PRINTED: u32 = 12;
