@@ -157,7 +157,7 @@ fn cdr_is_read_in_both_orders_of_bytes() {
     // No pose: what stands in its place is not looked at.
     let mut without = bytes(LITTLE);
     without[28..84].fill(0);
-    assert!(error(&cdr(&without)).contains("message 1 on /touch: a position without a pose. Give direction"));
+    assert!(error(&cdr(&without)).contains("message 1 on /touch: a position without a pose. Correct the program"));
     without[93..].fill(0);
     assert_eq!(read(&cdr(&without)).unwrap().touches()[0].touch, parse_touch("0 0.25 -").unwrap());
     let mut far = bytes(LITTLE);

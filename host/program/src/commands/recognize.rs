@@ -61,7 +61,7 @@ pub(crate) struct Arguments {
     pub(super) next: bool,
     /// With --next: the middle finger is sent at most so far from the table's origin in x and y [default: twice the maps' range]
     #[arg(long, value_name = "MM", requires = "next")]
-    pub(super) within: Option<f64>,
+    pub(super) workspace: Option<f64>,
     /// Follow the model's plan of approaches; says after each touch where to touch next
     #[arg(long)]
     pub(super) active: bool,

@@ -99,7 +99,7 @@ pub(super) fn run(file: &MapsFile, arguments: &Arguments, global: &Global) -> Re
     let names = locate::names(&maps);
     let weights = arguments.expected.weights(&names, &vec![1.0; names.len()])?;
     let hand = Hand::of(&maps).ok_or(LocateProblem::NoHand).map_err(Error::from)?;
-    let within = locate::workspace(&maps, arguments.within)?;
+    let within = locate::workspace(&maps, arguments.workspace)?;
     let mut stream = Stream::new(maps, hand, stopping, weights, arguments.next.then_some(within), global);
     stream.begin();
     arguments.each(&mut |event| stream.take(event))

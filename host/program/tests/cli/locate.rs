@@ -107,15 +107,15 @@ fn each_touch_gives_a_verdict_a_place_and_the_next_approach_until_an_object_is_n
     }
     assert_eq!(said[end + 1]["touch"], 1, "another object begins");
     // Never out of the workspace.
-    for line in recognized(at, "maps.palpate --next --within 7.5", &lines) {
+    for line in recognized(at, "maps.palpate --next --workspace 7.5", &lines) {
         let next = ["x", "y"].map(|key| line["next"][key].as_f64().unwrap_or(0.0).abs());
         assert!(next[0] <= 7.5 && next[1] <= 7.5, "{line}");
     }
     refused(
         at,
-        "recognize maps.palpate lines.txt --next --within 2000",
+        "recognize maps.palpate lines.txt --next --workspace 2000",
         2,
-        "--within is 2000. Use a number of millimeters",
+        "--workspace is 2000. Use a number of millimeters",
     );
     let only = recognized(at, "maps.palpate --next --only slab", lines.lines().next().unwrap());
     assert_eq!(only[0]["object"], "slab");
