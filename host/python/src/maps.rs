@@ -414,17 +414,17 @@ pub(crate) struct Locator {
 #[pyo3::pymethods]
 impl Locator {
     /// It stops when the maps say so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`. `pose` is how much
-    /// where the object lies counts in the choice of approaches, in 64ths, `within` how far from the table's origin the middle
+    /// where the object lies counts in the choice of approaches, in 64ths, `workspace` how far from the table's origin the middle
     /// finger is sent in x and y, in millimeters (twice the maps' range; the outer ones reach beyond it by their distance from
     /// it), `seed` that of the choice.
     #[new]
-    #[pyo3(signature = (maps, *, error_rate=None, max_touches=None, pose=10, within=None, seed=1))]
+    #[pyo3(signature = (maps, *, error_rate=None, max_touches=None, pose=10, workspace=None, seed=1))]
     fn new(
         maps: Bound<'_, Maps>,
         error_rate: Option<f64>,
         max_touches: Option<u32>,
         pose: u16,
-        within: Option<f64>,
+        workspace: Option<f64>,
         seed: u32,
     ) -> Result<Self, Failure> {
         let opened = &maps.get().opened;
@@ -436,7 +436,7 @@ impl Locator {
         }
         let stopping = compile::stopping(error_rate.unwrap_or(own.error_rate()), limit)?;
         let stopping = if error_rate.is_none() { own.with_max_touches(limit) } else { stopping };
-        let within = locate::workspace(&maps, within)?;
+        let within = locate::workspace(&maps, workspace)?;
         let hand = Hand::of(&maps).ok_or(Error::from(LocateProblem::NoHand))?;
         let mut cell = OpenedLocator::new(Arc::clone(opened), |opened| {
             locate::locating(*opened.borrow_dependent(), stopping, None)

@@ -76,7 +76,7 @@ def test_times_and_heights_say_the_same(maps: palpate.Maps) -> None:
 
 
 def test_the_next_approach_stays_the_same_and_within_the_region(maps: palpate.Maps) -> None:
-    locator = palpate.Locator(maps, within=20.0)
+    locator = palpate.Locator(maps, workspace=20.0)
     assert locator.next()[:2] == (0.0, 0.0)
     for height in (12.0, 9.0, 15.0):
         x, y, roll = locator.next()

@@ -173,11 +173,11 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
 ///
 /// # Errors
 /// [`Setting`](crate::error::Setting) unless it is from 0 to 1,000 mm.
-pub fn workspace(maps: &Maps<'_>, within: Option<f64>) -> Result<u32> {
-    match within {
+pub fn workspace(maps: &Maps<'_>, workspace: Option<f64>) -> Result<u32> {
+    match workspace {
         None => Ok(2 * maps.range().unsigned_abs()),
         Some(millimeters) if (0.0..=1_000.0).contains(&millimeters) => Ok((millimeters * 1e3) as u32),
-        Some(other) => Err(Error::setting("within", other, "a number of millimeters from 0 to 1000")),
+        Some(other) => Err(Error::setting("workspace", other, "a number of millimeters from 0 to 1000")),
     }
 }
 

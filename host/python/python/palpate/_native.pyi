@@ -236,10 +236,10 @@ class Locator:
     >>> located.state, located.touches
     ('undecided', 1)
     """
-    def __new__(cls, /, maps: Maps, *, error_rate: SupportsFloat | SupportsIndex | None = None, max_touches: SupportsIndex | None = None, pose: SupportsIndex = 10, within: SupportsFloat | SupportsIndex | None = None, seed: SupportsIndex = 1) -> Locator:
+    def __new__(cls, /, maps: Maps, *, error_rate: SupportsFloat | SupportsIndex | None = None, max_touches: SupportsIndex | None = None, pose: SupportsIndex = 10, workspace: SupportsFloat | SupportsIndex | None = None, seed: SupportsIndex = 1) -> Locator:
         """
         It stops when the maps say so, or at a posterior of 1 - `error_rate`, and gives up after `max_touches`. `pose` is how much
-        where the object lies counts in the choice of approaches, in 64ths, `within` how far from the table's origin the middle
+        where the object lies counts in the choice of approaches, in 64ths, `workspace` how far from the table's origin the middle
         finger is sent in x and y, in millimeters (twice the maps' range; the outer ones reach beyond it by their distance from
         it), `seed` that of the choice.
         """
