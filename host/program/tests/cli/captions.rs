@@ -76,6 +76,13 @@ const NUMBERS: &[(&str, &str)] = &[
     ("1300 of them start-up", "of every image that compile::Memory measures"),
     ("such as 16384 or 16K", "an example of what to write"),
     ("a number above 0, such as 48", "an example of what to write"),
+    ("1mm or 2mm", "the sizes of cells"),
+    ("such as 30mm", "an example of what to write"),
+    ("such as 0.5mm", "an example of what to write"),
+    ("such as 2%", "an example of what to write"),
+    ("such as 1mm", "an example of what to write"),
+    ("such as 1mm/1deg", "an example of what to write"),
+    ("such as 3mm/5deg", "an example of what to write"),
     ("version 151", "of a browser"),
     ("Chrome from 148", "of a browser"),
     ("half a minute", "what link.js waits"),
@@ -166,6 +173,9 @@ const RELATIONS: &[(&str, &str)] = &[
     ("least one", "a definition"),
     ("record more", "advice"),
     ("capture more", "advice"),
+    ("No more than ${}", "a bound that was set"),
+    ("tells most", "the choice of locate::choose"),
+    ("on the higher side", "computed: is_slanted"),
 ];
 
 /// Files of texts that say results; all others hold help, and examples of what to write.

@@ -159,11 +159,11 @@ fn body(
                 h2 { "What is what" }
                 p {
                     "Each ghost is a pose that the object may have, as opaque as it is likely: blue for the leading object, purple for its \
-                     rivals. The twelve likeliest are shown."
+                     rivals. The likeliest are shown."
                 }
                 p {
                     "The maps were learned from " (count(usize::try_from(origin.touches).unwrap_or(usize::MAX))) " simulated approaches straight \
-                     down to each object: " (learned) " ways to lie, in cells of 2 mm, " (count(bytes)) " bytes. They expect heights to scatter by "
+                     down to each object: " (learned) " ways to lie, in cells of " (if maps.fine { 1 } else { 2 }) " mm, " (count(bytes)) " bytes. They expect heights to scatter by "
                     (maps.noise) " mm and " (100.0 * maps.lost) " % of contacts to be lost, and so the page's hand does. An object is named at a \
                      posterior of " (100.0 * (1.0 - maps.error_rate)) " %, which is a belief and not a calibrated promise."
                 }
