@@ -359,7 +359,7 @@ class Maps:
     @property
     def promise(self, /) -> Any | None:
         """
-        The promise that a calibration gave: its rate, of which aims it is, and what it rests on; `None` without one.
+        Promise of a calibration: its rate, the aims that it holds for, and its evidence; `None` without one.
         """
     @property
     def range(self, /) -> float:
