@@ -25,7 +25,7 @@
 //! # fn main() -> palpate::Result<()> {
 //! let compiled = CompiledModel::read("model.palpate")?;
 //! let fresh = Dataset::read("fresh".as_ref())?;
-//! let settings = calibrate::Settings { rate: 0.01, ..Default::default() };
+//! let settings = palpate::with!(calibrate::Settings::default(), rate = 0.01);
 //! let calibrated = calibrate(&compiled.model(), fresh, &settings, &())?;
 //! println!("{} of {} names were wrong", calibrated.promise.wrong, calibrated.promise.given);
 //! # Ok(())

@@ -14,7 +14,8 @@
 //!
 //! # fn main() -> palpate::Result<()> {
 //! let dataset = Dataset::read("data".as_ref())?;
-//! let tuned = tune(&dataset, &tune::Settings { max_bytes: Some(16 << 10), ..Default::default() }, &())?;
+//! let settings = palpate::with!(tune::Settings::default(), max_bytes = Some(16 << 10));
+//! let tuned = tune(&dataset, &settings, &())?;
 //! std::fs::write("model.palpate", &tuned.model).map_err(|e| palpate::Error::io("model.palpate", "write", e))?;
 //! # Ok(())
 //! # }

@@ -14,8 +14,8 @@ pub const TESTED: usize = 8;
 /// Bounds on the work of an approach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effort {
-    /// Heights that are looked up until a search ends. Each is about 330 instructions on a Cortex-M4F, built for size; passes over
-    /// the cells and a choice are about 35 million more. 450,000 serve ten objects.
+    /// Heights that are looked up until a search ends. They are most of the cost of an approach, besides
+    /// passes over the cells and a choice; the firmware's image `located` counts all of it. 450,000 serve ten objects.
     pub lookups: u32,
     /// Cells that are kept, if there is room for as many.
     pub cells: u32,
@@ -144,7 +144,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
     }
 
     /// The verdict on the touches so far. No object is named before a finger met more than the table: on an empty table the object
-    /// that is easiest to miss would be. Cost: a few dozen instructions for each object and touch, and a pass over the kept cells
+    /// that is easiest to miss would be. Cost: a pass over the objects and one over the touches, and one over the kept cells
     /// where the maps have a test for unknown objects. Cannot fail, like all that follows.
     pub fn verdict(&self) -> Verdict {
         let touches = u32::try_from(self.touches).unwrap_or(u32::MAX);
@@ -177,7 +177,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
             .0
     }
 
-    /// Sum of the weights of all other objects, that of the leader being 1. Cost: a few dozen instructions for each object.
+    /// Sum of the weights of all other objects, that of the leader being 1. Cost: a pass over the objects.
     pub fn rivals(&self) -> Rivals {
         let leader = self.leader();
         let objects = self.posteriors.iter().take(self.maps.objects()).enumerate();
@@ -213,7 +213,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
     /// True if no finger of any touch so far met more than the table, within 1.5 mm: after a verdict without a name there is
     /// probably no object. False before the first touch.
     ///
-    /// Cost: at most a dozen instructions for each touch. Cannot fail.
+    /// Cost: a pass over the touches. Cannot fail.
     pub fn met_table_alone(&self) -> bool {
         let seen = self.seen.get(..self.touches).unwrap_or_default();
         // What met nothing is below 0.
@@ -261,8 +261,8 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// The hand that the maps were learned with; none if they do not state it, or not in millimeters. Cost: a few dozen
-    /// instructions, some in f32. Cannot fail.
+    /// The hand that the maps were learned with; none if they do not state it, or not in millimeters. Cost: a few
+    /// multiplications, some in f32. Cannot fail.
     pub fn of(maps: &Maps<'_>) -> Option<Self> {
         let probe = maps.probe()?;
         if probe.length != palpate_shared::format::Length::Millimeter {
@@ -277,8 +277,8 @@ impl Hand {
         })
     }
 
-    /// Heights that a touch met; none without a position, or from another direction than straight down. Cost: about a hundred
-    /// instructions. Cannot fail.
+    /// Heights that a touch met; none without a position, or from another direction than straight down. Cost: a few
+    /// multiplications and divisions for each finger. Cannot fail.
     pub fn seen(&self, touch: &Touch) -> Option<Seen> {
         let (pose, position) = (touch.pose()?, touch.position()?);
         let [_, _, down] = pose.direction;

@@ -226,7 +226,7 @@ impl<'a> Maps<'a> {
         self.placement(placement).radius * 125 / 2
     }
 
-    /// The height that a fingertip meets at a point in a placement's frame, all in micrometers. Cost: a few dozen instructions.
+    /// The height that a fingertip meets at a point in a placement's frame, all in micrometers. Cost: one lookup of a cell.
     pub fn height(&self, placement: u8, at: [i32; 2]) -> i32 {
         let [x, y] = at.map(|micrometers| micrometers.clamp(-2_000_000, 2_000_000) * 2 / 125);
         self.height_at(&self.placement(placement), x, y) * 125 / 2

@@ -30,7 +30,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
     /// Places of an object: its most likely poses, best first, as many as there is room for; returns their number. Cells within
     /// 10 mm and 22.5° of the most likely one are of a mode. An interval holds 95 % of a mode's weight.
     ///
-    /// Cost: for each pose a few passes over the kept cells, about 100 instructions for each. Cannot fail.
+    /// Cost: for each pose a few passes over the kept cells. Cannot fail.
     pub fn poses(&self, object: usize, poses: &mut [Pose]) -> usize {
         let is_of = |cell: &Cell| usize::from(self.maps.object_of(cell.placement)) == object;
         let all: u64 = self.cells().iter().filter(|cell| is_of(cell)).map(|cell| u64::from(self.weight(cell))).sum();

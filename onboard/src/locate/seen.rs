@@ -27,7 +27,7 @@ pub struct Seen {
 impl Seen {
     /// An approach straight down with the middle finger at `x` and `y`; `row` is from there to the third finger, `contacts` are
     /// heights above the table, and `limit` is the height down to which the hand went. All in micrometers; what is farther than 2 m
-    /// counts as 2 m away. Cost: a few dozen instructions.
+    /// counts as 2 m away. Cost: a few multiplications.
     pub fn new([x, y]: [i32; 2], row: [i32; 2], contacts: [Contact; 3], limit: i32) -> Self {
         let place =
             |middle: i32, row: i32| [-1, 0, 1].map(|finger| sixteenths(i64::from(middle) + finger * i64::from(row)));

@@ -7,7 +7,8 @@
 //! use palpate_simulator::probe::noise::{Deviation, Noise};
 //! use palpate_shared::Touch;
 //!
-//! let noise = Noise { deviation: "0..10ms".parse()?, timer: 1_000.0, ..Noise::default() };
+//! let mut noise = Noise::default();
+//! (noise.deviation, noise.timer) = ("0..10ms".parse()?, 1_000.0);
 //! let noisy = noise.add("fork", &[Touch::from_micros([0, 12_345, 30_000])], 1);
 //! // The first contact is 0 again, and the timer counts whole milliseconds.
 //! assert!(noisy[0].times().iter().all(|time| time.micros().is_some_and(|micros| micros % 1_000 == 0)));
