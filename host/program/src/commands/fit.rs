@@ -149,7 +149,7 @@ fn bare_text(found: &BareTable, path: &Path) -> String {
         "scatter of a contact"
     );
     if found.is_slanted() {
-        text += "The table is not level: on the higher side objects look as much higher.\n";
+        text += "The table is not level: it raises objects on one side.\n";
     }
     text + &format!("Wrote {}\n", path.display())
 }

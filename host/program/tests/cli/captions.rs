@@ -175,7 +175,6 @@ const RELATIONS: &[(&str, &str)] = &[
     ("capture more", "advice"),
     ("No more than ${}", "a bound that was set"),
     ("tells most", "the choice of locate::choose"),
-    ("on the higher side", "computed: is_slanted"),
 ];
 
 /// Files of texts that say results; all others hold help, and examples of what to write.
