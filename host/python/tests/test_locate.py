@@ -141,7 +141,8 @@ def test_thresholds_keep_a_promise_on_a_simulated_table(maps: palpate.Maps) -> N
     assert calibrated.maps.objects == OBJECTS and maps.promise is None
     assert calibrated.maps.promise is not None and calibrated.maps.promise["aimed"] == "chosen"
     found = calibrated.maps.evaluate(OBJECTS, millimeters=UNIT, sequences=40)
-    assert found.error <= 0.1 and found.mean_approaches < 6 and found.off[0] <= found.off[1] < 10
+    # A name may be sure before the place is: half of the places are near.
+    assert found.error <= 0.1 and found.mean_approaches < 6 and found.off[0] < 10 and found.off[0] <= found.off[1]
     assert found.undecided < 0.2
     random = calibrated.maps.evaluate(OBJECTS, millimeters=UNIT, sequences=10, aimed="random", real=palpate.Real(lost=0.1))
     assert random.raw["sequences"] == 10
@@ -161,7 +162,7 @@ def test_settings_out_of_range_are_named(settings: dict[str, object], message: s
         palpate.Maps.of_meshes(["bowl"], probe=PROBE, millimeters=UNIT, **settings)  # type: ignore[arg-type]
 
 
-def test_wrong_touches_are_refused(maps: palpate.Maps) -> None:
+def test_wrong_touches_are_refused(maps: palpate.Maps, tmp_path: Path) -> None:
     locator = palpate.Locator(maps)
     with pytest.raises(ValueError, match="2 numbers, where 3 are needed"):
         locator.push((0.0, 0.1), (0.0, 0.0, 0.0), 0.0)
@@ -171,6 +172,9 @@ def test_wrong_touches_are_refused(maps: palpate.Maps) -> None:
         locator.push_heights((0.0, 0.1, 0.0), 0.0, 0.0, 0.0, lowest=math.inf)
     with pytest.raises(palpate.SettingError, match="aimed is best"):
         maps.evaluate(OBJECTS, millimeters=UNIT, aimed="best")
-    with pytest.raises(palpate.PalpateError, match="true size|unit"):
-        palpate.Maps.of_meshes(["bowl"], probe=PROBE)
+    # A file of this format does not state its unit; the built-in objects have one.
+    wedge = tmp_path / "wedge.obj"
+    wedge.write_text("v 0 0 0\nv 40 0 0\nv 0 40 0\nv 0 0 40\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    with pytest.raises(palpate.PalpateError, match="unit of the mesh is not known"):
+        palpate.Maps.of_meshes([str(wedge)], probe=PROBE)
     assert locator.touches == 0
