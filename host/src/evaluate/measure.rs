@@ -79,9 +79,9 @@ pub struct Confusion {
 /// names and the model's own weights; `None` leaves these.
 ///
 /// # Errors
-/// Errors of [`evaluate`] and [`Margins::new`]; [`EvaluateProblem`](crate::error::EvaluateProblem) for a plan or strangers that cannot
-/// be evaluated; [`Setting`](crate::error::Setting) `at` for more touches than
-/// enough groups can be drawn of.
+/// Errors of [`evaluate`] and [`Margins::new`]; [`EvaluateProblem`](crate::error::EvaluateProblem) for a plan or strangers
+/// that cannot be evaluated; [`Setting`](crate::error::Setting) `at` for more touches than there are enough
+/// different groups of.
 pub fn measure(
     candidate: Candidate<'_>,
     dataset: &Dataset,

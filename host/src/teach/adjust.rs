@@ -90,9 +90,9 @@ struct Material {
 /// is chosen by cross-validation: the largest gain over the given leaves, less two standard errors.
 ///
 /// # Errors
-/// Errors of [`teach`](fn@super::teach); [`TeachProblem::NotKnown`](crate::error::TeachProblem::NotKnown) for an object
-/// that the ensemble does
-/// not know.
+/// Errors of [`teach`](fn@super::teach); [`TeachProblem::NotKnown`](crate::error::TeachProblem::NotKnown) for an
+/// object that the ensemble
+/// does not know.
 pub fn adjust(
     ensemble: &Ensemble,
     known: &Dataset,

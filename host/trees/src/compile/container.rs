@@ -95,6 +95,7 @@ pub(super) fn count(number: usize) -> Result<u32> {
     u32::try_from(number).map_err(|_| too_large())
 }
 
+/// Error of a model with more of something than its field can count.
 pub(super) fn too_large() -> Error {
     CompileProblem::TooLarge.into()
 }

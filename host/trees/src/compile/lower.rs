@@ -1,4 +1,4 @@
-//! Lowers a forest, costs a layout without a byte being written, and writes one.
+//! Lowers a forest: from there a layout is costed without a byte being written, or written.
 
 use super::axes::{Axes, visit};
 use super::cost::{Instructions, Shape};

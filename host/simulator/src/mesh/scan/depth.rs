@@ -42,8 +42,8 @@ fn damaged(place: Place, what: impl Into<String>) -> Error {
     Error::at(place, MeshProblem::Damaged { format: "scan", what: what.into() })
 }
 
-/// Reads the points of the images that a list names, from `folder`; with masks those of the object with the number `chosen`, by
-/// default 0. Coordinates are in millimeters; errors name `path`, or the image.
+/// Reads the points of the images that a list names, from `folder`. Where there are masks, only object number `chosen` is read,
+/// by default 0. Coordinates are in millimeters; errors name `path`, or the image.
 pub(in crate::mesh) fn parse(list: &[u8], path: &Path, folder: Option<&Path>, chosen: Option<u32>) -> Result<Points> {
     let cameras: BTreeMap<u32, Camera> = serde_json::from_slice(list)
         .map_err(|error| damaged(Place::line(path, error.line() as u64), error.to_string()))?;
