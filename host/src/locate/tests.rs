@@ -180,6 +180,17 @@ fn touches_without_a_position_and_other_units_are_refused() {
 }
 
 #[test]
+fn maps_of_no_object_and_of_one_without_a_surface_are_refused_by_name() {
+    let settings = Settings::default();
+    let error = write(&[], &[], &probe(), &settings).unwrap_err().to_string();
+    assert!(error.contains("no objects"), "{error}");
+    let surfaces = learn(&touched(&objects(), 2_000), &settings).unwrap();
+    let names = ["bar", "puck", "cup"].map(String::from);
+    let error = write(&surfaces, &names, &probe(), &settings).unwrap_err().to_string();
+    assert!(error.contains("cup: no touch met it"), "{error}");
+}
+
+#[test]
 fn settings_out_of_range_are_refused_by_name() {
     let settings = Settings::default();
     for (wrong, name) in [
