@@ -4,7 +4,7 @@ use super::error::LocateProblem;
 use super::world::{Aimed, Drawn, Truth};
 use crate::error::{Error, Result};
 use crate::evidence::{Follower, Sequence, Sequences, Supplier};
-use palpate_onboard::locate::{Approach, Effort, Hand, Locator, Maps, Pose, Seen};
+use palpate_onboard::locate::{Approach, AtMost, Effort, Hand, Locator, Maps, Pose, Seen};
 use palpate_onboard::{Familiarity, Stopping, Verdict};
 use palpate_shared::Touch;
 use std::convert::Infallible;
@@ -71,7 +71,7 @@ pub trait Locating: Send + Sync {
 }
 
 struct Room<'m, const CELLS: usize, const OBJECTS: usize> {
-    maps: Maps<'m>,
+    fitting: AtMost<'m, OBJECTS>,
     stopping: Stopping,
     effort: Effort,
     locator: Locator<'m, CELLS, TOUCHES, OBJECTS>,
@@ -94,17 +94,17 @@ fn of<'m, const CELLS: usize, const OBJECTS: usize>(
     stopping: Stopping,
     effort: Effort,
 ) -> Box<dyn Locating + 'm> {
-    let Ok(locator) = Locator::new(maps, stopping, effort, 1) else {
-        unreachable!("there is room for as many objects")
-    };
-    Box::new(Room::<CELLS, OBJECTS> { maps, stopping, effort, locator })
+    let Ok(fitting) = maps.try_into() else { unreachable!("there is room for as many objects") };
+    let locator = Locator::new(fitting, stopping, effort, 1);
+    let mut room = Box::new(Room::<CELLS, OBJECTS> { fitting, stopping, effort, locator });
+    room.locator.reset();
+    room
 }
 
 impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJECTS> {
     fn begin(&mut self, seed: u32) {
-        if let Ok(locator) = Locator::new(self.maps, self.stopping, self.effort, seed) {
-            self.locator = locator;
-        }
+        self.locator = Locator::new(self.fitting, self.stopping, self.effort, seed);
+        self.locator.reset();
     }
 
     fn begin_of(&mut self, weights: &[u32]) {

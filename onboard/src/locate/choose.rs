@@ -41,10 +41,13 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
     /// neighboring fingers and `within` half the side of the square about the origin in which the middle finger may go, both in
     /// micrometers. `pose` is the share of the pose in what is to be told, in 64ths.
     ///
-    /// Cost: `candidates` × 64 × (3 lookups + 64 differences). Cannot fail.
+    /// Cost: `candidates` × 64 × (3 lookups + 64 differences), and a search if there was none yet. Cannot fail.
     pub fn choose(&mut self, spacing: u32, stroke: u32, within: u32, pose: u16) -> Approach {
         let sixteenths = |micrometers: u32| i32::try_from(micrometers / 125 * 2).unwrap_or(i32::MAX).min(32_000);
         let (spacing, stroke, within) = (sixteenths(spacing), sixteenths(stroke), sixteenths(within));
+        if self.count == 0 {
+            self.search();
+        }
         let mut drawn = [Drawn::default(); DRAWN];
         let count = self.draw(&mut drawn);
         let drawn = drawn.get_mut(..count).unwrap_or_default();

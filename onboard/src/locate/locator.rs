@@ -38,6 +38,19 @@ pub enum Exhausted {
     Lookups,
 }
 
+/// Maps of at most this many objects, for a [`Locator`] with room for them: `maps.try_into()`.
+#[derive(Clone, Copy, Debug)]
+pub struct AtMost<'m, const OBJECTS: usize>(Maps<'m>);
+
+impl<'m, const OBJECTS: usize> TryFrom<Maps<'m>> for AtMost<'m, OBJECTS> {
+    type Error = CapacityError;
+
+    fn try_from(maps: Maps<'m>) -> Result<Self, CapacityError> {
+        let objects = maps.objects();
+        if objects <= OBJECTS { Ok(Self(maps)) } else { Err(CapacityError { objects, capacity: OBJECTS }) }
+    }
+}
+
 /// Recognizes which object lies on a table, and where, with room for `CELLS` cells of 8 bytes, `TOUCHES` touches and `OBJECTS`
 /// objects.
 #[derive(Clone, Debug)]
@@ -63,20 +76,22 @@ pub struct Locator<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: 
 }
 
 impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'m, CELLS, TOUCHES, OBJECTS> {
-    /// A locator without a touch, which stops as `stopping` says. The seed is of the choice of approaches.
+    /// Room in which a search can work: checked when a program is built.
+    const IS_ENOUGH: () = assert!(CELLS >= 64 && TOUCHES > 0 && TOUCHES <= MOST_TOUCHES, "64 cells, 1 to 64 touches");
+
+    /// A locator without a touch, which stops as `stopping` says. The seed is of the choice of approaches. Until the first touch,
+    /// choice or reset nothing is searched: all objects are as likely, and none has a pose.
     ///
-    /// Cost: as [`reset`](Self::reset).
-    ///
-    /// # Errors
-    /// [`CapacityError`] for more objects than there is room for.
-    pub fn new(maps: Maps<'m>, stopping: Stopping, effort: Effort, seed: u32) -> Result<Self, CapacityError> {
+    /// Cost: writing its RAM, which is taken once: the locator is made where it is kept. Cannot fail; other numbers of cells and
+    /// touches do not build.
+    pub fn new(maps: AtMost<'m, OBJECTS>, stopping: Stopping, effort: Effort, seed: u32) -> Self {
+        const { Self::IS_ENOUGH };
+        let AtMost(maps) = maps;
         let objects = maps.objects();
-        if objects > OBJECTS || CELLS < 64 || TOUCHES == 0 || TOUCHES > MOST_TOUCHES {
-            return Err(CapacityError { objects, capacity: OBJECTS });
-        }
+        let each = |log: i32| core::array::from_fn(|object| if object < objects { log } else { NOTHING });
         // Xorshift stays at 0.
         let seed = seed.max(1);
-        let mut locator = Self {
+        Self {
             maps,
             stopping,
             effort,
@@ -84,18 +99,15 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
             touches: 0,
             pool: [Cell::default(); CELLS],
             count: 0,
-            priors: [NOTHING; OBJECTS],
+            priors: each(0),
             dropped: [NOTHING; OBJECTS],
-            posteriors: [NOTHING; OBJECTS],
+            posteriors: each(-logarithm(u64::try_from(objects).unwrap_or(1))),
             best: NOTHING,
             looked: 0,
             exhausted: None,
             random: Random(seed),
             seed,
-        };
-        locator.priors.iter_mut().take(objects).for_each(|prior| *prior = 0);
-        locator.reset();
-        Ok(locator)
+        }
     }
 
     /// Forgets all touches, for another object. Cost: that of a search without touches.

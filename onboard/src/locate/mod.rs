@@ -24,7 +24,7 @@ mod seen;
 mod tests;
 
 pub use choose::Approach;
-pub use locator::{Effort, Exhausted, Hand, Locator, TESTED};
+pub use locator::{AtMost, Effort, Exhausted, Hand, Locator, TESTED};
 pub use maps::{BEYOND, DISTANCES, LIKELIHOODS_LENGTH, MAPS_LENGTH, Maps, PLACEMENT_LENGTH, WIDTHS, WITHIN};
 pub use pose::Pose;
 pub use seen::{Contact, Seen};

@@ -157,7 +157,7 @@ fn place_of_maps(bytes: &[u8]) -> usize {
 type Small<'m> = Locator<'m, 4096, 32, 2>;
 
 fn locator(maps: Maps<'_>) -> Small<'_> {
-    Locator::new(maps, maps.stopping(), Effort::default(), 1).unwrap()
+    Locator::new(maps.try_into().unwrap(), maps.stopping(), Effort::default(), 1)
 }
 
 /// The heights that an object at a place in millimeters, turned by this many radians, gives an approach.
@@ -252,7 +252,7 @@ fn a_search_that_was_not_finished_names_nothing() {
     let stopping = Stopping::from_odds(1 << 55, 3);
     for lookups in [0, 1_000] {
         let effort = Effort { lookups, ..Effort::default() };
-        let mut locator = Locator::<4096, 32, 2>::new(maps, stopping, effort, 1).unwrap();
+        let mut locator = Locator::<4096, 32, 2>::new(maps.try_into().unwrap(), stopping, effort, 1);
         for touches in 1..5 {
             let verdict = locator.push_seen(met(wedge, Approach::default(), [0.0; 2], 0.3));
             assert_eq!(locator.exhausted(), Some(Exhausted::Lookups));
@@ -260,12 +260,12 @@ fn a_search_that_was_not_finished_names_nothing() {
             assert_eq!(verdict, if touches < 3 { Verdict::Undecided } else { Verdict::GaveUp });
         }
     }
-    let mut locator = Locator::<64, 32, 2>::new(maps, stopping, Effort::default(), 1).unwrap();
+    let mut locator = Locator::<64, 32, 2>::new(maps.try_into().unwrap(), stopping, Effort::default(), 1);
     assert_eq!(locator.push_seen(met(wedge, Approach::default(), [0.0; 2], 0.3)), Verdict::Undecided);
     assert_eq!((locator.exhausted(), locator.kept() <= 64), (Some(Exhausted::Cells), true));
     // As with room for no more.
     let effort = Effort { cells: 64, ..Effort::default() };
-    let mut bounded = Locator::<4096, 32, 2>::new(maps, stopping, effort, 1).unwrap();
+    let mut bounded = Locator::<4096, 32, 2>::new(maps.try_into().unwrap(), stopping, effort, 1);
     bounded.push_seen(met(wedge, Approach::default(), [0.0; 2], 0.3));
     assert_eq!((bounded.kept(), bounded.rivals().q56()), (locator.kept(), locator.rivals().q56()));
     assert_eq!(bounded.exhausted(), Some(Exhausted::Cells));
@@ -348,21 +348,34 @@ fn on_an_empty_table_nothing_but_the_table_is_met() {
 }
 
 #[test]
+fn a_locator_that_has_searched_nothing_chooses_as_after_a_reset() {
+    let bytes = model(&PINS, 0);
+    let maps = Maps::new(&bytes).unwrap();
+    let mut fresh = locator(maps);
+    let mut reset = fresh.clone();
+    reset.reset();
+    assert_eq!(fresh.verdict(), reset.verdict());
+    for object in 0..2 {
+        assert!(fresh.posterior(object).abs_diff(reset.posterior(object)) <= 1_024, "{}", fresh.posterior(object));
+    }
+    let [first, other] = [&mut fresh, &mut reset].map(|locator| locator.choose(15_000, 20_000, 40_000, 10));
+    assert_eq!(first, other);
+    assert_eq!(fresh.leader(), reset.leader());
+}
+
+#[test]
 fn the_forty_first_touch_is_one_too_many() {
     let bytes = model(&PINS, 0);
     let maps = Maps::new(&bytes).unwrap();
     let effort = Effort { lookups: 5_000, candidates: 1, ..Effort::default() };
-    let mut locator = Locator::<64, 32, 2>::new(maps, Stopping::from_odds(0, 100), effort, 0).unwrap();
+    let mut locator = Locator::<64, 32, 2>::new(maps.try_into().unwrap(), Stopping::from_odds(0, 100), effort, 0);
     for touches in 1..=40 {
         let verdict = locator.push_seen(met(pin, Approach::default(), [20.0; 2], 0.0));
         assert_eq!(verdict, if touches < 32 { Verdict::Undecided } else { Verdict::GaveUp });
         assert_eq!(locator.touches(), touches.min(32));
     }
     let small = CapacityError { objects: 2, capacity: 1 };
-    assert_eq!(Locator::<64, 32, 1>::new(maps, maps.stopping(), effort, 0).err(), Some(small));
-    assert!(Locator::<63, 32, 2>::new(maps, maps.stopping(), effort, 0).is_err());
-    assert!(Locator::<64, 0, 2>::new(maps, maps.stopping(), effort, 0).is_err());
-    assert!(Locator::<64, 65, 2>::new(maps, maps.stopping(), effort, 0).is_err());
+    assert_eq!(AtMost::<1>::try_from(maps).err(), Some(small));
 }
 
 #[test]
@@ -469,7 +482,8 @@ fn extreme() -> Vec<Seen> {
 fn follow(bytes: &[u8], touches: &[Seen]) -> bool {
     let Ok(maps) = Maps::new(bytes) else { return false };
     let effort = Effort { lookups: 1_000, candidates: 2, ..Effort::default() };
-    let Ok(mut locator) = Locator::<128, 8, 2>::new(maps, maps.stopping(), effort, 3) else { return true };
+    let Ok(fitting) = maps.try_into() else { return true };
+    let mut locator = Locator::<128, 8, 2>::new(fitting, maps.stopping(), effort, 3);
     for (&seen, end) in touches.iter().zip([0, 10_000, u32::MAX].into_iter().cycle()) {
         locator.push_seen(seen);
         let at = locator.choose(end, u32::MAX - end, end, 64);
@@ -519,7 +533,7 @@ proptest! {
         let bytes = model(&[WEDGE, CYLINDER], 0);
         let maps = Maps::new(&bytes).unwrap();
         let effort = Effort { lookups: 40_000, candidates: 16, ..Effort::default() };
-        let mut locator = Locator::<1024, 32, 2>::new(maps, maps.stopping(), effort, seed).unwrap();
+        let mut locator = Locator::<1024, 32, 2>::new(maps.try_into().unwrap(), maps.stopping(), effort, seed);
         for number in 0..=touches {
             let at = locator.choose(spacing, STROKE, within, 20);
             prop_assert!(at.x.unsigned_abs() <= within && at.y.unsigned_abs() <= within, "{at:?} of {within}");
