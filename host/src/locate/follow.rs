@@ -148,7 +148,7 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
     }
 
     fn posteriors(&self) -> Vec<f64> {
-        (0..self.maps.objects()).map(|object| f64::from(self.locator.posterior(object)) / 65_536.0).collect()
+        (0..self.locator.maps().objects()).map(|object| f64::from(self.locator.posterior(object)) / 65_536.0).collect()
     }
 
     fn choose(&mut self, hand: &Hand, within: u32, pose: u16) -> Approach {
