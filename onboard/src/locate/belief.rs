@@ -29,7 +29,7 @@ const LOSS: i32 = 9 * NAT;
 
 /// A cell: its likelihood, and what it is of.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Cell {
+pub struct Cell {
     pub(super) placement: u8,
     pub(super) yaw: u8,
     pub(super) x: u8,
@@ -38,6 +38,16 @@ pub(super) struct Cell {
     /// Logarithm of its share, in 1/64 nat.
     pub(super) likely: i16,
 }
+
+impl Cell {
+    /// No cell.
+    pub(crate) const NONE: Self = Self { placement: 0, yaw: 0, x: 0, y: 0, level: 0, likely: 0 };
+}
+
+/// A place for cells.
+pub trait Pool: AsRef<[Cell]> + AsMut<[Cell]> {}
+
+impl<P: AsRef<[Cell]> + AsMut<[Cell]>> Pool for P {}
 
 impl Maps<'_> {
     /// Middle of a cell along an axis, in 1/16 mm.
@@ -155,10 +165,10 @@ fn width(sixteenths: i32) -> usize {
     usize::try_from(bin.min(15)).unwrap_or(0)
 }
 
-impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_, CELLS, TOUCHES, OBJECTS> {
+impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Locator<'_, CELLS, TOUCHES, OBJECTS, P> {
     /// The cells in the pool.
     pub(super) fn cells(&self) -> &[Cell] {
-        self.pool.get(..self.count).unwrap_or_default()
+        self.pool.as_ref().get(..self.count).unwrap_or_default()
     }
 
     /// Number of cells that the pool may hold.
@@ -208,7 +218,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         let likely = self.likely(&cell, placement, least);
         cell.likely = i16::try_from(likely).unwrap_or(i16::MIN);
         let has_room = self.count < self.room();
-        match self.pool.get_mut(self.count) {
+        match self.pool.as_mut().get_mut(self.count) {
             Some(slot) if likely >= least && has_room => {
                 *slot = cell;
                 self.count += 1;
@@ -238,10 +248,10 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         }
         let mut kept = 0;
         for index in 0..count {
-            let cell = at(&self.pool, index);
+            let cell = at(self.pool.as_ref(), index);
             if bin(&cell) >= first {
                 self.drop_cell(&cell);
-            } else if let Some(slot) = self.pool.get_mut(kept) {
+            } else if let Some(slot) = self.pool.as_mut().get_mut(kept) {
                 *slot = cell;
                 kept += 1;
             }
@@ -300,7 +310,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         loop {
             let mut index = 0;
             while index < self.count {
-                let cell = at(&self.pool, index);
+                let cell = at(self.pool.as_ref(), index);
                 if cell.level >= FINEST || i32::from(cell.likely) < threshold {
                     index += 1;
                     continue;
@@ -332,8 +342,8 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
     /// Replaces a cell by its parts.
     fn split(&mut self, index: usize, cell: &Cell) {
         self.count -= 1;
-        let last = at(&self.pool, self.count);
-        if let Some(slot) = self.pool.get_mut(index) {
+        let last = at(self.pool.as_ref(), self.count);
+        if let Some(slot) = self.pool.as_mut().get_mut(index) {
             *slot = last;
         }
         let map = self.maps.placement(cell.placement);

@@ -1,7 +1,6 @@
 //! Where to touch next.
 
-use super::belief::YAWS;
-use super::belief::turn;
+use super::belief::{Pool, YAWS, turn};
 use super::locator::Locator;
 use super::maps::Placement;
 use super::number::{NAT, direction, logarithm, of_sum, power};
@@ -18,6 +17,8 @@ pub struct Approach {
     pub roll: u8,
 }
 
+/// Default share of the pose in what the next approach is to tell, in 64ths.
+pub const POSE: u16 = 10;
 /// Cells that are drawn as hypotheses.
 const DRAWN: usize = 64;
 
@@ -35,7 +36,7 @@ struct Drawn {
     heights: [i32; 3],
 }
 
-impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_, CELLS, TOUCHES, OBJECTS> {
+impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Locator<'_, CELLS, TOUCHES, OBJECTS, P> {
     /// The approach that tells most about the object, and a little about its pose: of a bounded number of candidates on hypotheses
     /// drawn by their weight, the one whose heights have the largest mutual information with them. `spacing` is the distance of
     /// neighboring fingers and `within` half the side of the square about the origin in which the middle finger may go, both in
@@ -104,7 +105,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
             let mut next = u64::from(self.random.next()) % step;
             let (mut passed, mut took) = (0, 0);
             for index in 0..self.count {
-                let cell = at(&self.pool, index);
+                let cell = at(self.pool.as_ref(), index);
                 if usize::from(self.maps.object_of(cell.placement)) != object {
                     continue;
                 }

@@ -1,10 +1,10 @@
 //! The object's place.
 
-use super::belief::{Cell, YAWS, turn};
+use super::belief::{Cell, Pool, YAWS, turn};
 use super::locator::Locator;
 
 /// A mode of the pose: where an object's origin is on the table, how it is turned, and how sure that is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pose {
     /// The object's placement.
     pub placement: u8,
@@ -26,7 +26,7 @@ const TURNED_APART: i32 = 16;
 /// Bins of a distance.
 const BINS: usize = 64;
 
-impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_, CELLS, TOUCHES, OBJECTS> {
+impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Locator<'_, CELLS, TOUCHES, OBJECTS, P> {
     /// Places of an object: its most likely poses, best first, as many as there is room for; returns their number. Cells within
     /// 10 mm and 22.5° of the most likely one are of a mode. An interval holds 95 % of a mode's weight.
     ///

@@ -98,6 +98,23 @@ pub enum Query {
     },
     /// Asks for the program that the chip runs. A chip whose program is older than this question does not answer it.
     Program,
+    /// Asks for a place where the most likely object lies. Only a chip that [has maps](ModelInfo::has_maps) is sure to answer
+    /// this and the two that follow.
+    Place {
+        /// Rank of the place, from 0.
+        rank: u8,
+    },
+    /// Asks for the name of a placement.
+    Placement {
+        /// The placement's index in the model.
+        placement: u8,
+    },
+    /// Asks for the next approach straight down.
+    NextPress {
+        /// Half the side of the square about the table's origin in which the middle finger may go, in micrometers; none: twice
+        /// the maps' range.
+        within: Option<u32>,
+    },
 }
 
 /// The answer to a [`Query`].
@@ -132,6 +149,15 @@ pub enum Answer<'a> {
     NextApproach(ApproachMessage),
     /// To [`Query::Program`]: name and version; empty if it does not say.
     Program(&'a str),
+    /// To [`Query::Place`].
+    Place {
+        /// True if no finger met more than the table so far.
+        table_alone: bool,
+        /// The place; none before the first touch, and if there are not as many.
+        place: Option<PlaceMessage>,
+    },
+    /// To [`Query::NextPress`].
+    NextPress(PressMessage),
 }
 
 /// Something to do, exactly once.
@@ -165,6 +191,15 @@ pub enum Command<'a> {
     },
     /// It is complete: check it and use it. Until then, and if the check fails, what was there before stays in use.
     Commit,
+    /// Take a touch with a position into account. Only a chip that [has maps](ModelInfo::has_maps) is sure to understand it.
+    Press {
+        /// The touch; its pose is in the table's frame.
+        touch: TouchMessage,
+        /// The hand's position in the table's frame, in micrometers.
+        position: [i32; 3],
+        /// True if the outcome should have a [`Detail`].
+        detail: bool,
+    },
 }
 
 /// Kind of data that arrives in chunks.
@@ -220,12 +255,27 @@ pub enum Refusal {
     Unwritable,
     /// The model has no plan of approaches, or none for a pose that can be reached.
     NoPlan,
+    /// The model is of maps, and the touch has no position: not counted.
+    NoPosition,
+    /// The model is of trees, and the touch has a position: not counted.
+    Position,
+    /// The model is of maps, and the hand does not come straight down: not counted.
+    NotDown,
 }
 
 impl Refusal {
     /// True if this refuses a touch that was not counted because the model was not trained for it.
     pub const fn is_of_a_touch(self) -> bool {
-        matches!(self, Self::Pattern | Self::Spread | Self::NoPose | Self::Features)
+        matches!(
+            self,
+            Self::Pattern
+                | Self::Spread
+                | Self::NoPose
+                | Self::Features
+                | Self::NoPosition
+                | Self::Position
+                | Self::NotDown
+        )
     }
 }
 
@@ -245,6 +295,9 @@ impl core::fmt::Display for Refusal {
             Self::Unwritable => "the chip could not write it: load it again; its memory may be worn out",
             Self::NoPlan => "the chip's model has no plan of approaches in poses that can be reached",
             Self::Features => "the chip's model is over rows of features, not touches",
+            Self::NoPosition => "the chip's model is of maps, and the touch has no position",
+            Self::Position => "the touch has a position, and the chip has no model of maps",
+            Self::NotDown => "it does not come straight down",
         })
     }
 }
@@ -406,6 +459,34 @@ impl ApproachMessage {
     }
 }
 
+/// A place where an object lies on a table, and how sure it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PlaceMessage {
+    /// The object's placement.
+    pub placement: u8,
+    /// Place of the placement's origin, in micrometers.
+    pub position: [i32; 2],
+    /// Turn about the vertical axis, in 1/65,536 turn.
+    pub yaw: u16,
+    /// Half of a 95 % interval of x, of y in micrometers.
+    pub within: [u32; 2],
+    /// Half of a 95 % interval of the yaw in 1/65,536 turn; none where the object is round.
+    pub yaw_within: Option<u16>,
+    /// Share of this place among all of the object, in Q16.
+    pub share: u32,
+}
+
+/// An approach straight down that a chip proposes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PressMessage {
+    /// Place of the middle finger, in micrometers.
+    pub position: [i32; 2],
+    /// Direction of the row of fingers, in 1/256 turn from the x axis.
+    pub roll: u8,
+}
+
 /// Enough to see whether two recognizers agree in every bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -438,17 +519,25 @@ pub struct ModelInfo {
     pub length: u32,
     /// Objects less one.
     pub last_object: u8,
-    /// [`Descriptor::code`], 255 for a model of other features.
+    /// [`Descriptor::code`], 255 for a model of other features, [`ModelInfo::MAPS`] for one of maps.
     pub descriptor: u8,
 }
 
 impl ModelInfo {
+    /// In place of a descriptor's code: maps, for touches with a position.
+    pub const MAPS: u8 = 254;
+
+    /// True for a model of maps.
+    pub const fn has_maps(&self) -> bool {
+        self.descriptor == Self::MAPS
+    }
+
     /// Number of objects that the model knows.
     pub fn objects(&self) -> usize {
         usize::from(self.last_object) + 1
     }
 
-    /// Descriptor of the model's touches.
+    /// Descriptor of the model's touches; none for a model of maps, or of other features.
     pub fn descriptor(&self) -> Option<Descriptor> {
         Descriptor::from_code(self.descriptor)
     }

@@ -13,9 +13,9 @@
 //!
 //! | from | message | delivery |
 //! |---|---|---|
-//! | host | [`Command`]: touch, reset, load | numbered, executed exactly once and in order |
+//! | host | [`Command`]: touch, press, reset, load | numbered, executed exactly once and in order |
 //! | chip | [`Outcome`]: verdict, done, refused | repeated on demand for the last [`WINDOW`] commands |
-//! | host | [`Query`]: model, names, posteriors, statistics, snapshot, next approach, program | changes nothing, repeated until answered |
+//! | host | [`Query`]: model, names, posteriors, places, statistics, snapshot, next approach, program | changes nothing, repeated until answered |
 //! | chip | [`Answer`] | |
 //! | chip | [`Event`]: its own touches, faults, power-up | numbered, so that the host knows how many it missed |
 //!
@@ -32,6 +32,10 @@
 //! is sent again at each start, with the same numbers, until something else is stored. So a host hears of everything that
 //! counts, even after power cuts, and recognizes a copy by its numbers.
 //!
+//! Touches with a position ([`Command::Press`]), and the questions about the place of an object, came to this version later. A
+//! chip whose program is older does not read them, and refuses to load maps. So a host looks first whether the chip
+//! [has maps](ModelInfo::has_maps); an older host takes those for a model of rows, and sends it nothing.
+//!
 //! An answer names the session of the host that asked, so that several hosts may listen to one chip.
 //!
 //! [`DeviceEnd`] and [`HostEnd`] do this without a transport or a clock: bytes go in, bytes come out. Over an
@@ -47,8 +51,8 @@ pub use device::{Device, DeviceEnd, NotStored, Progress};
 pub use frame::{Decoder, FRAME_MAX, Frame, FrameError, VERSION, encode};
 pub use host::{HostEnd, HostSettings, HostStatistics, Incoming, LinkError};
 pub use message::{
-    Answer, ApproachMessage, Command, Decision, Detail, Event, FaultKind, Message, ModelInfo, Outcome, Payload, Query,
-    Refusal, Statistics, TouchMessage, VerdictMessage,
+    Answer, ApproachMessage, Command, Decision, Detail, Event, FaultKind, Message, ModelInfo, Outcome, Payload,
+    PlaceMessage, PressMessage, Query, Refusal, Statistics, TouchMessage, VerdictMessage,
 };
 
 /// Commands that may be under way at a time, and outcomes that the chip keeps.
