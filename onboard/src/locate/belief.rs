@@ -2,7 +2,7 @@
 
 use super::locator::{Exhausted, Locator};
 use super::maps::{Maps, Placement};
-use super::number::{NAT, NOTHING, add, direction, of_sum, power};
+use super::number::{NAT, NOTHING, add, direction, of_sum, power, quotient};
 use super::seen::Seen;
 use crate::bytes::at;
 
@@ -53,12 +53,12 @@ impl Maps<'_> {
     /// Middle of a cell along an axis, in 1/16 mm.
     #[inline(always)]
     pub(super) fn middle(&self, place: u8, level: u8) -> i32 {
-        ((2 * i32::from(place) + 1) * self.range) / (i32::from(self.roots) << level) - self.range
+        quotient((2 * i32::from(place) + 1) * self.range, i32::from(self.roots) << level) - self.range
     }
 
     /// Half of a cell's side, in 1/16 mm.
     pub(super) fn half(&self, level: u8) -> i32 {
-        self.range / (i32::from(self.roots) << level)
+        quotient(self.range, i32::from(self.roots) << level)
     }
 
     /// Likelihood of a cell given the touches, the last first; less than `least` may be of some of them alone.
@@ -75,11 +75,11 @@ impl Maps<'_> {
         let level = i32::from(cell.level);
         let (cos, sin) = direction(turn(cell.yaw, cell.level));
         let (x, y) = (self.middle(cell.x, cell.level), self.middle(cell.y, cell.level));
-        let side = (self.range * 5) / ((i32::from(self.roots) << level) * 4);
+        let side = quotient(self.range * 5, (i32::from(self.roots) << level) * 4);
         let [drift, drift_yaw] = self.drift;
         // Half of a cell's turn, in radians in Q14.
         let (angle, drift_yaw) =
-            if placement.is_round { (0, 0) } else { (HALF_TURN / (i32::from(YAWS) << level), drift_yaw) };
+            if placement.is_round { (0, 0) } else { (quotient(HALF_TURN, i32::from(YAWS) << level), drift_yaw) };
         for (seen, moves) in seen.iter().rev().zip(ROOTS) {
             // Moves add up as the root of their number.
             let (blur, angle) = (side + ((drift * moves) >> 4), angle + ((drift_yaw * moves) >> 4));
@@ -117,7 +117,7 @@ impl Maps<'_> {
         } else if low > limit {
             [self.of_missing_beyond(low - limit); 2]
         } else {
-            [self.of_missing_within(((limit - low + 11) * 64) / (high - low + 22)), self.of_missing_within(64)]
+            [self.of_missing_within(quotient((limit - low + 11) * 64, high - low + 22)), self.of_missing_within(64)]
         }
     }
 }
@@ -146,7 +146,7 @@ const HALF_TURN: i32 = 51_472;
 
 /// Middle of a cell's yaw, in 1/256 turn.
 pub(super) fn turn(yaw: u8, level: u8) -> i32 {
-    ((2 * i32::from(yaw) + 1) * 128) / (i32::from(YAWS) << level)
+    quotient((2 * i32::from(yaw) + 1) * 128, i32::from(YAWS) << level)
 }
 
 /// Length of a vector, at most 6 % off.
@@ -301,7 +301,8 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Lo
                 }
                 let number = |value: u32| u8::try_from(value).unwrap_or(0);
                 let (rest, roots) = (root / u32::from(yaws), u32::from(roots));
-                let (yaw, x, y) = (number(root % u32::from(yaws)), number(rest % roots), number(rest / roots));
+                let [x, y] = [rest.checked_rem(roots), rest.checked_div(roots)].map(|place| number(place.unwrap_or(0)));
+                let yaw = number(root % u32::from(yaws));
                 self.put(Cell { placement, yaw, x, y, level: 0, likely: 0 }, &map);
             }
         }

@@ -3,19 +3,9 @@
 use super::belief::{Pool, YAWS, turn};
 use super::locator::Locator;
 use super::maps::Placement;
-use super::number::{NAT, direction, logarithm, of_sum, power};
+use super::number::{NAT, direction, logarithm, of_sum, power, quotient};
 use crate::bytes::at;
-
-/// An approach straight down.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Approach {
-    /// Place of the middle finger, in micrometers.
-    pub x: i32,
-    /// Place of the middle finger, in micrometers.
-    pub y: i32,
-    /// Direction of the row of fingers, in 1/256 turn from the x axis.
-    pub roll: u8,
-}
+use palpate_shared::Approach;
 
 /// Default share of the pose in what the next approach is to tell, in 64ths.
 pub const POSE: u16 = 10;
@@ -101,8 +91,9 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Lo
                 continue;
             }
             let step = sum / share + 1;
-            let weight = power(-at(&self.posteriors, object)) / u32::try_from(share).unwrap_or(1);
-            let mut next = u64::from(self.random.next()) % step;
+            let weight =
+                power(-at(&self.posteriors, object)).checked_div(u32::try_from(share).unwrap_or(1)).unwrap_or(0);
+            let mut next = u64::from(self.random.next()).checked_rem(step).unwrap_or(0);
             let (mut passed, mut took) = (0, 0);
             for index in 0..self.count {
                 let cell = at(self.pool.as_ref(), index);
@@ -111,7 +102,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Lo
                 }
                 passed += u64::from(self.weight(&cell));
                 while passed > next && took < share {
-                    let half_turn = 128 / (i32::from(YAWS) << cell.level) + 1;
+                    let half_turn = quotient(128, i32::from(YAWS) << cell.level) + 1;
                     let half = self.maps.half(cell.level);
                     let placement = self.maps.placement(cell.placement);
                     let turned = turn(cell.yaw, cell.level) + self.random.within(half_turn);

@@ -25,8 +25,8 @@ pub(crate) mod tests;
 
 #[cfg(feature = "station")]
 pub(crate) use belief::Cell;
-pub use choose::{Approach, POSE};
+pub use choose::POSE;
 pub use locator::{Effort, Exhausted, Hand, Locator, TESTED};
 pub use maps::{BEYOND, DISTANCES, LIKELIHOODS_LENGTH, MAPS_LENGTH, Maps, PLACEMENT_LENGTH, WIDTHS, WITHIN};
-pub use pose::Pose;
+pub use palpate_shared::{Approach, TablePose as Pose};
 pub use seen::{Contact, Seen};

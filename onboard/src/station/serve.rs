@@ -82,7 +82,7 @@ pub fn serve<const N: usize, S: Storage, T: Read + Write>(
     serve_with::<N, _, _, _>(built_in, storage, (), boot, transport)
 }
 
-/// As [`serve`], with room for a model of maps too: a `&mut` [`Table`](super::Table).
+/// Serves a host as [`serve`] does, with room for a model of maps too: a `&mut` [`Table`](super::Table).
 ///
 /// # Errors
 /// As [`serve`].

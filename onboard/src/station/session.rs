@@ -9,9 +9,11 @@ use crate::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, Stopping, Verdict};
 use core::fmt;
 use palpate_shared::Touch;
 use palpate_shared::link::{
-    ApproachMessage, Decision, Detail, Device, ModelInfo, NotStored, Outcome, POSE_BYTES, Payload, PlaceMessage,
-    PressMessage, Progress, Refusal, VerdictMessage, checksum,
+    ApproachMessage, Decision, Detail, Device, ModelInfo, NotStored, Outcome, POSE_BYTES, Payload, Progress, Refusal,
+    VerdictMessage, checksum,
 };
+#[cfg(feature = "locate")]
+use palpate_shared::{Approach, TablePose};
 
 /// Room for a snapshot of `N` objects, where an array's length cannot be computed from `N`: room for a snapshot of
 /// one object, `N` times.
@@ -69,18 +71,9 @@ impl<'m, const N: usize> Station<'m, N> {
 
 impl<'m, const N: usize, S, L> Station<'m, N, S, L> {
     const fn empty(built_in: &'m [u8], storage: S, located: L) -> Self {
-        Self {
-            built_in,
-            storage,
-            opened: None,
-            state: None,
-            located,
-            source: Source::BuiltIn,
-            kept: Source::BuiltIn,
-            staged: None,
-            refused: 0,
-            program: PROGRAM,
-        }
+        let (opened, state, staged, refused, program) = (None, None, None, 0, PROGRAM);
+        let (source, kept) = (Source::BuiltIn, Source::BuiltIn);
+        Self { built_in, storage, opened, state, located, source, kept, staged, refused, program }
     }
 }
 
@@ -97,8 +90,8 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
 }
 
 impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
-    /// As [`open`](Self::open), with room for a model of maps. Its touches are not kept: after a reset a host hears that they are
-    /// forgotten.
+    /// A station as of [`open`](Self::open), with room for a model of maps. Touches under maps are not kept: after a reset a host
+    /// hears that they are forgotten.
     ///
     /// # Errors
     /// [`RecordsTooShort`].
@@ -229,6 +222,20 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
         self.counted(pushed.map_err(refusal))
     }
 
+    /// Takes a touch with a position into account, in micrometers, under a model of maps.
+    ///
+    /// Cost: a search of the maps, and with a detail a checksum of the evidence.
+    ///
+    /// # Errors
+    /// [`Refusal::NoModel`] without a usable model; [`Refusal::NoPose`], [`Refusal::NotDown`], or [`Refusal::Position`] with a model
+    /// of trees: [`Station::refused`] counts those.
+    pub fn press(&mut self, touch: &Touch, position: [i32; 3], detail: bool) -> Result<VerdictMessage, Refusal> {
+        let bytes = bytes_at(self.built_in, &self.storage, self.source);
+        let pressed = self.located.press(bytes, touch, position, detail);
+        // Without maps it says that there is no model.
+        self.counted(pressed.map_err(|refusal| if self.state.is_some() { Refusal::Position } else { refusal }))
+    }
+
     /// Counts a touch that is refused.
     fn counted(&mut self, pushed: Result<VerdictMessage, Refusal>) -> Result<VerdictMessage, Refusal> {
         if pushed.is_err() {
@@ -348,11 +355,7 @@ impl<const N: usize, S: Storage, L: Locates> Device for Station<'_, N, S, L> {
     }
 
     fn press(&mut self, touch: &Touch, position: [i32; 3], detail: bool) -> Outcome {
-        let bytes = bytes_at(self.built_in, &self.storage, self.source);
-        let pressed = self.located.press(bytes, touch, position, detail);
-        // Without maps it says that there is no model.
-        let pressed = pressed.map_err(|refusal| if self.state.is_some() { Refusal::Position } else { refusal });
-        self.counted(pressed).map_or_else(Outcome::Refused, Outcome::Verdict)
+        Self::press(self, touch, position, detail).map_or_else(Outcome::Refused, Outcome::Verdict)
     }
 
     fn reset(&mut self) -> Outcome {
@@ -439,15 +442,18 @@ impl<const N: usize, S: Storage, L: Locates> Device for Station<'_, N, S, L> {
         proposal.ok_or(Refusal::NoPlan)
     }
 
-    fn place(&mut self, rank: u8) -> Result<(bool, Option<PlaceMessage>), Refusal> {
+    #[cfg(feature = "locate")]
+    fn place(&mut self, rank: u8) -> Result<(bool, Option<TablePose>), Refusal> {
         self.located.place(bytes_at(self.built_in, &self.storage, self.source), rank)
     }
 
+    #[cfg(feature = "locate")]
     fn placement(&self, placement: u8) -> Option<&str> {
         self.located.placement(self.bytes_at(self.source), placement)
     }
 
-    fn next_press(&mut self, within: Option<u32>) -> Result<PressMessage, Refusal> {
+    #[cfg(feature = "locate")]
+    fn next_press(&mut self, within: Option<u32>) -> Result<Approach, Refusal> {
         self.located.next_press(bytes_at(self.built_in, &self.storage, self.source), within)
     }
 

@@ -1,11 +1,11 @@
 //! Models of maps in a station: touches with a position, and the place of an object.
 
-use palpate_shared::Touch;
-use palpate_shared::link::{ModelInfo, PlaceMessage, PressMessage, Refusal, VerdictMessage};
+use palpate_shared::link::{ModelInfo, Refusal, VerdictMessage};
+use palpate_shared::{Approach, TablePose, Touch};
 #[cfg(feature = "locate")]
 use {
     super::session::decision,
-    crate::locate::{Approach, Cell, Effort, Hand, Locator, Maps, POSE, Pose},
+    crate::locate::{Cell, Effort, Hand, Locator, Maps, POSE},
     palpate_shared::Position,
     palpate_shared::link::Detail,
 };
@@ -17,8 +17,7 @@ pub trait Locates {
     ///
     /// # Errors
     /// [`Refusal::Invalid`] for other bytes, [`Refusal::TooLong`] for more objects than there is room for.
-    fn open(&mut self, model: &[u8]) -> Result<(), Refusal> {
-        let _ = model;
+    fn open(&mut self, _: &[u8]) -> Result<(), Refusal> {
         Err(Refusal::Invalid)
     }
 
@@ -26,8 +25,7 @@ pub trait Locates {
     fn close(&mut self) {}
 
     /// Description of the maps in use; none if there are none, and then nothing of the following does anything.
-    fn info(&self, model: &[u8]) -> Option<ModelInfo> {
-        let _ = model;
+    fn info(&self, _: &[u8]) -> Option<ModelInfo> {
         None
     }
 
@@ -35,14 +33,7 @@ pub trait Locates {
     ///
     /// # Errors
     /// [`Refusal::NoPose`] and [`Refusal::NotDown`] for one that is not counted, [`Refusal::NoModel`] without maps.
-    fn press(
-        &mut self,
-        model: &[u8],
-        touch: &Touch,
-        position: [i32; 3],
-        detail: bool,
-    ) -> Result<VerdictMessage, Refusal> {
-        let _ = (model, touch, position, detail);
+    fn press(&mut self, _: &[u8], _: &Touch, _: [i32; 3], _: bool) -> Result<VerdictMessage, Refusal> {
         Err(Refusal::NoModel)
     }
 
@@ -50,26 +41,22 @@ pub trait Locates {
     ///
     /// # Errors
     /// [`Refusal::NoModel`] without maps.
-    fn reset(&mut self, model: &[u8]) -> Result<(), Refusal> {
-        let _ = model;
+    fn reset(&mut self, _: &[u8]) -> Result<(), Refusal> {
         Err(Refusal::NoModel)
     }
 
     /// The name of an object.
-    fn name<'n>(&self, model: &'n [u8], object: u8) -> Option<&'n str> {
-        let _ = (model, object);
+    fn name<'n>(&self, _: &'n [u8], _: u8) -> Option<&'n str> {
         None
     }
 
     /// The name of a placement.
-    fn placement<'n>(&self, model: &'n [u8], placement: u8) -> Option<&'n str> {
-        let _ = (model, placement);
+    fn placement<'n>(&self, _: &'n [u8], _: u8) -> Option<&'n str> {
         None
     }
 
     /// The posterior of an object in Q56.
-    fn posterior(&self, model: &[u8], object: u8) -> Option<u64> {
-        let _ = (model, object);
+    fn posterior(&self, _: &[u8], _: u8) -> Option<u64> {
         None
     }
 
@@ -77,8 +64,7 @@ pub trait Locates {
     ///
     /// # Errors
     /// [`Refusal::NoModel`] without maps.
-    fn place(&mut self, model: &[u8], rank: u8) -> Result<(bool, Option<PlaceMessage>), Refusal> {
-        let _ = (model, rank);
+    fn place(&mut self, _: &[u8], _: u8) -> Result<(bool, Option<TablePose>), Refusal> {
         Err(Refusal::NoModel)
     }
 
@@ -87,8 +73,7 @@ pub trait Locates {
     ///
     /// # Errors
     /// [`Refusal::NoModel`] without maps.
-    fn next_press(&mut self, model: &[u8], within: Option<u32>) -> Result<PressMessage, Refusal> {
-        let _ = (model, within);
+    fn next_press(&mut self, _: &[u8], _: Option<u32>) -> Result<Approach, Refusal> {
         Err(Refusal::NoModel)
     }
 }
@@ -113,7 +98,7 @@ pub struct Table<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize>
     /// The locator without maps and cells, and the hand; none while no maps are in use.
     opened: Option<(Locator<'static, CELLS, TOUCHES, OBJECTS, ()>, Hand)>,
     /// The approach that was proposed after the last touch, and its workspace.
-    proposed: Option<(Option<u32>, PressMessage)>,
+    proposed: Option<(Option<u32>, Approach)>,
 }
 
 #[cfg(feature = "locate")]
@@ -174,6 +159,8 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locates for
         })
     }
 
+    // On its own in the stack, like the others: other commands need little of it.
+    #[inline(never)]
     fn press(
         &mut self,
         model: &[u8],
@@ -218,32 +205,25 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locates for
         (object < maps.objects()).then(|| u64::from(locator.posterior(object)) << 40)
     }
 
-    fn place(&mut self, model: &[u8], rank: u8) -> Result<(bool, Option<PlaceMessage>), Refusal> {
+    #[inline(never)]
+    fn place(&mut self, model: &[u8], rank: u8) -> Result<(bool, Option<TablePose>), Refusal> {
         self.with(model, |locator, _| {
-            let (mut poses, rank) = ([Pose::default(); PLACES], usize::from(rank));
+            let (mut poses, rank) = ([TablePose::default(); PLACES], usize::from(rank));
             let poses = if locator.touches() == 0 { None } else { poses.get_mut(..=rank) }.unwrap_or_default();
             let found = locator.poses(locator.leader(), poses);
-            let place = poses.get(..found).and_then(|found| found.get(rank)).map(|pose| PlaceMessage {
-                placement: pose.placement,
-                position: pose.position,
-                yaw: pose.yaw,
-                within: pose.within,
-                yaw_within: pose.yaw_within,
-                share: pose.share,
-            });
-            (locator.met_table_alone(), place)
+            (locator.met_table_alone(), poses.get(..found).and_then(|found| found.get(rank)).copied())
         })
     }
 
-    fn next_press(&mut self, model: &[u8], within: Option<u32>) -> Result<PressMessage, Refusal> {
+    #[inline(never)]
+    fn next_press(&mut self, model: &[u8], within: Option<u32>) -> Result<Approach, Refusal> {
         if let Some((_, press)) = self.proposed.filter(|(asked, _)| *asked == within) {
             return Ok(press);
         }
         let press = self.with(model, |locator, hand| {
             let within = within.unwrap_or(2 * locator.maps().range().unsigned_abs());
             let stroke = hand.stroke.unwrap_or(u32::MAX);
-            let Approach { x, y, roll } = locator.choose(hand.spacing, stroke, within, POSE);
-            PressMessage { position: [x, y], roll }
+            locator.choose(hand.spacing, stroke, within, POSE)
         })?;
         self.proposed = Some((within, press));
         Ok(press)

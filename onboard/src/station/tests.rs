@@ -62,7 +62,7 @@ impl<'m> Line<'m> {
     fn arriving(&mut self, sent: Vec<u8>) -> Vec<u8> {
         let is_there = |_: &u8| {
             self.bytes += 1;
-            self.loses == 0 || self.bytes % self.loses != 0
+            self.loses == 0 || !self.bytes.is_multiple_of(self.loses)
         };
         let mut sent = sent;
         sent.retain(is_there);
@@ -105,8 +105,7 @@ impl<'m> Line<'m> {
     }
 
     fn press(&mut self, touch: &Touch) -> Outcome {
-        let position = touch.position().unwrap().micrometers;
-        self.say(Command::Press { touch: touch.into(), position, detail: true })
+        self.say(Command::of_touch(touch, true))
     }
 
     fn ask(&mut self, query: Query) -> String {
@@ -184,10 +183,7 @@ fn verdicts_places_and_approaches_over_a_line_that_loses_bytes_are_those_of_a_lo
                 }
                 at = locator.choose(hand.spacing, hand.stroke.unwrap(), 2 * maps.range().unsigned_abs(), POSE);
                 let next = line.ask(Query::NextPress { within: None });
-                assert_eq!(
-                    next,
-                    format!("NextPress(PressMessage {{ position: [{}, {}], roll: {} }})", at.x, at.y, at.roll)
-                );
+                assert_eq!(next, format!("NextPress(Approach {{ x: {}, y: {}, roll: {} }})", at.x, at.y, at.roll));
                 // A question that is repeated has the same answer.
                 assert_eq!(line.ask(Query::NextPress { within: None }), next);
             }
@@ -279,19 +275,19 @@ proptest! {
                 None => touch,
             };
             match station.press(&touch, position, true) {
-                Outcome::Verdict(verdict) => {
+                Ok(verdict) => {
                     counted += 1;
                     prop_assert_eq!(verdict.touches, counted);
                     prop_assert!(pose.is_some() && is_down);
                 }
-                Outcome::Refused(Refusal::NoPose) => prop_assert!(pose.is_none()),
-                Outcome::Refused(Refusal::NotDown) => prop_assert!(!is_down),
+                Err(Refusal::NoPose) => prop_assert!(pose.is_none()),
+                Err(Refusal::NotDown) => prop_assert!(!is_down),
                 other => prop_assert!(false, "{:?}", other),
             }
             let (_, place) = station.place(rank).unwrap();
             prop_assert!(rank < 4 || place.is_none());
             let reach = within.unwrap_or(u32::MAX).max(125);
-            let [x, y] = station.next_press(within).unwrap().position;
+            let Approach { x, y, .. } = station.next_press(within).unwrap();
             prop_assert!(x.unsigned_abs() <= reach && y.unsigned_abs() <= reach);
         }
     }

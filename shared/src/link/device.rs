@@ -2,11 +2,13 @@
 
 use super::frame::{Decoder, FRAME_MAX, Frame, encode};
 use super::message::{
-    Answer, ApproachMessage, Command, Event, Message, ModelInfo, Outcome, Payload, PlaceMessage, PressMessage, Query,
-    Refusal, Statistics,
+    Answer, ApproachMessage, Command, Event, Message, ModelInfo, Outcome, Payload, Query, Refusal, Statistics,
+    micrometers,
 };
 use super::{CHUNK, POSE_BYTES, POSTERIORS, WINDOW};
 use crate::Touch;
+#[cfg(any(test, feature = "position"))]
+use crate::{Approach, TablePose};
 use embedded_io::{Read, Write};
 use serde::{Deserialize, Serialize};
 
@@ -57,26 +59,29 @@ pub trait Device {
         Outcome::Refused(Refusal::Position)
     }
 
+    #[cfg(any(test, feature = "position"))]
     /// True if no finger met more than the table, and the place of this rank where the most likely object lies.
     ///
     /// # Errors
     /// A [`Refusal`] to send instead.
-    fn place(&mut self, rank: u8) -> Result<(bool, Option<PlaceMessage>), Refusal> {
+    fn place(&mut self, rank: u8) -> Result<(bool, Option<TablePose>), Refusal> {
         let _ = rank;
         Err(Refusal::Unsupported)
     }
 
+    #[cfg(any(test, feature = "position"))]
     /// A placement's name.
     fn placement(&self, placement: u8) -> Option<&str> {
         let _ = placement;
         None
     }
 
+    #[cfg(any(test, feature = "position"))]
     /// The approach straight down that tells most: see [`Query::NextPress`]. Asked again before another touch, it is the same.
     ///
     /// # Errors
     /// A [`Refusal`] to send instead.
-    fn next_press(&mut self, within: Option<u32>) -> Result<PressMessage, Refusal> {
+    fn next_press(&mut self, within: Option<u32>) -> Result<Approach, Refusal> {
         let _ = within;
         Err(Refusal::Unsupported)
     }
@@ -342,7 +347,7 @@ fn execute<'a>(
         Command::Begin { payload, length, checksum } => device.begin(payload, length, checksum),
         Command::Chunk { offset, bytes } => device.chunk(offset, bytes),
         Command::Commit => device.commit(),
-        Command::Press { touch, position, detail } => device.press(&Touch::from(&touch), position, detail),
+        Command::Press { touch, position, detail } => device.press(&Touch::from(&touch), micrometers(position), detail),
     };
     if let Some(slot) = progress.slot(sequence) {
         *slot = Some(outcome);
@@ -365,6 +370,7 @@ fn answer<'b>(
         Query::Hello | Query::Open { .. } => Answer::Session { next: progress.next, boot },
         Query::Model => device.model().map_or(Answer::Refused(Refusal::NoModel), Answer::Model),
         Query::Name { object } => named(device.name(object)),
+        #[cfg(any(test, feature = "position"))]
         Query::Placement { placement } => named(device.placement(placement)),
         Query::Program => Answer::Program(short(device.program())),
         Query::Statistics => Answer::Statistics(Statistics { refused: device.refused(), ..*statistics }),
@@ -382,10 +388,12 @@ fn answer<'b>(
             Ok(approach) => Answer::NextApproach(approach),
             Err(refusal) => Answer::Refused(refusal),
         },
+        #[cfg(any(test, feature = "position"))]
         Query::Place { rank } => match device.place(rank) {
             Ok((table_alone, place)) => Answer::Place { table_alone, place },
             Err(refusal) => Answer::Refused(refusal),
         },
+        #[cfg(any(test, feature = "position"))]
         Query::NextPress { within } => match device.next_press(within) {
             Ok(press) => Answer::NextPress(press),
             Err(refusal) => Answer::Refused(refusal),

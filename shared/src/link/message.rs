@@ -3,6 +3,8 @@
 
 use super::POSE_BYTES;
 use crate::checksum::checksum_of;
+#[cfg(any(test, feature = "position"))]
+use crate::{Approach, TablePose};
 use crate::{ContactTime, Descriptor, Pose, Touch};
 use serde::{Deserialize, Serialize};
 
@@ -98,18 +100,21 @@ pub enum Query {
     },
     /// Asks for the program that the chip runs. A chip whose program is older than this question does not answer it.
     Program,
-    /// Asks for a place where the most likely object lies. Only a chip that [has maps](ModelInfo::has_maps) is sure to answer
-    /// this and the two that follow.
+    /// Asks for a place where the most likely object lies. Only a chip that [has maps](ModelInfo::has_maps) answers this and the
+    /// two that follow, which take no flash without the feature `position`.
+    #[cfg(any(test, feature = "position"))]
     Place {
         /// Rank of the place, from 0.
         rank: u8,
     },
     /// Asks for the name of a placement.
+    #[cfg(any(test, feature = "position"))]
     Placement {
         /// The placement's index in the model.
         placement: u8,
     },
     /// Asks for the next approach straight down.
+    #[cfg(any(test, feature = "position"))]
     NextPress {
         /// Half the side of the square about the table's origin in which the middle finger may go, in micrometers; none: twice
         /// the maps' range.
@@ -150,14 +155,16 @@ pub enum Answer<'a> {
     /// To [`Query::Program`]: name and version; empty if it does not say.
     Program(&'a str),
     /// To [`Query::Place`].
+    #[cfg(any(test, feature = "position"))]
     Place {
         /// True if no finger met more than the table so far.
         table_alone: bool,
         /// The place; none before the first touch, and if there are not as many.
-        place: Option<PlaceMessage>,
+        place: Option<TablePose>,
     },
     /// To [`Query::NextPress`].
-    NextPress(PressMessage),
+    #[cfg(any(test, feature = "position"))]
+    NextPress(Approach),
 }
 
 /// Something to do, exactly once.
@@ -195,11 +202,24 @@ pub enum Command<'a> {
     Press {
         /// The touch; its pose is in the table's frame.
         touch: TouchMessage,
-        /// The hand's position in the table's frame, in micrometers.
-        position: [i32; 3],
+        /// The hand's position in the table's frame: x, y and z in micrometers, i32 little endian.
+        position: [u8; 12],
         /// True if the outcome should have a [`Detail`].
         detail: bool,
     },
+}
+
+#[cfg(feature = "position")]
+impl Command<'_> {
+    /// The command that takes a touch into account, with its position if it has one.
+    pub fn of_touch(touch: &Touch, detail: bool) -> Self {
+        let (message, mut position) = (TouchMessage::from(touch), [0; 12]);
+        let Some(crate::Position { micrometers }) = touch.position() else {
+            return Self::Touch { touch: message, detail };
+        };
+        position.iter_mut().zip(micrometers.into_iter().flat_map(i32::to_le_bytes)).for_each(|(to, from)| *to = from);
+        Self::Press { touch: message, position, detail }
+    }
 }
 
 /// Kind of data that arrives in chunks.
@@ -399,6 +419,11 @@ fn pose_bytes(pose: &Pose) -> [u8; 12] {
     bytes
 }
 
+/// Numbers in the bytes of a position.
+pub(super) fn micrometers([a, b, c, d, e, f, g, h, i, j, k, l]: [u8; 12]) -> [i32; 3] {
+    [[a, b, c, d], [e, f, g, h], [i, j, k, l]].map(i32::from_le_bytes)
+}
+
 fn pose_of([a, b, c, d, e, f, g, h, i, j, k, l]: [u8; 12]) -> Pose {
     Pose {
         direction: [[a, b], [c, d], [e, f]].map(i16::from_le_bytes),
@@ -457,34 +482,6 @@ impl ApproachMessage {
     pub fn middle(&self) -> Pose {
         pose_of(self.middle)
     }
-}
-
-/// A place where an object lies on a table, and how sure it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct PlaceMessage {
-    /// The object's placement.
-    pub placement: u8,
-    /// Place of the placement's origin, in micrometers.
-    pub position: [i32; 2],
-    /// Turn about the vertical axis, in 1/65,536 turn.
-    pub yaw: u16,
-    /// Half of a 95 % interval of x, of y in micrometers.
-    pub within: [u32; 2],
-    /// Half of a 95 % interval of the yaw in 1/65,536 turn; none where the object is round.
-    pub yaw_within: Option<u16>,
-    /// Share of this place among all of the object, in Q16.
-    pub share: u32,
-}
-
-/// An approach straight down that a chip proposes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct PressMessage {
-    /// Place of the middle finger, in micrometers.
-    pub position: [i32; 2],
-    /// Direction of the row of fingers, in 1/256 turn from the x axis.
-    pub roll: u8,
 }
 
 /// Enough to see whether two recognizers agree in every bit.

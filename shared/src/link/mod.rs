@@ -51,8 +51,8 @@ pub use device::{Device, DeviceEnd, NotStored, Progress};
 pub use frame::{Decoder, FRAME_MAX, Frame, FrameError, VERSION, encode};
 pub use host::{HostEnd, HostSettings, HostStatistics, Incoming, LinkError};
 pub use message::{
-    Answer, ApproachMessage, Command, Decision, Detail, Event, FaultKind, Message, ModelInfo, Outcome, Payload,
-    PlaceMessage, PressMessage, Query, Refusal, Statistics, TouchMessage, VerdictMessage,
+    Answer, ApproachMessage, Command, Decision, Detail, Event, FaultKind, Message, ModelInfo, Outcome, Payload, Query,
+    Refusal, Statistics, TouchMessage, VerdictMessage,
 };
 
 /// Commands that may be under way at a time, and outcomes that the chip keeps.

@@ -1,7 +1,7 @@
 mod state_machine;
 
 use super::*;
-use crate::{ContactTime, Pose, Touch};
+use crate::{Approach, ContactTime, Pose, TablePose, Touch};
 use proptest::prelude::*;
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
@@ -693,7 +693,7 @@ fn golden_frames_pin_the_format() {
     let (mut without, down) = ([0; POSE_BYTES], Pose { direction: [0, 0, -32767], alignment: [32767, 0, 0] });
     (without[0], without[12]) = (255, 1);
     let pressed = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(300)]).with_pose(down);
-    let place = PlaceMessage {
+    let place = TablePose {
         placement: 3,
         position: [12_300, -4_100],
         yaw: 15_838,
@@ -701,7 +701,9 @@ fn golden_frames_pin_the_format() {
         yaw_within: Some(546),
         share: 60_000,
     };
-    let press = PressMessage { position: [-1_000, 0], roll: 64 };
+    let press = Approach { x: -1_000, y: 0, roll: 64 };
+    // In micrometers: -12300, 4100, 25000.
+    let position = [244, 207, 255, 255, 4, 16, 0, 0, 168, 97, 0, 0];
     let frames: [(Message<'_>, &[u8]); 13] = [
         (
             Message::Command { sequence: 1, command: Command::Touch { touch: (&touch).into(), detail: true } },
@@ -741,11 +743,11 @@ fn golden_frames_pin_the_format() {
         (
             Message::Command {
                 sequence: 1,
-                command: Command::Press { touch: (&pressed).into(), position: [-12_300, 4_100, 25_000], detail: false },
+                command: Command::Press { touch: (&pressed).into(), position, detail: false },
             },
             &[
                 0, 3, 3, 2, 1, 1, 4, 2, 1, 5, 9, 255, 255, 255, 255, 15, 172, 2, 1, 1, 1, 1, 5, 1, 128, 255, 127, 1, 1,
-                1, 9, 151, 192, 1, 136, 64, 208, 134, 3, 5, 2, 127, 234, 9, 0,
+                1, 7, 244, 207, 255, 255, 4, 16, 1, 3, 168, 97, 1, 1, 5, 57, 156, 103, 80, 0,
             ],
         ),
         (

@@ -6,7 +6,7 @@
 //! they are connected to. `PALPATE_LINK_STEPS=1000000` sets the number of steps; without it there are 60,000.
 
 use crate::link::*;
-use crate::{Pose, Touch};
+use crate::{Approach, Pose, TablePose, Touch};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::{vec, vec::Vec};
@@ -128,19 +128,19 @@ impl Device for Notebook {
         Ok(approach(without[0]))
     }
 
-    fn place(&mut self, rank: u8) -> Result<(bool, Option<PlaceMessage>), Refusal> {
+    fn place(&mut self, rank: u8) -> Result<(bool, Option<TablePose>), Refusal> {
         Ok((rank >= 4, Some(place(rank))))
     }
 
-    fn next_press(&mut self, within: Option<u32>) -> Result<PressMessage, Refusal> {
-        Ok(PressMessage { position: [within.map_or(-1, u32::cast_signed), i32::MIN], roll: 255 })
+    fn next_press(&mut self, within: Option<u32>) -> Result<Approach, Refusal> {
+        Ok(Approach { x: within.map_or(-1, u32::cast_signed), y: i32::MIN, roll: 255 })
     }
 }
 
 /// The place of this rank.
-fn place(rank: u8) -> PlaceMessage {
+fn place(rank: u8) -> TablePose {
     let position = [i32::from(rank), -1];
-    PlaceMessage { placement: rank, position, yaw: 65_535, within: [0, u32::MAX], yaw_within: None, share: 65_536 }
+    TablePose { placement: rank, position, yaw: 65_535, within: [0, u32::MAX], yaw_within: None, share: 65_536 }
 }
 
 /// A question for an approach, with a number in it.
@@ -259,7 +259,9 @@ impl World {
                 let (touch, number) = (Touch::from_micros([0, self.next_touch, 0]), self.next_touch);
                 let Host { end, given, connected, .. } = &mut self.hosts[host];
                 // Every other one has a position.
-                let (touch, position) = ((&touch).into(), [number.cast_signed(), i32::MIN, -1]);
+                let touch = (&touch).into();
+                let [a, b, c, d] = number.to_le_bytes();
+                let position = [a, b, c, d, 0, 0, 0, 128, 255, 255, 255, 255];
                 let command = match number % 2 {
                     0 => Command::Touch { touch, detail: false },
                     _ => Command::Press { touch, position, detail: false },
@@ -425,7 +427,7 @@ impl World {
                             0 => Answer::Name(NAMES[usize::from(name)]),
                             1 => Answer::NextApproach(approach(name)),
                             2 => Answer::Place { table_alone: name >= 4, place: Some(place(name)) },
-                            _ => Answer::NextPress(PressMessage { position: [name.into(), i32::MIN], roll: 255 }),
+                            _ => Answer::NextPress(Approach { x: name.into(), y: i32::MIN, roll: 255 }),
                         };
                         assert_eq!(answer, expected, "the answer is another question's");
                     }
