@@ -143,7 +143,7 @@ fn touches_with_a_position_give_the_hosts_verdicts_places_and_approaches_over_a_
     objects.iter_mut().for_each(|object| object.millimeters = Some(4.0));
     let origin = Origin {
         touches: 8_000,
-        probe: probe.clone(),
+        probe,
         unit: Length::Millimeter,
         scene: Surroundings::Table { cone: 0.0 },
         position: true,
@@ -155,7 +155,7 @@ fn touches_with_a_position_give_the_hosts_verdicts_places_and_approaches_over_a_
     let settings = with!(locate::Settings::default(), fine = false);
     let surfaces = locate::learn(&dataset, &settings).unwrap();
     let model = locate::write(&surfaces, &dataset.names(), &probe, &settings).unwrap();
-    for (faults, settings, touches) in [(None, PATIENT, 200), (Some("0.0005,0.0005,0.01,2"), BRISK, 100)] {
+    for (faults, settings, touches) in [(None, PATIENT, 100), (Some("0.0005,0.0005,0.01,2"), BRISK, 40)] {
         let mut transport = Emulator::for_firmware(build_with("uart", M4F, None, "locate")).start().unwrap();
         if let Some(faults) = faults {
             transport = transport.with_faults(faults.parse().unwrap(), 1);

@@ -6,7 +6,6 @@ use palpate::chip::{Asks, Connection, Emulator, Port, Steps, Update, stream};
 use palpate::compile::{Leaf, Settings, compile};
 use palpate::touches::{Dataset, ObjectTouches, Source};
 use palpate::with;
-use palpate_onboard::Model;
 use palpate_onboard::station::{Memory, record_length, serve};
 use palpate_shared::Descriptor;
 use palpate_shared::link::HostSettings;
