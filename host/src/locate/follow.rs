@@ -15,8 +15,6 @@ pub const TOUCHES: usize = 32;
 pub const CELLS: usize = 14_336;
 /// Cells and objects on a host that follows many objects.
 const MANY: usize = 65_536;
-/// Share of the pose in what the next approach is to tell, in 64ths.
-pub const POSE: u16 = 10;
 /// Distance below the table at which a finger cannot have stopped, in millimeters.
 const BELOW: f64 = 15.0;
 
@@ -140,8 +138,7 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
     }
 
     fn poses(&self, object: usize) -> Vec<Pose> {
-        let none = Pose { placement: 0, position: [0; 2], yaw: 0, within: [0; 2], yaw_within: None, share: 0 };
-        let mut poses = vec![none; 4];
+        let mut poses = vec![Pose::default(); 4];
         let found = self.locator.poses(object, &mut poses);
         poses.truncate(found);
         poses
@@ -176,8 +173,18 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
 pub fn workspace(maps: &Maps<'_>, workspace: Option<f64>) -> Result<u32> {
     match workspace {
         None => Ok(2 * maps.range().unsigned_abs()),
-        Some(millimeters) if (0.0..=1_000.0).contains(&millimeters) => Ok((millimeters * 1e3) as u32),
-        Some(other) => Err(Error::setting("workspace", other, "a number of millimeters from 0 to 1000")),
+        Some(millimeters) => within(millimeters),
+    }
+}
+
+/// Half the side of a workspace that is stated, in micrometers.
+///
+/// # Errors
+/// As [`workspace`].
+pub fn within(millimeters: f64) -> Result<u32> {
+    match (0.0..=1_000.0).contains(&millimeters) {
+        true => Ok((millimeters * 1e3) as u32),
+        false => Err(Error::setting("workspace", millimeters, "a number of millimeters from 0 to 1000")),
     }
 }
 

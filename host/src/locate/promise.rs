@@ -323,7 +323,7 @@ fn play(
 /// Plays sequences to the model's own threshold.
 ///
 /// # Errors
-/// As [`calibrate`].
+/// As [`calibrate`](fn@calibrate).
 pub fn evaluate(
     maps: Maps<'_>,
     standing: &[Standing],

@@ -11,17 +11,17 @@ use std::vec::Vec;
 use std::{format, vec};
 
 /// An object's height in millimeters at a point in millimeters.
-type Heights = fn(f64, f64) -> f64;
+pub(crate) type Heights = fn(f64, f64) -> f64;
 
 /// A placement: its object, its heights, cells on each side of the middle one, and whether it is round.
 #[derive(Clone, Copy)]
-struct Placed(u8, Heights, [i32; 2], bool);
+pub(crate) struct Placed(u8, Heights, [i32; 2], bool);
 
 const SPACING: u32 = 15_000;
 const STROKE: u32 = 20_000;
 const HAND: Hand = Hand { spacing: SPACING, speed: 100_000, stroke: Some(STROKE) };
 
-fn wedge(x: f64, y: f64) -> f64 {
+pub(crate) fn wedge(x: f64, y: f64) -> f64 {
     if x.abs() > 22.0 || y.abs() > 12.0 {
         0.0
     } else if x < 0.0 {
@@ -31,7 +31,7 @@ fn wedge(x: f64, y: f64) -> f64 {
     }
 }
 
-fn cylinder(x: f64, y: f64) -> f64 {
+pub(crate) fn cylinder(x: f64, y: f64) -> f64 {
     if x.hypot(y) < 16.0 { 28.0 } else { 0.0 }
 }
 
@@ -43,8 +43,8 @@ fn pin(x: f64, y: f64) -> f64 {
     if x.hypot(y) < 3.0 { 12.0 } else { 0.0 }
 }
 
-const WEDGE: Placed = Placed(0, wedge, [25, 15], false);
-const CYLINDER: Placed = Placed(1, cylinder, [19, 19], true);
+pub(crate) const WEDGE: Placed = Placed(0, wedge, [25, 15], false);
+pub(crate) const CYLINDER: Placed = Placed(1, cylinder, [19, 19], true);
 const BAR: Placed = Placed(0, bar, [28, 12], false);
 const PINS: [Placed; 2] = [Placed(0, pin, [4, 4], true), Placed(1, wedge, [3, 3], false)];
 
@@ -67,7 +67,7 @@ fn likelihoods() -> Vec<i16> {
 
 /// The bytes of a model of these placements, as `FORMAT.md` describes them, with cells of 1 mm and within 30 mm; `misfit` is the
 /// mean likelihood for each touch.
-fn model(placed: &[Placed], misfit: i16) -> Vec<u8> {
+pub(crate) fn model(placed: &[Placed], misfit: i16) -> Vec<u8> {
     let (mut records, mut heights) = (Vec::new(), Vec::<u8>::new());
     for &Placed(object, height, half, is_round) in placed {
         let in_grid = |x: i32, y: i32| {
@@ -154,9 +154,9 @@ fn place_of_maps(bytes: &[u8]) -> usize {
     bytes.len() - 4 - content.next_multiple_of(4)
 }
 
-type Small<'m> = Locator<'m, 4096, 32, 2>;
+pub(crate) type Small<'m> = Locator<'m, 4096, 32, 2>;
 
-fn locator(maps: Maps<'_>) -> Small<'_> {
+pub(crate) fn locator(maps: Maps<'_>) -> Small<'_> {
     Locator::new(maps.try_into().unwrap(), maps.stopping(), Effort::default(), 1)
 }
 
@@ -188,8 +188,7 @@ fn touch(locator: &mut Small<'_>, height: Heights, place: [f64; 2], yaw: f64, le
 }
 
 fn poses(locator: &Small<'_>, object: usize) -> Vec<Pose> {
-    let none = Pose { placement: 9, position: [0; 2], yaw: 0, within: [0; 2], yaw_within: None, share: 0 };
-    let mut poses = vec![none; 4];
+    let mut poses = vec![Pose { placement: 9, ..Pose::default() }; 4];
     let found = locator.poses(object, &mut poses);
     poses.truncate(found);
     poses
