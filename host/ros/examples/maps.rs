@@ -33,8 +33,7 @@ pub(crate) fn maps() -> palpate::Result<Vec<u8>> {
         is_round: *name == "puck",
     });
     let surfaces: Vec<Surface> = surfaces.collect();
-    let probe =
-        with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
+    let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
     write(&surfaces, &objects.map(String::from), &probe, &with!(Settings::default(), fine = false))
 }
 
