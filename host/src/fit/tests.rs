@@ -464,8 +464,8 @@ fn full_touches_and_poses_of_a_short_stroke_are_fitted_as_well() {
     assert!(found.stroke.unwrap().holds(2.5), "{:?}", found.stroke);
 }
 
-/// Approaches from above to two objects on a table, in a recording of each placement that states it, or in one of each object that states
-/// none.
+/// Approaches from above to two objects on a table, in a recording of each placement that states it, or in one of each object
+/// that states none.
 fn tabled(count: usize, seed: u64, probe: &Crooked, is_stated: bool) -> (Dataset, Settings) {
     let scene = Surroundings::Table { cone: 60.0 };
     let settings = Settings { origin: Origin { scene, ..Origin::default() }, approaches: 12_000, ..settings() };
