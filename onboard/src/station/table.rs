@@ -90,7 +90,7 @@ const SEED: u32 = 1;
 
 /// A [`Locator`] for the maps of a [`Station`](super::Station), with the default [`Effort`].
 ///
-/// RAM: 8 bytes for each of the `CELLS`, 20 for each of the `TOUCHES`, 12 for each of the `OBJECTS`, and some numbers.
+/// RAM: in proportion to `CELLS`, nearly all of it, `TOUCHES` and `OBJECTS`; `size_of` tells how much.
 #[cfg(feature = "locate")]
 #[derive(Debug)]
 pub struct Table<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> {
