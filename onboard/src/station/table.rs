@@ -4,7 +4,7 @@ use palpate_shared::link::{ModelInfo, Refusal, VerdictMessage};
 use palpate_shared::{Approach, TablePose, Touch};
 #[cfg(feature = "locate")]
 use {
-    super::session::decision,
+    super::message::decision,
     crate::locate::{Cell, Effort, Hand, Locator, Maps, POSE},
     palpate_shared::Position,
     palpate_shared::link::Detail,
@@ -68,7 +68,7 @@ pub trait Locates {
         Err(Refusal::NoModel)
     }
 
-    /// The next approach, with the middle finger within so many micrometers of the origin in x and y; none: twice the maps' range.
+    /// The next approach, with the middle finger within this many micrometers of the origin in x and y; none: twice the maps' range.
     /// The same until the next touch.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ mod screen;
 mod watch;
 
 use crate::commands::progress::Bar;
-use crate::commands::recognize::Line;
+use crate::commands::recognize_lines::Line;
 use crate::commands::recognize_maps::print_located;
 use crate::commands::{self, Global};
 use clap::ArgGroup;
