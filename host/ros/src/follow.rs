@@ -1,4 +1,4 @@
-//! What follows the touches of an object, and what is said after each of them.
+//! A follower of the touches of an object, and the messages after each of them.
 
 use crate::wire::{self, Approach, Evidence, PoseWithCovariance, Verdict};
 use palpate::onboard::Verdict as Decision;
