@@ -64,7 +64,7 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
         [("f32", Leaf::F32), ("i16", Leaf::I16), ("early", Leaf::I16), ("whole", Leaf::I16), ("code", Leaf::I16)];
     for (number, file) in CALLED.iter().enumerate() {
         let options = Options { missing: file.contains("missing-0").then_some(0.0), ..Options::default() };
-        let ensemble = Ensemble::load_with(&Path::new(ROOT).join("tests/data/import").join(file), &options).unwrap();
+        let ensemble = Ensemble::load_with(Path::new(ROOT).join("tests/data/import").join(file), &options).unwrap();
         let stem = file.rsplit_once('.').unwrap().0;
         let (rows, margins) = (numbers(&format!("{stem}.rows.csv"), 1), numbers(&format!("{stem}.margins.csv"), 0));
         let imported = ensemble.origin.imported.as_ref().unwrap();
