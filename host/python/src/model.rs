@@ -344,7 +344,7 @@ impl Model {
         let none = EvaluateProblem::NoProbabilities { is_loaded: own.source.is_none() && is_class };
         let rule = rule.ok_or_else(|| Error::from(none))?;
         let margins = Self::of_all(slf, rows)?;
-        let shares = margins.chunks_exact(objects).filter_map(|row| rule.of(row, prediction.scale.into()));
+        let shares = margins.chunks_exact(objects).filter_map(|row| rule.of(row));
         Ok(two(slf.py(), shares.flatten().collect(), objects)?)
     }
 

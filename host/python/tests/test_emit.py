@@ -39,10 +39,10 @@ def compiled(name: str) -> tuple[Any, palpate.Model]:
 
 def said(directory: Path, lines: str, sources: tuple[str, ...] = ()) -> list[list[float]]:
     """The numbers that a program prints of each row."""
-    rows = ",\n".join("{" + ",".join("NAN" if np.isnan(value) else f"{value:.9g}f" for value in row) + "}" for row in ROWS.tolist())
+    rows = ",\n".join("{" + ",".join("NAN" if np.isnan(value) else f"{value!r}f" for value in row) + "}" for row in ROWS.tolist())
     text = (
-        '#include "model.h"\n#include <math.h>\n#include <stdio.h>\n#define ROWS {' + rows.replace("\n", "\\\n") + "}\n"
-        "static const float rows[][6] = ROWS;\nint main(void)\n{\n    float p[3];\n    unsigned i;\n"
+        '#include "model.h"\n#include <math.h>\n#include <stdio.h>\n'
+        "static const float rows[][6] = {" + rows + "};\nint main(void)\n{\n    float p[3];\n    unsigned i;\n"
         "    for (i = 0; i < sizeof rows / sizeof *rows; i++) {\n" + lines + "    }\n    return 0;\n}\n"
     )
     (directory / "main.c").write_text(text)

@@ -133,8 +133,7 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
                 let other = if probability == Probability::Shares { 1.0 - margins[0] } else { 0.0 };
                 let first = vec![other; outputs - margins.len()];
                 let nats: Vec<f64> = first.iter().chain(margins).map(|margin| margin / scale).collect();
-                let shares =
-                    if has_posteriors && !is_whole { probability.of(&nats, scale).unwrap() } else { Vec::new() };
+                let shares = if has_posteriors && !is_whole { probability.of(&nats).unwrap() } else { Vec::new() };
                 expected.push((format!("{name}, row {row}"), own, shares, bound));
             }
         }

@@ -63,14 +63,15 @@ impl Probability {
         *self == Self::Softmax
     }
 
-    /// Probabilities from margins in nats, times `scale` the library's own; `None` where there is no rule.
-    pub fn of(self, margins: &[f64], scale: f64) -> Option<Vec<f64>> {
+    /// Probabilities from a row's margins in nats; `None` where there is no rule.
+    pub fn of(self, margins: &[f64]) -> Option<Vec<f64>> {
         let most = margins.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let all: f64 = margins.iter().map(|margin| (margin - most).exp()).sum();
         let each = |margin: &f64| match self {
             Self::Softmax => (margin - most).exp() / all,
             Self::Logistic => 1.0 / (1.0 + (-margin).exp()),
-            Self::Shares | Self::Unknown => margin * scale,
+            // Votes for each class, of any unit.
+            Self::Shares | Self::Unknown => margin / margins.iter().sum::<f64>(),
         };
         (self != Self::Unknown).then(|| margins.iter().map(each).collect())
     }
