@@ -166,7 +166,7 @@ pub fn calibrate(
     let misfit = terms.unknown.then(|| misfit(&each));
     let stated = Restated { misfit, stretch: terms.until.map_or(0, |_| stretch(&each)), ..plain };
     let bytes = restated(maps, &stated)?;
-    let strictest = own + STRICTER;
+    let strictest = own.max((own + STRICTER).min(SHARPEST));
     let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest, progress)?;
     let chosen = calibrate::choose(&sequences, &names, strictest, &terms.promise)?;
     let odds = chosen.odds.strictest();
@@ -204,6 +204,8 @@ pub fn calibrate(
 
 /// Nats beyond the posterior's own threshold at which the strictest is.
 const STRICTER: f64 = 4.0;
+/// Largest margin worth asking for, in nats: a search ends when cells that are not fine weigh e^-6 of all.
+const SHARPEST: f64 = 6.0;
 /// Share of known objects that may be called unknown.
 const ALARMS: f64 = 0.01;
 

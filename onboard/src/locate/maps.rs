@@ -428,6 +428,12 @@ impl<'a> Maps<'a> {
         [placement.scaled(lowest), placement.scaled(highest)]
     }
 
+    /// Least and greatest height of the four cells closest to a point, in 1/16 mm.
+    #[inline(always)]
+    pub(super) fn close(&self, placement: &Placement, x: i32, y: i32) -> [i32; 2] {
+        self.square(placement, x, y).map(|height| placement.scaled(height))
+    }
+
     /// Least and greatest of the cells about a point, for the two finest levels.
     #[inline(always)]
     fn nearby(&self, placement: &Placement, x: i32, y: i32, level: usize) -> [u32; 2] {
@@ -450,13 +456,23 @@ impl<'a> Maps<'a> {
                 [(-1, -1), (1, -1), (-1, 1), (1, 1)].into_iter().for_each(|(u, v)| take(height(i + u, j + v)));
             }
         } else {
-            let (i, j) = ((x + (half[0] << 5)) >> 5, (y + (half[1] << 5)) >> 5);
-            if i < 0 || j < 0 || i >= 2 * half[0] || j >= 2 * half[1] {
-                return [0; 2];
-            }
-            [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().for_each(|(u, v)| take(height(i + u, j + v)));
+            return self.square(placement, x, y);
         }
         range
+    }
+
+    /// Least and greatest height of the four cells closest to a point.
+    #[inline(always)]
+    fn square(&self, placement: &Placement, x: i32, y: i32) -> [u32; 2] {
+        let ([half, ..], shift) = (placement.half, if self.is_fine { 4 } else { 5 });
+        let (i, j) = ((x + (half[0] << shift)) >> shift, (y + (half[1] << shift)) >> shift);
+        if i < 0 || j < 0 || i >= 2 * half[0] || j >= 2 * half[1] {
+            return [0; 2];
+        }
+        let start = at(&placement.offset, 0).wrapping_add(row(half, i, j));
+        let next = start.wrapping_add(row(half, 0, 1));
+        let heights = [start, start.wrapping_add(1), next, next.wrapping_add(1)].map(|place| self.count(place));
+        heights.into_iter().fold([u32::MAX, 0], |[low, high], height| [low.min(height), high.max(height)])
     }
 }
 
