@@ -61,8 +61,11 @@ impl Maps<'_> {
                 let (u, v) = ((cos * u + sin * v) >> 14, (cos * v - sin * u) >> 14);
                 let radius = length(u, v).min(placement.radius);
                 let blur = blur + ((radius * angle) >> 14);
-                let interval =
-                    if is_finest && blur <= CLOSE { self.close(placement, u, v) } else { self.heights(placement, u, v, blur) };
+                let interval = if is_finest && blur <= CLOSE {
+                    self.close(placement, u, v)
+                } else {
+                    self.heights(placement, u, v, blur)
+                };
                 let [of_whole, of_finest] =
                     self.of_finger(i32::from(at(&seen.z, finger)), i32::from(seen.limit), interval);
                 whole += of_whole;
