@@ -429,7 +429,7 @@ impl<'a> Maps<'a> {
     }
 
     /// Least and greatest height about a point in a finest cell, in 1/16 mm: half of what the four closest cells span, about the
-    /// height between them.
+    /// height between them, or all of it at a wall.
     #[inline(always)]
     pub(super) fn close(&self, placement: &Placement, x: i32, y: i32) -> [i32; 2] {
         let shift = self.shift();
@@ -439,9 +439,14 @@ impl<'a> Maps<'a> {
         let part = |place: i32| (place & ((1 << shift) - 1)).unsigned_abs();
         let whole = 1_u32 << shift;
         let [a, b, c, d] = heights;
+        let full = span(heights).map(|height| placement.scaled(height));
+        // At a wall a contact is at its top or at its foot.
+        if full[1] - full[0] > 6 << shift {
+            return full;
+        }
         let between = |from: u32, to: u32, part: u32| from * (whole - part) + to * part;
         let middle = between(between(a, b, part(x)), between(c, d, part(x)), part(y)) >> (2 * shift);
-        span(heights).map(|height| placement.scaled((height + middle) / 2))
+        full.map(|height| (height + placement.scaled(middle)) / 2)
     }
 
     /// Least and greatest of the cells about a point, for the two finest levels.
