@@ -31,6 +31,7 @@ mod rows;
 mod run;
 mod scene;
 mod sequences;
+mod shape;
 mod shell;
 mod strangers;
 mod table;

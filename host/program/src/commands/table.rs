@@ -5,6 +5,7 @@ use super::maps::name;
 use super::probe::UnitArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
+use super::shape::{self, Touched};
 use palpate::calibrate;
 use palpate::error::LocateProblem;
 use palpate::evaluate::Finding;
@@ -13,9 +14,10 @@ use palpate::locate::{
 };
 use palpate::output;
 use palpate::probe::Probe;
+use palpate::probe::file::ProbeFile;
 use palpate::wording::{count, decimal, percent, rate};
 use palpate::{Error, Result};
-use palpate_shared::format::Per;
+use palpate_shared::format::{Length, Per};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -89,9 +91,16 @@ impl TableArguments {
         let noise = wanted.real.on_table(locate::stated(&maps).noise(probe.speed))?;
         let mut units = self.units.clone();
         units.imply_true_size();
-        let mut objects = units.objects(wanted.objects, wanted.seed)?;
-        objects.sort_by(|a, b| a.name.cmp(&b.name));
-        let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, &Bar::new())?;
+        let (touched, meshes): (Vec<String>, Vec<String>) =
+            wanted.objects.iter().cloned().partition(|source| shape::is_touches(source));
+        let objects = if meshes.is_empty() { Vec::new() } else { units.objects(&meshes, wanted.seed)? };
+        let mut standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, &Bar::new())?;
+        let hand = ProbeFile { probe, unit: Length::Millimeter, real: locate::stated(&maps).noise(probe.speed) };
+        for source in &touched {
+            let Touched { name, shape, .. } = shape::read(Path::new(source), &hand)?;
+            standing.push(shape.standing(&name)?);
+        }
+        standing.sort_by(|a, b| a.name.cmp(&b.name));
         let promised = Promised::of(&maps).map(|promised| promised.aimed);
         let terms = Terms {
             promise: wanted.promise,
