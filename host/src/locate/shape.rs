@@ -257,7 +257,7 @@ impl Relief {
         all.par_iter().zip(&self.distances).map(of).collect()
     }
 
-    /// Value of a sample in each cell: errors of the guesses about it, as far as it is nearer to them than other samples.
+    /// Value of a sample in each cell: errors of the guesses that it is nearer to than other samples.
     fn gains(&self) -> Vec<f64> {
         let wrong = |([low, high], distance): ([f64; 2], &f64)| (high - low + UNKNOWN * distance) * distance.min(1.0);
         let wrong: Vec<f64> = self.about(1.0, 1.0).into_iter().zip(&self.distances).map(wrong).collect();
