@@ -65,7 +65,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let shared = std::env::var("PALPATE_SHARED").unwrap_or_else(|_| "../shared".into());
     let folder = given.get("objects").cloned().unwrap_or(format!("{shared}/objects"));
     let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
-    let mut objects = palpate::mesh::source::objects(&[folder.into()])?;
+    let mut objects = palpate::mesh::source::objects(&[folder])?;
     for object in &mut objects {
         object.millimeters = Some(1.0);
         let length = object.instances().filter_map(|instance| object.true_length(instance)).fold(0.0, f64::max);
