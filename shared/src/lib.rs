@@ -31,12 +31,14 @@ pub mod format;
 #[cfg(feature = "link")]
 pub mod link;
 mod pattern;
+mod place;
 mod poses;
 mod touch;
 
 pub use checksum::checksum;
 pub use descriptor::{Descriptor, Features, MAX_FEATURES, MISSING_FEATURE};
 pub use pattern::{ContactPattern, Patterns};
+pub use place::{Approach, TablePose};
 pub use poses::{DIRECTIONS, MOST_POSES, Poses};
 #[cfg(feature = "position")]
 pub use touch::Position;

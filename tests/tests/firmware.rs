@@ -3,12 +3,15 @@
 //! Needs `qemu-system-arm` and the targets thumbv7em-none-eabihf and thumbv6m-none-eabi, so it is asked for:
 //! `cargo test -p palpate-tests --test firmware -- --ignored`. It builds the images itself.
 
-use palpate::chip::{Connection, Emulator, Faults, Steps, Summary, Update, stream};
+use palpate::chip::{Asks, Connection, Emulator, Faults, Steps, Summary, Update, stream};
 use palpate::compile::{Leaf, Settings, compile};
-use palpate::touches::{Dataset, ObjectTouches, Source};
+use palpate::mesh::builtin;
+use palpate::probe::approach::Probe;
+use palpate::touches::{Dataset, ObjectTouches, Origin, Source, Surroundings};
 use palpate::with;
+use palpate::{capture, locate};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
-use palpate_shared::format::{Counted, Trained, TrainedTouches};
+use palpate_shared::format::{Counted, Length, Trained, TrainedTouches};
 use palpate_shared::link::{
     Decision, Decoder, Detail, Event, FaultKind, HostSettings, Message, TouchMessage, VerdictMessage,
 };
@@ -32,9 +35,14 @@ const OBJECTS: usize = 10;
 
 /// Builds an image, with a model in it where one is given.
 fn build(image: &str, target: &str, model: Option<&Path>) -> PathBuf {
+    build_with(image, target, model, "")
+}
+
+fn build_with(image: &str, target: &str, model: Option<&Path>, features: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../onboard/firmware").canonicalize().unwrap();
     let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["build", "--release", "--quiet", "--bin", image, "--target", target]).current_dir(&folder);
+    cargo.args(["build", "--release", "--quiet", "--bin", image, "--target", target, "--features", features]);
+    cargo.current_dir(&folder);
     // What this test was built with is not what the firmware is built with.
     cargo.env_remove("CARGO_TARGET_DIR").env_remove("RUSTFLAGS").env_remove("PALPATE_MODEL");
     if let Some(model) = model {
@@ -87,9 +95,8 @@ fn parity(
     let mut connection = Connection::open(transport, settings).unwrap();
     connection.load(model, &()).unwrap();
     let chip = connection.model().unwrap();
-    let host = Model::new(model).unwrap();
     let steps = Steps::sequences(dataset(1_000), 60, touches);
-    stream(&mut connection, steps, &chip, Some(&host), false, |connection, update| {
+    stream(&mut connection, steps, &chip, Some(model), Asks::Nothing, |connection, update| {
         each(connection, &update);
         Ok(ControlFlow::Continue(()))
     })
@@ -126,6 +133,48 @@ fn ten_thousand_touches_arrive_exactly_once_over_a_bad_line() {
     );
     assert!(summary.resent > 100 && summary.garbled > 100 && summary.chip_garbled > 100, "{summary:?}");
     assert!(summary.chip_repeated > 10 && summary.chip_early > 10, "{summary:?}");
+}
+
+#[test]
+#[ignore = "needs an emulator; see the top of tests/tests/firmware.rs"]
+fn touches_with_a_position_give_the_hosts_verdicts_places_and_approaches_over_a_bad_line() {
+    let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
+    let mut objects = builtin::make(&["bowl", "camera", "mouse"], None).unwrap();
+    objects.iter_mut().for_each(|object| object.millimeters = Some(4.0));
+    let origin = Origin {
+        touches: 8_000,
+        probe,
+        unit: Length::Millimeter,
+        scene: Surroundings::Table { cone: 0.0 },
+        position: true,
+        pose: true,
+        approaches: true,
+        ..Origin::default()
+    };
+    let dataset = capture::in_memory(&objects, &origin.into(), &()).unwrap().0;
+    let settings = with!(locate::Settings::default(), fine = false);
+    let surfaces = locate::learn(&dataset, &settings).unwrap();
+    let model = locate::write(&surfaces, &dataset.names(), &probe, &settings).unwrap();
+    for (faults, settings, touches) in [(None, PATIENT, 100), (Some("0.0005,0.0005,0.01,2"), BRISK, 40)] {
+        let mut transport = Emulator::for_firmware(build_with("uart", M4F, None, "locate")).start().unwrap();
+        if let Some(faults) = faults {
+            transport = transport.with_faults(faults.parse().unwrap(), 1);
+        }
+        let mut connection = Connection::open(transport, settings).unwrap();
+        connection.load(&model, &()).unwrap();
+        let chip = connection.model().unwrap();
+        assert!(chip.info.has_maps() && chip.placements.len() == surfaces.len(), "{chip:?}");
+        let (steps, asks) = (Steps::sequences(dataset.clone(), 5, touches), Asks::Place { within: None });
+        let each = |_: &mut Connection, _| Ok(ControlFlow::Continue(()));
+        let summary = stream(&mut connection, steps, &chip, Some(&model), asks, each).unwrap();
+        eprintln!("{} bytes of maps, {summary:?}", model.len());
+        assert_eq!(
+            (summary.touches, summary.compared, summary.approaches, summary.differences),
+            (touches, touches, touches, 0),
+            "{summary:?}"
+        );
+        assert_eq!(summary.garbled + summary.chip_garbled > 0, faults.is_some(), "{summary:?}");
+    }
 }
 
 #[test]

@@ -169,6 +169,23 @@ fn switches_a_link_and_a_station_with_flash_cannot_panic_and_take_the_flash_that
 
 #[test]
 #[ignore = "builds firmware: needs the target thumbv6m-none-eabi"]
+fn a_station_with_room_for_maps_cannot_panic_and_takes_the_flash_that_is_stated() {
+    let mut readme = Readme::open("onboard/README.md");
+    let image = image("table", "compact,i8-leaves,locate");
+    println!("table     compact,i8-leaves,locate: {} bytes of flash", image.flash);
+    assert!(image.symbols.iter().any(|name| name.contains("palpate_onboard")), "the image has no symbols");
+    assert!(!image.symbols.iter().any(|name| name.contains("panic")), "panicking code is linked");
+    readme.cell(
+        "`locate`: touches with a position and maps over the link, instead of trees too",
+        1,
+        image.flash as u64,
+        PERCENT,
+    );
+    readme.finish();
+}
+
+#[test]
+#[ignore = "builds firmware: needs the target thumbv6m-none-eabi"]
 fn float_code_would_be_found() {
     let image = image("verdict", "complete,f32-leaves");
     println!("verdicts, also of f32 leaves: {} bytes of flash", image.flash);

@@ -2,11 +2,10 @@
 //!
 //! 100,000 touches; `PALPATE_SOAK=1000000 cargo test -p palpate-tests --test soak -- --nocapture` for a million.
 
-use palpate::chip::{Connection, Emulator, Port, Steps, Update, stream};
+use palpate::chip::{Asks, Connection, Emulator, Port, Steps, Update, stream};
 use palpate::compile::{Leaf, Settings, compile};
 use palpate::touches::{Dataset, ObjectTouches, Source};
 use palpate::with;
-use palpate_onboard::Model;
 use palpate_onboard::station::{Memory, record_length, serve};
 use palpate_shared::Descriptor;
 use palpate_shared::link::HostSettings;
@@ -81,7 +80,6 @@ fn soak_between_two_processes_neither_drifts_nor_grows_nor_loses_a_frame() {
     };
     let settings = with!(Settings::default(), leaf = Leaf::I16);
     let bytes = compile(&random::ensemble(shape, 1), &settings).unwrap().bytes;
-    let model = Model::new(&bytes).unwrap();
 
     // The chip connects to us, and palpate link connects to what passes its bytes on.
     let chips_end = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -111,16 +109,22 @@ fn soak_between_two_processes_neither_drifts_nor_grows_nor_loses_a_frame() {
     let dataset = Dataset::new((0..OBJECTS).map(object).collect());
     let (mut early, mut done, mut events) = ([None; 2], 0_u64, 0);
     let processes = ["self".to_owned(), chip.id().to_string()];
-    let summary =
-        stream(&mut connection, Steps::sequences(dataset, 300, count), &described, Some(&model), false, |_, update| {
+    let summary = stream(
+        &mut connection,
+        Steps::sequences(dataset, 300, count),
+        &described,
+        Some(&bytes),
+        Asks::Nothing,
+        |_, update| {
             done += u64::from(matches!(update, Update::Touch { .. } | Update::Refused { .. }));
             events += u32::from(matches!(update, Update::Event(..)));
             if done == count / 10 && early[0].is_none() {
                 early = processes.each_ref().map(|process| memory(process));
             }
             Ok(ControlFlow::Continue(()))
-        })
-        .unwrap();
+        },
+    )
+    .unwrap();
     let late = processes.each_ref().map(|process| memory(process));
     drop(connection);
     passing.join().unwrap();

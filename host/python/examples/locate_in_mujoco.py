@@ -223,8 +223,8 @@ def main():
     own, rest = parser.parse_known_args()
     # The maps expect contacts that a robot's fingers lose at slopes and edges.
     real = palpate.Real(height=0.6, lost=0.05, position=0.7, drift=0.3, drift_yaw=0.3)
+    meshes = own.meshes  # the robot's own arguments have meshes, too
     options = robot.arguments().parse_args(["-o", ".", "--stroke", "2", *rest], namespace=own)
-    meshes = own.meshes
     del own
     things = [Thing(path) for path in meshes]
     if options.maps:

@@ -177,6 +177,8 @@ def test_wrong_touches_are_refused(maps: palpate.Maps, tmp_path: Path) -> None:
     wedge.write_text("v 0 0 0\nv 40 0 0\nv 0 40 0\nv 0 0 40\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
     with pytest.raises(palpate.PalpateError, match="unit of the mesh is not known"):
         palpate.Maps.of_meshes([str(wedge)], probe=PROBE)
+    with pytest.raises(palpate.PalpateError, match="no objects"):
+        palpate.Maps.of_meshes({}, probe=PROBE)
     assert locator.touches == 0
 
 

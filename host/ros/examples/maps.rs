@@ -9,6 +9,7 @@
 
 use palpate::locate::{Settings, Surface, write};
 use palpate::probe::Probe;
+use palpate::with;
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -32,8 +33,8 @@ pub(crate) fn maps() -> palpate::Result<Vec<u8>> {
         is_round: *name == "puck",
     });
     let surfaces: Vec<Surface> = surfaces.collect();
-    let probe = Probe { radius: 1.5, spacing: 15.0, speed: 100.0, tilt: 0.0, stroke: Some(20.0), ..Probe::default() };
-    write(&surfaces, &objects.map(String::from), &probe, &Settings { fine: false, ..Settings::default() })
+    let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
+    write(&surfaces, &objects.map(String::from), &probe, &with!(Settings::default(), fine = false))
 }
 
 /// Height of an object over a place, in millimeters.

@@ -384,6 +384,7 @@ def test_a_hand_that_knows_where_it_is_learns_what_lies_where(maps):
     place, yaw = (0.012, -0.007), math.pi / 6
     with Node(maps, "--frame-id", "tray") as node:
         peer, last = Peer(node), qos(latched=True)
+        parameters = Service(peer, "set_parameters", SetParametersRequest, SetParametersResponse)
         verdicts, next_poses = peer.latched("verdict", Verdict), peer.reader("next_pose", PoseStamped, qos=last)
         poses, placements = peer.reader("pose", PoseWithCovarianceStamped), peer.reader("placement", String)
         touches = peer.writer("touch", Touch)
@@ -403,7 +404,6 @@ def test_a_hand_that_knows_where_it_is_learns_what_lies_where(maps):
         assert abs(at.x - place[0]) < 3 * covariance[0] ** 0.5 < 0.015
         assert abs(at.y - place[1]) < 3 * covariance[7] ** 0.5 < 0.015
         assert [index for index, number in enumerate(covariance) if number] == [0, 7, 35]
-        parameters = Service(peer, "set_parameters", SetParametersRequest, SetParametersResponse)
         for frame in ("", "table"):
             value = ParameterValue(4, string_value=frame)
             [result] = parameters.call(SetParametersRequest([Parameter("frame_id", value)])).results

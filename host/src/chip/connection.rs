@@ -3,6 +3,7 @@
 use super::Transport;
 use crate::error::{ChipProblem, Error, Place, Result};
 use crate::progress::{self, Progress};
+use palpate_onboard::locate::{Approach, Pose};
 use palpate_shared::link::{
     Answer, ApproachMessage, CHUNK, Command, Event, HostEnd, HostSettings, HostStatistics, Incoming, ModelInfo,
     Outcome, POSE_BYTES, Payload, Query, Refusal, Statistics, checksum,
@@ -30,6 +31,8 @@ enum Reply {
     Statistics(Statistics),
     Posteriors(Vec<u64>),
     NextApproach(ApproachMessage),
+    Place(bool, Option<Pose>),
+    NextPress(Approach),
     Program(String),
     Refused(Refusal),
     Other,
@@ -42,6 +45,8 @@ pub struct ChipModel {
     pub info: ModelInfo,
     /// The objects' names.
     pub names: Vec<String>,
+    /// The placements' names, of a model of maps.
+    pub placements: Vec<String>,
 }
 
 /// A session with a chip.
@@ -260,8 +265,17 @@ impl Connection {
                 reply => return self.unexpected(&reply),
             }
         }
+        let mut placements = Vec::new();
+        while info.has_maps() && placements.len() < 255 {
+            let placement = u8::try_from(placements.len()).unwrap_or(u8::MAX);
+            match self.ask(Query::Placement { placement })? {
+                Reply::Name(name) => placements.push(name),
+                Reply::Refused(Refusal::NoObject) => break,
+                reply => return self.unexpected(&reply),
+            }
+        }
         self.model = Some((info.checksum, self.end.boot()));
-        Ok(ChipModel { info, names })
+        Ok(ChipModel { info, names, placements })
     }
 
     /// Name and version of the chip's program; none if it does not say. A chip that does not know the question takes ten
@@ -317,6 +331,28 @@ impl Connection {
         }
     }
 
+    /// True if no finger met more than the table, and the most likely places of the most likely object, of a model of maps.
+    ///
+    /// # Errors
+    /// [`ChipProblem::Refused`] if it has none. When the line broke or the chip is silent.
+    pub fn places(&mut self) -> Result<(bool, Vec<Pose>)> {
+        places(|rank| match self.ask(Query::Place { rank })? {
+            Reply::Place(table_alone, place) => Ok((table_alone, place)),
+            reply => self.unexpected(&reply),
+        })
+    }
+
+    /// The approach straight down that the chip proposes, of a model of maps; `within` as in [`Query::NextPress`].
+    ///
+    /// # Errors
+    /// As [`places`](Self::places).
+    pub fn next_press(&mut self, within: Option<u32>) -> Result<Approach> {
+        match self.ask(Query::NextPress { within })? {
+            Reply::NextPress(approach) => Ok(approach),
+            reply => self.unexpected(&reply),
+        }
+    }
+
     /// Loads a model into the chip, which checks it before it uses it. `progress` counts bytes.
     ///
     /// # Errors
@@ -357,6 +393,16 @@ impl Connection {
     }
 }
 
+/// The places that are answered, from the most likely on, and whether no finger met more than the table.
+pub(super) fn places<E>(mut ask: impl FnMut(u8) -> Result<(bool, Option<Pose>), E>) -> Result<(bool, Vec<Pose>), E> {
+    let mut poses = Vec::new();
+    loop {
+        let (table_alone, place) = ask(u8::try_from(poses.len()).unwrap_or(u8::MAX))?;
+        let Some(place) = place.filter(|_| poses.len() < 255) else { return Ok((table_alone, poses)) };
+        poses.push(place);
+    }
+}
+
 fn keep(answer: Answer<'_>) -> Reply {
     match answer {
         Answer::Model(info) => Reply::Model(info),
@@ -366,6 +412,8 @@ fn keep(answer: Answer<'_>) -> Reply {
             Reply::Posteriors(bytes.as_chunks::<8>().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect())
         }
         Answer::NextApproach(approach) => Reply::NextApproach(approach),
+        Answer::Place { table_alone, place } => Reply::Place(table_alone, place),
+        Answer::NextPress(press) => Reply::NextPress(press),
         Answer::Program(program) => Reply::Program(program.into()),
         Answer::Refused(refusal) => Reply::Refused(refusal),
         _ => Reply::Other,

@@ -174,6 +174,9 @@ impl Problem for ChipProblem {
                  passes them to push_features, and its verdicts are the same."
             }
             Self::Refused(Refusal::NoObject) => "Load the model again.",
+            Self::Refused(Refusal::Position) => {
+                "Load maps, which `palpate train` makes of touches with a position, or leave positions out."
+            }
             Self::Refused(_) | Self::UnexpectedAnswer => {
                 "Flash the chip again: its program speaks another version of the link."
             }

@@ -153,7 +153,7 @@ impl Entry {
                 Some(Self::Fault { what: format!("a touch was not counted: {refusal}") })
             }
             Update::Next(approach) => Some(Self::next(approach)),
-            Update::Event(..) | Update::Idle => None,
+            Update::Located(_) | Update::Event(..) | Update::Idle => None,
         }
     }
 }

@@ -31,5 +31,5 @@ pub use journal::{Entry, Journal};
 pub use port::Port;
 pub use record::{RecordEvent, RecordSummary, record};
 pub use steps::{Step, Steps};
-pub use stream::{Summary, Update, probability, stream};
+pub use stream::{Asks, Located, Summary, Update, probability, stream};
 pub use transport::Transport;

@@ -1,17 +1,44 @@
 //! Touches to the chip, verdicts from it, and the host's own recognizer beside it.
 
+use super::connection::places;
 use super::{ChipModel, Connection, Received, Step, Steps};
 use crate::error::{ChipProblem, Result};
-use palpate_onboard::Model;
-use palpate_onboard::station::Station;
-use palpate_shared::Touch;
+use crate::locate::{Approach, CELLS, Pose, TOUCHES};
+use palpate_onboard::station::{NoStorage, Station, Table};
 use palpate_shared::link::{
-    ApproachMessage, Command, Decision, Device, Event, Outcome, POSE_BYTES, Refusal, TouchMessage, VerdictMessage,
+    ApproachMessage, Command, Decision, Device, Event, Outcome, POSE_BYTES, Refusal, VerdictMessage,
 };
+use palpate_shared::{Position, Touch};
 use serde::Serialize;
 use std::collections::VecDeque;
+use std::fmt::Debug;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
+
+/// Question to the chip after each touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asks {
+    /// None.
+    Nothing,
+    /// The next approach of the model's plan, unless the touch decided.
+    Approach,
+    /// The object's place, and the next approach within so many micrometers unless the touch decided, of a model of maps.
+    Place {
+        /// None: twice the maps' range.
+        within: Option<u32>,
+    },
+}
+
+/// The place of an object on the chip's table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Located {
+    /// True if no finger met more than the table so far.
+    pub table_alone: bool,
+    /// The most likely poses of the most likely object, best first.
+    pub poses: Vec<Pose>,
+    /// Where to touch next; none after a verdict.
+    pub next: Option<Approach>,
+}
 
 /// Something new from the chip.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +65,8 @@ pub enum Update {
     },
     /// The approach that the chip proposes next, after a touch that decided nothing.
     Next(ApproachMessage),
+    /// The object's place, after a touch.
+    Located(Located),
     /// Something that happened on the chip by itself, and how many events before it were lost.
     Event(Event, u32),
     /// Nothing has happened for a while.
@@ -53,9 +82,9 @@ pub struct Summary {
     pub refused: u64,
     /// Touches, counted or not, that were compared with the host's recognizer.
     pub compared: u64,
-    /// Proposed approaches that were compared with the host's recognizer.
+    /// Proposed approaches, with places, that were compared with the host's recognizer.
     pub approaches: u64,
-    /// Compared touches with another verdict, posterior, evidence or approach.
+    /// Compared touches with another verdict, posterior, evidence, place or approach.
     pub differences: u64,
     /// The first of them.
     pub first_difference: Option<String>,
@@ -118,44 +147,56 @@ enum Sent {
 }
 
 /// Streams `steps` to the chip until they end or `each` breaks, and passes every update to `each`, in order. With a
-/// `mirror`, the host recognizes the same touches with this model and compares every verdict, posterior and evidence.
-/// With `asks`, the chip is asked for the next approach after every touch that decided nothing, and its answer is compared
-/// too: one touch at a time is then under way.
+/// `mirror`, the host recognizes the same touches with this model's bytes and compares every verdict, posterior and evidence; with
+/// maps it has room for [`CELLS`] cells. Answers to `asks` are compared too: one touch at a time is then under way.
 ///
 /// # Errors
 /// When a step cannot be read, the chip refuses a touch, the line breaks, the mirror's model is not the chip's, or it is
-/// asked for an approach and its model has no plan.
+/// asked for what its model does not have; before a touch with a position is sent to a chip without maps, which may not know it.
 pub fn stream(
     connection: &mut Connection,
     mut steps: Steps,
     chip: &ChipModel,
-    mirror: Option<&Model<'_>>,
-    asks: bool,
+    mirror: Option<&[u8]>,
+    asks: Asks,
     mut each: impl FnMut(&mut Connection, Update) -> Result<ControlFlow<()>>,
 ) -> Result<Summary> {
     if let Some(model) = mirror
-        && model.checksum() != chip.info.checksum
+        && let expected = model.last_chunk().map_or(0, |stated| u32::from_le_bytes(*stated))
+        && expected != chip.info.checksum
     {
-        let problem = ChipProblem::OtherModel { chip: chip.info.checksum, expected: model.checksum() };
-        return Err(connection.wrong(problem));
+        return Err(connection.wrong(ChipProblem::OtherModel { chip: chip.info.checksum, expected }));
     }
-    let mut mirror = mirror.map(Station::<256>::new);
+    let mut table = Box::new(Table::new());
+    // Without storage no record is too short.
+    let mirror = mirror.and_then(|model| Mirror::open_with(model, NoStorage, &mut *table).ok());
+    let mut mirror = mirror.map(|(mirror, ..)| mirror);
     // A person who types lines wants each verdict before typing the next line.
-    let one_by_one = asks || matches!(steps, Steps::Lines { .. });
+    let one_by_one = asks != Asks::Nothing || matches!(steps, Steps::Lines { .. });
     let mut run = Run { summary: Summary::default(), under_way: VecDeque::new(), truth: None, decided: false };
-    let mut pending = None;
+    // An object whose place is asked for ends with its verdict, where lines do not say which touches are of it.
+    let (mut pending, mut has_ended) = (None, false);
     let mut more = true;
     let mut busy = Busy::default();
     while more || pending.is_some() || !run.under_way.is_empty() {
         while connection.has_room() && (pending.is_some() || more) && (!one_by_one || run.under_way.is_empty()) {
-            let step = match pending.take() {
+            let mut step = match pending.take() {
                 Some(step) => Some(step),
                 None => steps.next_step()?,
             };
+            if std::mem::take(&mut has_ended) && matches!(step, Some(Step::Touch(_))) {
+                pending = step.replace(Step::Object(None));
+            }
             let Some(step) = step else {
                 more = false;
                 break;
             };
+            if let Step::Touch(touch) = &step
+                && touch.position().is_some()
+                && !chip.info.has_maps()
+            {
+                return Err(connection.wrong(ChipProblem::Refused(Refusal::Position)));
+            }
             if !connection.submit(command(&step))? {
                 pending = Some(step);
                 break;
@@ -171,21 +212,36 @@ pub fn stream(
         };
         busy.set(!run.under_way.is_empty(), Instant::now());
         // A verdict ends the object: the next touch is of another one.
-        let is_open = match &update {
-            Update::Touch { verdict, .. } => verdict.decision == Decision::Undecided,
-            Update::Refused { .. } => !run.decided,
-            _ => false,
+        let (is_touch, is_open) = match &update {
+            Update::Touch { verdict, .. } => (true, verdict.decision == Decision::Undecided),
+            Update::Refused { .. } => (true, !run.decided),
+            _ => (false, false),
         };
         if each(connection, update)?.is_break() {
             break;
         }
-        if asks && is_open {
-            let approach = connection.next_approach()?;
-            let expected = mirror.as_ref().map(|mirror| mirror.next_approach(&[0; POSE_BYTES]));
-            run.compare_approaches(expected, approach);
-            if each(connection, Update::Next(approach))?.is_break() {
-                break;
+        let answer = match asks {
+            Asks::Approach if is_open => {
+                let approach = connection.next_approach()?;
+                let expected = mirror.as_ref().map(|mirror| mirror.next_approach(&[0; POSE_BYTES]));
+                run.compare_answers(expected, &Ok(approach));
+                Update::Next(approach)
             }
+            Asks::Place { within } if is_touch => {
+                let (table_alone, poses) = connection.places()?;
+                let next = if is_open { Some(connection.next_press(within)?) } else { None };
+                let located = Located { table_alone, poses, next };
+                run.compare_answers(
+                    mirror.as_mut().map(|mirror| expected(mirror, within, is_open)),
+                    &Ok(located.clone()),
+                );
+                has_ended = !is_open && matches!(steps, Steps::Lines { .. });
+                Update::Located(located)
+            }
+            _ => continue,
+        };
+        if each(connection, answer)?.is_break() {
+            break;
         }
     }
     busy.set(false, Instant::now());
@@ -205,14 +261,24 @@ pub fn stream(
     })
 }
 
+/// The host's own recognizer, with a chip's room for maps.
+type Mirror<'m> = Station<'m, 256, NoStorage, &'m mut Table<CELLS, TOUCHES, 16>>;
+
+/// The place that the host's own recognizer says.
+fn expected(mirror: &mut Mirror<'_>, within: Option<u32>, is_open: bool) -> Result<Located, Refusal> {
+    let (table_alone, poses) = places(|rank| mirror.place(rank))?;
+    let next = if is_open { Some(mirror.next_press(within)?) } else { None };
+    Ok(Located { table_alone, poses, next })
+}
+
 fn command(step: &Step) -> Command<'static> {
     match step {
         Step::Object(_) => Command::Reset,
-        Step::Touch(touch) => Command::Touch { touch: TouchMessage::from(touch), detail: true },
+        Step::Touch(touch) => Command::of_touch(touch, true),
     }
 }
 
-fn sent(step: Step, mirror: Option<&mut Station<'_, 256>>, chip: &ChipModel) -> Sent {
+fn sent(step: Step, mirror: Option<&mut Mirror<'_>>, chip: &ChipModel) -> Sent {
     match step {
         Step::Object(name) => {
             if let Some(mirror) = mirror {
@@ -222,7 +288,10 @@ fn sent(step: Step, mirror: Option<&mut Station<'_, 256>>, chip: &ChipModel) -> 
         }
         Step::Touch(touch) => {
             let Some(mirror) = mirror else { return Sent::Touch { touch, expected: None, posteriors: None } };
-            let expected = Some(mirror.push(&touch, true));
+            let expected = Some(match touch.position() {
+                Some(Position { micrometers }) => mirror.press(&touch, micrometers, true),
+                None => mirror.push(&touch, true),
+            });
             let objects = 0..=chip.info.last_object;
             let posteriors = objects.map(|object| mirror.posterior(object).map_or(0.0, probability)).collect();
             Sent::Touch { touch, expected, posteriors: Some(posteriors) }
@@ -287,13 +356,13 @@ impl Run {
         }
     }
 
-    fn compare_approaches(&mut self, expected: Option<Result<ApproachMessage, Refusal>>, approach: ApproachMessage) {
+    fn compare_answers<T: PartialEq + Debug>(&mut self, expected: Option<T>, answer: &T) {
         let Some(expected) = expected else { return };
         self.summary.approaches += 1;
-        if expected != Ok(approach) {
+        if expected != *answer {
             self.summary.differences += 1;
             let number = self.summary.touches + self.summary.refused;
-            let difference = || format!("after touch {number} the host proposes {expected:?}, the chip {approach:?}");
+            let difference = || format!("after touch {number} the host says {expected:?}, the chip {answer:?}");
             self.summary.first_difference.get_or_insert_with(difference);
         }
     }

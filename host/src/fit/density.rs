@@ -11,7 +11,7 @@
 
 use super::candidate::{Hypothesis, NOISE};
 use super::late::Late;
-use super::line::{Axis, LEVELS, Line, RATIO, deviation_of};
+use super::line::{Axis, Kernel, LEVELS, Line, RATIO, deviation_of, mix};
 use super::observed::{FULL, OUTER, Observed, mirrored};
 use crate::random::{self, Purpose};
 use palpate_shared::Touch;
@@ -33,45 +33,46 @@ struct Plane {
 }
 
 impl Plane {
-    /// A density of these samples and their mirror images, whose second number has the other sign.
-    fn new(samples: &[[f32; 2]], deviation: f64) -> Self {
+    /// A density of these samples and their mirror images, whose second number has the other sign; and that of the second
+    /// number alone.
+    fn new(samples: &[[f32; 2]], deviation: f64) -> (Self, Line) {
         let deviations = [6.0_f64.sqrt() * deviation, 2.0_f64.sqrt() * deviation];
         let axes = [0, 1].map(|axis| {
             let farthest = samples.iter().fold(1.0_f64, |most, sample| most.max(f64::from(sample[axis].abs())));
             Axis::new(deviations[axis], 1.2 * farthest + 4.0 * deviations[axis])
         });
-        let values = [0, 1]
-            .map(|axis: usize| -> Vec<f64> { (0..axes[axis].cells()).map(|cell| axes[axis].value(cell)).collect() });
+        let values = axes.each_ref().map(Axis::values);
         let columns = axes[1].cells();
         let mut density = vec![0.0_f32; axes[0].cells() * columns];
-        let (mut down, mut across) = (Vec::new(), Vec::new());
+        let mut second = Line::empty(axes[1].clone());
+        let (mut down, mut across) = (Kernel::default(), Kernel::default());
         for &[x, y] in samples {
-            let row = axes[0].kernel(x.into(), deviations[0], &values[0], &mut down);
-            for y in [y, -y] {
-                let column = axes[1].kernel(y.into(), deviations[1], &values[1], &mut across);
-                for (row, height) in (row..).zip(&down) {
+            axes[0].kernel(x.into(), deviations[0], &values[0], &mut down);
+            axes[1].kernel(y.into(), deviations[1], &values[1], &mut across);
+            let (row, down) = down.own();
+            for (column, across) in [across.own(), across.mirrored()] {
+                second.add((column, across));
+                for (row, height) in (row..).zip(down) {
                     let cells = density[row * columns + column..].iter_mut();
-                    cells.zip(&across).for_each(|(cell, own)| *cell += height * own);
+                    cells.zip(across).for_each(|(cell, own)| *cell += height * own);
                 }
             }
         }
         let share = 0.5 / samples.len().max(1) as f32;
         density.iter_mut().for_each(|cell| *cell *= share);
-        Self { axes, density }
+        (Self { axes, density }, second.scaled(2 * samples.len()))
     }
 
     fn at(&self, x: f64, y: f64) -> f64 {
-        let [Some((row, down)), Some((column, across))] = [self.axes[0].between(x), self.axes[1].between(y)] else {
+        let (Some((row, down)), Some((column, across))) = (self.axes[0].between(x), self.axes[1].between(y)) else {
             return 0.0;
         };
         let columns = self.axes[1].cells();
         let at = |row: usize| {
             let first = row * columns + column;
-            let [one, other] = [first, first + 1].map(|cell| f64::from(self.density[cell]));
-            one + across * (other - one)
+            mix(self.density[first].into(), self.density[first + 1].into(), across)
         };
-        let [one, other] = [at(row), at(row + 1)];
-        one + down * (other - one)
+        mix(at(row), at(row + 1), down)
     }
 }
 
@@ -94,7 +95,8 @@ pub(super) struct Densities {
     full: Vec<[f32; 2]>,
     /// The middle finger's time less the outer one's.
     neighbors: [Vec<f32>; 2],
-    outer: [Vec<f32>; 2],
+    /// The third finger's time less the first one's, where only these two touch.
+    outer: Vec<f32>,
     /// The share of each set of fingers among all approaches, a set and its mirror image alike.
     pub(super) shares: [f64; 8],
     /// Contact times of some of the approaches, in milliseconds.
@@ -108,7 +110,7 @@ impl Densities {
     /// Densities of simulated approaches, with contact or without, that no stroke ended; and the recordings' stroke as a time in
     /// milliseconds.
     pub(super) fn new(name: &str, touches: &[Touch], window: Option<f64>) -> Self {
-        let (mut full, mut neighbors, mut outer) = (Vec::new(), [Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
+        let (mut full, mut neighbors, mut outer) = (Vec::new(), [Vec::new(), Vec::new()], Vec::new());
         let mut counts = [0_u32; 8];
         for observed in touches.iter().map(Observed::of) {
             counts[usize::from(observed.fingers)] += 1;
@@ -118,11 +120,10 @@ impl Densities {
                     full.push([first as f32, second as f32]);
                     // κ is the sum, the slope the difference, of the outer fingers' delays after the middle one.
                     neighbors[1].extend([(first + second) / -2.0, (first - second) / -2.0].map(|late| late as f32));
-                    outer[1].extend([second as f32, -second as f32]);
                 }
                 0b011 => neighbors[0].push(first as f32),
                 0b110 => neighbors[0].push(-first as f32),
-                OUTER => outer[0].extend([first as f32, -first as f32]),
+                OUTER => outer.extend([first as f32, -first as f32]),
                 _ => {}
             }
         }
@@ -164,18 +165,18 @@ impl Densities {
 
     /// Makes the tables of usual noise, side by side; those of other noise are made when they are needed.
     pub(super) fn prepare(&self) {
-        (5..17).into_par_iter().for_each(|level| _ = self.level(level));
+        (9..17).into_par_iter().for_each(|level| _ = self.level(level));
     }
 
     fn level(&self, level: usize) -> &Level {
         self.levels[level].get_or_init(|| {
             let deviation = deviation_of(level);
             let pair = 2.0_f64.sqrt() * deviation;
-            let lines = |samples: &[Vec<f32>; 2]| [0, 1].map(|which: usize| Line::new(&samples[which], pair));
+            let (full, outer) = Plane::new(&self.full, deviation);
             Level {
-                full: Plane::new(&self.full, deviation),
-                neighbors: lines(&self.neighbors),
-                outer: lines(&self.outer),
+                full,
+                neighbors: self.neighbors.each_ref().map(|samples| Line::new(samples, pair)),
+                outer: [Line::new(&self.outer, pair), outer],
             }
         })
     }
@@ -199,32 +200,40 @@ pub(super) struct Smoothed<'a> {
     late: Option<&'a Late>,
 }
 
-impl Smoothed<'_> {
-    fn between(&self, at: impl Fn(&Level) -> f64) -> f64 {
-        let [one, other] = self.levels.map(at);
-        one + self.share * (other - one)
-    }
+/// Position of a difference of two fingers' times, in cells from 0 in the tables of both levels.
+pub(super) struct Apart([f64; 2]);
 
+impl Smoothed<'_> {
     /// Density of κ and slope of a full touch, per square millisecond.
     pub(super) fn full(&self, curvature: f64, slope: f64) -> f64 {
-        self.between(|level| level.full.at(curvature, slope))
+        let [one, other] = self.levels;
+        mix(one.full.at(curvature, slope), other.full.at(curvature, slope), self.share)
+    }
+
+    /// Position of a difference of two fingers' times in the tables of both levels.
+    pub(super) fn apart(&self, late: f64) -> Apart {
+        let [one, other] = self.levels;
+        Apart([one.neighbors[0].away(late), other.neighbors[0].away(late)])
+    }
+
+    fn pair(&self, Apart([one, other]): &Apart, lines: impl Fn(&Level) -> &Line) -> f64 {
+        mix(lines(self.levels[0]).at(*one), lines(self.levels[1]).at(*other), self.share)
     }
 
     /// Density of how much later the middle finger is than an outer one, per millisecond, if only these two touch and if all do.
-    pub(super) fn neighbors(&self, late: f64) -> [f64; 2] {
-        [0, 1].map(|which: usize| self.between(|level| level.neighbors[which].at(late)))
+    pub(super) fn neighbors(&self, apart: &Apart) -> [f64; 2] {
+        [self.pair(apart, |level| &level.neighbors[0]), self.pair(apart, |level| &level.neighbors[1])]
     }
 
     /// Density of the difference between the outer fingers.
-    pub(super) fn outer(&self, late: f64) -> [f64; 2] {
-        [0, 1].map(|which: usize| self.between(|level| level.outer[which].at(late)))
+    pub(super) fn outer(&self, apart: &Apart) -> [f64; 2] {
+        [self.pair(apart, |level| &level.outer[0]), self.pair(apart, |level| &level.outer[1])]
     }
 
     /// [`Late::density`], 0 without a stroke.
-    pub(super) fn late(&self, window: f64, which: usize, apart: f64) -> f64 {
+    pub(super) fn late(&self, window: f64, which: usize, Apart([one, other]): &Apart) -> f64 {
         let Some(late) = self.late else { return 0.0 };
-        let at = |level: usize| late.density(window, level, 2.0_f64.sqrt() * deviation_of(level), which, apart);
-        let [one, other] = [self.level, self.level + 1].map(at);
-        one + self.share * (other - one)
+        let at = |level: usize, away| late.density(window, level, 2.0_f64.sqrt() * deviation_of(level), which, away);
+        mix(at(self.level, *one), at(self.level + 1, *other), self.share)
     }
 }

@@ -6,7 +6,7 @@
 //! one and read with interpolation. What is recorded lies within the stroke, where nothing changes. Noise, a hundredth of
 //! a stroke, is left out at its end, and offsets where only one contact was recorded.
 
-use super::line::{LEVELS, Line};
+use super::line::{LEVELS, Line, mix};
 use super::observed::{FULL, OUTER, Observed, mirrored};
 use palpate_shared::Touch;
 use std::sync::OnceLock;
@@ -48,8 +48,7 @@ impl Late {
 
     fn between(&self, window: f64, of: impl Fn(&Step) -> f64) -> f64 {
         let (lower, share) = self.place(window);
-        let [one, other] = [lower, lower + 1].map(|step| of(&self.steps[step]));
-        one + share * (other - one)
+        mix(of(&self.steps[lower]), of(&self.steps[lower + 1]), share)
     }
 
     /// The share of each set of fingers among all approaches where the stroke takes this long.
@@ -58,9 +57,10 @@ impl Late {
     }
 
     /// The density among all approaches of two fingers' difference while the third, which would touch too, is late: of
-    /// neighbors or, with `which` 1, of the outer fingers. `deviation` is the noise of level `level`.
-    pub(super) fn density(&self, window: f64, level: usize, deviation: f64, which: usize, late: f64) -> f64 {
-        self.between(window, |step| step.of_full[which] * step.level(level, deviation)[which].at(late))
+    /// neighbors or, with `which` 1, of the outer fingers. `deviation` is the noise of level `level`, and `away` the
+    /// difference in cells of its tables.
+    pub(super) fn density(&self, window: f64, level: usize, deviation: f64, which: usize, away: f64) -> f64 {
+        self.between(window, |step| step.of_full[which] * step.level(level, deviation)[which].at(away))
     }
 }
 
@@ -115,7 +115,8 @@ mod tests {
             assert!((shares[0b011] + shares[0b110] - cut / 3.0).abs() < 2e-3, "{window}: {shares:?}");
             assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-9);
             // A Gaussian about 10 ms; half of it for either two neighbors.
-            let density = late.density(window, 0, 2.0, 0, 10.0);
+            let away = late.steps[0].level(0, 2.0)[0].away(10.0);
+            let density = late.density(window, 0, 2.0, 0, away);
             let peak = 1.0 / (2.0_f64.hypot(0.3) * std::f64::consts::TAU.sqrt());
             assert!((density / (cut / 6.0 * peak) - 1.0).abs() < 0.03, "{window}: {density}");
         }

@@ -172,6 +172,8 @@ impl Layers<'_> {
     /// Compass search: a step to either side of each number, and half of it where none is better.
     fn best(&self, plain: &Best) -> Result<(Numbers, Best)> {
         let (mut numbers, mut best) = (START, self.explained(START, &plain.candidate, slopes::again)?);
+        // What was tried is no better.
+        let mut tried = vec![START];
         let [mut step, last] = STEPS;
         while step > last {
             let mut moved = false;
@@ -179,9 +181,10 @@ impl Layers<'_> {
                 for way in [step, -step] {
                     let mut there = numbers;
                     there[index] += way;
-                    if there[0] < 0.0 || there[1] < -4.0 {
+                    if there[0] < 0.0 || there[1] < -4.0 || tried.contains(&there) {
                         continue;
                     }
+                    tried.push(there);
                     let found = self.explained(there, &best.candidate, slopes::again)?;
                     if found.log_likelihood > best.log_likelihood + 0.05 {
                         (numbers, best, moved) = (there, found, true);

@@ -2,14 +2,12 @@
 
 use super::candidate::{Hypothesis, NOISE};
 use super::density::Densities;
-use super::observed::{FULL, OUTER, Observed};
+use super::observed::{FULL, OUTER, Observed, wide};
 use palpate_shared::format::Counted;
 use std::f64::consts::TAU;
 
 /// The share of touches that come from nowhere: so that one odd touch cannot decide a fit.
 const ODD: f64 = 0.004;
-/// Spread of the times of odd touches, in milliseconds.
-const ODD_SPREAD: f64 = 150.0;
 
 /// Likelihood of one object's touches under a candidate.
 pub(super) struct Explained<'a> {
@@ -42,8 +40,13 @@ impl<'a> Explained<'a> {
         let shares = stroke.map_or(object.shares, |stroke| stroke.shares);
         let touched = |fingers: u8| -> f64 { shares[usize::from(fingers)] };
         // An approach is not recorded if every finger that touched missed its contact.
-        let set = |touched: u8| std::array::from_fn(|recorded| product(touched, recorded as u8, &candidate.missed));
-        let products: [[f64; 8]; 8] = std::array::from_fn(|touched| set(touched as u8));
+        // Loops, since arrays that are made by functions take longer than all touches where assertions are on.
+        let mut products = [[0.0; 8]; 8];
+        for (touched, products) in (0..).zip(&mut products) {
+            for (recorded, own) in (0..).zip(products) {
+                *own = product(touched, recorded, &candidate.missed);
+            }
+        }
         let nothing: f64 = (0..8).map(|fingers| touched(fingers) * products[usize::from(fingers)][0]).sum();
         let recorded = match kept {
             Counted::All | Counted::Full => 0.0,
@@ -73,17 +76,24 @@ impl<'a> Explained<'a> {
     /// The logarithm of the density of a touch in any pose.
     pub(super) fn log_density(&self, observed: &Observed) -> f64 {
         let Hypothesis { factor, late: [first, middle, third], .. } = self.candidate;
-        let Observed { fingers, first: x, second: y } = *observed;
-        let (times, odd) = match fingers {
-            FULL => {
+        let Observed { fingers, first: x, second: y, odd } = *observed;
+        // Of two contacts the difference of their times on the simulated clock.
+        let apart = match fingers {
+            0b011 => Some((x - (middle - first)) / factor),
+            0b110 => Some((third - middle - x) / factor),
+            OUTER => Some((x - (third - first)) / factor),
+            _ => None,
+        };
+        let apart = apart.map(|apart| self.smoothed.apart(apart));
+        let times = match (fingers, &apart) {
+            (FULL, _) => {
                 let curvature = (x - (first - 2.0 * middle + third)) / factor;
                 let slope = (y - (third - first)) / factor;
-                ([0.0, self.smoothed.full(curvature, slope) / (factor * factor)], wide(x) * wide(y))
+                [0.0, self.smoothed.full(curvature, slope) / (factor * factor)]
             }
-            0b011 => (self.smoothed.neighbors((x - (middle - first)) / factor).map(|d| d / factor), wide(x)),
-            0b110 => (self.smoothed.neighbors((third - middle - x) / factor).map(|d| d / factor), wide(x)),
-            OUTER => (self.smoothed.outer((x - (third - first)) / factor).map(|d| d / factor), wide(x)),
-            _ => ([1.0; 2], 1.0),
+            (OUTER, Some(apart)) => self.smoothed.outer(apart).map(|d| d / factor),
+            (_, Some(apart)) => self.smoothed.neighbors(apart).map(|d| d / factor),
+            _ => [1.0; 2],
         };
         let full = usize::from(FULL);
         if self.kept == Counted::Full {
@@ -101,18 +111,17 @@ impl<'a> Explained<'a> {
             let share = shares[usize::from(touched)] * self.product(touched, fingers);
             density += share * times[usize::from(touched == FULL)];
         }
-        if let Some(window) = self.window() {
+        if let (Some(window), Some(apart)) = (self.window(), &apart) {
             // The third finger would have touched too, later than the stroke, which began with the first of these two.
-            let late = |which: usize, apart: f64, [from, to, third]: [f64; 3]| {
+            let late = |which: usize, [from, to, third]: [f64; 3]| {
                 let began = if x > 0.0 { from } else { to };
-                self.smoothed.late((window - third + began) / factor, which, apart / factor) / factor
+                self.smoothed.late((window - third + began) / factor, which, apart) / factor
             };
             density += self.product(fingers, fingers)
                 * match fingers {
-                    0b011 => late(0, x - (middle - first), [first, middle, third]),
-                    0b110 => late(0, third - middle - x, [middle, third, first]),
-                    OUTER => late(1, x - (third - first), [first, third, middle]),
-                    _ => 0.0,
+                    0b011 => late(0, [first, middle, third]),
+                    0b110 => late(0, [middle, third, first]),
+                    _ => late(1, [first, third, middle]),
                 };
         }
         (density * (1.0 - ODD) + ODD * odd / 8.0).ln() - self.recorded
@@ -120,23 +129,29 @@ impl<'a> Explained<'a> {
 
     /// The logarithm of the likelihood of touches in any pose.
     pub(super) fn log_likelihood(&self, touches: &[Observed]) -> f64 {
-        touches.iter().map(|touch| self.log_density(touch)).sum()
+        let few = self.few();
+        let of = |touch: &Observed| few[usize::from(touch.fingers)].unwrap_or_else(|| self.log_density(touch));
+        touches.iter().map(of).sum()
+    }
+
+    /// The logarithms of the densities of touches with one contact or none, which have no times.
+    fn few(&self) -> [Option<f64>; 8] {
+        let mut few = [None; 8];
+        for fingers in [0b000, 0b001, 0b010, 0b100] {
+            few[usize::from(fingers)] = Some(self.log_density(&Observed::without_times(fingers)));
+        }
+        few
     }
 }
 
 /// The probability that of the `touched` fingers these are `recorded` and the others missed their contact.
 pub(super) fn product(touched: u8, recorded: u8, missed: &[f64; 3]) -> f64 {
-    let of = |(finger, missed): (u8, &f64)| match (touched >> finger & 1, recorded >> finger & 1) {
+    let of = |finger: usize| match (touched >> finger & 1, recorded >> finger & 1) {
         (0, _) => 1.0,
-        (_, 0) => *missed,
-        _ => 1.0 - missed,
+        (_, 0) => missed[finger],
+        _ => 1.0 - missed[finger],
     };
-    (0..).zip(missed).map(of).product()
-}
-
-/// A density that is nowhere small: Cauchy's.
-fn wide(x: f64) -> f64 {
-    2.0 / (TAU * ODD_SPREAD * (1.0 + (x / ODD_SPREAD).powi(2)))
+    of(0) * of(1) * of(2)
 }
 
 /// Presses on a flat plate: curvature is 0 except for the probe's own, and the slope is the plate's, with the other sign after each
@@ -144,8 +159,8 @@ fn wide(x: f64) -> f64 {
 /// of an object, and misses nothing, so its noise and its missed contacts are its own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plate {
-    /// Full touches of presses in one direction of the row, and in the other.
-    pub(super) presses: Vec<(f64, Observed)>,
+    /// Full touches of presses: 1 in one direction of the row, −1 in the other; and how likely each is as an odd one.
+    presses: Vec<(f64, Observed, f64)>,
     /// Number of presses.
     pub(super) count: usize,
 }
@@ -159,7 +174,7 @@ impl Plate {
         for (turn, observed) in [1.0, -1.0].into_iter().cycle().zip(touches) {
             plate.count += 1;
             if observed.fingers == FULL {
-                plate.presses.push((turn, observed));
+                plate.presses.push((turn, observed, ODD * wide(observed.first) * wide(observed.second)));
             }
         }
         plate
@@ -170,12 +185,12 @@ impl Plate {
         let [first, middle, third] = candidate.late;
         let [curvature, slope] = [first - 2.0 * middle + third, third - first];
         let count = self.presses.len().max(1) as f64;
-        let tilt: f64 = self.presses.iter().map(|(turn, press)| turn * (press.second - slope)).sum::<f64>() / count;
+        let tilt: f64 = self.presses.iter().map(|(turn, press, _)| turn * (press.second - slope)).sum::<f64>() / count;
         let normal = |x: f64, deviation: f64| (-0.5 * (x / deviation).powi(2)).exp() / (deviation * TAU.sqrt());
         // For each press its two deviations for a noise of 1, and how likely it is as an odd one.
-        let presses = self.presses.iter().map(|(turn, press)| {
+        let presses = self.presses.iter().map(|(turn, press, odd)| {
             let [one, other] = [press.first - curvature, press.second - slope - turn * tilt];
-            (one / 6.0_f64.sqrt(), other / 2.0_f64.sqrt(), ODD * wide(press.first) * wide(press.second))
+            (one / 6.0_f64.sqrt(), other / 2.0_f64.sqrt(), *odd)
         });
         let presses: Vec<(f64, f64, f64)> = presses.collect();
         let of = |noise: f64, &(one, other, odd): &(f64, f64, f64)| {
@@ -191,7 +206,11 @@ impl Plate {
                 square += times / all * (press.0.powi(2) + press.1.powi(2));
                 weight += times / all;
             }
+            let last = noise;
             noise = (square / (2.0 * weight).max(1e-9)).sqrt().clamp(NOISE[0], NOISE[1]);
+            if noise == last {
+                break;
+            }
         }
         presses.iter().map(|press| of(noise, press).1.ln()).sum()
     }

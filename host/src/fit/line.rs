@@ -36,35 +36,76 @@ impl Axis {
         2 * self.half + 1
     }
 
-    /// Position of x, in cells from the first.
-    pub(super) fn position(&self, x: f64) -> f64 {
+    /// Position of x, in cells from 0: on all axes of the same deviation the same.
+    fn away(&self, x: f64) -> f64 {
         // The standard library's asinh takes three times as long, for digits near 0 that no cell needs.
         let x = self.scale * x;
-        (x.abs() + (x * x + 1.0).sqrt()).ln().copysign(x) / GROWTH + self.half as f64
+        (x.abs() + (x * x + 1.0).sqrt()).ln().copysign(x) / GROWTH
     }
 
-    pub(super) fn value(&self, cell: usize) -> f64 {
+    fn value(&self, cell: usize) -> f64 {
         (GROWTH * (cell as f64 - self.half as f64)).sinh() / GROWTH * self.width
     }
 
     /// The first of the two cells that x lies between, and how far it is from the first to the second; none outside.
     pub(super) fn between(&self, x: f64) -> Option<(usize, f64)> {
-        let position = self.position(x);
+        self.between_cells(self.away(x))
+    }
+
+    /// Like [`Axis::between`], for a position in cells from 0.
+    fn between_cells(&self, away: f64) -> Option<(usize, f64)> {
+        let position = away + self.half as f64;
         let cell = position.floor();
         (cell >= 0.0 && position < (self.cells() - 1) as f64).then_some((cell as usize, position - cell))
     }
 
-    /// The kernel of a sample at x: its first cell, and its density at this and the following cells.
-    pub(super) fn kernel(&self, x: f64, deviation: f64, values: &[f64], kernel: &mut Vec<f32>) -> usize {
+    /// Makes the kernel of a sample at x, and of its mirror image.
+    pub(super) fn kernel(&self, x: f64, deviation: f64, values: &[f64], kernel: &mut Kernel) {
         let width = deviation.hypot(SMOOTHING * x);
-        let last = (self.cells() - 1) as f64;
-        let cell = |x: f64| self.position(x).clamp(0.0, last);
-        let (from, to) = (cell(x - REACH * width).ceil() as usize, cell(x + REACH * width).floor() as usize);
+        let (low, high) = (self.away(x - REACH * width), self.away(x + REACH * width));
+        let last = self.cells() - 1;
+        let cell = |away: f64| (away + self.half as f64).clamp(0.0, last as f64);
+        let range = |low: f64, high: f64| {
+            let (from, to) = (cell(low).ceil() as usize, cell(high).floor() as usize);
+            from..=to.max(from)
+        };
+        let (own, mirrored) = (range(low, high), range(-high, -low));
+        // Rounding may make one of them longer.
+        let [from, to] = [*own.start().min(&(last - mirrored.end())), *own.end().max(&(last - mirrored.start()))];
         let height = 1.0 / (width * std::f64::consts::TAU.sqrt());
-        kernel.clear();
+        kernel.first = [*own.start(), *mirrored.start()];
         let density = |value: &f64| (height * (-0.5 * ((value - x) / width).powi(2)).exp()) as f32;
-        kernel.extend(values[from..=to.max(from)].iter().map(density));
-        from
+        kernel.both.clear();
+        kernel.both.extend(values[from..=to].iter().map(density));
+        kernel.mirrored.clear();
+        kernel.mirrored.extend(kernel.both[last - mirrored.end() - from..=last - mirrored.start() - from].iter().rev());
+        kernel.own = own.start() - from..own.end() + 1 - from;
+    }
+
+    /// The value of each cell.
+    pub(super) fn values(&self) -> Vec<f64> {
+        (0..self.cells()).map(|cell| self.value(cell)).collect()
+    }
+}
+
+/// The kernel of a sample and that of its mirror image, whose number has the other sign.
+#[derive(Default)]
+pub(super) struct Kernel {
+    first: [usize; 2],
+    both: Vec<f32>,
+    own: std::ops::Range<usize>,
+    mirrored: Vec<f32>,
+}
+
+impl Kernel {
+    /// The first cell, and the density at this and the following cells.
+    pub(super) fn own(&self) -> (usize, &[f32]) {
+        (self.first[0], &self.both[self.own.clone()])
+    }
+
+    /// [`Kernel::own`] of the mirror image.
+    pub(super) fn mirrored(&self) -> (usize, &[f32]) {
+        (self.first[1], &self.mirrored)
     }
 }
 
@@ -79,22 +120,47 @@ impl Line {
     pub(super) fn new(samples: &[f32], deviation: f64) -> Self {
         let farthest = samples.iter().fold(1.0_f64, |most, x| most.max(f64::from(x.abs())));
         let axis = Axis::new(deviation, 1.2 * farthest + 4.0 * deviation);
-        let values: Vec<f64> = (0..axis.cells()).map(|cell| axis.value(cell)).collect();
-        let (mut density, mut kernel) = (vec![0.0; axis.cells()], Vec::new());
+        let values = axis.values();
+        let (mut line, mut kernel) = (Self::empty(axis), Kernel::default());
         for &x in samples {
-            let from = axis.kernel(x.into(), deviation, &values, &mut kernel);
-            density[from..].iter_mut().zip(&kernel).for_each(|(cell, height)| *cell += height);
+            line.axis.kernel(x.into(), deviation, &values, &mut kernel);
+            line.add(kernel.own());
         }
-        let share = 1.0 / samples.len().max(1) as f32;
-        density.iter_mut().for_each(|cell| *cell *= share);
-        Self { axis, density }
+        line.scaled(samples.len())
     }
 
-    pub(super) fn at(&self, x: f64) -> f64 {
-        let Some((cell, share)) = self.axis.between(x) else { return 0.0 };
-        let [one, other] = [cell, cell + 1].map(|cell| f64::from(self.density[cell]));
-        one + share * (other - one)
+    /// A density of no samples.
+    pub(super) fn empty(axis: Axis) -> Self {
+        Self { density: vec![0.0; axis.cells()], axis }
     }
+
+    /// Adds a sample's kernel.
+    pub(super) fn add(&mut self, (from, kernel): (usize, &[f32])) {
+        self.density[from..].iter_mut().zip(kernel).for_each(|(cell, height)| *cell += height);
+    }
+
+    /// The density where so many samples were added.
+    pub(super) fn scaled(mut self, samples: usize) -> Self {
+        let share = 1.0 / samples.max(1) as f32;
+        self.density.iter_mut().for_each(|cell| *cell *= share);
+        self
+    }
+
+    /// Position of x, in cells from 0: in all lines of the same deviation the same.
+    pub(super) fn away(&self, x: f64) -> f64 {
+        self.axis.away(x)
+    }
+
+    /// The density at a position in cells from 0.
+    pub(super) fn at(&self, away: f64) -> f64 {
+        let Some((cell, share)) = self.axis.between_cells(away) else { return 0.0 };
+        mix(self.density[cell].into(), self.density[cell + 1].into(), share)
+    }
+}
+
+/// The value this share of the way from one to the other.
+pub(super) fn mix(one: f64, other: f64, share: f64) -> f64 {
+    one + share * (other - one)
 }
 
 /// The standard deviation of a level, in milliseconds.

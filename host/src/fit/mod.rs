@@ -172,7 +172,8 @@ pub fn fit(
     let pressed = plate.map(|touches| Plate::new(touches.iter().map(Observed::of)));
     let layer = layer::layer(&recordings, samples, pressed.as_ref(), stroke, progress)?;
     let simulated = Simulated::new(touched, layer, settings, progress)?;
-    fit_to(&simulated, stroke, recorded, plate, settings, progress)
+    let densities = simulated.densities(stroke);
+    fit_to(&simulated, &densities, stroke, recorded, plate, settings, progress)
 }
 
 /// The object or placement of each recording, if there are enough touches.
@@ -187,21 +188,20 @@ fn useful(recorded: &Dataset, touched: &[Touched], plate: Option<&[Touch]>) -> R
     Ok(of)
 }
 
-/// Like [`fit`], to simulated touches.
+/// Like [`fit`], to simulated touches and their densities.
 fn fit_to(
     simulated: &Simulated,
+    objects: &[Densities],
     stroke: Stroke,
     recorded: &Dataset,
     plate: Option<&[Touch]>,
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
-    let Simulated { touches, touched, layer } = simulated;
-    let place = |own: &ObjectTouches| place(&own.name, touches.iter().map(|own| own.name.as_str()));
+    let Simulated { touched, layer, .. } = simulated;
+    let place = |own: &ObjectTouches| place(&own.name, objects.iter().map(|own| own.name.as_str()));
     let of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
     let kept = kept(recorded);
-    let densities = |own: &ObjectTouches| Densities::new(&own.name, own.touches(), stroke.window);
-    let objects: Vec<Densities> = touches.iter().map(densities).collect();
     let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
         in_poses: posed::in_poses(&own.name, own.touches(), &touched[object], &layer.real, settings),
         is_mixed: touched[object].is_mixed(),
@@ -210,7 +210,7 @@ fn fit_to(
     let recordings: Vec<Recording<'_>> = recordings.collect();
     let evidence = Evidence {
         recordings: &recordings,
-        objects: &objects,
+        objects,
         of,
         plate: plate.map(|touches| Plate::new(touches.iter().map(Observed::of))),
         stroke,
@@ -281,6 +281,12 @@ impl Simulated {
         };
         let touches = touched.iter().map(one).collect::<Result<_>>()?;
         Ok(Self { touches, touched, layer })
+    }
+
+    /// The densities of the touches where the recordings have this stroke.
+    fn densities(&self, stroke: Stroke) -> Vec<Densities> {
+        let of = |own: &ObjectTouches| Densities::new(&own.name, own.touches(), stroke.window);
+        self.touches.iter().map(of).collect()
     }
 }
 

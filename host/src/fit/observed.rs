@@ -1,6 +1,7 @@
 //! Touches as a fit sees them: which fingers touched, and differences of their times.
 
 use palpate_shared::Touch;
+use std::f64::consts::TAU;
 
 /// Observation of a touch: which fingers touched, and how far apart in time, in milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,7 +13,12 @@ pub(super) struct Observed {
     pub(super) first: f64,
     /// The signed slope of a full touch, else 0.
     pub(super) second: f64,
+    /// The density of these times if they come from nowhere; 1 without times.
+    pub(super) odd: f64,
 }
+
+/// Spread of the times of odd touches, in milliseconds.
+const ODD_SPREAD: f64 = 150.0;
 
 /// All three fingers.
 pub(super) const FULL: u8 = 0b111;
@@ -33,13 +39,28 @@ impl Observed {
             [Some(a), None, Some(c)] => (OUTER, c - a, 0.0),
             [a, b, c] => (u8::from(a.is_some()) | u8::from(b.is_some()) << 1 | u8::from(c.is_some()) << 2, 0.0, 0.0),
         };
-        Self { fingers, first, second }
+        let odd = match fingers {
+            FULL => wide(first) * wide(second),
+            0b011 | 0b110 | OUTER => wide(first),
+            _ => 1.0,
+        };
+        Self { fingers, first, second, odd }
+    }
+
+    /// Observation of these fingers, fewer than two of which touched.
+    pub(super) fn without_times(fingers: u8) -> Self {
+        Self { fingers, first: 0.0, second: 0.0, odd: 1.0 }
     }
 
     /// Number of fingers that touched.
     pub(super) fn contacts(self) -> u32 {
         self.fingers.count_ones()
     }
+}
+
+/// A density that is nowhere small: Cauchy's.
+pub(super) fn wide(x: f64) -> f64 {
+    2.0 / (TAU * ODD_SPREAD * (1.0 + (x / ODD_SPREAD).powi(2)))
 }
 
 /// The share of each set of fingers, a set and its mirror image alike, of these counts among `all` approaches.

@@ -31,7 +31,12 @@ const NEIGHBOR: usize = 3;
 
 /// Approaches in the pose of one recorded touch.
 #[derive(Debug)]
-pub(super) struct InPose(Vec<Simulated>);
+pub(super) struct InPose {
+    /// Approaches with contacts of all fingers that were recorded: no others explain the touch.
+    explaining: Vec<Simulated>,
+    /// Number of approaches.
+    count: f64,
+}
 
 #[derive(Clone, Copy, Debug)]
 struct Simulated {
@@ -76,7 +81,9 @@ pub(super) fn in_poses(
         let mut approaches: Vec<Simulated> = approaches.collect();
         let gaps: Vec<f32> = approaches.iter().map(|approach| gap(approach, &approaches)).collect();
         approaches.iter_mut().zip(gaps).for_each(|(approach, gap)| approach.gap = gap);
-        Some(InPose(approaches))
+        let (fingers, count) = (Observed::of(touch).fingers, approaches.len() as f64);
+        approaches.retain(|approach| approach.touched & fingers == fingers);
+        Some(InPose { explaining: approaches, count })
     };
     touches.par_iter().enumerate().map(one).collect()
 }
@@ -159,10 +166,11 @@ pub(super) fn log_density(explained: &Explained<'_>, observed: &Observed, in_pos
 }
 
 /// The density among the approaches in its pose; none if they all say nothing.
-fn density(explained: &Explained<'_>, observed: &Observed, InPose(approaches): &InPose) -> Option<f64> {
+fn density(explained: &Explained<'_>, observed: &Observed, in_pose: &InPose) -> Option<f64> {
     let (Hypothesis { factor, late, noise, missed }, kept) = (&explained.candidate, explained.kept);
-    let (mut sum, mut weights) = (0.0, 0.0);
-    for Simulated { touched, times, gap } in approaches {
+    // Of full touches alone it counts how many approaches would be full.
+    let (mut sum, mut weights) = (0.0, if kept == Counted::Full { 0.0 } else { in_pose.count });
+    for Simulated { touched, times, gap } in &in_pose.explaining {
         let seen = |finger: usize| factor * f64::from(times[finger]) + late[finger];
         let weight = match (kept, explained.window()) {
             (Counted::Full, _) => f64::from(u8::from(*touched == FULL)),
@@ -182,9 +190,9 @@ fn density(explained: &Explained<'_>, observed: &Observed, InPose(approaches): &
                 weight * (1.0 - late_share(last - first, window, *noise))
             }
             (Counted::Full, None) => weight,
-            _ => 1.0,
+            _ => 0.0,
         };
-        if touched & observed.fingers != observed.fingers || weight <= 0.0 {
+        if weight <= 0.0 {
             continue;
         }
         // Squared distance and variance.

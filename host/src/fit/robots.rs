@@ -76,8 +76,8 @@ impl Bench {
     }
 }
 
-/// By default one set of each robot without poses; `PALPATE_REPETITIONS=4 cargo test -p palpate --lib honest_recordings --
-/// --nocapture` has all four with and without, in 10 minutes.
+/// By default one set of each robot without poses, and fewer simulated approaches; `PALPATE_REPETITIONS=4 cargo test -p palpate
+/// --lib honest_recordings -- --nocapture` has all four with and without, in 10 minutes.
 #[test]
 fn honest_recordings_of_compliant_robots_are_not_refused_and_a_plate_makes_no_fit_worse() {
     let shared = std::env::var_os("PALPATE_SHARED").map_or_else(|| "../../shared".into(), PathBuf::from);
@@ -86,7 +86,10 @@ fn honest_recordings_of_compliant_robots_are_not_refused_and_a_plate_makes_no_fi
         return;
     }
     let sets = repetitions(1).min(4) as usize;
-    let settings = Settings::default();
+    let settings = match sets {
+        1 => Settings { approaches: 60_000, ..Settings::default() },
+        _ => Settings::default(),
+    };
     let objects = source::objects(&[shared.join("objects").to_str().unwrap().into()]).unwrap();
     let scenes = scenes(&objects, &settings, &()).unwrap();
     let touched = touched::touched(&objects, scenes, &Dataset::default());

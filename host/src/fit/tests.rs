@@ -102,20 +102,25 @@ fn settings() -> Settings {
     Settings { approaches: 20_000, ..Settings::default() }
 }
 
+/// Touches of rigid fingers, and their densities where no stroke ends them.
+type Rigid = (Simulated, Vec<Densities>);
+
 /// Touches of rigid fingers, made once for all fits to them.
-fn simulated(settings: &Settings) -> Simulated {
-    let scenes = scenes(&objects(), settings, &()).unwrap();
-    let touched = touched::touched(&objects(), scenes, &Dataset::default());
-    Simulated::new(touched, Layer::default(), settings, &()).unwrap()
+fn simulated(objects: &[Object], settings: &Settings) -> Rigid {
+    let scenes = scenes(objects, settings, &()).unwrap();
+    let touched = touched::touched(objects, scenes, &Dataset::default());
+    let simulated = Simulated::new(touched, Layer::default(), settings, &()).unwrap();
+    let densities = simulated.densities(Stroke::default());
+    (simulated, densities)
 }
 
-static SIMULATED: LazyLock<Simulated> = LazyLock::new(|| simulated(&settings()));
+static SIMULATED: LazyLock<Rigid> = LazyLock::new(|| simulated(&objects(), &settings()));
 /// Touches of rigid fingers at a finer resolution: gaps between simulated touches count as noise, which is estimated at up to
 /// 3.5 ms where it is 2.
-static MANY: LazyLock<Simulated> = LazyLock::new(|| simulated(&Settings { approaches: 120_000, ..settings() }));
+static MANY: LazyLock<Rigid> = LazyLock::new(|| simulated(&objects(), &Settings { approaches: 120_000, ..settings() }));
 
 /// The fit of a probe whose fingers are known to be rigid, and whose objects to stay.
-fn rigid(simulated: &Simulated, recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
+fn rigid((simulated, endless): &Rigid, recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
     let settings = settings();
     let own = |own: &ObjectTouches| {
         let object = place(&own.name, simulated.touches.iter().map(|own| own.name.as_str())).unwrap();
@@ -123,7 +128,8 @@ fn rigid(simulated: &Simulated, recorded: &Dataset, plate: Option<&[Touch]>) -> 
     };
     let touches: Vec<&[Touch]> = recorded.objects.iter().map(own).collect();
     let stroke = stroke::stroke(recorded, &touches, kept(recorded), &settings.origin.probe).unwrap();
-    fit_to(simulated, stroke, recorded, plate, &settings, &()).unwrap()
+    let ended = stroke.window.map(|_| simulated.densities(stroke));
+    fit_to(simulated, ended.as_ref().unwrap_or(endless), stroke, recorded, plate, &settings, &()).unwrap()
 }
 
 fn fitted(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
@@ -181,8 +187,7 @@ fn fingers_that_bend_aside_are_found_and_rigid_ones_are_not_said_to_bend() {
     let one =
         |object: &Object| ObjectTouches::new(&object.name, approaches_of(object, 300, 21, &BENT, real), Source::Object);
     let soft = Dataset::new(objects().iter().map(one).collect());
-    let found =
-        fit(&soft, &objects(), Some(&plate(60, &BENT)), &Settings { approaches: 40_000, ..settings() }, &()).unwrap();
+    let found = fit(&soft, &objects(), Some(&plate(60, &BENT)), &settings(), &()).unwrap();
     // Noise and bend are hardly told apart: the one makes up for the other.
     near(&found, &BENT, [0.05, 1.5, 1.2]);
     assert!(found.speed_factor.holds(1.0 / BENT.longer), "{:?}", found.speed_factor);
@@ -306,12 +311,13 @@ fn a_recording_under_a_wrong_name_is_named_with_the_right_one() {
     let fork = other("fork");
     wrong.objects[1].edit(|touches| *touches = approaches(&fork, 300, 14, &BENT));
     let all = [objects(), vec![fork]].concat();
-    let found = fit(&wrong, &all, None, &settings(), &()).unwrap();
+    let simulated = simulated(&all, &settings());
+    let found = rigid(&simulated, &wrong, None);
     let expected = Suspect::OtherObject { object: "mouse".into(), looks_like: "fork".into() };
     assert_eq!(found.suspects, [expected]);
     // Also where it is the only recording.
     let only = Dataset::new(vec![wrong.objects[1].clone()]);
-    let found = fit(&only, &all, None, &settings(), &()).unwrap();
+    let found = rigid(&simulated, &only, None);
     assert!(
         matches!(&found.suspects[..], [Suspect::OtherObject { looks_like, .. }] if looks_like == "fork"),
         "{:?}",
@@ -333,7 +339,7 @@ fn two_objects_in_one_recording_are_named_with_the_place() {
     // And if they are mixed.
     let mut mixed = recorded(&objects(), 300, 15, &BENT);
     mixed.objects[0].edit(|touches| (0..300).step_by(3).for_each(|index| touches[index] = watch[index]));
-    let found = layered(&mixed, None);
+    let found = fitted(&mixed, None);
     assert!(
         matches!(&found.suspects[..], [Suspect::TwoObjects { object, other, .. }] if object == "bowl" && other == "wristwatch"),
         "{:?}",
@@ -347,7 +353,7 @@ fn a_probe_that_was_moved_on_the_way_is_named_with_the_place() {
     let after = Crooked { late: [0.0, -12.0, 6.0], ..BENT };
     let changed = approaches(&objects()[0], 400, 17, &after);
     moved.objects[0].edit(|touches| _ = touches.splice(150.., changed[..250].iter().copied()));
-    let found = layered(&moved, None);
+    let found = fitted(&moved, None);
     let suspect = found.suspects.iter().find(|suspect| matches!(suspect, Suspect::Changed { .. }));
     let Some(Suspect::Changed { object, from, what }) = suspect else { panic!("{:?}", found.suspects) };
     assert_eq!(object, "bowl");
@@ -358,7 +364,7 @@ fn a_probe_that_was_moved_on_the_way_is_named_with_the_place() {
 fn a_mesh_of_another_shape_is_like_no_recording() {
     let mut other = recorded(&objects(), 300, 18, &BENT);
     other.objects[1].edit(|touches| *touches = approaches(&self::other("spoon"), 300, 18, &BENT));
-    let found = layered(&other, None);
+    let found = fitted(&other, None);
     assert!(found.suspects.iter().any(|suspect| suspect.to_string().starts_with("mouse: ")), "{:?}", found.suspects);
 }
 
@@ -424,7 +430,7 @@ fn a_stated_stroke_is_kept_and_recordings_of_another_are_refused_with_both() {
     let stating = |stroke: f64| {
         let probe = with!(Probe::default(), stroke = Some(stroke));
         let origin = Origin { probe, ..Origin::default() };
-        fit(&short, &objects(), None, &Settings { origin, ..settings() }, &())
+        fit(&short, &objects(), None, &Settings { origin, approaches: 12_000, ..settings() }, &())
     };
     let found = stating(3.0).unwrap();
     assert_eq!((found.stroke, found.probe.stroke), (None, Some(3.0)));
@@ -458,8 +464,8 @@ fn full_touches_and_poses_of_a_short_stroke_are_fitted_as_well() {
     assert!(found.stroke.unwrap().holds(2.5), "{:?}", found.stroke);
 }
 
-/// Approaches from above to objects on a table, in a recording of each placement that states it, or in one of each object that states
-/// none.
+/// Approaches from above to two objects on a table, in a recording of each placement that states it, or in one of each object
+/// that states none.
 fn tabled(count: usize, seed: u64, probe: &Crooked, is_stated: bool) -> (Dataset, Settings) {
     let scene = Surroundings::Table { cone: 60.0 };
     let settings = Settings { origin: Origin { scene, ..Origin::default() }, approaches: 12_000, ..settings() };
@@ -483,7 +489,7 @@ fn tabled(count: usize, seed: u64, probe: &Crooked, is_stated: bool) -> (Dataset
         let touches = by_source.iter().flatten().map(|&touch| recorded(&touched.touches()[touch])).collect();
         ObjectTouches::in_runs(&object.name, touches, runs.collect())
     };
-    (Dataset::new(objects().iter().map(one).collect()), settings)
+    (Dataset::new(objects()[..2].iter().map(one).collect()), settings)
 }
 
 #[test]
@@ -532,6 +538,6 @@ fn the_file_of_an_estimated_stroke_states_how_far_contacts_may_be_behind_it() {
     // A later recording of the same hand, whose clock runs 1.5 % slow, is fitted with the file as well, and its late contacts are none.
     let later = stopped(&recorded(&objects(), 400, 7, &BENT), 253);
     let origin = Origin { probe: file.probe, ..Origin::default() };
-    let again = fit(&later, &objects(), None, &Settings { origin, ..settings() }, &()).unwrap();
+    let again = fit(&later, &objects(), None, &Settings { origin, approaches: 12_000, ..settings() }, &()).unwrap();
     assert_eq!((again.stroke, again.probe), (None, file.probe));
 }

@@ -18,6 +18,9 @@ pub enum LocateProblem {
     /// The data set is not in millimeters.
     #[error("the touches are not of objects at their true size")]
     Unit,
+    /// There is nothing to learn from.
+    #[error("there are no objects to make maps of")]
+    NoObjects,
     /// No touch met an object.
     #[error("{object}: no touch met it{}", named(placement))]
     NotMet {
@@ -135,6 +138,7 @@ impl Problem for LocateProblem {
                 "State the position of every touch, or of none: the last three columns of a line."
             }
             Self::Unit => "Capture with `--scene table --position`, or state the probe in millimeters.",
+            Self::NoObjects => "Give at least one mesh, or touches of one object.",
             Self::NotMet { .. } => "Touch it, or leave it out.",
             Self::Placements { .. } => "Leave objects out, or placements that are rare.",
             Self::Large { .. } => "Use maps of 2 mm, or leave it out: a map reaches 250 cells from its middle.",

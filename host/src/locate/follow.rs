@@ -4,7 +4,7 @@ use super::error::LocateProblem;
 use super::world::{Aimed, Drawn, Truth};
 use crate::error::{Error, Result};
 use crate::evidence::{Follower, Sequence, Sequences, Supplier};
-use palpate_onboard::locate::{Approach, Effort, Hand, Locator, Maps, Pose, Seen};
+use palpate_onboard::locate::{Approach, AtMost, Effort, Hand, Locator, Maps, Pose, Seen};
 use palpate_onboard::{Familiarity, Stopping, Verdict};
 use palpate_shared::Touch;
 use std::convert::Infallible;
@@ -15,8 +15,6 @@ pub const TOUCHES: usize = 32;
 pub const CELLS: usize = 14_336;
 /// Cells and objects on a host that follows many objects.
 const MANY: usize = 65_536;
-/// Share of the pose in what the next approach is to tell, in 64ths.
-pub const POSE: u16 = 10;
 /// Distance below the table at which a finger cannot have stopped, in millimeters.
 const BELOW: f64 = 15.0;
 
@@ -71,7 +69,7 @@ pub trait Locating: Send + Sync {
 }
 
 struct Room<'m, const CELLS: usize, const OBJECTS: usize> {
-    maps: Maps<'m>,
+    fitting: AtMost<'m, OBJECTS>,
     stopping: Stopping,
     effort: Effort,
     locator: Locator<'m, CELLS, TOUCHES, OBJECTS>,
@@ -94,17 +92,17 @@ fn of<'m, const CELLS: usize, const OBJECTS: usize>(
     stopping: Stopping,
     effort: Effort,
 ) -> Box<dyn Locating + 'm> {
-    let Ok(locator) = Locator::new(maps, stopping, effort, 1) else {
-        unreachable!("there is room for as many objects")
-    };
-    Box::new(Room::<CELLS, OBJECTS> { maps, stopping, effort, locator })
+    let Ok(fitting) = maps.try_into() else { unreachable!("there is room for as many objects") };
+    let locator = Locator::new(fitting, stopping, effort, 1);
+    let mut room = Box::new(Room::<CELLS, OBJECTS> { fitting, stopping, effort, locator });
+    room.locator.reset();
+    room
 }
 
 impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJECTS> {
     fn begin(&mut self, seed: u32) {
-        if let Ok(locator) = Locator::new(self.maps, self.stopping, self.effort, seed) {
-            self.locator = locator;
-        }
+        self.locator = Locator::new(self.fitting, self.stopping, self.effort, seed);
+        self.locator.reset();
     }
 
     fn begin_of(&mut self, weights: &[u32]) {
@@ -140,15 +138,14 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
     }
 
     fn poses(&self, object: usize) -> Vec<Pose> {
-        let none = Pose { placement: 0, position: [0; 2], yaw: 0, within: [0; 2], yaw_within: None, share: 0 };
-        let mut poses = vec![none; 4];
+        let mut poses = vec![Pose::default(); 4];
         let found = self.locator.poses(object, &mut poses);
         poses.truncate(found);
         poses
     }
 
     fn posteriors(&self) -> Vec<f64> {
-        (0..self.maps.objects()).map(|object| f64::from(self.locator.posterior(object)) / 65_536.0).collect()
+        (0..self.locator.maps().objects()).map(|object| f64::from(self.locator.posterior(object)) / 65_536.0).collect()
     }
 
     fn choose(&mut self, hand: &Hand, within: u32, pose: u16) -> Approach {
@@ -176,8 +173,18 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
 pub fn workspace(maps: &Maps<'_>, workspace: Option<f64>) -> Result<u32> {
     match workspace {
         None => Ok(2 * maps.range().unsigned_abs()),
-        Some(millimeters) if (0.0..=1_000.0).contains(&millimeters) => Ok((millimeters * 1e3) as u32),
-        Some(other) => Err(Error::setting("workspace", other, "a number of millimeters from 0 to 1000")),
+        Some(millimeters) => within(millimeters),
+    }
+}
+
+/// Half the side of a workspace that is stated, in micrometers.
+///
+/// # Errors
+/// As [`workspace`].
+pub fn within(millimeters: f64) -> Result<u32> {
+    match (0.0..=1_000.0).contains(&millimeters) {
+        true => Ok((millimeters * 1e3) as u32),
+        false => Err(Error::setting("workspace", millimeters, "a number of millimeters from 0 to 1000")),
     }
 }
 

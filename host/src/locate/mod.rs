@@ -27,10 +27,10 @@ mod tests;
 mod world;
 mod write;
 
-pub use follow::{CELLS, Locating, POSE, TOUCHES, locating, seen, workspace};
+pub use follow::{CELLS, Locating, TOUCHES, locating, seen, within, workspace};
 pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspect, names, stated};
 pub use learn::{Surface, learn, probe_of};
-pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, Pose, Seen, TESTED};
+pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, POSE, Pose, Seen, TESTED};
 pub use pose::{Off, Until};
 pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, calibrate, evaluate};
 pub use shape::{Relief, Sample, Shape, samples};

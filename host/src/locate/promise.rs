@@ -89,7 +89,7 @@ pub struct Evaluation {
     pub off: [f64; 2],
     /// Right names, each with a pose.
     pub poses: usize,
-    /// Poses whose truth is in their intervals, modulo symmetry.
+    /// Poses whose truth is in their intervals, modulo symmetry; without [`Terms::until`] in those of one of their modes.
     pub poses_in_interval: usize,
     /// Poses within what [`Terms::until`] asks for; all without it.
     pub poses_within: usize,
@@ -164,7 +164,7 @@ pub fn calibrate(
     let least = if terms.unknown { TESTED } else { 1 };
     let each = play(plain_maps, standing, probe, &before, (odds_of(own), least), progress)?;
     let misfit = terms.unknown.then(|| misfit(&each));
-    let stated = Restated { misfit, stretch: stretch(&each), ..plain };
+    let stated = Restated { misfit, stretch: terms.until.map_or(0, |_| stretch(&each)), ..plain };
     let bytes = restated(maps, &stated)?;
     let strictest = own + STRICTER;
     let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest, progress)?;
@@ -228,9 +228,14 @@ fn misfit(each: &[Played]) -> (i16, u16) {
     ((mean.round() as i16).min(-1), width.ceil() as u16)
 }
 
+/// Distance of a pose in another placement from the truth, in units of its intervals.
+const ELSEWHERE: f64 = 1e3;
+
 /// The factor in Q8 by which intervals hold 95 % of the poses.
 fn stretch(each: &[Played]) -> u16 {
-    let mut parts: Vec<f64> = each.iter().filter_map(|played| played.in_intervals).collect();
+    // Wider intervals do not cure a pose in another placement.
+    let mut parts: Vec<f64> =
+        each.iter().filter_map(|played| played.in_intervals).filter(|&part| part < ELSEWHERE).collect();
     parts.sort_by(f64::total_cmp);
     let place = ((parts.len() + 1) as f64 * 0.95).ceil() as usize;
     let factor = parts.get(place.saturating_sub(1).min(parts.len().saturating_sub(1))).copied().unwrap_or(1.0);
@@ -267,7 +272,7 @@ struct Played {
     fits: Vec<i32>,
     /// Distance of the pose from the truth; none if the object lies in another way, or no name was given.
     off: Option<Off>,
-    /// This distance in units of the pose's intervals; far outside if the object lies in another way.
+    /// This distance in units of the pose's intervals, of the closest mode where there are several.
     in_intervals: Option<f64>,
     looked: [u64; 2],
 }
@@ -287,7 +292,7 @@ fn play(
     let of = |index: usize| -> Result<Played> {
         progress::advance(progress, 1)?;
         let (mut pressed, mut pressing) = setup.sequence(index as u64);
-        let (mut outcome, mut fits, mut pose) = (Outcome::default(), Vec::new(), None);
+        let (mut outcome, mut fits, mut modes) = (Outcome::default(), Vec::new(), Vec::new());
         let Ok(_) = evidence::follow(&mut pressed, &mut pressing, |follower, counted| {
             (outcome.touches, outcome.approaches) = (counted.touches as usize, counted.approaches as usize);
             let familiarity = follower.familiarity();
@@ -300,13 +305,16 @@ fn play(
             let is_sure = terms.until.is_none_or(|until| until.is_met(&poses));
             let may_name = familiarity == Familiarity::Known && counted.touches as usize >= least;
             if may_name && follower.rivals() <= odds && is_sure {
-                (outcome.recognized, pose) = (Some(leader), poses.first().copied());
+                (outcome.recognized, modes) = (Some(leader), poses);
             }
             outcome.unknown || outcome.recognized.is_some() || counted.touches >= terms.max_touches
         });
-        let off = pose.and_then(|pose| equivalents.off(&pressed.before, &pose));
+        let off = modes.first().and_then(|pose| equivalents.off(&pressed.before, pose));
         let is_right = outcome.recognized == Some(pressed.class);
-        let in_intervals = pose.filter(|_| is_right).map(|pose| off.map_or(1e3, |off| off.in_intervals(&pose)));
+        // Asked for its pose, it states one; else up to four.
+        modes.truncate(terms.until.map_or(usize::MAX, |_| 1));
+        let parts = modes.iter().filter_map(|pose| Some(equivalents.off(&pressed.before, pose)?.in_intervals(pose)));
+        let in_intervals = is_right.then(|| parts.fold(ELSEWHERE, f64::min));
         Ok(Played { outcome, fits, off, in_intervals, looked: pressing.looked })
     };
     (0..terms.sequences).into_par_iter().map(of).collect()
@@ -315,7 +323,7 @@ fn play(
 /// Plays sequences to the model's own threshold.
 ///
 /// # Errors
-/// As [`calibrate`].
+/// As [`calibrate`](fn@calibrate).
 pub fn evaluate(
     maps: Maps<'_>,
     standing: &[Standing],

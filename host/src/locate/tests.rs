@@ -148,6 +148,27 @@ fn a_calibrated_model_states_its_promise_and_how_approaches_were_aimed() {
 }
 
 #[test]
+fn intervals_of_poses_change_only_where_a_promise_is_for_poses() {
+    use palpate_onboard::locate::{Contact, Seen};
+    let bytes = model(&Settings::default());
+    let objects = objects();
+    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
+    let within = |bytes: &[u8]| {
+        let maps = Maps::new(bytes).unwrap();
+        let mut locating = locating(maps, maps.stopping(), None);
+        locating.push(Seen::new([0, 0], [15_000, 0], [Contact::At(20_000); 3], 0));
+        locating.poses(0)[0].within
+    };
+    let calibrated = |until| {
+        let terms = Terms { until, ..terms(40) };
+        calibrate(Maps::new(&bytes).unwrap(), &standing, &probe(), &terms, &()).unwrap().model
+    };
+    // A name is sure long before its pose: intervals that held 95 % of such poses would be as wide as the table.
+    assert_eq!(within(&calibrated(None)), within(&bytes));
+    assert_ne!(within(&calibrated(Some(Until { millimeters: 4.0, degrees: 8.0 }))), within(&bytes));
+}
+
+#[test]
 fn an_object_that_the_model_does_not_know_is_called_unknown() {
     let bytes = model(&Settings::default());
     let mut objects = objects().to_vec();
@@ -177,6 +198,17 @@ fn touches_without_a_position_and_other_units_are_refused() {
     dataset.origin = None;
     let error = learn(&dataset, &Settings::default()).unwrap_err().to_string();
     assert!(error.contains("true size"), "{error}");
+}
+
+#[test]
+fn maps_of_no_object_and_of_one_without_a_surface_are_refused_by_name() {
+    let settings = Settings::default();
+    let error = write(&[], &[], &probe(), &settings).unwrap_err().to_string();
+    assert!(error.contains("no objects"), "{error}");
+    let surfaces = learn(&touched(&objects(), 2_000), &settings).unwrap();
+    let names = ["bar", "puck", "cup"].map(String::from);
+    let error = write(&surfaces, &names, &probe(), &settings).unwrap_err().to_string();
+    assert!(error.contains("cup: no touch met it"), "{error}");
 }
 
 #[test]

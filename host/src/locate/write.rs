@@ -23,9 +23,17 @@ const WINDOWS: [i32; 4] = [4, 8, 16, 32];
 /// Writes a model of maps.
 ///
 /// # Errors
-/// [`LocateProblem`] for a name or a map that is too large; [`Setting`](crate::error::Setting) for settings out of range.
+/// [`LocateProblem`] for an object without a surface, or a name or a map that is too large; [`Setting`](crate::error::Setting) for settings out of range.
 pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: &Settings) -> Result<Vec<u8>> {
     settings.check()?;
+    if objects.is_empty() {
+        return Err(LocateProblem::NoObjects.into());
+    }
+    for (index, object) in objects.iter().enumerate() {
+        if !surfaces.iter().any(|surface| surface.object == index) {
+            return Err(LocateProblem::NotMet { object: object.clone(), placement: String::new() }.into());
+        }
+    }
     let (mut records, mut heights) = (Vec::new(), Vec::new());
     for surface in surfaces {
         let offset = u32::try_from(heights.len()).unwrap_or(u32::MAX);

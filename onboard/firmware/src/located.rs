@@ -73,7 +73,7 @@ pub struct Found {
 /// Takes in a touch, and chooses the next approach. After a verdict the locator starts again.
 pub fn push(locator: &mut OnChip<'_>, touch: &Touch, hand: Hand, terms: &Terms) -> Found {
     let verdict = locator.push(touch, hand);
-    let mut pose = [Pose { placement: 0, position: [0; 2], yaw: 0, within: [0; 2], yaw_within: None, share: 0 }];
+    let mut pose = [Pose::default()];
     let found = locator.poses(locator.leader(), &mut pose);
     let next = locator.choose(hand.spacing, hand.stroke.unwrap_or(u32::MAX), terms.within, terms.pose);
     Found { verdict, pose: pose.into_iter().take(found).next(), next }

@@ -2,7 +2,7 @@
 
 use super::locator::{Exhausted, Locator};
 use super::maps::{Maps, Placement};
-use super::number::{NAT, NOTHING, add, direction, of_sum, power};
+use super::number::{NAT, NOTHING, add, direction, of_sum, power, quotient};
 use super::seen::Seen;
 use crate::bytes::at;
 
@@ -29,7 +29,7 @@ const LOSS: i32 = 9 * NAT;
 
 /// A cell: its likelihood, and what it is of.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Cell {
+pub struct Cell {
     pub(super) placement: u8,
     pub(super) yaw: u8,
     pub(super) x: u8,
@@ -39,16 +39,26 @@ pub(super) struct Cell {
     pub(super) likely: i16,
 }
 
+impl Cell {
+    /// No cell.
+    pub(crate) const NONE: Self = Self { placement: 0, yaw: 0, x: 0, y: 0, level: 0, likely: 0 };
+}
+
+/// A place for cells.
+pub trait Pool: AsRef<[Cell]> + AsMut<[Cell]> {}
+
+impl<P: AsRef<[Cell]> + AsMut<[Cell]>> Pool for P {}
+
 impl Maps<'_> {
     /// Middle of a cell along an axis, in 1/16 mm.
     #[inline(always)]
     pub(super) fn middle(&self, place: u8, level: u8) -> i32 {
-        ((2 * i32::from(place) + 1) * self.range) / (i32::from(self.roots) << level) - self.range
+        quotient((2 * i32::from(place) + 1) * self.range, i32::from(self.roots) << level) - self.range
     }
 
     /// Half of a cell's side, in 1/16 mm.
     pub(super) fn half(&self, level: u8) -> i32 {
-        self.range / (i32::from(self.roots) << level)
+        quotient(self.range, i32::from(self.roots) << level)
     }
 
     /// Likelihood of a cell given the touches, the last first; less than `least` may be of some of them alone.
@@ -65,11 +75,11 @@ impl Maps<'_> {
         let level = i32::from(cell.level);
         let (cos, sin) = direction(turn(cell.yaw, cell.level));
         let (x, y) = (self.middle(cell.x, cell.level), self.middle(cell.y, cell.level));
-        let side = (self.range * 5) / ((i32::from(self.roots) << level) * 4);
+        let side = quotient(self.range * 5, (i32::from(self.roots) << level) * 4);
         let [drift, drift_yaw] = self.drift;
         // Half of a cell's turn, in radians in Q14.
         let (angle, drift_yaw) =
-            if placement.is_round { (0, 0) } else { (HALF_TURN / (i32::from(YAWS) << level), drift_yaw) };
+            if placement.is_round { (0, 0) } else { (quotient(HALF_TURN, i32::from(YAWS) << level), drift_yaw) };
         for (seen, moves) in seen.iter().rev().zip(ROOTS) {
             // Moves add up as the root of their number.
             let (blur, angle) = (side + ((drift * moves) >> 4), angle + ((drift_yaw * moves) >> 4));
@@ -107,7 +117,7 @@ impl Maps<'_> {
         } else if low > limit {
             [self.of_missing_beyond(low - limit); 2]
         } else {
-            [self.of_missing_within(((limit - low + 11) * 64) / (high - low + 22)), self.of_missing_within(64)]
+            [self.of_missing_within(quotient((limit - low + 11) * 64, high - low + 22)), self.of_missing_within(64)]
         }
     }
 }
@@ -136,7 +146,7 @@ const HALF_TURN: i32 = 51_472;
 
 /// Middle of a cell's yaw, in 1/256 turn.
 pub(super) fn turn(yaw: u8, level: u8) -> i32 {
-    ((2 * i32::from(yaw) + 1) * 128) / (i32::from(YAWS) << level)
+    quotient((2 * i32::from(yaw) + 1) * 128, i32::from(YAWS) << level)
 }
 
 /// Length of a vector, at most 6 % off.
@@ -155,10 +165,10 @@ fn width(sixteenths: i32) -> usize {
     usize::try_from(bin.min(15)).unwrap_or(0)
 }
 
-impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_, CELLS, TOUCHES, OBJECTS> {
+impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Locator<'_, CELLS, TOUCHES, OBJECTS, P> {
     /// The cells in the pool.
     pub(super) fn cells(&self) -> &[Cell] {
-        self.pool.get(..self.count).unwrap_or_default()
+        self.pool.as_ref().get(..self.count).unwrap_or_default()
     }
 
     /// Number of cells that the pool may hold.
@@ -208,7 +218,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         let likely = self.likely(&cell, placement, least);
         cell.likely = i16::try_from(likely).unwrap_or(i16::MIN);
         let has_room = self.count < self.room();
-        match self.pool.get_mut(self.count) {
+        match self.pool.as_mut().get_mut(self.count) {
             Some(slot) if likely >= least && has_room => {
                 *slot = cell;
                 self.count += 1;
@@ -238,10 +248,10 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         }
         let mut kept = 0;
         for index in 0..count {
-            let cell = at(&self.pool, index);
+            let cell = at(self.pool.as_ref(), index);
             if bin(&cell) >= first {
                 self.drop_cell(&cell);
-            } else if let Some(slot) = self.pool.get_mut(kept) {
+            } else if let Some(slot) = self.pool.as_mut().get_mut(kept) {
                 *slot = cell;
                 kept += 1;
             }
@@ -291,7 +301,8 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
                 }
                 let number = |value: u32| u8::try_from(value).unwrap_or(0);
                 let (rest, roots) = (root / u32::from(yaws), u32::from(roots));
-                let (yaw, x, y) = (number(root % u32::from(yaws)), number(rest % roots), number(rest / roots));
+                let [x, y] = [rest.checked_rem(roots), rest.checked_div(roots)].map(|place| number(place.unwrap_or(0)));
+                let yaw = number(root % u32::from(yaws));
                 self.put(Cell { placement, yaw, x, y, level: 0, likely: 0 }, &map);
             }
         }
@@ -300,7 +311,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         loop {
             let mut index = 0;
             while index < self.count {
-                let cell = at(&self.pool, index);
+                let cell = at(self.pool.as_ref(), index);
                 if cell.level >= FINEST || i32::from(cell.likely) < threshold {
                     index += 1;
                     continue;
@@ -332,8 +343,8 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
     /// Replaces a cell by its parts.
     fn split(&mut self, index: usize, cell: &Cell) {
         self.count -= 1;
-        let last = at(&self.pool, self.count);
-        if let Some(slot) = self.pool.get_mut(index) {
+        let last = at(self.pool.as_ref(), self.count);
+        if let Some(slot) = self.pool.as_mut().get_mut(index) {
             *slot = last;
         }
         let map = self.maps.placement(cell.placement);

@@ -1,23 +1,14 @@
 //! Where to touch next.
 
-use super::belief::YAWS;
-use super::belief::turn;
+use super::belief::{Pool, YAWS, turn};
 use super::locator::Locator;
 use super::maps::Placement;
-use super::number::{NAT, direction, logarithm, of_sum, power};
+use super::number::{NAT, direction, logarithm, of_sum, power, quotient};
 use crate::bytes::at;
+use palpate_shared::Approach;
 
-/// An approach straight down.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Approach {
-    /// Place of the middle finger, in micrometers.
-    pub x: i32,
-    /// Place of the middle finger, in micrometers.
-    pub y: i32,
-    /// Direction of the row of fingers, in 1/256 turn from the x axis.
-    pub roll: u8,
-}
-
+/// Default share of the pose in what the next approach is to tell, in 64ths.
+pub const POSE: u16 = 10;
 /// Cells that are drawn as hypotheses.
 const DRAWN: usize = 64;
 
@@ -35,16 +26,19 @@ struct Drawn {
     heights: [i32; 3],
 }
 
-impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_, CELLS, TOUCHES, OBJECTS> {
+impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Locator<'_, CELLS, TOUCHES, OBJECTS, P> {
     /// The approach that tells most about the object, and a little about its pose: of a bounded number of candidates on hypotheses
     /// drawn by their weight, the one whose heights have the largest mutual information with them. `spacing` is the distance of
     /// neighboring fingers and `within` half the side of the square about the origin in which the middle finger may go, both in
     /// micrometers. `pose` is the share of the pose in what is to be told, in 64ths.
     ///
-    /// Cost: `candidates` × 64 × (3 lookups + 64 differences). Cannot fail.
+    /// Cost: `candidates` × 64 × (3 lookups + 64 differences), and a search if there was none yet. Cannot fail.
     pub fn choose(&mut self, spacing: u32, stroke: u32, within: u32, pose: u16) -> Approach {
         let sixteenths = |micrometers: u32| i32::try_from(micrometers / 125 * 2).unwrap_or(i32::MAX).min(32_000);
         let (spacing, stroke, within) = (sixteenths(spacing), sixteenths(stroke), sixteenths(within));
+        if self.count == 0 {
+            self.search();
+        }
         let mut drawn = [Drawn::default(); DRAWN];
         let count = self.draw(&mut drawn);
         let drawn = drawn.get_mut(..count).unwrap_or_default();
@@ -100,17 +94,18 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
                 continue;
             }
             let step = sum / share + 1;
-            let weight = power(-at(&self.posteriors, object)) / u32::try_from(share).unwrap_or(1);
-            let mut next = u64::from(self.random.next()) % step;
+            let weight =
+                power(-at(&self.posteriors, object)).checked_div(u32::try_from(share).unwrap_or(1)).unwrap_or(0);
+            let mut next = u64::from(self.random.next()).checked_rem(step).unwrap_or(0);
             let (mut passed, mut took) = (0, 0);
             for index in 0..self.count {
-                let cell = at(&self.pool, index);
+                let cell = at(self.pool.as_ref(), index);
                 if usize::from(self.maps.object_of(cell.placement)) != object {
                     continue;
                 }
                 passed += u64::from(self.weight(&cell));
                 while passed > next && took < share {
-                    let half_turn = 128 / (i32::from(YAWS) << cell.level) + 1;
+                    let half_turn = quotient(128, i32::from(YAWS) << cell.level) + 1;
                     let half = self.maps.half(cell.level);
                     let placement = self.maps.placement(cell.placement);
                     let turned = turn(cell.yaw, cell.level) + self.random.within(half_turn);

@@ -1,6 +1,6 @@
 //! The follower: touches in, a verdict out.
 
-use super::belief::{Cell, FINEST, MOST_TOUCHES, NEAR};
+use super::belief::{Cell, FINEST, MOST_TOUCHES, NEAR, Pool};
 use super::maps::Maps;
 use super::number::{NOTHING, Random, add, logarithm, odds};
 use super::seen::{Contact, Seen};
@@ -38,16 +38,29 @@ pub enum Exhausted {
     Lookups,
 }
 
+/// Maps of at most this many objects, for a [`Locator`] with room for them: `maps.try_into()`.
+#[derive(Clone, Copy, Debug)]
+pub struct AtMost<'m, const OBJECTS: usize>(Maps<'m>);
+
+impl<'m, const OBJECTS: usize> TryFrom<Maps<'m>> for AtMost<'m, OBJECTS> {
+    type Error = CapacityError;
+
+    fn try_from(maps: Maps<'m>) -> Result<Self, CapacityError> {
+        let objects = maps.objects();
+        if objects <= OBJECTS { Ok(Self(maps)) } else { Err(CapacityError { objects, capacity: OBJECTS }) }
+    }
+}
+
 /// Recognizes which object lies on a table, and where, with room for `CELLS` cells of 8 bytes, `TOUCHES` touches and `OBJECTS`
-/// objects.
+/// objects. The cells are in `P`.
 #[derive(Clone, Debug)]
-pub struct Locator<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> {
+pub struct Locator<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P = [Cell; CELLS]> {
     pub(super) maps: Maps<'m>,
     pub(super) stopping: Stopping,
     pub(super) effort: Effort,
     pub(super) seen: [Seen; TOUCHES],
     pub(super) touches: usize,
-    pub(super) pool: [Cell; CELLS],
+    pub(super) pool: P,
     pub(super) count: usize,
     /// Logarithm of each object's weight before the first touch.
     priors: [i32; OBJECTS],
@@ -63,41 +76,86 @@ pub struct Locator<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: 
 }
 
 impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'m, CELLS, TOUCHES, OBJECTS> {
-    /// A locator without a touch, which stops as `stopping` says. The seed is of the choice of approaches.
+    /// A locator without a touch, which stops as `stopping` says. The seed is of the choice of approaches. Until the first touch,
+    /// choice or reset nothing is searched: all objects are as likely, and none has a pose.
     ///
-    /// Cost: as [`reset`](Self::reset).
-    ///
-    /// # Errors
-    /// [`CapacityError`] for more objects than there is room for.
-    pub fn new(maps: Maps<'m>, stopping: Stopping, effort: Effort, seed: u32) -> Result<Self, CapacityError> {
+    /// Cost: writing its RAM, which is taken once: the locator is made where it is kept. Cannot fail; other numbers of cells and
+    /// touches do not build.
+    pub fn new(maps: AtMost<'m, OBJECTS>, stopping: Stopping, effort: Effort, seed: u32) -> Self {
+        Locator::without_pool(maps, stopping, effort, seed).over(maps.0, [Cell::NONE; CELLS])
+    }
+}
+
+impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'m, CELLS, TOUCHES, OBJECTS, ()> {
+    /// Room in which a search can work: checked when a program is built.
+    const IS_ENOUGH: () = assert!(CELLS >= 64 && TOUCHES > 0 && TOUCHES <= MOST_TOUCHES, "64 cells, 1 to 64 touches");
+
+    /// A locator that has still to get its cells.
+    pub(crate) fn without_pool(maps: AtMost<'m, OBJECTS>, stopping: Stopping, effort: Effort, seed: u32) -> Self {
+        const { Self::IS_ENOUGH };
+        let AtMost(maps) = maps;
         let objects = maps.objects();
-        if objects > OBJECTS || CELLS < 64 || TOUCHES == 0 || TOUCHES > MOST_TOUCHES {
-            return Err(CapacityError { objects, capacity: OBJECTS });
-        }
+        let each = |log: i32| core::array::from_fn(|object| if object < objects { log } else { NOTHING });
         // Xorshift stays at 0.
         let seed = seed.max(1);
-        let mut locator = Self {
+        Self {
             maps,
             stopping,
             effort,
             seen: [Seen::default(); TOUCHES],
             touches: 0,
-            pool: [Cell::default(); CELLS],
+            pool: (),
             count: 0,
-            priors: [NOTHING; OBJECTS],
+            priors: each(0),
             dropped: [NOTHING; OBJECTS],
-            posteriors: [NOTHING; OBJECTS],
+            posteriors: each(-logarithm(u64::try_from(objects).unwrap_or(1))),
             best: NOTHING,
             looked: 0,
             exhausted: None,
             random: Random(seed),
             seed,
-        };
-        locator.priors.iter_mut().take(objects).for_each(|prior| *prior = 0);
-        locator.reset();
-        Ok(locator)
+        }
+    }
+}
+
+impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P> Locator<'_, CELLS, TOUCHES, OBJECTS, P> {
+    /// This locator with the same maps at another place, and another place for the same cells. Cost: all but the cells is copied.
+    pub(crate) fn over<'n, Q>(self, maps: Maps<'n>, pool: Q) -> Locator<'n, CELLS, TOUCHES, OBJECTS, Q> {
+        let Self { stopping, effort, seen, touches, count, priors, dropped, posteriors, .. } = self;
+        let Self { best, looked, exhausted, random, seed, .. } = self;
+        Locator {
+            maps,
+            stopping,
+            effort,
+            seen,
+            touches,
+            pool,
+            count,
+            priors,
+            dropped,
+            posteriors,
+            best,
+            looked,
+            exhausted,
+            random,
+            seed,
+        }
     }
 
+    /// Posterior of an object in Q16; 0 for one that is not there. Cost: a few instructions.
+    pub fn posterior(&self, object: usize) -> u32 {
+        super::number::power(-self.posteriors.get(object).copied().unwrap_or(NOTHING))
+    }
+
+    /// Logarithms of all posteriors, in 1/64 nat; beyond the objects there are any numbers.
+    pub(crate) fn evidence(&self) -> [i64; OBJECTS] {
+        self.posteriors.map(i64::from)
+    }
+}
+
+impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool>
+    Locator<'m, CELLS, TOUCHES, OBJECTS, P>
+{
     /// Forgets all touches, for another object. Cost: that of a search without touches.
     pub fn reset(&mut self) {
         (self.touches, self.count, self.random) = (0, 0, Random(self.seed));
@@ -184,11 +242,6 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
         let others =
             objects.filter(|(object, _)| *object != leader).fold(NOTHING, |sum, (_, &posterior)| add(sum, posterior));
         Rivals::from_q56(odds(at(&self.posteriors, leader) - others))
-    }
-
-    /// Posterior of an object in Q16; 0 for one that is not there. Cost: a few instructions.
-    pub fn posterior(&self, object: usize) -> u32 {
-        super::number::power(-self.posteriors.get(object).copied().unwrap_or(NOTHING))
     }
 
     /// Result of the test of whether the touches fit an object at all, for maps that state one: doubtful before the eighth touch,

@@ -75,6 +75,29 @@ impl<'a> Maps<'a> {
     /// [`ModelError`] for bytes that are truncated, too many, of another version, changed, meaningless, or a model of trees.
     pub fn new(model: &'a [u8]) -> Result<Self, ModelError> {
         crate::model::whole(model)?;
+        Self::read(model)
+    }
+
+    /// No maps: those of a locator whose maps are elsewhere.
+    pub(crate) const NONE: Self = Self {
+        model: &[],
+        records: &[],
+        likelihoods: &[],
+        heights: &[],
+        is_fine: false,
+        range: 0,
+        roots: 0,
+        drift: [0; 2],
+        misfit: 0,
+        misfit_width: 0,
+        stretch: 0,
+    };
+
+    /// Opens a model without computing its checksum. Cost: some instructions for each placement.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub(crate) fn read(model: &'a [u8]) -> Result<Self, ModelError> {
         let header = Header::of(model);
         // The layout, the threshold, the limit of touches.
         let fields =

@@ -21,10 +21,12 @@ mod number;
 mod pose;
 mod seen;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
-pub use choose::Approach;
-pub use locator::{Effort, Exhausted, Hand, Locator, TESTED};
+#[cfg(feature = "station")]
+pub(crate) use belief::Cell;
+pub use choose::POSE;
+pub use locator::{AtMost, Effort, Exhausted, Hand, Locator, TESTED};
 pub use maps::{BEYOND, DISTANCES, LIKELIHOODS_LENGTH, MAPS_LENGTH, Maps, PLACEMENT_LENGTH, WIDTHS, WITHIN};
-pub use pose::Pose;
+pub use palpate_shared::{Approach, TablePose as Pose};
 pub use seen::{Contact, Seen};

@@ -54,6 +54,12 @@ const LOGARITHMS: [u8; 256] = {
     logarithms
 };
 
+/// The quotient of two numbers; 0 where that is none, which no maps lead to.
+#[inline(always)]
+pub(super) fn quotient(number: i32, divisor: i32) -> i32 {
+    number.checked_div(divisor).unwrap_or(0)
+}
+
 /// The sine of an angle. Cost: a few instructions.
 #[inline(always)]
 pub(super) fn sine(angle: i32) -> i32 {

@@ -1,24 +1,9 @@
 //! The object's place.
 
-use super::belief::{Cell, YAWS, turn};
+use super::belief::{Cell, Pool, YAWS, turn};
 use super::locator::Locator;
-
-/// A mode of the pose: where an object's origin is on the table, how it is turned, and how sure that is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pose {
-    /// The object's placement.
-    pub placement: u8,
-    /// Place of the placement's origin, in micrometers.
-    pub position: [i32; 2],
-    /// Turn about the vertical axis, in 1/65,536 turn.
-    pub yaw: u16,
-    /// Half of a 95 % interval of x, of y in micrometers.
-    pub within: [u32; 2],
-    /// Half of a 95 % interval of the yaw in 1/65,536 turn; none where the object is round.
-    pub yaw_within: Option<u16>,
-    /// Share of this mode among all cells of the object, in Q16.
-    pub share: u32,
-}
+use super::number::quotient;
+use palpate_shared::TablePose as Pose;
 
 /// Largest distance from the most likely cell of those that are of its mode, in 1/16 mm, and 1/256 turn.
 const APART: i32 = 10 * 16;
@@ -26,7 +11,7 @@ const TURNED_APART: i32 = 16;
 /// Bins of a distance.
 const BINS: usize = 64;
 
-impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_, CELLS, TOUCHES, OBJECTS> {
+impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Locator<'_, CELLS, TOUCHES, OBJECTS, P> {
     /// Places of an object: its most likely poses, best first, as many as there is room for; returns their number. Cells within
     /// 10 mm and 22.5° of the most likely one are of a mode. An interval holds 95 % of a mode's weight.
     ///
@@ -36,7 +21,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
         let all: u64 = self.cells().iter().filter(|cell| is_of(cell)).map(|cell| u64::from(self.weight(cell))).sum();
         let mut found = 0;
         while found < poses.len() {
-            let (earlier, rest) = poses.split_at_mut(found);
+            let Some((earlier, rest)) = poses.split_at_mut_checked(found) else { break };
             let is_free = |cell: &Cell| is_of(cell) && !earlier.iter().any(|pose| self.is_near(cell, pose));
             let best = self.cells().iter().filter(|cell| is_free(cell)).max_by_key(|cell| cell.likely);
             let (Some(best), Some(slot)) = (best, rest.first_mut()) else { break };
@@ -108,8 +93,11 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
                 passed * 20 >= sum * 19
             });
             // Half of a cell is added to what the middles of cells are apart.
-            let half =
-                if axis == 2 { (32_768 / (i32::from(YAWS) << best.level)) >> 4 } else { self.maps.half(best.level) };
+            let half = if axis == 2 {
+                quotient(32_768, i32::from(YAWS) << best.level) >> 4
+            } else {
+                self.maps.half(best.level)
+            };
             *width = 4 * i32::try_from(bin.unwrap_or(BINS - 1) + 1).unwrap_or(0) + half;
         }
         let micrometers = |sixteenths: i32| sixteenths * 125 / 2;
@@ -130,11 +118,11 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator<'_,
 
 /// Middle of a cell's yaw, in 1/65,536 turn.
 fn fine(cell: &Cell) -> i32 {
-    ((2 * i32::from(cell.yaw) + 1) * 32_768) / (i32::from(YAWS) << cell.level)
+    quotient((2 * i32::from(cell.yaw) + 1) * 32_768, i32::from(YAWS) << cell.level)
 }
 
 /// Difference of two angles in units of a turn divided by `whole`: between minus and plus half a turn.
 fn turned(one: i32, other: i32, whole: i32) -> i32 {
     let apart = one - other;
-    (apart + whole + whole / 2).rem_euclid(whole) - whole / 2
+    (apart + whole + whole / 2).checked_rem_euclid(whole).unwrap_or(0) - whole / 2
 }

@@ -11,17 +11,17 @@ use std::vec::Vec;
 use std::{format, vec};
 
 /// An object's height in millimeters at a point in millimeters.
-type Heights = fn(f64, f64) -> f64;
+pub(crate) type Heights = fn(f64, f64) -> f64;
 
 /// A placement: its object, its heights, cells on each side of the middle one, and whether it is round.
 #[derive(Clone, Copy)]
-struct Placed(u8, Heights, [i32; 2], bool);
+pub(crate) struct Placed(u8, Heights, [i32; 2], bool);
 
 const SPACING: u32 = 15_000;
 const STROKE: u32 = 20_000;
 const HAND: Hand = Hand { spacing: SPACING, speed: 100_000, stroke: Some(STROKE) };
 
-fn wedge(x: f64, y: f64) -> f64 {
+pub(crate) fn wedge(x: f64, y: f64) -> f64 {
     if x.abs() > 22.0 || y.abs() > 12.0 {
         0.0
     } else if x < 0.0 {
@@ -31,7 +31,7 @@ fn wedge(x: f64, y: f64) -> f64 {
     }
 }
 
-fn cylinder(x: f64, y: f64) -> f64 {
+pub(crate) fn cylinder(x: f64, y: f64) -> f64 {
     if x.hypot(y) < 16.0 { 28.0 } else { 0.0 }
 }
 
@@ -43,8 +43,8 @@ fn pin(x: f64, y: f64) -> f64 {
     if x.hypot(y) < 3.0 { 12.0 } else { 0.0 }
 }
 
-const WEDGE: Placed = Placed(0, wedge, [25, 15], false);
-const CYLINDER: Placed = Placed(1, cylinder, [19, 19], true);
+pub(crate) const WEDGE: Placed = Placed(0, wedge, [25, 15], false);
+pub(crate) const CYLINDER: Placed = Placed(1, cylinder, [19, 19], true);
 const BAR: Placed = Placed(0, bar, [28, 12], false);
 const PINS: [Placed; 2] = [Placed(0, pin, [4, 4], true), Placed(1, wedge, [3, 3], false)];
 
@@ -67,7 +67,7 @@ fn likelihoods() -> Vec<i16> {
 
 /// The bytes of a model of these placements, as `FORMAT.md` describes them, with cells of 1 mm and within 30 mm; `misfit` is the
 /// mean likelihood for each touch.
-fn model(placed: &[Placed], misfit: i16) -> Vec<u8> {
+pub(crate) fn model(placed: &[Placed], misfit: i16) -> Vec<u8> {
     let (mut records, mut heights) = (Vec::new(), Vec::<u8>::new());
     for &Placed(object, height, half, is_round) in placed {
         let in_grid = |x: i32, y: i32| {
@@ -154,10 +154,10 @@ fn place_of_maps(bytes: &[u8]) -> usize {
     bytes.len() - 4 - content.next_multiple_of(4)
 }
 
-type Small<'m> = Locator<'m, 4096, 32, 2>;
+pub(crate) type Small<'m> = Locator<'m, 4096, 32, 2>;
 
-fn locator(maps: Maps<'_>) -> Small<'_> {
-    Locator::new(maps, maps.stopping(), Effort::default(), 1).unwrap()
+pub(crate) fn locator(maps: Maps<'_>) -> Small<'_> {
+    Locator::new(maps.try_into().unwrap(), maps.stopping(), Effort::default(), 1)
 }
 
 /// The heights that an object at a place in millimeters, turned by this many radians, gives an approach.
@@ -188,8 +188,7 @@ fn touch(locator: &mut Small<'_>, height: Heights, place: [f64; 2], yaw: f64, le
 }
 
 fn poses(locator: &Small<'_>, object: usize) -> Vec<Pose> {
-    let none = Pose { placement: 9, position: [0; 2], yaw: 0, within: [0; 2], yaw_within: None, share: 0 };
-    let mut poses = vec![none; 4];
+    let mut poses = vec![Pose { placement: 9, ..Pose::default() }; 4];
     let found = locator.poses(object, &mut poses);
     poses.truncate(found);
     poses
@@ -252,7 +251,7 @@ fn a_search_that_was_not_finished_names_nothing() {
     let stopping = Stopping::from_odds(1 << 55, 3);
     for lookups in [0, 1_000] {
         let effort = Effort { lookups, ..Effort::default() };
-        let mut locator = Locator::<4096, 32, 2>::new(maps, stopping, effort, 1).unwrap();
+        let mut locator = Locator::<4096, 32, 2>::new(maps.try_into().unwrap(), stopping, effort, 1);
         for touches in 1..5 {
             let verdict = locator.push_seen(met(wedge, Approach::default(), [0.0; 2], 0.3));
             assert_eq!(locator.exhausted(), Some(Exhausted::Lookups));
@@ -260,12 +259,12 @@ fn a_search_that_was_not_finished_names_nothing() {
             assert_eq!(verdict, if touches < 3 { Verdict::Undecided } else { Verdict::GaveUp });
         }
     }
-    let mut locator = Locator::<64, 32, 2>::new(maps, stopping, Effort::default(), 1).unwrap();
+    let mut locator = Locator::<64, 32, 2>::new(maps.try_into().unwrap(), stopping, Effort::default(), 1);
     assert_eq!(locator.push_seen(met(wedge, Approach::default(), [0.0; 2], 0.3)), Verdict::Undecided);
     assert_eq!((locator.exhausted(), locator.kept() <= 64), (Some(Exhausted::Cells), true));
     // As with room for no more.
     let effort = Effort { cells: 64, ..Effort::default() };
-    let mut bounded = Locator::<4096, 32, 2>::new(maps, stopping, effort, 1).unwrap();
+    let mut bounded = Locator::<4096, 32, 2>::new(maps.try_into().unwrap(), stopping, effort, 1);
     bounded.push_seen(met(wedge, Approach::default(), [0.0; 2], 0.3));
     assert_eq!((bounded.kept(), bounded.rivals().q56()), (locator.kept(), locator.rivals().q56()));
     assert_eq!(bounded.exhausted(), Some(Exhausted::Cells));
@@ -348,21 +347,34 @@ fn on_an_empty_table_nothing_but_the_table_is_met() {
 }
 
 #[test]
+fn a_locator_that_has_searched_nothing_chooses_as_after_a_reset() {
+    let bytes = model(&PINS, 0);
+    let maps = Maps::new(&bytes).unwrap();
+    let mut fresh = locator(maps);
+    let mut reset = fresh.clone();
+    reset.reset();
+    assert_eq!(fresh.verdict(), reset.verdict());
+    for object in 0..2 {
+        assert!(fresh.posterior(object).abs_diff(reset.posterior(object)) <= 1_024, "{}", fresh.posterior(object));
+    }
+    let [first, other] = [&mut fresh, &mut reset].map(|locator| locator.choose(15_000, 20_000, 40_000, 10));
+    assert_eq!(first, other);
+    assert_eq!(fresh.leader(), reset.leader());
+}
+
+#[test]
 fn the_forty_first_touch_is_one_too_many() {
     let bytes = model(&PINS, 0);
     let maps = Maps::new(&bytes).unwrap();
     let effort = Effort { lookups: 5_000, candidates: 1, ..Effort::default() };
-    let mut locator = Locator::<64, 32, 2>::new(maps, Stopping::from_odds(0, 100), effort, 0).unwrap();
+    let mut locator = Locator::<64, 32, 2>::new(maps.try_into().unwrap(), Stopping::from_odds(0, 100), effort, 0);
     for touches in 1..=40 {
         let verdict = locator.push_seen(met(pin, Approach::default(), [20.0; 2], 0.0));
         assert_eq!(verdict, if touches < 32 { Verdict::Undecided } else { Verdict::GaveUp });
         assert_eq!(locator.touches(), touches.min(32));
     }
     let small = CapacityError { objects: 2, capacity: 1 };
-    assert_eq!(Locator::<64, 32, 1>::new(maps, maps.stopping(), effort, 0).err(), Some(small));
-    assert!(Locator::<63, 32, 2>::new(maps, maps.stopping(), effort, 0).is_err());
-    assert!(Locator::<64, 0, 2>::new(maps, maps.stopping(), effort, 0).is_err());
-    assert!(Locator::<64, 65, 2>::new(maps, maps.stopping(), effort, 0).is_err());
+    assert_eq!(AtMost::<1>::try_from(maps).err(), Some(small));
 }
 
 #[test]
@@ -469,7 +481,8 @@ fn extreme() -> Vec<Seen> {
 fn follow(bytes: &[u8], touches: &[Seen]) -> bool {
     let Ok(maps) = Maps::new(bytes) else { return false };
     let effort = Effort { lookups: 1_000, candidates: 2, ..Effort::default() };
-    let Ok(mut locator) = Locator::<128, 8, 2>::new(maps, maps.stopping(), effort, 3) else { return true };
+    let Ok(fitting) = maps.try_into() else { return true };
+    let mut locator = Locator::<128, 8, 2>::new(fitting, maps.stopping(), effort, 3);
     for (&seen, end) in touches.iter().zip([0, 10_000, u32::MAX].into_iter().cycle()) {
         locator.push_seen(seen);
         let at = locator.choose(end, u32::MAX - end, end, 64);
@@ -519,7 +532,7 @@ proptest! {
         let bytes = model(&[WEDGE, CYLINDER], 0);
         let maps = Maps::new(&bytes).unwrap();
         let effort = Effort { lookups: 40_000, candidates: 16, ..Effort::default() };
-        let mut locator = Locator::<1024, 32, 2>::new(maps, maps.stopping(), effort, seed).unwrap();
+        let mut locator = Locator::<1024, 32, 2>::new(maps.try_into().unwrap(), maps.stopping(), effort, seed);
         for number in 0..=touches {
             let at = locator.choose(spacing, STROKE, within, 20);
             prop_assert!(at.x.unsigned_abs() <= within && at.y.unsigned_abs() <= within, "{at:?} of {within}");

@@ -9,6 +9,7 @@
 //! | program | what |
 //! |---|---|
 //! | [`serve`] | a chip that recognizes touches from a host |
+//! | [`serve_with`] | the same, with models of maps too |
 //! | [`ProbeStation`] | a chip with fingers of its own, which also takes touches and models from a host |
 //!
 //! # Power cuts
@@ -34,11 +35,17 @@ mod record;
 mod serve;
 mod session;
 mod storage;
+mod table;
+#[cfg(all(test, feature = "locate"))]
+mod tests;
 
 pub use flash::{FlashError, FlashStorage, MappedFlash};
 pub use memory::Memory;
 pub use probe::{Board, Happened, LONGEST_WAIT, LinkFailed, ProbeSettings, ProbeStation};
 pub use record::record_length;
-pub use serve::{ERRORS_IN_A_ROW, ServeError, serve};
+pub use serve::{ERRORS_IN_A_ROW, ServeError, serve, serve_with};
 pub use session::{PROGRAM, RecordsTooShort, Station};
 pub use storage::{NoStorage, Place, Storage};
+pub use table::Locates;
+#[cfg(feature = "locate")]
+pub use table::Table;

@@ -2,6 +2,7 @@
 
 use super::session::{RecordsTooShort, Station};
 use super::storage::Storage;
+use super::table::Locates;
 use core::fmt;
 use embedded_io::{Read, Write};
 use palpate_shared::link::DeviceEnd;
@@ -78,7 +79,21 @@ pub fn serve<const N: usize, S: Storage, T: Read + Write>(
     boot: u32,
     transport: &mut T,
 ) -> Result<(), ServeError<T::Error>> {
-    let (mut station, progress, starts) = Station::<N, &mut S>::open(built_in, storage)?;
+    serve_with::<N, _, _, _>(built_in, storage, (), boot, transport)
+}
+
+/// Serves a host as [`serve`] does, with room for a model of maps too: a `&mut` [`Table`](super::Table).
+///
+/// # Errors
+/// As [`serve`].
+pub fn serve_with<const N: usize, S: Storage, L: Locates, T: Read + Write>(
+    built_in: &[u8],
+    storage: &mut S,
+    located: L,
+    boot: u32,
+    transport: &mut T,
+) -> Result<(), ServeError<T::Error>> {
+    let (mut station, progress, starts) = Station::<N, &mut S, L>::open_with(built_in, storage, located)?;
     // Each start writes a record at its first command, so the counter is another one after each that mattered.
     let mut end = DeviceEnd::new(progress, boot.wrapping_add(starts));
     let (mut reads, mut writes) = (Failures(0), Failures(0));

@@ -2,6 +2,7 @@
 
 use super::record::{Record, Source, Staged, record_length};
 use super::storage::{NoStorage, Place, Storage};
+use super::table::Locates;
 use crate::decide::State;
 use crate::model::Opened;
 use crate::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, Stopping, Verdict};
@@ -11,6 +12,8 @@ use palpate_shared::link::{
     ApproachMessage, Decision, Detail, Device, ModelInfo, NotStored, Outcome, POSE_BYTES, Payload, Progress, Refusal,
     VerdictMessage, checksum,
 };
+#[cfg(feature = "locate")]
+use palpate_shared::{Approach, TablePose};
 
 /// Room for a snapshot of `N` objects, where an array's length cannot be computed from `N`: room for a snapshot of
 /// one object, `N` times.
@@ -37,14 +40,16 @@ impl fmt::Display for RecordsTooShort {
 
 impl core::error::Error for RecordsTooShort {}
 
-/// A recognizer with room for `N` objects, as a [`Device`] at the end of a link, and what it keeps in `S`.
+/// A recognizer with room for `N` objects, as a [`Device`] at the end of a link, and what it keeps in `S`. A model of maps is
+/// used instead of trees where `L` has room for one.
 #[derive(Debug)]
-pub struct Station<'m, const N: usize, S = NoStorage> {
+pub struct Station<'m, const N: usize, S = NoStorage, L = ()> {
     built_in: &'m [u8],
     storage: S,
     /// The model in use, and the state of recognition under it.
     opened: Option<Opened>,
     state: Option<State<N>>,
+    located: L,
     source: Source,
     /// The model of the newest record: it must not be written over.
     kept: Source,
@@ -58,16 +63,17 @@ pub struct Station<'m, const N: usize, S = NoStorage> {
 impl<'m, const N: usize> Station<'m, N> {
     /// A station that has one model and no storage: nothing can be loaded, nothing lasts.
     pub fn new(model: &Model<'m>) -> Self {
-        let mut station = Self::empty(model.bytes(), NoStorage);
+        let mut station = Self::empty(model.bytes(), NoStorage, ());
         station.use_model(Some(model.opened()));
         station
     }
 }
 
-impl<'m, const N: usize, S> Station<'m, N, S> {
-    const fn empty(built_in: &'m [u8], storage: S) -> Self {
+impl<'m, const N: usize, S, L> Station<'m, N, S, L> {
+    const fn empty(built_in: &'m [u8], storage: S, located: L) -> Self {
+        let (opened, state, staged, refused, program) = (None, None, None, 0, PROGRAM);
         let (source, kept) = (Source::BuiltIn, Source::BuiltIn);
-        Self { built_in, storage, opened: None, state: None, source, kept, staged: None, refused: 0, program: PROGRAM }
+        Self { built_in, storage, opened, state, located, source, kept, staged, refused, program }
     }
 }
 
@@ -79,25 +85,42 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
     /// # Errors
     /// [`RecordsTooShort`].
     pub fn open(built_in: &'m [u8], storage: S) -> Result<(Self, Progress, u32), RecordsTooShort> {
+        Self::open_with(built_in, storage, ())
+    }
+}
+
+impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
+    /// A station as of [`open`](Self::open), with room for a model of maps. Touches under maps are not kept: after a reset a host
+    /// hears that they are forgotten.
+    ///
+    /// # Errors
+    /// [`RecordsTooShort`].
+    pub fn open_with(built_in: &'m [u8], storage: S, located: L) -> Result<(Self, Progress, u32), RecordsTooShort> {
         let (needed, found) = (record_length(N), storage.record_length());
         if found < needed && found > 0 {
             return Err(RecordsTooShort { needed, found });
         }
-        let mut station = Self::empty(built_in, storage);
+        let mut station = Self::empty(built_in, storage, located);
         let newest = station.storage.newest();
         let starts = newest.map_or(0, |(counter, _)| counter);
         let record = newest.and_then(|(_, record)| postcard::from_bytes::<Record<'_>>(record).ok());
         let Some(record) = record else {
-            station.use_model(station.model_at(Source::BuiltIn).map(|model| model.opened()));
+            station.use_built_in();
             return Ok((station, Progress::NONE, starts));
         };
+        let (bytes, source) = (bytes_at(station.built_in, &station.storage, record.source), record.source);
+        let is_of_record = bytes.last_chunk().is_some_and(|stated| u32::from_le_bytes(*stated) == record.model);
+        if is_of_record && station.located.open(bytes).is_ok() {
+            (station.source, station.kept) = (source, source);
+            return Ok((station, Progress::NONE, starts));
+        }
         let model = station.model_at(record.source);
         // A record of a model that is not there any more is not of this program: neither its evidence nor its progress.
         if model.map_or(0, |model| model.checksum()) != record.model {
-            station.use_model(station.model_at(Source::BuiltIn).map(|model| model.opened()));
+            station.use_built_in();
             return Ok((station, Progress::NONE, starts));
         }
-        let (source, staged, progress) = (record.source, record.staged, record.progress.clone());
+        let (staged, progress) = (record.staged, record.progress.clone());
         let opened = model.map(|model| model.opened());
         let state = model.and_then(|model| {
             let mut recognizer = Recognizer::new(&model, Stopping::from_model(&model)).ok()?;
@@ -116,15 +139,17 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
     }
 
     fn bytes_at(&self, source: Source) -> &[u8] {
-        let prefix = |place, length| {
-            let length = usize::try_from(length).unwrap_or(usize::MAX);
-            self.storage.model(place).get(..length).unwrap_or_default()
-        };
-        match source {
-            Source::BuiltIn => self.built_in,
-            Source::First(length) => prefix(Place::First, length),
-            Source::Second(length) => prefix(Place::Second, length),
+        bytes_at(self.built_in, &self.storage, source)
+    }
+
+    /// Puts the built-in model into use, if it is one.
+    fn use_built_in(&mut self) {
+        let opened = self.model_at(Source::BuiltIn).map(|model| model.opened());
+        if opened.is_none() {
+            // Other bytes are no model either.
+            let _ = self.located.open(self.built_in);
         }
+        self.use_model(opened);
     }
 
     /// Puts a model into use, with nothing touched.
@@ -146,6 +171,16 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
         self.opened?.model(self.bytes_at(self.source))
     }
 
+    /// True while maps are in use.
+    fn has_maps(&self) -> bool {
+        self.located.info(self.bytes_at(self.source)).is_some()
+    }
+
+    /// The refusal of what needs trees.
+    fn no_trees(&self) -> Refusal {
+        if self.has_maps() { Refusal::Unsupported } else { Refusal::NoModel }
+    }
+
     /// Lets the recognizer do something.
     ///
     /// # Errors
@@ -161,8 +196,8 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
 
     /// Asks the recognizer without changing it.
     fn ask<T>(&self, question: impl FnOnce(&Model<'_>, &State<N>) -> T) -> Result<T, Refusal> {
-        let (model, state) = (self.model().ok_or(Refusal::NoModel)?, self.state.as_ref().ok_or(Refusal::NoModel)?);
-        Ok(question(&model, state))
+        let both = self.model().zip(self.state.as_ref());
+        both.map(|(model, state)| question(&model, state)).ok_or_else(|| self.no_trees())
     }
 
     /// Takes a touch into account.
@@ -171,24 +206,42 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
     ///
     /// # Errors
     /// [`Refusal::NoModel`] without a usable model; [`Refusal::Pattern`], [`Refusal::Spread`], [`Refusal::NoPose`] or
-    /// [`Refusal::Features`] for a touch that the model was not trained for: [`Station::refused`] counts those.
+    /// [`Refusal::Features`] for a touch that the model was not trained for, and [`Refusal::NoPosition`] for one to a model of maps:
+    /// [`Station::refused`] counts those.
     pub fn push(&mut self, touch: &Touch, detail: bool) -> Result<VerdictMessage, Refusal> {
+        if self.has_maps() {
+            return self.counted(Err(Refusal::NoPosition));
+        }
         let pushed = self.with(|recognizer| {
-            let decision = match recognizer.push(touch)? {
-                Verdict::Undecided => Decision::Undecided,
-                Verdict::Recognized { object, .. } => Decision::Recognized(object),
-                Verdict::Unknown => Decision::Unknown,
-                Verdict::GaveUp => Decision::GaveUp,
-            };
+            let decision = decision(recognizer.push(touch)?);
             let best = recognizer.best();
             let detail = detail.then(|| Detail::new(recognizer.posterior(best).q56(), recognizer.evidence()));
             let best = u8::try_from(best).unwrap_or(u8::MAX);
             Ok(VerdictMessage { decision, best, touches: recognizer.touches(), detail })
         })?;
+        self.counted(pushed.map_err(refusal))
+    }
+
+    /// Takes a touch with a position into account, in micrometers, under a model of maps.
+    ///
+    /// Cost: a search of the maps, and with a detail a checksum of the evidence.
+    ///
+    /// # Errors
+    /// [`Refusal::NoModel`] without a usable model; [`Refusal::NoPose`], [`Refusal::NotDown`], or [`Refusal::Position`] with a model
+    /// of trees: [`Station::refused`] counts those.
+    pub fn press(&mut self, touch: &Touch, position: [i32; 3], detail: bool) -> Result<VerdictMessage, Refusal> {
+        let bytes = bytes_at(self.built_in, &self.storage, self.source);
+        let pressed = self.located.press(bytes, touch, position, detail);
+        // Without maps it says that there is no model.
+        self.counted(pressed.map_err(|refusal| if self.state.is_some() { Refusal::Position } else { refusal }))
+    }
+
+    /// Counts a touch that is refused.
+    fn counted(&mut self, pushed: Result<VerdictMessage, Refusal>) -> Result<VerdictMessage, Refusal> {
         if pushed.is_err() {
             self.refused = self.refused.saturating_add(1);
         }
-        pushed.map_err(refusal)
+        pushed
     }
 
     /// True if the touches so far have decided; no further one counts before a reset.
@@ -222,17 +275,21 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
         }
         match staged.payload {
             Payload::Model => {
-                let model = Model::new(bytes).map_err(|_| Refusal::Invalid)?;
-                if model.object_count() > N {
-                    return Err(Refusal::TooLong);
+                let opened = match Model::new(bytes) {
+                    Ok(model) if model.object_count() > N => return Err(Refusal::TooLong),
+                    Ok(model) => Some(model.opened()),
+                    Err(_) => None,
+                };
+                match opened {
+                    Some(_) => self.located.close(),
+                    None => self.located.open(bytes)?,
                 }
-                let opened = model.opened();
                 self.source = Source::loaded(place, staged.length);
-                self.use_model(Some(opened));
+                self.use_model(opened);
                 Ok(())
             }
             Payload::Snapshot => {
-                let (model, state) = (self.model().ok_or(Refusal::NoModel)?, self.state.clone());
+                let (model, state) = (self.model().ok_or_else(|| self.no_trees())?, self.state.clone());
                 let mut recognizer = Recognizer::continued(model, state.ok_or(Refusal::NoModel)?);
                 recognizer.restore(bytes).map_err(|_| Refusal::Invalid)?;
                 self.state = Some(recognizer.into_state());
@@ -255,6 +312,29 @@ impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
     }
 }
 
+/// Bytes of the model that a source names.
+fn bytes_at<'b>(built_in: &'b [u8], storage: &'b impl Storage, source: Source) -> &'b [u8] {
+    let prefix = |place, length| {
+        let length = usize::try_from(length).unwrap_or(usize::MAX);
+        storage.model(place).get(..length).unwrap_or_default()
+    };
+    match source {
+        Source::BuiltIn => built_in,
+        Source::First(length) => prefix(Place::First, length),
+        Source::Second(length) => prefix(Place::Second, length),
+    }
+}
+
+/// Converts to the link's message.
+pub(super) const fn decision(verdict: Verdict) -> Decision {
+    match verdict {
+        Verdict::Undecided => Decision::Undecided,
+        Verdict::Recognized { object, .. } => Decision::Recognized(object),
+        Verdict::Unknown => Decision::Unknown,
+        Verdict::GaveUp => Decision::GaveUp,
+    }
+}
+
 /// Converts to the link's message.
 const fn refusal(refused: Refused) -> Refusal {
     match refused {
@@ -269,13 +349,19 @@ fn outcome(result: Result<(), Refusal>) -> Outcome {
     result.map_or_else(Outcome::Refused, |()| Outcome::Done)
 }
 
-impl<const N: usize, S: Storage> Device for Station<'_, N, S> {
+impl<const N: usize, S: Storage, L: Locates> Device for Station<'_, N, S, L> {
     fn touch(&mut self, touch: &Touch, detail: bool) -> Outcome {
         self.push(touch, detail).map_or_else(Outcome::Refused, Outcome::Verdict)
     }
 
+    fn press(&mut self, touch: &Touch, position: [i32; 3], detail: bool) -> Outcome {
+        Self::press(self, touch, position, detail).map_or_else(Outcome::Refused, Outcome::Verdict)
+    }
+
     fn reset(&mut self) -> Outcome {
-        outcome(self.with(|recognizer| recognizer.reset()))
+        let bytes = bytes_at(self.built_in, &self.storage, self.source);
+        let reset = self.located.reset(bytes);
+        outcome(reset.or_else(|_| self.with(|recognizer| recognizer.reset())))
     }
 
     fn begin(&mut self, payload: Payload, length: u32, checksum: u32) -> Outcome {
@@ -302,6 +388,10 @@ impl<const N: usize, S: Storage> Device for Station<'_, N, S> {
     }
 
     fn model(&self) -> Option<ModelInfo> {
+        let maps = self.located.info(self.bytes_at(self.source));
+        if maps.is_some() {
+            return maps;
+        }
         let model = Self::model(self)?;
         Some(ModelInfo {
             checksum: model.checksum(),
@@ -312,12 +402,16 @@ impl<const N: usize, S: Storage> Device for Station<'_, N, S> {
     }
 
     fn name(&self, object: u8) -> Option<&str> {
-        let object = usize::from(object);
-        let model = self.opened?.model(self.bytes_at(self.source))?;
+        let bytes = self.bytes_at(self.source);
+        let Some(opened) = self.opened else { return self.located.name(bytes, object) };
+        let (object, model) = (usize::from(object), opened.model(bytes)?);
         (object < model.object_count()).then(|| model.object_name(object))
     }
 
     fn posterior(&self, object: u8) -> Option<u64> {
+        if self.opened.is_none() {
+            return self.located.posterior(self.bytes_at(self.source), object);
+        }
         let object = usize::from(object);
         let known = |model: &Model<'_>, state: &State<N>| {
             (object < model.object_count()).then(|| state.posterior(model, object).q56())
@@ -348,6 +442,21 @@ impl<const N: usize, S: Storage> Device for Station<'_, N, S> {
         proposal.ok_or(Refusal::NoPlan)
     }
 
+    #[cfg(feature = "locate")]
+    fn place(&mut self, rank: u8) -> Result<(bool, Option<TablePose>), Refusal> {
+        self.located.place(bytes_at(self.built_in, &self.storage, self.source), rank)
+    }
+
+    #[cfg(feature = "locate")]
+    fn placement(&self, placement: u8) -> Option<&str> {
+        self.located.placement(self.bytes_at(self.source), placement)
+    }
+
+    #[cfg(feature = "locate")]
+    fn next_press(&mut self, within: Option<u32>) -> Result<Approach, Refusal> {
+        self.located.next_press(bytes_at(self.built_in, &self.storage, self.source), within)
+    }
+
     fn program(&self) -> &str {
         self.program
     }
@@ -363,7 +472,7 @@ impl<const N: usize, S: Storage> Device for Station<'_, N, S> {
         let mut buffer: SnapshotBuffer<N> = [[0; _]; N];
         let evidence = self.ask(|model, state| state.snapshot(model, buffer.as_flattened_mut()).ok());
         let evidence = evidence.ok().flatten().unwrap_or_default();
-        let model = self.model().map_or(0, |model| model.checksum());
+        let model = Device::model(self).map_or(0, |model| model.checksum);
         let (source, staged) = (self.source, self.staged);
         let record = Record { model, source, staged, progress: progress.clone(), evidence };
         self.storage.store(|bytes| postcard::to_slice(&record, bytes).ok().map(|written| written.len()))?;

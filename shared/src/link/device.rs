@@ -3,9 +3,12 @@
 use super::frame::{Decoder, FRAME_MAX, Frame, encode};
 use super::message::{
     Answer, ApproachMessage, Command, Event, Message, ModelInfo, Outcome, Payload, Query, Refusal, Statistics,
+    micrometers,
 };
 use super::{CHUNK, POSE_BYTES, POSTERIORS, WINDOW};
 use crate::Touch;
+#[cfg(any(test, feature = "position"))]
+use crate::{Approach, TablePose};
 use embedded_io::{Read, Write};
 use serde::{Deserialize, Serialize};
 
@@ -47,6 +50,39 @@ pub trait Device {
     /// A [`Refusal`] to send instead.
     fn next_approach(&self, without: &[u8; POSE_BYTES]) -> Result<ApproachMessage, Refusal> {
         let _ = without;
+        Err(Refusal::Unsupported)
+    }
+
+    /// Takes a touch with a position into account, in micrometers; [`Outcome::Verdict`], with a detail if asked for.
+    fn press(&mut self, touch: &Touch, position: [i32; 3], detail: bool) -> Outcome {
+        let _ = (touch, position, detail);
+        Outcome::Refused(Refusal::Position)
+    }
+
+    #[cfg(any(test, feature = "position"))]
+    /// True if no finger met more than the table, and the place of this rank where the most likely object lies.
+    ///
+    /// # Errors
+    /// A [`Refusal`] to send instead.
+    fn place(&mut self, rank: u8) -> Result<(bool, Option<TablePose>), Refusal> {
+        let _ = rank;
+        Err(Refusal::Unsupported)
+    }
+
+    #[cfg(any(test, feature = "position"))]
+    /// A placement's name.
+    fn placement(&self, placement: u8) -> Option<&str> {
+        let _ = placement;
+        None
+    }
+
+    #[cfg(any(test, feature = "position"))]
+    /// The approach straight down that tells most: see [`Query::NextPress`]. Asked again before another touch, it is the same.
+    ///
+    /// # Errors
+    /// A [`Refusal`] to send instead.
+    fn next_press(&mut self, within: Option<u32>) -> Result<Approach, Refusal> {
+        let _ = within;
         Err(Refusal::Unsupported)
     }
 
@@ -311,6 +347,7 @@ fn execute<'a>(
         Command::Begin { payload, length, checksum } => device.begin(payload, length, checksum),
         Command::Chunk { offset, bytes } => device.chunk(offset, bytes),
         Command::Commit => device.commit(),
+        Command::Press { touch, position, detail } => device.press(&Touch::from(&touch), micrometers(position), detail),
     };
     if let Some(slot) = progress.slot(sequence) {
         *slot = Some(outcome);
@@ -332,10 +369,9 @@ fn answer<'b>(
     match query {
         Query::Hello | Query::Open { .. } => Answer::Session { next: progress.next, boot },
         Query::Model => device.model().map_or(Answer::Refused(Refusal::NoModel), Answer::Model),
-        Query::Name { object } => match device.name(object) {
-            Some(name) => Answer::Name(short(name)),
-            None => Answer::Refused(Refusal::NoObject),
-        },
+        Query::Name { object } => named(device.name(object)),
+        #[cfg(any(test, feature = "position"))]
+        Query::Placement { placement } => named(device.placement(placement)),
         Query::Program => Answer::Program(short(device.program())),
         Query::Statistics => Answer::Statistics(Statistics { refused: device.refused(), ..*statistics }),
         Query::Posteriors { first } => {
@@ -352,11 +388,25 @@ fn answer<'b>(
             Ok(approach) => Answer::NextApproach(approach),
             Err(refusal) => Answer::Refused(refusal),
         },
+        #[cfg(any(test, feature = "position"))]
+        Query::Place { rank } => match device.place(rank) {
+            Ok((table_alone, place)) => Answer::Place { table_alone, place },
+            Err(refusal) => Answer::Refused(refusal),
+        },
+        #[cfg(any(test, feature = "position"))]
+        Query::NextPress { within } => match device.next_press(within) {
+            Ok(press) => Answer::NextPress(press),
+            Err(refusal) => Answer::Refused(refusal),
+        },
         Query::Snapshot { offset } => match device.snapshot(offset, buffer) {
             Ok((length, written)) => Answer::Snapshot { length, bytes: buffer.get(..written).unwrap_or_default() },
             Err(refusal) => Answer::Refused(refusal),
         },
     }
+}
+
+fn named(name: Option<&str>) -> Answer<'_> {
+    name.map_or(Answer::Refused(Refusal::NoObject), |name| Answer::Name(short(name)))
 }
 
 /// The beginning of a text: as much of it as fits into a frame.

@@ -3,6 +3,8 @@
 
 use super::POSE_BYTES;
 use crate::checksum::checksum_of;
+#[cfg(any(test, feature = "position"))]
+use crate::{Approach, TablePose};
 use crate::{ContactTime, Descriptor, Pose, Touch};
 use serde::{Deserialize, Serialize};
 
@@ -98,6 +100,26 @@ pub enum Query {
     },
     /// Asks for the program that the chip runs. A chip whose program is older than this question does not answer it.
     Program,
+    /// Asks for a place where the most likely object lies. Only a chip that [has maps](ModelInfo::has_maps) answers this and the
+    /// two that follow, which take no flash without the feature `position`.
+    #[cfg(any(test, feature = "position"))]
+    Place {
+        /// Rank of the place, from 0.
+        rank: u8,
+    },
+    /// Asks for the name of a placement.
+    #[cfg(any(test, feature = "position"))]
+    Placement {
+        /// The placement's index in the model.
+        placement: u8,
+    },
+    /// Asks for the next approach straight down.
+    #[cfg(any(test, feature = "position"))]
+    NextPress {
+        /// Half the side of the square about the table's origin in which the middle finger may go, in micrometers; none: twice
+        /// the maps' range.
+        within: Option<u32>,
+    },
 }
 
 /// The answer to a [`Query`].
@@ -132,6 +154,17 @@ pub enum Answer<'a> {
     NextApproach(ApproachMessage),
     /// To [`Query::Program`]: name and version; empty if it does not say.
     Program(&'a str),
+    /// To [`Query::Place`].
+    #[cfg(any(test, feature = "position"))]
+    Place {
+        /// True if no finger met more than the table so far.
+        table_alone: bool,
+        /// The place; none before the first touch, and if there are not as many.
+        place: Option<TablePose>,
+    },
+    /// To [`Query::NextPress`].
+    #[cfg(any(test, feature = "position"))]
+    NextPress(Approach),
 }
 
 /// Something to do, exactly once.
@@ -165,6 +198,28 @@ pub enum Command<'a> {
     },
     /// It is complete: check it and use it. Until then, and if the check fails, what was there before stays in use.
     Commit,
+    /// Take a touch with a position into account. Only a chip that [has maps](ModelInfo::has_maps) is sure to understand it.
+    Press {
+        /// The touch; its pose is in the table's frame.
+        touch: TouchMessage,
+        /// The hand's position in the table's frame: x, y and z in micrometers, i32 little endian.
+        position: [u8; 12],
+        /// True if the outcome should have a [`Detail`].
+        detail: bool,
+    },
+}
+
+#[cfg(feature = "position")]
+impl Command<'_> {
+    /// The command that takes a touch into account, with its position if it has one.
+    pub fn of_touch(touch: &Touch, detail: bool) -> Self {
+        let (message, mut position) = (TouchMessage::from(touch), [0; 12]);
+        let Some(crate::Position { micrometers }) = touch.position() else {
+            return Self::Touch { touch: message, detail };
+        };
+        position.iter_mut().zip(micrometers.into_iter().flat_map(i32::to_le_bytes)).for_each(|(to, from)| *to = from);
+        Self::Press { touch: message, position, detail }
+    }
 }
 
 /// Kind of data that arrives in chunks.
@@ -220,12 +275,27 @@ pub enum Refusal {
     Unwritable,
     /// The model has no plan of approaches, or none for a pose that can be reached.
     NoPlan,
+    /// The model is of maps, and the touch has no position: not counted.
+    NoPosition,
+    /// The model is of trees, and the touch has a position: not counted.
+    Position,
+    /// The model is of maps, and the hand does not come straight down: not counted.
+    NotDown,
 }
 
 impl Refusal {
     /// True if this refuses a touch that was not counted because the model was not trained for it.
     pub const fn is_of_a_touch(self) -> bool {
-        matches!(self, Self::Pattern | Self::Spread | Self::NoPose | Self::Features)
+        matches!(
+            self,
+            Self::Pattern
+                | Self::Spread
+                | Self::NoPose
+                | Self::Features
+                | Self::NoPosition
+                | Self::Position
+                | Self::NotDown
+        )
     }
 }
 
@@ -245,6 +315,9 @@ impl core::fmt::Display for Refusal {
             Self::Unwritable => "the chip could not write it: load it again; its memory may be worn out",
             Self::NoPlan => "the chip's model has no plan of approaches in poses that can be reached",
             Self::Features => "the chip's model is over rows of features, not touches",
+            Self::NoPosition => "the chip's model is of maps, and the touch has no position",
+            Self::Position => "the touch has a position, and the chip has no model of maps",
+            Self::NotDown => "it does not come straight down",
         })
     }
 }
@@ -346,6 +419,11 @@ fn pose_bytes(pose: &Pose) -> [u8; 12] {
     bytes
 }
 
+/// Numbers in the bytes of a position.
+pub(super) fn micrometers([a, b, c, d, e, f, g, h, i, j, k, l]: [u8; 12]) -> [i32; 3] {
+    [[a, b, c, d], [e, f, g, h], [i, j, k, l]].map(i32::from_le_bytes)
+}
+
 fn pose_of([a, b, c, d, e, f, g, h, i, j, k, l]: [u8; 12]) -> Pose {
     Pose {
         direction: [[a, b], [c, d], [e, f]].map(i16::from_le_bytes),
@@ -438,17 +516,25 @@ pub struct ModelInfo {
     pub length: u32,
     /// Objects less one.
     pub last_object: u8,
-    /// [`Descriptor::code`], 255 for a model of other features.
+    /// [`Descriptor::code`], 255 for a model of other features, [`ModelInfo::MAPS`] for one of maps.
     pub descriptor: u8,
 }
 
 impl ModelInfo {
+    /// In place of a descriptor's code: maps, for touches with a position.
+    pub const MAPS: u8 = 254;
+
+    /// True for a model of maps.
+    pub const fn has_maps(&self) -> bool {
+        self.descriptor == Self::MAPS
+    }
+
     /// Number of objects that the model knows.
     pub fn objects(&self) -> usize {
         usize::from(self.last_object) + 1
     }
 
-    /// Descriptor of the model's touches.
+    /// Descriptor of the model's touches; none for a model of maps, or of other features.
     pub fn descriptor(&self) -> Option<Descriptor> {
         Descriptor::from_code(self.descriptor)
     }

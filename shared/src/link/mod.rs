@@ -13,9 +13,9 @@
 //!
 //! | from | message | delivery |
 //! |---|---|---|
-//! | host | [`Command`]: touch, reset, load | numbered, executed exactly once and in order |
+//! | host | [`Command`]: touch, press, reset, load | numbered, executed exactly once and in order |
 //! | chip | [`Outcome`]: verdict, done, refused | repeated on demand for the last [`WINDOW`] commands |
-//! | host | [`Query`]: model, names, posteriors, statistics, snapshot, next approach, program | changes nothing, repeated until answered |
+//! | host | [`Query`]: model, names, posteriors, places, statistics, snapshot, next approach, program | changes nothing, repeated until answered |
 //! | chip | [`Answer`] | |
 //! | chip | [`Event`]: its own touches, faults, power-up | numbered, so that the host knows how many it missed |
 //!
@@ -31,6 +31,10 @@
 //! the host notices a start even if the event that announces it was lost. The last event that was stored with the evidence
 //! is sent again at each start, with the same numbers, until something else is stored. So a host hears of everything that
 //! counts, even after power cuts, and recognizes a copy by its numbers.
+//!
+//! Touches with a position ([`Command::Press`]), and the questions about the place of an object, came to this version later. A
+//! chip whose program is older does not read them, and refuses to load maps. So a host looks first whether the chip
+//! [has maps](ModelInfo::has_maps); an older host takes those for a model of rows, and sends it nothing.
 //!
 //! An answer names the session of the host that asked, so that several hosts may listen to one chip.
 //!

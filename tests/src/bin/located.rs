@@ -222,7 +222,7 @@ fn run(
 /// Approaches as the image `located` reads them: the terms, then each touch with what this machine makes of it.
 fn approaches(maps: Maps<'_>, world: &World<'_>, terms: &Terms, count: f64) -> Result<Vec<u8>, Box<dyn Error>> {
     let hand = Hand::of(&maps).ok_or("the maps state no hand")?;
-    let mut locator = OnChip::new(maps, maps.stopping(), terms.effort, 1).map_err(|error| error.to_string())?;
+    let mut locator = OnChip::new(maps.try_into()?, maps.stopping(), terms.effort, 1);
     let mut bytes = terms.to_bytes().to_vec();
     let mut index = 0;
     while bytes.len() < located::TERMS + count as usize * (located::TOUCH + located::LENGTH) {

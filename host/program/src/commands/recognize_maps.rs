@@ -56,11 +56,11 @@ fn degrees(turn: u16) -> f64 {
 }
 
 impl<'m> Mode<'m> {
-    fn of(maps: &Maps<'m>, pose: Pose) -> Self {
+    fn of(placement: &'m str, pose: Pose) -> Self {
         let [x, y] = pose.position.map(millimeters);
         let [x_within, y_within] = pose.within.map(|within| f64::from(within) / 1e3);
         Self {
-            placement: maps.placement_name(pose.placement),
+            placement,
             x,
             y,
             yaw: pose.yaw_within.map(|_| degrees(pose.yaw)),
@@ -77,6 +77,25 @@ impl From<Approach> for Next {
         let degrees = f64::from(roll) / 256.0 * 360.0;
         Self { x: millimeters(x), y: millimeters(y), roll: (degrees * 100.0).round() / 100.0 }
     }
+}
+
+/// Prints verdict, place and next approach after a touch, of placements with these names.
+pub(super) fn print_located<'m>(
+    line: Line<'m>,
+    poses: Vec<Pose>,
+    next: Option<Approach>,
+    name: impl Fn(u8) -> &'m str,
+) -> Result<()> {
+    let mut modes = poses.into_iter().map(|pose| Mode::of(name(pose.placement), pose)).collect::<Vec<_>>().into_iter();
+    let pose = modes.next();
+    let placement = pose.as_ref().map_or("", |pose| pose.placement);
+    let located = Located { line, placement, pose, modes: modes.collect(), next: next.map(Next::from) };
+    // Numbers and strings are always JSON.
+    output::print(&format!(
+        "{}
+",
+        serde_json::to_string(&located).unwrap_or_default()
+    ))
 }
 
 /// Recognizes objects by touches with a position.
@@ -177,12 +196,7 @@ impl<'m> Stream<'m> {
         };
         let Some(within) = self.within else { return line.print(self.json) };
         let poses = if self.touches == 0 { Vec::new() } else { self.locating.poses(leader) };
-        let mut modes = poses.into_iter().map(|pose| Mode::of(&self.maps, pose)).collect::<Vec<_>>().into_iter();
-        let pose = modes.next();
-        let next = (verdict == Verdict::Undecided).then(|| self.locating.choose(&self.hand, within, POSE).into());
-        let placement = pose.as_ref().map_or("", |pose| pose.placement);
-        let located = Located { line, placement, pose, modes: modes.collect(), next };
-        // Numbers and strings are always JSON.
-        output::print(&format!("{}\n", serde_json::to_string(&located).unwrap_or_default()))
+        let next = (verdict == Verdict::Undecided).then(|| self.locating.choose(&self.hand, within, POSE));
+        print_located(line, poses, next, |placement| self.maps.placement_name(placement))
     }
 }

@@ -142,7 +142,7 @@ impl TableArguments {
         let noise = terms.real.noise(probe.speed).to_string();
         match global.json {
             true => output::print_json(&Evaluated { aimed: terms.aimed, noise, evaluation: &evaluated }),
-            false => output::print(&evaluated_text(&evaluated, terms.aimed, &noise)),
+            false => output::print(&evaluated_text(&evaluated, &terms, &noise)),
         }
     }
 }
@@ -182,14 +182,14 @@ fn calibrated_text(path: &Path, calibrated: &Calibrated, before: u64) -> String 
         + &format!("{}: {} bytes\n", path.display(), count(calibrated.model.len()))
 }
 
-fn evaluated_text(evaluated: &Evaluation, aimed: Aimed, noise: &str) -> String {
+fn evaluated_text(evaluated: &Evaluation, terms: &Terms, noise: &str) -> String {
     let Evaluation { sequences, given, wrong, undecided, unknown, off: [half, most], .. } = *evaluated;
     let mut text = format!(
         "{} sequences of {}, for {noise}\n\
          {} names given, {} of them wrong ({wrong}); {undecided} sequences undecided, {unknown} unknown; {} approaches each\n\
-         places of right names: half within {} mm, 95 % within {} mm; {} of {} poses in their intervals\n",
+         places of right names: half within {} mm, 95 % within {} mm; {} of {} in the intervals of {}\n",
         count(sequences),
-        how(aimed),
+        how(terms.aimed),
         count(given),
         percent(wrong as f64 / given.max(1) as f64, 2),
         decimal(evaluated.mean_approaches, 2),
@@ -197,6 +197,7 @@ fn evaluated_text(evaluated: &Evaluation, aimed: Aimed, noise: &str) -> String {
         decimal(most, 1),
         count(evaluated.poses_in_interval),
         count(evaluated.poses),
+        if terms.until.is_some() { "their pose" } else { "one of the modes of their pose" },
     );
     if let Some(tested) = &evaluated.promise {
         let promised = &tested.promised;
@@ -217,7 +218,7 @@ fn evaluated_text(evaluated: &Evaluation, aimed: Aimed, noise: &str) -> String {
             },
         );
         for (is_other, what) in
-            [(promised.aimed != aimed, how(promised.aimed)), (promised.noise != noise, promised.noise.as_str())]
+            [(promised.aimed != terms.aimed, how(promised.aimed)), (promised.noise != noise, promised.noise.as_str())]
         {
             if is_other {
                 _ = writeln!(text, "Void here: it was made for {what}.");

@@ -1,8 +1,9 @@
 //! The commands that talk to a chip: link and watch, with a chip's whole program behind a TCP connection.
 
 use crate::compiled::Place;
+use crate::locate::{located, recognized, refused};
 use crate::{command, json, run, stderr, stdout};
-use palpate_onboard::station::{Memory, NoStorage, record_length, serve};
+use palpate_onboard::station::{Memory, NoStorage, Table, record_length, serve, serve_with};
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -51,6 +52,69 @@ fn chip() -> String {
         // It ends with an error where the host hangs up in the middle of something.
         let _ = serve::<OBJECTS, _, _>(&[], &mut memory, 0, &mut Wire(stream));
     })
+}
+
+/// A chip with room for maps, as a Cortex-M4F with 128 KB has.
+fn chip_with_table() -> String {
+    port(|stream| {
+        stream.set_nodelay(true).unwrap();
+        let [mut a, mut b] = [(); 2].map(|()| vec![0; 60_000]);
+        let [mut c, mut d] = [(); 2].map(|()| vec![0; record_length(OBJECTS)]);
+        let mut memory = Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] };
+        let mut table = Box::new(Table::<14_336, 32, 16>::new());
+        let _ = serve_with::<OBJECTS, _, _, _>(&[], &mut memory, &mut *table, 0, &mut Wire(stream));
+    })
+}
+
+#[test]
+fn a_chip_with_maps_says_verdicts_places_and_approaches_as_the_host_does() {
+    let directory = located();
+    let at = directory.path();
+    let listing: Value = serde_json::from_slice(&std::fs::read(at.join("data/dataset.json")).unwrap()).unwrap();
+    let placements = listing["objects"][0]["placements"].as_array().unwrap().len();
+    let text = std::fs::read_to_string(at.join("data/brick.txt")).unwrap();
+    // An empty line begins another object.
+    let mut lines = text.lines().step_by(placements).take(12).map(|line| format!("{line}\n")).collect::<Vec<_>>();
+    lines.insert(2, "\n".into());
+    let said = recognized(at, "maps.palpate --next", &lines.concat());
+    assert!(said.iter().any(|line| line["verdict"] == "recognized"), "{said:?}");
+    let link = |chip: String, words: &str| crate::locate::run(at, &format!("link {chip} {words}"));
+    let text = link(chip_with_table(), "lines.txt --load maps.palpate --next");
+    assert_eq!(text.lines().map(|line| serde_json::from_str(line).unwrap()).collect::<Vec<Value>>(), said);
+    let words = "--parity data --stop-after 12 --per-object 6 --next --workspace 15 --bad-line 0.001,0.001,0.02,0";
+    let text = link(chip_with_table(), &format!("--load maps.palpate {words}"));
+    assert!(text.contains("compared with the host: 12 touches and 12 proposed approaches, 0 differences"), "{text}");
+    assert!(link(chip_with_table(), "--load maps.palpate").contains(", maps, 2 objects: brick, slab"));
+}
+
+#[test]
+fn touches_with_a_position_and_a_chip_without_maps_do_not_go_together() {
+    let directory = located();
+    let at = directory.path();
+    std::fs::copy(Place::new().path("model.palpate"), at.join("trees.palpate")).unwrap();
+    std::fs::write(at.join("located.txt"), "0 0 0 0 0 -1 1 0 0 0 0 20\n").unwrap();
+    std::fs::write(at.join("free.txt"), "0 0 0.08\n0 0 0 0 0.6 -0.8 1 0 0 0 0 20\n").unwrap();
+    std::fs::write(at.join("nan.txt"), "0 0 0 0 0 -1 1 0 0 nan 0 20\n").unwrap();
+    let of_trees = "the chip refuses: the touch has a position, and the chip has no model of maps. Load maps";
+    for (chip, words, code, expected) in [
+        (chip(), "located.txt --load trees.palpate", 1, of_trees),
+        (chip_with_table(), "located.txt --load trees.palpate", 1, of_trees),
+        (chip(), "free.txt --load trees.palpate --next", 2, "--next is given. Use it with a model of maps"),
+        (
+            chip_with_table(),
+            "located.txt --load maps.palpate --active",
+            2,
+            "--active is given. Use it with a model of trees",
+        ),
+        (chip(), "--load maps.palpate", 1, "the chip refuses the model: "),
+        (chip_with_table(), "nan.txt --load maps.palpate", 1, "nan.txt:1: "),
+        (chip_with_table(), "located.txt --load maps.palpate --next --workspace 2000", 2, "--workspace"),
+    ] {
+        refused(at, &format!("link {chip} {words}"), code, expected);
+    }
+    let text = crate::locate::run(at, &format!("link {} free.txt --load maps.palpate", chip_with_table()));
+    let refused = "not counted: the chip's model is of maps, and the touch has no position\nnot counted: it does not come straight down\n";
+    assert!(text.starts_with(refused), "{text}");
 }
 
 /// A run of the program that reads `input`.

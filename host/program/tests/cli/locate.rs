@@ -15,7 +15,7 @@ fn brick(directory: &Path, name: &str, sides: [f64; 3]) {
 }
 
 /// Two boxes, touches of them with positions, and a model of maps.
-fn located() -> tempfile::TempDir {
+pub(crate) fn located() -> tempfile::TempDir {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
     std::fs::create_dir(at.join("meshes")).unwrap();
@@ -28,16 +28,16 @@ fn located() -> tempfile::TempDir {
     directory
 }
 
-fn run(at: &Path, words: &str) -> String {
+pub(crate) fn run(at: &Path, words: &str) -> String {
     succeeds(at, &words.split_whitespace().collect::<Vec<_>>())
 }
 
-fn refused(at: &Path, words: &str, code: i32, expected: &str) {
+pub(crate) fn refused(at: &Path, words: &str, code: i32, expected: &str) {
     fails(at, &words.split_whitespace().collect::<Vec<_>>(), code, expected);
 }
 
 /// The lines that a stream of touches gives.
-fn recognized(at: &Path, words: &str, lines: &str) -> Vec<Value> {
+pub(crate) fn recognized(at: &Path, words: &str, lines: &str) -> Vec<Value> {
     std::fs::write(at.join("lines.txt"), lines).unwrap();
     let printed = run(at, &format!("recognize {words} lines.txt"));
     printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()

@@ -27,9 +27,8 @@ fn main() -> ! {
     let terms = Terms::from_bytes(terms);
     let Ok(maps) = Maps::new(MODEL) else { fail() };
     let (Some(hand), Some(peripherals)) = (Hand::of(&maps), cortex_m::Peripherals::take()) else { fail() };
-    // Borrowed where it was made: moved, it would take its RAM twice.
-    let mut made = OnChip::new(maps, maps.stopping(), terms.effort, 1);
-    let Ok(locator) = &mut made else { fail() };
+    let Ok(fitting) = maps.try_into() else { fail() };
+    let locator = &mut OnChip::new(fitting, maps.stopping(), terms.effort, 1);
     let mut meter = Meter::new(peripherals.SYST);
     let (mut count, mut named, mut different, mut all, mut most, mut stack) = (0, 0, 0, 0, 0, 0);
     for approach in approaches.as_chunks::<{ TOUCH + LENGTH }>().0 {

@@ -1,7 +1,7 @@
 mod state_machine;
 
 use super::*;
-use crate::{ContactTime, Pose, Touch};
+use crate::{Approach, ContactTime, Pose, TablePose, Touch};
 use proptest::prelude::*;
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
@@ -692,7 +692,19 @@ fn golden_frames_pin_the_format() {
     // Written out by hand, except the checksums: version, session, message, CRC-32, in COBS.
     let (mut without, down) = ([0; POSE_BYTES], Pose { direction: [0, 0, -32767], alignment: [32767, 0, 0] });
     (without[0], without[12]) = (255, 1);
-    let frames: [(Message<'_>, &[u8]); 8] = [
+    let pressed = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(300)]).with_pose(down);
+    let place = TablePose {
+        placement: 3,
+        position: [12_300, -4_100],
+        yaw: 15_838,
+        within: [900, 1_000],
+        yaw_within: Some(546),
+        share: 60_000,
+    };
+    let press = Approach { x: -1_000, y: 0, roll: 64 };
+    // In micrometers: -12300, 4100, 25000.
+    let position = [244, 207, 255, 255, 4, 16, 0, 0, 168, 97, 0, 0];
+    let frames: [(Message<'_>, &[u8]); 13] = [
         (
             Message::Command { sequence: 1, command: Command::Touch { touch: (&touch).into(), detail: true } },
             &[
@@ -727,6 +739,35 @@ fn golden_frames_pin_the_format() {
         (
             Message::Answer { asker: 2, tag: 5, answer: Answer::Program("gpio 1") },
             &[0, 3, 3, 2, 1, 1, 16, 1, 2, 5, 8, 6, 103, 112, 105, 111, 32, 49, 42, 229, 240, 127, 0],
+        ),
+        (
+            Message::Command {
+                sequence: 1,
+                command: Command::Press { touch: (&pressed).into(), position, detail: false },
+            },
+            &[
+                0, 3, 3, 2, 1, 1, 4, 2, 1, 5, 9, 255, 255, 255, 255, 15, 172, 2, 1, 1, 1, 1, 5, 1, 128, 255, 127, 1, 1,
+                1, 7, 244, 207, 255, 255, 4, 16, 1, 3, 168, 97, 1, 1, 5, 57, 156, 103, 80, 0,
+            ],
+        ),
+        (
+            Message::Query { tag: 5, query: Query::Place { rank: 1 } },
+            &[0, 3, 3, 2, 1, 1, 1, 8, 5, 9, 1, 34, 102, 175, 61, 0],
+        ),
+        (
+            Message::Answer { asker: 2, tag: 5, answer: Answer::Place { table_alone: false, place: Some(place) } },
+            &[
+                0, 3, 3, 2, 1, 1, 5, 1, 2, 5, 9, 24, 1, 3, 152, 192, 1, 135, 64, 222, 123, 132, 7, 232, 7, 1, 162, 4,
+                224, 212, 3, 96, 53, 50, 59, 0,
+            ],
+        ),
+        (
+            Message::Query { tag: 5, query: Query::NextPress { within: Some(40_000) } },
+            &[0, 3, 3, 2, 1, 1, 1, 11, 5, 11, 1, 192, 184, 2, 69, 185, 59, 152, 0],
+        ),
+        (
+            Message::Answer { asker: 2, tag: 5, answer: Answer::NextPress(press) },
+            &[0, 3, 3, 2, 1, 1, 7, 1, 2, 5, 10, 207, 15, 6, 64, 139, 212, 99, 76, 0],
         ),
     ];
     for (message, golden) in frames {

@@ -6,7 +6,7 @@
 //! they are connected to. `PALPATE_LINK_STEPS=1000000` sets the number of steps; without it there are 60,000.
 
 use crate::link::*;
-use crate::{Pose, Touch};
+use crate::{Approach, Pose, TablePose, Touch};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::{vec, vec::Vec};
@@ -22,7 +22,7 @@ const LATEST: u32 = 6;
 enum Action {
     /// A host gives a touch.
     Submit(usize),
-    /// A host asks for a name or an approach, whose number is the question's.
+    /// A host asks for a name, an approach or a place, whose number is the question's.
     Ask(usize),
     /// A host opens a session.
     Connect(usize),
@@ -87,6 +87,11 @@ impl Device for Notebook {
         Outcome::Verdict(VerdictMessage { decision: Decision::Undecided, best: 0, touches: number, detail: None })
     }
 
+    fn press(&mut self, touch: &Touch, position: [i32; 3], detail: bool) -> Outcome {
+        assert_eq!(position, [touch.times()[1].micros().expect("a number").cast_signed(), i32::MIN, -1]);
+        self.touch(touch, detail)
+    }
+
     fn reset(&mut self) -> Outcome {
         Outcome::Done
     }
@@ -122,6 +127,20 @@ impl Device for Notebook {
     fn next_approach(&self, without: &[u8; POSE_BYTES]) -> Result<ApproachMessage, Refusal> {
         Ok(approach(without[0]))
     }
+
+    fn place(&mut self, rank: u8) -> Result<(bool, Option<TablePose>), Refusal> {
+        Ok((rank >= 4, Some(place(rank))))
+    }
+
+    fn next_press(&mut self, within: Option<u32>) -> Result<Approach, Refusal> {
+        Ok(Approach { x: within.map_or(-1, u32::cast_signed), y: i32::MIN, roll: 255 })
+    }
+}
+
+/// The place of this rank.
+fn place(rank: u8) -> TablePose {
+    let position = [i32::from(rank), -1];
+    TablePose { placement: rank, position, yaw: 65_535, within: [0, u32::MAX], yaw_within: None, share: 65_536 }
 }
 
 /// A question for an approach, with a number in it.
@@ -148,7 +167,7 @@ struct Host {
     given: Vec<u32>,
     /// Number of these that have an outcome.
     answered: usize,
-    /// The number of the name or approach that was asked for.
+    /// The number of what was asked for.
     asked: Option<u8>,
     /// The next event of each life of a chip that was heard.
     events: BTreeMap<u32, u32>,
@@ -237,9 +256,16 @@ impl World {
         let mut frames = Vec::new();
         match action {
             Action::Submit(host) => {
-                let touch = Touch::from_micros([0, self.next_touch, 0]);
+                let (touch, number) = (Touch::from_micros([0, self.next_touch, 0]), self.next_touch);
                 let Host { end, given, connected, .. } = &mut self.hosts[host];
-                let command = Command::Touch { touch: (&touch).into(), detail: false };
+                // Every other one has a position.
+                let touch = (&touch).into();
+                let [a, b, c, d] = number.to_le_bytes();
+                let position = [a, b, c, d, 0, 0, 0, 128, 255, 255, 255, 255];
+                let command = match number % 2 {
+                    0 => Command::Touch { touch, detail: false },
+                    _ => Command::Press { touch, position, detail: false },
+                };
                 if *connected && end.submit(command, now, |frame| frames.push(frame.to_vec())).is_some() {
                     given.push(self.next_touch);
                     self.next_touch += 1;
@@ -249,8 +275,13 @@ impl World {
             Action::Ask(host) => {
                 self.names = (self.names + 1) % 8;
                 let (name, Host { end, asked, connected, .. }) = (self.names, &mut self.hosts[host]);
-                // Names and approaches in turn: the answer has the question's number.
-                let query = if name % 2 == 0 { Query::Name { object: name } } else { next_approach(name) };
+                // In turn: the answer has the question's number.
+                let query = match name % 4 {
+                    0 => Query::Name { object: name },
+                    1 => next_approach(name),
+                    2 => Query::Place { rank: name },
+                    _ => Query::NextPress { within: Some(name.into()) },
+                };
                 if *connected && asked.is_none() && end.ask(query, now, |frame| frames.push(frame.to_vec())) {
                     *asked = Some(name);
                 }
@@ -392,9 +423,11 @@ impl World {
                     }
                     Incoming::Answer(answer) => {
                         let name = asked.take().expect("something was asked");
-                        let expected = match name % 2 {
+                        let expected = match name % 4 {
                             0 => Answer::Name(NAMES[usize::from(name)]),
-                            _ => Answer::NextApproach(approach(name)),
+                            1 => Answer::NextApproach(approach(name)),
+                            2 => Answer::Place { table_alone: name >= 4, place: Some(place(name)) },
+                            _ => Answer::NextPress(Approach { x: name.into(), y: i32::MIN, roll: 255 }),
                         };
                         assert_eq!(answer, expected, "the answer is another question's");
                     }

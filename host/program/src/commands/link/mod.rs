@@ -5,19 +5,22 @@ mod screen;
 mod watch;
 
 use crate::commands::progress::Bar;
+use crate::commands::recognize::Line;
+use crate::commands::recognize_maps::print_located;
 use crate::commands::{self, Global};
 use clap::ArgGroup;
 use palpate::chip::{
-    ChipModel, Connection, Emulator, Entry, Faults, Journal, Port, Steps, Summary, Transport, Update, probability,
-    stream,
+    Asks, ChipModel, Connection, Emulator, Entry, Faults, Journal, Located, Port, Steps, Summary, Transport, Update,
+    probability, stream,
 };
 use palpate::compile::CompiledModel;
 use palpate::error::{ChipProblem, Place};
+use palpate::locate::{self, MapsFile};
 use palpate::output::{print, print_json, refuse_foreign};
 use palpate::progress::Progress;
 use palpate::touches::{Log, is_log};
 use palpate::{Error, Result};
-use palpate_shared::link::{Decision, HostSettings};
+use palpate_shared::link::{Decision, HostSettings, Refusal, VerdictMessage};
 use std::io::BufReader;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -61,7 +64,7 @@ impl LineOptions {
 
 #[derive(clap::Args)]
 #[command(group(ArgGroup::new("expected").args(["against", "load"])), after_help = "\
-The chip runs the firmware in onboard/firmware (uart), or a program of your own around palpate_onboard::station. A touch is one line of three contact times in seconds (- for a missing contact), as in a data set; an empty line begins another object. `palpate data record` records what the chip's own fingers touch.
+The chip runs the firmware in onboard/firmware (uart), or a program of your own around palpate_onboard::station. A touch is one line of three contact times in seconds (- for a missing contact), as in a data set; an empty line begins another object. Maps take twelve columns, as `palpate recognize` does. `palpate data record` records what the chip's own fingers touch.
 
 Examples:
   palpate link /dev/ttyACM0                           what is on the chip?
@@ -69,6 +72,7 @@ Examples:
   palpate link /dev/ttyACM0 touches/                  recognize a data set
   echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -  recognize typed touches
   palpate link /dev/ttyACM0 - --active                where to touch next
+  robot | palpate link /dev/ttyACM0 - --load maps.palpate --next
   palpate link /dev/ttyACM0 --watch                   watch its own fingers
   palpate link journal.jsonl --watch                  watch another link
   palpate link emulator --load model.palpate --parity touches/ \\
@@ -100,6 +104,12 @@ pub(crate) struct Arguments {
     /// Follow the model's plan of approaches; asks the chip after each touch for the next one
     #[arg(long)]
     active: bool,
+    /// With a model of maps: print each touch's verdict, place and next approach as JSON, as recognize --next does
+    #[arg(long, conflicts_with_all = ["active", "watch"])]
+    next: bool,
+    /// With --next: the middle finger is sent at most so far from the table's origin in x and y [default: twice the maps' range]
+    #[arg(long, value_name = "MM", requires = "next")]
+    workspace: Option<f64>,
     /// Write what happens to a file, which `palpate link FILE --watch` follows
     #[arg(long, value_name = "FILE")]
     journal: Option<PathBuf>,
@@ -117,18 +127,27 @@ fn port(text: &str) -> Result<String> {
 
 impl Arguments {
     /// Opens a session, and loads the model if there is one to load.
-    fn open(&self, port: &Port, seed: u64) -> Result<(Connection, Option<CompiledModel>)> {
-        let model = self.load.as_deref().map(CompiledModel::read).transpose()?;
-        if let Some(path) = self.load.as_deref()
-            && model.as_ref().is_some_and(|model| model.model().descriptor().is_none())
-        {
-            return Err(Error::at(Place::file(path), ChipProblem::Rows));
-        }
+    fn open(&self, port: &Port, seed: u64) -> Result<(Connection, Option<Vec<u8>>)> {
+        let model = self.load.as_deref().map(model_of_touches).transpose()?;
         let mut connection = self.line.open(port, seed)?;
-        if let Some(file) = &model {
-            connection.load(file.bytes(), &Bar::new())?;
+        if let Some(model) = &model {
+            connection.load(model, &Bar::new())?;
         }
         Ok((connection, model))
+    }
+
+    /// The question to a chip with this model after each touch.
+    fn asks(&self, chip: &ChipModel) -> Result<Asks> {
+        let (option, allowed) = match (self.active, self.next, chip.info.has_maps()) {
+            (true, _, true) => {
+                ("active", "it with a model of trees; a model of maps says with --next where to touch next")
+            }
+            (_, true, false) => ("next", "it with a model of maps; of a plan --active says the next"),
+            (true, ..) => return Ok(Asks::Approach),
+            (_, true, _) => return Ok(Asks::Place { within: self.workspace.map(locate::within).transpose()? }),
+            _ => return Ok(Asks::Nothing),
+        };
+        Err(Error::setting(option, "given", allowed))
     }
 
     /// The touches in `source`: a data set's directory, a file of lines, a log, or `-` for standard input.
@@ -151,31 +170,43 @@ impl Arguments {
     }
 }
 
+/// The bytes of a model of trees over touches, or of maps.
+fn model_of_touches(path: &Path) -> Result<Vec<u8>> {
+    if let Some(maps) = MapsFile::read(path)? {
+        return Ok(maps.maps().model().to_vec());
+    }
+    let compiled = CompiledModel::read(path)?;
+    match compiled.model().descriptor() {
+        Some(_) => Ok(compiled.bytes().to_vec()),
+        None => Err(Error::at(Place::file(path), ChipProblem::Rows)),
+    }
+}
+
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     arguments.journal.iter().try_for_each(|journal| refuse_foreign(journal))?;
     if arguments.watch {
         return watch::run(&arguments, global);
     }
     let port: Port = arguments.port.parse()?;
-    let named = arguments.against.as_deref().map(CompiledModel::read).transpose()?;
+    let named = arguments.against.as_deref().map(model_of_touches).transpose()?;
     let steps = match arguments.parity.as_ref().or(arguments.source.as_ref()) {
         Some(source) => Some(arguments.steps(source)?),
         None => None,
     };
     let (mut connection, loaded) = arguments.open(&port, global.seed())?;
     let chip = connection.model()?;
-    if steps.is_some() && chip.info.descriptor().is_none() {
+    if steps.is_some() && chip.info.descriptor().is_none() && !chip.info.has_maps() {
         return Err(ChipProblem::Rows.into());
     }
     let mut printer = Printer::new(&chip, global.json, arguments.journal.as_deref())?;
     let Some(steps) = steps else { return printer.model(&port) };
 
-    let compiled = named.or(loaded);
-    let model = compiled.as_ref().map(CompiledModel::model);
+    let (asks, model) = (arguments.asks(&chip)?, named.or(loaded));
+    printer.prints_places = arguments.next;
     let progress = Bar::new();
     progress.begin("touching", steps.count());
     let interactive = steps.count().is_none();
-    let summary = stream(&mut connection, steps, &chip, model.as_ref(), arguments.active, |_, update| {
+    let summary = stream(&mut connection, steps, &chip, model.as_deref(), asks, |_, update| {
         if matches!(update, Update::Touch { .. } | Update::Refused { .. }) {
             progress.advance(1);
         }
@@ -183,7 +214,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         Ok(ControlFlow::Continue(()))
     })?;
     drop(progress);
-    printer.summary(&summary)?;
+    printer.summary(&summary, arguments.next && arguments.parity.is_none())?;
     match summary.first_difference {
         Some(first) if arguments.parity.is_some() => {
             let Summary { differences, compared, .. } = summary;
@@ -200,6 +231,11 @@ struct Printer<'c> {
     journal: Option<Journal>,
     start: Instant,
     object: Option<String>,
+    /// Places are printed, as JSON, and nothing else of a touch.
+    prints_places: bool,
+    /// The last verdict, and the refusal of a touch after it.
+    last: Option<VerdictMessage>,
+    refused: Option<Refusal>,
 }
 
 impl<'c> Printer<'c> {
@@ -208,7 +244,8 @@ impl<'c> Printer<'c> {
         if let Some(journal) = &mut journal {
             journal.write(&Entry::model(chip))?;
         }
-        Ok(Self { chip, json, journal, start: Instant::now(), object: None })
+        let (start, object, last, refused) = (Instant::now(), None, None, None);
+        Ok(Self { chip, json, journal, start, object, prints_places: false, last, refused })
     }
 
     fn model(&self, port: &Port) -> Result<()> {
@@ -216,7 +253,8 @@ impl<'c> Printer<'c> {
         if self.json {
             return print_json(&Entry::model(self.chip));
         }
-        let descriptor = info.descriptor().map_or("other features", |descriptor| descriptor.name());
+        let other = if info.has_maps() { "maps" } else { "other features" };
+        let descriptor = info.descriptor().map_or(other, |descriptor| descriptor.name());
         print(&format!(
             "{port}: a model of {} bytes, checksum {:08x}, {descriptor}, {} objects: {}\n",
             info.length,
@@ -236,7 +274,30 @@ impl<'c> Printer<'c> {
             journal.write(entry)?;
         }
         match update {
-            Update::Object(name) => self.object.clone_from(name),
+            Update::Object(name) => (self.object, self.last) = (name.clone(), None),
+            Update::Touch { verdict, .. } if self.prints_places => (self.last, self.refused) = (Some(*verdict), None),
+            Update::Refused { refusal, .. } if self.prints_places => self.refused = Some(*refusal),
+            Update::Located(Located { table_alone, poses, next }) => {
+                let decision = self.last.map_or(Decision::Undecided, |last| last.decision);
+                let posterior =
+                    self.last.and_then(|last| last.detail).map_or(0.0, |detail| probability(detail.posterior()));
+                let line = Line {
+                    touch: self.last.map_or(0, |last| last.touches),
+                    verdict: match decision {
+                        Decision::Recognized(_) => "recognized",
+                        Decision::Unknown => "unknown",
+                        Decision::GaveUp => "gave-up",
+                        _ => "undecided",
+                    },
+                    object: self.last.map_or("", |last| self.name(last.best)),
+                    posterior,
+                    refused: self.refused.map(|refusal| refusal.to_string()),
+                    table_alone: matches!(decision, Decision::Unknown | Decision::GaveUp) && *table_alone,
+                    next: None,
+                };
+                let name = |placement: u8| self.chip.placements.get(usize::from(placement)).map_or("", String::as_str);
+                print_located(line, poses.clone(), *next, name)?;
+            }
             Update::Touch { verdict, decided, .. } if !self.json && (*decided || every_touch) => {
                 let posterior = probability(verdict.detail.map_or(0, |detail| detail.posterior()));
                 let said = match verdict.decision {
@@ -264,10 +325,14 @@ impl<'c> Printer<'c> {
         Ok(())
     }
 
-    fn summary(&mut self, summary: &Summary) -> Result<()> {
+    /// Prints a summary, except where lines of JSON are all that is printed.
+    fn summary(&mut self, summary: &Summary, is_silent: bool) -> Result<()> {
         if let Some(journal) = &mut self.journal {
             let garbled = summary.garbled + summary.chip_garbled;
             journal.write(&Entry::Link { resent: summary.resent, garbled, missed: summary.missed_events })?;
+        }
+        if is_silent {
+            return Ok(());
         }
         if self.json {
             return print_json(summary);

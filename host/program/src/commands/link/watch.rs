@@ -26,6 +26,7 @@ fn watch(arguments: &Arguments, port: &Port, global: &Global) -> Result<()> {
     let steps = arguments.source.as_deref().map(|source| arguments.steps(source)).transpose()?;
     let (mut connection, loaded) = arguments.open(port, global.seed())?;
     let chip = connection.model()?;
+    let asked = arguments.asks(&chip)?;
     let mut display = Display::open(port.to_string(), global.json)?;
     display.take(Entry::model(&chip))?;
     let start = Instant::now();
@@ -42,8 +43,7 @@ fn watch(arguments: &Arguments, port: &Port, global: &Global) -> Result<()> {
     };
     match steps {
         Some(steps) => {
-            let model = loaded.as_ref().map(|file| file.model());
-            stream(&mut connection, steps, &chip, model.as_ref(), arguments.active, &mut each)?;
+            stream(&mut connection, steps, &chip, loaded.as_deref(), asked, &mut each)?;
         }
         None => loop {
             let update = match connection.hear(Duration::from_millis(50))? {

@@ -1,0 +1,294 @@
+//! Models of maps in a station: loaded, touched and asked over the link.
+
+use super::*;
+use crate::locate::tests::{CYLINDER, Heights, WEDGE, locator, model, wedge};
+use crate::locate::{Approach, Hand, Maps, POSE, Pose};
+use crate::{Model, Verdict};
+use palpate_shared::link::*;
+use palpate_shared::{ContactTime, Pose as HandPose, Position, Q15_ONE, Touch};
+use proptest::prelude::*;
+use std::vec::Vec;
+use std::{format, string::String, vec};
+
+const TREES: &[u8] = include_bytes!("../../../models/household.palpate");
+
+type Room = Table<4096, 32, 2>;
+
+/// A chip's memory, which outlasts its program.
+struct Kept {
+    models: [Vec<u8>; 2],
+    records: [Vec<u8>; 2],
+}
+
+impl Kept {
+    fn new() -> Self {
+        let record = vec![0xff; record_length(16)];
+        Self { models: [vec![0; 60_000], vec![0; 60_000]], records: [record.clone(), record] }
+    }
+
+    fn memory(&mut self) -> Memory<'_> {
+        let Self { models: [a, b], records: [c, d] } = self;
+        Memory { models: [a, b], records: [c, d] }
+    }
+}
+
+/// A host and a chip on a line that loses one of so many bytes, 0 for none.
+struct Line<'m> {
+    host: HostEnd,
+    end: DeviceEnd,
+    station: Station<'m, 16, Memory<'m>, &'m mut Room>,
+    loses: usize,
+    bytes: usize,
+    now: u64,
+    open: bool,
+    outcomes: Vec<Outcome>,
+    answers: Vec<String>,
+}
+
+impl<'m> Line<'m> {
+    fn new(built_in: &'m [u8], kept: &'m mut Kept, room: &'m mut Room, loses: usize) -> Self {
+        let (station, progress, starts) = Station::open_with(built_in, kept.memory(), room).unwrap();
+        let host = HostEnd::new(HostSettings { retry: 10_000, attempts: 1_000 });
+        let end = DeviceEnd::new(progress, starts);
+        let (outcomes, answers) = (Vec::new(), Vec::new());
+        let mut line = Self { host, end, station, loses, bytes: 0, now: 0, open: false, outcomes, answers };
+        let mut sent = Vec::new();
+        line.host.connect(7, 0, |frame| sent.extend_from_slice(frame));
+        line.settle(sent);
+        line
+    }
+
+    /// Bytes that arrive.
+    fn arriving(&mut self, sent: Vec<u8>) -> Vec<u8> {
+        let is_there = |_: &u8| {
+            self.bytes += 1;
+            self.loses == 0 || !self.bytes.is_multiple_of(self.loses)
+        };
+        let mut sent = sent;
+        sent.retain(is_there);
+        sent
+    }
+
+    /// Lets both talk until nothing is under way.
+    fn settle(&mut self, mut sent: Vec<u8>) {
+        for _ in 0..100_000 {
+            let down = self.arriving(std::mem::take(&mut sent));
+            let mut up = Vec::new();
+            self.end.receive(&down, &mut self.station, |frame| up.extend_from_slice(frame));
+            let up = self.arriving(up);
+            self.now += 3_000;
+            let Self { host, now, open, outcomes, answers, .. } = self;
+            host.receive(
+                &up,
+                *now,
+                |frame| sent.extend_from_slice(frame),
+                |incoming| match incoming {
+                    Incoming::Opened => *open = true,
+                    Incoming::Outcome { outcome, .. } => outcomes.push(outcome),
+                    Incoming::Answer(answer) => answers.push(format!("{answer:?}")),
+                    Incoming::Event { .. } => {}
+                },
+            );
+            host.tick(*now, |frame| sent.extend_from_slice(frame)).unwrap();
+            if self.open && self.host.is_idle() {
+                return;
+            }
+        }
+        panic!("{:?}", self.host.statistics());
+    }
+
+    fn say(&mut self, command: Command<'_>) -> Outcome {
+        let mut sent = Vec::new();
+        self.host.submit(command, self.now, |frame| sent.extend_from_slice(frame)).unwrap();
+        self.settle(sent);
+        *self.outcomes.last().unwrap()
+    }
+
+    fn press(&mut self, touch: &Touch) -> Outcome {
+        self.say(Command::of_touch(touch, true))
+    }
+
+    fn ask(&mut self, query: Query) -> String {
+        let mut sent = Vec::new();
+        assert!(self.host.ask(query, self.now, |frame| sent.extend_from_slice(frame)));
+        self.settle(sent);
+        self.answers.pop().unwrap()
+    }
+
+    /// Loads a model; the last outcome.
+    fn load(&mut self, bytes: &[u8]) -> Outcome {
+        let (payload, length) = (Payload::Model, bytes.len() as u32);
+        self.say(Command::Begin { payload, length, checksum: checksum(bytes) });
+        for (index, bytes) in bytes.chunks(CHUNK).enumerate() {
+            self.say(Command::Chunk { offset: (index * CHUNK) as u32, bytes });
+        }
+        self.say(Command::Commit)
+    }
+}
+
+/// The touch of an approach to an object at a place in millimeters, turned by this many radians.
+fn touch(height: Heights, at: Approach, [x, y]: [f64; 2], yaw: f64) -> Touch {
+    let roll = f64::from(at.roll) / 256.0 * std::f64::consts::TAU;
+    let heights = [-15.0, 0.0, 15.0].map(|finger| {
+        let (u, v) = (f64::from(at.x) / 1e3 + finger * roll.cos() - x, f64::from(at.y) / 1e3 + finger * roll.sin() - y);
+        height(yaw.cos() * u + yaw.sin() * v, yaw.cos() * v - yaw.sin() * u)
+    });
+    let highest = heights.into_iter().fold(0.0, f64::max);
+    let times = heights.map(|height| match highest - height {
+        // A hand of 100 mm per second, with a stroke of 20 mm.
+        way if way <= 20.0 => ContactTime::from_micros((way * 1e4) as u32),
+        _ => ContactTime::MISSING,
+    });
+    let alignment = [roll.cos(), roll.sin(), 0.0].map(|share| (share * f64::from(Q15_ONE)) as i16);
+    let position = Position { micrometers: [at.x, at.y, (highest * 1e3) as i32] };
+    Touch::new(times).with_pose(HandPose { direction: [0, 0, -Q15_ONE], alignment }).with_position(position)
+}
+
+#[test]
+fn verdicts_places_and_approaches_over_a_line_that_loses_bytes_are_those_of_a_locator() {
+    let bytes = model(&[WEDGE, CYLINDER], 0);
+    let maps = Maps::new(&bytes).unwrap();
+    let hand = Hand::of(&maps).unwrap();
+    for loses in [0, 157] {
+        let (mut kept, mut room, mut locator) = (Kept::new(), Room::new(), locator(maps));
+        let mut line = Line::new(&bytes, &mut kept, &mut room, loses);
+        for (place, yaw) in [([12.0, -9.0], 0.6), ([-20.0, 17.0], 2.4)] {
+            assert_eq!(line.ask(Query::Place { rank: 0 }), "Place { table_alone: false, place: None }");
+            let mut at = Approach { x: 0, y: 0, roll: 40 };
+            let mut verdict = Verdict::Undecided;
+            while verdict == Verdict::Undecided {
+                let touch = touch(wedge, at, place, yaw);
+                verdict = locator.push(&touch, hand).unwrap();
+                let Outcome::Verdict(said) = line.press(&touch) else { panic!("{:?}", line.outcomes) };
+                let best = locator.leader();
+                let evidence = [0, 1].map(|object| locator.posterior(object));
+                assert_eq!((said.decision, usize::from(said.best)), (session::decision(verdict), best));
+                assert_eq!(said.touches as usize, locator.touches());
+                assert_eq!(said.detail.unwrap().posterior(), u64::from(evidence[best]) << 40);
+                let posteriors = evidence.map(|posterior| (u64::from(posterior) << 40).to_le_bytes()).concat();
+                assert_eq!(line.ask(Query::Posteriors { first: 0 }), format!("Posteriors({posteriors:?})"));
+                let mut poses = [Pose::default(); 4];
+                let found = locator.poses(best, &mut poses);
+                for rank in 0..5 {
+                    let said = line.ask(Query::Place { rank });
+                    match poses[..found].get(usize::from(rank)) {
+                        Some(pose) => {
+                            let [x, y] = pose.position;
+                            let expected =
+                                format!("placement: {}, position: [{x}, {y}], yaw: {},", pose.placement, pose.yaw);
+                            assert!(said.contains(&expected), "{said}, not {expected}");
+                        }
+                        None => assert!(said.ends_with("place: None }"), "{said}"),
+                    }
+                }
+                at = locator.choose(hand.spacing, hand.stroke.unwrap(), 2 * maps.range().unsigned_abs(), POSE);
+                let next = line.ask(Query::NextPress { within: None });
+                assert_eq!(next, format!("NextPress(Approach {{ x: {}, y: {}, roll: {} }})", at.x, at.y, at.roll));
+                // A question that is repeated has the same answer.
+                assert_eq!(line.ask(Query::NextPress { within: None }), next);
+            }
+            assert_eq!(verdict, locator.verdict());
+            assert!(matches!(verdict, Verdict::Recognized { .. }), "{verdict:?}");
+            assert_eq!(line.say(Command::Reset), Outcome::Done);
+            locator.reset();
+        }
+        assert_eq!(line.ask(Query::Placement { placement: 1 }), "Name(\"up\")");
+        assert_eq!(line.ask(Query::Placement { placement: 2 }), "Refused(NoObject)");
+        assert_eq!(line.ask(Query::Name { object: 1 }), "Name(\"object 1\")");
+        assert_eq!(line.ask(Query::Name { object: 2 }), "Refused(NoObject)");
+        let info = format!("length: {}, last_object: 1, descriptor: 254 }})", bytes.len());
+        assert!(line.ask(Query::Model).ends_with(&info), "{info}");
+        assert_eq!(line.end.statistics().garbled > 0, loses > 0);
+    }
+}
+
+#[test]
+fn maps_are_loaded_in_place_of_trees_and_each_refuses_the_touches_of_the_other() {
+    let (maps, refused) = (model(&[WEDGE, CYLINDER], 0), Outcome::Refused);
+    let at = Approach { x: 0, y: 0, roll: 40 };
+    let located = touch(wedge, at, [0.0; 2], 0.0);
+    let free = Command::Touch { touch: (&Touch::from_micros([0, 30_000, 50_000])).into(), detail: false };
+    let (mut kept, mut room) = (Kept::new(), Room::new());
+    let mut line = Line::new(&[], &mut kept, &mut room, 0);
+    assert_eq!(line.press(&located), refused(Refusal::NoModel));
+    assert_eq!(line.ask(Query::NextPress { within: None }), "Refused(NoModel)");
+    assert_eq!(line.load(TREES), Outcome::Done);
+    assert_eq!(line.press(&located), refused(Refusal::Position));
+    assert!(matches!(line.say(free.clone()), Outcome::Verdict(_)));
+    assert_eq!(line.load(&maps), Outcome::Done);
+    assert_eq!(line.say(free.clone()), refused(Refusal::NoPosition));
+    let first = line.press(&located);
+    assert!(matches!(first, Outcome::Verdict(VerdictMessage { touches: 1, .. })), "{first:?}");
+    assert_eq!(line.ask(Query::Snapshot { offset: 0 }), "Refused(Unsupported)");
+    // What is no model changes nothing: the touch before still counts.
+    assert_eq!(line.load(&maps[..maps.len() - 1]), refused(Refusal::Invalid));
+    assert!(matches!(line.press(&located), Outcome::Verdict(VerdictMessage { touches: 2, .. })));
+    assert_eq!(line.load(TREES), Outcome::Done);
+    assert_eq!(line.press(&located), refused(Refusal::Position));
+    assert!(line.ask(Query::Statistics).contains("refused: 4,"));
+    assert_eq!(line.load(&maps), Outcome::Done);
+    // After a reset the maps are there, and their touches are not: the host's session is not known any more.
+    drop(line);
+    let line = Line::new(&[], &mut kept, &mut room, 0);
+    assert_eq!(Device::model(&line.station).map(|info| info.checksum), Some(checksum_of(&maps)));
+    assert_eq!(line.end.progress().executed(), 0);
+}
+
+/// The checksum that a model states.
+fn checksum_of(model: &[u8]) -> u32 {
+    u32::from_le_bytes(*model.last_chunk().unwrap())
+}
+
+#[test]
+fn a_station_without_room_for_maps_refuses_them_and_so_does_one_with_too_little() {
+    let maps = model(&[WEDGE, CYLINDER], 0);
+    assert_eq!(().open(&maps), Err(Refusal::Invalid));
+    assert_eq!((&mut Table::<4096, 32, 1>::new()).open(&maps), Err(Refusal::TooLong));
+    assert_eq!((&mut Room::new()).open(TREES), Err(Refusal::Invalid));
+    let mut room = Table::<64, 1, 2>::new();
+    let mut station = Station::<16, _, _>::open_with(&maps, NoStorage, &mut room).unwrap().0;
+    assert!(station.model().is_none() && Device::model(&station).unwrap().has_maps());
+    assert_eq!(station.begin(Payload::Model, 1, 0), Outcome::Refused(Refusal::Unsupported));
+    // Trees have no places.
+    let mut trees = Station::<16>::new(&Model::new(TREES).unwrap());
+    assert_eq!((trees.place(0), trees.placement(0)), (Err(Refusal::NoModel), None));
+}
+
+proptest! {
+    #[test]
+    fn any_touch_at_any_position_is_counted_or_refused(
+        touches in prop::collection::vec((any::<[u32; 3]>(), any::<Option<[i16; 6]>>(), any::<[i32; 3]>(), any::<bool>()), 1..6),
+        rank: u8,
+        within: Option<u32>,
+    ) {
+        let maps = model(&[WEDGE, CYLINDER], 0);
+        let mut room = Table::<256, 8, 2>::new();
+        let mut station = Station::<16, _, _>::open_with(&maps, NoStorage, &mut room).unwrap().0;
+        let mut counted = 0;
+        for (times, pose, position, is_down) in touches {
+            let touch = Touch::new(times.map(ContactTime::from_micros));
+            let touch = match pose {
+                Some([x, y, z, a, b, c]) => {
+                    let direction = if is_down { [x, y, i16::MIN] } else { [x, y, z.max(-31_127)] };
+                    touch.with_pose(HandPose { direction, alignment: [a, b, c] })
+                }
+                None => touch,
+            };
+            match station.press(&touch, position, true) {
+                Ok(verdict) => {
+                    counted += 1;
+                    prop_assert_eq!(verdict.touches, counted);
+                    prop_assert!(pose.is_some() && is_down);
+                }
+                Err(Refusal::NoPose) => prop_assert!(pose.is_none()),
+                Err(Refusal::NotDown) => prop_assert!(!is_down),
+                other => prop_assert!(false, "{:?}", other),
+            }
+            let (_, place) = station.place(rank).unwrap();
+            prop_assert!(rank < 4 || place.is_none());
+            let reach = within.unwrap_or(u32::MAX).max(125);
+            let Approach { x, y, .. } = station.next_press(within).unwrap();
+            prop_assert!(x.unsigned_abs() <= reach && y.unsigned_abs() <= reach);
+        }
+    }
+}
