@@ -1,4 +1,4 @@
-"""An object is dropped on a table in MuJoCo, and a compliant hand finds out what it is and where it lies.
+"""An object is dropped on a table in MuJoCo, and a compliant hand recognizes what it is and where it lies.
 
 For users without a robot: docs/guide/locate.md. The hand of robot_in_mujoco.py comes straight down where `palpate.Locator` says.
 Its fingers give way, bend aside and press on switches; the object lies free on the table, and may slide, turn and tilt.

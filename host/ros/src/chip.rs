@@ -1,6 +1,7 @@
 //! A chip that recognizes by itself, behind a thread: orders in, reports out.
 
-use crate::decide::{Step, UNDECIDED, behind, with_best};
+use crate::decide::{behind, with_best};
+use crate::follow::{Step, UNDECIDED};
 use crate::wire::{Approach, Evidence, Verdict, unit_vectors};
 use async_channel::{Receiver, Sender, TryRecvError};
 use palpate::chip::{ChipModel, Connection, Emulator, Port, Received, probability};

@@ -1,11 +1,13 @@
 //! From touches to verdicts, without DDS: messages in, messages out.
 
-use crate::place::{Placed, Placing};
+use crate::follow::{Following, Step, UNDECIDED};
+use crate::place::Placing;
 use crate::served::Served;
-use crate::wire::{self, Approach, Evidence, Expected, Touch, Verdict, unit_vectors};
+use crate::thresholds::Thresholds;
+use crate::wire::{Approach, Evidence, Expected, Touch, Verdict, unit_vectors};
 use palpate::compile::CompiledModel;
 use palpate::onboard::shared::Touch as Felt;
-use palpate::onboard::{Recognizer, Stopping, Verdict as Decision};
+use palpate::onboard::{Recognizer, Verdict as Decision};
 use std::sync::Arc;
 
 /// Room for the objects of any model.
@@ -19,80 +21,6 @@ self_cell::self_cell!(
         dependent: Recognizing,
     }
 );
-
-/// Stopping thresholds; 0 stands for the model's own.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Thresholds {
-    /// The posterior has to exceed 1 less this.
-    pub(crate) error_rate: f64,
-    /// Touches after which the recognizer gives up.
-    pub(crate) max_touches: i64,
-}
-
-impl Thresholds {
-    /// Stopping rule for a model whose own is `own`.
-    ///
-    /// # Errors
-    /// The number that is out of range, and the range.
-    pub(crate) fn over(self, own: Stopping) -> Result<Stopping, String> {
-        let max_touches = match u32::try_from(self.max_touches) {
-            Ok(0) => own.max_touches(),
-            Ok(most) => most,
-            Err(_) => return Err("max_touches is a number from 0, the model's own limit, to 4294967295".into()),
-        };
-        if self.error_rate == 0.0 {
-            return Ok(own.with_max_touches(max_touches));
-        }
-        Stopping::new(self.error_rate, max_touches)
-            .ok_or_else(|| "error_rate is a number from 1e-15 to below 0.5, or 0 for the model's own thresholds".into())
-    }
-}
-
-/// Messages after a touch, or a reset.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Step {
-    pub(crate) verdict: Verdict,
-    /// None where a chip cannot be asked about it any more.
-    pub(crate) evidence: Option<Evidence>,
-    /// Next approach, for a model with a plan, while nothing is decided.
-    pub(crate) approach: Option<Approach>,
-    /// Place of the object, after a touch, for a model of maps.
-    pub(crate) placed: Option<Placed>,
-    /// Next approach, for a model of maps, while nothing is decided.
-    pub(crate) next_pose: Option<wire::Pose>,
-}
-
-impl Step {
-    /// True if no further touch of this object can change the verdict.
-    pub(crate) fn is_decided(&self) -> bool {
-        self.verdict.verdict != UNDECIDED
-    }
-}
-
-/// The verdict while nothing is decided.
-pub(crate) const UNDECIDED: &str = "undecided";
-
-/// Follows the touches of one object.
-pub(crate) trait Following {
-    /// The model's objects.
-    fn names(&self) -> Vec<String>;
-    /// The objects that can be named, each once.
-    fn known(&self) -> Vec<String>;
-    /// Begins another object, of those that have a weight if there are weights.
-    fn begin(&mut self, weights: Option<&[u32]>);
-    /// Takes in a touch.
-    ///
-    /// # Errors
-    /// Why it is not counted; nothing changes then.
-    fn push(&mut self, felt: &Felt) -> Result<(), String>;
-    fn verdict(&self) -> Decision;
-    fn touches(&self) -> u32;
-    /// The likeliest object.
-    fn best(&self) -> usize;
-    fn posteriors(&self) -> Vec<f64>;
-    /// Adds where to touch next, and where the object is.
-    fn complete(&self, step: &mut Step);
-}
 
 /// Recognizes objects, one after another.
 ///
@@ -306,6 +234,7 @@ mod tests {
     use super::*;
     use palpate::compile::{Restated, restate};
     use palpate::onboard::Rivals;
+    use palpate::onboard::Stopping;
     use palpate::onboard::shared::Poses;
     use palpate::onboard::shared::format::{Plan, Tag};
 

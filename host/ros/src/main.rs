@@ -3,24 +3,26 @@
 mod chip;
 mod clients;
 mod decide;
+mod follow;
 mod node;
 mod open;
 mod participant;
 mod place;
 mod served;
 mod switches;
+mod thresholds;
 mod wire;
 
 use async_signal::{Signal, Signals};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, ValueEnum};
-use decide::Thresholds;
 use open::Options;
 use palpate::chip::Port;
 use ros2_client::{NodeName, ServiceMapping};
 use served::Served;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use thresholds::Thresholds;
 
 /// A ROS 2 node that recognizes objects by touch; needs no ROS installation
 #[derive(Parser)]

@@ -2,12 +2,13 @@
 
 use crate::chip::{self, ChipEvent, Order};
 use crate::clients::{AllClients, Clients};
-use crate::decide::{Decider, Step, Thresholds, UNDECIDED};
+use crate::decide::Decider;
+use crate::follow::{Placed, Step, UNDECIDED};
 use crate::open::{Actions, Change, Inputs, Options, Outputs, open, parameters, text};
 use crate::participant;
-use crate::place::Placed;
 use crate::served::Served;
 use crate::switches::Switches;
+use crate::thresholds::Thresholds;
 use crate::wire::{
     Bool, DiagnosticArray, DiagnosticStatus, Expected, Header, KeyValue, Recognized, ResetDone, Stamped, Text, Touch,
     Verdict,

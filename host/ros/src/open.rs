@@ -1,7 +1,7 @@
 //! The node's interface: topics with their quality of service, a service, an action and parameters.
 
-use crate::decide::Thresholds;
 use crate::served::Served;
+use crate::thresholds::Thresholds;
 use crate::wire::{
     Approach, Bool, DiagnosticArray, Evidence, Expected, PACKAGE, Pose, PoseWithCovariance, Recognized, ResetDone,
     Stamped, Text, Touch, Verdict,

@@ -1,6 +1,6 @@
 //! Objects on a table, by a model of maps: what lies there, where, and where to touch next.
 
-use crate::decide::{Following, Step};
+use crate::follow::{Following, Placed, Step};
 use crate::wire::{self, PoseWithCovariance};
 use palpate::error::LocateProblem;
 use palpate::locate::{self, Approach, Hand, Locating, MapsFile, POSE, Pose};
@@ -20,14 +20,6 @@ self_cell::self_cell!(
         dependent: Located,
     }
 );
-
-/// The likeliest place of the likeliest object.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Placed {
-    /// Name of the placement; empty for an object without.
-    pub(crate) placement: String,
-    pub(crate) pose: PoseWithCovariance,
-}
 
 /// A follower of touches with a position.
 pub(crate) struct Placing {
@@ -147,8 +139,9 @@ mod example;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decide::{Decider, Thresholds};
+    use crate::decide::Decider;
     use crate::served::Served;
+    use crate::thresholds::Thresholds;
     use crate::wire::{Expected, Touch};
 
     /// The object's place in millimeters, and its yaw.

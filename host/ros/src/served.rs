@@ -1,6 +1,6 @@
 //! A model that the node serves: trees, or maps.
 
-use crate::decide::Thresholds;
+use crate::thresholds::Thresholds;
 use palpate::compile::CompiledModel;
 use palpate::locate::{MapsFile, TOUCHES};
 use palpate::onboard::Stopping;

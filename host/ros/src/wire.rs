@@ -230,7 +230,7 @@ mod tests {
 
     const POSE: Pose = Pose { position: [2.0, -0.5, 0.0], orientation: [0.0, 0.0, 1.0, 0.0] };
 
-    /// That of `POSE` with `header()`.
+    /// Definition of `POSE`, with `header()`.
     #[rustfmt::skip]
     const BYTES: [u8; 80] = [
         7, 0, 0, 0, 9, 0, 0, 0,

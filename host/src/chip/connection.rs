@@ -345,7 +345,7 @@ impl Connection {
     /// The approach straight down that the chip proposes, of a model of maps; `within` as in [`Query::NextPress`].
     ///
     /// # Errors
-    /// As [`places`](Self::places).
+    /// Those of [`places`](Self::places).
     pub fn next_press(&mut self, within: Option<u32>) -> Result<Approach> {
         match self.ask(Query::NextPress { within })? {
             Reply::NextPress(approach) => Ok(approach),

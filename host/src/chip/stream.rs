@@ -22,7 +22,7 @@ pub enum Asks {
     Nothing,
     /// The next approach of the model's plan, unless the touch decided.
     Approach,
-    /// The object's place, and the next approach within so many micrometers unless the touch decided, of a model of maps.
+    /// With a model of maps: the object's place, and the next approach within this many micrometers unless the touch decided.
     Place {
         /// None: twice the maps' range.
         within: Option<u32>,
@@ -36,7 +36,7 @@ pub struct Located {
     pub table_alone: bool,
     /// The most likely poses of the most likely object, best first.
     pub poses: Vec<Pose>,
-    /// Where to touch next; none after a verdict.
+    /// Next approach; none after a verdict.
     pub next: Option<Approach>,
 }
 

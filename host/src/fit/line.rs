@@ -139,7 +139,7 @@ impl Line {
         self.density[from..].iter_mut().zip(kernel).for_each(|(cell, height)| *cell += height);
     }
 
-    /// The density where so many samples were added.
+    /// The density where this many samples were added.
     pub(super) fn scaled(mut self, samples: usize) -> Self {
         let share = 1.0 / samples.max(1) as f32;
         self.density.iter_mut().for_each(|cell| *cell *= share);

@@ -47,7 +47,7 @@ impl Observed {
         Self { fingers, first, second, odd }
     }
 
-    /// Observation of these fingers, fewer than two of which touched.
+    /// Observation of fingers, at most one of which touched.
     pub(super) fn without_times(fingers: u8) -> Self {
         Self { fingers, first: 0.0, second: 0.0, odd: 1.0 }
     }

@@ -195,7 +195,7 @@ pub(super) struct Pressing<'m> {
     pub(super) within: u32,
     pub(super) aimed: Aimed,
     pub(super) pose: u16,
-    /// Where to touch next; none before the first touch, and where approaches are aimed at random.
+    /// Next approach; none before the first touch, and where approaches are aimed at random.
     pub(super) next: Option<Approach>,
     /// Heights that were looked up by all approaches, and at most by one.
     pub(super) looked: [u64; 2],

@@ -9,15 +9,6 @@ use palpate::probe::Probe;
 use palpate::probe::scene;
 use std::f64::consts::TAU;
 
-/// Objects that may lie on the table, and the one that does.
-#[derive(Default)]
-pub(crate) struct Press {
-    pub(crate) standing: Vec<Standing>,
-    pub(crate) probe: Probe,
-    pub(crate) opened: Option<(World<'static>, Maps<'static>)>,
-    pub(crate) hidden: Option<Hidden<'static>>,
-}
-
 impl Table {
     pub(crate) fn lay(&mut self, object: u32, weight: f64) -> Option<usize> {
         let object = index(object);

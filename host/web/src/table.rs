@@ -1,12 +1,11 @@
 //! State of the table: one game, one round, one series, and the memory that the script shares.
 
-use crate::press::Press;
 use palpate::compile::open;
 use palpate::glam::DVec3;
-use palpate::locate::Standing;
+use palpate::locate::{Maps, Standing, World};
 use palpate::mesh::Mesh;
 use palpate::onboard::{Refused, Verdict};
-use palpate::play::{Approached, Game, Round, Series, decompress, unpack};
+use palpate::play::{Approached, Game, Hidden, Round, Series, decompress, unpack};
 use palpate::probe::hand::Unreached;
 use palpate::probe::noise::{Deviation, Noise};
 use palpate::probe::{Aim, Probe};
@@ -15,6 +14,15 @@ use palpate::shared::{ContactPattern, Pose, Q15_ONE, Touch};
 use palpate::touches::Origin;
 use palpate::with;
 use std::cell::RefCell;
+
+/// Objects that may lie on the table, and the one that does.
+#[derive(Default)]
+pub(crate) struct Press {
+    pub(crate) standing: Vec<Standing>,
+    pub(crate) probe: Probe,
+    pub(crate) opened: Option<(World<'static>, Maps<'static>)>,
+    pub(crate) hidden: Option<Hidden<'static>>,
+}
 
 /// State that the functions work on.
 #[derive(Default)]

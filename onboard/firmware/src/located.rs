@@ -66,7 +66,7 @@ pub struct Found {
     pub verdict: Option<Verdict>,
     /// The leader's most likely pose.
     pub pose: Option<Pose>,
-    /// Where to touch next.
+    /// Next approach.
     pub next: Approach,
 }
 

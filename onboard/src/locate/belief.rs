@@ -1,17 +1,12 @@
-//! Cells of (placement, yaw, x, y), and their likelihoods.
+//! The search: likelihoods of cells, best first.
 
+use super::cell::{Cell, FINEST, NEAR, Pool, ROOTS, YAWS, turn};
 use super::locator::{Exhausted, Locator};
 use super::maps::{Maps, Placement};
 use super::number::{NAT, NOTHING, add, direction, of_sum, power, quotient};
 use super::seen::Seen;
 use crate::bytes::at;
 
-/// Most touches that a locator has room for.
-pub(super) const MOST_TOUCHES: usize = 64;
-/// Root cells of yaw.
-pub(super) const YAWS: u8 = 8;
-/// Times that a root cell can be split: finest cells are of 0.9 mm and 2.8°.
-pub(super) const FINEST: u8 = 4;
 /// Logarithm of the number of parts of a cell.
 const PARTS: i32 = 133;
 /// Logarithm of the number of parts of a cell of a round placement, which has no yaw.
@@ -26,28 +21,6 @@ const SPLIT: i32 = 12 * NAT;
 const DONE: i32 = 6 * NAT;
 /// Share that a pool may lose at once when it is full.
 const LOSS: i32 = 9 * NAT;
-
-/// A cell: its likelihood, and what it is of.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Cell {
-    pub(super) placement: u8,
-    pub(super) yaw: u8,
-    pub(super) x: u8,
-    pub(super) y: u8,
-    pub(super) level: u8,
-    /// Logarithm of its share, in 1/64 nat.
-    pub(super) likely: i16,
-}
-
-impl Cell {
-    /// No cell.
-    pub(crate) const NONE: Self = Self { placement: 0, yaw: 0, x: 0, y: 0, level: 0, likely: 0 };
-}
-
-/// A place for cells.
-pub trait Pool: AsRef<[Cell]> + AsMut<[Cell]> {}
-
-impl<P: AsRef<[Cell]> + AsMut<[Cell]>> Pool for P {}
 
 impl Maps<'_> {
     /// Middle of a cell along an axis, in 1/16 mm.
@@ -122,32 +95,8 @@ impl Maps<'_> {
     }
 }
 
-/// Roots of 0, 1, 2 and so on in Q4: of the number of moves since a touch.
-const ROOTS: [i32; MOST_TOUCHES] = {
-    let (mut roots, mut number, mut root) = ([0; MOST_TOUCHES], 0, 0);
-    while number < MOST_TOUCHES as i32 {
-        while (root + 1) * (root + 1) <= number * 256 {
-            root += 1;
-        }
-        roots[number as usize] = root;
-        number += 1;
-    }
-    roots
-};
-/// Root of a number of touches in Q4.
-pub(super) fn root(touches: usize) -> i32 {
-    at(&ROOTS, touches.min(MOST_TOUCHES - 1))
-}
-
-/// Heights below this may be of the table after a contact was lost, in 1/16 mm.
-pub(super) const NEAR: i32 = 24;
 /// Half a turn, in radians in Q14.
 const HALF_TURN: i32 = 51_472;
-
-/// Middle of a cell's yaw, in 1/256 turn.
-pub(super) fn turn(yaw: u8, level: u8) -> i32 {
-    quotient((2 * i32::from(yaw) + 1) * 128, i32::from(YAWS) << level)
-}
 
 /// Length of a vector, at most 6 % off.
 fn length(x: i32, y: i32) -> i32 {

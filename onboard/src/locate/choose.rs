@@ -1,6 +1,6 @@
 //! Where to touch next.
 
-use super::belief::{Pool, YAWS, turn};
+use super::cell::{Pool, YAWS, turn};
 use super::locator::Locator;
 use super::maps::Placement;
 use super::number::{NAT, direction, logarithm, of_sum, power, quotient};

@@ -1,6 +1,6 @@
 //! The follower: touches in, a verdict out.
 
-use super::belief::{Cell, FINEST, MOST_TOUCHES, NEAR, Pool};
+use super::cell::{Cell, FINEST, MOST_TOUCHES, NEAR, Pool};
 use super::maps::Maps;
 use super::number::{NOTHING, Random, add, logarithm, odds};
 use super::seen::{Contact, Seen};

@@ -1,5 +1,6 @@
 //! Height maps of placements, read in place.
 
+use super::cell::root;
 use crate::bytes::{ModelError, at};
 use crate::decide::Stopping;
 use palpate_shared::format::{
@@ -278,7 +279,7 @@ impl<'a> Maps<'a> {
     /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown after so many touches; none
     /// without a test for unknown objects.
     pub(super) fn misfit(&self, touches: usize) -> Option<i32> {
-        let root = super::belief::root(touches).max(1);
+        let root = root(touches).max(1);
         (self.misfit != 0).then(|| i32::from(self.misfit) - (i32::from(self.misfit_width) << 4) / root)
     }
 

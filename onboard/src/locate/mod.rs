@@ -14,6 +14,7 @@
 //! All of it is integer arithmetic, so every machine gives the same bits.
 
 mod belief;
+mod cell;
 mod choose;
 mod locator;
 mod maps;
@@ -24,7 +25,7 @@ mod seen;
 pub(crate) mod tests;
 
 #[cfg(feature = "station")]
-pub(crate) use belief::Cell;
+pub(crate) use cell::Cell;
 pub use choose::POSE;
 pub use locator::{AtMost, Effort, Exhausted, Hand, Locator, TESTED};
 pub use maps::{BEYOND, DISTANCES, LIKELIHOODS_LENGTH, MAPS_LENGTH, Maps, PLACEMENT_LENGTH, WIDTHS, WITHIN};

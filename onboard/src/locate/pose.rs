@@ -1,6 +1,6 @@
 //! The object's place.
 
-use super::belief::{Cell, Pool, YAWS, turn};
+use super::cell::{Cell, Pool, YAWS, turn};
 use super::locator::Locator;
 use super::number::quotient;
 use palpate_shared::TablePose as Pose;

@@ -30,6 +30,7 @@
 
 mod flash;
 mod memory;
+mod message;
 mod probe;
 mod record;
 mod serve;

@@ -1,15 +1,16 @@
 //! A model in use, and the commands it can be given.
 
+use super::message::{decision, refusal};
 use super::record::{Record, Source, Staged, record_length};
 use super::storage::{NoStorage, Place, Storage};
 use super::table::Locates;
 use crate::decide::State;
 use crate::model::Opened;
-use crate::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, Stopping, Verdict};
+use crate::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict};
 use core::fmt;
 use palpate_shared::Touch;
 use palpate_shared::link::{
-    ApproachMessage, Decision, Detail, Device, ModelInfo, NotStored, Outcome, POSE_BYTES, Payload, Progress, Refusal,
+    ApproachMessage, Detail, Device, ModelInfo, NotStored, Outcome, POSE_BYTES, Payload, Progress, Refusal,
     VerdictMessage, checksum,
 };
 #[cfg(feature = "locate")]
@@ -322,26 +323,6 @@ fn bytes_at<'b>(built_in: &'b [u8], storage: &'b impl Storage, source: Source) -
         Source::BuiltIn => built_in,
         Source::First(length) => prefix(Place::First, length),
         Source::Second(length) => prefix(Place::Second, length),
-    }
-}
-
-/// Converts to the link's message.
-pub(super) const fn decision(verdict: Verdict) -> Decision {
-    match verdict {
-        Verdict::Undecided => Decision::Undecided,
-        Verdict::Recognized { object, .. } => Decision::Recognized(object),
-        Verdict::Unknown => Decision::Unknown,
-        Verdict::GaveUp => Decision::GaveUp,
-    }
-}
-
-/// Converts to the link's message.
-const fn refusal(refused: Refused) -> Refusal {
-    match refused {
-        Refused::Pattern(_) => Refusal::Pattern,
-        Refused::Spread => Refusal::Spread,
-        Refused::NoPose => Refusal::NoPose,
-        Refused::NeedsFeatures | Refused::NeedsTouches => Refusal::Features,
     }
 }
 

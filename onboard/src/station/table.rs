@@ -4,7 +4,7 @@ use palpate_shared::link::{ModelInfo, Refusal, VerdictMessage};
 use palpate_shared::{Approach, TablePose, Touch};
 #[cfg(feature = "locate")]
 use {
-    super::session::decision,
+    super::message::decision,
     crate::locate::{Cell, Effort, Hand, Locator, Maps, POSE},
     palpate_shared::Position,
     palpate_shared::link::Detail,
@@ -68,7 +68,7 @@ pub trait Locates {
         Err(Refusal::NoModel)
     }
 
-    /// The next approach, with the middle finger within so many micrometers of the origin in x and y; none: twice the maps' range.
+    /// The next approach, with the middle finger within this many micrometers of the origin in x and y; none: twice the maps' range.
     /// The same until the next touch.
     ///
     /// # Errors
@@ -90,7 +90,7 @@ const SEED: u32 = 1;
 
 /// A [`Locator`] for the maps of a [`Station`](super::Station), with the default [`Effort`].
 ///
-/// RAM: 8 bytes for each of the `CELLS`, 20 for each of the `TOUCHES`, 12 for each of the `OBJECTS`, and some numbers.
+/// RAM: in proportion to `CELLS`, nearly all of it, `TOUCHES` and `OBJECTS`; `size_of` tells how much.
 #[cfg(feature = "locate")]
 #[derive(Debug)]
 pub struct Table<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> {

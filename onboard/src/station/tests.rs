@@ -162,7 +162,7 @@ fn verdicts_places_and_approaches_over_a_line_that_loses_bytes_are_those_of_a_lo
                 let Outcome::Verdict(said) = line.press(&touch) else { panic!("{:?}", line.outcomes) };
                 let best = locator.leader();
                 let evidence = [0, 1].map(|object| locator.posterior(object));
-                assert_eq!((said.decision, usize::from(said.best)), (session::decision(verdict), best));
+                assert_eq!((said.decision, usize::from(said.best)), (message::decision(verdict), best));
                 assert_eq!(said.touches as usize, locator.touches());
                 assert_eq!(said.detail.unwrap().posterior(), u64::from(evidence[best]) << 40);
                 let posteriors = evidence.map(|posterior| (u64::from(posterior) << 40).to_le_bytes()).concat();

@@ -3,7 +3,7 @@
 use super::numbers::count;
 use super::probe::{IN_MILLIMETERS, SizeArguments, refuse_unstated};
 use super::progress::Bar;
-use super::recognize::{Event, each_of};
+use super::recognize_lines::{Event, each_of};
 use super::scene::SceneArguments;
 use super::{Global, remark};
 use palpate::error::{FitProblem, ProbeProblem};

@@ -24,6 +24,7 @@ mod progress;
 mod prove;
 mod real;
 mod recognize;
+mod recognize_lines;
 mod recognize_maps;
 mod recognize_rows;
 mod report;

@@ -32,7 +32,7 @@ impl RealArguments {
     /// Noise of the option; `base` without it, and where it leaves settings open.
     ///
     /// # Errors
-    /// As [`on_table`](Self::on_table), and for objects that move.
+    /// Noise on a table, as [`on_table`](Self::on_table), and moves of the object.
     pub(crate) fn over(&self, base: Noise) -> Result<Noise> {
         let noise = self.on_table(base)?;
         if noise.drift == [0.0; 2] {

@@ -1,20 +1,20 @@
 use super::Global;
 use super::expected::ExpectedArguments;
 use super::numbers::error_rate;
+use super::recognize_lines::{Event, Line, each_of};
+use super::recognize_maps::{self, Asked};
 use super::recognize_rows::{reset, verdict_name};
 use palpate::Result;
 use palpate::chip::Entry;
 use palpate::compile::{self, CompiledModel};
-use palpate::error::{Error, EvaluateProblem, Place, TouchesProblem};
+use palpate::error::{Error, EvaluateProblem, Place};
 use palpate::locate::MapsFile;
 use palpate::output;
-use palpate::touches::{Log, LogWriter, Logged, LoggedVerdict, begins_log, parse_touch};
+use palpate::touches::{LogWriter, LoggedVerdict};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::format::Counted;
 use palpate_shared::link::ApproachMessage;
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// Recognize objects from a stream of touches.
@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     file: PathBuf,
     /// The file has rows of features, not touches
     #[arg(long)]
-    pub(super) features: bool,
+    features: bool,
     /// Add up the evidence of rows until there is a verdict, as that of touches
     #[arg(long, requires = "features")]
     add_up: bool,
@@ -53,75 +53,46 @@ pub(crate) struct Arguments {
     sequence_column: Option<String>,
     /// The share of wrong names to accept, such as 1%; stops there [default: the model's own thresholds]
     #[arg(long, value_name = "RATE", value_parser = error_rate)]
-    pub(super) error_rate: Option<f64>,
+    error_rate: Option<f64>,
     /// Give up after this many touches [default: the model's own limit]
     #[arg(long, value_name = "N")]
-    pub(super) max_touches: Option<u32>,
+    max_touches: Option<u32>,
     /// With a model of maps: print each touch's verdict, place and next approach as JSON
     #[arg(long, conflicts_with_all = ["features", "active", "mcap"])]
-    pub(super) next: bool,
+    next: bool,
     /// Explore an object that stands still, for its map: says as JSON where the map is least known, until as many millimeters are known of as large a share
     #[arg(long, value_name = "MM/SHARE", num_args = 0..=1, require_equals = true, default_missing_value = "2mm/50%")]
     #[arg(conflicts_with_all = ["next", "features", "active", "mcap"])]
-    pub(super) explore: Option<super::shape::Known>,
+    explore: Option<super::shape::Known>,
     /// With --next or --explore: the middle finger is sent at most so far from the table's origin in x and y [default: twice the maps' range; 60 with --explore]
     #[arg(long, value_name = "MM")]
-    pub(super) workspace: Option<f64>,
+    workspace: Option<f64>,
     /// Follow the model's plan of approaches; says after each touch where to touch next
     #[arg(long)]
-    pub(super) active: bool,
+    active: bool,
     /// Write touches, verdicts and posteriors as a log, which Foxglove shows
     #[arg(long, value_name = "FILE", conflicts_with = "features")]
-    pub(super) mcap: Option<PathBuf>,
+    mcap: Option<PathBuf>,
     #[command(flatten)]
-    pub(super) expected: ExpectedArguments,
-}
-
-#[derive(serde::Serialize)]
-pub(super) struct Line<'a> {
-    pub(super) touch: u32,
-    pub(super) verdict: &'static str,
-    pub(super) object: &'a str,
-    pub(super) posterior: f64,
-    /// Reason why the touch was not counted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) refused: Option<String>,
-    /// True where a sequence ends without a name, and nothing but the table was met.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub(super) table_alone: bool,
-    /// The approach that helps most.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) next: Option<Entry>,
-}
-
-impl Line<'_> {
-    pub(super) fn print(&self, json: bool) -> Result<()> {
-        if json {
-            return super::print_line(self);
-        }
-        match &self.refused {
-            Some(refused) => output::print(&format!("{:4}  not counted: {refused}\n", self.touch))?,
-            None if self.table_alone => {
-                output::print(&format!("{:4}  {:10}  nothing but the table was met\n", self.touch, self.verdict))?
-            }
-            None => output::print(&format!(
-                "{:4}  {:10}  {} {:.4}\n",
-                self.touch, self.verdict, self.object, self.posterior
-            ))?,
-        }
-        self.next.as_ref().map_or(Ok(()), |next| output::print(&format!("      {next}\n")))
-    }
+    expected: ExpectedArguments,
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if let Some(goal) = arguments.explore {
-        return super::shape::explore(goal, &arguments.model, &arguments);
+        return super::shape::explore(goal, &arguments.model, &arguments.file, arguments.workspace);
     }
     if arguments.workspace.is_some() && !arguments.next {
         return Err(Error::setting("workspace", "given", "it with --next or --explore"));
     }
     if let Some(maps) = MapsFile::read(&arguments.model)? {
-        return super::recognize_maps::run(&maps, &arguments, global);
+        let Arguments { features, active, error_rate, max_touches, next, workspace, .. } = arguments;
+        let of_trees = [("features", features), ("active", active), ("mcap", arguments.mcap.is_some())];
+        if let Some((option, _)) = of_trees.iter().find(|(_, is_given)| *is_given) {
+            let allowed = "it with a model of trees; a model of maps says with --next where to touch next";
+            return Err(Error::setting(option, "given", allowed));
+        }
+        let asked = Asked { error_rate, max_touches, expected: &arguments.expected, next, workspace };
+        return recognize_maps::run(&maps, &arguments.file, &asked, global);
     }
     let compiled = CompiledModel::read(&arguments.model)?;
     let model = compiled.model();
@@ -162,7 +133,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let mut stream =
         Stream { recognizer, model: &model, weights, longest, active, json, log, touches: 0, is_any_partial: false };
     stream.reset();
-    arguments.each(&mut |event| stream.take(event))?;
+    each_of(&arguments.file, &mut |event| stream.take(event))?;
     if model.trained_touches().counted != Counted::Full {
         super::warn_of_full(stream.touches, stream.is_any_partial);
     }
@@ -170,79 +141,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         (Some(log), Some(path)) => log.finish(path),
         _ => Ok(()),
     }
-}
-
-/// Part of a stream of touches.
-pub(super) enum Event<'e> {
-    /// Another object begins.
-    Begin,
-    /// A touch, with its place in the file and what a log says of it.
-    Touch {
-        /// The touch.
-        touch: &'e Touch,
-        /// Its place.
-        place: Place,
-        /// Name of its object.
-        object: Option<&'e str>,
-        /// Its time, in nanoseconds.
-        time: Option<u64>,
-    },
-}
-
-impl Arguments {
-    /// Hands on the touches of the file; of lines each before the next is waited for.
-    pub(super) fn each(&self, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
-        each_of(&self.file, take)
-    }
-}
-
-/// Hands on the touches of a file, or of standard input.
-pub(super) fn each_of(path: &Path, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
-    if path.as_os_str() == "-" {
-        return each(std::io::stdin().lock(), Path::new("standard input"), take);
-    }
-    let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
-    each(touches, path, take)
-}
-
-fn each(touches: impl Read, path: &Path, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
-    let mut reader = BufReader::new(touches);
-    let begin = reader.fill_buf().map_err(|source| Error::io(path, "read the touches", source))?;
-    if begins_log(begin) {
-        return each_of_log(&Log::of(reader, path)?, path, take);
-    }
-    let mut bytes = Vec::new();
-    for number in 1.. {
-        bytes.clear();
-        let read = reader.read_until(b'\n', &mut bytes);
-        if read.map_err(|source| Error::io(path, "read the touches", source))? == 0 {
-            break;
-        }
-        let place = || Place::line(path, number);
-        let line = std::str::from_utf8(&bytes).map_err(|_| Error::at(place(), TouchesProblem::NotText))?.trim();
-        if line.is_empty() {
-            take(Event::Begin)?;
-            continue;
-        }
-        let touch = parse_touch(line).map_err(|problem| Error::at(place(), problem))?;
-        take(Event::Touch { touch: &touch, place: place(), object: None, time: None })?;
-    }
-    Ok(())
-}
-
-fn each_of_log(log: &Log, path: &Path, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
-    log.skipped().iter().for_each(super::say);
-    let mut before = None;
-    for logged in log.touches() {
-        let Logged { time, touch, offset, .. } = logged;
-        let object = log.object(logged);
-        if object != before {
-            take(Event::Begin)?;
-        }
-        before = object;
-        take(Event::Touch { touch, place: Place::byte(path, *offset), object, time: Some(*time) })?;
-    }
-    Ok(())
 }
 
 /// A log of verdicts that is to become the file at `path`.

@@ -1,13 +1,15 @@
 //! `palpate recognize` with a model of maps: objects with their place on a table.
 
 use super::Global;
-use super::recognize::{Arguments, Event, Line};
+use super::expected::ExpectedArguments;
+use super::recognize_lines::{Event, Line, each_of};
 use super::recognize_rows::verdict_name;
 use palpate::error::LocateProblem;
 use palpate::locate::{self, Approach, Hand, Locating, Maps, MapsFile, POSE, Pose};
 use palpate::output;
 use palpate::{Error, Result, compile};
 use palpate_onboard::{Stopping, Verdict};
+use std::path::Path;
 
 /// Verdict and place after a touch.
 #[derive(serde::Serialize)]
@@ -19,7 +21,7 @@ struct Located<'m> {
     pose: Option<Mode<'m>>,
     /// Others of this object.
     modes: Vec<Mode<'m>>,
-    /// Where to touch next; none after a verdict.
+    /// Next approach; none after a verdict.
     next: Option<Next>,
 }
 
@@ -98,30 +100,36 @@ pub(super) fn print_located<'m>(
     ))
 }
 
-/// Recognizes objects by touches with a position.
-pub(super) fn run(file: &MapsFile, arguments: &Arguments, global: &Global) -> Result<()> {
+/// Settings of a recognition, as they were given.
+pub(super) struct Asked<'a> {
+    pub(super) error_rate: Option<f64>,
+    pub(super) max_touches: Option<u32>,
+    pub(super) expected: &'a ExpectedArguments,
+    /// Places and the next approach are printed.
+    pub(super) next: bool,
+    /// See [`locate::workspace`].
+    pub(super) workspace: Option<f64>,
+}
+
+/// Recognizes objects by touches with a position, from a file.
+pub(super) fn run(file: &MapsFile, touches: &Path, asked: &Asked<'_>, global: &Global) -> Result<()> {
     let maps = file.maps();
-    let of_trees = [("features", arguments.features), ("active", arguments.active), ("mcap", arguments.mcap.is_some())];
-    if let Some((option, _)) = of_trees.iter().find(|(_, is_given)| *is_given) {
-        let allowed = "it with a model of trees; a model of maps says with --next where to touch next";
-        return Err(Error::setting(option, "given", allowed));
-    }
     let own = maps.stopping();
-    let max_touches = arguments.max_touches.unwrap_or(own.max_touches());
+    let max_touches = asked.max_touches.unwrap_or(own.max_touches());
     if max_touches as usize > locate::TOUCHES {
         return Err(Error::setting("max_touches", max_touches, format!("1 to {}", locate::TOUCHES)));
     }
-    let stopping = match arguments.error_rate {
+    let stopping = match asked.error_rate {
         Some(rate) => compile::stopping(rate, max_touches)?,
         None => own.with_max_touches(max_touches),
     };
     let names = locate::names(&maps);
-    let weights = arguments.expected.weights(&names, &vec![1.0; names.len()])?;
+    let weights = asked.expected.weights(&names, &vec![1.0; names.len()])?;
     let hand = Hand::of(&maps).ok_or(LocateProblem::NoHand).map_err(Error::from)?;
-    let within = locate::workspace(&maps, arguments.workspace)?;
-    let mut stream = Stream::new(maps, hand, stopping, weights, arguments.next.then_some(within), global);
+    let within = locate::workspace(&maps, asked.workspace)?;
+    let mut stream = Stream::new(maps, hand, stopping, weights, asked.next.then_some(within), global);
     stream.begin();
-    arguments.each(&mut |event| stream.take(event))
+    each_of(touches, &mut |event| stream.take(event))
 }
 
 /// A stream of touches and what locates by them.

@@ -1,7 +1,7 @@
 //! Objects that nobody has a mesh of: files of touches with a position, and where to touch next.
 
 use super::probe::ProbeArguments;
-use super::recognize::{Arguments, Event, each_of};
+use super::recognize_lines::{Event, each_of};
 use super::recognize_maps::Next;
 use palpate::locate::{self, MapsFile, Real, Shape};
 use palpate::output;
@@ -91,7 +91,7 @@ struct Explored {
 const WORKSPACE: f64 = 60.0;
 
 /// Says after each touch of an object that stands still where its map is least known.
-pub(super) fn explore(goal: Known, model: &Path, arguments: &Arguments) -> Result<()> {
+pub(super) fn explore(goal: Known, model: &Path, touches: &Path, workspace: Option<f64>) -> Result<()> {
     let is_probe = model.extension().is_some_and(|extension| extension == "toml");
     let of_maps = |file: MapsFile| -> Result<ProbeFile> {
         let maps = file.maps();
@@ -102,13 +102,13 @@ pub(super) fn explore(goal: Known, model: &Path, arguments: &Arguments) -> Resul
         if is_probe { Some(ProbeFile::read(model)?) } else { MapsFile::read(model)?.map(of_maps).transpose()? };
     let allowed = "it with a probe file in millimeters (hand.toml) or a model of maps, which states its hand";
     let file = in_millimeters(file).ok_or_else(|| Error::setting("explore", "given", allowed))?;
-    let half = arguments.workspace.unwrap_or(WORKSPACE);
+    let half = workspace.unwrap_or(WORKSPACE);
     if !(1.0..=200.0).contains(&half) {
         return Err(Error::setting("workspace", half, "a number of millimeters from 1 to 200"));
     }
     let begin = || Shape::within(&file.probe, [half; 2], noise(&file));
     let (mut shape, mut touch) = (begin(), 0);
-    arguments.each(&mut |event| {
+    each_of(touches, &mut |event| {
         let Event::Touch { touch: met, place, .. } = event else {
             (shape, touch) = (begin(), 0);
             return Ok(());

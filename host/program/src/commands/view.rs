@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 #[command(group(ArgGroup::new("recognizes").args(["play", "port"])), after_help = "\
 Pages work in any browser, without a network. The inside of a surface is orange; a mesh that shows orange from outside is inside out, or has holes.
 
-With --play the page lets you touch several objects, and models recognize them. Without --model four are trained for it, which takes about a minute. With --scene table, too, one of the objects lies hidden on a table, and a hand that knows where it is finds out what it is and where it lies. With --port it shows what a chip at the reader's computer touches and recognizes, where the browser has Web Serial.
+With --play the page lets you touch several objects, and models recognize them. Without --model, it trains four, which takes about a minute. With --scene table, too, one of the objects lies hidden on a table, and a hand that knows where it is finds out what it is and where it lies. With --port it shows what a chip at the reader's computer touches and recognizes, where the browser has Web Serial.
 
 Examples:
   palpate view bowl -o bowl.html                a built-in object

@@ -250,7 +250,7 @@ class Locator:
         """
     def next(self, /) -> tuple[float, float, float]:
         """
-        Where to touch next: x and y of the middle finger in millimeters, and the roll of the row of fingers in degrees from the x
+        Next approach: x and y of the middle finger in millimeters, and the roll of the row of fingers in degrees from the x
         axis. The same until another touch is taken in.
         """
     @property
@@ -310,7 +310,7 @@ class Maps:
         Finds the loosest threshold at which at most a share of `error_rate` of the names is wrong, with a probability of
         `confidence`, on sequences of approaches to these meshes on a simulated table.
 
-        `aimed` says how approaches are aimed, and so of which the promise is: "chosen" ones, as by `Locator.next`, or "random"
+        `aimed` says how approaches are aimed, and which approaches the promise is for: "chosen" ones, as by `Locator.next`, or "random"
         ones about the place believed in. `real` is what the simulated hand and table add. `until` goes on until the place is as
         sure, such as (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing
         is named before the eighth approach then.

@@ -1,4 +1,4 @@
-//! A page on which a hand comes straight down on a table, and a locator finds out what lies there, and where.
+//! A page on which a hand comes straight down on a table, and a locator recognizes what lies there, and where.
 
 use super::{Settings, WASM, safe, surfaces};
 use crate::page::{html, scene};
@@ -24,7 +24,7 @@ pub const MOST_OBJECTS: usize = 16;
 /// approaches to each object. The same objects and settings give the same page.
 ///
 /// # Errors
-/// As [`surfaces()`], [`in_memory`], [`learn`](fn@locate::learn) and [`write`](fn@locate::write); for noise that a table does not have.
+/// Those of [`surfaces()`], [`in_memory`], [`learn`](fn@locate::learn) and [`write`](fn@locate::write); for noise that a table does not have.
 pub fn table(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<String> {
     let scene = Surroundings::Table { cone: 0.0 };
     let unit = Length::Millimeter;

@@ -87,7 +87,7 @@ impl Problem for ProbeProblem {
             }
             Self::OnlyCaptured => "Capture with `palpate capture --probe FILE`, or leave grazing out of the file.".into(),
             Self::BadFile { .. } => {
-                "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and if you like tilt, stroke, travel, timer and [real].".into()
+                "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and optionally tilt, stroke, travel, timer and [real].".into()
             }
             Self::BadQuantity { example, .. } => format!("Give {example}."),
             Self::CastFields { .. } | Self::CastCoordinate { .. } | Self::CastTime { .. } => {

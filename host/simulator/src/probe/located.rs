@@ -36,7 +36,7 @@ impl Approach {
     }
 
     /// Draws an approach straight down. Place: uniform in a `region`, from its lowest to its highest x and y. Start: the lowest
-    /// point of the middle fingertip is at `clearance` above the object's highest point. Row: as [`draw_at`](Self::draw_at).
+    /// point of the middle fingertip is at `clearance` above the object's highest point. Row: as [`draw`](Self::draw).
     pub fn draw_down(
         rng: &mut impl Rng,
         scene: &Scene,

@@ -5,7 +5,7 @@ mod screen;
 mod watch;
 
 use crate::commands::progress::Bar;
-use crate::commands::recognize::Line;
+use crate::commands::recognize_lines::Line;
 use crate::commands::recognize_maps::print_located;
 use crate::commands::{self, Global};
 use clap::ArgGroup;
@@ -104,7 +104,7 @@ pub(crate) struct Arguments {
     /// Follow the model's plan of approaches; asks the chip after each touch for the next one
     #[arg(long)]
     active: bool,
-    /// With a model of maps: print each touch's verdict, place and next approach as JSON, as recognize --next does
+    /// With a model of maps: print each touch's verdict, place and next approach as JSON
     #[arg(long, conflicts_with_all = ["active", "watch"])]
     next: bool,
     /// With --next: the middle finger is sent at most so far from the table's origin in x and y [default: twice the maps' range]
