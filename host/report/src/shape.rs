@@ -110,7 +110,7 @@ fn drawn(
     let mut svg = format!(
         "<svg viewBox=\"0 0 {width} {height}\" width=\"{}\" height=\"{}\" role=\"img\" aria-label=\"Map from above\">\
          <defs><pattern id=\"guessed\" width=\"2\" height=\"2\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
-         <path d=\"M0 0V2\" stroke=\"#d55e00\" stroke-width=\"0.7\"/></pattern></defs><g shape-rendering=\"crispEdges\">",
+         <path d=\"M0 0V2\" stroke=\"#d55e00\" stroke-width=\"0.7\"/></pattern></defs>",
         width * SCALE,
         height * SCALE
     );
@@ -135,7 +135,6 @@ fn drawn(
             }
         }
     }
-    svg += "</g>";
     for sample in samples {
         let [u, v] = [0, 1].map(|axis| sample.place[axis] - relief.middle[axis]);
         let (u, v) = (u + f64::from(x) + 0.5, f64::from(y) - v + 0.5);

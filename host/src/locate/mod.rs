@@ -32,7 +32,7 @@ pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspec
 pub use learn::{Surface, learn, probe_of};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, POSE, Pose, Seen, TESTED};
 pub use pose::{Off, Until};
-pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, calibrate, evaluate};
+pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, calibrate, calibrate_recorded, evaluate};
 pub use shape::{Relief, Sample, Shape, samples};
 #[cfg(feature = "train")]
 pub use table::{BareTable, LEAST_PRESSES, Measured, REACH, bare_table};

@@ -247,10 +247,15 @@ fn presses_on_the_bare_table_measure_it_and_the_fingertips() {
 
 /// Lines of a hand that presses an L of 20 and 10 mm height, which lies at a place and is turned.
 fn pressed(place: [f64; 2], yaw: f64, count: usize) -> String {
+    pressed_of(1.0, place, yaw, count)
+}
+
+/// Lines of an L whose heights are scaled.
+fn pressed_of(scale: f64, place: [f64; 2], yaw: f64, count: usize) -> String {
     let (sin, cos) = yaw.sin_cos();
     let height = |[x, y]: [f64; 2]| match () {
-        () if (0.0..=60.0).contains(&x) && (0.0..=20.0).contains(&y) => 20.0,
-        () if (0.0..=20.0).contains(&x) && (0.0..=50.0).contains(&y) => 10.0,
+        () if (0.0..=60.0).contains(&x) && (0.0..=20.0).contains(&y) => 20.0 * scale,
+        () if (0.0..=20.0).contains(&x) && (0.0..=50.0).contains(&y) => 10.0 * scale,
         () => 0.0,
     };
     let line = |number: usize| {
@@ -299,6 +304,36 @@ fn an_object_without_a_mesh_is_taught_by_touches_with_a_position() {
     refused(at, "train --teach pot.txt -o own.palpate", 1, "not of objects at their true size");
     std::fs::rename(at.join("pot.txt"), at.join("brick.txt")).unwrap();
     refused(at, "train data --teach brick.txt -o own.palpate", 2, "objects that the data set does not have");
+}
+
+#[test]
+fn recordings_of_objects_that_stood_still_test_a_promise() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    std::fs::write(at.join("hand.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\nstroke = 20\n")
+        .unwrap();
+    for (name, scale) in [("pot", 1.0), ("lid", 0.5)] {
+        std::fs::write(at.join(format!("{name}.txt")), pressed_of(scale, [0.0; 2], 0.0, 300)).unwrap();
+        for (place, yaw) in [([-25.0, -20.0], 0.3), ([-20.0, -30.0], 1.0), ([10.0, 5.0], 2.5)] {
+            std::fs::write(at.join("stay.txt"), pressed_of(scale, place, yaw, 120)).unwrap();
+            run(at, &format!("data record stay.txt -o stays --object {name} --position --probe hand.toml"));
+        }
+    }
+    run(at, "train --teach pot.txt --teach lid.txt -o own.palpate --probe hand.toml");
+    let said = run(at, "calibrate own.palpate --recorded stays -o sure.palpate --error-rate 20%");
+    assert!(said.contains("It holds for approaches like those of 6 recordings, in any order"), "{said}");
+    assert!(said.contains("note: sequences of one recording share its pose"), "{said}");
+    let promise = &json(palpate(at, &["inspect", "sure.palpate", "--json"]))["promise"];
+    assert_eq!((promise["error_rate"].as_f64(), promise["aimed"].as_str()), (Some(0.2), Some("random")));
+    let again = "calibrate own.palpate --recorded stays -o sure.palpate";
+    refused(at, again, 1, "names given are too few to promise 1 %");
+    refused(at, &format!("{again} --per object"), 2, "or with DIR");
+    refused(at, &format!("{again} --real noise=1ms"), 2, "or with DIR");
+    refused(at, "calibrate own.palpate stays --recorded stays -o sure.palpate", 1, "--recorded");
+    std::fs::write(at.join("other.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 12\nspeed = 100\nstroke = 20\n")
+        .unwrap();
+    run(at, "train --teach pot.txt --teach lid.txt -o other.palpate --probe other.toml");
+    refused(at, "calibrate other.palpate --recorded stays -o sure.palpate", 1, "spacing 12 and 15");
 }
 
 #[test]

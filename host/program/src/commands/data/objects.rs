@@ -8,6 +8,7 @@ use palpate::mesh::obj;
 use palpate::mesh::source::{self, Search, Source};
 use palpate::mesh::{Instance, Object};
 use palpate::output;
+use palpate::with;
 use palpate::{Error, Result};
 use palpate_report::page::render;
 use std::fmt::Write as _;
@@ -83,19 +84,12 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
 fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
     let (touched, others): (Vec<String>, Vec<String>) =
         arguments.sources.iter().cloned().partition(|source| shape::is_touches(source));
-    let (mut objects, mut files) = (Vec::new(), Vec::new());
+    let (mut objects, mut files) = if others.is_empty() { Default::default() } else { of_meshes(arguments, &others)? };
     for source in &touched {
         let file = shape::hand(&arguments.probe)?;
         let shape::Touched { name, shape, .. } = shape::read(Path::new(source), &file)?;
-        let mut object = Object::new(name, shape.relief().solid(file.probe.radius));
-        object.millimeters = Some(1.0);
-        objects.push(object);
+        objects.push(with!(Object::new(name, shape.relief().solid(file.probe.radius)), millimeters = Some(1.0)));
         files.push(source.into());
-    }
-    if !others.is_empty() {
-        let (meshes, own) = of_meshes(arguments, &others)?;
-        objects.extend(meshes);
-        files.extend(own);
     }
     Ok((objects, files))
 }
