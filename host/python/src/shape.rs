@@ -77,8 +77,8 @@ impl Shape {
             return Err(Error::setting("x, y, alignment or lowest", wrong, "finite numbers").into());
         }
         let Three(heights) = heights;
-        let samples = [-1.0, 0.0, 1.0].map(|finger| finger * self.spacing).into_iter().zip(heights).map(|(from, height)| Sample {
-            place: [x + from * across, y + from * along],
+        let samples = [-1.0, 0.0, 1.0].into_iter().zip(heights).map(|(finger, height)| Sample {
+            place: [x + finger * self.spacing * across, y + finger * self.spacing * along],
             height: height.unwrap_or(lowest.max(0.0)),
             is_contact: height.is_some(),
         });
