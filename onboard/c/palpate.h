@@ -1609,15 +1609,10 @@ PALPATE_API void palpate_reset(palpate_recognizer *recognizer)
     }
 }
 
-/* A recognizer that has touched nothing yet, with the model's own thresholds and limit. For others, set `odds`, `max_touches`
- * and `by_object` afterwards: odds = error rate / (1 - error rate) in Q56. The model must stay where it is. Fails with
- * PALPATE_TOO_MANY_OBJECTS only. */
-PALPATE_API palpate_error palpate_start(palpate_recognizer *recognizer, palpate_model *model)
+/* A recognizer of a model with no more than PALPATE_MAX_OBJECTS objects. */
+static inline void palpate_start_(palpate_recognizer *recognizer, const palpate_model *model)
 {
     const uint8_t *bytes = model->bytes;
-    if (model->objects > PALPATE_MAX_OBJECTS) {
-        return palpate_wrong_(model, PALPATE_TOO_MANY_OBJECTS, bytes + 14);
-    }
     recognizer->model = model;
     recognizer->odds = palpate_u32_(bytes + 48) | PALPATE_AS_(uint64_t, palpate_u32_(bytes + 52)) << 32;
     recognizer->max_touches = palpate_u32_(bytes + 56);
@@ -1626,6 +1621,17 @@ PALPATE_API palpate_error palpate_start(palpate_recognizer *recognizer, palpate_
     recognizer->span_ = 0;
 #endif
     palpate_reset(recognizer);
+}
+
+/* A recognizer that has touched nothing yet, with the model's own thresholds and limit. For others, set `odds`, `max_touches`
+ * and `by_object` afterwards: odds = error rate / (1 - error rate) in Q56. The model must stay where it is. Fails with
+ * PALPATE_TOO_MANY_OBJECTS only. */
+PALPATE_API palpate_error palpate_start(palpate_recognizer *recognizer, palpate_model *model)
+{
+    if (model->objects > PALPATE_MAX_OBJECTS) {
+        return palpate_wrong_(model, PALPATE_TOO_MANY_OBJECTS, model->bytes + 14);
+    }
+    palpate_start_(recognizer, model);
     return PALPATE_OK;
 }
 
@@ -2076,7 +2082,6 @@ static inline const uint8_t *palpate_prediction_(const palpate_model *model)
     return NULL;
 }
 
-#if PALPATE_EARLY
 /* The class with the largest of the sums. */
 static inline uint16_t palpate_best_of_(const palpate_model *model, const int32_t *sums)
 {
@@ -2094,6 +2099,7 @@ static inline uint16_t palpate_best_of_(const palpate_model *model, const int32_
     return PALPATE_AS_(uint16_t, best);
 }
 
+#if PALPATE_EARLY
 /* The class that palpate_predict_class gives, ties and all, from as few trees as possible, if `palpate export --early-exit`
  * wrote the model. `numbers` has room for `room` of them, and holds no margins afterwards. PALPATE_NO_CLASS, and nothing written,
  * if there are more objects than room. */
@@ -2147,20 +2153,26 @@ static inline float palpate_float_(uint32_t bits)
     return both.value;
 }
 
+/* A sum as an f32 value before the inverse link, times the scale that the model states. */
+static inline float palpate_raw_(const palpate_model *model, uint32_t sum)
+{
+    const uint8_t *prediction = palpate_prediction_(model);
+    const float scale = palpate_float_(prediction == NULL ? 0x3f800000u : palpate_u32_(prediction + 4));
+    const float unit = palpate_float_(palpate_u32_(model->bytes + 32));
+    return PALPATE_IS_F32_(model) ? palpate_float_(sum) * scale : PALPATE_AS_(float, PALPATE_AS_(int32_t, sum)) * (unit * scale);
+}
+
 /* The value of a row of `count` features before the inverse link: the margin of a model with one output, times the scale
  * that the model states; 0 for a model with several outputs. The bits are the crate's if the compiler computes in f32
  * (no excess precision). */
 PALPATE_API float palpate_predict_raw(const palpate_model *model, const int32_t *features, uint16_t count)
 {
-    const uint8_t *prediction = palpate_prediction_(model);
-    const float scale = palpate_float_(prediction == NULL ? 0x3f800000u : palpate_u32_(prediction + 4));
-    const float unit = palpate_float_(palpate_u32_(model->bytes + 32));
     uint32_t sum;
     if (model->objects != 1) {
         return 0;
     }
     palpate_sum_(model, features, count, &sum);
-    return PALPATE_IS_F32_(model) ? palpate_float_(sum) * scale : PALPATE_AS_(float, PALPATE_AS_(int32_t, sum)) * (unit * scale);
+    return palpate_raw_(model, sum);
 }
 
 /* e^x: within 1e-7 of the result. */
@@ -2245,6 +2257,79 @@ PALPATE_API float palpate_inverse_link(const palpate_model *model, float margin)
 PALPATE_API float palpate_predict_value(const palpate_model *model, const int32_t *features, uint16_t count)
 {
     return palpate_inverse_link(model, palpate_predict_raw(model, features, count));
+}
+
+/* ---- Calls of a model that `palpate export` wrote ---- */
+
+/* The values of a row by its sums. */
+static inline void palpate_values_of_(const palpate_model *model, const uint32_t *sums, float *values)
+{
+    uint_fast16_t i;
+    for (i = 0; i < model->objects; i++) {
+        values[i] = palpate_inverse_link(model, palpate_raw_(model, sums[i]));
+    }
+}
+
+/* Probabilities of a row by its sums in nats: a softmax, or with `apart` the logistic function of each, as where classes were
+ * trained one against all others. */
+static inline void palpate_posteriors_of_(const palpate_model *model, const uint32_t *sums, int apart, float *posteriors)
+{
+    const float unit = palpate_float_(palpate_u32_(model->bytes + 32));
+    const uint32_t most = apart ? 0 : sums[palpate_best_of_(model, PALPATE_AT_(const int32_t *, sums))];
+    float all = 0;
+    uint_fast16_t i;
+    for (i = 0; i < model->objects; i++) {
+        /* The difference of two sums is exact in units. */
+        const float behind = PALPATE_IS_F32_(model) ? palpate_float_(sums[i]) - palpate_float_(most)
+                                                    : PALPATE_AS_(float, PALPATE_AS_(int32_t, sums[i] - most)) * unit;
+        posteriors[i] = apart ? 1.0f / (1.0f + palpate_exp_(-behind)) : palpate_exp_(behind);
+        all += posteriors[i];
+    }
+    for (i = 0; !apart && i < model->objects; i++) {
+        posteriors[i] /= all;
+    }
+}
+
+/* The object that was recognized, or -1 while undecided, -2 where none fits, -3 where the limit was reached. */
+static inline int palpate_decided_(const palpate_recognizer *recognizer)
+{
+    const int verdict = recognizer->verdict;
+    return verdict == PALPATE_RECOGNIZED ? recognizer->object : verdict == PALPATE_UNDECIDED ? -1 : -verdict;
+}
+
+/* The decision, or without one the object with the most evidence, -1 if there is none. */
+static inline int palpate_ended_(const palpate_recognizer *recognizer)
+{
+    const int decided = palpate_decided_(recognizer);
+    return decided >= 0 || decided == -2 ? decided : recognizer->touches == 0 ? -1 : PALPATE_AS_(int, palpate_best(recognizer));
+}
+
+/* A step of a model that computes its features. */
+typedef palpate_touch palpate_step;
+
+/* Adds a touch, and answers as palpate_decided_ does. */
+static inline int palpate_add_step_(palpate_recognizer *recognizer, const palpate_step *touch)
+{
+    (void)palpate_push(recognizer, touch);
+    return palpate_decided_(recognizer);
+}
+
+/* Adds a touch by its times. */
+static inline int palpate_add_times_(palpate_recognizer *recognizer, const uint32_t *times)
+{
+    const palpate_touch touch = {{times[0], times[1], times[2]}, 0, {0, 0, 0}, {0, 0, 0}};
+    return palpate_add_step_(recognizer, &touch);
+}
+
+/* PALPATE_OK if the bytes of an opened model still have its checksum, else PALPATE_CHECKSUM. Cost: in proportion to the bytes. */
+static inline palpate_error palpate_check_(const palpate_model *model)
+{
+    const uint8_t *p = model->bytes;
+    uint32_t sum = 0xffffffffu;
+    for (; p != model->part_[PALPATE_END_]; p++) {
+        sum = palpate_crc_(sum, PALPATE_BYTE(p));
+    }
+    return ~sum == palpate_u32_(p) ? PALPATE_OK : PALPATE_CHECKSUM;
 }
 
 /* ---- Snapshots ---- */

@@ -43,9 +43,9 @@
 //!
 //! | feature | what |
 //! |---|---|
-//! | `effector` | [`effector`] |
-//! | `link` | [`shared`]`::link`, and snapshots of a recognizer |
-//! | `station` | [`station`], with both of these |
+//! | `effector` | [`effector`]; off by default |
+//! | `link` | [`shared`]`::link`, and snapshots of a recognizer; off by default |
+//! | `station` | [`station`], with both of these; off by default |
 //! | `compact`, `complete`, `wide` | layouts of trees that can be read |
 //! | `grid`, `patterns` | layouts of tables that can be read |
 //! | `code` | models whose trees are a function of the program (`Model::with_code`); off by default |

@@ -8,7 +8,7 @@ use crate::work::{Callback, long};
 use numpy::ndarray::{Ix1, Ix2};
 use palpate::ensemble::import::{Options, PartTree, Parts};
 use palpate::ensemble::train::{self as library, Outputs, Settings, Small};
-use palpate::ensemble::{self, Inputs, OverTouches, StatedProbe};
+use palpate::ensemble::{self, Inputs, OverTouches, Probability, StatedProbe};
 use palpate::error::{Error, EvaluateProblem};
 use palpate::rows::{Features, notes};
 use palpate::shared::Descriptor;
@@ -87,8 +87,9 @@ impl Ensemble {
     /// where margins start; an empty name stands for a feature that has none. `link` is "identity", "logistic",
     /// "exponential", "square" or "softplus": what makes a value of a margin. With `last_of_ties` the last of several
     /// largest margins names the class, otherwise the first. With `targets` each output is a value, and none is a class.
+    /// `probability` is "softmax", "logistic", "shares" or "unknown": what makes probabilities of margins.
     #[staticmethod]
-    #[pyo3(signature = (kind, features, base, trees, *, names=None, notes=Vec::new(), link="identity", last_of_ties=false, targets=false))]
+    #[pyo3(signature = (kind, features, base, trees, *, names=None, notes=Vec::new(), link="identity", last_of_ties=false, targets=false, probability="softmax"))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn from_trees(
         py: Python<'_>,
@@ -101,10 +102,18 @@ impl Ensemble {
         link: &str,
         last_of_ties: bool,
         targets: bool,
+        probability: &str,
     ) -> Result<Self, Failure> {
         let found = Link::ALL.iter().copied().find(|known| known.name() == link);
         let link =
             found.ok_or_else(|| Error::setting("link", link, "identity, logistic, exponential, square or softplus"))?;
+        let probability = match probability {
+            "softmax" => Probability::Softmax,
+            "logistic" => Probability::Logistic,
+            "shares" => Probability::Shares,
+            "unknown" => Probability::Unknown,
+            other => return Err(Error::setting("probability", other, "softmax, logistic, shares or unknown").into()),
+        };
         let prediction = Prediction { link, last_of_ties, targets, ..Prediction::default() };
         let tree = |(output, left, right, feature, threshold, missing_left, values): Columns<'_>| {
             PyResult::Ok(PartTree {
@@ -118,7 +127,7 @@ impl Ensemble {
             })
         };
         let trees = trees.into_iter().map(tree).collect::<PyResult<_>>()?;
-        let parts = Parts { kind, features, names: Vec::new(), base, trees, notes, prediction };
+        let parts = Parts { kind, features, names: Vec::new(), base, trees, notes, prediction, probability };
         let ensemble = py.detach(|| parts.into_ensemble(names.as_deref())).map_err(Error::from)?;
         Ok(Self { ensemble: Arc::new(ensemble) })
     }

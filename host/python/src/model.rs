@@ -6,13 +6,16 @@ use crate::data::DataSet;
 use crate::ensemble::Ensemble;
 use crate::failure::Failure;
 use numpy::ndarray::{Ix1, Ix2};
-use palpate::compile::{self as library, CompiledModel, Core, Goal, Layout, Leaf, Settings};
+use palpate::compile::code::Form;
+use palpate::compile::{self as library, Compiled, CompiledModel, Core, Goal, Language, Layout, Leaf, Settings};
+use palpate::ensemble::Probability;
 use palpate::error::{CompileProblem, Error, EvaluateProblem, TouchesProblem};
 use palpate::evaluate::Candidate;
 use palpate::evaluate::predict::{Predicted, predict};
 use palpate::evaluate::together::{AT_ONCE, Together, TouchesTogether};
 use palpate::onboard;
 use palpate::output;
+use palpate::prove::sources;
 use palpate::rows::{Encoder, Features, feature_names, notes};
 use palpate::shared::{Descriptor, Touch};
 use palpate::touches::touch_of_seconds;
@@ -45,6 +48,8 @@ pub(crate) struct Model {
     pub(crate) features: Features,
     /// Facts about its source.
     notes: Vec<String>,
+    /// The ensemble that it was compiled from, how, and the result; none of a model that was loaded.
+    source: Option<(Arc<palpate::ensemble::Ensemble>, Settings, Compiled)>,
 }
 
 impl Model {
@@ -54,7 +59,7 @@ impl Model {
         })?;
         let encoder = Encoder::of(opened.borrow_dependent());
         let features = Features::from(opened.borrow_dependent());
-        Ok(Self { opened: Arc::new(opened), encoder, features, notes: Vec::new() })
+        Ok(Self { opened: Arc::new(opened), encoder, features, notes: Vec::new(), source: None })
     }
 
     pub(crate) fn model(&self) -> &onboard::Model<'_> {
@@ -134,6 +139,39 @@ impl Model {
         py.detach(|| predict(Candidate::Compiled(self.model()), &values, self.features.count(), raw))
     }
 
+    /// The margins of all rows.
+    fn of_all<'py>(slf: &Bound<'py, Self>, rows: Rows<'py>) -> Result<Vec<f64>, Failure> {
+        let (py, own) = (slf.py(), slf.get());
+        let rows = match rows {
+            Rows::Array(array) if own.model().descriptor().is_none() => Rows::Array(features(slf, array)?),
+            other => other,
+        };
+        Ok(match (rows, own.model().descriptor()) {
+            (Rows::Data(_), None) => return Err(Error::from(EvaluateProblem::RawFeatures).into()),
+            (Rows::Data(data), Some(_)) => {
+                let touches: Vec<Touch> = data.get().touches().copied().collect();
+                own.of_touches(py, &touches)?
+            }
+            (Rows::Array(array), Some(_)) => {
+                let array: Input<'_, f64, Ix2> = array.extract()?;
+                let (values, columns) = array.rows()?;
+                let touches = touches(values, columns)?;
+                own.of_touches(py, &touches)?
+            }
+            (Rows::Array(array), None) => match &own.encoder {
+                Encoder::Real => {
+                    let array: Input<'_, f32, Ix2> = array.extract()?;
+                    own.of_rows(py, array.rows()?)?
+                }
+                // f32 does not hold all whole numbers.
+                Encoder::Scaled(_) => {
+                    let array: Input<'_, f64, Ix2> = array.extract()?;
+                    own.of_rows(py, array.rows()?)?
+                }
+            },
+        })
+    }
+
     fn of_touches(&self, py: Python<'_>, touches: &[Touch]) -> PyResult<Vec<f64>> {
         let model = self.model();
         self.fill(py, touches, 1, |together, touches, slots| together.touches_in_nats(model, touches, slots))
@@ -157,6 +195,52 @@ impl Model {
     /// Writes the model, whole or not at all. A file that Palpate did not write is not replaced.
     fn save(&self, py: Python<'_>, path: PathBuf) -> Result<(), Failure> {
         Ok(py.detach(|| output::write_bytes(&path, self.model().bytes()))?)
+    }
+
+    /// Writes the model as source code, and returns the files. `form` is "c" (an array), "rust", "c-code" (trees as C),
+    /// "thumb" or "thumb-m4f" (trees as assembly, for C and Rust); without it a name that ends in ".h" means "c", ".rs" "rust"
+    /// and ".s" "thumb". What has to be built with it, such as palpate.h, is written beside it, and for assembly the model. A
+    /// file that Palpate did not write is not replaced.
+    #[pyo3(signature = (path, *, form=None))]
+    fn emit(&self, py: Python<'_>, path: PathBuf, form: Option<&str>) -> Result<Vec<PathBuf>, Failure> {
+        let of_suffix = path.extension().and_then(|extension| match extension.to_str() {
+            Some("h") => Some("c"),
+            Some("rs") => Some("rust"),
+            Some("s") => Some("thumb"),
+            _ => None,
+        });
+        let refuse = |form: &str, allowed: &str| Err(Error::setting("form", form, allowed).into());
+        let all = "c, rust, c-code, thumb or thumb-m4f, or a path that ends in .h, .rs or .s";
+        let Some(name) = form.or(of_suffix) else { return refuse("not given", all) };
+        let language = Language::ALL.into_iter().find(|language| language.name() == name);
+        let code = Form::ALL.into_iter().find(|form| form.name() == name);
+        if language.is_none() && code.is_none() {
+            return refuse(name, all);
+        }
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let languages = [language.unwrap_or(Language::C)];
+        Ok(py.detach(|| {
+            let Some((ensemble, settings, compiled)) = &self.source else {
+                let Some(language) = language else {
+                    return Err(Error::setting(
+                        "form",
+                        name,
+                        "c or rust for a model that was loaded: it has bytes, not trees",
+                    ));
+                };
+                let text = library::emit(self.model(), &stem, language);
+                return library::write_sources(&path, &[(language.extension(), text)]);
+            };
+            let Some(form) = code else { return library::write_sources(&path, &sources(compiled, &stem, &languages)?) };
+            let settings = with!(settings.clone(), layout = Some(Layout::Code), forms = vec![form]);
+            let compiled = library::compile(ensemble, &settings)?;
+            let mut written = library::write_sources(&path, &sources(&compiled, &stem, &languages)?)?;
+            if let Form::Thumb(_) = form {
+                written.push(path.with_extension("palpate"));
+                output::write_bytes(&path.with_extension("palpate"), &compiled.bytes)?;
+            }
+            Ok(written)
+        })?)
     }
 
     /// The model's bytes, for the chip.
@@ -240,38 +324,28 @@ impl Model {
     /// the columns are found by their names, in any order and among others.
     #[pyo3(signature = (rows))]
     fn margins<'py>(slf: &Bound<'py, Self>, rows: Rows<'py>) -> Result<Output<'py, f64, Ix2>, Failure> {
-        let (py, owner) = (slf.py(), slf);
+        let margins = Self::of_all(slf, rows)?;
+        Ok(two(slf.py(), margins, slf.get().model().object_count())?)
+    }
+
+    /// The probabilities of each row's classes, one column per class, as `predict_proba` of the library that trained the model
+    /// gives them: for margins within `margin_error`, within half of it for boosted trees. Rows are as for `margins`. A model
+    /// that was loaded has none: its bytes do not say how probabilities are made of margins.
+    #[pyo3(signature = (rows))]
+    fn predict_proba<'py>(slf: &Bound<'py, Self>, rows: Rows<'py>) -> Result<Output<'py, f64, Ix2>, Failure> {
         let own = slf.get();
-        let objects = own.model().object_count();
-        let rows = match rows {
-            Rows::Array(array) if own.model().descriptor().is_none() => Rows::Array(features(owner, array)?),
-            other => other,
-        };
-        let margins = match (rows, own.model().descriptor()) {
-            (Rows::Data(_), None) => return Err(Error::from(EvaluateProblem::RawFeatures).into()),
-            (Rows::Data(data), Some(_)) => {
-                let touches: Vec<Touch> = data.get().touches().copied().collect();
-                own.of_touches(py, &touches)?
-            }
-            (Rows::Array(array), Some(_)) => {
-                let array: Input<'_, f64, Ix2> = array.extract()?;
-                let (values, columns) = array.rows()?;
-                let touches = touches(values, columns)?;
-                own.of_touches(py, &touches)?
-            }
-            (Rows::Array(array), None) => match &own.encoder {
-                Encoder::Real => {
-                    let array: Input<'_, f32, Ix2> = array.extract()?;
-                    own.of_rows(py, array.rows()?)?
-                }
-                // f32 does not hold all whole numbers.
-                Encoder::Scaled(_) => {
-                    let array: Input<'_, f64, Ix2> = array.extract()?;
-                    own.of_rows(py, array.rows()?)?
-                }
-            },
-        };
-        Ok(two(py, margins, objects)?)
+        let (prediction, objects) = (own.model().prediction(), own.model().object_count());
+        if own.model().descriptor().is_some() {
+            return Err(Error::from(EvaluateProblem::OverTouches).into());
+        }
+        let rule = own.source.as_ref().map(|(_, _, compiled)| compiled.probability);
+        let is_class = objects > 1 && !prediction.targets;
+        let rule = rule.filter(|rule| is_class && *rule != Probability::Unknown);
+        let none = EvaluateProblem::NoProbabilities { is_loaded: own.source.is_none() && is_class };
+        let rule = rule.ok_or_else(|| Error::from(none))?;
+        let margins = Self::of_all(slf, rows)?;
+        let shares = margins.chunks_exact(objects).filter_map(|row| rule.of(row, prediction.scale.into()));
+        Ok(two(slf.py(), shares.flatten().collect(), objects)?)
     }
 
     /// The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value
@@ -414,5 +488,8 @@ pub(crate) fn compile(
         None => library::compile(ensemble, &settings),
         Some(most) => library::compile_within(ensemble, &settings, most),
     })?;
-    Ok(Model { notes: notes(ensemble, settings.scales.as_deref()), ..Model::of(compiled.bytes)? })
+    let model = Model::of(compiled.bytes.clone())?;
+    let settings = with!(settings, leaf = model.model().leaf_type());
+    let notes = notes(ensemble, settings.scales.as_deref());
+    Ok(Model { notes, source: Some((Arc::clone(ensemble), settings, compiled)), ..model })
 }

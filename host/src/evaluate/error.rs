@@ -9,6 +9,16 @@ use palpate_shared::Descriptor;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateProblem {
+    /// Margins do not say which probabilities the library predicts.
+    #[error("{}", if *is_loaded {
+        "the bytes of a loaded model do not say how its library makes probabilities of margins"
+    } else {
+        "the model's margins do not determine probabilities: it predicts values, or classes of a calibrator or a hinge loss"
+    })]
+    NoProbabilities {
+        /// True if the model was read from its bytes.
+        is_loaded: bool,
+    },
     /// The model does not know an object of the data set.
     #[error("the model does not know the object {object}, only {}", known.join(", "))]
     UnknownObject {
@@ -229,6 +239,8 @@ impl Problem for EvaluateProblem {
                 let times = *needed as f64 / *object_sequences as f64;
                 return format!("Capture about {:.1} times as many touches of {object}.", (10.0 * times).ceil() / 10.0);
             }
+            Self::NoProbabilities { is_loaded: true } => "Compile its estimator again.",
+            Self::NoProbabilities { is_loaded: false } => "Use `predict` or `margins`.",
             Self::TooFewForMisfit { .. } | Self::TooFewForAlarms { .. } => "Capture more touches of every object.",
             Self::TooFewRecorded { object, enough: Some(enough), .. } => {
                 return format!(

@@ -1,10 +1,13 @@
-//! `palpate completions`: the parser's scripts, which also complete the keys of options.
+//! `palpate completions`: the parser's scripts, which also complete keys and values of options.
 
 use super::{Global, design, maps, trees};
 use clap_complete::Shell;
 use palpate::Result;
+use palpate::compile::code::Form;
+use palpate::compile::{Language, Layout, Leaf};
 use palpate::output::print;
 use palpate::probe::noise::PartialNoise;
+use palpate_shared::Descriptor;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -38,28 +41,41 @@ fn hidden(command: &clap::Command) -> Vec<&str> {
     own.chain(command.get_subcommands().flat_map(hidden)).collect()
 }
 
-/// The options, and the keys of each.
-fn options() -> [(&'static str, Vec<&'static str>); 4] {
-    [
-        ("maps", maps::keys().collect()),
-        ("real", PartialNoise::KEYS.into()),
-        ("search", design::KEYS.into()),
-        ("trees", trees::keys().collect()),
+/// The options, and the words of each: values, and keys with their `=`.
+fn options() -> Vec<(&'static str, Vec<String>)> {
+    let keys = |keys: Vec<&str>| keys.iter().map(|key| format!("{key}=")).collect();
+    let values = |values: Vec<&str>| values.into_iter().map(String::from).collect();
+    let goals = ["balanced", "speed", "size", "m4f", "m0+"];
+    let sources = Language::ALL.map(Language::name).into_iter().chain(Form::ALL.map(Form::name));
+    vec![
+        ("maps", keys(maps::keys().collect())),
+        ("real", keys(PartialNoise::KEYS.into())),
+        ("search", keys(design::KEYS.into())),
+        ("trees", keys(trees::keys().collect())),
+        ("layout", values(Layout::ALL.iter().map(|layout| layout.name()).chain(goals).collect())),
+        ("leaf", values(Leaf::ALL.iter().map(|leaf| leaf.name()).collect())),
+        ("descriptor", values(Descriptor::ALL.iter().map(|descriptor| descriptor.name()).collect())),
+        ("emit", values(sources.chain(["json"]).collect())),
     ]
 }
 
-/// The script of a shell that also completes keys, after a comma too.
+/// The script of a shell that also completes keys and values, after a comma too.
 fn completed(script: &str, shell: Shell) -> String {
     let options = options();
     match shell {
         Shell::Bash => {
-            let case =
-                |(option, keys): &(&str, Vec<&str>)| format!("        --{option}) keys=\"{}=\" ;;\n", keys.join("= "));
+            let case = |(option, words): &(&str, Vec<String>)| {
+                format!("        --{option}) keys=\"{}\" ;;\n", words.join(" "))
+            };
             script.to_owned() + &BASH.replace("CASES", &options.iter().map(case).collect::<String>())
         }
         Shell::Zsh => {
-            let function = |(option, keys): &(&str, Vec<&str>)| {
-                let keys: String = keys.iter().map(|key| format!(" '{key}:value: '")).collect();
+            let function = |(option, words): &(&str, Vec<String>)| {
+                let word = |word: &String| match word.strip_suffix('=') {
+                    Some(key) => format!(" '{key}:value: '"),
+                    None => format!(" '{word}'"),
+                };
+                let keys: String = words.iter().map(word).collect();
                 let files = if *option == "real" { "    _files -g '*.toml'\n" } else { "" };
                 format!("_palpate_{option}() {{\n    _values -s , key{keys}\n{files}}}\n\n")
             };
@@ -74,9 +90,9 @@ fn completed(script: &str, shell: Shell) -> String {
         }
         Shell::Fish => {
             let line = |line: &str| match options.iter().find(|(option, _)| line.contains(&format!(" -l {option} "))) {
-                Some((option, keys)) => {
+                Some((option, words)) => {
                     let only = if *option == "real" { "r" } else { "x" };
-                    let end = format!(" -{only} -a '(__palpate_keys {}=)'", keys.join("= "));
+                    let end = format!(" -{only} -a '(__palpate_keys {})'", words.join(" "));
                     line.strip_suffix(" -r").unwrap_or(line).to_owned() + &end + "\n"
                 }
                 None => format!("{line}\n"),

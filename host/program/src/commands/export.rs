@@ -4,7 +4,7 @@ use super::expected::PriorArguments;
 use super::numbers::error_rate;
 use super::unstated::UnstatedArguments;
 use palpate::Result;
-use palpate::compile::code::{Form, Program};
+use palpate::compile::code::Form;
 use palpate::compile::{
     self, Candidate, Compiled, CompiledModel, EarlyExit, EarlyExitFound, Goal, Instructions, Language, Layout, Leaf,
     Settings,
@@ -13,8 +13,9 @@ use palpate::ensemble::{self, Ensemble, Inputs, TouchOrigin, train};
 use palpate::error::Error;
 use palpate::output;
 use palpate::rows::scales::{self, Effect, Merged};
-use palpate::rows::{Rows, notes};
+use palpate::rows::{Rows, notes, warnings};
 use palpate::with;
+use palpate::wording::count;
 use palpate_shared::format::{Link, MAGIC};
 use std::fmt::Write as _;
 use std::fs::File;
@@ -68,6 +69,9 @@ pub(crate) struct Arguments {
     /// Classes without walking all trees: yes, or a CSV file of rows not trained on, for where that takes fewer instructions
     #[arg(long, value_name = "ROWS")]
     early_exit: Option<PathBuf>,
+    /// Also print the table of layouts, the features to build in, and all notes
+    #[arg(short, long)]
+    verbose: bool,
     #[command(flatten)]
     unstated: UnstatedArguments,
     #[command(flatten)]
@@ -164,6 +168,9 @@ struct Exported {
     /// The kind of file, if another library wrote it.
     #[serde(skip_serializing_if = "Option::is_none")]
     imported: Option<String>,
+    /// Notes after which an option may have to be chosen.
+    #[serde(skip)]
+    warnings: Vec<String>,
     /// Facts about it that a user should know.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     notes: Vec<String>,
@@ -247,6 +254,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         predicts: Predicts::of(&ensemble),
         merged: if settings.scales.is_some() { Vec::new() } else { scales::merged(&ensemble) },
         imported: imported.map(|imported| imported.kind.clone()),
+        warnings: warnings(&ensemble, settings.scales.as_deref()),
         notes: notes(&ensemble, settings.scales.as_deref()),
         scales: settings
             .scales
@@ -259,6 +267,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     };
     if global.json {
         return output::print_json_about(&arguments.output, &exported);
+    }
+    if !arguments.verbose {
+        return output::print_about(&arguments.output, &summary(&arguments.output, &exported));
     }
     // Trees that are code are built with the model.
     let features = if exported.form.is_some() { String::new() } else { features(&compile::open(&compiled.bytes)?) };
@@ -354,7 +365,13 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
     if output::refuse_input(&arguments.output, [model]).is_ok() {
         output::write_bytes(&arguments.output, compiled.bytes())?;
     }
-    emitted.iter().try_for_each(|(emitted, path)| write_source(*emitted, path, compiled.bytes()))?;
+    let name = arguments.output.file_stem().unwrap_or_default().to_string_lossy();
+    let source = |(emitted, _): &(Emitted, _)| {
+        let Emitted::Source(language) = emitted else { return None };
+        Some((language.extension(), compile::emit(&compiled.model(), &name, *language)))
+    };
+    let files: Vec<_> = emitted.iter().filter_map(source).collect();
+    compile::write_sources(&arguments.output, &files)?;
     let written = Sources {
         bytes: compiled.bytes().len(),
         layout: compiled.model().layout().name(),
@@ -369,7 +386,9 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
         // Writing to a string cannot fail.
         _ = writeln!(text, "Source code: {}", source.display());
     }
-    text += &features(&compiled.model());
+    if arguments.verbose {
+        text += &features(&compiled.model());
+    }
     output::print_about(&arguments.output, &text)
 }
 
@@ -379,22 +398,9 @@ fn places(arguments: &Arguments) -> Result<Vec<(Emitted, PathBuf)>> {
     for &emitted in &arguments.emit {
         for extension in emitted.extensions() {
             let path = output.with_extension(extension);
-            // A name such as .palpate has no stem, and what is beside it would be hidden.
-            let is_hidden = output.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
-            let taken = is_hidden || path == *output || path.file_name().is_some_and(|name| name == HEADER);
-            if output::is_stdout(output) || taken {
-                return Err(Error::setting(
-                    "output",
-                    output.display(),
-                    format!(
-                        "a file beside which another one can have the extension .{extension} (but not {HEADER}), for --emit"
-                    ),
-                ));
-            }
+            let taken = output::is_stdout(output) || path == *output;
+            compile::check_place(output, if taken { Path::new(compile::HEADER) } else { &path })?;
             output::admit(&path, arguments.inputs())?;
-            if *extension == "h" {
-                output::refuse_foreign(&path.with_file_name(HEADER))?;
-            }
             places.push((emitted, path));
         }
     }
@@ -403,8 +409,6 @@ fn places(arguments: &Arguments) -> Result<Vec<(Emitted, PathBuf)>> {
 
 /// Guide to using code.
 const GUIDE: &str = "docs/guide/code.md";
-/// The header that reads models in C.
-const HEADER: &str = "palpate.h";
 
 fn write_emitted(
     emitted: &[(Emitted, PathBuf)],
@@ -412,57 +416,13 @@ fn write_emitted(
     ensemble: &Ensemble,
     output: &Path,
 ) -> Result<Vec<PathBuf>> {
-    let mut written = Vec::new();
-    for (emitted, path) in emitted {
-        match emitted {
-            Emitted::Ensemble => ensemble.save(path)?,
-            Emitted::Source(_) if compiled.code.is_none() => {
-                write_source(*emitted, path, &compiled.bytes)?;
-                written.push(path.clone());
-            }
-            Emitted::Source(_) | Emitted::Code(_) => {}
-        }
+    let language = |emitted: &Emitted| if let Emitted::Source(language) = emitted { Some(*language) } else { None };
+    let languages: Vec<Language> = emitted.iter().filter_map(|(emitted, _)| language(emitted)).collect();
+    for (_, path) in emitted.iter().filter(|(emitted, _)| *emitted == Emitted::Ensemble) {
+        ensemble.save(path)?;
     }
-    if let Some((program, form)) = &compiled.code {
-        written = write_code(emitted, compiled, (program, *form), output)?;
-    }
-    Ok(written)
-}
-
-/// Writes trees as code, and what a program needs of the model beside it.
-fn write_code(
-    emitted: &[(Emitted, PathBuf)],
-    compiled: &Compiled,
-    (program, form): (&Program, Form),
-    output: &Path,
-) -> Result<Vec<PathBuf>> {
-    let language =
-        |(emitted, _): &(Emitted, _)| if let Emitted::Source(language) = emitted { Some(*language) } else { None };
-    let languages: Vec<Language> = emitted.iter().filter_map(language).collect();
     let name = output.file_stem().unwrap_or_default().to_string_lossy();
-    let mut written = Vec::new();
-    for (extension, text) in compile::emit_code(&compiled.bytes, program, form, &name, &languages)? {
-        let path = output.with_extension(extension);
-        write_text(&path, &text)?;
-        written.push(path);
-    }
-    Ok(written)
-}
-
-/// Writes a model as source code; in C with the header that reads it.
-fn write_source(emitted: Emitted, path: &Path, bytes: &[u8]) -> Result<()> {
-    let Emitted::Source(language) = emitted else { return Ok(()) };
-    let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    write_text(path, &compile::emit(&compile::open(bytes)?, &name, language))
-}
-
-/// Writes source code; in C with the header that reads models beside it.
-fn write_text(path: &Path, text: &str) -> Result<()> {
-    output::write_bytes(path, text.as_bytes())?;
-    match path.extension().is_some_and(|extension| extension == "h") {
-        true => output::write_bytes(&path.with_file_name(HEADER), palpate_onboard::C_HEADER.as_bytes()),
-        false => Ok(()),
-    }
+    compile::write_sources(output, &palpate::prove::sources(compiled, &name, &languages)?)
 }
 
 fn emitted(name: &str) -> Result<Emitted, String> {
@@ -627,6 +587,36 @@ fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<(Option<Vec<f32>
         }
     }
     Ok((Some(scales), rows))
+}
+
+/// Three lines on the model, its cost and its call, and notes that may need another option.
+fn summary(path: &Path, exported: &Exported) -> String {
+    let (each, of) = if exported.features.is_some() { ("row", "of the library's") } else { ("touch", "nats") };
+    let mut text = format!(
+        "{}: {} bytes, {} trees, margins within {:.1e} {of}\nInstructions per {each}, estimated: {}\n",
+        path.display(),
+        count(exported.bytes),
+        exported.trees,
+        exported.margin_error,
+        instructions(exported.instructions),
+    );
+    let header = exported.sources.iter().find(|source| source.extension().is_some_and(|extension| extension == "h"));
+    let call = match exported.predicts.as_ref().map(|predicts| predicts.what) {
+        Some("class") => "predict(row)",
+        Some("value") => "value(row)",
+        Some(_) => "values(row, values)",
+        None => "push(&state, times)",
+    };
+    let name = compile::identifier(&path.file_stem().unwrap_or_default().to_string_lossy());
+    text += &match (header, exported.sources.first()) {
+        (Some(header), _) => format!("In C: {name}_{call} of {}. More: --verbose\n", header.display()),
+        (None, Some(source)) => format!("Source code: {}. More: --verbose\n", source.display()),
+        (None, None) => "A header for C: --emit c. More: --verbose\n".into(),
+    };
+    if exported.sources.iter().any(|source| source.extension().is_some_and(|extension| extension == "s")) {
+        text += &format!("Note: build {} too; see {GUIDE}\n", path.with_extension("s").display());
+    }
+    text + &exported.warnings.iter().map(|warning| format!("Note: {warning}\n")).collect::<String>()
 }
 
 fn text(path: &Path, exported: &Exported, features: &str) -> String {

@@ -130,6 +130,8 @@ fn keys_of_options_are_completed_after_a_comma_too_where_the_shell_is_there() {
     assert_eq!(bash("palpate train data --trees rounds=3,d", "3,d"), "3,depth= 3,different_leaves=\n");
     assert_eq!(bash("palpate run --real timer=1ms,missed=2%,b", "2%,b"), "2%,bent=\n");
     assert_eq!(bash("palpate run --real noise=", ""), "\n");
+    assert_eq!(bash("palpate export e.json --layout comp", "comp"), "compact complete\n");
+    assert_eq!(bash("palpate export e.json --emit c,thumb-", "c,thumb-"), "c,thumb-m4f\n");
     let fish = std::process::Command::new("fish")
         .args(["-c", "source $argv[1]; complete -C 'palpate train data --trees rounds=3,dep'"])
         .arg(script("fish"))
@@ -139,7 +141,12 @@ fn keys_of_options_are_completed_after_a_comma_too_where_the_shell_is_there() {
         Err(_) => println!("SKIPPED: no fish"),
     }
     let zsh = std::fs::read_to_string(script("zsh")).unwrap();
-    assert!(zsh.contains(":_palpate_trees'") && zsh.contains("_values -s , key 'rounds:value: '"), "{zsh}");
+    assert!(
+        zsh.contains(":_palpate_trees'")
+            && zsh.contains("_values -s , key 'i8' 'i16' 'f32'")
+            && zsh.contains("_values -s , key 'rounds:value: '"),
+        "{zsh}"
+    );
 }
 
 #[test]

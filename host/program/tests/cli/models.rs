@@ -594,7 +594,7 @@ fn a_promise_whatever_the_placements_shares_is_one_of_each_placement_and_says_wh
         let (ensemble, compiled) = (format!("{model}.json"), format!("{model}.palpate"));
         let train = ["train", "touches", "-o", &ensemble, "--descriptor", "gravity", "--outputs", outputs];
         succeeds(at, &[&train[..], &["--trees", "rounds=10"]].concat());
-        let said = succeeds(at, &["export", &ensemble, "-o", &compiled]);
+        let said = succeeds(at, &["export", &ensemble, "-o", &compiled, "--verbose"]);
         assert_eq!(said.contains("-leaves, outputs\n"), outputs == "placements", "{said}");
     }
     let calibrate = ["calibrate", "model.palpate", "fresh", "-o", "sure.palpate", "--error-rate", "5%"];

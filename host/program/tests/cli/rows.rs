@@ -199,7 +199,7 @@ fn what_the_library_predicts_is_compared_too() {
         let source = data(&format!("{name}.{file}"));
         let of = |kind: &str| data(&format!("{name}.{kind}.csv"));
         let (rows, margins, values) = (of("rows"), of("margins"), of("predictions"));
-        let exported = stdout(run(["export", &source, "-o", &model]));
+        let exported = stdout(run(["export", &source, "-o", &model, "--verbose"]));
         let with = ["--library-margins", &margins, "--library-values", &values];
         let text = stdout(run([&["verify", &model, &source, &rows][..], &with].concat()));
         if file == "txt" {
@@ -413,7 +413,7 @@ fn the_layout_is_chosen_for_what_is_asked_and_all_candidates_are_named() {
     let small = candidates.iter().filter(|candidate| candidate["bytes"].as_u64().unwrap() <= 3 * smallest);
     let fastest = small.min_by_key(|candidate| candidate["instructions"]["m4f"].as_u64()).unwrap();
     assert_eq!(balanced["layout"], fastest["layout"]);
-    let text = stdout(run(["export", &data("xgboost-1.6-softprob.ubj"), "-o", &path("m")]));
+    let text = stdout(run(["export", &data("xgboost-1.6-softprob.ubj"), "-o", &path("m"), "--verbose"]));
     assert!(text.contains("compact") && text.contains("complete") && text.contains(" *"), "{text}");
 }
 
@@ -472,7 +472,7 @@ fn equal_leaves_of_a_forest_stand_once_and_that_is_said_everywhere() {
     assert_eq!(inspected["bytes"], parts.map(|bytes| bytes.as_u64().unwrap()).sum::<u64>());
     let text = stdout(run(["inspect", &path("yes")]));
     assert!(text.contains(&format!("{different} different ones, each once")), "{text}");
-    let text = stdout(run(["export", &forest, "-o", &path("m"), "--leaf", "i8", "--shared-leaves", "yes"]));
+    let text = stdout(run(["export", &forest, "-o", &path("m"), "--leaf", "i8", "--shared-leaves", "yes", "-v"]));
     assert!(text.contains(", shared ") && text.contains("i8-leaves, shared-leaves"), "{text}");
     // All candidates are the same whatever is asked for; sharing is one of them only where it is smaller.
     let all = json(run(["export", &forest, "-o", &path("m"), "--leaf", "i8", "--json"]));
@@ -521,7 +521,7 @@ fn verify_fails_where_the_library_has_another_class_that_no_rounding_explains() 
 fn what_a_file_does_not_say_is_said_at_export_and_can_be_stated() {
     let (_directory, path) = place();
     let export = |model: &str, more: &[&str]| {
-        stdout(run([&["export", &data(model), "-o", &path("m"), "--leaf", "f32"], more].concat()))
+        stdout(run([&["export", &data(model), "-o", &path("m"), "--leaf", "f32", "--verbose"], more].concat()))
     };
     let missing = "xgboost-3.2-missing-0.json";
     assert!(export(missing, &[]).contains("the number that stood for a missing value in training"));
@@ -567,6 +567,28 @@ fn what_a_file_does_not_say_is_said_at_export_and_can_be_stated() {
     assert!(text.contains("Whole units hold every value of these rows") && text.contains("height × 1"), "{text}");
     let text = stdout(run(["inspect", &path("m")]));
     assert!(text.contains("(per row, estimated)") && text.contains("200 rows") && !text.contains("touch"), "{text}");
+}
+
+#[test]
+fn export_says_in_three_lines_what_was_written_and_beyond_them_what_may_need_another_option() {
+    let (_directory, path) = place();
+    let export =
+        |model: &str, more: &[&str]| stdout(run([&["export", &data(model), "-o", &path("m.palpate")], more].concat()));
+    for (model, call) in [
+        ("lightgbm-4.7-multiclass.txt", "m_predict(row)"),
+        ("lightgbm-4.7-poisson.txt", "m_value(row)"),
+        ("sklearn-1.9-forest.onnx", "m_predict(row)"),
+    ] {
+        let text = export(model, &["--emit", "c"]);
+        assert!(text.lines().count() == 3 && text.split_whitespace().count() <= 35, "{text}");
+        assert!(text.contains(call) && text.contains(&path("m.h")), "{text}");
+        assert!(std::fs::read_to_string(path("m.h")).unwrap().contains(call.split('(').next().unwrap()));
+        assert!(export(model, &["--verbose"]).lines().count() > 4);
+    }
+    let text = export("xgboost-3.2-early-stopping.json", &[]);
+    assert!(text.contains("--emit c") && text.contains("stood for a missing value"), "{text}");
+    assert!(text.contains("up to the best iteration") && text.lines().count() == 5, "{text}");
+    assert!(export("lightgbm-4.7-seconds.txt", &[]).contains("stay different in f32"));
 }
 
 #[test]
@@ -843,7 +865,7 @@ fn a_class_from_fewer_trees_is_decided_by_rows_and_said_and_proved_in_data_and_i
         stdout(run(["verify", &model, &source, "--prove", &proof]));
         stdout(run(["verify", &model, &source, "--certificate", &proof]));
     }
-    let text = stdout(run(["export", &source, "-o", &model, "--layout", "compact", "--early-exit", "yes"]));
+    let text = stdout(run(["export", &source, "-o", &model, "--layout", "compact", "--early-exit", "yes", "-v"]));
     assert!(text.contains("A class is known after at most "), "{text}");
     for emit in ["thumb", "thumb-m4f"] {
         for early_exit in [&[][..], &["--early-exit", "yes"]] {

@@ -175,7 +175,7 @@ class Ensemble:
         Reads the bytes of such a file. `notes` are facts about it that it does not state.
         """
     @staticmethod
-    def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ..., link: str = "identity", last_of_ties: bool = False, targets: bool = False) -> Ensemble:
+    def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ..., link: str = "identity", last_of_ties: bool = False, targets: bool = False, probability: str = "softmax") -> Ensemble:
         """
         An ensemble of trees in memory. Each tree is a tuple of columns with one entry per node: the output that its
         leaves are for (`None`: each leaf has a value for each output), the left child (where x <= threshold; negative in
@@ -183,6 +183,7 @@ class Ensemble:
         where margins start; an empty name stands for a feature that has none. `link` is "identity", "logistic",
         "exponential", "square" or "softplus": what makes a value of a margin. With `last_of_ties` the last of several
         largest margins names the class, otherwise the first. With `targets` each output is a value, and none is a class.
+        `probability` is "softmax", "logistic", "shares" or "unknown": what makes probabilities of margins.
         """
     @staticmethod
     def load(path: str | PathLike[str], names: SupportsGetItem[int, str] | None = None, *, all_trees: bool = False, missing: SupportsFloat | SupportsIndex | None = None) -> Ensemble:
@@ -418,6 +419,13 @@ class Model:
         """
         The descriptor that turns touches into features; `None` for a model over rows of features.
         """
+    def emit(self, /, path: str | PathLike[str], *, form: str | None = None) -> list[str | PathLike[str]]:
+        """
+        Writes the model as source code, and returns the files. `form` is "c" (an array), "rust", "c-code" (trees as C),
+        "thumb" or "thumb-m4f" (trees as assembly, for C and Rust); without it a name that ends in ".h" means "c", ".rs" "rust"
+        and ".s" "thumb". What has to be built with it, such as palpate.h, is written beside it, and for assembly the model. A
+        file that Palpate did not write is not replaced.
+        """
     @property
     def features(self, /) -> list[str]:
         """
@@ -468,6 +476,12 @@ class Model:
         The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value
         (its values, a column for each of several targets), with `raw` the margin before the inverse link. Rows are as for
         `margins`.
+        """
+    def predict_proba(self, /, rows: DataSet | ArrayLike) -> NDArray[float64]:
+        """
+        The probabilities of each row's classes, one column per class, as `predict_proba` of the library that trained the model
+        gives them: for margins within `margin_error`, within half of it for boosted trees. Rows are as for `margins`. A model
+        that was loaded has none: its bytes do not say how probabilities are made of margins.
         """
     def save(self, /, path: str | PathLike[str]) -> None:
         """

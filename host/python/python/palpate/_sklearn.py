@@ -27,6 +27,8 @@ class _Parts:
     """The function from a margin to a value."""
     last_of_ties: bool = False
     """True if the last of several largest margins names the class, and not the first."""
+    probability: str = "softmax"
+    """The rule by which `predict_proba` makes probabilities of margins."""
     targets: bool = False
     """True if each output is a target of a regression, and none is a class."""
 
@@ -58,6 +60,7 @@ def read(model: Any, names: list[str] | None) -> Ensemble:
         link=parts.link,
         last_of_ties=parts.last_of_ties,
         targets=parts.targets,
+        probability=parts.probability,
     )
 
 
@@ -87,7 +90,7 @@ def _votes(model: Any, estimators: Sequence[Any]) -> _Parts:
             values = values[:, :, 0]
         trees.append(_tree(estimator.tree_, None if is_each else 0, values / len(estimators)))
     outputs = len(model.classes_) if is_classifier else targets
-    return _Parts([0.0] * outputs, trees, [_VOTES] if is_classifier else [], targets=targets > 1)
+    return _Parts([0.0] * outputs, trees, [_VOTES] if is_classifier else [], probability="shares", targets=targets > 1)
 
 
 def _isolation(model: Any) -> _Parts:
@@ -146,6 +149,7 @@ def _calibrated(model: Any) -> _Parts:
         if classes == 2 and own.method == "sigmoid"
         else "Margins are those of the calibrated classes: classes are right, posteriors are not the calibrated probabilities."
     ]
+    is_known = classes == 2 and own.method == "sigmoid"
     slopes = np.array([slope * half for slope, _ in calibrators])
     base = [slope * first + constant for (_, constant), slope, first in zip(calibrators, slopes, parts.base, strict=True)]
     trees: list[_Tree] = []
@@ -158,7 +162,7 @@ def _calibrated(model: Any) -> _Parts:
         else:
             scaled = (values.reshape(-1, classes) * slopes).ravel()
         trees.append((output, left, right, feature, threshold, missing, np.ascontiguousarray(scaled)))
-    return _Parts(base, trees, notes)
+    return _Parts(base, trees, notes, probability="softmax" if is_known else "unknown")
 
 
 def _line(calibrator: Any, classes: int) -> tuple[float, float]:

@@ -1,11 +1,16 @@
 //! A compiled model as source code, for programs that have no files.
 
+use super::Compiled;
+use super::calls::Calls;
 use super::code::{Form, Program};
 use super::model::open_any;
-use crate::error::Result;
+use crate::ensemble::Probability;
+use crate::error::{Error, Result};
+use palpate_base::output;
 use palpate_onboard::Model;
 use palpate_shared::format::Tag;
 use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 
 /// A language that a model is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,43 +42,86 @@ impl Language {
     }
 }
 
-/// The files of trees as code, and of the model beside it: their extensions and texts. `name`, the
-/// files' own without an extension, is what the array and the functions are called after.
-///
-/// `languages` are the ones that the model is written in as well: for C, what of the code C needs to know is with it.
-///
-/// # Errors
-/// None for what [`compile`](super::compile) returned.
-pub fn emit_code(
-    bytes: &[u8],
-    program: &Program,
-    form: Form,
-    name: &str,
-    languages: &[Language],
-) -> Result<Vec<(&'static str, String)>> {
-    let model = open_any(bytes)?;
-    let (file, name) = (name, identifier(name));
-    let mut files = match form {
-        // C is one file with the model's array.
-        Form::C => Vec::new(),
-        Form::Thumb(_) => program.sources(&name, file, model.checksum(), form),
-    };
-    if form == Form::C || languages.contains(&Language::C) {
-        let functions = match form {
-            Form::C => program.c_functions(&name),
-            Form::Thumb(_) => program.c_declaration(&name, model.checksum()),
+impl Compiled {
+    /// The model's files of source code: their extensions and texts. `name`, the files' own without an extension, is what the
+    /// array and the functions are called after; characters that an identifier cannot have become `_`.
+    ///
+    /// `languages` are the ones that the model is written in. Where its trees are code, their files are written in any case, and for
+    /// C what of them C needs to know.
+    ///
+    /// # Errors
+    /// None for what [`compile`](super::compile) returned.
+    pub fn sources(&self, name: &str, languages: &[Language]) -> Result<Vec<(&'static str, String)>> {
+        let model = open_any(&self.bytes)?;
+        let (file, name) = (name, identifier(name));
+        let Some((program, form)) = &self.code else {
+            let source = |&language: &Language| match language {
+                Language::C => ("h", c(&model, &name, self.probability, None)),
+                Language::Rust => ("rs", rust(&model, &name)),
+            };
+            return Ok(languages.iter().map(source).collect());
         };
-        files.push(("h", c(&model, &name, &(functions + &program.c_opening(&name)))));
+        let mut files = match form {
+            // C is one file with the model's array.
+            Form::C => Vec::new(),
+            Form::Thumb(_) => program.sources(&name, file, model.checksum(), *form),
+        };
+        if *form == Form::C || languages.contains(&Language::C) {
+            files.push(("h", c(&model, &name, self.probability, Some((program, *form)))));
+        }
+        Ok(files)
     }
-    Ok(files)
 }
 
-/// The model as an array in a source file, `name` being what the array is called after. Characters that an identifier
-/// cannot have become `_`.
+/// The header that reads models in C.
+pub const HEADER: &str = "palpate.h";
+
+/// Writes files of source code under the name of `path`, each with its extension, and beside a header the one that reads models.
+/// Returns their paths.
+///
+/// # Errors
+/// [`Setting`](crate::error::Setting) `output` for a name that a file may not have here; a file that Palpate did not write is
+/// there; [`Error::Io`].
+pub fn write_sources(path: &Path, files: &[(&'static str, String)]) -> Result<Vec<PathBuf>> {
+    let places: Vec<PathBuf> = files.iter().map(|(extension, _)| path.with_extension(extension)).collect();
+    for place in &places {
+        check_place(path, place)?;
+    }
+    for (place, (_, text)) in places.iter().zip(files) {
+        output::write_bytes(place, text.as_bytes())?;
+        if place.extension().is_some_and(|extension| extension == "h") {
+            output::write_bytes(&place.with_file_name(HEADER), palpate_onboard::C_HEADER.as_bytes())?;
+        }
+    }
+    Ok(places)
+}
+
+/// Refuses a place beside `path` that source code may not have.
+///
+/// # Errors
+/// As [`write_sources`].
+pub fn check_place(path: &Path, place: &Path) -> Result<()> {
+    // A name such as .palpate has no stem, and what is beside it would be hidden.
+    let is_hidden = path.file_name().is_none_or(|name| name.as_encoded_bytes().starts_with(b"."));
+    let extension = place.extension().unwrap_or_default().display();
+    if is_hidden || place.file_name().is_some_and(|name| name == HEADER) {
+        let allowed = format!(
+            "a file beside which another one can have the extension .{extension} (but not {HEADER}), for --emit"
+        );
+        return Err(Error::setting("output", path.display(), allowed));
+    }
+    if place.extension().is_some_and(|extension| extension == "h") {
+        output::refuse_foreign(&place.with_file_name(HEADER))?;
+    }
+    output::refuse_foreign(place)
+}
+
+/// A model of which only the bytes are known as a source file, as [`Compiled::sources`] writes it: without probabilities, since
+/// the bytes do not say what the library makes of margins.
 pub fn emit(model: &Model<'_>, name: &str, language: Language) -> String {
     let name = identifier(name);
     match language {
-        Language::C => c(model, &name, ""),
+        Language::C => c(model, &name, Probability::Unknown, None),
         Language::Rust => rust(model, &name),
     }
 }
@@ -94,7 +142,12 @@ fn avr_error(name: &str, length: usize) -> String {
     )
 }
 
-fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
+fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<(&Program, Form)>) -> String {
+    let functions = code.map_or_else(String::new, |(program, form)| match form {
+        Form::C => program.c_functions(name) + &program.c_opening(name),
+        Form::Thumb(_) => program.c_declaration(name, model.checksum()) + &program.c_opening(name),
+    });
+    let calls = Calls { model, name, probability, code: code.map(|(program, _)| program) }.text();
     let guard = format!("{}_MODEL_H", name.to_uppercase());
     let layout = model.layout().name().to_uppercase();
     let leaf = model.leaf_type().name().to_uppercase();
@@ -106,6 +159,14 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
     let early = if has_exits { "#ifndef PALPATE_EARLY\n#define PALPATE_EARLY 1\n#endif\n" } else { "" };
     let has_outputs = model.outputs().is_some();
     let outputs = if has_outputs { "#ifndef PALPATE_OUTPUTS\n#define PALPATE_OUTPUTS 1\n#endif\n" } else { "" };
+    let needed = [
+        ("PALPATE_STRANGERS", strangers),
+        ("PALPATE_SHARED", shared),
+        ("PALPATE_SENTINEL", sentinel),
+        ("PALPATE_ROW_EVIDENCE", row_evidence),
+        ("PALPATE_EARLY", u8::from(has_exits)),
+        ("PALPATE_OUTPUTS", u8::from(has_outputs)),
+    ];
     let (objects, length) = (model.object_count(), model.bytes().len());
     let too_long = if length > LONGEST_ON_AVR { avr_error(name, length) } else { String::new() };
     format!(
@@ -126,12 +187,12 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
          /* {open} */\n\
          static const uint8_t {name}_model[{length}]\n\
          #if defined(__AVR__)\n    PROGMEM\n#elif defined(__GNUC__)\n    __attribute__((aligned(4)))\n#endif\n    = {{\n\
-         {array}}};\n\n{functions}#endif\n",
+         {array}}};\n\n{functions}{calls}#endif\n",
         // Neither ends the comment nor seems to begin another.
         about = about(model).replace("*/", "* /").replace("/*", "/ *"),
-        checks = checks(&name.to_uppercase(), &layout, &leaf, [strangers, shared, sentinel, row_evidence], objects),
+        checks = checks(&name.to_uppercase(), &layout, &leaf, &needed, objects),
         array = array(model.bytes()),
-        open = match functions {
+        open = match functions.as_str() {
             "" => format!("palpate_open(&model, {name}_model, sizeof {name}_model)"),
             _ => format!("{name}_open(&model)"),
         },
@@ -140,8 +201,7 @@ fn c(model: &Model<'_>, name: &str, functions: &str) -> String {
 
 /// Compile-time check that names the line that makes room for all models, where another model or the program itself has
 /// left out what this one needs.
-fn checks(name: &str, layout: &str, leaf: &str, needed: [u8; 4], objects: usize) -> String {
-    let [strangers, shared, sentinel, row_evidence] = needed;
+fn checks(name: &str, layout: &str, leaf: &str, needed: &[(&str, u8)], objects: usize) -> String {
     let several =
         |all: &str, own: &str| (format!("({all} & {own}) == 0"), format!("{all} ({own} | those of the others)"));
     let number = |all: &str, own: usize| (format!("{all} < {own}"), format!("{all} {own}"));
@@ -150,10 +210,7 @@ fn checks(name: &str, layout: &str, leaf: &str, needed: [u8; 4], objects: usize)
         several("PALPATE_LEAVES", &format!("PALPATE_{leaf}")),
         number("PALPATE_MAX_OBJECTS", objects),
     ];
-    checks.extend((strangers == 1).then(|| number("PALPATE_STRANGERS", 1)));
-    checks.extend((shared == 1).then(|| number("PALPATE_SHARED", 1)));
-    checks.extend((sentinel == 1).then(|| number("PALPATE_SENTINEL", 1)));
-    checks.extend((row_evidence == 1).then(|| number("PALPATE_ROW_EVIDENCE", 1)));
+    checks.extend(needed.iter().filter(|(_, needed)| *needed == 1).map(|(name, _)| number(name, 1)));
     let check = |(fails, line): (String, String)| {
         format!("#if {fails}\n#error \"model {name}: before the first model is included, #define {line}\"\n#endif\n")
     };
@@ -206,7 +263,7 @@ fn array(bytes: &[u8]) -> String {
 }
 
 /// A name as C and Rust take it.
-fn identifier(name: &str) -> String {
+pub fn identifier(name: &str) -> String {
     let part = |character: char| if character.is_ascii_alphanumeric() { character.to_ascii_lowercase() } else { '_' };
     let name: String = name.chars().map(part).collect();
     if name.starts_with(|first: char| first.is_ascii_digit()) || name.is_empty() { format!("_{name}") } else { name }
@@ -218,10 +275,11 @@ mod tests {
 
     const HOUSEHOLD: &[u8] = include_bytes!("../../../../models/household.palpate");
 
-    /// The numbers between the last `open` and the end.
+    /// The numbers of the array after the first `open`.
     fn numbers(source: &str, open: &str) -> Vec<u8> {
-        let start = source.rfind(open).expect("an array") + open.len();
-        source[start..].split([',', '\n', ' ', '}', ']']).filter_map(|number| number.parse().ok()).collect()
+        let start = source.find(open).expect("an array") + open.len();
+        let array = source[start..].split(['}', ']']).next().unwrap();
+        array.split([',', '\n', ' ']).filter_map(|number| number.parse().ok()).collect()
     }
 
     #[test]

@@ -38,6 +38,7 @@
 
 mod axes;
 mod budget;
+mod calls;
 mod cells;
 pub mod code;
 mod container;
@@ -68,7 +69,7 @@ pub use budget::compile_within;
 pub use container::{OwnedSection, file};
 pub use cost::{Core, Instructions, Memory};
 pub use early::{EarlyExit, EarlyExitFound};
-pub use emit::{Language, emit, emit_code};
+pub use emit::{HEADER, Language, check_place, emit, identifier, write_sources};
 pub use error::CompileProblem;
 pub(crate) use merge::Source;
 pub(crate) use model::open_with_code;
@@ -77,7 +78,7 @@ pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
 pub use share::different_leaves;
 
-use crate::ensemble::Ensemble;
+use crate::ensemble::{Ensemble, Probability};
 use crate::error::{Error, Result};
 use code::{Form, Program, Statements};
 use forest::Forest;
@@ -209,6 +210,8 @@ pub struct Compiled {
     pub code: Option<(Program, Form)>,
     /// Places where a walk for a class alone may end, if that was asked for.
     pub early_exit: Option<EarlyExitFound>,
+    /// Rule that turns margins into the probabilities of the library that trained it.
+    pub probability: Probability,
 }
 
 /// When recognizers stop.
@@ -272,6 +275,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
         candidates,
         code: program.zip(form),
         early_exit,
+        probability: original.origin.imported.as_ref().map(|imported| imported.probability).unwrap_or_default(),
     })
 }
 

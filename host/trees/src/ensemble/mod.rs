@@ -20,7 +20,7 @@ pub use error::{EnsembleProblem, NameProblem, TreeProblem};
 pub(crate) use inputs::computed;
 pub use inputs::{Inputs, Occurring, Schema};
 pub use nodes::Threshold;
-pub use origin::{Columns, Imported, Provenance};
+pub use origin::{Columns, Imported, Probability, Provenance};
 
 use palpate_shared::format::Prediction;
 use std::borrow::Cow;

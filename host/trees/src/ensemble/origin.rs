@@ -30,6 +30,8 @@ pub struct Imported {
     /// Rule that turns margins into a class or a value, as the library's `predict` does it. Its scale makes the
     /// library's margins of what the trees add up to.
     pub prediction: Prediction,
+    /// Rule that turns margins into the probabilities that the library predicts.
+    pub probability: Probability,
     /// The least and the largest of the numbers that stand for a missing value, beside NaN.
     pub sentinel: Option<[f32; 2]>,
     /// For each node of each tree the threshold as the file has it, of no meaning for leaves; empty where all are the
@@ -38,6 +40,40 @@ pub struct Imported {
     /// Columns of the library's rows, where there are more than a model can have features: the ensemble has only those that
     /// its trees use.
     pub columns: Option<Columns>,
+}
+
+/// Rule that turns the margins of classes into the probabilities that a library predicts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Probability {
+    /// The softmax of the margins.
+    #[default]
+    Softmax,
+    /// The logistic function of each margin: each class was trained against all others.
+    Logistic,
+    /// The margins themselves: shares of votes.
+    Shares,
+    /// None that margins alone determine.
+    Unknown,
+}
+
+impl Probability {
+    /// True for a softmax.
+    pub(super) fn is_softmax(&self) -> bool {
+        *self == Self::Softmax
+    }
+
+    /// Probabilities from margins in nats, times `scale` the library's own; `None` where there is no rule.
+    pub fn of(self, margins: &[f64], scale: f64) -> Option<Vec<f64>> {
+        let most = margins.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let all: f64 = margins.iter().map(|margin| (margin - most).exp()).sum();
+        let each = |margin: &f64| match self {
+            Self::Softmax => (margin - most).exp() / all,
+            Self::Logistic => 1.0 / (1.0 + (-margin).exp()),
+            Self::Shares | Self::Unknown => margin * scale,
+        };
+        (self != Self::Unknown).then(|| margins.iter().map(each).collect())
+    }
 }
 
 /// Columns of a library's rows, and those that an ensemble has as its features.

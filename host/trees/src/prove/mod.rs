@@ -27,12 +27,14 @@ pub use certificate::{Certificate, CertifiedTree};
 pub use error::ProofProblem;
 pub use moves::{Moves, moves};
 
-use crate::compile::{self, Instructions, Source, code};
+use crate::compile::code::Form;
+use crate::compile::{self, Compiled, Instructions, Language, Source, code};
 use crate::ensemble::{Ensemble, Inputs};
 use crate::error::Result;
 use boxes::{Keys, Rows, Tree, Values, of_ensemble};
 use chip::Chip;
 use format::Plain;
+use palpate_base::wording::count;
 use palpate_onboard::Model;
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{LeafType, Link, f32_key};
@@ -118,7 +120,7 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
     Ok((proof, Certificate { model: checksum(bytes), ensemble: checksum(file), code: None, trees, table, outputs }))
 }
 
-/// Proves a model of the layout code, whose trees are assembly that [`emit_code`](compile::emit_code) wrote.
+/// Proves a model of the layout code, whose trees are assembly that [`Compiled::sources`](compile::Compiled::sources) wrote.
 ///
 /// # Errors
 /// Those of [`prove`]; [`ProofProblem::Assembly`] for assembly that is not understood.
@@ -163,6 +165,56 @@ pub fn check_code(
     let found = trees::of_code(subject, &order, false)?;
     holds(certificate, &found, ensemble)?;
     Ok(Proof { instructions: Some(read.instructions), ..subject.proof(&found) })
+}
+
+/// Files of source code as [`Compiled::sources`] has them, a header for C with the most instructions of a row: of assembly
+/// counted along its longest way, as a proof counts them, otherwise estimated.
+///
+/// # Errors
+/// None for what [`compile`](compile::compile) returned.
+pub fn sources(compiled: &Compiled, name: &str, languages: &[Language]) -> Result<Vec<(&'static str, String)>> {
+    let mut files = compiled.sources(name, languages)?;
+    let Some((_, header)) = files.iter_mut().find(|(extension, _)| *extension == "h") else { return Ok(files) };
+    // Leaves with a value for each class, unless they are votes, are not read back from assembly.
+    let assembly = |chip| -> Option<u64> {
+        let code = compiled.code.as_ref().map(|(program, _)| (program.clone(), Form::Thumb(chip)));
+        let files = Compiled { code, ..compiled.clone() }.sources(name, &[]).ok()?;
+        let (_, text) = files.first()?;
+        Some(with_code(&compiled.bytes, text).ok()?.1.instructions as u64)
+    };
+    let bytes = &compiled.bytes;
+    let model = if compiled.code.is_some() { compile::open_with_code(bytes)? } else { compile::open(bytes)? };
+    let (how, m4f, m0_plus) = match &compiled.code {
+        None => {
+            let Instructions { m4f, m0_plus } = Instructions::of_longest_ways(&model);
+            ("estimated", Some(m4f), m0_plus)
+        }
+        Some((_, Form::Thumb(chip))) => {
+            let most = assembly(*chip);
+            ("counted along the longest way", most, most.filter(|_| *chip == code::Chip::M0Plus))
+        }
+        // An early exit is not in assembly of such leaves. A compiler's code takes about a tenth more.
+        Some((_, Form::C)) if compiled.early_exit.is_some() => ("", None, None),
+        Some((_, Form::C)) => {
+            let more = |chip| assembly(chip).map(|most| most + most / 10);
+            ("estimated", more(code::Chip::M4F), more(code::Chip::M0Plus))
+        }
+    };
+    let mut text = String::from("/* ");
+    if let Some(m4f) = m4f {
+        let m0_plus = m0_plus.map_or_else(String::new, |most| format!(", {} on a Cortex-M0+", count(most)));
+        text += &format!(
+            "From features to margins: at most {} instructions on a Cortex-M4F{m0_plus}, {how}.\n * ",
+            count(m4f)
+        );
+    }
+    text += &format!(
+        "Flash: {} bytes for the model's array, and the functions that are called. RAM: the stack, and a palpate_recognizer for\n \
+         * each stream; nothing is static. */\n#ifndef ",
+        count(compiled.bytes.len()),
+    );
+    *header = header.replacen("#ifndef ", &text, 1);
+    Ok(files)
 }
 
 /// The checksum at the end of a model.

@@ -13,7 +13,7 @@ pub use columns::{BY_POSITION, Features, Matched, columns_of};
 pub use error::{ClassDiffers, RowsProblem, ValueDiffers};
 pub use generate::generate;
 pub(crate) use label::class;
-pub use notes::notes;
+pub use notes::{notes, warnings};
 pub use sequences::{RowOf, RowSequence, SequenceColumns, Sequences, SequencesBuilder};
 
 use crate::error::{Error, Place, Result};

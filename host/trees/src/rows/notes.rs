@@ -2,19 +2,30 @@
 
 use super::scales::{self, Effect};
 use crate::ensemble::Ensemble;
+use crate::ensemble::import::asks;
 
 /// Notes for the user, each a sentence: those of the file that it was read from, and the features with thresholds that
 /// become equal, in f32 or in whole numbers of units if it is compiled with `scales`.
 pub fn notes(ensemble: &Ensemble, scales: Option<&[f32]>) -> Vec<String> {
-    let imported = ensemble.origin.imported.as_ref();
-    let mut notes = imported.map(|imported| imported.notes.clone()).unwrap_or_default();
+    let mut notes = ensemble.origin.imported.as_ref().map(|imported| imported.notes.clone()).unwrap_or_default();
+    notes.extend(equal(ensemble, scales));
+    notes
+}
+
+/// The part of the [`notes`] after which a user may have to choose an option.
+pub fn warnings(ensemble: &Ensemble, scales: Option<&[f32]>) -> Vec<String> {
+    let imported = ensemble.origin.imported.iter().flat_map(|imported| &imported.notes);
+    imported.filter(|note| asks(note)).cloned().chain(equal(ensemble, scales)).collect()
+}
+
+/// Notes about thresholds that become equal.
+fn equal(ensemble: &Ensemble, scales: Option<&[f32]>) -> Vec<String> {
     match scales {
-        _ if imported.is_none() => {}
-        None => notes.extend(scales::merged(ensemble).iter().map(ToString::to_string)),
+        _ if ensemble.origin.imported.is_none() => Vec::new(),
+        None => scales::merged(ensemble).iter().map(ToString::to_string).collect(),
         Some(scales) => {
             let effects = scales::effects(ensemble, scales, None);
-            notes.extend(effects.iter().filter(|effect| effect.different < effect.thresholds).map(Effect::to_string));
+            effects.iter().filter(|effect| effect.different < effect.thresholds).map(Effect::to_string).collect()
         }
     }
-    notes
 }

@@ -6,9 +6,6 @@
 #include "rows.h" /* ROWS_FEATURES, rows_values, rows_starts, rows_sequences */
 #include "bare.h" /* the emulated chip: where to write */
 
-static palpate_model model;
-static palpate_recognizer recognizer;
-
 static void put(uintptr_t file, const char *text)
 {
     size_t length = 0;
@@ -30,35 +27,22 @@ static void put_number(uintptr_t file, uint32_t number)
     put(file, text + at);
 }
 
-/* A row comes from a sensor; here from an array. */
-static void row_keys(uint32_t row, int32_t *keys)
-{
-    int i;
-    for (i = 0; i < ROWS_FEATURES; i++) {
-        keys[i] = palpate_f32_key(rows_values[row * ROWS_FEATURES + (uint32_t)i]);
-    }
-}
-
 static int bare_main(void)
 {
     const uintptr_t file = bare_open("verdicts.txt", 5);
     uint32_t sequence;
-    if (palpate_open(&model, sure_model, sizeof sure_model) != PALPATE_OK || palpate_start(&recognizer, &model) != PALPATE_OK) {
-        return 1;
-    }
     for (sequence = 0; sequence < rows_sequences; sequence++) {
+        palpate_recognizer state;
         uint32_t row, used = 0;
-        palpate_reset(&recognizer);
-        for (row = rows_starts[sequence]; row < rows_starts[sequence + 1] && recognizer.verdict == PALPATE_UNDECIDED; row++) {
-            int32_t keys[ROWS_FEATURES];
-            row_keys(row, keys);
-            if (palpate_push_features(&recognizer, keys, ROWS_FEATURES) != PALPATE_COUNTED) {
-                return 2;
-            }
+        int found = -1;
+        sure_begin(&state);
+        /* A row comes from a sensor; here from an array. */
+        for (row = rows_starts[sequence]; row < rows_starts[sequence + 1] && found == -1; row++) {
+            found = sure_push(&state, rows_values + row * ROWS_FEATURES);
             used++;
         }
-        if (recognizer.verdict == PALPATE_RECOGNIZED) {
-            put_number(file, recognizer.object);
+        if (found >= 0) {
+            put_number(file, (uint32_t)found);
         } else {
             put(file, "-");
         }

@@ -36,8 +36,8 @@ pub(super) fn text(program: &Program, name: &str) -> String {
     writer.start();
     writer.line(&calls.concat());
     writer.line("}");
+    writer.best();
     if !program.exits.is_empty() {
-        writer.best();
         writer.class(&calls);
     }
     writer.text
@@ -46,7 +46,6 @@ pub(super) fn text(program: &Program, name: &str) -> String {
 /// The function that gives a class, of functions that are elsewhere.
 fn class_elsewhere(program: &Program, name: &str) -> String {
     let mut writer = Writer::new(program, name);
-    writer.best();
     writer.class_head();
     writer.line(&format!("    {name}_early(row, margins);\n    return {name}_best_(margins);\n}}"));
     writer.text
@@ -77,6 +76,9 @@ pub(super) fn declaration(program: &Program, name: &str, checksum: u32) -> Strin
             symbol(name, function, checksum)
         );
     }
+    let mut best = Writer::new(program, name);
+    best.best();
+    text += &best.text;
     if program.exits.is_empty() { text } else { text + &class_elsewhere(program, name) }
 }
 

@@ -106,6 +106,11 @@ impl Program {
         self
     }
 
+    /// True if a walk for a class alone may end early.
+    pub(in super::super) fn has_exits(&self) -> bool {
+        !self.exits.is_empty()
+    }
+
     /// True if a walk may end early in this form: in assembly, sums of leaves with a value for each object are two to a register
     /// until the end, unless they are votes.
     pub(in super::super) fn may_exit(&self, form: Form) -> bool {

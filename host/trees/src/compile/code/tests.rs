@@ -1,7 +1,7 @@
 //! Code against the layouts of data: to the bit, on this machine and on emulated chips.
 
 use super::super::groups::groups_and_splits;
-use super::super::{Leaf, Settings, compile, emit_code, open};
+use super::super::{Leaf, Settings, compile, open};
 use super::{Chip, Form, Program};
 use crate::compile::{Compiled, EarlyExit, Language, Layout};
 use crate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree, computed};
@@ -202,7 +202,7 @@ impl Case {
     pub(crate) fn assembly(&self, chip: Chip, early_exit: bool) -> (Vec<u8>, String) {
         let wanted = early_exit.then_some(EarlyExit::Always);
         let compiled = self.compiled_with(Some(Form::Thumb(chip)), wanted);
-        let files = emit_code(&compiled.bytes, program(&compiled), Form::Thumb(chip), "m", &[]).unwrap();
+        let files = compiled.sources("m", &[]).unwrap();
         let text = files.into_iter().find(|file| file.0 == "s").unwrap().1;
         (compiled.bytes, text)
     }
@@ -479,10 +479,9 @@ fn the_firmware_has_the_code_that_is_exported_now() {
     let ensemble = Ensemble::load_with(&path, &Default::default()).unwrap();
     let case = Case { name: "softmax".into(), ensemble, leaf: Leaf::I16 };
     let compiled = case.compiled(Some(Form::Thumb(Chip::M0Plus)));
-    let (program, form) = compiled.code.as_ref().unwrap();
     let place = |file: &str| root.join("onboard/firmware/src/code").join(file);
     assert_eq!(std::fs::read(place("softmax.palpate")).unwrap(), compiled.bytes);
-    for (extension, text) in emit_code(&compiled.bytes, program, *form, "softmax", &[]).unwrap() {
+    for (extension, text) in compiled.sources("softmax", &[]).unwrap() {
         let path = place(&format!("softmax.{extension}"));
         if std::env::var_os("PALPATE_RESTATE").is_some() {
             std::fs::write(&path, &text).unwrap();
@@ -497,7 +496,7 @@ fn exported(seed: u64, early_exit: bool) -> Vec<(&'static str, String)> {
     let case = Case { name: String::new(), ensemble, leaf: Leaf::I16 };
     let form = Form::Thumb(Chip::M0Plus);
     let compiled = case.compiled_with(Some(form), early_exit.then_some(EarlyExit::Always));
-    emit_code(&compiled.bytes, program(&compiled), form, "same", &[Language::C]).unwrap()
+    compiled.sources("same", &[Language::C]).unwrap()
 }
 
 /// The symbols of a text.
@@ -570,7 +569,7 @@ fn write(directory: &Path, cases: &[Case], form: Form, rows: usize, early_exit: 
         let (program, name) = (program(&compiled), format!("m{index}"));
         let values = case.rows(rows);
         let rows: Vec<Vec<i32>> = values.iter().map(|row| keys(row, program.key)).collect();
-        for (extension, text) in emit_code(&compiled.bytes, program, form, &name, &[Language::C]).unwrap() {
+        for (extension, text) in compiled.sources(&name, &[Language::C]).unwrap() {
             let path = directory.join(&name).with_extension(extension);
             std::fs::write(&path, text).unwrap();
             if extension == "s" {
@@ -593,7 +592,7 @@ fn write(directory: &Path, cases: &[Case], form: Form, rows: usize, early_exit: 
         };
         let classes: Vec<Vec<i32>> = rows.iter().map(class).collect();
         for (what, numbers) in
-            [("keys", &rows), ("values", &bits), ("expected", &expected(&plain, &rows)), ("classes", &classes)]
+            [("keys", &rows), ("given", &bits), ("expected", &expected(&plain, &rows)), ("classes", &classes)]
         {
             // The least number is written as a difference, since a compiler takes its digits as a larger type's.
             let number = |number: &i32| match *number {
@@ -607,18 +606,20 @@ fn write(directory: &Path, cases: &[Case], form: Form, rows: usize, early_exit: 
             body,
             "static void {name}_call(const void *row, int32_t *margins) {{ {name}_margins((const {kind} *)row, margins); }}"
         );
-        let class_of = if program.exits.is_empty() {
-            "0".to_owned()
-        } else {
+        let targets = case.ensemble.prediction().targets;
+        let class_of = if case.has_classes() && (!targets || !program.exits.is_empty()) {
+            let function = if targets { "class" } else { "predict" };
             _ = writeln!(
                 body,
-                "static int {name}_known(const void *row) {{ return {name}_class((const {kind} *)row); }}"
+                "static int {name}_known(const void *row) {{ return {name}_{function}((const {kind} *)row); }}"
             );
             format!("{name}_known")
+        } else {
+            "0".to_owned()
         };
         _ = writeln!(
             table,
-            "    {{{name}_open, {name}_call, {class_of}, {name}_keys, {name}_values, {name}_expected, {name}_classes, {}, {}, {}}},",
+            "    {{{name}_open, {name}_call, {class_of}, {name}_keys, {name}_given, {name}_expected, {name}_classes, {}, {}, {}}},",
             rows.len(),
             program.features,
             program.objects(),

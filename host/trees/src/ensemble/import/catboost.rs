@@ -8,7 +8,7 @@ use super::draft_node::DraftNode;
 use super::options::CATEGORIES;
 use super::set::Set;
 use super::unsupported;
-use crate::ensemble::{Ensemble, Output, Threshold};
+use crate::ensemble::{Ensemble, Output, Probability, Threshold};
 use crate::error::EnsembleProblem;
 use palpate_shared::format::Link;
 use serde::Deserialize;
@@ -197,6 +197,7 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
         draft.names = classes;
     }
     if loss == "MultiClassOneVsAll" {
+        draft.probability = Probability::Logistic;
         draft.notes.push("Posteriors are those of softmax, the model's of one class against all others.".into());
     }
     check_threshold(&document.model_info.binclass_probability_threshold)?;

@@ -4,7 +4,9 @@ use super::draft_node::DraftNode;
 use super::options::{default_names, named};
 use super::spelled_out::spelled_out;
 use super::votes;
-use crate::ensemble::{Ensemble, Imported, Inputs, MAX_OBJECTS, Node, Output, Provenance, Threshold, Tree, columns};
+use crate::ensemble::{
+    Ensemble, Imported, Inputs, MAX_OBJECTS, Node, Output, Probability, Provenance, Threshold, Tree, columns,
+};
 use crate::error::EnsembleProblem;
 use palpate_shared::format::Prediction;
 
@@ -24,6 +26,8 @@ pub(super) struct Draft {
     pub(super) f32_sums: bool,
     /// Rule by which the library's `predict` turns margins into a class or a value.
     pub(super) prediction: Prediction,
+    /// Rule by which its `predict_proba` turns margins into probabilities.
+    pub(super) probability: Probability,
     /// The numbers that stand for a missing value, beside NaN.
     pub(super) sentinel: Option<[f32; 2]>,
     /// Divisor of the library's raw scores that makes log-odds of them, whose softmax are its probabilities.
@@ -78,6 +82,7 @@ impl Draft {
             rounding,
             notes: self.notes,
             prediction: self.prediction,
+            probability: self.probability,
             sentinel: self.sentinel,
             thresholds,
             columns,

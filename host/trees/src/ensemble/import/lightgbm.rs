@@ -9,7 +9,7 @@ use super::draft_node::DraftNode;
 use super::options::CATEGORIES;
 use super::set::Set;
 use super::unsupported;
-use crate::ensemble::{Ensemble, Output, Threshold};
+use crate::ensemble::{Ensemble, Output, Probability, Threshold};
 use crate::error::EnsembleProblem;
 use palpate_shared::format::Link;
 use std::collections::BTreeMap;
@@ -145,6 +145,9 @@ fn objective(text: Option<&str>, outputs: usize, rounds: usize, draft: &mut Draf
     let sigmoid = words.find_map(|word| word.strip_prefix("sigmoid:")).unwrap_or("1");
     let sigmoid: f64 = sigmoid.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor > 0.0).unwrap_or(1.0);
     let is_classes = matches!(name, "multiclass" | "multiclassova");
+    if name == "custom" {
+        draft.probability = Probability::Unknown;
+    }
     if outputs > 1 && !is_classes && name != "custom" {
         return Err(EnsembleProblem::Objective { found: name.into(), of: None }.into());
     }
@@ -156,6 +159,7 @@ fn objective(text: Option<&str>, outputs: usize, rounds: usize, draft: &mut Draf
         draft.prediction.average = u32::try_from(rounds).unwrap_or(u32::MAX);
     }
     if name == "multiclassova" {
+        draft.probability = Probability::Logistic;
         draft.notes.push("Posteriors are those of softmax, the model's of one class against all others.".into());
     }
     draft.prediction.link = match name {

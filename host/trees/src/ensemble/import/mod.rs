@@ -37,6 +37,7 @@ pub use parts::{PartTree, Parts};
 use super::{Ensemble, xgboost};
 use crate::error::{EnsembleProblem, Error, Place, Result};
 use options::MISSING_UNKNOWN;
+pub(crate) use options::asks;
 use std::path::Path;
 
 impl Ensemble {

@@ -22,6 +22,14 @@ pub(in crate::ensemble) const MISSING_UNKNOWN: &str = "The file does not state t
                                           training (XGBoost's `missing=`): only NaN counts as missing. State the \
                                           number if there was another.";
 
+/// Start of the note about trees that are left out.
+pub(in crate::ensemble) const STOPPED_EARLY: &str = "Training stopped early: the ";
+
+/// True for a note after which a user may have to choose an option.
+pub(crate) fn asks(note: &str) -> bool {
+    note == MISSING_UNKNOWN || note.starts_with(STOPPED_EARLY)
+}
+
 /// Note about every model with categories.
 pub(in crate::ensemble) const CATEGORIES: &str = "Categories are the numbers that the library saw in training: of a pandas \
                                                   column their codes, from 0 on in the order of its categories.";

@@ -2,7 +2,7 @@
 
 use super::draft::{Draft, DraftTree};
 use super::draft_node::DraftNode;
-use crate::ensemble::{Ensemble, Output, Threshold};
+use crate::ensemble::{Ensemble, Output, Probability, Threshold};
 use crate::error::{EnsembleProblem, TreeProblem};
 use palpate_shared::format::Prediction;
 
@@ -23,6 +23,8 @@ pub struct Parts {
     pub notes: Vec<String>,
     /// Rule by which the library's `predict` turns margins into a class or a value.
     pub prediction: Prediction,
+    /// Rule by which its `predict_proba` turns margins into probabilities.
+    pub probability: Probability,
 }
 
 /// A tree as columns, one entry for each node; node 0 is its root.
@@ -51,7 +53,7 @@ impl Parts {
     /// [`EnsembleProblem`] for columns of unequal length, children and features out of range, a node that is reached
     /// twice, and everything that [`Ensemble::check`] refuses.
     pub fn into_ensemble(self, names: Option<&[String]>) -> Result<Ensemble, EnsembleProblem> {
-        let Self { kind, features, names: own, base, trees, notes, prediction } = self;
+        let Self { kind, features, names: own, base, trees, notes, prediction, probability } = self;
         let outputs = base.len();
         let trees = trees
             .into_iter()
@@ -60,7 +62,8 @@ impl Parts {
                 tree.draft(outputs).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
             })
             .collect::<Result<_, _>>()?;
-        Draft { features, names: own, base, trees, kind, notes, prediction, ..Draft::default() }.finish(names)
+        Draft { features, names: own, base, trees, kind, notes, prediction, probability, ..Draft::default() }
+            .finish(names)
     }
 }
 

@@ -4,8 +4,10 @@ use super::objective::{Kind, Objective};
 use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
 use super::trees::{Shape, has_sets, tree};
 use crate::ensemble::check::check_names;
-use crate::ensemble::import::options::{CATEGORIES, MISSING_UNKNOWN, Options, default_names, named, one_class};
-use crate::ensemble::{Ensemble, Imported, Inputs, Node, Provenance, Schema, Tree, columns};
+use crate::ensemble::import::options::{
+    CATEGORIES, MISSING_UNKNOWN, Options, STOPPED_EARLY, default_names, named, one_class,
+};
+use crate::ensemble::{Ensemble, Imported, Inputs, Node, Probability, Provenance, Schema, Tree, columns};
 use crate::error::EnsembleProblem;
 use palpate_shared::format::{Link as Inverse, Prediction};
 use std::collections::BTreeMap;
@@ -113,13 +115,17 @@ impl Document {
         if let Inputs::Rows(names) = inputs {
             let (features, columns) = columns::features(names, &mut trees, &mut notes)?;
             inputs = Inputs::Rows(features);
-            let Rows { mut prediction, sentinel } = rows(&attributes, inverse)?;
+            let Rows { mut prediction, mut probability, sentinel } = rows(&attributes, inverse)?;
             prediction.targets = outputs == Kind::One && objects.len() > 1;
+            if objective.name == "binary:hinge" {
+                probability = Probability::Unknown;
+            }
             if sentinel.is_none() {
                 notes.push(MISSING_UNKNOWN.into());
             }
             let kind = format!("XGBoost {version} {kind}");
-            origin.imported = Some(Imported { kind, notes, prediction, sentinel, columns, ..Imported::default() });
+            origin.imported =
+                Some(Imported { kind, notes, prediction, probability, sentinel, columns, ..Imported::default() });
         }
         let mut ensemble = Ensemble { inputs, objects, base_margins, trees, origin };
         if let Some(weights) = weights {
@@ -157,7 +163,7 @@ fn taken(
         return Ok(trees);
     }
     notes.push(format!(
-        "Training stopped early: the {wanted} trees up to the best iteration, {best}, are used, as by XGBClassifier and \
+        "{STOPPED_EARLY}{wanted} trees up to the best iteration, {best}, are used, as by XGBClassifier and \
          XGBRegressor, and not all {trees}, which Booster.predict uses. Ask for all trees to take those."
     ));
     Ok(wanted)
@@ -175,6 +181,8 @@ pub(super) struct StatedRows {
     /// Divisor of a margin before the link.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub(super) average: u32,
+    #[serde(default, skip_serializing_if = "Probability::is_softmax")]
+    pub(super) probability: Probability,
 }
 
 fn one() -> u32 {
@@ -188,6 +196,7 @@ fn is_one(number: &u32) -> bool {
 #[derive(Default)]
 struct Rows {
     prediction: Prediction,
+    probability: Probability,
     sentinel: Option<[f32; 2]>,
 }
 
@@ -196,7 +205,7 @@ fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows, EnsembleProbl
     let name = "palpate_prediction";
     let expected = "a JSON object of link, last_of_ties and scale";
     let Some(text) = attributes.get(name) else {
-        return Ok(Rows { prediction: Prediction { link: inverse, ..Prediction::default() }, sentinel: None });
+        return Ok(Rows { prediction: Prediction { link: inverse, ..Prediction::default() }, ..Rows::default() });
     };
     let stated: StatedRows = parsed(name, expected, text)?;
     let wrong = |detail: String| EnsembleProblem::Attribute { name, expected, detail };
@@ -215,9 +224,9 @@ fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows, EnsembleProbl
     if stated.average == 0 {
         return Err(wrong("a mean of no trees".into()));
     }
-    let StatedRows { last_of_ties, scale, average, .. } = stated;
+    let StatedRows { last_of_ties, scale, average, probability, .. } = stated;
     let prediction = Prediction { link, last_of_ties, scale, targets: false, average };
-    Ok(Rows { prediction, sentinel })
+    Ok(Rows { prediction, probability, sentinel })
 }
 
 /// The trees, and the weight of each in a dart booster: up to 3.2 it wraps another booster, then weights stand beside the

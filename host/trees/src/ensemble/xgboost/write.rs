@@ -6,7 +6,7 @@ use super::schema::{
     Document, Flag, Forest, ForestParameters, GradientBooster, Learner, LearnerParameters, NO_CONDITION, NO_PARENT,
     TreeColumns, TreeParameters,
 };
-use crate::ensemble::{Ensemble, Imported, Inputs, Node, Output, Provenance, Tree};
+use crate::ensemble::{Ensemble, Imported, Inputs, Node, Output, Probability, Provenance, Tree};
 use palpate_shared::format::Prediction;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -70,8 +70,8 @@ pub(super) fn attributes(inputs: &Inputs, objects: &[String], origin: &Provenanc
     if let Some(schema) = inputs.schema() {
         attributes.insert("palpate_descriptor".into(), schema.name.into());
     }
-    if let Some(Imported { prediction, sentinel, .. }) = &origin.imported
-        && (*prediction != Prediction::default() || sentinel.is_some())
+    if let Some(Imported { prediction, probability, sentinel, .. }) = &origin.imported
+        && (*prediction != Prediction::default() || *probability != Probability::default() || sentinel.is_some())
     {
         let stated = StatedRows {
             link: prediction.link.name().into(),
@@ -79,6 +79,7 @@ pub(super) fn attributes(inputs: &Inputs, objects: &[String], origin: &Provenanc
             scale: prediction.scale,
             sentinel: sentinel.map(|ends| ends.map(|end| end.to_string())),
             average: prediction.average,
+            probability: *probability,
         };
         if let Ok(text) = serde_json::to_string(&stated) {
             attributes.insert("palpate_prediction".into(), text);

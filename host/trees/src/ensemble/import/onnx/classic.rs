@@ -2,6 +2,7 @@
 
 use super::wire::Node;
 use super::{Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
+use crate::ensemble::Probability;
 use crate::ensemble::import::options::one_class;
 use palpate_shared::format::Link;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -191,6 +192,12 @@ fn classes(
     }
     let named: BTreeSet<i64> = targets.iter().copied().collect();
     let is_votes = transform == "NONE" && weights.iter().all(|&weight| weight >= 0.0);
+    draft.probability = match transform {
+        _ if is_votes => Probability::Shares,
+        "LOGISTIC" if named.len() > 1 => Probability::Logistic,
+        "SOFTMAX" | "LOGISTIC" => Probability::Softmax,
+        _ => Probability::Unknown,
+    };
     if is_votes {
         draft.notes.push(
             "Margins are shares of votes (probabilities), not log-odds: classes are right, posteriors are not calibrated."

@@ -2,6 +2,7 @@
 
 use super::wire::Node;
 use super::{Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
+use crate::ensemble::Probability;
 use palpate_shared::format::Link;
 
 /// The modes' names, by their codes.
@@ -34,6 +35,7 @@ pub(super) fn read(node: &Node<'_>, draft: &mut Draft) -> Result<usize> {
     draft.base = vec![0.0; wanted];
     if wanted > 1 {
         draft.notes.push("The file does not say what its outputs are: they are taken for classes.".into());
+        draft.probability = Probability::Unknown;
     }
     // Of one output a value; of classes margins are those before it.
     match integer("post_transform").and_then(|code| usize::try_from(code).ok()).unwrap_or(0) {

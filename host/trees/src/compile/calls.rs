@@ -1,0 +1,259 @@
+//! Functions in C that a program calls: a row to its class, value or probabilities, and steps to a verdict, from a model that
+//! is a constant.
+
+use super::code::Program;
+use crate::ensemble::Probability;
+use palpate_onboard::Model;
+use palpate_shared::format::Key;
+use std::fmt::Write as _;
+
+/// A model as C calls it.
+pub(super) struct Calls<'a> {
+    pub(super) model: &'a Model<'a>,
+    /// Prefix of all names.
+    pub(super) name: &'a str,
+    pub(super) probability: Probability,
+    /// The trees, where they are code.
+    pub(super) code: Option<&'a Program>,
+}
+
+/// Start of the header's parts, and of its pieces with an address of their own.
+struct Places {
+    parts: Vec<usize>,
+    cuts: usize,
+}
+
+impl Places {
+    /// Places of a model that was opened.
+    fn of(bytes: &[u8]) -> Self {
+        let (short, long) = (|at| usize::from(short(bytes, at)), |at| long(bytes, at) as usize);
+        let objects = usize::from(bytes[14]) + 1;
+        let optional = if short(4) == 1 { 0 } else { long(92) };
+        let axes = 4 * short(16);
+        let lengths = [long(68), optional, 8 * objects, long(80) + axes, 8 * short(18), long(84), long(88)];
+        let mut parts = vec![96];
+        lengths.iter().for_each(|length| parts.push(parts[parts.len() - 1] + length));
+        Self { cuts: parts[3] + axes, parts }
+    }
+}
+
+fn short(bytes: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes([bytes[at], bytes[at + 1]])
+}
+
+fn long(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+}
+
+impl Calls<'_> {
+    /// The model as `palpate_open` leaves it, and the functions that read it.
+    pub(super) fn text(&self) -> String {
+        let mut text = self.opened();
+        if self.model.descriptor().is_none() {
+            text += &self.of_rows();
+        }
+        if self.model.object_count() > 1 && !self.model.prediction().targets {
+            text += &self.of_steps();
+        }
+        let name = self.name;
+        text + &format!(
+            "/* PALPATE_OK if the model's bytes have their checksum, else PALPATE_CHECKSUM. {SAFE} */\n\
+             static inline palpate_error {name}_check(void)\n{{\n    return palpate_check_(&{name}_opened_);\n}}\n\n"
+        )
+    }
+
+    /// The constant, field by field as `palpate_model` declares them.
+    fn opened(&self) -> String {
+        let (name, bytes) = (self.name, self.model.bytes());
+        let Places { parts, cuts } = Places::of(bytes);
+        let at = |place: usize| format!("{name}_model + {place}");
+        let mut found: [Option<usize>; 19] = [None; 19];
+        let (mut place, mut exits_end, mut row, mut known) = (parts[1], 0, (0, 0), self.model.object_count());
+        // Without a section of what was trained: all times, of any spread, and directions if the descriptor has them.
+        let mut trained = (0x20, u8::from(self.is_oriented()), u32::MAX);
+        while place < parts[2] {
+            let (tag, length, content) = (short(bytes, place), long(bytes, place + 4) as usize, place + 8);
+            if let Some(slot) = found.get_mut(usize::from(tag & 0x7fff)) {
+                *slot = Some(content);
+            }
+            match tag & 0x7fff {
+                2 => trained = (bytes[content], bytes[content + 2], long(bytes, content + 4)),
+                6 => known -= usize::from(bytes[content]),
+                16 => {
+                    let most = (u32::from(bytes[content + 7]) << bytes[content + 5]) - 1;
+                    row = (long(bytes, content).cast_signed(), most);
+                }
+                17 => exits_end = content + (length & !7),
+                _ => {}
+            }
+            place = content + length.next_multiple_of(4);
+        }
+        let pointer = |tag: usize, offset: usize| found[tag].map_or_else(|| "NULL".into(), |place| at(place + offset));
+        let code = if self.code.is_some() { format!("{name}_code_") } else { "NULL".into() };
+        format!(
+            "/* The model as palpate_open leaves it: its bytes were checked when it was exported. */\n\
+             static const palpate_model {name}_opened_ = {{\n    {name}_model,\n    {{{parts}}},\n    \
+             {cuts}, {odds}, {strangers}, {table}, {sentinel}, {weights}, {rows}, {start}, {most}u,\n\
+             #if PALPATE_OUTPUTS\n    {outputs},\n#endif\n#if PALPATE_EARLY\n    {exits}, {ends},\n#endif\n    \
+             0, {spread}u, {objects}, {known}, {features}, {layout}, {leaf}, {descriptor}, {real}, {patterns}, {oriented}\n\
+             #if PALPATE_LAYOUTS & PALPATE_CODE\n    , {code}\n#endif\n}};\n\n",
+            parts = parts.iter().map(|&place| at(place)).collect::<Vec<_>>().join(", "),
+            cuts = at(cuts),
+            odds = pointer(5, 0),
+            strangers = pointer(6, 0),
+            table = pointer(12, 4),
+            sentinel = pointer(14, 0),
+            weights = pointer(4, 0),
+            rows = pointer(16, 0),
+            start = row.0,
+            most = row.1,
+            outputs = pointer(18, 0),
+            exits = pointer(17, 0),
+            ends = found[17].map_or_else(|| "NULL".into(), |_| at(exits_end)),
+            spread = trained.2,
+            objects = self.model.object_count(),
+            features = self.model.feature_count(),
+            layout = bytes[6],
+            leaf = bytes[7],
+            descriptor = bytes[12],
+            real = bytes[13],
+            patterns = trained.0,
+            oriented = trained.1,
+        )
+    }
+
+    /// True if the descriptor has directions.
+    fn is_oriented(&self) -> bool {
+        self.model.descriptor().is_some() && 0x6c >> self.model.bytes()[12] & 1 == 1
+    }
+
+    /// Type of a row's features, and what stands for a missing one.
+    fn row(&self) -> (&'static str, &'static str) {
+        if self.model.key() == Key::Real { ("float", "NaN") } else { ("int32_t", "INT32_MIN") }
+    }
+
+    /// Lines that make keys of a row, and the keys' name.
+    fn keys(&self) -> (String, &'static str) {
+        let (name, features) = (self.name, self.model.feature_count());
+        match self.model.key() {
+            Key::Whole => (String::new(), "row"),
+            Key::Real => (format!("    int32_t keys[{features}];\n    {name}_keys_(row, keys);\n"), "keys"),
+        }
+    }
+
+    /// Lines that add up the trees for a row.
+    fn sums(&self) -> String {
+        let (name, objects, features) = (self.name, self.model.object_count(), self.model.feature_count());
+        if self.code.is_some() {
+            return format!("    uint32_t sums[{objects}];\n    {name}_margins(row, PALPATE_AT_(int32_t *, sums));\n");
+        }
+        let (lines, keys) = self.keys();
+        format!("    uint32_t sums[{objects}];\n{lines}    palpate_sum_(&{name}_opened_, {keys}, {features}, sums);\n")
+    }
+
+    fn of_rows(&self) -> String {
+        let (name, objects, features) = (self.name, self.model.object_count(), self.model.feature_count());
+        let (row, missing) = self.row();
+        let mut text = String::new();
+        if (self.code.is_none(), row) == (true, "float") {
+            text += &format!(
+                "static inline void {name}_keys_(const float *row, int32_t *keys)\n{{\n    int i;\n    \
+                 for (i = 0; i < {features}; i++) {{\n        keys[i] = palpate_f32_key(row[i]);\n    }}\n}}\n\n"
+            );
+        }
+        let sums = self.sums();
+        let mut call = |about: &str, kind: &str, function: &str, more: &str, body: &str| {
+            _ = write!(
+                text,
+                "/* {about} of a row of {features} features, {missing} where one is missing. {SAFE} */\n\
+                 static inline {kind} {name}_{function}(const {row} *row{more})\n{{\n{body}}}\n\n"
+            );
+        };
+        if objects == 1 {
+            let body = format!(
+                "    float value;\n{sums}    palpate_values_of_(&{name}_opened_, sums, &value);\n    return value;\n"
+            );
+            call("The value", "float", "value", "", &body);
+        } else if self.model.prediction().targets {
+            let body = format!("{sums}    palpate_values_of_(&{name}_opened_, sums, values);\n");
+            call(&format!("The {objects} values"), "void", "values", ", float *values", &body);
+        } else {
+            let exits = self.model.early_exits().next().is_some();
+            let body = match self.code {
+                Some(program) if program.has_exits() => format!("    return {name}_class(row);\n"),
+                Some(_) => format!(
+                    "    int32_t margins[{objects}];\n    {name}_margins(row, margins);\n    return {name}_best_(margins);\n"
+                ),
+                None => {
+                    let (lines, keys) = self.keys();
+                    let function = if exits { "class_of" } else { "predict_class" };
+                    format!(
+                        "    int32_t margins[{objects}];\n{lines}    \
+                         return palpate_{function}(&{name}_opened_, {keys}, {features}, margins, {objects});\n"
+                    )
+                }
+            };
+            call("The class", "int", "predict", "", &body);
+            let body = match self.probability {
+                Probability::Unknown => return text,
+                Probability::Shares => format!("{sums}    palpate_values_of_(&{name}_opened_, sums, posteriors);\n"),
+                Probability::Softmax | Probability::Logistic => {
+                    let apart = u8::from(self.probability == Probability::Logistic);
+                    format!("{sums}    palpate_posteriors_of_(&{name}_opened_, sums, {apart}, posteriors);\n")
+                }
+            };
+            let about = format!("The {objects} probabilities, within {:.1e} of the library's,", self.bound());
+            call(&about, "void", "posteriors", ", float *posteriors", &body);
+        }
+        text
+    }
+
+    /// The farthest that a probability can be from the library's.
+    fn bound(&self) -> f32 {
+        // A softmax changes by half as much as its margins at most.
+        let margin = self.model.margin_error();
+        let margin = match self.probability {
+            Probability::Shares => margin * self.model.prediction().scale,
+            _ => margin / 2.0,
+        };
+        (margin + 1e-6) * 1.06
+    }
+
+    /// Functions that add up rows of a stream, or steps of a model that computes its features.
+    fn of_steps(&self) -> String {
+        let (name, objects, features) = (self.name, self.model.object_count(), self.model.feature_count());
+        let (step, parameter, body) = if self.model.descriptor().is_none() {
+            let body = if self.code.is_some() {
+                format!(
+                    "    int32_t margins[{objects}];\n    {name}_margins(row, margins);\n    \
+                     palpate_push_margins(state, margins, {objects});\n"
+                )
+            } else {
+                let (lines, keys) = self.keys();
+                format!("{lines}    (void)palpate_push_features(state, {keys}, {features});\n")
+            };
+            let parameter = format!("const {} *row", self.row().0);
+            ("a row of a stream", parameter, body + "    return palpate_decided_(state);\n")
+        } else if self.is_oriented() {
+            let body = "    return palpate_add_step_(state, step);\n".to_owned();
+            ("a step", "const palpate_step *step".into(), body)
+        } else {
+            let times = "a step by its three times in microseconds, PALPATE_MISSING for one that there is not";
+            (times, "const uint32_t *times".into(), "    return palpate_add_times_(state, times);\n".to_owned())
+        };
+        format!(
+            "/* Begins: nothing was added yet. {OWN} */\n\
+             static inline void {name}_begin(palpate_recognizer *state)\n{{\n    palpate_start_(state, &{name}_opened_);\n}}\n\n\
+             /* Adds {step}: the number of the object that is recognized; -1 while none is, -2 if none fits, -3 at the limit of \
+             steps. After a decision nothing changes until {name}_begin. {OWN} */\n\
+             static inline int {name}_push(palpate_recognizer *state, {parameter})\n{{\n{body}}}\n\n\
+             /* The decision at the end, or without one the object with the most evidence; -1 if nothing was added. {OWN} */\n\
+             static inline int {name}_end(const palpate_recognizer *state)\n{{\n    return palpate_ended_(state);\n}}\n\n"
+        )
+    }
+}
+
+/// Statement about functions that write nothing but their results.
+const SAFE: &str = "Any threads and interrupts may call it at once.";
+/// Statement about functions with a state.
+const OWN: &str = "Threads and interrupts may call it at once, each with a state of its own.";

@@ -1,0 +1,168 @@
+//! Functions in C that `palpate export` writes with a model, against the libraries that trained it.
+
+use palpate_base::with;
+use palpate_onboard::{C_HEADER, Model};
+use palpate_trees::compile::code::Form;
+use palpate_trees::compile::{EarlyExit, Language, Layout, Leaf, Settings, compile};
+use palpate_trees::ensemble::import::Options;
+use palpate_trees::ensemble::{Ensemble, Probability};
+use palpate_trees::prove::sources;
+use palpate_trees::rows::Encoder;
+use palpate_trees::verify::Candidate;
+use palpate_trees::verify::predict::{Predicted, predict};
+use std::path::Path;
+use std::process::Command;
+
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+
+/// Numbers of a file of `tests/data/import`, a missing one NaN.
+fn numbers(name: &str, header: usize) -> Vec<Vec<f64>> {
+    let text = std::fs::read_to_string(Path::new(ROOT).join("tests/data/import").join(name)).unwrap();
+    let number = |cell: &str| if cell.is_empty() { f64::NAN } else { cell.parse().unwrap() };
+    text.lines().skip(header).map(|line| line.split(',').map(number).collect()).collect()
+}
+
+/// A row as a C initializer.
+fn initializer(row: &[f64], is_whole: bool) -> String {
+    let cell = |value: &f64| match *value {
+        value if value.is_nan() && is_whole => "INT32_MIN".to_owned(),
+        value if value.is_nan() => "NAN".to_owned(),
+        value if is_whole => value.to_string(),
+        value if value.is_infinite() => format!("{}INFINITY", if value < 0.0 { "-" } else { "" }),
+        value => format!("{:e}f", value as f32),
+    };
+    format!("{{{}}}", row.iter().map(cell).collect::<Vec<_>>().join(","))
+}
+
+/// Models of every library and kind of prediction, without the extension of their margins.
+const CALLED: [&str; 16] = [
+    "xgboost-3.4-softmax.json",
+    "xgboost-3.4-binary.json",
+    "xgboost-3.2-hinge.json",
+    "xgboost-3.2-missing-0.json",
+    "xgboost-3.2-targets-vector.json",
+    "xgboost-3.2-reg-logistic.json",
+    "lightgbm-4.7-binary.txt",
+    "lightgbm-4.7-multiclassova.txt",
+    "lightgbm-4.7-forest-multiclass.txt",
+    "lightgbm-4.7-forest-gamma.txt",
+    "lightgbm-4.7-categorical-zero-as-missing.txt",
+    "catboost-1.2-multiclass.json",
+    "catboost-1.2-onevsall.json",
+    "catboost-1.2-tweedie.json",
+    "sklearn-1.9-forest.onnx",
+    "sklearn-1.9-forest-binary.onnx",
+];
+
+#[test]
+fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
+    let directory = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    put("palpate.h", C_HEADER);
+    let (mut functions, mut calls, mut expected) = (String::new(), String::new(), Vec::new());
+    let forms =
+        [("f32", Leaf::F32), ("i16", Leaf::I16), ("early", Leaf::I16), ("whole", Leaf::I16), ("code", Leaf::I16)];
+    for (number, file) in CALLED.iter().enumerate() {
+        let options = Options { missing: file.contains("missing-0").then_some(0.0), ..Options::default() };
+        let ensemble = Ensemble::load_with(Path::new(ROOT).join("tests/data/import").join(file), &options).unwrap();
+        let stem = file.rsplit_once('.').unwrap().0;
+        let (rows, margins) = (numbers(&format!("{stem}.rows.csv"), 1), numbers(&format!("{stem}.margins.csv"), 0));
+        let imported = ensemble.origin.imported.as_ref().unwrap();
+        let (probability, scale) = (imported.probability, f64::from(imported.prediction.scale));
+        let is_class = ensemble.objects.len() > 1 && !imported.prediction.targets;
+        for (form, leaf) in forms {
+            // Every kind once, and two with everything.
+            if form == "early" && !is_class || number > 1 && ["f32", "i16"][number % 2] == form {
+                continue;
+            }
+            let settings = with!(
+                Settings::default(),
+                leaf,
+                layout = Some(Layout::Compact),
+                scales = (form == "whole").then(|| vec![1000.0; rows[0].len()]),
+                early_exit = (form == "early").then_some(EarlyExit::Always)
+            );
+            let Ok(plain) = compile(&ensemble, &settings) else { continue };
+            let code = with!(settings.clone(), layout = Some(Layout::Code), forms = vec![Form::C]);
+            let code = if form == "code" { compile(&ensemble, &code).unwrap() } else { plain.clone() };
+            let name = format!("m{number}{form}");
+            let header = &sources(&code, &name, &[Language::C]).unwrap()[0].1;
+            put(&format!("{name}.h"), header);
+            let model = Model::new(&plain.bytes).unwrap();
+            let is_whole = form == "whole";
+            let encoder = Encoder::of(&model);
+            let whole = |row: &Vec<f64>| {
+                let keys = encoder.row(row).into_iter();
+                keys.map(|key| if key == i32::MIN { f64::NAN } else { f64::from(key) }).collect::<Vec<_>>()
+            };
+            let given = rows.iter().map(|row| initializer(&if is_whole { whole(row) } else { row.clone() }, is_whole));
+            let has_posteriors = is_class && probability != Probability::Unknown;
+            assert_eq!(header.contains(&format!("{name}_posteriors(")), has_posteriors, "{name}");
+            let bound = header.split("probabilities, within ").nth(1).map(|text| text.split(' ').next().unwrap());
+            let bound: f64 = bound.map_or(0.0, |text| text.parse().unwrap());
+            let outputs = ensemble.objects.len();
+            let call = match (is_class, outputs) {
+                (false, 1) => format!("v[0] = {name}_value(rows[i]);"),
+                (false, _) => format!("{name}_values(rows[i], v);"),
+                (true, _) if has_posteriors => {
+                    format!("{name}_posteriors(rows[i], v); printf(\"%d \", {name}_predict(rows[i]));")
+                }
+                (true, _) => format!("printf(\"%d \", {name}_predict(rows[i])); v[0] = 0;"),
+            };
+            functions += &format!(
+                "#include \"{name}.h\"\nstatic void run_{name}(void)\n{{\n    static const {} rows[][{}] = {{{}}};\n    \
+                 unsigned i, j;\n    float v[{outputs}] = {{0}};\n    for (i = 0; i < {}; i++) {{\n        {call}\n        \
+                 for (j = 0; j < {outputs}; j++) {{\n            printf(\"%.9g \", (double)v[j]);\n        }}\n        \
+                 puts(\"\");\n    }}\n}}\n",
+                if is_whole { "int32_t" } else { "float" },
+                rows[0].len(),
+                given.collect::<Vec<_>>().join(","),
+                rows.len(),
+            );
+            calls += &format!("    run_{name}();\n");
+            let values: Vec<f64> = rows.concat();
+            let predicted = predict(Candidate::Compiled(&model), &values, rows[0].len(), false).unwrap();
+            for (row, margins) in margins.iter().enumerate() {
+                let own = match &predicted {
+                    Predicted::Classes(classes) => vec![classes[row] as f64],
+                    Predicted::Values(values) => {
+                        values[outputs * row..outputs * (row + 1)].iter().map(|&value| f64::from(value)).collect()
+                    }
+                };
+                // A binary model has one column in the file: the score of its second class, or its share.
+                let other = if probability == Probability::Shares { 1.0 - margins[0] } else { 0.0 };
+                let first = vec![other; outputs - margins.len()];
+                let nats: Vec<f64> = first.iter().chain(margins).map(|margin| margin / scale).collect();
+                let shares =
+                    if has_posteriors && !is_whole { probability.of(&nats, scale).unwrap() } else { Vec::new() };
+                expected.push((format!("{name}, row {row}"), own, shares, bound));
+            }
+        }
+    }
+    put(
+        "program.c",
+        &format!("#include <math.h>\n#include <stdio.h>\n{functions}int main(void)\n{{\n{calls}    return 0;\n}}\n"),
+    );
+    let program = directory.path().join("program");
+    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
+    let wide = ["LAYOUTS=127", "LEAVES=7", "EARLY=1", "SENTINEL=1", "SHARED=1", "MAX_OBJECTS=32"];
+    let flags = wide.map(|macros| format!("-DPALPATE_{macros}"));
+    let mut command = Command::new(compiler);
+    command.args(["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-O1"]).args(flags);
+    let built = command.arg("program.c").arg("-o").arg(&program).current_dir(&directory).output().unwrap();
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    let output = Command::new(&program).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(text.lines().count(), expected.len());
+    let mut worst = 0.0_f64;
+    for (line, (name, own, shares, bound)) in text.lines().zip(&expected) {
+        let found: Vec<f64> = line.split_whitespace().map(|number| number.parse().unwrap()).collect();
+        let same = |(found, own): (&f64, &f64)| (*found as f32).to_bits() == (*own as f32).to_bits();
+        assert!(found.iter().zip(own).all(same), "{name}: {line}, not {own:?}");
+        for (found, share) in found[1..].iter().zip(shares) {
+            assert!((found - share).abs() <= *bound, "{name}: {line}, not {shares:?} within {bound}");
+            worst = worst.max((found - share).abs() / bound);
+        }
+    }
+    assert!(expected.len() > 2000 && worst > 0.1, "{} rows, at most {worst} of the bound", expected.len());
+}
