@@ -12,6 +12,7 @@ mod model;
 mod named;
 mod objects;
 mod recognizer;
+mod shape;
 mod stream;
 mod surface;
 mod work;
@@ -33,6 +34,8 @@ mod _native {
     use crate::model::{Model, compile};
     #[pymodule_export]
     use crate::recognizer::Recognizer;
+    #[pymodule_export]
+    use crate::shape::Shape;
     #[pymodule_export]
     use crate::stream::{calibrate, evaluate_sequences};
     #[pymodule_export]

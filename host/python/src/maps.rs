@@ -348,7 +348,7 @@ fn terms(
 }
 
 /// Three numbers, NaN or `None` where one is missing.
-pub(crate) struct Three([Option<f64>; 3]);
+pub(crate) struct Three(pub(crate) [Option<f64>; 3]);
 
 impl<'a, 'py> FromPyObject<'a, 'py> for Three {
     type Error = PyErr;
@@ -366,13 +366,13 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Three {
 
 impl Three {
     /// All three of them.
-    fn all(&self) -> [f64; 3] {
+    pub(crate) fn all(&self) -> [f64; 3] {
         self.0.map(|number| number.unwrap_or(f64::NAN))
     }
 }
 
 /// Direction of the row of fingers: a unit vector, or degrees from the x axis.
-pub(crate) struct Row([f64; 3]);
+pub(crate) struct Row(pub(crate) [f64; 3]);
 
 impl<'a, 'py> FromPyObject<'a, 'py> for Row {
     type Error = PyErr;

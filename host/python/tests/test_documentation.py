@@ -44,7 +44,7 @@ EXAMPLES = {name: text for name, text in NATIVE.items() if ">>>" in text}
 
 def test_the_native_module_has_its_examples() -> None:
     # pytest finds none of them by itself: a number that falls is an example that nobody runs.
-    assert len(EXAMPLES) == 10, sorted(EXAMPLES)
+    assert len(EXAMPLES) == 11, sorted(EXAMPLES)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

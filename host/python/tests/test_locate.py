@@ -180,3 +180,24 @@ def test_wrong_touches_are_refused(maps: palpate.Maps, tmp_path: Path) -> None:
     with pytest.raises(palpate.PalpateError, match="no objects"):
         palpate.Maps.of_meshes({}, probe=PROBE)
     assert locator.touches == 0
+
+
+def test_an_object_without_a_mesh_is_explored_until_it_is_known(maps: palpate.Maps) -> None:
+    def height(x: float, y: float) -> float:
+        return 12.0 if abs(x) < 20 and abs(y) < 10 else 0.0
+
+    shape = palpate.Shape(PROBE, workspace=30)
+    while shape.known(2.0) < 0.6 and shape.touches < 80:
+        x, y, roll = shape.next()
+        assert max(abs(x), abs(y)) <= 30
+        row = [(finger * 15 * math.cos(math.radians(roll)), finger * 15 * math.sin(math.radians(roll))) for finger in (-1, 0, 1)]
+        first, second, third = (height(x + u, y + v) for u, v in row)
+        shape.push_heights((first, second, third), x, y, roll)
+    assert shape.known(2.0) >= 0.6
+    low, high = shape.bounds
+    middle = shape.heights.shape[0] // 2, shape.heights.shape[1] // 2
+    assert low[middle] <= 12 <= high[middle] and abs(shape.heights[middle] - 12) < 1
+    vertices, triangles = shape.mesh()
+    assert max(z for _, _, z in vertices) < 14 and len(triangles) > 100
+    with pytest.raises(palpate.SettingError, match="workspace"):
+        palpate.Shape(PROBE, workspace=math.nan)

@@ -2,7 +2,7 @@
 //!
 //! [`report`] measures the chosen parts, or takes them from an interrupted report, and writes the page. [`view`] makes the page
 //! that shows an object and its touches, [`play`] the one on which objects can be touched, [`watch`] the one that watches a
-//! chip. The page of the program's main job is also drawn here, and [`page`] draws what all of them consist of.
+//! chip, [`shape`] the one of an object's map. The page of the program's main job is also drawn here, and [`page`] draws what all of them consist of.
 
 mod approaches;
 mod cache;
@@ -28,6 +28,7 @@ pub mod results;
 pub mod run_page;
 mod sequential;
 mod settings;
+pub mod shape;
 #[cfg(test)]
 mod small;
 mod stages;

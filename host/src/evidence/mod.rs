@@ -76,12 +76,16 @@ pub(crate) trait Sequences<F: Follower + ?Sized>: Supplier<F> {
     fn end(&mut self, steps: u32, is_whole: bool) -> bool;
 }
 
-/// Steps that are there, as an iterator.
-pub(crate) struct Given<'g, I>(I, PhantomData<&'g ()>);
+/// Steps that are there, as an iterator; as sequences, those of one class.
+pub(crate) struct Given<'g, I>(I, usize, PhantomData<&'g ()>);
 
 impl<'g, S: ?Sized + 'g, I: Iterator<Item = Option<&'g S>>> Given<'g, I> {
     pub(crate) fn new(steps: I) -> Self {
-        Self(steps, PhantomData)
+        Self::of(0, steps)
+    }
+
+    pub(crate) fn of(class: usize, steps: I) -> Self {
+        Self(steps, class, PhantomData)
     }
 }
 
@@ -90,6 +94,16 @@ impl<'g, F: Follower + ?Sized, I: Iterator<Item = Option<&'g F::Step>>> Supplier
 
     fn step(&mut self, _: &F) -> Result<Option<Option<&F::Step>>, Infallible> {
         Ok(self.0.next())
+    }
+}
+
+impl<'g, F: Follower + ?Sized, I: Iterator<Item = Option<&'g F::Step>>> Sequences<F> for Given<'g, I> {
+    fn begin(&mut self) -> Result<Option<Sequence>, Infallible> {
+        Ok(Some(Sequence::new(self.1)))
+    }
+
+    fn end(&mut self, _: u32, is_whole: bool) -> bool {
+        is_whole
     }
 }
 

@@ -195,6 +195,8 @@ pub(super) struct Pressing<'m> {
     pub(super) within: u32,
     pub(super) aimed: Aimed,
     pub(super) pose: u16,
+    /// Seed of the choice of approaches.
+    pub(super) seed: u32,
     /// Next approach; none before the first touch, and where approaches are aimed at random.
     pub(super) next: Option<Approach>,
     /// Heights that were looked up by all approaches, and at most by one.
@@ -213,6 +215,7 @@ impl Follower for Pressing<'_> {
     type Step = Seen;
 
     fn reset(&mut self) {
+        self.locating.begin(self.seed);
         self.next = None;
     }
 

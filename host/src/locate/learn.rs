@@ -2,9 +2,11 @@
 
 use super::Settings;
 use super::error::LocateProblem;
+use super::register::recorded;
+use super::shape::Relief;
 use crate::error::{Error, Result};
 use crate::probe::approach::{FINGERS, Probe};
-use crate::touches::{Dataset, ObjectTouches};
+use crate::touches::{Dataset, ObjectTouches, Source};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use rayon::prelude::*;
@@ -19,6 +21,11 @@ pub(super) const SAME: f64 = 0.8;
 const TURNS: usize = 72;
 /// A placement is round where its heights differ from their mean at the same distance by less than this, in millimeters.
 const ROUND: f64 = 1.2;
+
+/// Guesses below this are the table's, in millimeters.
+const FEW: f64 = 0.8;
+/// A guess is known if it is off by no more than this, in millimeters.
+const KNOWN: f64 = 2.0;
 
 /// A height that a fingertip met, in the placement's frame, in millimeters.
 #[derive(Clone, Copy, Debug)]
@@ -137,43 +144,91 @@ fn of_object(object: usize, touches: &ObjectTouches, probe: &Probe, settings: &S
     let placements = touches.placement_weights().unwrap_or_else(|| vec![(String::new(), 1.0)]);
     let mut surfaces: Vec<Surface> = Vec::new();
     for (placement, share) in placements {
-        let is_own = |touch: &usize| {
-            placement.is_empty() || touches.sources()[touches.source_of(*touch)].placement() == Some(&placement)
+        let is_own =
+            |source: &usize| placement.is_empty() || touches.sources()[*source].placement() == Some(&placement);
+        let sources: Vec<usize> = (0..touches.sources().len()).filter(is_own).collect();
+        let named = |problem: Error| match problem.problem() {
+            Some(LocateProblem::NotMet { object, .. }) => {
+                LocateProblem::NotMet { object: object.clone(), placement: placement.clone() }.into()
+            }
+            _ => problem,
         };
-        let mut met = Vec::new();
-        for touch in (0..touches.len()).filter(is_own) {
-            let heights = heights(&touches.touches()[touch], probe)
-                .ok_or_else(|| LocateProblem::NoPosition { object: touches.name.clone(), touch: touch + 1 })?;
-            let above = |own: Met| Met { height: own.height.max(0.0), ..own };
-            met.extend(heights.into_iter().flatten().map(above));
-        }
-        let named = Surface { object, placement, share, ..surface(&met, settings.cell()) };
-        if named.top() <= TABLE {
-            let Surface { placement, .. } = named;
-            return Err(LocateProblem::NotMet { object: touches.name.clone(), placement }.into());
-        }
-        let same = surfaces.iter_mut().find(|other| {
-            (0..TURNS).any(|turn| named.differs(other, turn as f64 / TURNS as f64 * std::f64::consts::TAU) < SAME)
-        });
-        match same {
-            Some(other) => other.share += named.share,
-            None => surfaces.push(Surface { is_round: named.looks_round(), ..named }),
+        for surface in of_placement(touches, &sources, probe, settings).map_err(named)? {
+            let named = Surface {
+                object,
+                placement: placement.clone() + &surface.placement,
+                share: share * surface.share,
+                ..surface
+            };
+            let same = surfaces.iter_mut().find(|other| {
+                (0..TURNS).any(|turn| named.differs(other, turn as f64 / TURNS as f64 * std::f64::consts::TAU) < SAME)
+            });
+            match same {
+                Some(other) => other.share += named.share,
+                None => surfaces.push(Surface { is_round: named.looks_round(), ..named }),
+            }
         }
     }
     Ok(surfaces)
 }
 
-/// Heights that the fingers of a touch met; none without a position or pose.
-pub(super) fn heights(touch: &Touch, probe: &Probe) -> Option<[Option<Met>; FINGERS]> {
+/// The surfaces of a placement: one, or several of recordings whose places relative to each other are not sure.
+fn of_placement(
+    touches: &ObjectTouches,
+    sources: &[usize],
+    probe: &Probe,
+    settings: &Settings,
+) -> Result<Vec<Surface>> {
+    let not_met = || LocateProblem::NotMet { object: touches.name.clone(), placement: String::new() };
+    let is_recorded = |source: &usize| !matches!(touches.sources()[*source], Source::Placement { .. });
+    let by_source = touches.by_source();
+    let all = || sources.iter().flat_map(|source| &by_source[*source]);
+    let no_position = |touch: &usize| LocateProblem::NoPosition { object: touches.name.clone(), touch: touch + 1 };
+    let mut met = Vec::new();
+    for touch in all() {
+        let heights = heights(&touches.touches()[*touch], probe).ok_or_else(|| no_position(touch))?;
+        met.extend(heights.into_iter().flatten().map(|own: Met| Met { height: own.height.max(0.0), ..own }));
+    }
+    if sources.iter().all(is_recorded) && is_few(&met) {
+        let recordings = sources
+            .iter()
+            .map(|source| by_source[*source].iter().map(|touch| touches.touches()[*touch]).collect::<Vec<_>>());
+        return recorded(&touches.name, &recordings.collect::<Vec<_>>(), probe, settings);
+    }
+    let surface = surface(&met, settings.cell());
+    if surface.top() <= TABLE { Err(not_met().into()) } else { Ok(vec![surface]) }
+}
+
+/// True if most of a recorded object's cells were not met.
+fn is_few(met: &[Met]) -> bool {
+    let raised = || met.iter().filter(|met| met.height > TABLE);
+    let side = |of: fn(&Met) -> f64| {
+        let [low, high] = raised().map(of).fold([0.0_f64; 2], |[low, high], at| [low.min(at), high.max(at)]);
+        high - low
+    };
+    (met.len() as f64) < 2.0 * side(|met| met.x) * side(|met| met.y)
+}
+
+/// Fingertips of a touch at its first contact; none without a position or pose.
+pub(super) fn tips(touch: &Touch, probe: &Probe) -> Option<[Met; FINGERS]> {
     let (pose, position) = (touch.pose()?, touch.position()?);
     let [x, y, z] = position.micrometers.map(|micrometers| f64::from(micrometers) / 1_000.0);
     let one = f64::from(palpate_shared::Q15_ONE);
     let row = pose.alignment.map(|share| f64::from(share) / one * probe.spacing);
-    let times = touch.times();
-    Some(std::array::from_fn(|number| {
-        let (micros, finger) = (times[number].micros()?, number as f64 - 1.0);
-        let height = z + finger * row[2] - f64::from(micros) * 1e-6 * probe.speed;
-        Some(Met { x: x + finger * row[0], y: y + finger * row[1], height })
+    Some([-1.0, 0.0, 1.0].map(|finger| Met {
+        x: x + finger * row[0],
+        y: y + finger * row[1],
+        height: z + finger * row[2],
+    }))
+}
+
+/// Heights that the fingers of a touch met; none without a position or pose.
+pub(super) fn heights(touch: &Touch, probe: &Probe) -> Option<[Option<Met>; FINGERS]> {
+    let (tips, times) = (tips(touch, probe)?, touch.times());
+    Some(std::array::from_fn(|finger| {
+        let micros = times[finger].micros()?;
+        let Met { x, y, height } = tips[finger];
+        Some(Met { x, y, height: height - f64::from(micros) * 1e-6 * probe.speed })
     }))
 }
 
@@ -207,6 +262,24 @@ fn surface(met: &[Met], cell: f64) -> Surface {
         }
     }
     let heights: Vec<f64> = known.into_iter().map(|height| height.unwrap_or(0.0)).collect();
+    footprint(half, cell, &heights, &own)
+}
+
+/// The surface of an object whose touches are few: guesses between them, about the middle of its footprint.
+pub(super) fn guessed(relief: &Relief, cell: f64) -> Surface {
+    let step = cell.round() as i32;
+    let half = relief.half.map(|half| half / step);
+    let at = |place: [i32; 2]| index(relief.half, place.map(|axis| axis * step));
+    let height =
+        |cell: usize| if relief.may_be_object(cell) && relief.heights[cell] > FEW { relief.heights[cell] } else { 0.0 };
+    let heights: Vec<f64> = places(half).map(|place| at(place).map_or(0.0, height)).collect();
+    let is_known = |cell: usize| !relief.is_guessed(cell, KNOWN);
+    let known: Vec<bool> = places(half).map(|place| at(place).is_some_and(is_known)).collect();
+    footprint(half, cell, &heights, &known)
+}
+
+/// The part of a grid that an object stands on.
+fn footprint(half: [i32; 2], cell: f64, heights: &[f64], own: &[bool]) -> Surface {
     // What rises from the table with its neighbors; one cell alone is noise.
     let is_object = |at: [i32; 2]| {
         let about = places([2, 2]).filter_map(|by| Some(heights[index(half, [at[0] + by[0], at[1] + by[1]])?]));
@@ -228,7 +301,7 @@ fn surface(met: &[Met], cell: f64) -> Surface {
 }
 
 /// Cells of the connected pieces that are at least a twentieth of the largest: noise on the table makes small ones.
-fn pieces(half: [i32; 2], cells: Vec<[i32; 2]>) -> Vec<[i32; 2]> {
+pub(super) fn pieces(half: [i32; 2], cells: Vec<[i32; 2]>) -> Vec<[i32; 2]> {
     let mut is_free = vec![false; count(half)];
     cells.iter().filter_map(|at| index(half, *at)).for_each(|cell| is_free[cell] = true);
     let mut pieces = Vec::new();
@@ -257,17 +330,17 @@ const MOST: i32 = 250;
 const MARGIN: i32 = 3;
 const SIDES: [[i32; 2]; 4] = [[1, 0], [-1, 0], [0, 1], [0, -1]];
 
-fn count([x, y]: [i32; 2]) -> usize {
+pub(super) fn count([x, y]: [i32; 2]) -> usize {
     ((2 * x + 1) * (2 * y + 1)) as usize
 }
 
 /// All cells of a grid.
-fn places([x, y]: [i32; 2]) -> impl Iterator<Item = [i32; 2]> {
+pub(super) fn places([x, y]: [i32; 2]) -> impl Iterator<Item = [i32; 2]> {
     (-y..=y).flat_map(move |j| (-x..=x).map(move |i| [i, j]))
 }
 
 /// The position of a cell in a grid, if it is in it.
-fn index([x, y]: [i32; 2], [i, j]: [i32; 2]) -> Option<usize> {
+pub(super) fn index([x, y]: [i32; 2], [i, j]: [i32; 2]) -> Option<usize> {
     (i.abs() <= x && j.abs() <= y).then(|| ((j + y) * (2 * x + 1) + i + x) as usize)
 }
 

@@ -16,6 +16,10 @@ mod inspect;
 mod learn;
 mod pose;
 mod promise;
+mod register;
+mod shape;
+#[cfg(test)]
+mod shape_tests;
 #[cfg(feature = "train")]
 mod table;
 #[cfg(test)]
@@ -28,7 +32,8 @@ pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspec
 pub use learn::{Surface, learn, probe_of};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, POSE, Pose, Seen, TESTED};
 pub use pose::{Off, Until};
-pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, calibrate, evaluate};
+pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, calibrate, calibrate_recorded, evaluate};
+pub use shape::{Relief, Sample, Shape, samples};
 #[cfg(feature = "train")]
 pub use table::{BareTable, LEAST_PRESSES, Measured, REACH, bare_table};
 pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};

@@ -56,12 +56,18 @@ impl Off {
 
 /// Turns by which a placement on the table looks like one of the maps.
 pub(super) struct Equivalents {
-    /// For each object and placement that stands, and each placement of the maps, turns in radians.
+    /// For each object and placement that stands, and each placement of the maps, turns in radians; each looks more alike than
+    /// its neighbors, so a turn that differs a little is not excused.
     turns: Vec<Vec<Vec<Vec<f64>>>>,
 }
 
 /// Turns that are compared.
 const TURNS: usize = 120;
+
+/// A compared turn.
+fn radians(turn: usize) -> f64 {
+    turn as f64 / TURNS as f64 * TAU
+}
 
 impl Equivalents {
     /// Compares all placements. Cost: some seconds for a hundred of them.
@@ -70,14 +76,21 @@ impl Equivalents {
         let of = |object: &Standing| {
             let own = |scene: &Scene| {
                 let surface = pressed(scene, probe);
-                let like = |known: &Surface| {
-                    if maps.object_name(known.object) != object.name {
-                        return Vec::new();
-                    }
-                    let turns = (0..TURNS).map(|turn| turn as f64 / TURNS as f64 * TAU);
-                    turns.filter(|turn| surface.differs(known, *turn) < LIKE).collect()
+                let differences = |known: &Surface| -> Vec<f64> {
+                    let is_of = maps.object_name(known.object) == object.name;
+                    let differs = |turn| if is_of { surface.differs(known, radians(turn)) } else { f64::INFINITY };
+                    (0..TURNS).map(differs).collect()
                 };
-                known.iter().map(like).collect()
+                let each: Vec<Vec<f64>> = known.iter().map(differences).collect();
+                // A map learned from few touches is of its own placement, however noisy it is.
+                let least = each.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+                let limit = LIKE.max(1.25 * least);
+                let alike = |differences: &Vec<f64>| -> Vec<f64> {
+                    let at = |turn: usize| differences[turn % TURNS];
+                    let is_least = |turn: &usize| at(*turn) <= at(turn + 1) && at(*turn) <= at(turn + TURNS - 1);
+                    (0..TURNS).filter(|turn| at(*turn) < limit).filter(is_least).map(radians).collect()
+                };
+                each.iter().map(alike).collect()
             };
             object.placements.iter().map(|(scene, _)| own(scene)).collect()
         };

@@ -9,11 +9,15 @@ use super::{Effort, Hand, Maps, Promised, Seen, TESTED, locating};
 use crate::calibrate::{self, margin_of, odds_of};
 use crate::error::Result;
 use crate::evaluate::Finding;
-use crate::evidence::{self, Follower, Limit, Outcome, Sequence, Totals};
+use crate::evidence::{self, Follower, Given, Limit, Outcome, Sequence, Totals};
 use crate::probe::approach::Probe;
+use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
+use crate::random::{self, Purpose};
+use crate::touches::{Dataset, ObjectTouches, Pool};
 use palpate_onboard::{Familiarity, Stopping};
 use palpate_shared::format::Promise;
+use rand::seq::SliceRandom;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -68,6 +72,9 @@ pub struct Calibrated {
     pub max_touches: u32,
     /// Noise that it holds for, in words.
     pub noise: String,
+    /// Recordings that it rests on; none if it rests on simulated approaches.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recordings: Option<usize>,
 }
 
 /// Results of an evaluation on a simulated table.
@@ -146,29 +153,80 @@ pub fn calibrate(
     terms: &Terms,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
-    let calibrate::Terms { rate, confidence, per } = terms.promise;
-    let names = super::names(&maps);
-    let missing = names.iter().find(|name| !standing.iter().any(|object| object.name == **name));
-    let unknown = standing.iter().find(|object| !names.contains(&object.name));
-    match (missing, unknown) {
-        (Some(object), _) => return Err(LocateProblem::Missing { object: object.clone() }.into()),
-        (_, Some(object)) => return Err(LocateProblem::Unknown { object: object.name.clone() }.into()),
-        _ => {}
-    }
-    let own = ((1.0 - rate) / rate).ln();
+    check_all(maps, standing.iter().map(|object| &object.name))?;
     let plain = Restated { odds: 0, max_touches: terms.max_touches, misfit: None, stretch: 0, promise: None };
     let bytes = restated(maps, &plain)?;
     let plain_maps = opened(&bytes)?;
     let before = Terms { sequences: terms.sequences.div_ceil(2), seed: terms.seed.wrapping_add(1), ..*terms };
     // Where a test is to decide, sequences are as long as it takes.
     let least = if terms.unknown { TESTED } else { 1 };
-    let each = play(plain_maps, standing, probe, &before, (odds_of(own), least), progress)?;
+    let each = play(plain_maps, standing, probe, &before, (odds_of(terms.promise.margin()), least), progress)?;
     let misfit = terms.unknown.then(|| misfit(&each));
     let stated = Restated { misfit, stretch: terms.until.map_or(0, |_| stretch(&each)), ..plain };
     let bytes = restated(maps, &stated)?;
-    let strictest = own + STRICTER;
-    let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest, progress)?;
-    let chosen = calibrate::choose(&sequences, &names, strictest, &terms.promise)?;
+    let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest(terms), progress)?;
+    promised(maps, &sequences, probe, terms, stated)
+}
+
+/// Refuses objects that are not those of the maps.
+fn check_all<'o>(maps: Maps<'_>, objects: impl Iterator<Item = &'o String>) -> Result<(), LocateProblem> {
+    let (names, objects) = (super::names(&maps), objects.collect::<Vec<_>>());
+    if let Some(object) = names.iter().find(|name| !objects.contains(name)) {
+        return Err(LocateProblem::Missing { object: object.clone() });
+    }
+    match objects.into_iter().find(|object| !names.contains(object)) {
+        Some(object) => Err(LocateProblem::Unknown { object: object.clone() }),
+        None => Ok(()),
+    }
+}
+
+/// Finds the loosest threshold that keeps a promise on recorded touches. Those of each recording are of an object that stood still;
+/// in a random order they are cut into sequences that share no touch.
+///
+/// # Errors
+/// As [`calibrate`](fn@calibrate), and as [`seen`](super::seen).
+pub fn calibrate_recorded(
+    maps: Maps<'_>,
+    recorded: &Dataset,
+    probe: &Probe,
+    terms: &Terms,
+    progress: &dyn Progress,
+) -> Result<Calibrated> {
+    check_all(maps, recorded.objects.iter().map(|object| &object.name))?;
+    let hand = Hand::of(&maps).ok_or(LocateProblem::NoHand)?;
+    let plain = Restated { odds: 0, max_touches: terms.max_touches, misfit: None, stretch: 0, promise: None };
+    let bytes = restated(maps, &plain)?;
+    let (plain_maps, names) = (opened(&bytes)?, super::names(&maps));
+    // Recorded touches have noise of their own.
+    let terms = &Terms { aimed: Aimed::Random, real: Real::like(&Noise::default(), probe.speed), ..*terms };
+    let of = |(index, (touches, pool)): (u64, (&ObjectTouches, Pool))| -> Result<Vec<Sequence>> {
+        progress::advance(progress, 1)?;
+        let is_down = |touch: &u32| match super::seen(&hand, &touches.touches()[*touch as usize]) {
+            Err(LocateProblem::NotDown) => Ok(None),
+            seen => seen.map(Some),
+        };
+        let mut steps = pool.touches.iter().map(is_down).collect::<Result<Vec<_>, _>>()?;
+        let mut random = random::generator(terms.seed, Purpose::Calibration, &touches.name, index);
+        steps.shuffle(&mut random);
+        let class = names.iter().position(|name| *name == touches.name).unwrap_or(usize::MAX);
+        let mut replayed = Given::of(class, steps.iter().map(Option::as_ref));
+        let mut pressing = pressing(plain_maps, hand, terms, 1);
+        let limit = Limit { margin: strictest(terms), max_touches: terms.max_touches };
+        let Ok(found) = evidence::sequences(&mut replayed, &mut pressing, usize::MAX, limit);
+        Ok(found)
+    };
+    let pools = |touches| ObjectTouches::pools(touches).into_iter().map(move |pool| (touches, pool));
+    let pools: Vec<_> = (0..).zip(recorded.objects.iter().flat_map(pools)).collect();
+    let count = pools.len();
+    progress.begin("recordings", Some(count as u64));
+    let sequences = pools.into_par_iter().map(of).collect::<Result<Vec<_>>>()?.concat();
+    Ok(Calibrated { recordings: Some(count), ..promised(maps, &sequences, probe, terms, plain)? })
+}
+
+/// The maps with the threshold at which sequences keep a promise.
+fn promised(maps: Maps<'_>, found: &[Sequence], probe: &Probe, terms: &Terms, stated: Restated) -> Result<Calibrated> {
+    let calibrate::Terms { rate, confidence, per } = terms.promise;
+    let chosen = calibrate::choose(found, &super::names(&maps), strictest(terms), &terms.promise)?;
     let odds = chosen.odds.strictest();
     let noise = terms.real.noise(probe.speed);
     let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
@@ -199,11 +257,17 @@ pub fn calibrate(
         margin: margin_of(odds),
         max_touches: terms.max_touches,
         noise: noise.to_string(),
+        recordings: None,
     })
 }
 
-/// Nats beyond the posterior's own threshold at which the strictest is.
-const STRICTER: f64 = 4.0;
+/// The strictest margin that is tried, in nats: more than the promise's own, unless searches are not as fine. They end when cells
+/// that are not fine weigh e^-6 of all.
+fn strictest(terms: &Terms) -> f64 {
+    let own = terms.promise.margin();
+    own.max((own + 4.0).min(6.0))
+}
+
 /// Share of known objects that may be called unknown.
 const ALARMS: f64 = 0.01;
 
@@ -412,17 +476,18 @@ impl<'s> Setup<'s> {
 
     fn sequence(&self, index: u64) -> (Pressed<'_>, Pressing<'_>) {
         let mut drawn: Drawn<'_> = self.world.draw(index);
-        // It must not stop by itself.
-        let stopping = Stopping::from_odds(0, u32::MAX);
-        let mut locating = locating(self.maps, stopping, self.terms.effort);
-        locating.begin(drawn.seed());
-        let within = self.maps.range().unsigned_abs() * 2;
-        let Terms { aimed, pose, .. } = *self.terms;
+        let pressing = pressing(self.maps, self.hand, self.terms, drawn.seed());
         let class = self.class_of[drawn.truth.object];
-        let pressing = Pressing { locating, hand: self.hand, within, aimed, pose, next: None, looked: [0, 0] };
         let before = drawn.truth;
         (Pressed { drawn, class, begun: false, seen: Seen::default(), reach: REACH, before }, pressing)
     }
+}
+
+/// A follower of approaches, which does not stop by itself.
+fn pressing<'m>(maps: Maps<'m>, hand: Hand, &Terms { aimed, pose, effort, .. }: &Terms, seed: u32) -> Pressing<'m> {
+    let locating = locating(maps, Stopping::from_odds(0, u32::MAX), effort);
+    let within = maps.range().unsigned_abs() * 2;
+    Pressing { locating, hand, within, aimed, pose, seed, next: None, looked: [0, 0] }
 }
 
 /// Half of the square about the believed place in which approaches are aimed at random, in millimeters.

@@ -45,7 +45,7 @@ impl Maps<'_> {
         least: i32,
         looked: &mut u32,
     ) -> i32 {
-        let level = i32::from(cell.level);
+        let (level, is_finest) = (i32::from(cell.level), cell.level >= FINEST);
         let (cos, sin) = direction(turn(cell.yaw, cell.level));
         let (x, y) = (self.middle(cell.x, cell.level), self.middle(cell.y, cell.level));
         let side = quotient(self.range * 5, (i32::from(self.roots) << level) * 4);
@@ -60,7 +60,12 @@ impl Maps<'_> {
                 let (u, v) = (i32::from(at(&seen.x, finger)) - x, i32::from(at(&seen.y, finger)) - y);
                 let (u, v) = ((cos * u + sin * v) >> 14, (cos * v - sin * u) >> 14);
                 let radius = length(u, v).min(placement.radius);
-                let interval = self.heights(placement, u, v, blur + ((radius * angle) >> 14));
+                let blur = blur + ((radius * angle) >> 14);
+                let interval = if is_finest && blur <= CLOSE {
+                    self.close(placement, u, v)
+                } else {
+                    self.heights(placement, u, v, blur)
+                };
                 let [of_whole, of_finest] =
                     self.of_finger(i32::from(at(&seen.z, finger)), i32::from(seen.limit), interval);
                 whole += of_whole;
@@ -71,7 +76,9 @@ impl Maps<'_> {
                 break;
             }
         }
-        whole.max(finest).clamp(NOTHING, -NOTHING)
+        // The best height in each interval bounds a cell that is split. In a finest cell it would fit objects with many edges to
+        // anything, more so with each touch.
+        if is_finest { whole } else { whole.max(finest) }.clamp(NOTHING, -NOTHING)
     }
 
     /// Likelihood of a finger's height given an interval, and given the height in it that fits best.
@@ -95,6 +102,8 @@ impl Maps<'_> {
     }
 }
 
+/// Radius of a finest cell, in 1/16 mm, within which its middle tells its heights.
+const CLOSE: i32 = 26;
 /// Half a turn, in radians in Q14.
 const HALF_TURN: i32 = 51_472;
 

@@ -384,7 +384,7 @@ impl<'a> Maps<'a> {
     /// The cell of the finest level that a point is in.
     #[inline(always)]
     fn cell_of(&self, [half_x, half_y]: [i32; 2], x: i32, y: i32) -> (i32, i32) {
-        let shift = if self.is_fine { 4 } else { 5 };
+        let shift = self.shift();
         let middle = 1 << (shift - 1);
         ((x + middle + (half_x << shift)) >> shift, (y + middle + (half_y << shift)) >> shift)
     }
@@ -428,6 +428,27 @@ impl<'a> Maps<'a> {
         [placement.scaled(lowest), placement.scaled(highest)]
     }
 
+    /// Least and greatest height about a point in a finest cell, in 1/16 mm: half of what the four closest cells span, about the
+    /// height between them, or all of it at a wall.
+    #[inline(always)]
+    pub(super) fn close(&self, placement: &Placement, x: i32, y: i32) -> [i32; 2] {
+        let shift = self.shift();
+        let [half_x, half_y] = at(&placement.half, 0);
+        let (x, y) = (x + (half_x << shift), y + (half_y << shift));
+        let Some(heights) = self.square(placement, x >> shift, y >> shift) else { return [0; 2] };
+        let part = |place: i32| (place & ((1 << shift) - 1)).unsigned_abs();
+        let whole = 1_u32 << shift;
+        let [a, b, c, d] = heights;
+        let full = span(heights).map(|height| placement.scaled(height));
+        // At a wall a contact is at its top or at its foot.
+        if full[1] - full[0] > 6 << shift {
+            return full;
+        }
+        let between = |from: u32, to: u32, part: u32| from * (whole - part) + to * part;
+        let middle = between(between(a, b, part(x)), between(c, d, part(x)), part(y)) >> (2 * shift);
+        full.map(|height| (height + placement.scaled(middle)) / 2)
+    }
+
     /// Least and greatest of the cells about a point, for the two finest levels.
     #[inline(always)]
     fn nearby(&self, placement: &Placement, x: i32, y: i32, level: usize) -> [u32; 2] {
@@ -450,14 +471,36 @@ impl<'a> Maps<'a> {
                 [(-1, -1), (1, -1), (-1, 1), (1, 1)].into_iter().for_each(|(u, v)| take(height(i + u, j + v)));
             }
         } else {
-            let (i, j) = ((x + (half[0] << 5)) >> 5, (y + (half[1] << 5)) >> 5);
-            if i < 0 || j < 0 || i >= 2 * half[0] || j >= 2 * half[1] {
-                return [0; 2];
-            }
-            [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().for_each(|(u, v)| take(height(i + u, j + v)));
+            let shift = self.shift();
+            let heights = self.square(placement, (x + (half[0] << shift)) >> shift, (y + (half[1] << shift)) >> shift);
+            return heights.map_or([0; 2], span);
         }
         range
     }
+
+    /// Heights of a cell of the finest level and its three neighbors toward larger x and y; none at the edge.
+    #[inline(always)]
+    fn square(&self, placement: &Placement, i: i32, j: i32) -> Option<[u32; 4]> {
+        let [half, ..] = placement.half;
+        if i < 0 || j < 0 || i >= 2 * half[0] || j >= 2 * half[1] {
+            return None;
+        }
+        let start = at(&placement.offset, 0).wrapping_add(row(half, i, j));
+        let next = start.wrapping_add(row(half, 0, 1));
+        Some([start, start.wrapping_add(1), next, next.wrapping_add(1)].map(|place| self.count(place)))
+    }
+
+    /// Logarithm to base two of a cell's side, in 1/16 mm.
+    #[inline(always)]
+    fn shift(&self) -> u32 {
+        if self.is_fine { 4 } else { 5 }
+    }
+}
+
+/// The least and greatest.
+#[inline(always)]
+fn span(heights: [u32; 4]) -> [u32; 2] {
+    heights.into_iter().fold([u32::MAX, 0], |[low, high], height| [low.min(height), high.max(height)])
 }
 
 /// Radius beyond which a window is the whole placement, in 1/16 mm.

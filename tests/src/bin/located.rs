@@ -4,9 +4,12 @@
 //!
 //! After each `+` are the keys of a run beyond the first ones; without one there is one run. `keep=1` takes the model of the run
 //! before, `row=NAME` prints a row of a table, `write=DIRECTORY` writes the files of the firmware's image `located`.
+//! `explored=NAME,NAME` have no mesh, and are learned from `teaching=300` touches each where the map is least known.
 
 use palpate::calibrate;
-use palpate::locate::{self, Aimed, Approach, Effort, Hand, Maps, Real, Settings, Standing, Truth, Until, World};
+use palpate::locate::{
+    self, Aimed, Approach, Effort, Hand, Maps, Real, Settings, Shape, Standing, Truth, Until, World,
+};
 use palpate::mesh::Object;
 use palpate::probe::approach::Probe;
 use palpate::shared::format::{Length, Per};
@@ -53,11 +56,22 @@ fn main() -> Result<(), Box<dyn Error>> {
         }));
     }
     standing.sort_by(|a, b| a.name.cmp(&b.name));
+    // Objects that have no mesh: each is explored in its most likely placement, and stands in no other.
+    let explored = base.0.get("explored").cloned().unwrap_or_default();
+    let is_explored = |name: &str| explored.split(',').any(|own| own == name);
+    for object in standing.iter_mut().filter(|object| is_explored(&object.name)) {
+        object.placements.sort_by(|one, other| other.1.total_cmp(&one.1));
+        object.placements.truncate(1);
+    }
     // Objects that the model does not know.
     let unknown = base.0.get("unknown").cloned().unwrap_or_default();
     let known: Vec<Standing> =
         standing.iter().filter(|object| !unknown.split(',').any(|name| name == object.name)).cloned().collect();
-    let dataset = taught(&known, &probe, base.number("touches", 20_000.0) as u64);
+    let mut dataset = taught(&known, &probe, base.number("touches", 20_000.0) as u64);
+    for (object, stands) in known.iter().enumerate().filter(|(_, stands)| is_explored(&stands.name)) {
+        let touches = explore(&known, object, &probe, base.number("teaching", 300.0) as usize);
+        dataset.objects[object] = ObjectTouches::new(stands.name.clone(), touches, Source::Object);
+    }
     eprintln!("touches {:.1} s", began.elapsed().as_secs_f64());
     let mut model = Vec::new();
     for given in &runs {
@@ -239,6 +253,25 @@ fn meshes(folder: &str, longest: f64) -> Result<Vec<Object>, Box<dyn Error>> {
         object.millimeters = Some(longest / length);
     }
     Ok(objects)
+}
+
+/// Touches of an object, each where its map is least known.
+fn explore(standing: &[Standing], object: usize, probe: &Probe, touches: usize) -> Vec<palpate::shared::Touch> {
+    let real = Real { lost: 0.0, ..Real::default() };
+    let world = World { standing, probe, real, range: 0.0, seed: 78 };
+    let (scene, _) = &standing[object].placements[0];
+    let [_, high] = scene.bounds();
+    let mut drawn = world.draw(object as u64).at(Truth { object, placement: 0, place: [0.0; 2], yaw: 0.0 });
+    let mut shape = Shape::within(probe, [high.x + 5.0, high.y + 5.0], real.height);
+    let mut all = Vec::new();
+    while all.len() < touches {
+        let relief = shape.relief();
+        let at = shape.next(&relief);
+        let touch = drawn.press(at);
+        shape.push(&touch).expect("the hand states where it is");
+        all.push(touch);
+    }
+    all
 }
 
 /// Touches of each placement, at random about its box.

@@ -34,19 +34,20 @@ Examples:
   palpate calibrate model.palpate fresh -o calibrated.palpate
   palpate calibrate model.palpate posed -o planned.palpate --plan 4
   palpate calibrate maps.palpate --objects meshes/ -o sure.palpate
+  palpate calibrate maps.palpate --recorded stays/ -o sure.palpate
   palpate calibrate a.palpate a.csv --label a --sequence-column id -o b.palpate")]
 pub(crate) struct Arguments {
     /// Compiled model
     model: PathBuf,
     /// Touches to calibrate on: a directory that `palpate capture` filled; or a file of sequences of rows
-    #[arg(value_name = "DIR", required_unless_present = "objects")]
+    #[arg(value_name = "DIR", required_unless_present_any = ["objects", "recorded"])]
     directory: Option<PathBuf>,
     /// Meshes of the objects, for a model of maps: approaches to them on a table are simulated
     #[arg(long, value_name = "MESHES", num_args = 1.., conflicts_with_all = TOUCHES)]
     objects: Vec<String>,
     #[command(flatten)]
     table: TableArguments,
-    /// Recorded touches of the objects; thresholds, or --strangers, are tested on them
+    /// Recorded touches of the objects; thresholds, or --strangers, are tested on them. Of a model of maps, without DIR: each recording is of an object that stood still
     #[arg(long, value_name = "DIR", conflicts_with_all = ["plan", "label"])]
     recorded: Option<PathBuf>,
     /// Where to write; the calibrated model
@@ -143,7 +144,13 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             max_touches: arguments.max_touches,
             seed: global.seed(),
         };
-        return arguments.table.calibrate(&wanted, &arguments.output, global);
+        let Arguments { per, active, strangers, real, recorded, table, output, .. } = &arguments;
+        let is_of_trees = *per != Per::Average || *active || strangers.held().is_some() || real.is_given();
+        if recorded.is_some() && (is_of_trees || strangers.background().is_some()) {
+            let allowed = "it without --per, --active, --strangers, --background and --real, or with DIR";
+            return Err(Error::setting("recorded", "given", allowed));
+        }
+        return table.calibrate(&wanted, recorded.as_deref(), output, global);
     };
     arguments.table.check_unused()?;
     if let Some(rolls) = arguments.plan {

@@ -32,6 +32,7 @@ mod rows;
 mod run;
 mod scene;
 mod sequences;
+mod shape;
 mod shell;
 mod strangers;
 mod table;

@@ -32,6 +32,7 @@ Examples:
   palpate recognize model.palpate data/fork.txt --prior fork=0.3,spoon=0.3
   probe | palpate recognize planned.palpate --active
   robot | palpate recognize maps.palpate --next
+  robot | palpate recognize hand.toml --explore=2mm/50%
   palpate recognize model.palpate monday.mcap --mcap verdicts.mcap
   palpate recognize model.palpate rows.csv --features --json
   palpate recognize a.palpate a.csv --features --add-up --sequence-column id")]
@@ -59,8 +60,12 @@ pub(crate) struct Arguments {
     /// With a model of maps: print each touch's verdict, place and next approach as JSON
     #[arg(long, conflicts_with_all = ["features", "active", "mcap"])]
     next: bool,
-    /// With --next: the middle finger is sent at most so far from the table's origin in x and y [default: twice the maps' range]
-    #[arg(long, value_name = "MM", requires = "next")]
+    /// Explore an object that stands still, for its map: says as JSON where the map is least known, until as many millimeters are known of as large a share
+    #[arg(long, value_name = "MM/SHARE", num_args = 0..=1, require_equals = true, default_missing_value = "2mm/50%")]
+    #[arg(conflicts_with_all = ["next", "features", "active", "mcap"])]
+    explore: Option<super::shape::Known>,
+    /// With --next or --explore: the middle finger is sent at most so far from the table's origin in x and y [default: twice the maps' range; 60 with --explore]
+    #[arg(long, value_name = "MM")]
     workspace: Option<f64>,
     /// Follow the model's plan of approaches; says after each touch where to touch next
     #[arg(long)]
@@ -73,6 +78,12 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    if let Some(goal) = arguments.explore {
+        return super::shape::explore(goal, &arguments.model, &arguments.file, arguments.workspace);
+    }
+    if arguments.workspace.is_some() && !arguments.next {
+        return Err(Error::setting("workspace", "given", "it with --next or --explore"));
+    }
     if let Some(maps) = MapsFile::read(&arguments.model)? {
         let Arguments { features, active, error_rate, max_touches, next, workspace, .. } = arguments;
         let of_trees = [("features", features), ("active", active), ("mcap", arguments.mcap.is_some())];

@@ -42,7 +42,7 @@ struct Mode<'m> {
 
 /// An approach straight down: the place of the middle finger in millimeters, and the row's angle from the x axis in degrees.
 #[derive(serde::Serialize)]
-struct Next {
+pub(super) struct Next {
     x: f64,
     y: f64,
     roll: f64,

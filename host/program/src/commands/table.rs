@@ -5,7 +5,9 @@ use super::maps::name;
 use super::probe::UnitArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
+use super::shape::{self, Touched};
 use palpate::calibrate;
+use palpate::ensemble::StatedProbe;
 use palpate::error::LocateProblem;
 use palpate::evaluate::Finding;
 use palpate::locate::{
@@ -13,9 +15,10 @@ use palpate::locate::{
 };
 use palpate::output;
 use palpate::probe::Probe;
+use palpate::probe::file::ProbeFile;
 use palpate::wording::{count, decimal, percent, rate};
 use palpate::{Error, Result};
-use palpate_shared::format::Per;
+use palpate_shared::format::{Length, Per};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -89,9 +92,16 @@ impl TableArguments {
         let noise = wanted.real.on_table(locate::stated(&maps).noise(probe.speed))?;
         let mut units = self.units.clone();
         units.imply_true_size();
-        let mut objects = units.objects(wanted.objects, wanted.seed)?;
-        objects.sort_by(|a, b| a.name.cmp(&b.name));
-        let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, &Bar::new())?;
+        let (touched, meshes): (Vec<String>, Vec<String>) =
+            wanted.objects.iter().cloned().partition(|source| shape::is_touches(source));
+        let objects = if meshes.is_empty() { Vec::new() } else { units.objects(&meshes, wanted.seed)? };
+        let mut standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, &Bar::new())?;
+        let hand = ProbeFile { probe, unit: Length::Millimeter, real: locate::stated(&maps).noise(probe.speed) };
+        for source in &touched {
+            let Touched { name, shape, .. } = shape::read(Path::new(source), &hand)?;
+            standing.push(shape.standing(&name)?);
+        }
+        standing.sort_by(|a, b| a.name.cmp(&b.name));
         let promised = Promised::of(&maps).map(|promised| promised.aimed);
         let terms = Terms {
             promise: wanted.promise,
@@ -109,19 +119,31 @@ impl TableArguments {
         Ok(Table { file, standing, probe, terms })
     }
 
-    /// Calibrates a model of maps, and writes it.
-    pub(crate) fn calibrate(&self, wanted: &Wanted<'_>, output: &Path, global: &Global) -> Result<()> {
-        output::admit(output, [wanted.model])?;
+    /// Calibrates a model of maps, on recordings if there are some, and writes it.
+    pub(crate) fn calibrate(
+        &self,
+        wanted: &Wanted<'_>,
+        recorded: Option<&Path>,
+        output: &Path,
+        global: &Global,
+    ) -> Result<()> {
+        output::admit(output, recorded.map(super::files_of).into_iter().flatten().chain([wanted.model.into()]))?;
         let Table { file, standing, probe, terms } = self.table(wanted)?;
-        // The sequences of an evaluation with the same seed are others.
-        let terms = Terms { seed: terms.seed.wrapping_mul(2), aimed: self.aimed.unwrap_or(Aimed::Chosen), ..terms };
-        let calibrated = locate::calibrate(file.maps(), &standing, &probe, &terms, &Bar::new())
-            .map_err(|error| error.in_file(wanted.model))?;
+        let maps = file.maps();
+        let calibrated = if let Some(directory) = recorded {
+            self.check_unused()?;
+            let recorded = super::dataset(directory)?;
+            StatedProbe::compare_with(["the maps", "the recordings"], maps.probe(), u32::MAX, &recorded)?;
+            locate::calibrate_recorded(maps, &recorded, &probe, &terms, &Bar::new())
+                .map_err(|error| error.in_file(directory))?
+        } else {
+            // The sequences of an evaluation with the same seed are others.
+            let terms = Terms { seed: terms.seed.wrapping_mul(2), aimed: self.aimed.unwrap_or(Aimed::Chosen), ..terms };
+            locate::calibrate(maps, &standing, &probe, &terms, &Bar::new())
+                .map_err(|error| error.in_file(wanted.model))?
+        };
         output::write_bytes(output, &calibrated.model)?;
-        match global.json {
-            true => output::print_json_about(output, &calibrated),
-            false => output::print_about(output, &calibrated_text(output, &calibrated, file.maps().stopping().odds())),
-        }
+        global.print_about(output, &calibrated, || calibrated_text(output, &calibrated, maps.stopping().odds()))
     }
 
     /// Evaluates a model of maps.
@@ -157,18 +179,22 @@ fn how(aimed: Aimed) -> &'static str {
 fn calibrated_text(path: &Path, calibrated: &Calibrated, before: u64) -> String {
     let Calibrated { promised, confidence, aimed, sequences, given, wrong, .. } = *calibrated;
     let margins = [("all".to_owned(), calibrated.margin)].into_iter().collect();
+    let terms = match calibrated.recordings {
+        None => format!("{}, for {}", how(aimed), calibrated.noise),
+        Some(recordings) => format!("approaches like those of {recordings} recordings, in any order"),
+    };
+    let note = "note: sequences of one recording share its pose: record each object in many places.\n";
     super::thresholds::promised(promised, Per::Average, "", confidence)
         + &format!(
-            "It holds for {}, for {}, and for at most {} of them.\n\
+            "It holds for {terms}, and for at most {} of them.\n\
              {} sequences: {} names given, {wrong} wrong, {} without a name; {} approaches each.\n",
-            how(aimed),
-            calibrated.noise,
             calibrated.max_touches,
             count(sequences),
             count(given),
             percent(1.0 - given as f64 / sequences.max(1) as f64, 2),
             decimal(calibrated.mean_approaches, 1),
         )
+        + calibrated.recordings.map_or("", |_| note)
         + &super::thresholds::text(&margins, &Default::default(), calibrate::margin_of(before))
         + &format!("{}: {} bytes\n", path.display(), count(calibrated.model.len()))
 }

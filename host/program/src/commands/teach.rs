@@ -1,8 +1,9 @@
 //! Options and output of `palpate train` for recorded touches.
 
 use palpate::error::{Error, Place, Result, TouchesProblem};
+use palpate::probe::file::ProbeFile;
 use palpate::teach::{Adjusted, Taught, TaughtObject};
-use palpate::touches::{Dataset, ObjectTouches, is_log};
+use palpate::touches::{Dataset, ObjectTouches, Origin, is_log};
 use palpate_report::teach::{more_approaches, page, promise};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -73,8 +74,34 @@ fn file(path: &Path) -> Result<Dataset> {
     Ok(Dataset::new(vec![touches]))
 }
 
-/// Adds the objects of `read`, from `path`.
-fn add(all: &mut Dataset, read: Dataset, path: &Path) -> Result<()> {
+/// Recorded touches with a position beside simulated ones, for maps; alone they are of the probe in a file.
+pub(crate) fn beside(
+    simulated: Option<Dataset>,
+    recorded: Option<Dataset>,
+    file: Option<&ProbeFile>,
+) -> Result<Dataset> {
+    let (simulated, recorded) = (simulated.unwrap_or_default(), recorded.unwrap_or_default());
+    if let Some(known) =
+        recorded.objects.iter().find(|own| simulated.objects.iter().any(|other| other.name == own.name))
+    {
+        let allowed = "objects that the data set does not have: maps of known ones are not adjusted";
+        return Err(Error::setting("teach", &known.name, allowed));
+    }
+    let stated = |file: &ProbeFile| Origin { probe: file.probe, unit: file.unit, position: true, ..Origin::default() };
+    let origin = simulated.origin.or(recorded.origin).or(file.map(stated));
+    let mut all = Dataset { origin, ..Dataset::new([simulated.objects, recorded.objects].concat()) };
+    all.objects.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(all)
+}
+
+/// Adds the objects of `read`, from `path`. Several recordings of one object with positions are all of it.
+fn add(all: &mut Dataset, mut read: Dataset, path: &Path) -> Result<()> {
+    let is_located = super::is_located(&read);
+    for own in all.objects.iter_mut().filter(|_| is_located) {
+        if let Some(place) = read.objects.iter().position(|object| object.name == own.name) {
+            *own = ObjectTouches::joined(own.name.clone(), &[own.clone(), read.objects.remove(place)]);
+        }
+    }
     if let Some(twice) = read.objects.iter().find(|object| all.objects.iter().any(|other| other.name == object.name)) {
         return Err(Error::at(Place::file(path), TouchesProblem::RecordedTwice { name: twice.name.clone() }));
     }

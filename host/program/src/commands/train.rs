@@ -40,6 +40,7 @@ Examples:
   palpate train approaches -o wary.json --background shapes
   palpate train approaches -o taught.json --teach pot.txt --page pot.html
   palpate train located -o maps.palpate --maps cell=2mm
+  palpate train located -o maps.palpate --teach pot.txt
   palpate train --teach recorded -o own.json")]
 pub(crate) struct Arguments {
     /// Touches to train on: a directory that `palpate capture` filled
@@ -128,10 +129,11 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let start = Instant::now();
     let recorded = arguments.teach.read()?;
     let dataset = arguments.directory.as_deref().map(super::dataset).transpose()?;
-    let located = dataset.as_ref().filter(|dataset| super::is_located(dataset)).zip(arguments.directory.as_ref());
-    if let Some((dataset, directory)) = located {
-        return maps(&arguments, dataset, global).map_err(|error| match error.exit_code() {
-            1 => error.in_file(directory),
+    let is_located = |dataset: &&Dataset| super::is_located(dataset);
+    if dataset.as_ref().or(recorded.as_ref()).filter(is_located).is_some() {
+        let paths = [arguments.directory.clone(), arguments.teach.files().into_iter().next()];
+        return maps(&arguments, dataset, recorded, global).map_err(|error| match paths.into_iter().flatten().next() {
+            Some(path) if error.exit_code() == 1 => error.in_file(&path),
             _ => error,
         });
     }
@@ -209,9 +211,10 @@ fn text(output: &Path, trained: &Trained<'_>, made: &Made) -> String {
 }
 
 /// Trains maps on touches with a position, without the options of trees.
-fn maps(arguments: &Arguments, dataset: &Dataset, global: &Global) -> Result<()> {
+fn maps(arguments: &Arguments, simulated: Option<Dataset>, recorded: Option<Dataset>, global: &Global) -> Result<()> {
     let of_trees = [
-        ("teach", !arguments.teach.files().is_empty()),
+        ("extend", arguments.teach.extend.is_some()),
+        ("page", arguments.teach.page.is_some()),
         ("background", arguments.background.is_some()),
         ("preset", arguments.preset.is_some()),
         ("descriptor", arguments.descriptor.is_some()),
@@ -227,10 +230,11 @@ fn maps(arguments: &Arguments, dataset: &Dataset, global: &Global) -> Result<()>
         ));
     }
     let file = arguments.probe.read()?;
-    arguments.probe.of_dataset(file.as_ref(), dataset)?;
-    let noise = arguments.real.on_table(arguments.probe.noise(file.as_ref(), dataset, Noise::default())?)?;
+    let dataset = super::teach::beside(simulated, recorded, file.as_ref())?;
+    arguments.probe.of_dataset(file.as_ref(), &dataset)?;
+    let noise = arguments.real.on_table(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?)?;
     let given = arguments.maps.clone().unwrap_or_default();
-    super::maps::train(dataset, &noise, &given, &arguments.output, global)
+    super::maps::train(&dataset, &noise, &given, &arguments.output, global)
 }
 
 /// Trains on simulated touches, or takes the ensemble that was, and teaches it the recorded ones, if there are any.

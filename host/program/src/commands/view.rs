@@ -5,6 +5,7 @@ use super::play;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::real::RealArguments;
 use super::scene::{SceneArguments, described};
+use super::shape::{self, Touched};
 use super::shell;
 use clap::ArgGroup;
 use glam::DVec3;
@@ -14,8 +15,8 @@ use palpate::mesh::facts::Facts;
 use palpate::output;
 use palpate::touches::{Origin, Surroundings};
 use palpate::{Error, Result};
-use palpate_report::{view, watch};
-use std::path::PathBuf;
+use palpate_report::{shape as view_map, view, watch};
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 #[command(group(ArgGroup::new("recognizes").args(["play", "port"])), after_help = "\
@@ -29,13 +30,17 @@ Examples:
   palpate view cup.obj -o cup.html --true-size mm --probe probe.toml
                                                 as large as it is, your probe
   palpate view fork -o fork.html --scene table  as it lies on a table
+  palpate view pot.txt -o pot.html --probe hand.toml
+                                                touches on a table
+  palpate view mon.txt tue.txt -o pot.html --probe hand.toml
+                                                two, compared
   palpate view --play -o play.html              ten objects, four models
   palpate view --play --model models/household.palpate -o play.html
   palpate view --play --scene table -o table.html
                                                 ten objects on a table
   palpate view --port -o chip.html              a chip, without a program")]
 pub(crate) struct Arguments {
-    /// A built-in object's name, a mesh (OBJ, STL, PLY, glTF, COLLADA) or scan (PLY, PCD, XYZ); with --play several, or directories
+    /// A built-in object's name, a mesh (OBJ, STL, PLY, glTF, COLLADA) or scan (PLY, PCD, XYZ); touches with a position (TXT), one or two; with --play several, or directories
     #[arg(value_name = "SOURCE", required_unless_present_any = ["play", "port"])]
     sources: Vec<String>,
     /// Where to write; the page
@@ -90,6 +95,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return if scene.is_floating() { play::run(wanted, global) } else { play::on_table(wanted, &on, global) };
     }
     let Arguments { sources, output, touches, misses, size, real, .. } = &arguments;
+    if (1..=2).contains(&sources.len()) && sources.iter().all(|source| shape::is_touches(source)) {
+        return maps(&arguments, global);
+    }
     let [source] = &sources[..] else {
         return Err(Error::setting("play", "not given", "it to see several objects on one page"));
     };
@@ -128,6 +136,24 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         text += &described(std::slice::from_ref(&object))?;
     }
     output::print_about(output, &text)
+}
+
+/// Makes a page of the map of an object that was touched where it stands, or of two and their difference.
+fn maps(Arguments { sources, output, size, .. }: &Arguments, global: &Global) -> Result<()> {
+    output::admit(output, sources)?;
+    let file = shape::hand(&size.probe)?;
+    let read = |source: &String| shape::read(Path::new(source), &file);
+    let touched = sources.iter().map(read).collect::<Result<Vec<_>>>()?;
+    let mut maps: Vec<view_map::Map> = Vec::new();
+    let mut registered = false;
+    for Touched { name, touches, shape } in touched {
+        let aligned = maps.first().and_then(|first| first.shape.aligned(&touches));
+        registered = aligned.is_some();
+        maps.push(view_map::Map { name, shape: aligned.unwrap_or(shape), radius: file.probe.radius });
+    }
+    output::write_bytes(output, view_map::page(&maps, registered).as_bytes())?;
+    let text = || format!("{}: open it in a browser\n", output.display());
+    global.print_about(output, &serde_json::json!({ "page": output, "registered": registered }), text)
 }
 
 /// Makes a page that watches a chip.

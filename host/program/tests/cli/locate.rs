@@ -244,3 +244,136 @@ fn presses_on_the_bare_table_measure_it_and_the_fingertips() {
     }
     assert!(!at.join("x.toml").exists());
 }
+
+/// Lines of a hand that presses an L of 20 and 10 mm height, which lies at a place and is turned.
+fn pressed(place: [f64; 2], yaw: f64, count: usize) -> String {
+    pressed_of(1.0, place, yaw, count)
+}
+
+/// Lines of an L whose heights are scaled.
+fn pressed_of(scale: f64, place: [f64; 2], yaw: f64, count: usize) -> String {
+    let (sin, cos) = yaw.sin_cos();
+    let height = |[x, y]: [f64; 2]| match () {
+        () if (0.0..=60.0).contains(&x) && (0.0..=20.0).contains(&y) => 20.0 * scale,
+        () if (0.0..=20.0).contains(&x) && (0.0..=50.0).contains(&y) => 10.0 * scale,
+        () => 0.0,
+    };
+    let line = |number: usize| {
+        let share = |step: f64| (number as f64 * step).fract() * 2.0 - 1.0;
+        let [u, v] = [25.0 + 42.0 * share(0.754_877_666), 25.0 + 36.0 * share(0.569_840_291)];
+        let [x, y] = [place[0] + cos * u - sin * v, place[1] + sin * u + cos * v];
+        let heights = [-15.0, 0.0, 15.0].map(|finger| {
+            let [dx, dy] = [x + finger - place[0], y - place[1]];
+            height([cos * dx + sin * dy, cos * dy - sin * dx])
+        });
+        let first = heights.into_iter().fold(0.0, f64::max);
+        let [one, two, three] = heights.map(|height| (first - height) / 100.0);
+        format!("{one:.6} {two:.6} {three:.6} 0 0 -1 1 0 0 {x:.3} {y:.3} {first:.3}\n")
+    };
+    (0..count).map(line).collect()
+}
+
+#[test]
+fn an_object_without_a_mesh_is_taught_by_touches_with_a_position() {
+    let directory = located();
+    let at = directory.path();
+    std::fs::write(at.join("pot.txt"), pressed([0.0; 2], 0.0, 300)).unwrap();
+    let trained = json(palpate(
+        at,
+        &["train", "data", "--teach", "pot.txt", "-o", "mixed.palpate", "--maps", "cell=2mm,range=30mm", "--json"],
+    ));
+    assert_eq!(trained["objects"], 3);
+    let pot = trained["placements"].as_array().unwrap().iter().filter(|own| own["object"] == "pot").count();
+    assert_eq!(pot, 1);
+    let lines = recognized(at, "mixed.palpate --next", &pressed([-20.0, -15.0], 0.4, 8));
+    assert_eq!(lines.last().unwrap()["object"], "pot", "{lines:?}");
+    // The promise is for the taught object, too.
+    run(
+        at,
+        "calibrate mixed.palpate --objects meshes pot.txt --true-size mm -o sure.palpate --sequences 60 --error-rate 10%",
+    );
+    let alone = "train --teach pot.txt -o own.palpate --probe probe.toml";
+    assert!(run(at, alone).contains("maps of 1 placements of 1 objects"), "{}", run(at, alone));
+    // Another recording, turned, is of the same surface.
+    std::fs::create_dir(at.join("later")).unwrap();
+    std::fs::write(at.join("later/pot.txt"), pressed([10.0, 5.0], 1.0, 200)).unwrap();
+    assert!(
+        run(at, "train --teach pot.txt --teach later/pot.txt -o own.palpate --probe probe.toml")
+            .contains("maps of 1 placements")
+    );
+    refused(at, "train --teach pot.txt -o own.palpate", 1, "not of objects at their true size");
+    std::fs::rename(at.join("pot.txt"), at.join("brick.txt")).unwrap();
+    refused(at, "train data --teach brick.txt -o own.palpate", 2, "objects that the data set does not have");
+}
+
+#[test]
+fn recordings_of_objects_that_stood_still_test_a_promise() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    std::fs::write(at.join("hand.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\nstroke = 20\n")
+        .unwrap();
+    for (name, scale) in [("pot", 1.0), ("lid", 0.5)] {
+        std::fs::write(at.join(format!("{name}.txt")), pressed_of(scale, [0.0; 2], 0.0, 300)).unwrap();
+        for (place, yaw) in [([-25.0, -20.0], 0.3), ([-20.0, -30.0], 1.0), ([10.0, 5.0], 2.5)] {
+            std::fs::write(at.join("stay.txt"), pressed_of(scale, place, yaw, 120)).unwrap();
+            run(at, &format!("data record stay.txt -o stays --object {name} --position --probe hand.toml"));
+        }
+    }
+    run(at, "train --teach pot.txt --teach lid.txt -o own.palpate --probe hand.toml");
+    let said = run(at, "calibrate own.palpate --recorded stays -o sure.palpate --error-rate 20%");
+    assert!(said.contains("It holds for approaches like those of 6 recordings, in any order"), "{said}");
+    assert!(said.contains("note: sequences of one recording share its pose"), "{said}");
+    let promise = &json(palpate(at, &["inspect", "sure.palpate", "--json"]))["promise"];
+    assert_eq!((promise["error_rate"].as_f64(), promise["aimed"].as_str()), (Some(0.2), Some("random")));
+    let again = "calibrate own.palpate --recorded stays -o sure.palpate";
+    refused(at, again, 1, "names given are too few to promise 1 %");
+    refused(at, &format!("{again} --per object"), 2, "or with DIR");
+    refused(at, &format!("{again} --real noise=1ms"), 2, "or with DIR");
+    refused(at, "calibrate own.palpate stays --recorded stays -o sure.palpate", 1, "--recorded");
+    std::fs::write(at.join("other.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 12\nspeed = 100\nstroke = 20\n")
+        .unwrap();
+    run(at, "train --teach pot.txt --teach lid.txt -o other.palpate --probe other.toml");
+    refused(at, "calibrate other.palpate --recorded stays -o sure.palpate", 1, "spacing 12 and 15");
+}
+
+#[test]
+fn touches_with_a_position_have_a_surface_and_a_page() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    std::fs::write(at.join("hand.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\nstroke = 20\n")
+        .unwrap();
+    std::fs::write(at.join("pot.txt"), pressed([0.0; 2], 0.0, 300)).unwrap();
+    std::fs::write(at.join("later.txt"), pressed([10.0, 5.0], 1.0, 200)).unwrap();
+    run(at, "data objects pot.txt -o meshes --probe hand.toml");
+    let checked = run(at, "view meshes/pot.obj -o mesh.html --true-size mm --probe hand.toml");
+    assert!(checked.contains("nothing is wrong with the mesh"), "{checked}");
+    run(at, "view pot.txt -o pot.html --probe hand.toml");
+    let page = std::fs::read_to_string(at.join("pot.html")).unwrap();
+    assert!(page.contains("300 approaches") && page.contains("url(#guessed)") && page.contains("class=\"contact\""));
+    let two = json(palpate(at, &["view", "pot.txt", "later.txt", "-o", "two.html", "--probe", "hand.toml", "--json"]));
+    assert_eq!(two["registered"], true);
+    assert!(std::fs::read_to_string(at.join("two.html")).unwrap().contains("Difference"));
+    refused(at, "view pot.txt -o pot.html", 2, "a probe file in millimeters");
+    std::fs::write(at.join("bad.txt"), pressed([0.0; 2], 0.0, 2) + "NaN 0 0 0 0 -1 1 0 0 0 0 0\n").unwrap();
+    refused(at, "view bad.txt -o bad.html --probe hand.toml", 1, "bad.txt:3");
+    std::fs::write(at.join("bare.txt"), "0 0 0 0 0 -1 1 0 0 0 0 0\n").unwrap();
+    refused(at, "data objects bare.txt -o meshes --probe hand.toml", 1, "bare: no touch met it");
+    std::fs::write(at.join("plain.txt"), "0 0.1 0.2\n").unwrap();
+    refused(at, "data objects plain.txt -o meshes --probe hand.toml", 1, "the touch has no position");
+}
+
+#[test]
+fn exploring_says_where_to_touch_next_until_the_map_is_known() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    std::fs::write(at.join("hand.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\nstroke = 20\n")
+        .unwrap();
+    let lines = recognized(at, "hand.toml --explore=2mm/30% --workspace 30", &pressed([-25.0, -20.0], 0.0, 300));
+    let next = &lines[0]["next"];
+    assert!(next["x"].as_f64().unwrap().abs() <= 30.0 && next["roll"].is_number(), "{next}");
+    assert_eq!(lines[0]["state"], "exploring");
+    let known = lines.iter().find(|line| line["state"] == "known").unwrap();
+    assert!(known["next"].is_null() && known["known"].as_f64().unwrap() >= 0.3, "{known}");
+    refused(at, "recognize hand.toml --explore=2mm lines.txt", 2, "such as 2mm/80%");
+    refused(at, "recognize hand.toml --explore --workspace 900 lines.txt", 2, "from 1 to 200");
+}

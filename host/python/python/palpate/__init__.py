@@ -18,7 +18,7 @@ from ._errors import FileError, InputError, ModelWarning, PalpateError, SettingE
 from ._evaluate import Evaluation, Parity, Sequential, evaluate, parity
 from ._import import compile, to_ensemble
 from ._locate import CalibratedMaps, MapsEvaluation
-from ._native import DataSet, Ensemble, Locator, Maps, Model, Recognizer, Surface, capture, train
+from ._native import DataSet, Ensemble, Locator, Maps, Model, Recognizer, Shape, Surface, capture, train
 from ._stream import Calibrated, Ends, SequenceRecognizer, calibrate, evaluate_sequences
 from ._types import Located, Meshes, Mode, Probe, Progress, Real, Touch, Verdict
 
@@ -50,6 +50,7 @@ __all__ = [
     "SequenceRecognizer",
     "Sequential",
     "SettingError",
+    "Shape",
     "Surface",
     "Touch",
     "Verdict",

@@ -11,7 +11,7 @@ from palpate._types import Located, Meshes, Probe, Progress, Real, Touch, Verdic
 from pandas import DataFrame
 from typing import Any, SupportsFloat, SupportsIndex, final
 
-__all__ = ["DataSet", "Ensemble", "Locator", "Maps", "Model", "Recognizer", "Surface", "calibrate", "capture", "checksums", "compile", "evaluate", "evaluate_sequences", "parity", "sources", "train"]
+__all__ = ["DataSet", "Ensemble", "Locator", "Maps", "Model", "Recognizer", "Shape", "Surface", "calibrate", "capture", "checksums", "compile", "evaluate", "evaluate_sequences", "parity", "sources", "train"]
 
 @final
 class DataSet:
@@ -554,6 +554,60 @@ class Recognizer:
     def verdict(self, /) -> Verdict:
         """
         The verdict after the last touch.
+        """
+
+@final
+class Shape:
+    """
+    Learns the heights of one object that stands still on a table, and says where they are least known.
+
+    `probe` is in millimeters, `workspace` how far from the table's origin the middle finger is sent in x and y, and `noise` the
+    standard deviation of a contact's height, in millimeters.
+
+    >>> import palpate
+    >>> probe = palpate.Probe(radius=1.5, spacing=15, speed=100, tilt=0, stroke=20)
+    >>> shape = palpate.Shape(probe, workspace=20)
+    >>> while shape.known(2.0) < 0.5 and shape.touches < 40:
+    ...     x, y, roll = shape.next()
+    ...     shape.push_heights((10.0, 10.0, 10.0), x, y, roll)
+    >>> shape.heights.shape, bool(abs(shape.heights[22, 22] - 10) < 1)
+    ((45, 45), True)
+    """
+    def __new__(cls, /, probe: Probe, *, workspace: SupportsFloat | SupportsIndex = 60.0, noise: SupportsFloat | SupportsIndex = 0.5) -> Shape: ...
+    @property
+    def bounds(self, /) -> tuple[NDArray[float64], NDArray[float64]]:
+        """
+        The least and the greatest height of each cell: nineteen of twenty such intervals hold the truth.
+        """
+    @property
+    def heights(self, /) -> NDArray[float64]:
+        """
+        Heights in millimeters on a grid of 1 mm about the origin, a row for each y, ascending.
+        """
+    def known(self, /, millimeters: SupportsFloat | SupportsIndex) -> float:
+        """
+        Share of the cells that may be the object's whose height is known to some millimeters.
+        """
+    def mesh(self, /) -> tuple[list[list[float]], list[list[int]]]:
+        """
+        The surface, closed to the table: vertices in millimeters, and triangles.
+        """
+    def next(self, /) -> tuple[float, float, float]:
+        """
+        Where to touch next: x and y of the middle finger in millimeters, and the roll of the row in degrees from the x axis.
+        """
+    def push(self, /, times: Touch, position: Touch, alignment: ArrayLike) -> None:
+        """
+        Takes in a touch, as `Locator.push` does.
+        """
+    def push_heights(self, /, heights: Touch, x: SupportsFloat | SupportsIndex, y: SupportsFloat | SupportsIndex, alignment: ArrayLike, *, lowest: SupportsFloat | SupportsIndex = 0.0) -> None:
+        """
+        Takes in heights, as `Locator.push_heights` does.
+        """
+    @property
+    def touches(self, /) -> int:
+        """
+        The number of touches taken in.
         """
 
 @final

@@ -120,7 +120,7 @@ impl Problem for CompileProblem {
     fn fix(&self) -> String {
         match self {
             Self::Maps => {
-                "`palpate inspect` and `recognize` take it, and `calibrate` and `evaluate` with --objects; other commands take models of trees."
+                "`palpate inspect` and `recognize` take it, and `evaluate` with --objects and `calibrate` with --objects or --recorded alone; other commands take models of trees."
             }
             Self::Model(ModelError::NotAModel) => "Give a file that `palpate export` wrote.",
             Self::Model(ModelError::Version(_)) => "Export the ensemble again with this version of palpate.",

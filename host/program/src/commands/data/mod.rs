@@ -23,7 +23,7 @@ enum Command {
     /// Record touches of a real probe: from lines, a log, or a chip
     Record(Box<record::Arguments>),
     /// Write built-in objects, meshes or surfaces of scans as OBJ files
-    Objects(objects::Arguments),
+    Objects(Box<objects::Arguments>),
     /// Move spheres against a mesh as a file says, to compare the simulator with another engine
     #[command(hide = true)]
     Cast(cast::Arguments),

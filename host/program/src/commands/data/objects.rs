@@ -1,12 +1,14 @@
 //! `palpate data objects`.
 
-use crate::commands::probe::{reading, tell};
+use crate::commands::probe::{ProbeArguments, reading, tell};
+use crate::commands::shape;
 use crate::commands::{Global, remark};
 use palpate::mesh::builtin;
 use palpate::mesh::obj;
 use palpate::mesh::source::{self, Search, Source};
 use palpate::mesh::{Instance, Object};
 use palpate::output;
+use palpate::with;
 use palpate::{Error, Result};
 use palpate_report::page::render;
 use std::fmt::Write as _;
@@ -20,10 +22,12 @@ Examples:
   palpate data objects -o meshes --picture all.png  and a picture of them
   palpate data objects -o meshes --varied 7         other proportions
   palpate data objects mug.pcd -o meshes            the surface of a scan
+  palpate data objects pot.txt -o meshes --probe hand.toml
+                                                    of touches on a table
 
 The built-in meshes are closed, in centimeters, with z up; others keep the unit of their file. The same command always writes the same bytes.")]
 pub(super) struct Arguments {
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), files of touches with a position (TXT), directories of meshes
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
     /// Where to write; a directory for NAME.obj of each object, NAME/INSTANCE.obj of several instances
@@ -38,6 +42,8 @@ pub(super) struct Arguments {
     /// Leave out bad meshes
     #[arg(long)]
     skip_bad: bool,
+    #[command(flatten)]
+    probe: ProbeArguments,
 }
 
 /// A file that was written.
@@ -76,7 +82,20 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
 
 /// The objects, and the files that they come from.
 fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
-    let sources = source::files(&arguments.sources)?;
+    let (touched, others): (Vec<String>, Vec<String>) =
+        arguments.sources.iter().cloned().partition(|source| shape::is_touches(source));
+    let (mut objects, mut files) = if others.is_empty() { Default::default() } else { of_meshes(arguments, &others)? };
+    for source in &touched {
+        let file = shape::hand(&arguments.probe)?;
+        let shape::Touched { name, shape, .. } = shape::read(Path::new(source), &file)?;
+        objects.push(with!(Object::new(name, shape.relief().solid(file.probe.radius)), millimeters = Some(1.0)));
+        files.push(source.into());
+    }
+    Ok((objects, files))
+}
+
+fn of_meshes(arguments: &Arguments, given: &[String]) -> Result<(Vec<Object>, Vec<PathBuf>)> {
+    let sources = source::files(given)?;
     let (mut names, mut files) = (Vec::new(), Vec::new());
     for source in &sources {
         match source {
@@ -88,7 +107,7 @@ fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
     let objects = match arguments.varied {
         None => {
             let search = Search { skips_bad: arguments.skip_bad, ..Search::default() };
-            let loaded = reading(|| source::load(&arguments.sources, search))?;
+            let loaded = reading(|| source::load(given, search))?;
             loaded.notes.iter().for_each(|note| remark(&format!("palpate: {note}")));
             loaded.objects
         }

@@ -1,0 +1,189 @@
+//! Recordings of one object, registered by the follower where its pose is sure.
+
+use super::learn::{Surface, guessed, index};
+use super::shape::{Relief, Sample, Shape, samples};
+use super::{Effort, Hand, Maps, Settings, TOUCHES, Until, locating, seen, write};
+use crate::error::{Error, Result};
+use crate::probe::approach::Probe;
+use crate::with;
+use palpate_shared::Touch;
+
+/// A pose is sure if it is known as well.
+const SURE: Until = Until { millimeters: 3.0, degrees: 8.0 };
+/// Half of the square about the middle of a recording's contacts in which the object's middle is looked for, in millimeters.
+const NEAR: f64 = 15.0;
+/// Fewest touches that a pose is taken from.
+const LEAST: usize = 8;
+/// Share of a recording's contacts that must lie within the intervals of the map that it is merged with.
+const AGREE: f64 = 0.9;
+/// Cosine of the turn from which a pose is another one.
+const APART: f64 = 0.94;
+/// Another turn fits nearly as well if its contacts are off by less than this factor.
+const RIVAL: f64 = 1.25;
+/// A contact that is off by more counts as much, in millimeters.
+const OFF: f64 = 5.0;
+
+/// A pose of one recording's object in another's frame: place in millimeters, and turn in radians.
+type Placed = [f64; 3];
+
+/// The surfaces of an object's recordings: one of all whose places relative to each other are sure, and one of each other.
+///
+/// # Errors
+/// [`LocateProblem::NotMet`](super::error::LocateProblem::NotMet), and as [`samples`].
+pub(super) fn recorded(
+    name: &str,
+    recordings: &[Vec<Touch>],
+    probe: &Probe,
+    settings: &Settings,
+) -> Result<Vec<Surface>> {
+    let mut pieces: Vec<(Shape, f64)> = Vec::new();
+    for touches in recordings {
+        let own: Vec<Sample> = all_samples(touches, probe)?;
+        let merged = pieces.iter_mut().find_map(|(shape, share)| {
+            let moved = registered(shape, touches, &own, probe, settings)?;
+            let all = [shape.samples(), &moved].concat();
+            *shape = Shape::of(all, probe, settings.noise, name).ok()?;
+            *share += 1.0;
+            Some(())
+        });
+        if merged.is_none() {
+            pieces.push((Shape::of(own, probe, settings.noise, name)?, 1.0));
+        }
+    }
+    let count = recordings.len() as f64;
+    let of = |(number, (shape, share)): (usize, (Shape, f64))| Surface {
+        placement: if number == 0 { String::new() } else { format!(" {}", number + 1) },
+        share: share / count,
+        ..guessed(&shape.relief(), settings.cell())
+    };
+    Ok(pieces.into_iter().enumerate().map(of).collect())
+}
+
+/// Samples of all touches.
+pub(super) fn all_samples(touches: &[Touch], probe: &Probe) -> Result<Vec<Sample>> {
+    let all = touches.iter().map(|touch| samples(touch, probe)).collect::<Result<Vec<_>, _>>().map_err(Error::from)?;
+    Ok(all.concat())
+}
+
+/// The samples of another recording in a shape's frame; none unless the follower is sure of its pose, no other turn fits nearly as
+/// well, and the contacts agree.
+pub(super) fn registered(
+    shape: &Shape,
+    touches: &[Touch],
+    own: &[Sample],
+    probe: &Probe,
+    settings: &Settings,
+) -> Option<Vec<Sample>> {
+    let relief = shape.relief();
+    let other = Shape::of(own.to_vec(), probe, settings.noise, "").ok()?;
+    let (found, is_round) = follow(&relief, touches, &other, probe, settings)?;
+    let (off, placed) = refined(&relief, own, found);
+    let is_rival = |turn: i32| {
+        let (rival, at) = refined(&relief, own, turned(&relief, found, f64::from(15 * turn).to_radians()));
+        (at[2] - placed[2]).cos() < APART && rival < RIVAL * off
+    };
+    if !is_round && (1..24).any(is_rival) {
+        return None;
+    }
+    let moved: Vec<Sample> = own.iter().map(|sample| Sample { place: back(placed, sample.place), ..*sample }).collect();
+    let inside = moved.iter().filter(|sample| sample.is_contact).filter_map(|sample| {
+        let cell = cell(&relief, sample.place)?;
+        let [low, high] = relief.bounds[cell];
+        let is_object = relief.may_be_object(cell) || sample.height > 3.0 * settings.noise;
+        is_object.then(|| (low - settings.noise..=high + settings.noise).contains(&sample.height))
+    });
+    let (agreeing, count) =
+        inside.fold((0, 0), |(agreeing, count), agrees| (agreeing + usize::from(agrees), count + 1));
+    (agreeing as f64 >= AGREE * f64::from(count) && count > 0).then_some(moved)
+}
+
+/// The pose of a shape in another recording's frame, from its touches one after the other; and true if it is round; none unless
+/// it becomes sure.
+fn follow(
+    relief: &Relief,
+    touches: &[Touch],
+    other: &Shape,
+    probe: &Probe,
+    settings: &Settings,
+) -> Option<(Placed, bool)> {
+    // A guess is off at steps; the recording's own footprint is near its middle.
+    let settings = with!(
+        settings.clone(),
+        noise = settings.noise.max(1.0),
+        position = settings.position.max(1.0),
+        outliers = 1e-3,
+        range = NEAR,
+        misfit = None
+    );
+    let surface = guessed(relief, settings.cell());
+    let model = write(&[surface], &["object".into()], probe, &settings).ok()?;
+    let maps = Maps::new(&model).ok()?;
+    let hand = Hand::of(&maps)?;
+    let effort = Effort { lookups: 5_000_000, ..Effort::default() };
+    let mut locating = locating(maps, maps.stopping(), Some(effort));
+    locating.begin(1);
+    let middle = other.middle.map(|place| (place * 1e3) as i32);
+    let step = (touches.len() / TOUCHES).max(1);
+    for touch in touches.iter().step_by(step).take(TOUCHES) {
+        let mut position = touch.position()?;
+        (0..2).for_each(|axis| position.micrometers[axis] -= middle[axis]);
+        locating.push(seen(&hand, &touch.with_position(position)).ok()?);
+        let poses = locating.poses(0);
+        let first = *poses.first()?;
+        // Turned in another way it may look the same, but samples would be mixed up.
+        let is_one = first.yaw_within.is_none() || f64::from(first.share) >= 0.95 * 65_536.0;
+        if locating.touches() >= LEAST && is_one && !locating.is_exhausted() && SURE.is_met(&poses) {
+            let [x, y] = [0, 1].map(|axis| f64::from(first.position[axis] + middle[axis]) / 1e3);
+            let yaw = f64::from(first.yaw) / 65_536.0 * std::f64::consts::TAU;
+            // The surface's frame is about the middle of the relief.
+            let (sin, cos) = yaw.sin_cos();
+            let [u, v] = relief.middle;
+            return Some(([x - cos * u + sin * v, y - sin * u - cos * v, yaw], first.yaw_within.is_none()));
+        }
+    }
+    None
+}
+
+/// A place in a recording's frame, in the shape's.
+fn back([x, y, yaw]: Placed, place: [f64; 2]) -> [f64; 2] {
+    let (sin, cos) = yaw.sin_cos();
+    let [u, v] = [place[0] - x, place[1] - y];
+    [cos * u + sin * v, cos * v - sin * u]
+}
+
+fn cell(relief: &Relief, place: [f64; 2]) -> Option<usize> {
+    index(relief.half, [0, 1].map(|axis| (place[axis] - relief.middle[axis]).round() as i32))
+}
+
+/// A pose turned about the shape's middle.
+fn turned(relief: &Relief, [x, y, yaw]: Placed, by: f64) -> Placed {
+    let [u, v] = relief.middle;
+    let (sin, cos) = yaw.sin_cos();
+    let middle = [x + cos * u - sin * v, y + sin * u + cos * v];
+    let (sin, cos) = (yaw + by).sin_cos();
+    [middle[0] - cos * u + sin * v, middle[1] - sin * u - cos * v, yaw + by]
+}
+
+/// The pose nearby at which contacts are closest to the guesses, and the sum of their distances.
+fn refined(relief: &Relief, own: &[Sample], found: Placed) -> (f64, Placed) {
+    let contacts: Vec<&Sample> = own.iter().filter(|sample| sample.is_contact).collect();
+    let off = |placed: &Placed| -> f64 {
+        let off = |sample: &&Sample| {
+            let guess = cell(relief, back(*placed, sample.place)).map_or(0.0, |cell| relief.heights[cell]);
+            (sample.height - guess).abs().min(OFF)
+        };
+        contacts.iter().map(off).sum()
+    };
+    let (mut least, mut best, mut step) = (off(&found), found, 2.0);
+    while step > 0.1 {
+        let around = [[step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step]];
+        let moved = around.map(|by| [best[0] + by[0], best[1] + by[1], best[2]]);
+        let turns = [1.0, -1.0].map(|sign| turned(relief, best, sign * (2.0_f64 * step).to_radians()));
+        let better = moved.into_iter().chain(turns).map(|placed| (off(&placed), placed));
+        match better.min_by(|one, other| one.0.total_cmp(&other.0)).filter(|(off, _)| *off < least) {
+            Some(nearer) => (least, best) = nearer,
+            None => step /= 2.0,
+        }
+    }
+    (least, best)
+}
