@@ -441,7 +441,7 @@ impl<'a> Maps<'a> {
         let [a, b, c, d] = heights;
         let full = span(heights).map(|height| placement.scaled(height));
         // At a wall a contact is at its top or at its foot.
-        if full[1] - full[0] > 6 << shift {
+        if full[1] - full[0] > 4 << shift {
             return full;
         }
         let between = |from: u32, to: u32, part: u32| from * (whole - part) + to * part;
