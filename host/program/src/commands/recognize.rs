@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "MM/SHARE", num_args = 0..=1, require_equals = true, default_missing_value = "2mm/50%")]
     #[arg(conflicts_with_all = ["next", "features", "active", "mcap"])]
     explore: Option<super::shape::Known>,
-    /// With --next or --explore: the middle finger is sent at most so far from the table's origin in x and y [default: twice the maps' range; 60 with --explore]
+    /// Proposed approaches send the middle finger at most so far from the table's origin in x and y [default: twice the maps' range; 60 with --explore]
     #[arg(long, value_name = "MM")]
     workspace: Option<f64>,
     /// Follow the model's plan of approaches; says after each touch where to touch next

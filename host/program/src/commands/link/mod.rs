@@ -107,7 +107,7 @@ pub(crate) struct Arguments {
     /// With a model of maps: print each touch's verdict, place and next approach as JSON
     #[arg(long, conflicts_with_all = ["active", "watch"])]
     next: bool,
-    /// With --next: the middle finger is sent at most so far from the table's origin in x and y [default: twice the maps' range]
+    /// Proposed approaches send the middle finger at most so far from the table's origin in x and y [default: twice the maps' range]
     #[arg(long, value_name = "MM", requires = "next")]
     workspace: Option<f64>,
     /// Write what happens to a file, which `palpate link FILE --watch` follows
