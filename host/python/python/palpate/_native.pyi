@@ -9,6 +9,7 @@ from os import PathLike
 from palpate._locate import CalibratedMaps, MapsEvaluation
 from palpate._types import Located, Meshes, Probe, Progress, Real, Touch, Verdict
 from pandas import DataFrame
+from pathlib import Path
 from typing import Any, SupportsFloat, SupportsIndex, final
 
 __all__ = ["DataSet", "Ensemble", "Locator", "Maps", "Model", "Recognizer", "Shape", "Surface", "calibrate", "capture", "checksums", "compile", "evaluate", "evaluate_sequences", "parity", "sources", "train"]
@@ -419,7 +420,7 @@ class Model:
         """
         The descriptor that turns touches into features; `None` for a model over rows of features.
         """
-    def emit(self, /, path: str | PathLike[str], *, form: str | None = None) -> list[str | PathLike[str]]:
+    def emit(self, /, path: str | PathLike[str], *, form: str | None = None) -> list[Path]:
         """
         Writes the model as source code, and returns the files. `form` is "c" (an array), "rust", "c-code" (trees as C),
         "thumb" or "thumb-m4f" (trees as assembly, for C and Rust); without it a name that ends in ".h" means "c", ".rs" "rust"
