@@ -10,8 +10,10 @@
 //! approaches with the chip's own code, and [`calibrate`](fn@calibrate) finds thresholds that keep a promise on approaches to
 //! objects on a simulated table, chosen or at random.
 
+mod contacts;
 pub(crate) mod error;
 mod follow;
+mod grid;
 mod inspect;
 mod learn;
 mod pose;
@@ -20,6 +22,7 @@ mod register;
 mod shape;
 #[cfg(test)]
 mod shape_tests;
+mod surface;
 #[cfg(feature = "train")]
 mod table;
 #[cfg(test)]
@@ -29,11 +32,12 @@ mod write;
 
 pub use follow::{CELLS, Locating, TOUCHES, locating, seen, within, workspace};
 pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspect, names, stated};
-pub use learn::{Surface, learn, probe_of};
+pub use learn::{learn, probe_of};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, POSE, Pose, Seen, TESTED};
 pub use pose::{Off, Until};
 pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, calibrate, calibrate_recorded, evaluate};
 pub use shape::{Relief, Sample, Shape, samples};
+pub use surface::Surface;
 #[cfg(feature = "train")]
 pub use table::{BareTable, LEAST_PRESSES, Measured, REACH, bare_table};
 pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};

@@ -1,6 +1,6 @@
 //! Poses against the truth, modulo symmetry, and how wide their intervals must be.
 
-use super::learn::{SAME, Surface};
+use super::surface::{SAME, Surface};
 use super::world::{Standing, Truth};
 use super::{Maps, Pose};
 use crate::probe::approach::Probe;

@@ -1,9 +1,10 @@
 //! Recordings of one object, registered by the follower where its pose is sure.
 
-use super::learn::{Surface, guessed, index};
-use super::shape::{Relief, Sample, Shape, samples};
+use super::grid::{index, places};
+use super::shape::{Relief, Sample, Shape, all_samples};
+use super::surface::{Surface, footprint};
 use super::{Effort, Hand, Maps, Settings, TOUCHES, Until, locating, seen, write};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::probe::approach::Probe;
 use crate::with;
 use palpate_shared::Touch;
@@ -23,13 +24,18 @@ const RIVAL: f64 = 1.25;
 /// A contact that is off by more counts as much, in millimeters.
 const OFF: f64 = 5.0;
 
+/// Guesses below this are the table's, in millimeters.
+const FEW: f64 = 0.8;
+/// A guess is known if it is off by no more than this, in millimeters.
+const KNOWN: f64 = 2.0;
+
 /// A pose of one recording's object in another's frame: place in millimeters, and turn in radians.
 type Placed = [f64; 3];
 
 /// The surfaces of an object's recordings: one of all whose places relative to each other are sure, and one of each other.
 ///
 /// # Errors
-/// [`LocateProblem::NotMet`](super::error::LocateProblem::NotMet), and as [`samples`].
+/// [`LocateProblem::NotMet`](super::error::LocateProblem::NotMet), and [`samples`](super::samples).
 pub(super) fn recorded(
     name: &str,
     recordings: &[Vec<Touch>],
@@ -59,15 +65,35 @@ pub(super) fn recorded(
     Ok(pieces.into_iter().enumerate().map(of).collect())
 }
 
-/// Samples of all touches.
-pub(super) fn all_samples(touches: &[Touch], probe: &Probe) -> Result<Vec<Sample>> {
-    let all = touches.iter().map(|touch| samples(touch, probe)).collect::<Result<Vec<_>, _>>().map_err(Error::from)?;
-    Ok(all.concat())
+impl Shape {
+    /// Another recording of the same object, moved and turned onto this one; none unless the follower is sure of its pose, and
+    /// the contacts agree.
+    #[must_use]
+    pub fn aligned(&self, touches: &[Touch]) -> Option<Self> {
+        let own = all_samples(touches, &self.probe).ok()?;
+        let settings = Settings { noise: self.noise, ..Settings::default() };
+        let mut aligned = self.clone();
+        aligned.samples = registered(self, touches, &own, &self.probe, &settings)?;
+        Some(aligned)
+    }
+}
+
+/// The surface of an object whose touches are few: guesses between them, about the middle of its footprint.
+fn guessed(relief: &Relief, cell: f64) -> Surface {
+    let step = cell.round() as i32;
+    let half = relief.half.map(|half| half / step);
+    let at = |place: [i32; 2]| index(relief.half, place.map(|axis| axis * step));
+    let height =
+        |cell: usize| if relief.may_be_object(cell) && relief.heights[cell] > FEW { relief.heights[cell] } else { 0.0 };
+    let heights: Vec<f64> = places(half).map(|place| at(place).map_or(0.0, height)).collect();
+    let is_known = |cell: usize| !relief.is_guessed(cell, KNOWN);
+    let known: Vec<bool> = places(half).map(|place| at(place).is_some_and(is_known)).collect();
+    footprint(half, cell, &heights, &known)
 }
 
 /// The samples of another recording in a shape's frame; none unless the follower is sure of its pose, no other turn fits nearly as
 /// well, and the contacts agree.
-pub(super) fn registered(
+fn registered(
     shape: &Shape,
     touches: &[Touch],
     own: &[Sample],

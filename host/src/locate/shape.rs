@@ -1,11 +1,11 @@
 //! The heights of one object that stands still: what is known of them, what is guessed, and where to touch next.
 
+use super::contacts::{Met, tips};
 use super::error::LocateProblem;
 use super::follow::seen;
-use super::learn::{Met, index, pieces, places, tips};
-use super::register::{all_samples, registered};
-use super::{Approach, Hand, Settings, Standing};
-use crate::error::Result;
+use super::grid::{index, pieces, places};
+use super::{Approach, Hand, Standing};
+use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::scene::{Scene, Table};
@@ -67,14 +67,20 @@ pub fn samples(touch: &Touch, probe: &Probe) -> Result<[Sample; FINGERS], Locate
     }))
 }
 
+/// Samples of all touches.
+pub(super) fn all_samples(touches: &[Touch], probe: &Probe) -> Result<Vec<Sample>> {
+    let all = touches.iter().map(|touch| samples(touch, probe)).collect::<Result<Vec<_>, _>>().map_err(Error::from)?;
+    Ok(all.concat())
+}
+
 /// Touches of one object that stands still.
 #[derive(Clone, Debug)]
 pub struct Shape {
-    probe: Probe,
-    noise: f64,
+    pub(super) probe: Probe,
+    pub(super) noise: f64,
     pub(super) middle: [f64; 2],
     half: [f64; 2],
-    samples: Vec<Sample>,
+    pub(super) samples: Vec<Sample>,
 }
 
 impl Shape {
@@ -116,15 +122,6 @@ impl Shape {
     /// Takes in samples, of three fingers at a time.
     pub fn add(&mut self, samples: impl IntoIterator<Item = Sample>) {
         self.samples.extend(samples);
-    }
-
-    /// Another recording of the same object, moved and turned onto this one; none unless the follower is sure of its pose, and
-    /// the contacts agree.
-    #[must_use]
-    pub fn aligned(&self, touches: &[Touch]) -> Option<Self> {
-        let own = all_samples(touches, &self.probe).ok()?;
-        let settings = Settings { noise: self.noise, ..Settings::default() };
-        Some(Self { samples: registered(self, touches, &own, &self.probe, &settings)?, ..self.clone() })
     }
 
     /// The object as it stands on a simulated table, its guesses taken for the truth.

@@ -57,7 +57,7 @@ fn relief(touches: &[Touch]) -> Relief {
 }
 
 fn height(relief: &Relief, [x, y]: [i32; 2]) -> f64 {
-    relief.heights[learn::index(relief.half, [x, y]).unwrap()]
+    relief.heights[grid::index(relief.half, [x, y]).unwrap()]
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn a_step_stays_a_step_between_few_touches() {
     for at in [[40, 10], [10, 10], [10, 40], [40, 40], [-10, -5]] {
         assert!(off(at) < 1.0, "{at:?}: {}", height(&relief, at));
     }
-    let all = learn::places([60, 50]).filter(|[x, y]| *x >= -5 && *y >= -5);
+    let all = grid::places([60, 50]).filter(|[x, y]| *x >= -5 && *y >= -5);
     let (sum, count) = all.fold((0.0, 0.0), |(sum, count), at| (sum + off(at), count + 1.0));
     assert!(sum / count < 1.0, "{}", sum / count);
 }
@@ -75,7 +75,7 @@ fn a_step_stays_a_step_between_few_touches() {
 #[test]
 fn intervals_hold_the_truth_in_nineteen_of_twenty_cells() {
     let relief = relief(&pressed([0.0; 2], 0.0, 100, ell));
-    let all: Vec<bool> = learn::places(relief.half)
+    let all: Vec<bool> = grid::places(relief.half)
         .enumerate()
         .filter(|(_, at)| ell(at.map(f64::from)) > 0.0)
         .map(|(cell, at)| (relief.bounds[cell][0]..=relief.bounds[cell][1]).contains(&ell(at.map(f64::from))))
@@ -96,7 +96,7 @@ fn touches_of_nothing_and_of_the_table_alone_are_no_object() {
     for heights in [[None; 3], [Some(0.0); 3], [Some(0.4), Some(-0.6), None]] {
         let touches: Vec<Touch> = (0..50).map(|number| touch([f64::from(number), 0.0], heights)).collect();
         assert!(relief(&touches).heights.iter().all(|height| *height < 0.5), "{heights:?}");
-        let all = register::all_samples(&touches, &probe()).unwrap();
+        let all = shape::all_samples(&touches, &probe()).unwrap();
         let error = Shape::of(all, &probe(), 0.5, "pot").unwrap_err().to_string();
         assert!(error.contains("pot: no touch met it"), "{error}");
     }

@@ -1,8 +1,9 @@
 //! Height of the table and offsets of fingertips, from presses on the bare table.
 
 use super::Hand;
+use super::contacts::{Met, heights};
 use super::error::LocateProblem;
-use super::learn::{Met, heights, median};
+use super::learn::median;
 use crate::error::{Error, Place, Result};
 use crate::probe::approach::{FINGERS, Probe};
 use nalgebra::{SMatrix, SVector};

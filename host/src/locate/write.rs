@@ -2,7 +2,7 @@
 
 use super::Settings;
 use super::error::LocateProblem;
-use super::learn::Surface;
+use super::surface::Surface;
 use crate::compile::{OwnedSection, file};
 use crate::error::Result;
 use crate::probe::approach::Probe;
