@@ -87,7 +87,7 @@ impl Shape {
         Ok(())
     }
 
-    /// Where to touch next: x and y of the middle finger in millimeters, and the roll of the row in degrees from the x axis.
+    /// The next approach: x and y of the middle finger in millimeters, and the roll of the row in degrees from the x axis.
     fn next(&mut self) -> (f64, f64, f64) {
         let relief = self.relief().clone();
         let next = self.shape.next(&relief);

@@ -350,7 +350,7 @@ fn seen(object: &Option<String>, rate: f64, tally: Tally, needed: Option<u64>, u
     format!("{all} names given{of}{units}, {wrong} wrong, are too few to know whether {rate_text} % is kept{needed}")
 }
 
-fn percent(rate: f64) -> f64 {
+pub(crate) fn percent(rate: f64) -> f64 {
     (rate * 1e9).round() / 1e7
 }
 

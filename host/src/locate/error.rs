@@ -1,5 +1,6 @@
 //! Problems with recognition of objects with a place.
 
+use crate::calibrate::error::percent;
 use crate::error::Problem;
 use palpate_onboard::ModelError;
 
@@ -113,6 +114,16 @@ pub enum LocateProblem {
     /// There is noise that a simulated table does not have.
     #[error("a simulated table has other noise")]
     Noise,
+    /// There are too few recordings for a promise, even without any error.
+    #[error("{found} recordings are too few to promise {} %: at least {needed} are needed, with a name in each sequence and none wrong", percent(*rate))]
+    FewRecordings {
+        /// The promised rate.
+        rate: f64,
+        /// Recordings, each by the share of its sequences that got a name.
+        found: u64,
+        /// Recordings that are needed.
+        needed: u64,
+    },
     /// An object of the model is not on the table.
     #[error("{object} is not among the objects to calibrate on")]
     Missing {
@@ -158,6 +169,9 @@ impl Problem for LocateProblem {
             Self::Slanted { .. } => "Level the table, or turn the frame of positions so that z is 0 all over it.",
             Self::Trees => "Give a directory of touches, or a model that was trained on touches with a position.",
             Self::Noise => "Use noise, timer, missed (one share for all fingers), position and drift.",
+            Self::FewRecordings { .. } => {
+                "Record the objects in more places, or promise a higher error rate; more touches in the same places do not help."
+            }
             Self::Missing { .. } | Self::Unknown { .. } => {
                 "Give the objects that the model was trained on, all of them and no others."
             }

@@ -6,8 +6,8 @@ use super::pose::{Equivalents, Off, Until};
 use super::world::{Aimed, Drawn, Real, Standing, World};
 use super::write::{Restated, restated};
 use super::{Effort, Hand, Maps, Promised, Seen, TESTED, locating};
-use crate::calibrate::{self, margin_of, odds_of};
-use crate::error::Result;
+use crate::calibrate::{self, Chosen, Stop, Tally, Way, choose_groups, margin_of, odds_of};
+use crate::error::{CalibrateProblem, Error, Result};
 use crate::evaluate::Finding;
 use crate::evidence::{self, Follower, Given, Limit, Outcome, Sequence, Totals};
 use crate::probe::approach::Probe;
@@ -165,7 +165,8 @@ pub fn calibrate(
     let stated = Restated { misfit, stretch: terms.until.map_or(0, |_| stretch(&each)), ..plain };
     let bytes = restated(maps, &stated)?;
     let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest(terms), progress)?;
-    promised(maps, &sequences, probe, terms, stated)
+    let chosen = calibrate::choose(&sequences, &super::names(&maps), strictest(terms), &terms.promise)?;
+    promised(maps, &chosen, probe, terms, stated, None)
 }
 
 /// Refuses objects that are not those of the maps.
@@ -180,11 +181,12 @@ fn check_all<'o>(maps: Maps<'_>, objects: impl Iterator<Item = &'o String>) -> R
     }
 }
 
-/// Finds the loosest threshold that keeps a promise on recorded touches. Those of each recording are of an object that stood still;
-/// in a random order they are cut into sequences that share no touch.
+/// Finds the loosest threshold that keeps a promise for new recordings, on recorded touches. Those of each recording are of an object
+/// that stood still; in a random order they are cut into sequences that share no touch. Sequences of a recording share its pose, so
+/// recordings are the groups of the test by betting (Waudby-Smith and Ramdas, 2024): each counts once.
 ///
 /// # Errors
-/// As [`calibrate`](fn@calibrate), and as [`seen`](super::seen).
+/// The ones of [`calibrate`](fn@calibrate) and [`seen`](super::seen).
 pub fn calibrate_recorded(
     maps: Maps<'_>,
     recorded: &Dataset,
@@ -213,20 +215,36 @@ pub fn calibrate_recorded(
         let mut pressing = pressing(plain_maps, hand, terms, 1);
         let limit = Limit { margin: strictest(terms), max_touches: terms.max_touches };
         let Ok(found) = evidence::sequences(&mut replayed, &mut pressing, usize::MAX, limit);
-        Ok(found)
+        let group = usize::try_from(index).ok();
+        Ok(found.into_iter().map(|sequence| sequence.of_group(group)).collect())
     };
     let pools = |touches| ObjectTouches::pools(touches).into_iter().map(move |pool| (touches, pool));
     let pools: Vec<_> = (0..).zip(recorded.objects.iter().flat_map(pools)).collect();
     let count = pools.len();
     progress.begin("recordings", Some(count as u64));
     let sequences = pools.into_par_iter().map(of).collect::<Result<Vec<_>>>()?.concat();
-    Ok(Calibrated { recordings: Some(count), ..promised(maps, &sequences, probe, terms, plain)? })
+    let calibrate::Terms { rate, .. } = terms.promise;
+    let way = Way { starts: &[strictest(terms)], loosest: None };
+    let chosen = choose_groups(&[], &sequences, names.len(), &way, &terms.promise).map_err(|stop| match stop {
+        Stop::TooMany { tally: Tally { wrong, all }, needed, .. } => {
+            CalibrateProblem::NotKept { object: None, rate, wrong, given: all, needed, remedy: None }.into()
+        }
+        Stop::TooFew { found, needed, .. } => Error::from(LocateProblem::FewRecordings { rate, found, needed }),
+        Stop::Looser => CalibrateProblem::Looser { rate }.into(),
+    })?;
+    promised(maps, &chosen, probe, terms, plain, Some(count))
 }
 
-/// The maps with the threshold at which sequences keep a promise.
-fn promised(maps: Maps<'_>, found: &[Sequence], probe: &Probe, terms: &Terms, stated: Restated) -> Result<Calibrated> {
+/// The maps with a threshold that was chosen; on so many recordings, or on simulated approaches.
+fn promised(
+    maps: Maps<'_>,
+    chosen: &Chosen,
+    probe: &Probe,
+    terms: &Terms,
+    stated: Restated,
+    recordings: Option<usize>,
+) -> Result<Calibrated> {
     let calibrate::Terms { rate, confidence, per } = terms.promise;
-    let chosen = calibrate::choose(found, &super::names(&maps), strictest(terms), &terms.promise)?;
     let odds = chosen.odds.strictest();
     let noise = terms.real.noise(probe.speed);
     let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
@@ -236,7 +254,7 @@ fn promised(maps: Maps<'_>, found: &[Sequence], probe: &Probe, terms: &Terms, st
         per,
         approaches: true,
         active: terms.aimed == Aimed::Chosen,
-        groups: false,
+        groups: recordings.is_some(),
         sequences: count(chosen.sequences),
         given: count(chosen.given),
         wrong: count(chosen.wrong),
@@ -257,7 +275,7 @@ fn promised(maps: Maps<'_>, found: &[Sequence], probe: &Probe, terms: &Terms, st
         margin: margin_of(odds),
         max_touches: terms.max_touches,
         noise: noise.to_string(),
-        recordings: None,
+        recordings,
     })
 }
 

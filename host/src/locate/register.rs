@@ -32,7 +32,7 @@ const KNOWN: f64 = 2.0;
 /// A pose of one recording's object in another's frame: place in millimeters, and turn in radians.
 type Placed = [f64; 3];
 
-/// The surfaces of an object's recordings: one of all whose places relative to each other are sure, and one of each other.
+/// The surfaces of an object's recordings: one for those whose places relative to each other are sure, and one for each of the rest.
 ///
 /// # Errors
 /// [`LocateProblem::NotMet`](super::error::LocateProblem::NotMet), and [`samples`](super::samples).

@@ -31,7 +31,7 @@ const DEVIATIONS: f64 = 1.6;
 const OBJECT: f64 = 1.0;
 /// Error of a guess for each millimeter to the nearest sample where all guesses are equal, in millimeters.
 const UNKNOWN: f64 = 0.2;
-/// A sample tells of cells within this distance, in millimeters.
+/// Distance within which a sample helps to know a cell, in millimeters.
 const TELLS: i32 = 4;
 /// Directions of the row that are compared, in half a turn.
 const ROLLS: u8 = 16;
@@ -50,7 +50,7 @@ pub struct Sample {
 /// Samples of a touch of a probe in millimeters. A missing finger met nothing within the stroke, or its contact was lost.
 ///
 /// # Errors
-/// As [`seen`](super::seen).
+/// [`LocateProblem`], the ones of [`seen`](super::seen).
 pub fn samples(touch: &Touch, probe: &Probe) -> Result<[Sample; FINGERS], LocateProblem> {
     let micrometers = |millimeters: f64| (millimeters * 1e3) as u32;
     let stroke = probe.stroke.map(micrometers);
@@ -113,7 +113,7 @@ impl Shape {
     /// Takes in a touch.
     ///
     /// # Errors
-    /// As [`samples`].
+    /// [`LocateProblem`], the ones of [`samples`].
     pub fn push(&mut self, touch: &Touch) -> Result<(), LocateProblem> {
         self.add(samples(touch, &self.probe)?);
         Ok(())
@@ -124,7 +124,7 @@ impl Shape {
         self.samples.extend(samples);
     }
 
-    /// The object as it stands on a simulated table, its guesses taken for the truth.
+    /// The object standing on a simulated table, with its guessed heights taken as true.
     ///
     /// # Errors
     /// If no surface rises from the table.
@@ -326,7 +326,7 @@ fn disc(half: [i32; 2], [i, j]: [i32; 2], reach: i32) -> impl Iterator<Item = (u
 
 /// The height at a place, and the distance to the nearest sample.
 ///
-/// Of the nearest samples a plane is found that passes close to most of them and ignores the rest, so that it is of one side of a
+/// A plane is fitted that passes close to most of the nearest samples and ignores the rest, so that it stays on one side of a
 /// step: least squares with weights that fall with the distance from the plane, begun at the weighted median. A sample without a
 /// contact counts where the plane is above it.
 fn guess(samples: &[Sample], [x, y]: [f64; 2]) -> (f64, f64) {

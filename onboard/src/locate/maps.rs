@@ -441,7 +441,7 @@ impl<'a> Maps<'a> {
         let [a, b, c, d] = heights;
         let full = span(heights).map(|height| placement.scaled(height));
         // At a wall a contact is at its top or at its foot.
-        if full[1] - full[0] > 4 << shift {
+        if full[1] - full[0] > WALL << shift {
             return full;
         }
         let between = |from: u32, to: u32, part: u32| from * (whole - part) + to * part;
@@ -505,6 +505,8 @@ fn span(heights: [u32; 4]) -> [u32; 2] {
 
 /// Radius beyond which a window is the whole placement, in 1/16 mm.
 const WIDEST: i32 = 36 * 16;
+/// Sides of a cell that four cells span at a wall.
+const WALL: i32 = 4;
 /// Radius of a level's window, in 64ths of its size.
 const REACH: i32 = 130;
 

@@ -1,4 +1,4 @@
-//! Objects that nobody has a mesh of: files of touches with a position, and where to touch next.
+//! Objects without a mesh: files of touches with a position, and the next approach.
 
 use super::probe::ProbeArguments;
 use super::recognize_lines::{Event, each_of};
@@ -56,7 +56,7 @@ fn in_millimeters(file: Option<ProbeFile>) -> Option<ProbeFile> {
     file.filter(|file| file.unit == Length::Millimeter)
 }
 
-/// Goal of exploring: a map of which a share is known to some millimeters.
+/// Goal of exploring: the share of the map that has to be known, and the error that counts as known.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Known {
     millimeters: f64,
@@ -83,7 +83,7 @@ struct Explored {
     state: &'static str,
     /// Share of the cells that may be the object's that is known as well as wanted.
     known: f64,
-    /// Where to touch next; none once the map is known.
+    /// The next approach; none once the map is known.
     next: Option<Next>,
 }
 

@@ -181,9 +181,11 @@ fn calibrated_text(path: &Path, calibrated: &Calibrated, before: u64) -> String 
     let margins = [("all".to_owned(), calibrated.margin)].into_iter().collect();
     let terms = match calibrated.recordings {
         None => format!("{}, for {}", how(aimed), calibrated.noise),
-        Some(recordings) => format!("approaches like those of {recordings} recordings, in any order"),
+        Some(recordings) => {
+            format!("approaches like those of {recordings} recordings, in any order and in new recordings")
+        }
     };
-    let note = "note: sequences of one recording share its pose: record each object in many places.\n";
+    let note = "note: sequences of one recording share its pose, so each recording counts once.\n";
     super::thresholds::promised(promised, Per::Average, "", confidence)
         + &format!(
             "It holds for {terms}, and for at most {} of them.\n\

@@ -595,7 +595,7 @@ class Shape:
         """
     def next(self, /) -> tuple[float, float, float]:
         """
-        Where to touch next: x and y of the middle finger in millimeters, and the roll of the row in degrees from the x axis.
+        The next approach: x and y of the middle finger in millimeters, and the roll of the row in degrees from the x axis.
         """
     def push(self, /, times: Touch, position: Touch, alignment: ArrayLike) -> None:
         """

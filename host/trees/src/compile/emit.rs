@@ -73,7 +73,7 @@ impl Compiled {
     }
 }
 
-/// The header that reads models in C.
+/// Name of the header that reads models in C.
 pub const HEADER: &str = "palpate.h";
 
 /// Writes files of source code under the name of `path`, each with its extension, and beside a header the one that reads models.
@@ -99,7 +99,7 @@ pub fn write_sources(path: &Path, files: &[(&'static str, String)]) -> Result<Ve
 /// Refuses a place beside `path` that source code may not have.
 ///
 /// # Errors
-/// As [`write_sources`].
+/// [`Setting`](crate::error::Setting) `output`, like [`write_sources`]; a file that Palpate did not write is there.
 pub fn check_place(path: &Path, place: &Path) -> Result<()> {
     // A name such as .palpate has no stem, and what is beside it would be hidden.
     let is_hidden = path.file_name().is_none_or(|name| name.as_encoded_bytes().starts_with(b"."));
@@ -116,8 +116,8 @@ pub fn check_place(path: &Path, place: &Path) -> Result<()> {
     output::refuse_foreign(place)
 }
 
-/// A model of which only the bytes are known as a source file, as [`Compiled::sources`] writes it: without probabilities, since
-/// the bytes do not say what the library makes of margins.
+/// Source file of a model whose bytes alone are known. It is the one that [`Compiled::sources`] writes, without probabilities: the
+/// bytes do not say how the library turns margins into them.
 pub fn emit(model: &Model<'_>, name: &str, language: Language) -> String {
     let name = identifier(name);
     match language {
@@ -262,7 +262,7 @@ fn array(bytes: &[u8]) -> String {
     text
 }
 
-/// A name as C and Rust take it.
+/// Turns a name into an identifier of C and Rust: lowercase letters, digits and `_`.
 pub fn identifier(name: &str) -> String {
     let part = |character: char| if character.is_ascii_alphanumeric() { character.to_ascii_lowercase() } else { '_' };
     let name: String = name.chars().map(part).collect();
