@@ -200,9 +200,10 @@ impl Maps {
     /// `aimed` says how approaches are aimed, and which approaches the promise is for: "chosen" ones, as by `Locator.next`, or "random"
     /// ones about the place believed in. `real` is what the simulated hand and table add. `until` goes on until the place is as
     /// sure, such as (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing
-    /// is named before the eighth approach then.
+    /// is named before the eighth approach then. `workspace` is how far from the table's origin the middle finger comes down in x and
+    /// y, in millimeters, by default twice the range.
     #[pyo3(signature = (meshes, *, millimeters=None, error_rate=0.01, confidence=0.95, sequences=1000, max_touches=25,
-        aimed="chosen", real=None, pose=10, until=None, unknown=false, seed=1, progress=None))]
+        aimed="chosen", real=None, pose=10, until=None, unknown=false, workspace=None, seed=1, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn calibrate<'py>(
         &self,
@@ -218,14 +219,15 @@ impl Maps {
         pose: u16,
         until: Option<(f64, f64)>,
         unknown: bool,
+        workspace: Option<f64>,
         seed: u64,
         progress: Option<Callback>,
     ) -> Result<objects::CalibratedMaps<'py>, Failure> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let promise = calibrate::Terms { rate: error_rate, confidence, per: Per::Average };
-        let terms = Terms { promise, unknown, ..terms(sequences, max_touches, aimed, real, pose, until, seed)? };
-        let played = Played { objects: meshes, millimeters, terms };
         let maps = *self.maps();
+        let promise = calibrate::Terms { rate: error_rate, confidence, per: Per::Average };
+        let terms = Terms { promise, unknown, ..terms(&maps, sequences, max_touches, aimed, real, pose, until, workspace, seed)? };
+        let played = Played { objects: meshes, millimeters, terms };
         let found = long(py, progress.as_ref(), |progress| {
             played.play(&maps, progress, |standing, probe, terms| {
                 locate::calibrate(maps, standing, probe, terms, progress)
@@ -240,7 +242,7 @@ impl Maps {
     /// Plays sequences of approaches to these meshes on a simulated table, other ones than those of `calibrate` if the seed is
     /// another, to the maps' own threshold. The arguments are as for `calibrate`.
     #[pyo3(signature = (meshes, *, millimeters=None, sequences=1000, max_touches=25, aimed="chosen", real=None, pose=10,
-        until=None, seed=2, progress=None))]
+        until=None, workspace=None, seed=2, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn evaluate<'py>(
         &self,
@@ -253,13 +255,14 @@ impl Maps {
         real: Option<Real>,
         pose: u16,
         until: Option<(f64, f64)>,
+        workspace: Option<f64>,
         seed: u64,
         progress: Option<Callback>,
     ) -> Result<objects::MapsEvaluation<'py>, Failure> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let terms = terms(sequences, max_touches, aimed, real, pose, until, seed)?;
-        let played = Played { objects: meshes, millimeters, terms };
         let maps = *self.maps();
+        let terms = terms(&maps, sequences, max_touches, aimed, real, pose, until, workspace, seed)?;
+        let played = Played { objects: meshes, millimeters, terms };
         let found = long(py, progress.as_ref(), |progress| {
             played.play(&maps, progress, |standing, probe, terms| {
                 locate::evaluate(maps, standing, probe, terms, progress)
@@ -332,19 +335,23 @@ impl Maps {
 }
 
 /// Terms with a promise of 1 %.
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 fn terms(
+    maps: &locate::Maps<'_>,
     sequences: usize,
     max_touches: u32,
     name: &str,
     real: Option<Real>,
     pose: u16,
     until: Option<(f64, f64)>,
+    workspace: Option<f64>,
     seed: u64,
 ) -> palpate::Result<Terms> {
     let (aimed, Real(real)) = (aimed(name)?, real.unwrap_or_default());
     let until = until.map(|(millimeters, degrees)| Until { millimeters, degrees });
     let promise = calibrate::Terms { rate: 0.01, confidence: 0.95, per: Per::Average };
-    Ok(Terms { promise, sequences, max_touches, aimed, real, pose, until, unknown: false, seed, effort: None })
+    let within = locate::workspace(maps, workspace)?;
+    Ok(Terms { promise, sequences, max_touches, aimed, real, pose, within, until, unknown: false, seed, effort: None })
 }
 
 /// Three numbers, NaN or `None` where one is missing.

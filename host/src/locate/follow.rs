@@ -265,7 +265,9 @@ impl<'m> Supplier<Pressing<'m>> for Pressed<'_> {
             (None, Aimed::Chosen) => Approach { roll: self.drawn.anywhere([0.0; 2], 0.0).roll, ..Approach::default() },
             (None, Aimed::Random) => {
                 let about = follower.believed().filter(|_| self.begun).unwrap_or_default();
-                self.drawn.anywhere(about, self.reach)
+                let at = self.drawn.anywhere(about, self.reach);
+                let half = i32::try_from(follower.within).unwrap_or(i32::MAX);
+                Approach { x: at.x.clamp(-half, half), y: at.y.clamp(-half, half), ..at }
             }
         };
         self.begun = true;

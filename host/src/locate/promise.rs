@@ -40,6 +40,8 @@ pub struct Terms {
     pub until: Option<Until>,
     /// Weight of the pose where approaches are chosen, in 64ths.
     pub pose: u16,
+    /// Greatest x and y of the middle finger from the table's origin, in micrometers: [`workspace`](super::workspace).
+    pub within: u32,
     /// Seed of all random numbers.
     pub seed: u64,
     /// Bounds on the work of an approach; none: a chip's.
@@ -502,9 +504,13 @@ impl<'s> Setup<'s> {
 }
 
 /// A follower of approaches, which does not stop by itself.
-fn pressing<'m>(maps: Maps<'m>, hand: Hand, &Terms { aimed, pose, effort, .. }: &Terms, seed: u32) -> Pressing<'m> {
+fn pressing<'m>(
+    maps: Maps<'m>,
+    hand: Hand,
+    &Terms { aimed, pose, within, effort, .. }: &Terms,
+    seed: u32,
+) -> Pressing<'m> {
     let locating = locating(maps, Stopping::from_odds(0, u32::MAX), effort);
-    let within = maps.range().unsigned_abs() * 2;
     Pressing { locating, hand, within, aimed, pose, seed, next: None, looked: [0, 0] }
 }
 

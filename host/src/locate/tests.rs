@@ -66,6 +66,7 @@ fn terms(sequences: usize) -> Terms {
         unknown: false,
         until: None,
         pose: 10,
+        within: 60_000,
         seed: 7,
         effort: None,
     }
@@ -144,6 +145,22 @@ fn a_calibrated_model_states_its_promise_and_how_approaches_were_aimed() {
         let found = evaluate(maps, &standing, &probe(), &other, &()).unwrap();
         assert!(found.wrong * 4 <= found.given, "{found:?}");
         assert_eq!(Maps::new(&bytes).unwrap().promise(), None);
+    }
+}
+
+#[test]
+fn a_hand_that_may_not_leave_the_middle_needs_more_approaches_chosen_or_at_random() {
+    let bytes = model(&Settings::default());
+    let objects = objects();
+    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
+    for aimed in [Aimed::Chosen, Aimed::Random] {
+        let mean = |within| {
+            let terms = Terms { aimed, within, ..terms(30) };
+            evaluate(Maps::new(&bytes).unwrap(), &standing, &probe(), &terms, &()).unwrap().mean_approaches
+        };
+        let [kept, free] = [0, 60_000].map(mean);
+        assert!(kept > 1.5 * free, "{aimed:?}: {kept} in the middle, {free} anywhere");
+        assert_eq!(mean(u32::MAX), mean(10_000_000));
     }
 }
 

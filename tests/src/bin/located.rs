@@ -153,6 +153,7 @@ fn run(
         unknown: number("strangers", 0.0) > 0.0,
         until: until.then(|| Until { millimeters: number("until", 3.0), degrees: number("degrees", 5.0) }),
         pose: number("pose", 10.0) as u16,
+        within: locate::within(number("workspace", 60.0))?,
         seed: number("seed", 1.0) as u64,
         effort,
     };

@@ -34,6 +34,9 @@ pub(crate) struct TableArguments {
     /// Make a test for objects that the model does not know; names then take eight approaches or more
     #[arg(long, requires = "objects")]
     detect_unknown: bool,
+    /// Greatest x and y of the middle finger from the table's origin, in millimeters [default: twice the maps' range]
+    #[arg(long, value_name = "MM", requires = "objects")]
+    workspace: Option<f64>,
     #[command(flatten)]
     units: UnitArguments,
 }
@@ -113,6 +116,7 @@ impl TableArguments {
             until: self.until,
             // Where the pose is to be sure, approaches are chosen for it, too.
             pose: if self.until.is_some() { 4 * POSE } else { POSE },
+            within: locate::workspace(&maps, self.workspace)?,
             seed: wanted.seed,
             effort: None,
         };
