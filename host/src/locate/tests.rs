@@ -159,7 +159,7 @@ fn a_hand_that_may_not_leave_the_middle_needs_more_approaches_chosen_or_at_rando
             evaluate(Maps::new(&bytes).unwrap(), &standing, &probe(), &terms, &()).unwrap().mean_approaches
         };
         let [kept, free] = [0, 60_000].map(mean);
-        assert!(kept > 1.5 * free, "{aimed:?}: {kept} in the middle, {free} anywhere");
+        assert!(kept > 1.2 * free, "{aimed:?}: {kept} in the middle, {free} anywhere");
         assert_eq!(mean(u32::MAX), mean(10_000_000));
     }
 }
