@@ -61,14 +61,15 @@ impl Maps<'_> {
                 let (u, v) = ((cos * u + sin * v) >> 14, (cos * v - sin * u) >> 14);
                 let radius = length(u, v).min(placement.radius);
                 let blur = blur + ((radius * angle) >> 14);
-                let interval = if is_finest && blur <= CLOSE {
-                    self.close(placement, u, v)
-                } else {
-                    self.heights(placement, u, v, blur)
+                let is_close = is_finest && blur <= CLOSE;
+                let interval = match is_close {
+                    true => self.close(placement, u, v),
+                    false => self.heights(placement, u, v, blur),
                 };
                 let [of_whole, of_finest] =
                     self.of_finger(i32::from(at(&seen.z, finger)), i32::from(seen.limit), interval);
-                whole += of_whole;
+                // Where the object has moved since, the mean over all that it may have offered says next to nothing.
+                whole += if is_finest && !is_close && drift > 0 { of_finest } else { of_whole };
                 finest += of_finest;
             }
             *looked = looked.saturating_add(3);
