@@ -2,8 +2,27 @@
 
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use palpate::progress::Progress;
+use std::process::exit;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
+
+/// The newest bar, to say how far it came.
+static NEWEST: Mutex<Option<ProgressBar>> = Mutex::new(None);
+
+/// Has Ctrl-C say how far a command came that goes on with `--resume`.
+pub(super) fn tell_when_interrupted() {
+    // Without a handler Ctrl-C ends the program as well.
+    _ = ctrlc::set_handler(|| {
+        let bar = NEWEST.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let far = bar.as_ref().and_then(|bar| {
+            bar.set_style(ProgressStyle::with_template("").ok()?);
+            Some(format!(" at {} of {}, {}", bar.position(), bar.length()?, bar.message()))
+        });
+        let far = far.unwrap_or_default();
+        eprintln!("palpate: interrupted{far}. What is done is kept: repeat the command with --resume.");
+        exit(130);
+    });
+}
 
 /// Draws the current stage of a long call: a bar where the number of steps is known, else a spinner. Silent where
 /// stderr is no terminal; cleared when dropped.
@@ -41,6 +60,7 @@ impl Progress for Bar {
             }
         };
         let bar = bar.with_message(stage.to_owned()).with_finish(ProgressFinish::AndClear);
+        *NEWEST.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
         std::mem::replace(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner), bar).finish_and_clear();
     }
 
