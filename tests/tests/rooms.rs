@@ -111,25 +111,6 @@ fn crates_are_built_on_those_below_them_alone() {
 }
 
 #[test]
-fn the_table_of_the_chips_features_has_each_of_them_and_says_which_are_off() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("onboard");
-    let manifest = read_to_string(root.join("Cargo.toml")).unwrap();
-    let features = manifest.split("[features]\n").nth(1).unwrap().split("\n[").next().unwrap();
-    let features: BTreeMap<&str, &str> = features.lines().filter_map(|line| line.split_once(" = ")).collect();
-    let is_on = |name: &str| features["default"].contains(&format!("\"{name}\""));
-    let expected: BTreeMap<&str, bool> =
-        features.keys().filter(|name| **name != "default").map(|name| (*name, is_on(name))).collect();
-    let library = read_to_string(root.join("src/lib.rs")).unwrap();
-    let table = library.split("//! | feature | what |\n").nth(1).unwrap().lines().skip(1);
-    let mut stated = BTreeMap::new();
-    for row in table.map_while(|line| line.strip_prefix("//! | `")) {
-        let (names, what) = row.split_once(" | ").unwrap();
-        stated.extend(names.trim_end_matches('`').split("`, `").map(|name| (name, !what.contains("off by default"))));
-    }
-    assert_eq!(stated, expected);
-}
-
-#[test]
 fn zephyrs_options_are_the_macros_that_the_c_header_takes() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("onboard/c");
     let options = read_to_string(root.join("zephyr/Kconfig")).unwrap();

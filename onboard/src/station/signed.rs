@@ -11,7 +11,7 @@ use palpate_shared::link::{NotStored, Refusal};
 /// Not signed are snapshots, touches, and whatever can write to the flash without the link.
 #[derive(Clone, Copy, Debug)]
 pub struct Signed<S, V> {
-    /// Where models and records are kept.
+    /// The storage of models and records.
     pub storage: S,
     /// The lowest counter of a model.
     pub least: u32,

@@ -242,9 +242,10 @@ pub enum Outcome {
     Verdict(VerdictMessage),
     /// It was not done.
     Refused(Refusal),
-    /// Of [`Command::Begin`] and [`Command::Chunk`]: what is before this offset is there. Chunks from it on are to come, after
-    /// those that are under way and refused; so no chunk goes out before the outcome of its beginning. A chip asks for it when a load that was interrupted begins again, and when a chunk
-    /// could not be written, as after a power cut: flash is written again from the start of its sector.
+    /// To [`Command::Begin`] and [`Command::Chunk`]: all before this offset has arrived. Chunks from it on are to come, once those
+    /// under way were refused; so no chunk goes out before the outcome of its beginning. A chip answers so when a load that was
+    /// interrupted begins again, and when a chunk could not be written, as after a power cut: flash is written again from the
+    /// start of a sector.
     Continue {
         /// Offset of the next chunk.
         offset: u32,

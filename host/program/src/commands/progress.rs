@@ -2,7 +2,6 @@
 
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use palpate::progress::Progress;
-use std::process::exit;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
@@ -10,19 +9,24 @@ use std::time::Duration;
 static NEWEST: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
 /// Has Ctrl-C say how far a command came that goes on with `--resume`.
+#[cfg(unix)]
 pub(super) fn tell_when_interrupted() {
-    // Without a handler Ctrl-C ends the program as well.
-    _ = ctrlc::set_handler(|| {
+    // Without this, Ctrl-C ends the program as well.
+    let Ok(mut signals) = signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT]) else { return };
+    std::thread::spawn(move || {
+        signals.forever().next();
         let bar = NEWEST.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let far = bar.as_ref().and_then(|bar| {
-            bar.set_style(ProgressStyle::with_template("").ok()?);
-            Some(format!(" at {} of {}, {}", bar.position(), bar.length()?, bar.message()))
-        });
-        let far = far.unwrap_or_default();
-        eprintln!("palpate: interrupted{far}. What is done is kept: repeat the command with --resume.");
-        exit(130);
+        let far = bar.and_then(|bar| Some(format!(" at {} of {}, {}", bar.position(), bar.length()?, bar.message())));
+        eprintln!(
+            "\npalpate: interrupted{}. What is done is kept: repeat the command with --resume.",
+            far.unwrap_or_default()
+        );
+        std::process::exit(130);
     });
 }
+
+#[cfg(not(unix))]
+pub(super) fn tell_when_interrupted() {}
 
 /// Draws the current stage of a long call: a bar where the number of steps is known, else a spinner. Silent where
 /// stderr is no terminal; cleared when dropped.

@@ -1,4 +1,4 @@
-//! What it costs to check a signed model: instructions, stack and flash. Without the feature `signed` every signature is taken
+//! Cost of the check of a signed model: instructions, stack and flash. Without the feature `signed` every signature is taken
 //! as good, so the difference in flash is that of the check.
 #![no_std]
 #![no_main]
@@ -23,7 +23,7 @@ const SIGNATURE: [u8; 64] = [
     0x51, 0x41, 0x43, 0x8e, 0x7a, 0x10, 0x0b,
 ];
 
-/// What `station::Signed::verify` is.
+/// The function for `station::Signed::verify`.
 #[cfg(feature = "signed")]
 fn verify(signed: &[u8], signature: &[u8; 64]) -> bool {
     let signature = ed25519_compact::Signature::new(*signature);

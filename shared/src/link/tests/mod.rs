@@ -769,6 +769,14 @@ fn golden_frames_pin_the_format() {
             Message::Answer { asker: 2, tag: 5, answer: Answer::NextPress(press) },
             &[0, 3, 3, 2, 1, 1, 7, 1, 2, 5, 10, 207, 15, 6, 64, 139, 212, 99, 76, 0],
         ),
+        (
+            Message::Outcome { sequence: 7, outcome: Outcome::Continue { offset: 4_096 } },
+            &[0, 3, 3, 2, 1, 1, 10, 3, 7, 3, 128, 32, 64, 191, 151, 254, 0],
+        ),
+        (
+            Message::Outcome { sequence: 7, outcome: Outcome::Refused(Refusal::Older) },
+            &[0, 3, 3, 2, 1, 1, 9, 3, 7, 2, 17, 13, 212, 221, 210, 0],
+        ),
     ];
     for (message, golden) in frames {
         assert_eq!(encode(&Frame { session: 2, message }, &mut [0; FRAME_MAX]), golden);
