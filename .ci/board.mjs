@@ -153,7 +153,6 @@ class Bench {
   constructor() {
     Object.assign(this, start());
     this.line = [];
-    this.awake = 0; // instructions
     this.wire = this.clock.createAlarm(() => this.pass());
     this.until(300);
   }
@@ -175,10 +174,7 @@ class Bench {
         const next = clock.nanosToNextAlarm;
         clock.tick(Math.max(100, Math.min(next > 0 ? next : 1e6, end - clock.nanos)));
         if (core.interruptsUpdated) core.executeInstruction();
-      } else {
-        clock.tick(core.executeInstruction() * 8);
-        this.awake += 1;
-      }
+      } else clock.tick(core.executeInstruction() * 8);
     }
   }
   // What the chip has sent.
@@ -286,27 +282,8 @@ const touches = () => {
   return `${told} touches, times off by up to ${worst} µs`;
 };
 
-// How much the chip is awake without a host: while nothing happens, and in a touch.
-const asleep = () => {
-  const bench = new Bench();
-  const during = (ms, act = () => {}) => {
-    const before = bench.awake;
-    act();
-    bench.until(ms);
-    return bench.awake - before;
-  };
-  during(2000);
-  const idle = during(10000) / 10;
-  const moves = [[2, false, 7.3], [3, false, 23.8], [4, false, 40], [2, true, 3], [3, true, 3], [4, true, 422.9]];
-  const touch = () => moves.reduce((sum, [pin, isOpen, ms]) => sum + during(ms, () => bench.chip.gpio[pin].setInputValue(isOpen)), 0);
-  touch();
-  const inTouch = touch() - idle / 2;
-  expect(idle < 20000, `the chip executes ${idle} instructions per second while nothing happens`);
-  return `awake for ${Math.round(idle)} instructions per idle second, ${Math.round(inTouch)} more in a touch`;
-};
-
 const began = performance.now();
-const notes = [errors, touches, asleep].map((test) => (wrong.length ? "" : test()));
+const notes = [errors, touches].map((test) => (wrong.length ? "" : test()));
 const seconds = ((performance.now() - began) / 1000).toFixed(1);
 console.log(wrong.length ? wrong.map((what) => `WRONG ${name}: ${what}`).join("\n") : `${name}: right, ${seconds} s; ${notes.join("; ")}`);
 process.exitCode = wrong.length ? 1 : 0;
