@@ -704,7 +704,7 @@ fn golden_frames_pin_the_format() {
     let press = Approach { x: -1_000, y: 0, roll: 64 };
     // In micrometers: -12300, 4100, 25000.
     let position = [244, 207, 255, 255, 4, 16, 0, 0, 168, 97, 0, 0];
-    let frames: [(Message<'_>, &[u8]); 13] = [
+    let frames: [(Message<'_>, &[u8]); 15] = [
         (
             Message::Command { sequence: 1, command: Command::Touch { touch: (&touch).into(), detail: true } },
             &[
