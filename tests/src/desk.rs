@@ -72,6 +72,14 @@ pub struct Desk {
     pub may_fail: bool,
     /// Error that ended the session.
     pub failed: Option<LinkError>,
+    /// Commands without an outcome so far.
+    given: VecDeque<Command<'static>>,
+    /// Chunks since the last beginning.
+    chunks: Vec<Command<'static>>,
+    /// Outcomes to come that do not count: the load goes on from an earlier chunk.
+    passed_over: usize,
+    /// Offsets from which the chip had loads go on.
+    pub continued: Vec<u32>,
     /// Off once the power is gone: nothing is read or written then.
     pub power: Rc<Cell<bool>>,
 }
@@ -93,6 +101,10 @@ impl Desk {
             newest: None,
             may_fail: false,
             failed: None,
+            given: VecDeque::new(),
+            chunks: Vec::new(),
+            passed_over: 0,
+            continued: Vec::new(),
             power: Rc::new(Cell::new(true)),
         };
         // Another host each time.
@@ -104,16 +116,44 @@ impl Desk {
     }
 
     fn talk(&mut self) {
-        let Self { host, script, to_chip, now, .. } = self;
+        let Self { host, script, to_chip, now, given, chunks, .. } = self;
         while let Some(step) = script.front() {
             let said = match step {
+                Step::Do(_) if matches!(given.back(), Some(Command::Begin { .. } | Command::Commit)) => false,
                 Step::Do(command) => host.submit(command.clone(), *now, |bytes| to_chip.extend(bytes)).is_some(),
                 Step::Ask(query) => host.is_idle() && host.ask(*query, *now, |bytes| to_chip.extend(bytes)),
             };
             if !said {
                 break;
             }
-            script.pop_front();
+            let Some(Step::Do(command)) = script.pop_front() else { continue };
+            match command {
+                Command::Begin { .. } => chunks.clear(),
+                Command::Chunk { .. } => chunks.push(command.clone()),
+                _ => {}
+            }
+            given.push_back(command);
+        }
+    }
+
+    /// Takes an outcome, unless it is of a chunk that comes again.
+    fn hear(&mut self, outcome: Outcome) {
+        self.given.pop_front();
+        if self.passed_over > 0 {
+            self.passed_over -= 1;
+        } else if let Outcome::Continue { offset: from } = outcome {
+            self.continued.push(from);
+            let is_again = |command: &Command<'_>| matches!(command, Command::Chunk { offset, .. } if *offset >= from);
+            while matches!(self.script.front(), Some(Step::Do(Command::Chunk { offset, .. })) if *offset < from) {
+                self.script.pop_front();
+            }
+            let again = self.chunks.extract_if(.., |command| is_again(command));
+            let commit = self.given.iter().filter(|command| **command == Command::Commit).cloned();
+            let again: Vec<_> = again.chain(commit).map(Step::Do).collect();
+            again.into_iter().rev().for_each(|step| self.script.push_front(step));
+            self.passed_over = self.given.len();
+        } else {
+            self.outcomes.push(outcome);
         }
     }
 
@@ -181,7 +221,8 @@ impl Write for Desk {
             return self.alive().map(|()| 0);
         }
         self.newest = news.or(self.newest);
-        let Self { host, to_chip, outcomes, answers, open, now, .. } = self;
+        let Self { host, to_chip, answers, open, now, .. } = self;
+        let mut outcomes = Vec::new();
         host.receive(
             buffer,
             *now,
@@ -193,6 +234,7 @@ impl Write for Desk {
                 Incoming::Event { .. } => {}
             },
         );
+        outcomes.into_iter().for_each(|outcome| self.hear(outcome));
         Ok(buffer.len())
     }
 

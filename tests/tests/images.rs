@@ -4,6 +4,7 @@
 //! They are built for thumbv6m-none-eabi, so these tests only run where they are asked for:
 //! `cargo test -p palpate-tests --test images -- --ignored --nocapture`, which `.ci/firmware` does.
 
+use palpate::compile::{Core, code_flash};
 use palpate_tests::stated::Readme;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -109,6 +110,18 @@ fn an_image_of_verdicts_alone_cannot_panic_and_holds_no_float_code() {
 #[ignore = "builds firmware: needs the target thumbv6m-none-eabi"]
 fn an_image_with_posteriors_cannot_panic_and_holds_no_float_code() {
     holds_no_panic_and_no_float_code("posterior");
+}
+
+#[test]
+#[ignore = "builds firmware: needs the target thumbv6m-none-eabi"]
+fn the_flash_of_a_set_of_features_is_about_what_inspect_says_and_none_of_them_can_panic() {
+    let others = ["sentinel", "row-evidence"].map(|name| format!("compact,i8-leaves,palpate-onboard/{name}"));
+    let others = others.iter().map(String::as_str).chain(["compact,i8-leaves,outputs"]);
+    for features in IMAGES.iter().map(|(_, features, _)| *features).chain(others) {
+        let names: Vec<&str> = features.split(',').map(|name| name.trim_start_matches("palpate-onboard/")).collect();
+        let (said, found) = (code_flash(Core::M0Plus, &names), image("verdict", features).flash);
+        assert!(said.abs_diff(found) * 20 <= found, "{features}: {found} bytes, {said} by the estimate");
+    }
 }
 
 /// Builds an image with each of the features; a posterior may take 200 bytes more.

@@ -111,6 +111,21 @@ fn crates_are_built_on_those_below_them_alone() {
 }
 
 #[test]
+fn zephyrs_options_are_the_macros_that_the_c_header_takes() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("onboard/c");
+    let options = read_to_string(root.join("zephyr/Kconfig")).unwrap();
+    let options: BTreeSet<&str> = options.lines().filter_map(|line| line.strip_prefix("config PALPATE_")).collect();
+    let header = read_to_string(root.join("palpate.h")).unwrap();
+    let macros = header.split("Macros that may be defined").nth(1).unwrap().lines().skip(1);
+    let macros = macros.map_while(|line| line.strip_prefix(" *   PALPATE_")?.split([' ', '(']).next());
+    // Lists have an option for each of their values, and the others are code.
+    let values = ["COMPACT", "COMPLETE", "GRID", "WIDE", "PATTERNS", "CODE", "I8", "I16", "F32", "SETTINGS"];
+    let expected: BTreeSet<&str> =
+        macros.filter(|name| !["LAYOUTS", "LEAVES", "BYTE", "API"].contains(name)).chain(values).collect();
+    assert_eq!(options, expected);
+}
+
+#[test]
 fn trees_know_no_touch() {
     // The format's limit of steps, and ordinary words.
     let others = ["max_touches", "compos", "dispos", "expos", "oppos", "propos", "purpos", "suppos", "transpos"];

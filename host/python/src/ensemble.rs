@@ -8,7 +8,7 @@ use crate::work::{Callback, long};
 use numpy::ndarray::{Ix1, Ix2};
 use palpate::ensemble::import::{Options, PartTree, Parts};
 use palpate::ensemble::train::{self as library, Outputs, Settings, Small};
-use palpate::ensemble::{self, Inputs, OverTouches, Probability, StatedProbe};
+use palpate::ensemble::{self, Inputs, Node, OverTouches, Probability, StatedProbe, Threshold};
 use palpate::error::{Error, EvaluateProblem};
 use palpate::rows::{Features, notes};
 use palpate::shared::Descriptor;
@@ -132,6 +132,37 @@ impl Ensemble {
         Ok(Self { ensemble: Arc::new(ensemble) })
     }
 
+    /// The feature and the threshold of each split, and whether a value that equals it goes left.
+    fn _splits(&self) -> Result<(Vec<usize>, Vec<f64>, Vec<bool>), Failure> {
+        let imported = self.ensemble.origin.imported.as_ref();
+        if imported.is_some_and(|imported| imported.sentinel.is_some() || imported.columns.is_some()) {
+            let allowed = "a model of at most 256 columns in which NaN alone is missing";
+            return Err(Error::setting("model", "a pipeline", allowed).into());
+        }
+        let mut splits = (Vec::new(), Vec::new(), Vec::new());
+        for (tree, node, feature) in self.split_nodes() {
+            let Some(Threshold { value, inclusive }) = self.ensemble.threshold(tree, node) else { continue };
+            splits.0.push(feature);
+            splits.1.push(value);
+            splits.2.push(inclusive);
+        }
+        Ok(splits)
+    }
+
+    /// The same trees with other thresholds, in the order of `_splits`; values below them go left.
+    fn _with_thresholds(&self, thresholds: Vec<f32>) -> Self {
+        let mut ensemble = (*self.ensemble).clone();
+        for ((tree, node, _), new) in self.split_nodes().zip(thresholds) {
+            if let Node::Split { threshold, .. } = &mut ensemble.trees[tree].nodes[node] {
+                *threshold = new;
+            }
+        }
+        if let Some(imported) = &mut ensemble.origin.imported {
+            imported.thresholds.clear();
+        }
+        Self { ensemble: Arc::new(ensemble) }
+    }
+
     /// Writes an ensemble over touches as XGBoost's JSON. A file that Palpate did not write is not replaced.
     fn save(&self, py: Python<'_>, path: PathBuf) -> Result<(), Failure> {
         Ok(py.detach(|| self.ensemble.save(&path))?)
@@ -208,6 +239,18 @@ impl Ensemble {
             Inputs::Rows(names) => format!("{} features", names.len()),
         };
         format!("Ensemble({} trees, {kind}, {} objects)", self.ensemble.trees.len(), self.ensemble.objects.len())
+    }
+}
+
+impl Ensemble {
+    /// The tree, node and feature of each split.
+    fn split_nodes(&self) -> impl Iterator<Item = (usize, usize, usize)> {
+        self.ensemble.trees.iter().enumerate().flat_map(|(tree, own)| {
+            own.nodes.iter().enumerate().filter_map(move |(node, own)| match own {
+                Node::Split { feature, .. } => Some((tree, node, *feature)),
+                Node::Leaf { .. } => None,
+            })
+        })
     }
 }
 

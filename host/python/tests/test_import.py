@@ -20,8 +20,6 @@ from sklearn import (
     linear_model,
     model_selection,
     multiclass,
-    pipeline,
-    preprocessing,
     tree,
 )
 
@@ -284,7 +282,6 @@ def combining() -> list[Any]:
     """Estimators of which each holds trees and does something else than to add them up."""
     stump = tree.DecisionTreeClassifier(max_depth=1)
     deep, regression = tree.DecisionTreeClassifier(max_depth=4), tree.DecisionTreeRegressor(max_depth=4)
-    forest = ensemble.RandomForestClassifier(5, random_state=1)
     return [
         ensemble.AdaBoostClassifier(stump, n_estimators=10, random_state=1),
         ensemble.AdaBoostRegressor(regression, n_estimators=10, random_state=1),
@@ -299,7 +296,6 @@ def combining() -> list[Any]:
         model_selection.FixedThresholdClassifier(deep, threshold=0.8),
         model_selection.GridSearchCV(deep, {"max_depth": [2, 3]}),
         multiclass.OneVsRestClassifier(deep),
-        pipeline.make_pipeline(preprocessing.StandardScaler(), forest),
         linear_model.LogisticRegression(),
     ]
 

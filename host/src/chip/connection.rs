@@ -12,6 +12,9 @@ use std::collections::VecDeque;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::{Duration, Instant};
 
+/// Times that a chip may have a load go on from an earlier byte: memory that is worn out would have it go on forever.
+const CONTINUED: u32 = 20;
+
 /// Message of a chip, by itself or about a command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Received {
@@ -357,39 +360,54 @@ impl Connection {
     ///
     /// # Errors
     /// [`ChipProblem::ModelRefused`] when the chip refuses it: it then goes on with the one it had, as it does when this
-    /// is [cancelled](Error::Cancelled). When the line broke or the chip is silent.
+    /// is [cancelled](Error::Cancelled); loaded again, a model goes on where it was. When the line broke or the chip is silent.
     pub fn load(&mut self, bytes: &[u8], progress: &dyn Progress) -> Result<()> {
         progress.begin("loading", Some(bytes.len() as u64));
         self.model = None;
         let length = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
         let begin = Command::Begin { payload: Payload::Model, length, checksum: checksum(bytes) };
-        let chunks = bytes.chunks(CHUNK).enumerate().map(|(index, bytes)| {
-            let offset = u32::try_from(index * CHUNK).unwrap_or(u32::MAX);
-            Command::Chunk { offset, bytes }
-        });
-        let mut commands = std::iter::once(begin).chain(chunks).chain([Command::Commit]);
-        let total = bytes.len().div_ceil(CHUNK) + 2;
-        let mut done = 0_usize;
-        while done < total {
-            while self.has_room()
-                && let Some(command) = commands.next()
-            {
+        let command = |at: usize| match bytes.get(at..).unwrap_or_default() {
+            [] => (Command::Commit, usize::MAX),
+            rest => {
+                let (offset, bytes) = (u32::try_from(at).unwrap_or(u32::MAX), rest.get(..CHUNK).unwrap_or(rest));
+                (Command::Chunk { offset, bytes }, at + bytes.len())
+            }
+        };
+        self.submit(begin)?;
+        // Ends of the commands under way, and how many of them the chip refuses because it goes on from an earlier byte.
+        let (mut under_way, mut passed_over) = (VecDeque::from([0]), 0_usize);
+        let (mut next, mut told, mut continued) = (0, 0, 0);
+        loop {
+            // The outcome of the beginning says which chunk is the first.
+            while passed_over == 0 && next != usize::MAX && under_way.front() != Some(&0) && self.has_room() {
+                let (command, end) = command(next);
                 self.submit(command)?;
+                next = end;
+                under_way.push_back(end);
             }
-            match self.hear(Duration::from_millis(20))? {
-                Some(Received::Outcome(Outcome::Refused(refusal))) => {
-                    return Err(self.wrong(ChipProblem::ModelRefused(refusal)));
+            let Some(&end) = under_way.front() else { return Ok(()) };
+            let Some(Received::Outcome(outcome)) = self.hear(Duration::from_millis(20))? else {
+                progress::check(progress)?;
+                continue;
+            };
+            under_way.pop_front();
+            let arrived = match outcome {
+                _ if passed_over > 0 => {
+                    passed_over -= 1;
+                    continue;
                 }
-                Some(Received::Outcome(_)) => {
-                    // The first outcome is that of the beginning, the last that of the end.
-                    let chunk = done.checked_sub(1).and_then(|chunk| bytes.chunks(CHUNK).nth(chunk));
-                    progress::advance(progress, chunk.map_or(0, |chunk| chunk.len() as u64))?;
-                    done += 1;
+                Outcome::Continue { offset } if continued < CONTINUED => {
+                    next = usize::try_from(offset).unwrap_or(usize::MAX).min(bytes.len());
+                    (passed_over, continued) = (under_way.len(), continued + 1);
+                    next
                 }
-                Some(Received::Event(..) | Received::Earlier(_)) | None => progress::check(progress)?,
-            }
+                Outcome::Continue { .. } => return Err(self.wrong(ChipProblem::ModelRefused(Refusal::Unwritable))),
+                Outcome::Refused(refusal) => return Err(self.wrong(ChipProblem::ModelRefused(refusal))),
+                _ => end.min(bytes.len()),
+            };
+            progress::advance(progress, arrived.saturating_sub(told) as u64)?;
+            told = told.max(arrived);
         }
-        Ok(())
     }
 }
 

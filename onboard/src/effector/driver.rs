@@ -54,7 +54,7 @@ pub struct Effector {
 }
 
 /// Faults that have not been reported yet, one per kind and finger.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Faults {
     stuck: [bool; 3],
     bouncing: [bool; 3],
@@ -71,6 +71,9 @@ enum Lost {
 }
 
 impl Faults {
+    const NONE: Self =
+        Self { stuck: [false; 3], bouncing: [false; 3], silent: [false; 3], unreadable: [false; 3], lost: None };
+
     fn take(&mut self) -> Option<Fault> {
         match self.lost.take() {
             Some(Lost::Overrun) => return Some(Fault::Overrun),
@@ -88,8 +91,8 @@ impl Faults {
 }
 
 impl Effector {
-    /// A driver that takes its fingers for open.
-    pub fn new(settings: Settings) -> Self {
+    /// A driver that takes its fingers for open; also in a static.
+    pub const fn new(settings: Settings) -> Self {
         Self {
             settings: settings.in_range(),
             fingers: [Debounce::new(); 3],
@@ -101,7 +104,7 @@ impl Effector {
             now: None,
             open_since: None,
             touch: None,
-            faults: Faults::default(),
+            faults: Faults::NONE,
         }
     }
 

@@ -34,19 +34,22 @@ impl Default for Settings {
     /// for the other fingers (of 200,000 simulated touches the contacts were up to 1.05 s apart), 100 ms release, 10 ms
     /// rest, 5 s until stuck, silent after 100 touches.
     fn default() -> Self {
-        Self {
-            debounce: 5_000,
-            settle: 25_000,
-            timeout: 1_200_000,
-            release: 100_000,
-            rest: 10_000,
-            stuck: 5_000_000,
-            silent_after: 100,
-        }
+        Self::DEFAULT
     }
 }
 
 impl Settings {
+    /// The default, for a static.
+    pub const DEFAULT: Self = Self {
+        debounce: 5_000,
+        settle: 25_000,
+        timeout: 1_200_000,
+        release: 100_000,
+        rest: 10_000,
+        stuck: 5_000_000,
+        silent_after: 100,
+    };
+
     /// Settings with the timeout that a model needs, as `scale`'s probe takes it: the time that the stroke of the model's
     /// probe takes, after which contacts were missing in training; of a model without a stroke a sixteenth more than the
     /// largest time between contacts that it was trained on. The timeout stays if the model states neither.
@@ -65,11 +68,19 @@ impl Settings {
     }
 
     /// Settings with every duration in range, and `settle` and `stuck` long enough to make sense.
-    pub(super) fn in_range(self) -> Self {
-        let [debounce, settle, timeout, release, rest, stuck] =
-            [self.debounce, self.settle, self.timeout, self.release, self.rest, self.stuck].map(|d| d.min(LONGEST));
-        let settle = settle.max(debounce.saturating_add(1));
-        let stuck = stuck.max(timeout.saturating_add(1)).max(settle.saturating_add(1));
+    pub(super) const fn in_range(self) -> Self {
+        let [debounce, settle, timeout] = [within(self.debounce), within(self.settle), within(self.timeout)];
+        let [release, rest, stuck] = [within(self.release), within(self.rest), within(self.stuck)];
+        let settle = longer(settle, debounce.saturating_add(1));
+        let stuck = longer(longer(stuck, timeout.saturating_add(1)), settle.saturating_add(1));
         Self { debounce, settle, timeout, release, rest, stuck, silent_after: self.silent_after }
     }
+}
+
+const fn within(duration: u32) -> u32 {
+    if duration < LONGEST { duration } else { LONGEST }
+}
+
+const fn longer(one: u32, other: u32) -> u32 {
+    if one > other { one } else { other }
 }

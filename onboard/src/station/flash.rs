@@ -297,6 +297,10 @@ impl<F: MappedFlash, const RECORD: usize> Storage for FlashStorage<F, RECORD> {
         write(&mut self.flash, from, bytes).ok_or(NotStored)
     }
 
+    fn sector(&self) -> usize {
+        F::ERASE_SIZE
+    }
+
     fn record_length(&self) -> usize {
         RECORD
     }

@@ -26,7 +26,8 @@
 //! | [`Memory`] | battery-backed RAM or FRAM, or RAM where it must survive resets but no power cuts |
 //! | [`NoStorage`] | nothing is kept, no model can be loaded |
 //!
-//! A loaded model is written to the place that is not in use and checked there; the record that follows switches to it.
+//! A loaded model is written to the place that is not in use and checked there; the record that follows switches to it. A load
+//! that was cut goes on at the sector of the cut. [`Signed`] takes signed models alone.
 
 mod flash;
 mod memory;
@@ -35,6 +36,7 @@ mod probe;
 mod record;
 mod serve;
 mod session;
+mod signed;
 mod storage;
 mod table;
 #[cfg(all(test, feature = "locate"))]
@@ -46,6 +48,7 @@ pub use probe::{Board, Happened, LONGEST_WAIT, LinkFailed, ProbeSettings, ProbeS
 pub use record::record_length;
 pub use serve::{ERRORS_IN_A_ROW, ServeError, serve, serve_with};
 pub use session::{PROGRAM, RecordsTooShort, Station};
+pub use signed::Signed;
 pub use storage::{NoStorage, Place, Storage};
 pub use table::Locates;
 #[cfg(feature = "locate")]

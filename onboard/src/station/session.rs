@@ -276,6 +276,13 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
         }
         match staged.payload {
             Payload::Model => {
+                let current = match self.source {
+                    Source::BuiltIn => self.built_in,
+                    Source::First(_) => self.storage.model(Place::First),
+                    Source::Second(_) => self.storage.model(Place::Second),
+                };
+                let length = self.storage.admit(bytes, current)?;
+                let bytes = bytes.get(..length).ok_or(Refusal::TooLong)?;
                 let opened = match Model::new(bytes) {
                     Ok(model) if model.object_count() > N => return Err(Refusal::TooLong),
                     Ok(model) => Some(model.opened()),
@@ -285,7 +292,7 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
                     Some(_) => self.located.close(),
                     None => self.located.open(bytes)?,
                 }
-                self.source = Source::loaded(place, staged.length);
+                self.source = Source::loaded(place, u32::try_from(length).map_err(|_| Refusal::TooLong)?);
                 self.use_model(opened);
                 Ok(())
             }
@@ -301,15 +308,21 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
     }
 
     /// Takes the next part of the arriving data.
-    fn take(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
+    fn take(&mut self, offset: u32, bytes: &[u8]) -> Result<Outcome, Refusal> {
         let staged = self.staged.filter(|staged| staged.received == offset).ok_or(Refusal::OutOfOrder)?;
         let start = usize::try_from(offset).map_err(|_| Refusal::TooLong)?;
         let end = start.checked_add(bytes.len()).and_then(|end| u32::try_from(end).ok());
         let received = end.filter(|&end| end <= staged.length).ok_or(Refusal::TooLong)?;
         let place = self.next_place().ok_or(Refusal::Unwritable)?;
-        let written = self.storage.write_model(place, start, bytes);
-        self.staged = written.is_ok().then_some(Staged { received, ..staged });
-        written.map_err(|_| Refusal::Unwritable)
+        if self.storage.write_model(place, start, bytes).is_ok() {
+            self.staged = Some(Staged { received, ..staged });
+            return Ok(Outcome::Done);
+        }
+        // Words that are half written cannot be written again before their sector is erased, and what precedes them goes too.
+        let before = start.checked_rem(self.storage.sector()).and_then(|before| u32::try_from(before).ok());
+        let offset = offset.saturating_sub(before.unwrap_or(0));
+        self.staged = Some(Staged { received: offset, ..staged });
+        Ok(Outcome::Continue { offset })
     }
 }
 
@@ -346,7 +359,13 @@ impl<const N: usize, S: Storage, L: Locates> Device for Station<'_, N, S, L> {
     }
 
     fn begin(&mut self, payload: Payload, length: u32, checksum: u32) -> Outcome {
-        self.staged = None;
+        if let Some(staged) = self.staged.take()
+            && (staged.payload, staged.length, staged.checksum) == (payload, length, checksum)
+            && staged.received > 0
+        {
+            self.staged = Some(staged);
+            return Outcome::Continue { offset: staged.received };
+        }
         let room = self.storage.room();
         outcome(if room == 0 {
             // No smaller model would fit either.
@@ -360,11 +379,11 @@ impl<const N: usize, S: Storage, L: Locates> Device for Station<'_, N, S, L> {
     }
 
     fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Outcome {
-        outcome(self.take(offset, bytes))
+        self.take(offset, bytes).unwrap_or_else(Outcome::Refused)
     }
 
     fn commit(&mut self) -> Outcome {
-        let complete = self.staged.take().filter(|staged| staged.received == staged.length);
+        let complete = self.staged.take_if(|staged| staged.received == staged.length);
         outcome(complete.ok_or(Refusal::OutOfOrder).and_then(|staged| self.accept(staged)))
     }
 

@@ -1,6 +1,6 @@
 //! State that a station keeps through resets and power cuts, in any kind of memory.
 
-use palpate_shared::link::NotStored;
+use palpate_shared::link::{NotStored, Refusal};
 
 /// One of the two places for models: one in use, the other being filled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,8 +27,23 @@ pub trait Storage {
     /// bytes; the last part that came may come again after a power cut.
     ///
     /// # Errors
-    /// [`NotStored`]: the storage then holds something else, which nobody asks for.
+    /// [`NotStored`]: the sector then holds something else, which nobody asks for.
     fn write_model(&mut self, place: Place, offset: usize, bytes: &[u8]) -> Result<(), NotStored>;
+
+    /// Bytes of a sector of the places for models: after [`NotStored`] parts come again from the start of the last sector on.
+    fn sector(&self) -> usize {
+        1
+    }
+
+    /// Decides about a model that has arrived, before it is used: the length of the model at the start of `loaded`. `current`
+    /// starts with the model in use. [`Signed`](super::Signed) checks signatures; by default everything is a model.
+    ///
+    /// # Errors
+    /// A [`Refusal`] to send.
+    fn admit(&self, loaded: &[u8], current: &[u8]) -> Result<usize, Refusal> {
+        let _ = current;
+        Ok(loaded.len())
+    }
 
     /// The most bytes of a record, see [`record_length`](super::record_length); 0 where nothing is kept.
     fn record_length(&self) -> usize;
@@ -56,6 +71,14 @@ impl<S: Storage> Storage for &mut S {
 
     fn write_model(&mut self, place: Place, offset: usize, bytes: &[u8]) -> Result<(), NotStored> {
         (**self).write_model(place, offset, bytes)
+    }
+
+    fn sector(&self) -> usize {
+        (**self).sector()
+    }
+
+    fn admit(&self, loaded: &[u8], current: &[u8]) -> Result<usize, Refusal> {
+        (**self).admit(loaded, current)
     }
 
     fn record_length(&self) -> usize {

@@ -242,6 +242,14 @@ pub enum Outcome {
     Verdict(VerdictMessage),
     /// It was not done.
     Refused(Refusal),
+    /// To [`Command::Begin`] and [`Command::Chunk`]: all before this offset has arrived. Chunks from it on are to come, once those
+    /// under way were refused; so no chunk goes out before the outcome of its beginning. A chip answers so when a load that was
+    /// interrupted begins again, and when a chunk could not be written, as after a power cut: flash is written again from the
+    /// start of a sector.
+    Continue {
+        /// Offset of the next chunk.
+        offset: u32,
+    },
 }
 
 /// Reason why the chip refused.
@@ -281,6 +289,10 @@ pub enum Refusal {
     Position,
     /// The model is of maps, and the hand does not come straight down: not counted.
     NotDown,
+    /// The chip takes signed models alone, and this one is not signed with its key.
+    Signature,
+    /// The model's signature has a lower counter than that of the model in use.
+    Older,
 }
 
 impl Refusal {
@@ -318,6 +330,8 @@ impl core::fmt::Display for Refusal {
             Self::NoPosition => "the chip's model is of maps, and the touch has no position",
             Self::Position => "the touch has a position, and the chip has no model of maps",
             Self::NotDown => "it does not come straight down",
+            Self::Signature => "the model is not signed with the key that the chip trusts: sign it",
+            Self::Older => "the model is older than the chip's: sign it with a higher counter",
         })
     }
 }

@@ -1,8 +1,7 @@
 //! Chips on the command line: their names, what a touch costs on them, and what they have to be built with.
 
-use palpate::compile::{Core, Instructions};
+use palpate::compile::{self, Core, Instructions};
 use palpate::onboard::Model;
-use palpate_shared::format::Weights;
 
 /// The processor of this name.
 pub(super) fn core(name: &str) -> Result<Core, String> {
@@ -22,18 +21,5 @@ pub(super) fn instructions(instructions: Instructions) -> String {
 
 /// The line that names the cargo features that a chip needs.
 pub(super) fn features(model: &Model<'_>) -> String {
-    let sections = [
-        ("shared-leaves", model.shared_leaves().is_some()),
-        ("sentinel", model.sentinel().is_some()),
-        ("strangers", model.strangers().is_some()),
-        ("row-evidence", model.row_evidence().is_some() || model.weight_of(u32::MAX) != Weights::ONE),
-        ("outputs", model.outputs().is_some()),
-    ];
-    let needed: String =
-        sections.iter().filter(|section| section.1).map(|section| format!(", {}", section.0)).collect();
-    format!(
-        "To read only this model, build palpate-onboard with: {}, {}-leaves{needed}\n",
-        model.layout().name(),
-        model.leaf_type().name(),
-    )
+    format!("To read only this model, build palpate-onboard with: {}\n", compile::features(model).join(", "))
 }

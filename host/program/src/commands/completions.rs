@@ -5,6 +5,7 @@ use clap_complete::Shell;
 use palpate::Result;
 use palpate::compile::code::Form;
 use palpate::compile::{Language, Layout, Leaf};
+use palpate::mesh::builtin;
 use palpate::output::print;
 use palpate::probe::noise::PartialNoise;
 use palpate_shared::Descriptor;
@@ -59,6 +60,14 @@ fn options() -> Vec<(&'static str, Vec<String>)> {
     ]
 }
 
+/// Commands that touch or show objects.
+const TOUCH: &str = "run report capture view design fit objects";
+
+/// Names of objects that need no file.
+fn objects() -> String {
+    ["builtin"].into_iter().chain(builtin::names()).collect::<Vec<_>>().join(" ")
+}
+
 /// The script of a shell that also completes keys and values, after a comma too.
 fn completed(script: &str, shell: Shell) -> String {
     let options = options();
@@ -67,7 +76,8 @@ fn completed(script: &str, shell: Shell) -> String {
             let case = |(option, words): &(&str, Vec<String>)| {
                 format!("        --{option}) keys=\"{}\" ;;\n", words.join(" "))
             };
-            script.to_owned() + &BASH.replace("CASES", &options.iter().map(case).collect::<String>())
+            let cases = options.iter().map(case).collect::<String>();
+            script.to_owned() + &BASH.replace("CASES", &cases).replace("OBJECTS", &objects()).replace("COMMANDS", TOUCH)
         }
         Shell::Zsh => {
             let function = |(option, words): &(&str, Vec<String>)| {
@@ -79,11 +89,16 @@ fn completed(script: &str, shell: Shell) -> String {
                 let files = if *option == "real" { "    _files -g '*.toml'\n" } else { "" };
                 format!("_palpate_{option}() {{\n    _values -s , key{keys}\n{files}}}\n\n")
             };
-            let functions: String = options.iter().map(function).collect();
+            let objects = format!(
+                "_palpate_objects() {{\n    _alternative 'files:file:_files' 'objects:object:({})'\n}}\n\n",
+                objects()
+            );
+            let functions: String = options.iter().map(function).collect::<String>() + &objects;
             let line = |line: &str| match options.iter().find(|(option, _)| line.starts_with(&format!("'--{option}=[")))
             {
                 Some((option, _)) => line.replace(":_default'", &format!(":_palpate_{option}'")) + "\n",
                 None if line.starts_with("if [ \"$funcstack[1]\"") => format!("{functions}{line}\n"),
+                None if line.starts_with("'*::sources") => line.replace(":_default'", ":_palpate_objects'") + "\n",
                 None => format!("{line}\n"),
             };
             script.lines().map(line).collect()
@@ -97,7 +112,8 @@ fn completed(script: &str, shell: Shell) -> String {
                 }
                 None => format!("{line}\n"),
             };
-            script.lines().map(line).collect::<String>() + FISH
+            let objects = format!("complete -c palpate -n '__fish_seen_subcommand_from {TOUCH}' -a '{}'\n", objects());
+            script.lines().map(line).collect::<String>() + FISH + &objects
         }
         _ => script.into(),
     }
@@ -112,7 +128,12 @@ _palpate_keys() {
     option="${option##* }"
     [[ "$word" == --*=* ]] && option="${word%%=*}" word="${word#*=}"
     case "$option" in
-CASES        *) _palpate "$@"; return ;;
+CASES        *)
+            _palpate "$@"
+            read -r _ option keys _ <<< "$line"
+            [[ "$word" != -* && " COMMANDS " =~ " $option "|" $keys " ]] &&
+                COMPREPLY+=($(compgen -W "OBJECTS" -- "$word") $(compgen -f -- "$word"))
+            return ;;
     esac
     COMPREPLY=()
     word="${word##*,}"

@@ -4,7 +4,7 @@ use palpate::chip::inspect::{
     Defaults, Feature, Inspected, Noise, OnChip, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches,
     TrainedOn, inspect, on_chip,
 };
-use palpate::compile::{CompiledModel, Core, Memory};
+use palpate::compile::{CompiledModel, Core, FEATURES, Memory};
 use palpate::locate::MapsFile;
 use palpate::wording::{count, counted, rate, scientific};
 use palpate::{Error, Result};
@@ -20,6 +20,7 @@ With --chip, instructions per touch are measured where QEMU is installed and the
 Examples:
   palpate inspect model.palpate
   palpate inspect model.palpate --chip m0+ --mhz 48
+  palpate inspect model.palpate --chip m4f --config compact,complete,i8-leaves
   palpate inspect model.palpate --json")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
@@ -30,6 +31,9 @@ pub(crate) struct Arguments {
     /// The processor's clock in MHz, to give the time per touch
     #[arg(long, requires = "chip", value_name = "MHZ", value_parser = megahertz)]
     mhz: Option<f64>,
+    /// The features that palpate-onboard is built with, such as compact,i8-leaves,strangers [default: those that the model needs]
+    #[arg(long, requires = "chip", value_name = "FEATURES", value_delimiter = ',', value_parser = FEATURES.map(|(name, _)| name))]
+    config: Vec<String>,
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
@@ -42,7 +46,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let compiled = CompiledModel::read(&arguments.model)?;
     let model = compiled.model();
     let mut inspected = inspect(&model);
-    inspected.chip = arguments.chip.map(|core| on_chip(&model, core, arguments.mhz)).transpose()?;
+    let features: Vec<&str> = arguments.config.iter().map(String::as_str).collect();
+    let features = Some(&features[..]).filter(|features| !features.is_empty());
+    inspected.chip = arguments.chip.map(|core| on_chip(&model, core, arguments.mhz, features)).transpose()?;
     global.print(&inspected, || text(&inspected))
 }
 
@@ -270,6 +276,10 @@ fn chip_lines(lines: &mut Lines, chip: &OnChip) {
     lines.line("stack", format!("{stack} bytes, estimated"));
     let [margins, verdict] = [chip.margin_instructions, chip.verdict_instructions].map(known);
     lines.line("instructions", format!("{margins} to the margins, {verdict} to the verdict (per touch, {})", chip.how));
+    lines.line(
+        "at most",
+        format!("{} to the margins, the longest way through all trees, estimated", known(chip.most_instructions)),
+    );
     if let (Some(mhz), Some(microseconds)) = (chip.mhz, chip.microseconds) {
         lines.line("time", format!("{microseconds:.0} µs per touch at {mhz} MHz, one instruction per cycle"));
     }

@@ -249,14 +249,17 @@ More:
   docs/reference/options.md  what options take, and how commands work"
 }
 
-/// Addition to an error with which `command` ends: its options that help.
-fn hint(error: &Error, command: &str) -> Option<String> {
-    let cli = cli();
-    let command = cli.find_subcommand(command)?;
-    let has = |option: &str| {
+/// True if a command, or one below it, has an option.
+fn has_option(command: &str, option: &str) -> bool {
+    cli().find_subcommand(command).is_some_and(|command| {
         let all = std::iter::once(command).chain(command.get_subcommands());
         all.flat_map(clap::Command::get_arguments).any(|argument| argument.get_long() == Some(option))
-    };
+    })
+}
+
+/// Addition to an error with which `command` ends: its options that help.
+fn hint(error: &Error, command: &str) -> Option<String> {
+    let has = |option: &str| has_option(command, option);
     let said = match (error.problem(), error.problem(), error.problem()) {
         (Some(Foreign), ..) => "--force replaces it.",
         (_, Some(TouchesProblem::Incomplete), _) => "Repeat the command of the capture with --resume.",
@@ -306,9 +309,16 @@ fn unwrapped(text: &str) -> String {
 pub fn main() -> ExitCode {
     let matches = cli().try_get_matches().unwrap_or_else(|error| {
         let words: Vec<String> = std::env::args().skip(1).collect();
-        without_trailing(without_help(&words).unwrap_or(error)).exit()
+        let error = without_trailing(without_help(&words).unwrap_or(error));
+        if error.use_stderr() && words.iter().any(|word| word == "--json") {
+            _ = output::print_json(&serde_json::json!({ "error": error.to_string().trim_end() }));
+        }
+        error.exit()
     });
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    if has_option(matches.subcommand_name().unwrap_or_default(), "resume") {
+        progress::tell_when_interrupted();
+    }
     match cli.global.apply().and_then(|()| cli.command.run(&cli.global)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

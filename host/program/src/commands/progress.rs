@@ -5,6 +5,29 @@ use palpate::progress::Progress;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
+/// The newest bar, to say how far it came.
+static NEWEST: Mutex<Option<ProgressBar>> = Mutex::new(None);
+
+/// Has Ctrl-C say how far a command came that goes on with `--resume`.
+#[cfg(unix)]
+pub(super) fn tell_when_interrupted() {
+    // Without this, Ctrl-C ends the program as well.
+    let Ok(mut signals) = signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT]) else { return };
+    std::thread::spawn(move || {
+        signals.forever().next();
+        let bar = NEWEST.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let far = bar.and_then(|bar| Some(format!(" at {} of {}, {}", bar.position(), bar.length()?, bar.message())));
+        eprintln!(
+            "\npalpate: interrupted{}. What is done is kept: repeat the command with --resume.",
+            far.unwrap_or_default()
+        );
+        std::process::exit(130);
+    });
+}
+
+#[cfg(not(unix))]
+pub(super) fn tell_when_interrupted() {}
+
 /// Draws the current stage of a long call: a bar where the number of steps is known, else a spinner. Silent where
 /// stderr is no terminal; cleared when dropped.
 pub(crate) struct Bar(Mutex<ProgressBar>);
@@ -41,6 +64,7 @@ impl Progress for Bar {
             }
         };
         let bar = bar.with_message(stage.to_owned()).with_finish(ProgressFinish::AndClear);
+        *NEWEST.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
         std::mem::replace(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner), bar).finish_and_clear();
     }
 

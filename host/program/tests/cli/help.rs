@@ -1,6 +1,7 @@
 //! The program's own texts: help and completions.
 
 use crate::{command, run, stderr, stdout};
+use std::process::Stdio;
 
 /// The program's commands, as its help lists them in groups: what stands before two blanks.
 fn commands() -> Vec<String> {
@@ -132,6 +133,8 @@ fn keys_of_options_are_completed_after_a_comma_too_where_the_shell_is_there() {
     assert_eq!(bash("palpate run --real noise=", ""), "\n");
     assert_eq!(bash("palpate export e.json --layout comp", "comp"), "compact complete\n");
     assert_eq!(bash("palpate export e.json --emit c,thumb-", "c,thumb-"), "c,thumb-m4f\n");
+    assert!(bash("palpate capture cup b", "b").contains("builtin"), "names of objects, where a command takes some");
+    assert!(!bash("palpate export b", "b").contains("builtin"));
     let fish = std::process::Command::new("fish")
         .args(["-c", "source $argv[1]; complete -C 'palpate train data --trees rounds=3,dep'"])
         .arg(script("fish"))
@@ -147,6 +150,26 @@ fn keys_of_options_are_completed_after_a_comma_too_where_the_shell_is_there() {
             && zsh.contains("_values -s , key 'rounds:value: '"),
         "{zsh}"
     );
+}
+
+#[test]
+#[cfg(unix)]
+fn ctrl_c_says_how_far_a_capture_came_and_how_it_goes_on() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut capture = command(["capture", "bowl", "-o", "data", "--touches", "10000000"]);
+    let capture = capture.current_dir(&directory).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    while !directory.path().join("data").exists() {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let process = capture.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-INT", &process]).status().unwrap().success());
+    let output = capture.wait_with_output().unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        error.contains("palpate: interrupted") && error.ends_with("repeat the command with --resume.\n"),
+        "{error}"
+    );
+    assert_eq!(output.status.code(), Some(130));
 }
 
 #[test]
@@ -197,4 +220,8 @@ fn an_error_is_json_on_standard_output_where_results_would_be() {
     let error = stderr(output, 1);
     let text = found["error"].as_str().unwrap();
     assert!(text.contains("no-such-file") && error.contains(text), "{found}, {error}");
+    let output = run(["inspect", "--chp", "m4f", "--json"]);
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let error = stderr(output, 2);
+    assert!(error.contains(found["error"].as_str().unwrap()) && error.contains("--chip"), "{found}, {error}");
 }

@@ -20,6 +20,7 @@ from ._import import compile, to_ensemble
 from ._locate import CalibratedMaps, MapsEvaluation
 from ._native import DataSet, Ensemble, Locator, Maps, Model, Recognizer, Shape, Surface, capture, train
 from ._stream import Calibrated, Ends, SequenceRecognizer, calibrate, evaluate_sequences
+from ._touches import TouchRecognizer
 from ._types import Located, Meshes, Mode, Probe, Progress, Real, Touch, Verdict
 
 __version__ = _version("palpate")
@@ -53,6 +54,7 @@ __all__ = [
     "Shape",
     "Surface",
     "Touch",
+    "TouchRecognizer",
     "Verdict",
     "calibrate",
     "capture",

@@ -26,7 +26,7 @@ class Sequential:
     error_standard_error: float
     undecided: float
     """Share of sequences without a verdict."""
-    per_object: dict[str, float]
+    per_object: dict[str, float] = field(repr=False)
     """Touches (or approaches) used on average, for each object."""
 
 
@@ -41,16 +41,16 @@ class Evaluation:
     """Groups drawn for each object."""
     accuracy: dict[int, float]
     """Accuracy after a number of touches."""
-    accuracy_standard_error: dict[int, float]
-    per_object: dict[str, dict[int, float]]
+    accuracy_standard_error: dict[int, float] = field(repr=False)
+    per_object: dict[str, dict[int, float]] = field(repr=False)
     """The same for each object."""
     sequential: Sequential
     """Figures when it stops by itself."""
-    approach_accuracy: dict[int, float]
+    approach_accuracy: dict[int, float] = field(repr=False)
     """Accuracy after a number of approaches, where the data set holds those."""
-    approach_sequential: Sequential | None
+    approach_sequential: Sequential | None = field(repr=False)
     """The same counted in approaches."""
-    patterns: dict[str, float]
+    patterns: dict[str, float] = field(repr=False)
     """Share of each contact pattern among the touches."""
     raw: dict[str, object] = field(repr=False)
     """All figures, as `palpate evaluate --json` prints them."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _native, _sklearn
+from . import _native, _pipeline, _sklearn
 from ._errors import InputError, ModelWarning, SettingError
 from ._native import Ensemble, Model
 
@@ -21,7 +21,11 @@ def to_ensemble(
     model: object, names: Sequence[str] | None = None, *, all_trees: bool = False, missing: float | None = None
 ) -> Ensemble:
     """The trees of a model of another library: a booster or estimator of XGBoost, LightGBM or CatBoost, a forest or
-    boosted trees of scikit-learn, a model of ONNX; or a file that one of them wrote, as a path.
+    boosted trees of scikit-learn, a model of ONNX; a pipeline of scikit-learn whose scalers come before one of these; or a file
+    that one of them wrote, as a path.
+
+    A pipeline's scalers (StandardScaler, MinMaxScaler, MaxAbsScaler, RobustScaler) go into the thresholds, so that the model takes
+    rows as they are before scaling, and decides as the pipeline does on rows in f64 (an array of float32 is scaled in f32).
 
     `names` are the classes', in the order of the labels. Where training stopped early, the trees up to the best round are
     taken, as the library predicts with them; with `all_trees` all of them. `missing` is the number that stood for a missing
@@ -197,13 +201,20 @@ def _sklearn_trees(model: Any, asked: _Asked) -> Ensemble:
     return _sklearn.read(model, asked.names)
 
 
+def _of_pipeline(model: Any, asked: _Asked) -> Ensemble:
+    scalers, last = _pipeline.steps_of(model)
+    ensemble = to_ensemble(last, asked.names, all_trees=asked.all_trees)
+    is_f64 = type(last).__name__.startswith("HistGradientBoosting") or _class(type(last))[0] == "lightgbm"
+    return _pipeline.fold(ensemble, scalers, model.n_features_in_, not is_f64) if scalers else ensemble
+
+
 _Reader = Callable[[Any, _Asked], Ensemble]
 
 _READERS: dict[str, dict[str, _Reader]] = {
     "catboost": dict.fromkeys(["CatBoost", "CatBoostClassifier", "CatBoostRanker", "CatBoostRegressor"], _catboost),
     "lightgbm": dict.fromkeys(["Booster", "LGBMClassifier", "LGBMRanker", "LGBMRegressor"], _lightgbm),
     "onnx": {"ModelProto": _onnx},
-    "sklearn": dict.fromkeys(_sklearn.KNOWN, _sklearn_trees),
+    "sklearn": dict.fromkeys(_sklearn.KNOWN, _sklearn_trees) | {"Pipeline": _of_pipeline},
     "xgboost": dict.fromkeys(
         ["Booster", "XGBClassifier", "XGBRFClassifier", "XGBRFRegressor", "XGBRanker", "XGBRegressor"], _xgboost
     ),
@@ -212,7 +223,7 @@ _READERS: dict[str, dict[str, _Reader]] = {
 
 _INSIDE = {
     "lightgbm": "A booster inside it may be `model.booster_`. ",
-    "sklearn": "Of a pipeline give the last step, and transform rows as its first steps do; of a search `best_estimator_`. ",
+    "sklearn": "Of a search give `best_estimator_`. ",
     "xgboost": "A booster inside it may be `model.get_booster()`. ",
 }
 """Attributes in which a readable model may be found inside one that is not."""

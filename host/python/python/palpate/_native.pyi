@@ -160,6 +160,14 @@ class Ensemble:
         """
         The positions of the features among columns with these names, and a note about them.
         """
+    def _splits(self, /) -> tuple[list[int], list[float], list[bool]]:
+        """
+        The feature and the threshold of each split, and whether a value that equals it goes left.
+        """
+    def _with_thresholds(self, /, thresholds: SupportsGetItem[int, SupportsFloat | SupportsIndex]) -> Ensemble:
+        """
+        The same trees with other thresholds, in the order of `_splits`; values below them go left.
+        """
     @property
     def descriptor(self, /) -> str | None:
         """

@@ -309,7 +309,7 @@ class SequenceRecognizer:
     def verdicts(self, X: npt.ArrayLike, *, sequence: _Ids) -> list[Verdict]:
         """The verdict on each sequence, in their order: its class as text, and the rows that it took."""
         if not hasattr(self, "model_"):
-            raise _not_fitted()
+            raise _not_fitted(self)
         table, ids = _table(X), _ids(sequence, "sequence")
         found, wanted = table.shape[1], getattr(self, "n_features_in_", None)
         # The columns of a table are found by their names.
@@ -371,8 +371,8 @@ def _clone(estimator: Any) -> Any:
     return importlib.import_module("sklearn.base").clone(estimator)
 
 
-def _not_fitted() -> Exception:
-    text = "the SequenceRecognizer is not fitted. Call its `fit` first."
+def _not_fitted(estimator: object) -> Exception:
+    text = f"the {type(estimator).__name__} is not fitted. Call its `fit` first."
     if importlib.util.find_spec("sklearn") is None:
         return InputError(text)
     error: Exception = importlib.import_module("sklearn.exceptions").NotFittedError(text)

@@ -8,7 +8,7 @@ pub use stated::{
 
 use super::instructions::Chip;
 use crate::compile::{self, Core, Instructions, Memory};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evaluate;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH};
@@ -108,6 +108,8 @@ pub struct OnChip {
     pub margin_instructions: Option<u64>,
     /// From contact times to the verdict.
     pub verdict_instructions: Option<u64>,
+    /// Up to the margins, if features lead the longest way through every tree; estimated.
+    pub most_instructions: Option<u64>,
     /// The clock.
     pub mhz: Option<f64>,
     /// From contact times to the verdict, at one instruction per cycle.
@@ -182,11 +184,17 @@ fn parts(model: &Model<'_>) -> BTreeMap<&'static str, usize> {
 }
 
 /// The cost of a model on a processor, at a clock in MHz if one is given: measured where QEMU and the firmware's image are
-/// there, else estimated.
+/// there, else estimated. The flash is that with these [`features`](compile::features) of palpate-onboard, by default those that
+/// the model needs.
 ///
 /// # Errors
-/// As [`Chip::measure`].
-pub fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>) -> Result<OnChip> {
+/// If the model needs another feature. As [`Chip::measure`].
+pub fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>, features: Option<&[&str]>) -> Result<OnChip> {
+    let needed = compile::features(model);
+    let features = features.unwrap_or(&needed);
+    if let Some(missing) = needed.iter().find(|name| !features.contains(name)) {
+        return Err(Error::setting("config", features.join(","), format!("also {missing}, which the model needs")));
+    }
     let emulated = match core {
         Core::M4F => Chip::M4F,
         Core::M0Plus => Chip::M0Plus,
@@ -205,10 +213,11 @@ pub fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>) -> Result<OnChip
     };
     Ok(OnChip {
         core,
-        memory: Memory::of_model(model, core),
+        memory: Memory::of_model(model, core, features),
         how,
         margin_instructions: margins,
         verdict_instructions: verdict,
+        most_instructions: Instructions::of_longest_ways(model).on(core),
         mhz,
         microseconds: mhz.zip(verdict).map(|(mhz, verdict)| verdict as f64 / mhz),
     })

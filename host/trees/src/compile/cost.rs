@@ -8,7 +8,7 @@
 
 use super::groups::groups_and_splits;
 use palpate_onboard::Model;
-use palpate_shared::format::{Group, Layout, LeafType};
+use palpate_shared::format::{Group, Layout, LeafType, Weights};
 use serde::Serialize;
 
 /// A processor that costs are known for.
@@ -36,8 +36,8 @@ pub struct Instructions {
 pub struct Memory {
     /// Flash of the model.
     pub model_flash: usize,
-    /// Flash of a whole image that reads this layout and these leaves and gives verdicts; 1,300 bytes of it are start-up,
-    /// vector table and the compiler's own routines, which most programs have anyway.
+    /// Flash of a whole image that gives verdicts, with the crate's features that the model needs or that are asked for; 1,300
+    /// bytes of it are start-up, vector table and the compiler's own routines, which most programs have anyway.
     pub code_flash: usize,
     /// RAM of the opened model and of a recognizer with room for just the model's objects.
     pub ram: usize,
@@ -62,7 +62,7 @@ impl Instructions {
     }
 
     /// The most instructions that margins take, if features lead the longest way through every tree.
-    pub(crate) fn of_longest_ways(model: &Model<'_>) -> Self {
+    pub fn of_longest_ways(model: &Model<'_>) -> Self {
         Self::with_steps(model, f64::max)
     }
 
@@ -95,8 +95,8 @@ impl Instructions {
 }
 
 impl Memory {
-    /// Memory of a compiled model on a processor.
-    pub fn of_model(model: &Model<'_>, core: Core) -> Self {
+    /// Memory of a compiled model on a processor, with these features of palpate-onboard.
+    pub fn of_model(model: &Model<'_>, core: Core, features: &[&str]) -> Self {
         let objects = model.object_count();
         // A recognizer: 8 bytes per object and 40; an opened model: 64.
         let ram = 8 * objects + 40 + 64;
@@ -109,32 +109,51 @@ impl Memory {
                 // A whole row of features, and the columns' numbers.
                 Layout::Code => 1_500,
             };
-        Self { model_flash: model.bytes().len(), code_flash: code_flash(core, model), ram, stack }
+        Self { model_flash: model.bytes().len(), code_flash: code_flash(core, features), ram, stack }
     }
 }
 
-/// Bytes of the firmware's `verdict` image with one layout and one type of leaf.
-fn code_flash(core: Core, model: &Model<'_>) -> usize {
-    // By layout; i8, i16 and f32 leaves.
-    let bytes = match (core, model.layout()) {
-        (Core::M4F, Layout::Grid) => [6_060, 6_068, 6_148],
-        (Core::M4F, Layout::Patterns) => [6_156, 6_164, 6_240],
-        (Core::M4F, Layout::Compact) => [6_516, 6_528, 6_940],
-        (Core::M4F, Layout::Complete) => [7_984, 7_548, 7_756],
-        (Core::M4F, Layout::Wide) => [6_516, 6_484, 6_892],
-        // Without the trees.
-        (Core::M4F | Core::M0Plus, Layout::Code) => [5_600; 3],
-        (Core::M0Plus, Layout::Grid) => [5_476, 5_508, 5_604],
-        (Core::M0Plus, Layout::Patterns) => [5_624, 5_656, 5_748],
-        (Core::M0Plus, Layout::Compact) => [6_216, 6_224, 7_168],
-        (Core::M0Plus, Layout::Complete) => [7_092, 7_228, 7_852],
-        (Core::M0Plus, Layout::Wide) => [6_220, 6_192, 7_144],
+/// Features of palpate-onboard that models need, and the bytes of flash of each on a Cortex-M4F and a Cortex-M0+, beyond
+/// [`COMMON`]: `verdict` images of the firmware, which `cargo test -p palpate-tests --test images` compares.
+pub const FEATURES: [(&str, [usize; 2]); 14] = [
+    ("compact", [780, 1_012]),
+    ("complete", [2_048, 1_932]),
+    ("grid", [340, 292]),
+    ("wide", [900, 1_076]),
+    ("patterns", [468, 456]),
+    ("code", [0, 130]),
+    ("i8-leaves", [0, 0]),
+    ("i16-leaves", [76, 60]),
+    ("f32-leaves", [400, 940]),
+    ("shared-leaves", [1_372, 1_160]),
+    ("sentinel", [380, 420]),
+    ("row-evidence", [492, 632]),
+    ("strangers", [3_496, 4_736]),
+    ("outputs", [1_764, 2_000]),
+];
+
+/// Flash of what all images of verdicts have.
+const COMMON: [usize; 2] = [5_948, 5_472];
+
+/// Features of palpate-onboard that a model needs.
+pub fn features(model: &Model<'_>) -> Vec<&'static str> {
+    let leaf = model.leaf_type();
+    let needed = |name: &str| match name {
+        "shared-leaves" => model.shared_leaves().is_some(),
+        "sentinel" => model.sentinel().is_some(),
+        "strangers" => model.strangers().is_some(),
+        "row-evidence" => model.row_evidence().is_some() || model.weight_of(u32::MAX) != Weights::ONE,
+        "outputs" => model.outputs().is_some(),
+        _ => name == model.layout().name() || name.strip_suffix("-leaves") == Some(leaf.name()),
     };
-    match model.leaf_type() {
-        LeafType::I8 => bytes[0],
-        LeafType::I16 => bytes[1],
-        LeafType::F32 => bytes[2],
-    }
+    FEATURES.iter().map(|(name, _)| *name).filter(|name| needed(name)).collect()
+}
+
+/// Flash of a whole image of verdicts with these features of palpate-onboard, within 5 % where that was measured.
+pub fn code_flash(core: Core, features: &[&str]) -> usize {
+    let of = |bytes: [usize; 2]| bytes[usize::from(core == Core::M0Plus)];
+    let has = |name: &str| features.contains(&name);
+    of(COMMON) + FEATURES.iter().filter(|(name, _)| has(name)).map(|(_, bytes)| of(*bytes)).sum::<usize>()
 }
 
 /// Properties of a model that the cost of margins depends on.

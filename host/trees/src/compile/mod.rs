@@ -67,7 +67,7 @@ mod write;
 
 pub use budget::compile_within;
 pub use container::{OwnedSection, file};
-pub use cost::{Core, Instructions, Memory};
+pub use cost::{Core, FEATURES, Instructions, Memory, code_flash, features};
 pub use early::{EarlyExit, EarlyExitFound};
 pub use emit::{HEADER, Language, check_place, emit, identifier, write_sources};
 pub use error::CompileProblem;

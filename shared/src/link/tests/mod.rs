@@ -704,7 +704,7 @@ fn golden_frames_pin_the_format() {
     let press = Approach { x: -1_000, y: 0, roll: 64 };
     // In micrometers: -12300, 4100, 25000.
     let position = [244, 207, 255, 255, 4, 16, 0, 0, 168, 97, 0, 0];
-    let frames: [(Message<'_>, &[u8]); 13] = [
+    let frames: [(Message<'_>, &[u8]); 15] = [
         (
             Message::Command { sequence: 1, command: Command::Touch { touch: (&touch).into(), detail: true } },
             &[
@@ -768,6 +768,14 @@ fn golden_frames_pin_the_format() {
         (
             Message::Answer { asker: 2, tag: 5, answer: Answer::NextPress(press) },
             &[0, 3, 3, 2, 1, 1, 7, 1, 2, 5, 10, 207, 15, 6, 64, 139, 212, 99, 76, 0],
+        ),
+        (
+            Message::Outcome { sequence: 7, outcome: Outcome::Continue { offset: 4_096 } },
+            &[0, 3, 3, 2, 1, 1, 10, 3, 7, 3, 128, 32, 64, 191, 151, 254, 0],
+        ),
+        (
+            Message::Outcome { sequence: 7, outcome: Outcome::Refused(Refusal::Older) },
+            &[0, 3, 3, 2, 1, 1, 9, 3, 7, 2, 17, 13, 212, 221, 210, 0],
         ),
     ];
     for (message, golden) in frames {

@@ -20,6 +20,7 @@ use palpate::output::{print, print_json, refuse_foreign};
 use palpate::progress::Progress;
 use palpate::touches::{Log, is_log};
 use palpate::{Error, Result};
+use palpate_shared::format::SignedModel;
 use palpate_shared::link::{Decision, HostSettings, Refusal, VerdictMessage};
 use std::io::BufReader;
 use std::ops::ControlFlow;
@@ -128,12 +129,12 @@ fn port(text: &str) -> Result<String> {
 impl Arguments {
     /// Opens a session, and loads the model if there is one to load.
     fn open(&self, port: &Port, seed: u64) -> Result<(Connection, Option<Vec<u8>>)> {
-        let model = self.load.as_deref().map(model_of_touches).transpose()?;
+        let loaded = self.load.as_deref().map(with_signature).transpose()?;
         let mut connection = self.line.open(port, seed)?;
-        if let Some(model) = &model {
-            connection.load(model, &Bar::new())?;
+        if let Some((bytes, _)) = &loaded {
+            connection.load(bytes, &Bar::new())?;
         }
-        Ok((connection, model))
+        Ok((connection, loaded.map(|(_, model)| model)))
     }
 
     /// The question to a chip with this model after each touch.
@@ -180,6 +181,17 @@ fn model_of_touches(path: &Path) -> Result<Vec<u8>> {
         Some(_) => Ok(compiled.bytes().to_vec()),
         None => Err(Error::at(Place::file(path), ChipProblem::Rows)),
     }
+}
+
+/// Bytes to load, and the model in them, which a signature may follow.
+fn with_signature(path: &Path) -> Result<(Vec<u8>, Vec<u8>)> {
+    let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read the model", error))?;
+    let model = match SignedModel::read(&bytes) {
+        // The chip checks it.
+        Some(signed) => signed.model.to_vec(),
+        None => return model_of_touches(path).map(|model| (model.clone(), model)),
+    };
+    Ok((bytes, model))
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
