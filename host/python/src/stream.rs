@@ -24,8 +24,8 @@ fn sequences(
     ids: &[String],
     groups: Option<&[String]>,
 ) -> Result<Sequences, Failure> {
-    let wanted = model.feature_count();
-    let values = taken(&Features::from(model), rows.rows()?)?;
+    let wanted = model.measured_count();
+    let values = taken(&Features::measured(model), rows.rows()?)?;
     let count = values.len() / wanted;
     let lengths =
         [("y", labels.map(<[String]>::len)), ("sequence", Some(ids.len())), ("groups", groups.map(<[String]>::len))];
@@ -51,7 +51,8 @@ fn sequences(
 /// Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
 #[pyo3::pyfunction]
 #[pyo3(signature = (model, rows, labels, sequence, *, groups=None, error_rate=0.01, per="average", confidence=0.95,
-    max_rows=None, strangers=None, background=None, background_sequence=None, seed=1, progress=None))]
+    max_rows=None, strangers=None, background=None, background_sequence=None, guard=false,
+    seed=1, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn calibrate(
     py: Python<'_>,
@@ -67,6 +68,7 @@ pub(crate) fn calibrate(
     strangers: Option<&str>,
     background: Option<Input<'_, f64, Ix2>>,
     background_sequence: Option<Vec<String>>,
+    guard: bool,
     seed: u64,
     progress: Option<Callback>,
 ) -> Result<(Model, String), Failure> {
@@ -90,7 +92,7 @@ pub(crate) fn calibrate(
                 StrangerTest::new(test, opened, others.as_ref())
             })
             .transpose()?;
-        let settings = with!(Settings::default(), rate = error_rate, per, confidence, max_rows, strangers, seed);
+        let settings = with!(Settings::default(), rate = error_rate, per, confidence, max_rows, guard, strangers, seed);
         stream::calibrate(opened, &rows, &settings, progress)
     })?;
     let text = json(&calibrated);

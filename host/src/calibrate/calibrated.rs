@@ -68,6 +68,9 @@ pub struct Calibrated {
     /// The shape of evidence of rows.
     #[serde(flatten)]
     pub rows: Option<OfRows>,
+    /// Rows that a guard refuses, if the model has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub guard: Option<crate::stream::Guarded>,
     /// The test for what the model does not know.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strangers: Option<Found>,
@@ -253,6 +256,7 @@ impl Calibrated {
             temperature: None,
             recorded: None,
             rows: None,
+            guard: None,
             strangers: None,
             note: None,
         })

@@ -5,7 +5,8 @@ use super::follow::follow;
 use super::parts::Parts;
 use super::settings::Settings;
 use super::shape::{self, Fitted, STRICTEST};
-use super::{Rows, check};
+use super::{Rows, check, check_columns, guard, taken};
+use super::guard::Guarded;
 use crate::calibrate::{
     Begin, Calibrated, Chosen, Limit, Odds, OfRows, Stated, Stop, Terms, Used, Way, choose_groups, choose_independent,
     share_tested,
@@ -34,9 +35,13 @@ pub fn calibrate(
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
     progress.begin("computing margins", None);
-    let rows = Rows::new(model, sequences)?;
+    let (bytes, learned) = guarded(model, sequences, settings)?;
+    let model = &compile::open(&bytes)?;
+    let rows = taken(model, sequences)?;
+    let margins = Rows::new(model, &rows);
     progress.begin("calibrating", None);
-    let calibrated = calibrate_margins(model, &rows, &sequences.sequences, settings)?;
+    let calibrated = calibrate_margins(model, &margins, &rows.sequences, settings)?;
+    let guard = learned.map(|learned| Guarded { rows: sequences.len() - learned, refused: sequences.len() - rows.len() });
     let (copies, all) = (copies(sequences), sequences.sequences.len());
     let note = (copies > 0).then(|| {
         format!(
@@ -44,7 +49,25 @@ pub fn calibrate(
              the promise may not hold: leave them out, or name what they come from as their group."
         )
     });
-    Ok(Calibrated { note, ..calibrated })
+    Ok(Calibrated { note, guard, ..calibrated })
+}
+
+/// The model with a guard, if one is wanted, and without one of an earlier calibration; and the number of rows that the guard was
+/// learned from.
+fn guarded(model: &Model<'_>, sequences: &Sequences, settings: &Settings) -> Result<(Vec<u8>, Option<usize>)> {
+    check(model)?;
+    settings.check()?;
+    let without = restate(model, &Restated { sections: vec![(Tag::Guard, None)], ..Restated::default() })?;
+    if !settings.guard {
+        return Ok((without, None));
+    }
+    let model = compile::open(&without)?;
+    check_columns(&model, sequences)?;
+    // Of the same sequences and seed the parts are the same again.
+    let learned = Parts::new(&sequences.sequences, settings)?.learned;
+    let rows = learned.iter().map(|sequence| sequence.rows.len()).sum();
+    let section = (Tag::Guard, Some((true, guard::section(&model, sequences, &learned))));
+    Ok((restate(&model, &Restated { sections: vec![section], ..Restated::default() })?, Some(rows)))
 }
 
 /// Like [`calibrate`], from margins that were computed before.

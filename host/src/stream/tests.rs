@@ -102,7 +102,7 @@ struct Population {
 impl Population {
     fn new(kind: Kind, count: usize, length: usize) -> Self {
         let made = sequences(kind, count, length, 7);
-        let rows = Rows::new(&compile::open(&MODEL).unwrap(), &made).unwrap();
+        let rows = Rows::new(&compile::open(&MODEL).unwrap(), &made);
         Self { rows, sequences: made.sequences, kind }
     }
 
@@ -401,7 +401,7 @@ fn a_test_for_strangers_names_no_more_rows_between_the_classes_than_no_test() {
         let without = calibrate(&model, &made, &settings, &()).unwrap();
         let named = |calibrated: &[u8]| {
             let found =
-                evaluate_ends(&compile::open(calibrated).unwrap(), &Rows::new(&model, &idle).unwrap(), &idle.sequences);
+                evaluate_ends(&compile::open(calibrated).unwrap(), &Rows::new(&model, &idle), &idle.sequences);
             (500.0 * (1.0 - found.undecided - found.unknown)).round() as u32
         };
         for background in [None, Some(5.0)] {

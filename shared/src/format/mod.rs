@@ -16,6 +16,7 @@ mod plan;
 mod prediction;
 mod promise;
 mod records;
+mod sequences;
 mod strangers;
 mod trained;
 
@@ -31,6 +32,7 @@ pub use plan::Plan;
 pub use prediction::{Link, Prediction, Sentinel};
 pub use promise::{OddsByObject, Promise, PromisedNoise, Temperature};
 pub use records::{Axis, Columns, Group};
+pub use sequences::{Fault, Guard, Limits, Position};
 pub use strangers::{MisfitTerms, MisfitTest, ObjectMisfit, Strangers};
 pub use trained::{
     Feature, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedCapture,

@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from . import _native
 from ._errors import InputError, SettingError
-from ._import import compile
+from ._import import compile, to_ensemble
 from ._native import Model, Recognizer
-from ._rows import names_of, rows_of, take
+from ._rows import names_of, numbered, rows_of, take
 from ._types import Progress, Verdict
 
 _Ids = Sequence[object] | npt.NDArray[Any]
@@ -118,6 +118,7 @@ def calibrate(
     strangers: str | None = None,
     background: npt.ArrayLike | None = None,
     background_sequence: _Ids | None = None,
+    guard: bool = False,
     seed: int = 1,
     progress: Progress | None = None,
 ) -> Calibrated:
@@ -127,7 +128,8 @@ def calibrate(
     other, and are of one class. Without `groups` sequences must be independent of each other; with them, such as a person for
     each row, the promise is for new groups. The rows must be others than those of the training. `per` is what the rate is
     promised of: "average", "name" or "object". With `strangers` ("likely" or "certain") the model also tests whether rows fit
-    any class; rows of others can be given as a `background`, with their own sequences. `seed` says which sequences are learned
+    any class; rows of others can be given as a `background`, with their own sequences. With `guard` the model refuses rows of a
+    sensor that is dead, stuck or out of its range, which then add nothing. `seed` says which sequences are learned
     from: calibrate once. Of several seeds, rates or models tried on the same sequences, the one that looks best keeps its promise
     less often than stated.
 
@@ -143,9 +145,11 @@ def calibrate(
     True
     """
     compiled = model if isinstance(model, Model) else compile(model, max_touches=max_rows or 200)
+    # A recognizer's features are those that someone measures, without a row's number.
+    owner = Recognizer(compiled)
     calibrated, text = _native.calibrate(
         compiled,
-        rows_of(compiled, rows),
+        rows_of(owner, rows),
         _texts(labels),
         _ids(sequence, "sequence"),
         groups=None if groups is None else _ids(groups, "group"),
@@ -154,8 +158,9 @@ def calibrate(
         confidence=confidence,
         max_rows=max_rows,
         strangers=strangers,
-        background=None if background is None else rows_of(compiled, background),
+        background=None if background is None else rows_of(owner, background),
         background_sequence=None if background_sequence is None else _ids(background_sequence, "sequence"),
+        guard=guard,
         seed=seed,
         progress=progress,
     )
@@ -181,7 +186,7 @@ def evaluate_sequences(
     `calibrate`. Without an `error_rate` the model stops at its own thresholds."""
     text = _native.evaluate_sequences(
         model,
-        rows_of(model, rows),
+        rows_of(Recognizer(model), rows),
         _texts(labels),
         _ids(sequence, "sequence"),
         groups=None if groups is None else _ids(groups, "group"),
@@ -201,6 +206,9 @@ class SequenceRecognizer:
     groups, and calibrates on the others; `predict` gives a class for each sequence, or `None` without a verdict. A classifier that
     is fitted already is taken as it is with `prefit`, or in scikit-learn's `FrozenEstimator`; all sequences are calibrated on
     then, and must be others than those that it was trained on.
+
+    With `position` the classifier also gets the row's number in its sequence, counted from 1, as the last column (`"position"` of a
+    table), which whoever follows a sequence counts, also on a chip. `guard` is as for `calibrate`.
     """
 
     def __init__(
@@ -212,6 +220,8 @@ class SequenceRecognizer:
         confidence: float = 0.95,
         max_rows: int | None = None,
         strangers: str | None = None,
+        position: bool = False,
+        guard: bool = False,
         train_share: float = 0.5,
         prefit: bool = False,
         seed: int = 1,
@@ -222,6 +232,8 @@ class SequenceRecognizer:
         self.confidence = confidence
         self.max_rows = max_rows
         self.strangers = strangers
+        self.position = position
+        self.guard = guard
         self.train_share = train_share
         self.prefit = prefit
         self.seed = seed
@@ -259,11 +271,12 @@ class SequenceRecognizer:
         fitted = self._fitted()
         if fitted is None:
             train = self._train(ids if owners is None else owners)
-            fitted = _clone(self.estimator).fit(take(table, train), labels[train])
+            known = numbered(table, _numbers(_texts(ids))) if self.position else table
+            fitted = _clone(self.estimator).fit(take(known, train), labels[train])
             calibrated = ~train
         self.estimator_ = fitted
         self.calibrated_ = calibrate(
-            fitted,
+            self._compiled(fitted, table),
             take(table, calibrated),
             labels[calibrated],
             sequence=ids[calibrated],
@@ -273,6 +286,7 @@ class SequenceRecognizer:
             confidence=self.confidence,
             max_rows=self.max_rows,
             strangers=self.strangers,
+            guard=self.guard,
             seed=self.seed,
         )
         self.model_ = self.calibrated_.model
@@ -280,7 +294,23 @@ class SequenceRecognizer:
         for name in ("n_features_in_", "feature_names_in_"):
             if hasattr(fitted, name):
                 setattr(self, name, getattr(fitted, name))
+        if self.position:
+            self.n_features_in_ = table.shape[1]
+            if hasattr(self, "feature_names_in_"):
+                self.feature_names_in_ = self.feature_names_in_[:-1]
         return self
+
+    def _compiled(self, fitted: Any, table: Any) -> Any:
+        """The model of a fitted classifier, or the classifier itself without a position."""
+        if not self.position:
+            return fitted
+        ensemble = to_ensemble(fitted)
+        if len(ensemble.features) != table.shape[1] + 1:
+            raise InputError(
+                f"the trees take {len(ensemble.features)} features, and X has {table.shape[1]}, to which position=True adds one. Train on "
+                "all of them, at most 256."
+            )
+        return compile(ensemble, max_touches=self.max_rows or 200, position=ensemble.features[-1])
 
     def _fitted(self) -> Any:
         """The classifier that is fitted already, if one is given."""
@@ -346,6 +376,8 @@ _PARAMETERS = (
     "confidence",
     "max_rows",
     "strangers",
+    "position",
+    "guard",
     "train_share",
     "prefit",
     "seed",
@@ -369,6 +401,12 @@ def _clone(estimator: Any) -> Any:
     if importlib.util.find_spec("sklearn") is None:
         return copy.deepcopy(estimator)
     return importlib.import_module("sklearn.base").clone(estimator)
+
+
+def _numbers(sequence: list[str]) -> npt.NDArray[np.float64]:
+    """The number of each row in its sequence, from 1."""
+    lengths = [stretch.stop - stretch.start for stretch in _stretches(sequence)]
+    return np.concatenate([np.arange(1.0, length + 1) for length in lengths])
 
 
 def _not_fitted() -> Exception:
