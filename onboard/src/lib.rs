@@ -86,8 +86,8 @@ pub mod station;
 
 pub use bytes::{Aligned, ModelError};
 pub use decide::{
-    CapacityError, Familiarity, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, RowsSeen, Stopping,
-    Verdict,
+    CapacityError, Familiarity, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, RowsSeen,
+    Stopping, Verdict,
 };
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};

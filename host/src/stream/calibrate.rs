@@ -2,11 +2,11 @@
 
 use super::copies::copies;
 use super::follow::follow;
+use super::guard::Guarded;
 use super::parts::Parts;
 use super::settings::Settings;
 use super::shape::{self, Fitted, STRICTEST};
-use super::{Rows, check, check_columns, guard, taken};
-use super::guard::Guarded;
+use super::{Rows, check, check_columns, guard, rows_of, taken};
 use crate::calibrate::{
     Begin, Calibrated, Chosen, Limit, Odds, OfRows, Stated, Stop, Terms, Used, Way, choose_groups, choose_independent,
     share_tested,
@@ -41,7 +41,8 @@ pub fn calibrate(
     let margins = Rows::new(model, &rows);
     progress.begin("calibrating", None);
     let calibrated = calibrate_margins(model, &margins, &rows.sequences, settings)?;
-    let guard = learned.map(|learned| Guarded { rows: sequences.len() - learned, refused: sequences.len() - rows.len() });
+    let all = rows_of(sequences);
+    let guard = learned.map(|learned| Guarded { rows: all - learned, refused: all - rows_of(&rows) });
     let (copies, all) = (copies(sequences), sequences.sequences.len());
     let note = (copies > 0).then(|| {
         format!(

@@ -1,7 +1,7 @@
 //! Verdicts on sequences of rows: how often they are wrong, after how many rows, and what a fixed number of rows would give.
 
 use super::settings::check_rows;
-use super::{Rows, check, taken};
+use super::{Rows, check, rows_of, taken};
 use crate::compile;
 use crate::error::Result;
 use crate::evaluate::Finding;
@@ -165,7 +165,7 @@ impl Switched {
 pub fn evaluate(model: &Model<'_>, sequences: &Sequences, wanted: &Wanted) -> Result<Evaluated> {
     let rows = taken(model, sequences)?;
     let evaluated = measured(model, &Rows::new(model, &rows), &rows.sequences, wanted, true)?;
-    Ok(Evaluated { refused: model.guard().map(|_| sequences.len() - rows.len()), ..evaluated })
+    Ok(Evaluated { refused: model.guard().map(|_| rows_of(sequences) - rows_of(&rows)), ..evaluated })
 }
 
 /// Like [`evaluate`], from margins that were computed before; without the comparison and a sequence's evidence unless it

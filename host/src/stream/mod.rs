@@ -72,6 +72,11 @@ impl Rows<'_> {
     }
 }
 
+/// Number of rows of all sequences.
+fn rows_of(sequences: &Sequences) -> usize {
+    sequences.sequences.iter().map(|sequence| sequence.rows.len()).sum()
+}
+
 /// Refuses rows of another number of measured features.
 fn check_columns(model: &Model<'_>, sequences: &Sequences) -> Result<()> {
     let (found, wanted) = (sequences.features, model.measured_count());

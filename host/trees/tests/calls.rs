@@ -170,7 +170,8 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
 /// Limits that some rows break: the lower half of each feature's range, present, at most two rows the same.
 fn limits(encoder: &Encoder, rows: &[Vec<f64>], position: usize) -> Vec<u8> {
     let of = |feature: usize| {
-        let mut values: Vec<i32> = rows.iter().map(|row| encoder.row(row)[feature]).filter(|key| *key != i32::MIN).collect();
+        let mut values: Vec<i32> =
+            rows.iter().map(|row| encoder.row(row)[feature]).filter(|key| *key != i32::MIN).collect();
         values.sort_unstable();
         let (low, high) = (values[0], values[values.len() * 9 / 10]);
         if feature == position { Limits::NONE } else { Limits { low, high, may_miss: feature == 1, most_equal: 2 } }
@@ -239,7 +240,8 @@ fn rows_of_a_sequence_are_numbered_and_refused_by_the_same_bits_as_in_rust() {
                 seen.reset();
             }
             let row = encoder.row(row);
-            let pushed = if is_guarded { recognizer.push_seen(&row, &mut seen) } else { recognizer.push_features(&row) };
+            let pushed =
+                if is_guarded { recognizer.push_seen(&row, &mut seen) } else { recognizer.push_features(&row) };
             let (answer, feature) = match pushed {
                 Err(Refused::Guarded(feature, _)) => (-4, u32::from(feature) + 1),
                 Err(other) => panic!("{other}"),
@@ -284,7 +286,8 @@ fn rows_of_a_sequence_are_numbered_and_refused_by_the_same_bits_as_in_rust() {
     );
     let program = directory.path().join("program");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
-    let flags = ["LAYOUTS=127", "LEAVES=7", "SEQUENCES=1", "MAX_OBJECTS=32"].map(|macros| format!("-DPALPATE_{macros}"));
+    let flags =
+        ["LAYOUTS=127", "LEAVES=7", "SEQUENCES=1", "MAX_OBJECTS=32"].map(|macros| format!("-DPALPATE_{macros}"));
     let mut command = Command::new(compiler);
     command.args(["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-O1"]).args(flags);
     let built = command.arg("program.c").arg("-o").arg(&program).current_dir(&directory).output().unwrap();

@@ -8,8 +8,8 @@ use super::together::{self, Leading};
 use crate::bytes::AlignedTo8;
 use crate::model::{Model, Refused};
 use core::fmt;
-use palpate_shared::{MISSING_FEATURE, Touch};
 use palpate_shared::format::Outputs;
+use palpate_shared::{MISSING_FEATURE, Touch};
 
 /// Result of the touches so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -81,11 +81,7 @@ impl<const N: usize> Recognizer<'_, N> {
     ///
     /// # Errors
     /// As [`RowsSeen::next`].
-    pub fn push_seen<const F: usize>(
-        &mut self,
-        measured: &[i32],
-        seen: &mut RowsSeen<F>,
-    ) -> Result<Verdict, Refused> {
+    pub fn push_seen<const F: usize>(&mut self, measured: &[i32], seen: &mut RowsSeen<F>) -> Result<Verdict, Refused> {
         let features = seen.next(self.model(), measured)?;
         let mut margins = [0; N];
         self.model().margins_of(&features, &mut margins);

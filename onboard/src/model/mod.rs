@@ -23,9 +23,9 @@ pub use refused::Refused;
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
-    Counted, EarlyExit, Feature, Guard, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, Outputs, PatternShares,
-    Plan, Position, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature, TrainedCapture,
-    TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
+    Counted, EarlyExit, Feature, Guard, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, Outputs,
+    PatternShares, Plan, Position, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature,
+    TrainedCapture, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
 };
 use palpate_shared::{Descriptor, MISSING_FEATURE, Patterns};
 

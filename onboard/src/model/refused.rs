@@ -55,7 +55,9 @@ impl fmt::Display for Refused {
             Self::NeedsSeen => "the model states which rows it takes: they need a RowsSeen with room for its features",
             Self::Guarded(_, Fault::Outside) => "a feature is outside of what the model was calibrated on",
             Self::Guarded(_, Fault::Missing) => "a feature is missing, which never happened in calibration",
-            Self::Guarded(_, Fault::Stuck) => "a feature stayed the same for longer than in any sequence of calibration",
+            Self::Guarded(_, Fault::Stuck) => {
+                "a feature stayed the same for longer than in any sequence of calibration"
+            }
         })
     }
 }

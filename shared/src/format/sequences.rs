@@ -163,7 +163,10 @@ mod tests {
         assert!(guard.limits().eq([limits, Limits::NONE]));
         assert_eq!(Guard::from_bytes(&bytes, 3), None);
         let of = |value, equal| limits.check(value, equal).err();
-        assert_eq!([of(-5, 1), of(9, 3), of(-6, 1), of(10, 1)], [None, None, Some(Fault::Outside), Some(Fault::Outside)]);
+        assert_eq!(
+            [of(-5, 1), of(9, 3), of(-6, 1), of(10, 1)],
+            [None, None, Some(Fault::Outside), Some(Fault::Outside)]
+        );
         assert_eq!([of(0, 4), of(MISSING_FEATURE, 1)], [Some(Fault::Stuck), Some(Fault::Missing)]);
         assert_eq!(Limits::NONE.check(MISSING_FEATURE, u32::MAX), Ok(()));
     }

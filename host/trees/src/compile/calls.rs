@@ -284,8 +284,10 @@ impl Calls<'_> {
         let (begin, push, refused) = match is_guarded {
             true => (
                 "    seen->rows = 0;\n    seen->refused = 0;\n",
-                format!("    seen->refused = palpate_next_row(&{name}_opened_, {argument}, keys);\n    \
-                         if (seen->refused != 0) {{\n        return -4;\n    }}\n"),
+                format!(
+                    "    seen->refused = palpate_next_row(&{name}_opened_, {argument}, keys);\n    \
+                         if (seen->refused != 0) {{\n        return -4;\n    }}\n"
+                ),
                 ", -4 if the model does not take the row, which adds nothing",
             ),
             false => ("", format!("    (void)palpate_next_row(&{name}_opened_, {argument}, keys);\n"), ""),
