@@ -26,6 +26,7 @@ mod background;
 mod calibrate;
 mod copies;
 mod evaluate;
+mod folds;
 mod follow;
 mod guard;
 #[cfg(feature = "parquet")]
@@ -36,8 +37,9 @@ mod shape;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 
-pub use calibrate::calibrate;
+pub use calibrate::{calibrate, calibrate_with};
 pub use evaluate::{Comparison, Evaluated, Grown, Point, PromiseOfSequences, Switched, Wanted, evaluate};
+pub use folds::{Estimated, Learned, estimate};
 pub use guard::{GUARD_MARGIN, GUARD_RUN, Guarded};
 pub use settings::Settings;
 #[cfg(feature = "train")]

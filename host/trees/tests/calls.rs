@@ -232,7 +232,7 @@ fn rows_of_a_sequence_are_numbered_and_refused_by_the_same_bits_as_in_rust() {
             })
             .collect();
         let objects = model.object_count();
-        let mut recognizer = Recognizer::<32>::new(&model, Stopping::from_odds(1 << 40, 5)).unwrap();
+        let mut recognizer = Recognizer::<32>::new(&model, Stopping::from_odds(1 << 54, 5)).unwrap();
         let mut seen = RowsSeen::<32>::new();
         for (number, row) in measured.iter().enumerate() {
             if number % LENGTH == 0 {
@@ -268,7 +268,7 @@ fn rows_of_a_sequence_are_numbered_and_refused_by_the_same_bits_as_in_rust() {
             "#include \"{name}.h\"\nstatic void run_{name}(void)\n{{\n    static const {} rows[][{}] = {{{}}};\n    \
              palpate_recognizer state;\n    {seen}\n    int i, j;\n    for (i = 0; i < {}; i++) {{\n        int answer;\n        \
              if (i % {LENGTH} == 0) {{\n            {name}_begin(&state{argument});\n            \
-             state.odds = (uint64_t)1 << 40;\n            state.max_touches = 5;\n            state.by_object = 0;\n        }}\n        \
+             state.odds = (uint64_t)1 << 54;\n            state.max_touches = 5;\n            state.by_object = 0;\n        }}\n        \
              answer = {name}_push(&state{argument}, rows[i]);\n        printf(\"%d %d\", answer, (int){refused});\n        \
              for (j = 0; j < {objects}; j++) {{\n            \
              printf(\" %lld\", state.touches == 0 ? 0LL : (long long)state.evidence[j]);\n        }}\n        \

@@ -27,6 +27,7 @@ pub(super) fn features(model: &Model<'_>) -> String {
         ("sentinel", model.sentinel().is_some()),
         ("strangers", model.strangers().is_some()),
         ("row-evidence", model.row_evidence().is_some() || model.weight_of(u32::MAX) != Weights::ONE),
+        ("sequences", model.position().is_some() || model.guard().is_some()),
         ("outputs", model.outputs().is_some()),
     ];
     let needed: String =
