@@ -703,3 +703,44 @@ fn promises_are_kept_with_row_numbers_and_with_guards_on_sensors_that_fail() {
         assert!(refused <= repetitions / 2, "{what}: {refused} refused");
     }
 }
+
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::folds -- --nocapture` repeats it as often.
+#[test]
+fn folds_leave_all_sequences_to_the_test_keep_the_promise_and_estimate_the_error_rate() {
+    let repetitions = repetitions(3);
+    let model = compile::open(&MODEL).unwrap();
+    let all = sequences(Kind::Autoregressive(0.5), 2_001, 30, 8);
+    let (mut broken, mut refused, mut plain_refused, mut estimates) = (0, 0, 0, Vec::new());
+    for run in 0..repetitions {
+        let mut learned = Learned::default();
+        for fold in 0..4 {
+            learned.add(&model, &sequences(Kind::Autoregressive(0.5), 21, 30, 1_000 + 4 * run + fold)).unwrap();
+        }
+        let mut random = generator(run, Purpose::Synthetic, "drawn", 0);
+        let of = |_| all.sequences[random.random_range(0..all.sequences.len())].clone();
+        let drawn = Sequences { sequences: (0..60).map(of).collect(), ..all.clone() };
+        let settings = Settings { rate: 0.1, seed: run, max_rows: Some(30), ..Settings::default() };
+        let error = |bytes: &[u8]| evaluate(&compile::open(bytes).unwrap(), &all, &Wanted::default()).unwrap();
+        match calibrate_with(&model, &drawn, &learned, &settings, &()) {
+            Ok(made) => {
+                assert_eq!((made.sequences, made.learned), (60, Some(84)));
+                broken += u64::from(error(&made.model).error > 0.1);
+            }
+            Err(_) => refused += 1,
+        }
+        plain_refused += u64::from(calibrate(&model, &drawn, &settings, &()).is_err());
+        let estimated = estimate(&model, &learned, &settings).unwrap();
+        let found = error(&estimated.model);
+        assert!(found.promise.is_none());
+        estimates.push(estimated.error - found.error);
+    }
+    let mean = estimates.iter().sum::<f64>() / estimates.len() as f64;
+    println!(
+        "{broken} of {repetitions} broken, {refused} refused, {plain_refused} without folds; estimates are {mean:+.3} off on average"
+    );
+    assert_rare("folds", broken, repetitions, 0.05);
+    assert!(mean.abs() < 0.1, "{estimates:?}");
+    let two = compile::open(&ramp_model(0, None))
+        .map(|two| estimate(&two, &Learned::default(), &Settings::default()).is_err());
+    assert!(two.unwrap());
+}
