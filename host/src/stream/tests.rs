@@ -568,8 +568,8 @@ fn ramp_model(position: usize, scales: Option<Vec<f32>>) -> Vec<u8> {
     let split = |feature, threshold, left, right| Node::Split { feature, threshold, missing_left: true, left, right };
     let leaf = |first: f32| Node::Leaf(vec![first, -first]);
     let value = 1 - position;
-    let nodes =
-        vec![split(position, 5.5, 1, 2), split(value, 0.55, 3, 4), split(value, 0.55, 4, 3), leaf(0.7), leaf(-0.7)];
+    let splits = [split(position, 5.5, 1, 2), split(value, 0.55, 3, 4), split(value, 0.55, 5, 6)];
+    let nodes = splits.into_iter().chain([0.7, -0.7, -0.7, 0.7].map(leaf)).collect();
     let ensemble = Ensemble {
         inputs: Inputs::unnamed(2),
         objects: ["up", "down"].map(String::from).to_vec(),
