@@ -2112,6 +2112,12 @@ PALPATE_API uint16_t palpate_next_row(const palpate_model *model, uint32_t *rows
     }
     return refused;
 }
+
+/* Number of rows that were pushed in a sequence. */
+static inline uint32_t palpate_rows_(const palpate_recognizer *recognizer)
+{
+    return recognizer->touches;
+}
 #endif
 
 /* The posterior of an object in Q56 (PALPATE_ONE is 1), from the evidence divided by the model's temperature; 0 for an object

@@ -3,14 +3,13 @@
 use super::copies::copies;
 use super::folds::{Learned, moved};
 use super::follow::follow;
-use super::guard::Guarded;
 use super::parts::Parts;
 use super::settings::Settings;
 use super::shape::{self, Fitted, STRICTEST};
 use super::{Rows, check, check_columns, guard, rows_of, taken};
 use crate::calibrate::{
-    Begin, Calibrated, Chosen, Limit, Odds, OfRows, Stated, Stop, Terms, Used, Way, choose_groups, choose_independent,
-    share_tested,
+    Begin, Calibrated, Chosen, Guarded, Limit, Odds, OfRows, Stated, Stop, Terms, Used, Way, choose_groups,
+    choose_independent, share_tested,
 };
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};

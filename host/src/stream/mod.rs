@@ -40,7 +40,7 @@ mod tests;
 pub use calibrate::{calibrate, calibrate_with};
 pub use evaluate::{Comparison, Evaluated, Grown, Point, PromiseOfSequences, Switched, Wanted, evaluate};
 pub use folds::{Estimated, Learned, estimate};
-pub use guard::{GUARD_MARGIN, GUARD_RUN, Guarded};
+pub use guard::{GUARD_MARGIN, GUARD_RUN};
 pub use settings::Settings;
 #[cfg(feature = "train")]
 pub use settings::StrangerTest;

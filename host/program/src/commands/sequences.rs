@@ -104,7 +104,7 @@ pub(crate) fn evaluate(asked: Evaluation<'_>, compiled: &CompiledModel, global: 
 fn evaluated_text(evaluated: &Evaluated) -> String {
     let Evaluated { sequences, rows, error, wrong, undecided, unknown, mean_rows, median_rows, .. } = evaluated;
     let groups = evaluated.groups.map_or_else(String::new, |groups| format!(" of {groups} groups"));
-    let refused = evaluated.refused.map_or_else(String::new, |refused| format!(", {refused} more refused"));
+    let refused = evaluated.refused.map_or_else(String::new, |refused| format!(", {refused} others refused"));
     let mut text = format!(
         "{sequences} sequences{groups}, {rows} rows{refused}\n\
          of the names given {} wrong; of all sequences {} wrong, {} undecided, {} unknown\n\

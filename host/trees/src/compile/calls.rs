@@ -292,7 +292,7 @@ impl Calls<'_> {
             ),
             false => ("", format!("    (void)palpate_next_row(&{name}_opened_, {argument}, keys);\n"), ""),
         };
-        let rows = if is_guarded { "" } else { "    uint32_t rows = state->touches;\n" };
+        let rows = if is_guarded { "" } else { "    uint32_t rows = palpate_rows_(state);\n" };
         text + &format!(
             "/* Begins a sequence: nothing was added yet. {OWN} */\n\
              static inline void {name}_begin(palpate_recognizer *state{seen})\n{{\n    \
