@@ -25,6 +25,7 @@
  *   PALPATE_SHARED       0: rejects models that store equal leaves once, in a table
  *   PALPATE_SENTINEL     0: rejects models over rows in which a number stands for a missing value
  *   PALPATE_ROW_EVIDENCE 0: rejects models that state what a row adds to the evidence, or how much rows count together
+ *   PALPATE_SEQUENCES    1: reads models that number the rows of a sequence, or state which of them they take; rejected by default
  *   PALPATE_EARLY        1: adds palpate_class_of, which gives a class without walking all trees
  *   PALPATE_OUTPUTS      1: reads models in which several outputs belong to one object; rejected by default
  *   PALPATE_STRANGERS    0: rejects models with a test for unknown objects, or with a background
@@ -64,6 +65,9 @@
 #endif
 #ifndef PALPATE_ROW_EVIDENCE
 #define PALPATE_ROW_EVIDENCE 1
+#endif
+#ifndef PALPATE_SEQUENCES
+#define PALPATE_SEQUENCES 0
 #endif
 #ifndef PALPATE_EARLY
 #define PALPATE_EARLY 0
@@ -194,6 +198,10 @@ typedef struct {
     const uint8_t *row_; /* table from a row's margins to evidence; NULL: the margins */
     int32_t row_start_;  /* the margin of that table's first value */
     uint32_t row_most_;  /* beyond it, up to the last one */
+#if PALPATE_SEQUENCES
+    const uint8_t *position_; /* the feature that is a row's number, or NULL */
+    const uint8_t *guard_;    /* limits of each feature, or NULL */
+#endif
 #if PALPATE_OUTPUTS
     const uint8_t *outputs_; /* the objects that outputs belong to; NULL if each is an object */
 #endif
@@ -568,6 +576,22 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 if (!palpate_check_row_(model, content, length)) {
                     return PALPATE_FIELD;
                 }
+#if PALPATE_SEQUENCES
+            } else if (last == 21) {
+                /* A feature that exists, and a step above 0, in a model over rows. */
+                if (!palpate_holds_(length, 8, 0, 0) || PALPATE_BYTE(content) >= model->features || palpate_i32_(content + 4) < 1 ||
+                    model->descriptor != 255) {
+                    return PALPATE_FIELD;
+                }
+                model->position_ = content;
+            } else if (last == 22) {
+                if (model->descriptor != 255) {
+                    return PALPATE_FIELD;
+                }
+                model->guard_ = content;
+                pieces = model->features;
+                piece = 12;
+#endif
 #if PALPATE_OUTPUTS
             } else if (last == 18) {
                 if (!palpate_check_outputs_(model, content, length)) {
@@ -871,6 +895,10 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
         model->weights_ = NULL;
         model->row_ = NULL;
     }
+#if PALPATE_SEQUENCES
+    model->position_ = NULL;
+    model->guard_ = NULL;
+#endif
 #if PALPATE_OUTPUTS
     model->outputs_ = NULL;
 #endif
@@ -2039,6 +2067,58 @@ PALPATE_API palpate_answer palpate_push_features(palpate_recognizer *recognizer,
     palpate_push_evidence_(recognizer, margins);
     return PALPATE_COUNTED;
 }
+
+#if PALPATE_SEQUENCES
+/* The value of a feature in the last row of a sequence, and the number of rows that it has been the same. */
+typedef struct {
+    int32_t value;
+    uint32_t equal;
+} palpate_last;
+
+/* Makes the next row of a sequence ready for palpate_push_features. `features` are all of the model's; that of the row's number,
+ * if it has one, is filled in. `rows` is the number of rows before, 0 where a sequence begins, and is counted on. `last` has room
+ * for each feature if the model states which rows it takes, and may be NULL otherwise. The result is 0, or the number, counted from
+ * 1, of the first feature that the model does not take: such a row is not to be pushed. Cost: a few instructions for each feature. */
+PALPATE_API uint16_t palpate_next_row(const palpate_model *model, uint32_t *rows, palpate_last *last, int32_t *features)
+{
+    const uint8_t *limits = model->guard_;
+    const int is_first = *rows == 0;
+    uint16_t refused = 0;
+    uint_fast16_t i;
+    *rows += *rows != UINT32_MAX;
+    if (model->position_ != NULL) {
+        const uint32_t most = PALPATE_AS_(uint32_t, 1) << 24, number = *rows < most ? *rows : most;
+        const int32_t step = palpate_i32_(model->position_ + 4);
+        features[PALPATE_BYTE(model->position_)] = model->real ? palpate_f32_key(PALPATE_AS_(float, number))
+            : number > PALPATE_AS_(uint32_t, INT32_MAX / step) ? INT32_MAX : PALPATE_AS_(int32_t, number) * step;
+    }
+    for (i = 0; limits != NULL && i < model->features; i++, limits += 12) {
+        const uint32_t stated = palpate_u32_(limits + 8), most_equal = stated & 0x7fffffffu;
+        int32_t value = features[i];
+        int is_refused;
+        if (PALPATE_SENTINEL && model->sentinel_ != NULL && palpate_i32_(model->sentinel_) <= value &&
+            value <= palpate_i32_(model->sentinel_ + 4)) {
+            value = PALPATE_MISSING_FEATURE;
+        }
+        if (is_first || value != last[i].value) {
+            last[i].equal = 0;
+        }
+        last[i].value = value;
+        last[i].equal += last[i].equal != UINT32_MAX;
+        is_refused = value == PALPATE_MISSING_FEATURE ? stated >> 31 == 0 : value < palpate_i32_(limits) || value > palpate_i32_(limits + 4);
+        if (refused == 0 && (is_refused || (most_equal != 0 && last[i].equal > most_equal))) {
+            refused = PALPATE_AS_(uint16_t, i + 1);
+        }
+    }
+    return refused;
+}
+
+/* Number of rows that were pushed in a sequence. */
+static inline uint32_t palpate_rows_(const palpate_recognizer *recognizer)
+{
+    return recognizer->touches;
+}
+#endif
 
 /* The posterior of an object in Q56 (PALPATE_ONE is 1), from the evidence divided by the model's temperature; 0 for an object
  * that the model does not know. Cost: an exponential for each object, and a long division. */

@@ -53,6 +53,7 @@
 //! | `shared-leaves` | trees whose equal leaves are stored once |
 //! | `sentinel` | models over rows in which a number stands for a missing value |
 //! | `row-evidence` | models that state what a row adds to the evidence, and how much rows count together |
+//! | `sequences` | models that number the rows of a sequence, or state which of them they take |
 //! | `strangers` | models with a background, or a test for objects that they do not know |
 //! | `outputs` | models with several outputs for one object |
 //! | `locate` | [`locate`]; off by default |
@@ -85,7 +86,8 @@ pub mod station;
 
 pub use bytes::{Aligned, ModelError};
 pub use decide::{
-    CapacityError, Familiarity, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, Stopping, Verdict,
+    CapacityError, Familiarity, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, RowsSeen,
+    Stopping, Verdict,
 };
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};

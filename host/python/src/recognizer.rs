@@ -8,7 +8,7 @@ use crate::objects::{self, class};
 use numpy::ndarray::Ix1;
 use palpate::compile::{self, longest_time};
 use palpate::error::{Error, EvaluateProblem, TouchesProblem};
-use palpate::onboard::{Refused, Stopping, Verdict};
+use palpate::onboard::{Refused, RowsSeen, Stopping, Verdict};
 use palpate::rows::{Encoder, Features};
 use palpate::shared::Touch;
 use pyo3::inspect::PyStaticExpr;
@@ -78,6 +78,7 @@ pub(crate) struct Recognizer {
     cell: OpenedRecognizer,
     encoder: Encoder,
     features: Features,
+    seen: Box<RowsSeen<256>>,
     names: Vec<Py<PyString>>,
     /// The longest time between contacts that makes sense, in seconds.
     longest: f64,
@@ -107,7 +108,8 @@ impl Recognizer {
         })?;
         let names = compile::names(model.model()).iter().map(|name| PyString::new(py, name).unbind()).collect();
         let longest = if model.model().descriptor().is_some() { longest_time(model.model()) } else { f64::INFINITY };
-        Ok(Self { cell, encoder: model.encoder.clone(), features: model.features.clone(), names, longest })
+        let (encoder, features) = (Encoder::measured(model.model()), Features::measured(model.model()));
+        Ok(Self { cell, encoder, features, seen: Box::default(), names, longest })
     }
 
     /// Takes in a touch: three contact times in seconds on any clock, `None` or NaN for a finger that did not touch, with
@@ -129,7 +131,7 @@ impl Recognizer {
     }
 
     /// Takes in a row of features, for a model over those, with NaN for a missing one. The features of a pandas series are
-    /// found by their names.
+    /// found by their names. A model with a `position` counts it itself since the last `reset`: the row has the other features.
     #[pyo3(signature = (row))]
     fn push_row<'py>(slf: &Bound<'py, Self>, row: ArrayLike<'py>) -> Result<objects::Verdict<'py>, Failure> {
         let (py, ArrayLike(row)) = (slf.py(), row);
@@ -141,7 +143,8 @@ impl Recognizer {
             None => own.encoder.row(&taken(&own.features, (row.values()?, row.values()?.len()))?),
             Some(_) => own.encoder.row(row.values()?),
         };
-        let pushed = own.cell.with_dependent_mut(|_, recognizer| recognizer.push_features(&row));
+        let Self { cell, seen, .. } = &mut *own;
+        let pushed = cell.with_dependent_mut(|_, recognizer| recognizer.push_seen(&row, seen));
         own.say(py, pushed)
     }
 
@@ -180,6 +183,7 @@ impl Recognizer {
     /// priors, in any unit.
     #[pyo3(signature = (weights=None))]
     fn reset(&mut self, weights: Option<Vec<u32>>) -> Result<(), Failure> {
+        self.seen.reset();
         self.cell.with_dependent_mut(|_, recognizer| match weights {
             None => {
                 recognizer.reset();
@@ -198,7 +202,7 @@ impl Recognizer {
     fn say<'py>(&self, py: Python<'py>, pushed: Result<Verdict, Refused>) -> Result<objects::Verdict<'py>, Failure> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let recognizer = self.cell.borrow_dependent();
-        let refused = pushed.err().map(|refused| refused.to_string());
+        let refused = pushed.err().map(|refused| palpate::stream::refusal(recognizer.model(), refused));
         let verdict = pushed.unwrap_or_else(|_| recognizer.verdict());
         let class = class(py, "Verdict", &CLASS)?;
         let made = match verdict {

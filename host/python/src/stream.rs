@@ -12,7 +12,7 @@ use palpate::error::{Error, RowsProblem};
 use palpate::rows::{Features, RowOf, Sequences, SequencesBuilder};
 use palpate::shared::format::Held;
 use palpate::strangers;
-use palpate::stream::{self, Settings, StrangerTest, Wanted};
+use palpate::stream::{self, Learned, Settings, StrangerTest, Wanted};
 use palpate::with;
 use pyo3::prelude::*;
 
@@ -24,8 +24,8 @@ fn sequences(
     ids: &[String],
     groups: Option<&[String]>,
 ) -> Result<Sequences, Failure> {
-    let wanted = model.feature_count();
-    let values = taken(&Features::from(model), rows.rows()?)?;
+    let wanted = model.measured_count();
+    let values = taken(&Features::measured(model), rows.rows()?)?;
     let count = values.len() / wanted;
     let lengths =
         [("y", labels.map(<[String]>::len)), ("sequence", Some(ids.len())), ("groups", groups.map(<[String]>::len))];
@@ -48,10 +48,43 @@ fn sequences(
     Ok(builder.finish().map_err(Error::from)?)
 }
 
+/// A fold of a training: a model that was trained without it, its rows, labels, sequences and groups.
+type Fold<'py> = (Bound<'py, Model>, Input<'py, f64, Ix2>, Vec<String>, Vec<String>, Option<Vec<String>>);
+
+/// Folds with the margins of their models.
+fn learned(folds: Vec<Fold<'_>>) -> Result<Learned, Failure> {
+    let mut learned = Learned::default();
+    for (model, rows, labels, ids, groups) in folds {
+        let opened = model.get().model();
+        learned.add(opened, &sequences(opened, &rows, Some(&labels), &ids, groups.as_deref())?)?;
+    }
+    Ok(learned)
+}
+
+/// Sets a model's threshold from the folds of its training, and returns the model and an estimate of its error rate.
+#[pyo3::pyfunction]
+#[pyo3(signature = (model, folds, *, error_rate, max_rows, guard))]
+pub(crate) fn estimate_sequences(
+    py: Python<'_>,
+    model: Bound<'_, Model>,
+    folds: Vec<Fold<'_>>,
+    error_rate: f64,
+    max_rows: Option<u32>,
+    guard: bool,
+) -> Result<(Model, String), Failure> {
+    let opened = model.get().model();
+    let learned = learned(folds)?;
+    let settings = with!(Settings::default(), rate = error_rate, max_rows, guard);
+    let found = long(py, None, |_| stream::estimate(opened, &learned, &settings))?;
+    let text = json(&found);
+    Ok((Model::of(found.model)?, text))
+}
+
 /// Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
 #[pyo3::pyfunction]
 #[pyo3(signature = (model, rows, labels, sequence, *, groups=None, error_rate=0.01, per="average", confidence=0.95,
-    max_rows=None, strangers=None, background=None, background_sequence=None, seed=1, progress=None))]
+    max_rows=None, strangers=None, background=None, background_sequence=None, guard=false,
+    seed=1, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn calibrate(
     py: Python<'_>,
@@ -67,6 +100,8 @@ pub(crate) fn calibrate(
     strangers: Option<&str>,
     background: Option<Input<'_, f64, Ix2>>,
     background_sequence: Option<Vec<String>>,
+    guard: bool,
+    learned: Option<Vec<Fold<'_>>>,
     seed: u64,
     progress: Option<Callback>,
 ) -> Result<(Model, String), Failure> {
@@ -83,6 +118,7 @@ pub(crate) fn calibrate(
         .map(|rows| sequences(opened, &rows, None, background_sequence.as_deref().unwrap_or_default(), None))
         .transpose()?;
     let held = held.transpose()?;
+    let learned = learned.map(self::learned).transpose()?;
     let calibrated = long(py, progress.as_ref(), |progress| {
         let strangers = held
             .map(|held| {
@@ -90,8 +126,11 @@ pub(crate) fn calibrate(
                 StrangerTest::new(test, opened, others.as_ref())
             })
             .transpose()?;
-        let settings = with!(Settings::default(), rate = error_rate, per, confidence, max_rows, strangers, seed);
-        stream::calibrate(opened, &rows, &settings, progress)
+        let settings = with!(Settings::default(), rate = error_rate, per, confidence, max_rows, guard, strangers, seed);
+        match &learned {
+            None => stream::calibrate(opened, &rows, &settings, progress),
+            Some(learned) => stream::calibrate_with(opened, &rows, learned, &settings, progress),
+        }
     })?;
     let text = json(&calibrated);
     Ok((Model::of(calibrated.model)?, text))

@@ -245,3 +245,79 @@ def test_scikit_learns_checks_hold(estimator: Any, check: Any) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         check(estimator)
+
+
+def ramps(count: int, seed: int) -> tuple[npt.NDArray[np.float64], Any, Any]:
+    """Ramps that rise or fall: a row tells the class only with its number."""
+    generator = np.random.default_rng(seed)
+    classes = np.arange(count) % 2
+    rise = np.arange(1, 11) / 10
+    rows = np.where(classes[:, None] == 0, rise, 1.1 - rise) + 0.2 * generator.normal(size=(count, 10))
+    return rows.reshape(-1, 1), np.repeat(np.array(["up", "down"])[classes], 10), np.repeat(np.arange(count), 10)
+
+
+@pytest.mark.parametrize("kind", ["array", "pandas"])
+def test_a_row_number_is_added_in_training_and_counted_by_whoever_follows_a_sequence(kind: str) -> None:
+    def table(values: npt.NDArray[np.float64]) -> Any:
+        return values if kind == "array" else pd.DataFrame(values, columns=["height"])
+
+    X, y, sequence = ramps(800, 1)
+    estimator = ensemble.HistGradientBoostingClassifier(max_iter=10, max_depth=3, random_state=1)
+    recognizer = palpate.SequenceRecognizer(estimator, error_rate=0.1, position=True)
+    recognizer.fit(table(X), y, sequence=sequence)
+    assert recognizer.n_features_in_ == 1 and recognizer.estimator_.n_features_in_ == 2
+    X, y, sequence = ramps(600, 2)
+    found = recognizer.predict(table(X), sequence=sequence)
+    named = found != None  # noqa: E711
+    ends = palpate.evaluate_sequences(recognizer.model_, table(X), y, sequence=sequence)
+    assert named.mean() > 0.8 and np.isclose((found[named] != y[::10][named]).mean(), ends.error) and ends.error < 0.13
+    # The same rows in one sequence each have the number 1.
+    assert ends.error < palpate.evaluate_sequences(recognizer.model_, table(X), y, sequence=np.arange(len(X))).error
+    with pytest.raises(palpate.InputError, match="2"):
+        palpate.evaluate_sequences(recognizer.model_, np.column_stack([X, X]), y, sequence=sequence)
+    if kind == "pandas":
+        with pytest.raises(palpate.InputError, match="has a column 'position'"):
+            recognizer.fit(table(X).assign(position=1), y, sequence=sequence)
+
+
+def test_a_guard_names_the_feature_of_a_dead_sensor_and_its_row_adds_nothing() -> None:
+    X, y, sequence, _ = streams(900, 1)
+    recognizer = palpate.SequenceRecognizer(estimators()[2], error_rate=0.1, guard=True).fit(X, y, sequence=sequence)
+    assert recognizer.calibrated_.raw["guard"]["refused"] <= 0.001 * recognizer.calibrated_.raw["guard"]["rows"] + 1
+    dead = palpate.Recognizer(recognizer.model_)
+    for row, why in [([np.nan, 0.0], "f0: a feature is missing"), ([0.5, 99.0], "f1: a feature is outside")]:
+        verdict = dead.push_row(np.array(row))
+        assert verdict.refused is not None and verdict.refused.startswith(why) and dead.touches == 0
+    answers = [dead.push_row(np.array([0.5, 0.1 * number])).refused for number in range(5)]
+    assert answers[-1] is not None and answers[-1].startswith("f0: a feature stayed the same"), answers
+    broken = X.copy()
+    broken[np.arange(len(X)) % LENGTH > 0] = np.nan
+    ends = palpate.evaluate_sequences(recognizer.model_, broken, y, sequence=sequence)
+    assert ends.raw["refused"] == 900 * (LENGTH - 1)
+
+
+def test_a_position_that_is_no_feature_or_no_class_is_an_error() -> None:
+    X, y, _ = ramps(100, 1)
+    own = ensemble.HistGradientBoostingClassifier(max_iter=3).fit(np.column_stack([X, X]), y)
+    with pytest.raises(palpate.SettingError, match="position is row"):
+        palpate.compile(own, position="row")
+    value = ensemble.HistGradientBoostingRegressor(max_iter=3).fit(np.column_stack([X, X]), np.arange(len(X)))
+    with pytest.raises(palpate.SettingError, match="position is f1"):
+        palpate.compile(value, position="f1")
+
+
+def test_folds_leave_all_other_sequences_to_the_test_and_estimate_where_nothing_can_be_promised() -> None:
+    X, y, sequence, _ = streams(160, 1)
+    own = palpate.SequenceRecognizer(estimators()[2], error_rate=0.2, max_rows=LENGTH, guard=True)
+    plain = own.fit(X, y, sequence=sequence).calibrated_
+    folded = own.set_params(folds=4).fit(X, y, sequence=sequence).calibrated_
+    assert plain.sequences + plain.raw["learned"] == folded.sequences == folded.raw["learned"] == 80
+    again = base.clone(own).fit(X, y, sequence=sequence)
+    assert again.model_.checksum == own.model_.checksum
+    estimated = own.set_params(promise=False, error_rate=0.1).fit(X, y, sequence=sequence)
+    assert estimated.estimated_.sequences == 160 and not hasattr(estimated, "calibrated_")
+    X, y, sequence, _ = streams(1500, 2)
+    ends = palpate.evaluate_sequences(estimated.model_, X, y, sequence=sequence)
+    assert "promise" not in ends.raw and abs(ends.error - estimated.estimated_.error) < 0.08, (ends, estimated.estimated_)
+    with pytest.raises(palpate.SettingError, match="folds is 1"):
+        palpate.SequenceRecognizer(estimators()[2], folds=1).fit(X, y, sequence=sequence)

@@ -68,6 +68,9 @@ pub struct Calibrated {
     /// The shape of evidence of rows.
     #[serde(flatten)]
     pub rows: Option<OfRows>,
+    /// Rows that a guard refuses, if the model has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub guard: Option<Guarded>,
     /// The test for what the model does not know.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strangers: Option<Found>,
@@ -122,6 +125,15 @@ pub struct OfRows {
     /// The weights that are kept: of 1, 2, 4, 8 and so on rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weights_by_doubling: Option<Vec<f64>>,
+}
+
+/// Effect of a guard on the sequences that it was not learned from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Guarded {
+    /// Their rows.
+    pub rows: usize,
+    /// Rows of these that it refuses.
+    pub refused: usize,
 }
 
 /// Rows that a part of the shape saves.
@@ -253,6 +265,7 @@ impl Calibrated {
             temperature: None,
             recorded: None,
             rows: None,
+            guard: None,
             strangers: None,
             note: None,
         })

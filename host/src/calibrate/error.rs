@@ -51,6 +51,9 @@ pub enum CalibrateProblem {
         /// The promised rate.
         rate: f64,
     },
+    /// Folds of a training do not belong to the model, or are fewer than two.
+    #[error("the folds have other features or classes than the model, or are fewer than two")]
+    FoldDiffers,
     /// There are too few sequences of rows, or groups of them, for a promise, even without any error.
     #[error("{} are too few to promise {} %: at least {needed} are needed, none of them wrong; {}", how_many(*found, object, *groups, *names_in), percent(*rate), could(*possible, *held))]
     TooFewSequences {
@@ -273,6 +276,7 @@ impl Problem for CalibrateProblem {
             Self::TooManyAlarms { .. } => {
                 "Train the model on rows like these, so that they fit their classes, or calibrate without the test."
             }
+            Self::FoldDiffers => "Train the model of each fold as the model itself, on sequences of every class.",
             Self::Looser { .. } => "Calibrate on more, or without the test.",
             Self::NotKeptByRows { wrong, given, rate, .. } if is_too_few(Tally { wrong: *wrong, all: *given }, *rate) => {
                 "Record more sequences, or promise a higher error rate."

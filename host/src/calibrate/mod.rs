@@ -56,7 +56,7 @@ mod walk;
 pub use crate::evidence::{Lead, Limit, Odds, Sequence, margin_of, odds_of};
 pub(crate) use begin::Begin;
 pub(crate) use calibrated::Stated;
-pub use calibrated::{Calibrated, Gain, OfObject, OfRows, Used, Worse};
+pub use calibrated::{Calibrated, Gain, Guarded, OfObject, OfRows, Used, Worse};
 pub(crate) use choose::share_tested;
 pub use choose::{Chosen, choose};
 pub(crate) use choose::{Way, choose_independent};

@@ -1,14 +1,15 @@
 //! A model's shape, thresholds and promise, from sequences of rows.
 
 use super::copies::copies;
+use super::folds::{Learned, moved};
 use super::follow::follow;
 use super::parts::Parts;
 use super::settings::Settings;
 use super::shape::{self, Fitted, STRICTEST};
-use super::{Rows, check};
+use super::{Rows, check, check_columns, guard, rows_of, taken};
 use crate::calibrate::{
-    Begin, Calibrated, Chosen, Limit, Odds, OfRows, Stated, Stop, Terms, Used, Way, choose_groups, choose_independent,
-    share_tested,
+    Begin, Calibrated, Chosen, Guarded, Limit, Odds, OfRows, Stated, Stop, Terms, Used, Way, choose_groups,
+    choose_independent, share_tested,
 };
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};
@@ -33,10 +34,50 @@ pub fn calibrate(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
+    calibrate_from(model, sequences, None, settings, progress)
+}
+
+/// Like [`calibrate`], with what is learned from sequences of the model's training, so that all other sequences are tested on.
+///
+/// # Errors
+/// As [`calibrate`]; [`CalibrateProblem::FoldDiffers`] if `learned` is of another model.
+pub fn calibrate_with(
+    model: &Model<'_>,
+    sequences: &Sequences,
+    learned: &Learned,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Calibrated> {
+    calibrate_from(model, sequences, Some(learned), settings, progress)
+}
+
+fn calibrate_from(
+    model: &Model<'_>,
+    sequences: &Sequences,
+    learned: Option<&Learned>,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Calibrated> {
     progress.begin("computing margins", None);
-    let rows = Rows::new(model, sequences)?;
+    let (bytes, guarded) = guarded(model, sequences, learned, settings)?;
+    let model = &compile::open(&bytes)?;
+    let rows = taken(model, sequences)?;
+    let margins = Rows::new(model, &rows);
     progress.begin("calibrating", None);
-    let calibrated = calibrate_margins(model, &rows, &sequences.sequences, settings)?;
+    let calibrated = match learned {
+        None => calibrate_margins(model, &margins, &rows.sequences, settings)?,
+        Some(learned) => {
+            check_classes(model, &rows.sequences)?;
+            let mut both = margins.margins.into_owned();
+            both.extend(learned.units(model)?);
+            let own = learned.sequences.sequences.iter();
+            let own: Vec<_> = own.map(|sequence| moved(sequence, rows.len(), rows.groups.len())).collect();
+            let parts = Parts::of(&own, &rows.sequences, settings)?;
+            calibrate_parts(model, &Rows::of(model, both.into()), parts, settings)?
+        }
+    };
+    let all = rows_of(sequences);
+    let guard = guarded.map(|learned| Guarded { rows: all - learned, refused: all - rows_of(&rows) });
     let (copies, all) = (copies(sequences), sequences.sequences.len());
     let note = (copies > 0).then(|| {
         format!(
@@ -44,7 +85,39 @@ pub fn calibrate(
              the promise may not hold: leave them out, or name what they come from as their group."
         )
     });
-    Ok(Calibrated { note, ..calibrated })
+    Ok(Calibrated { note, guard, ..calibrated })
+}
+
+/// The model with a guard, if one is wanted, and without one of an earlier calibration; and the number of these rows that the
+/// guard was learned from.
+fn guarded(
+    model: &Model<'_>,
+    sequences: &Sequences,
+    others: Option<&Learned>,
+    settings: &Settings,
+) -> Result<(Vec<u8>, Option<usize>)> {
+    check(model)?;
+    settings.check()?;
+    let without = restate(model, &Restated { sections: vec![(Tag::Guard, None)], ..Restated::default() })?;
+    if !settings.guard {
+        return Ok((without, None));
+    }
+    let model = compile::open(&without)?;
+    check_columns(&model, sequences)?;
+    let (section, rows) = match others {
+        Some(others) => {
+            let learned: Vec<&RowSequence> = others.sequences.sequences.iter().collect();
+            (guard::section(&model, &others.sequences, &learned), 0)
+        }
+        None => {
+            // Of the same sequences and seed the parts are the same again.
+            let learned = Parts::new(&sequences.sequences, settings)?.learned;
+            let rows = learned.iter().map(|sequence| sequence.rows.len()).sum();
+            (guard::section(&model, sequences, &learned), rows)
+        }
+    };
+    let section = (Tag::Guard, Some((true, section)));
+    Ok((restate(&model, &Restated { sections: vec![section], ..Restated::default() })?, Some(rows)))
 }
 
 /// Like [`calibrate`], from margins that were computed before.
@@ -56,15 +129,23 @@ pub(super) fn calibrate_margins(
 ) -> Result<Calibrated> {
     check(model)?;
     settings.check()?;
+    check_classes(model, sequences)?;
+    calibrate_parts(model, rows, Parts::new(sequences, settings)?, settings)
+}
+
+/// Refuses sequences without one of every class.
+fn check_classes(model: &Model<'_>, sequences: &[RowSequence]) -> Result<()> {
+    let names = names(model).into_iter().enumerate();
+    let missing = names.filter(|(class, _)| !sequences.iter().any(|sequence| sequence.class == *class));
+    let objects: Vec<String> = missing.map(|(_, name)| name).collect();
+    if objects.is_empty() { Ok(()) } else { Err(CalibrateProblem::MissingSequences { objects }.into()) }
+}
+
+/// Like [`calibrate`], of parts.
+fn calibrate_parts(model: &Model<'_>, rows: &Rows<'_>, parts: Parts<'_>, settings: &Settings) -> Result<Calibrated> {
     let max_rows = settings.max_rows.unwrap_or(Stopping::from_model(model).max_touches());
     compile::stopping(settings.rate, max_rows)?;
     let names = names(model);
-    let missing = (0..names.len()).filter(|class| !sequences.iter().any(|sequence| sequence.class == *class));
-    let missing: Vec<String> = missing.map(|class| names[class].clone()).collect();
-    if !missing.is_empty() {
-        return Err(CalibrateProblem::MissingSequences { objects: missing }.into());
-    }
-    let parts = Parts::new(sequences, settings)?;
     let fitted = shape::fit(rows, &parts.learned, settings.rate, max_rows);
     let shaped = shaped(model, &fitted, max_rows)?;
     let followed = Followed { rows, names: names.len(), terms: settings.terms(), max_rows };
@@ -124,7 +205,7 @@ fn names(model: &Model<'_>) -> Vec<String> {
 }
 
 /// The model with what a row adds and how much rows count together, and without what an earlier calibration stated.
-fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Result<Vec<u8>> {
+pub(super) fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Result<Vec<u8>> {
     let unit = f64::from(model.unit());
     let shape = &fitted.shape;
     let sections = vec![

@@ -1,7 +1,7 @@
 //! Verdicts on sequences of rows: how often they are wrong, after how many rows, and what a fixed number of rows would give.
 
 use super::settings::check_rows;
-use super::{Rows, check};
+use super::{Rows, check, rows_of, taken};
 use crate::compile;
 use crate::error::Result;
 use crate::evaluate::Finding;
@@ -46,6 +46,9 @@ pub struct Evaluated {
     pub groups: Option<usize>,
     /// Rows of all sequences.
     pub rows: usize,
+    /// Rows beside these that the model's guard refuses, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refused: Option<usize>,
     /// Share of wrong ones among the names given, which a promise is about.
     pub error: f64,
     /// Share of all sequences that ended with a wrong name.
@@ -160,8 +163,9 @@ impl Switched {
 /// [`RowsProblem`](crate::error::RowsProblem) for a model without classes of rows, and for rows of another number of features;
 /// [`Setting`](crate::error::Setting) for settings out of their ranges.
 pub fn evaluate(model: &Model<'_>, sequences: &Sequences, wanted: &Wanted) -> Result<Evaluated> {
-    let rows = Rows::new(model, sequences)?;
-    measured(model, &rows, &sequences.sequences, wanted, true)
+    let rows = taken(model, sequences)?;
+    let evaluated = measured(model, &Rows::new(model, &rows), &rows.sequences, wanted, true)?;
+    Ok(Evaluated { refused: model.guard().map(|_| rows_of(sequences) - rows_of(&rows)), ..evaluated })
 }
 
 /// Like [`evaluate`], from margins that were computed before; without the comparison and a sequence's evidence unless it
@@ -198,6 +202,7 @@ pub(super) fn measured(
         sequences: sequences.len(),
         groups: (!groups.is_empty()).then_some(groups.len()),
         rows: sequences.iter().map(|sequence| sequence.rows.len()).sum(),
+        refused: None,
         error: totals.error(),
         wrong: totals.share(totals.wrong),
         undecided: totals.share(totals.undecided()),

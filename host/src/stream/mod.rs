@@ -26,7 +26,9 @@ mod background;
 mod calibrate;
 mod copies;
 mod evaluate;
+mod folds;
 mod follow;
+mod guard;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod parts;
@@ -35,16 +37,19 @@ mod shape;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 
-pub use calibrate::calibrate;
+pub use calibrate::{calibrate, calibrate_with};
 pub use evaluate::{Comparison, Evaluated, Grown, Point, PromiseOfSequences, Switched, Wanted, evaluate};
+pub use folds::{Estimated, Learned, estimate};
+pub use guard::{GUARD_MARGIN, GUARD_RUN};
 pub use settings::Settings;
 #[cfg(feature = "train")]
 pub use settings::StrangerTest;
 
 use crate::error::{EvaluateProblem, Result, RowsProblem};
 use crate::evaluate::together::units_of_rows;
-use palpate_onboard::Model;
-use palpate_trees::rows::{Encoder, Features, SequenceColumns, Sequences};
+use palpate_onboard::{Model, Refused, RowsSeen};
+use palpate_shared::format::Position;
+use palpate_trees::rows::{Encoder, Features, SequenceColumns, Sequences, feature_names};
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -63,19 +68,53 @@ pub(crate) struct Rows<'r> {
 }
 
 impl Rows<'_> {
-    /// The margins of all rows of sequences, on all threads.
-    ///
-    /// # Errors
-    /// [`EvaluateProblem::OverTouches`] for a model over touches, [`RowsProblem::Regression`] for one with a single output,
-    /// [`RowsProblem::Columns`] for rows of another number of features.
-    pub(crate) fn new(model: &Model<'_>, sequences: &Sequences) -> Result<Self> {
-        check(model)?;
-        let (found, wanted) = (sequences.features, model.feature_count());
-        if found != wanted {
-            return Err(RowsProblem::Columns { found, wanted, all: None }.into());
-        }
-        Ok(Self::of(model, units_of_rows(model, &Encoder::of(model), &sequences.values).into()))
+    /// The margins of all rows of sequences that were [taken], on all threads.
+    pub(crate) fn new(model: &Model<'_>, sequences: &Sequences) -> Self {
+        Self::of(model, units_of_rows(model, &Encoder::of(model), &sequences.values).into())
     }
+}
+
+/// Number of rows of all sequences.
+fn rows_of(sequences: &Sequences) -> usize {
+    sequences.sequences.iter().map(|sequence| sequence.rows.len()).sum()
+}
+
+/// Refuses rows of another number of measured features.
+fn check_columns(model: &Model<'_>, sequences: &Sequences) -> Result<()> {
+    let (found, wanted) = (sequences.features, model.measured_count());
+    if found == wanted { Ok(()) } else { Err(RowsProblem::Columns { found, wanted, all: None }.into()) }
+}
+
+/// Sequences as a recognizer takes them: with the number of each row, if the model has a [position](Model::position), and
+/// without the rows that its [guard](Model::guard) refuses.
+///
+/// # Errors
+/// Those of [`check`]; [`RowsProblem::Columns`] for rows of another number of measured features.
+fn taken<'s>(model: &Model<'_>, sequences: &'s Sequences) -> Result<Cow<'s, Sequences>> {
+    check(model)?;
+    check_columns(model, sequences)?;
+    let found = sequences.features;
+    let position = model.position().map(|position| usize::from(position.feature));
+    if position.is_none() && model.guard().is_none() {
+        return Ok(Cow::Borrowed(sequences));
+    }
+    let encoder = Encoder::measured(model);
+    let mut seen = RowsSeen::<256>::new();
+    let mut all = Sequences { features: model.feature_count(), values: Vec::new(), ..sequences.clone() };
+    for sequence in &mut all.sequences {
+        let start = all.values.len() / all.features;
+        seen.reset();
+        for row in sequences.values[sequence.rows.start * found..sequence.rows.end * found].chunks_exact(found) {
+            if seen.next(model, &encoder.row(row)).is_ok() {
+                let (before, after) = row.split_at(position.unwrap_or(found));
+                all.values.extend_from_slice(before);
+                all.values.extend(position.map(|_| f64::from(seen.rows().min(Position::MOST))));
+                all.values.extend_from_slice(after);
+            }
+        }
+        sequence.rows = start..all.values.len() / all.features;
+    }
+    Ok(Cow::Owned(all))
 }
 
 impl<'r> Rows<'r> {
@@ -104,6 +143,18 @@ pub fn check(model: &Model<'_>) -> Result<()> {
         return Err(RowsProblem::Regression { output: model.object_name(0).into() }.into());
     }
     Ok(())
+}
+
+/// Reason why a row or touch is not counted, with the feature's name.
+pub fn refusal(model: &Model<'_>, refused: Refused) -> String {
+    match refused {
+        Refused::Guarded(feature, _) => {
+            let names = feature_names(model);
+            let name = names.get(usize::from(feature)).map_or("", String::as_str);
+            format!("{name}: {refused}")
+        }
+        _ => refused.to_string(),
+    }
 }
 
 /// Reads sequences from CSV, or from Parquet if the file ends in `.parquet`.

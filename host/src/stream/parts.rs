@@ -67,6 +67,28 @@ impl<'s> Parts<'s> {
         })
     }
 
+    /// All sequences tested, and others learned from.
+    pub(super) fn of(learned: &'s [RowSequence], tested: &'s [RowSequence], settings: &Settings) -> Result<Self> {
+        let mut all: Vec<&RowSequence> = tested.iter().collect();
+        all.shuffle(&mut random::generator(settings.seed, Purpose::Calibration, "sequences", 0));
+        let parts = Self {
+            learned: learned.iter().collect(),
+            has_groups: all.iter().any(|sequence| sequence.group.is_some()),
+            tested: all,
+            #[cfg(feature = "train")]
+            units: 0,
+        };
+        let (units, least) = (parts.units_tested(), needed(settings.rate, settings.confidence));
+        if (units as u64) < least {
+            return Err(Self::too_few(units, least, parts.has_groups, None, settings).into());
+        }
+        Ok(Self {
+            #[cfg(feature = "train")]
+            units,
+            ..parts
+        })
+    }
+
     /// Groups, or sequences without groups, that are tested on.
     pub(super) fn units_tested(&self) -> usize {
         let groups: BTreeSet<usize> = self.tested.iter().filter_map(|sequence| sequence.group).collect();

@@ -1,7 +1,7 @@
 //! Settings of a promise on sequences of rows.
 
 #[cfg(feature = "train")]
-use super::Rows;
+use super::{Rows, taken};
 use crate::calibrate::{Per, Terms};
 use crate::error::{Error, Result};
 #[cfg(feature = "train")]
@@ -25,6 +25,8 @@ pub struct Settings {
     pub sequences: usize,
     /// Rows after which a sequence ends undecided; `None` takes the model's own limit.
     pub max_rows: Option<u32>,
+    /// True for a guard against dead sensors, learned with the shape of evidence: a row that it refuses adds nothing.
+    pub guard: bool,
     /// A test for what the model does not know, if one is wanted.
     #[cfg(feature = "train")]
     pub strangers: Option<StrangerTest>,
@@ -40,6 +42,7 @@ impl Default for Settings {
             confidence: 0.95,
             sequences: 1_000_000,
             max_rows: None,
+            guard: false,
             #[cfg(feature = "train")]
             strangers: None,
             seed: 1,
@@ -86,7 +89,8 @@ impl StrangerTest {
     /// [`RowsProblem`](crate::error::RowsProblem) for a model without classes of rows, and for rows of another number of features.
     pub fn new(settings: strangers::Settings, model: &Model<'_>, others: Option<&Sequences>) -> Result<Self> {
         let Some(others) = others else { return Ok(Self { settings, background: Vec::new() }) };
-        let rows = Rows::new(model, others)?;
+        let others = taken(model, others)?;
+        let rows = Rows::new(model, &others);
         let of = |sequence: &RowSequence| sequence.rows.clone().flat_map(|row| rows.row(row)).copied().collect();
         Ok(Self { settings, background: others.sequences.iter().map(of).collect() })
     }

@@ -318,12 +318,16 @@ fn followed(rows: &Rows<'_>, sequences: &[&RowSequence], shape: &Shape, max_rows
 /// is none below [`ROOM`].
 fn rows_at(sequences: &[Sequence], rate: f64) -> Option<f64> {
     // With fewer than that, no error rate is seen.
-    let rate = rate.max(2.0 / sequences.len().max(1) as f64);
-    let margins = (1..).map(|step| STEP * f64::from(step)).take_while(|margin| *margin < ROOM);
-    margins.into_iter().find_map(|margin| {
-        let totals = totals(sequences, &Odds::All(odds_of(margin)));
-        let is_kept = totals.given > 0 && totals.wrong as f64 <= rate * totals.given as f64;
-        is_kept.then(|| totals.mean_touches())
+    let margin = margin_at(sequences, rate.max(2.0 / sequences.len().max(1) as f64))?;
+    Some(totals(sequences, &Odds::All(odds_of(margin))).mean_touches())
+}
+
+/// That threshold, in nats.
+pub(super) fn margin_at(sequences: &[Sequence], rate: f64) -> Option<f64> {
+    let mut margins = (1..).map(|step| STEP * f64::from(step)).take_while(|margin| *margin < ROOM);
+    margins.find(|margin| {
+        let totals = totals(sequences, &Odds::All(odds_of(*margin)));
+        totals.given > 0 && totals.wrong as f64 <= rate * totals.given as f64
     })
 }
 

@@ -1,9 +1,10 @@
 //! Functions in C that `palpate export` writes with a model, against the libraries that trained it.
 
 use palpate_base::with;
-use palpate_onboard::{C_HEADER, Model};
+use palpate_onboard::{C_HEADER, Model, Recognizer, Refused, RowsSeen, Stopping, Verdict};
+use palpate_shared::format::{Limits, Tag};
 use palpate_trees::compile::code::Form;
-use palpate_trees::compile::{EarlyExit, Language, Layout, Leaf, Settings, compile};
+use palpate_trees::compile::{EarlyExit, Language, Layout, Leaf, Restated, Settings, compile, emit, restate};
 use palpate_trees::ensemble::import::Options;
 use palpate_trees::ensemble::{Ensemble, Probability};
 use palpate_trees::prove::sources;
@@ -164,4 +165,138 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
         }
     }
     assert!(expected.len() > 2000 && worst > 0.1, "{} rows, at most {worst} of the bound", expected.len());
+}
+
+/// Limits that some rows break: the lower half of each feature's range, present, at most two rows the same.
+fn limits(encoder: &Encoder, rows: &[Vec<f64>], position: usize) -> Vec<u8> {
+    let of = |feature: usize| {
+        let mut values: Vec<i32> =
+            rows.iter().map(|row| encoder.row(row)[feature]).filter(|key| *key != i32::MIN).collect();
+        values.sort_unstable();
+        let (low, high) = (values[0], values[values.len() * 9 / 10]);
+        if feature == position { Limits::NONE } else { Limits { low, high, may_miss: feature == 1, most_equal: 2 } }
+    };
+    (0..rows[0].len()).flat_map(|feature| of(feature).to_bytes()).collect()
+}
+
+#[test]
+fn rows_of_a_sequence_are_numbered_and_refused_by_the_same_bits_as_in_rust() {
+    const LENGTH: usize = 7;
+    let directory = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    put("palpate.h", C_HEADER);
+    let ensemble =
+        Ensemble::load_with(Path::new(ROOT).join("tests/data/import/xgboost-3.4-softmax.json"), &Options::default())
+            .unwrap();
+    let rows = numbers("xgboost-3.4-softmax.rows.csv", 1);
+    let position = rows[0].len() / 2;
+    let name_of_position = ensemble.inputs.names()[position].to_owned();
+    let (mut functions, mut calls, mut expected) = (String::new(), String::new(), String::new());
+    let mut refused = 0;
+    for (form, leaf, is_guarded) in
+        [("real", Leaf::I16, false), ("float", Leaf::F32, true), ("whole", Leaf::I16, true), ("code", Leaf::I16, false)]
+    {
+        let settings = with!(
+            Settings::default(),
+            leaf,
+            layout = Some(Layout::Compact),
+            scales = (form == "whole").then(|| vec![1000.0; rows[0].len()]),
+            position = Some(name_of_position.clone())
+        );
+        let plain = compile(&ensemble, &settings).unwrap();
+        let code = with!(settings.clone(), layout = Some(Layout::Code), forms = vec![Form::C]);
+        let mut bytes = plain.bytes.clone();
+        if is_guarded {
+            let model = Model::new(&plain.bytes).unwrap();
+            let section = (Tag::Guard, Some((true, limits(&Encoder::of(&model), &rows, position))));
+            bytes = restate(&model, &Restated { sections: vec![section], ..Restated::default() }).unwrap();
+        }
+        let model = Model::new(&bytes).unwrap();
+        let name = format!("s{form}");
+        let header = match form {
+            "code" => sources(&compile(&ensemble, &code).unwrap(), &name, &[Language::C]).unwrap().remove(0).1,
+            _ => emit(&model, &name, Language::C),
+        };
+        put(&format!("{name}.h"), &header);
+        let encoder = Encoder::measured(&model);
+        let is_whole = form == "whole";
+        let measured: Vec<Vec<f64>> = rows
+            .iter()
+            .enumerate()
+            .map(|(number, row)| {
+                let mut row = row.clone();
+                row.remove(position);
+                // A sensor that is stuck for a while.
+                row[0] = if number % 20 < 5 { 0.5 } else { row[0] };
+                row
+            })
+            .collect();
+        let objects = model.object_count();
+        let mut recognizer = Recognizer::<32>::new(&model, Stopping::from_odds(1 << 54, 5)).unwrap();
+        let mut seen = RowsSeen::<32>::new();
+        for (number, row) in measured.iter().enumerate() {
+            if number % LENGTH == 0 {
+                recognizer.reset();
+                seen.reset();
+            }
+            let row = encoder.row(row);
+            let pushed =
+                if is_guarded { recognizer.push_seen(&row, &mut seen) } else { recognizer.push_features(&row) };
+            let (answer, feature) = match pushed {
+                Err(Refused::Guarded(feature, _)) => (-4, u32::from(feature) + 1),
+                Err(other) => panic!("{other}"),
+                Ok(Verdict::Recognized { object, .. }) => (i32::from(object), 0),
+                Ok(Verdict::Undecided) => (-1, 0),
+                Ok(Verdict::Unknown) => (-2, 0),
+                Ok(Verdict::GaveUp) => (-3, 0),
+            };
+            refused += u32::from(answer == -4);
+            let evidence = (0..objects).map(|object| recognizer.evidence().get(object).copied().unwrap_or_default());
+            let numbers: Vec<String> = evidence.map(|number| number.to_string()).collect();
+            expected += &format!("{answer} {feature} {}\n", numbers.join(" "));
+        }
+        let keys = |row: &Vec<f64>| {
+            let keys = encoder.row(row).into_iter();
+            keys.map(|key| if key == i32::MIN { f64::NAN } else { f64::from(key) }).collect::<Vec<_>>()
+        };
+        let given = measured.iter().map(|row| initializer(&if is_whole { keys(row) } else { row.clone() }, is_whole));
+        let (seen, argument, refused) = match is_guarded {
+            true => (format!("{name}_seen seen;"), ", &seen", "seen.refused"),
+            false => (String::new(), "", "0"),
+        };
+        functions += &format!(
+            "#include \"{name}.h\"\nstatic void run_{name}(void)\n{{\n    static const {} rows[][{}] = {{{}}};\n    \
+             palpate_recognizer state;\n    {seen}\n    int i, j;\n    for (i = 0; i < {}; i++) {{\n        int answer;\n        \
+             if (i % {LENGTH} == 0) {{\n            {name}_begin(&state{argument});\n            \
+             state.odds = (uint64_t)1 << 54;\n            state.max_touches = 5;\n            state.by_object = 0;\n        }}\n        \
+             answer = {name}_push(&state{argument}, rows[i]);\n        printf(\"%d %d\", answer, (int){refused});\n        \
+             for (j = 0; j < {objects}; j++) {{\n            \
+             printf(\" %lld\", state.touches == 0 ? 0LL : (long long)state.evidence[j]);\n        }}\n        \
+             puts(\"\");\n    }}\n}}\n",
+            if is_whole { "int32_t" } else { "float" },
+            measured[0].len(),
+            given.collect::<Vec<_>>().join(","),
+            measured.len(),
+        );
+        calls += &format!("    run_{name}();\n");
+    }
+    put(
+        "program.c",
+        &format!("#include <math.h>\n#include <stdio.h>\n{functions}int main(void)\n{{\n{calls}    return 0;\n}}\n"),
+    );
+    let program = directory.path().join("program");
+    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
+    let flags =
+        ["LAYOUTS=127", "LEAVES=7", "SEQUENCES=1", "MAX_OBJECTS=32"].map(|macros| format!("-DPALPATE_{macros}"));
+    let mut command = Command::new(compiler);
+    command.args(["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-O1"]).args(flags);
+    let built = command.arg("program.c").arg("-o").arg(&program).current_dir(&directory).output().unwrap();
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    let output = Command::new(&program).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    for (number, (found, expected)) in text.lines().zip(expected.lines()).enumerate() {
+        assert_eq!(found, expected, "line {number}");
+    }
+    assert_eq!(text.lines().count(), expected.lines().count());
+    assert!(refused > 20 && expected.lines().any(|line| !line.starts_with('-')), "{refused} refused");
 }

@@ -108,11 +108,7 @@ impl<const N: usize> Recognizer<'_, N> {
         features: &[i32],
         forgetting: &mut Forgetting<N>,
     ) -> Result<Verdict, Refused> {
-        if self.model().descriptor().is_some() {
-            return Err(Refused::NeedsTouches);
-        }
-        let mut margins = [0; N];
-        self.model().margins_of(features, &mut margins);
+        let margins = self.margins_of_next(features)?;
         Ok(self.push_margins_forgetting(&margins, forgetting))
     }
 

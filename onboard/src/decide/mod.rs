@@ -5,6 +5,7 @@ mod evidence;
 mod expected;
 mod forgetting;
 mod recognizer;
+mod seen;
 #[cfg(feature = "link")]
 mod snapshot;
 mod stopping;
@@ -18,6 +19,7 @@ pub use forgetting::Forgetting;
 #[cfg(feature = "station")]
 pub(crate) use recognizer::State;
 pub use recognizer::{CapacityError, Recognizer, Verdict};
+pub use seen::RowsSeen;
 #[cfg(feature = "link")]
 pub use snapshot::{SNAPSHOT_LENGTH, SnapshotError};
 pub use stopping::Stopping;

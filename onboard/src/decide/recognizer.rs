@@ -8,8 +8,8 @@ use super::together::{self, Leading};
 use crate::bytes::AlignedTo8;
 use crate::model::{Model, Refused};
 use core::fmt;
-use palpate_shared::Touch;
 use palpate_shared::format::Outputs;
+use palpate_shared::{MISSING_FEATURE, Touch};
 
 /// Result of the touches so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,18 +152,39 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         Ok(self.add(&margins.0))
     }
 
-    /// Takes in a row of features, as [`Model::margins_of`].
+    /// Takes in a row of features, as [`Model::margins_of`]. Of a model with a [position](Model::position) the row is the
+    /// other features: its number is counted since the last [`reset`](Self::reset).
     ///
     /// # Errors
-    /// [`Refused::NeedsTouches`], for a model over touches.
+    /// [`Refused::NeedsTouches`], for a model over touches; [`Refused::NeedsSeen`], for one that states which rows it takes.
     pub fn push_features(&mut self, features: &[i32]) -> Result<Verdict, Refused> {
+        let mut margins = self.margins_of_next(features)?;
+        self.model.make_evidence(&mut margins);
+        Ok(self.add(&margins))
+    }
+
+    /// Margins of the next row of a sequence, as [`push_features`](Self::push_features) takes it.
+    pub(super) fn margins_of_next(&self, features: &[i32]) -> Result<[i32; N], Refused> {
         if self.model.descriptor().is_some() {
             return Err(Refused::NeedsTouches);
         }
         let mut margins = [0; N];
-        self.model.margins_of(features, &mut margins);
-        self.model.make_evidence(&mut margins);
-        Ok(self.add(&margins))
+        if !self.model.has_sequences() {
+            self.model.margins_of(features, &mut margins);
+        } else if self.model.guard().is_some() {
+            return Err(Refused::NeedsSeen);
+        } else {
+            self.margins_numbered(features, &mut margins);
+        }
+        Ok(margins)
+    }
+
+    // Apart: only a model with a position takes the room for its features on the stack.
+    #[inline(never)]
+    fn margins_numbered(&self, measured: &[i32], margins: &mut [i32]) {
+        let mut features = [MISSING_FEATURE; 256];
+        self.model.number(measured, self.touches().saturating_add(1), &mut features);
+        self.model.margins_of(&features, margins);
     }
 
     /// Takes in a touch by its margins, computed beforehand with [`Model::margins`]; missing ones count as 0. For

@@ -23,11 +23,11 @@ pub use refused::Refused;
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
-    Counted, EarlyExit, Feature, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, Outputs, PatternShares,
-    Plan, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature, TrainedCapture,
-    TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
+    Counted, EarlyExit, Feature, Guard, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, Outputs,
+    PatternShares, Plan, Position, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature,
+    TrainedCapture, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
 };
-use palpate_shared::{Descriptor, Patterns};
+use palpate_shared::{Descriptor, MISSING_FEATURE, Patterns};
 
 /// A compiled model, read in place from bytes that stay where they are (flash, at any alignment).
 ///
@@ -51,9 +51,9 @@ pub(crate) struct Stated {
     counted: Counted,
     needs_pose: bool,
     largest_spread: u32,
-    /// Offset of thresholds by object; 0 if there are none. The six highest bits are flags of
+    /// Offset of thresholds by object; 0 if there are none. The seven highest bits are flags of
     /// sections about strangers, of shared leaves, of features that stand for a missing value, of weights by the number of
-    /// touches, of the evidence of a row, and of outputs that belong together.
+    /// touches, of the evidence of a row, of outputs that belong together, and of rows that are numbered or guarded.
     by_object: u32,
 }
 
@@ -69,8 +69,11 @@ const HAS_WEIGHTS: u32 = 1 << 28;
 const HAS_ROW_EVIDENCE: u32 = 1 << 27;
 /// Flag of outputs that belong together.
 const HAS_OUTPUTS: u32 = 1 << 26;
+/// Flag of rows that are numbered or guarded.
+const HAS_SEQUENCES: u32 = 1 << 25;
 /// Flags that are not a place in [`Stated::by_object`].
-const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_SENTINEL | HAS_WEIGHTS | HAS_ROW_EVIDENCE | HAS_OUTPUTS;
+const MARKS: u32 =
+    HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_SENTINEL | HAS_WEIGHTS | HAS_ROW_EVIDENCE | HAS_OUTPUTS | HAS_SEQUENCES;
 
 impl Stated {
     /// Statements of a model without optional sections.
@@ -261,6 +264,57 @@ impl<'a> Model<'a> {
         }
         Weights::from_bytes(optional::find(self.optional(), Tag::Weights))
             .map_or(Weights::ONE, |weights| weights.of(touches))
+    }
+
+    /// True if rows of a sequence are numbered or guarded: see [`position`](Model::position) and [`guard`](Model::guard).
+    pub(crate) fn has_sequences(&self) -> bool {
+        cfg!(feature = "sequences") && self.stated.by_object & HAS_SEQUENCES != 0
+    }
+
+    /// The feature that is the number of a row in its sequence, if the model has one. Recognizers count it themselves:
+    /// see [`Recognizer::push_features`](crate::Recognizer::push_features). Other calls take it from the row.
+    ///
+    /// Cost: next to none if there is none, otherwise a few instructions for each optional section. Cannot fail.
+    pub fn position(&self) -> Option<Position> {
+        if !self.has_sequences() {
+            return None;
+        }
+        Position::from_bytes(optional::find(self.optional(), Tag::Position), self.feature_count())
+    }
+
+    /// Limits of each feature in the rows that the model takes in a sequence, if it states them: see
+    /// [`RowsSeen`](crate::RowsSeen).
+    ///
+    /// Cost: as [`position`](Model::position). Cannot fail.
+    pub fn guard(&self) -> Option<Guard<'a>> {
+        if !self.has_sequences() {
+            return None;
+        }
+        Guard::from_bytes(optional::find(self.optional(), Tag::Guard), self.feature_count())
+    }
+
+    /// Number of features of a row that someone measures: all but the [position](Model::position).
+    pub fn measured_count(&self) -> usize {
+        self.feature_count().saturating_sub(self.position().is_some().into())
+    }
+
+    /// The features of row `number` of a sequence, counted from 1, whose measured features are `measured`: these in their
+    /// order, and the number in the place of the model's [position](Model::position), or nothing more if it has none. Missing
+    /// ones at the end are [`MISSING_FEATURE`](palpate_shared::MISSING_FEATURE); those beyond the end of `features` are left out.
+    ///
+    /// Cost: a few instructions for each feature. Cannot fail.
+    pub fn number(&self, measured: &[i32], number: u32, features: &mut [i32]) {
+        features.fill(MISSING_FEATURE);
+        let position = self.position();
+        let place = position.map_or(usize::MAX, |position| usize::from(position.feature));
+        let (before, after) = measured.split_at(place.min(measured.len()));
+        features.iter_mut().zip(before).for_each(|(to, from)| *to = *from);
+        if let (Some(position), Some((own, rest))) =
+            (position, features.get_mut(place..).and_then(<[i32]>::split_first_mut))
+        {
+            *own = position.of(number, self.key() == Key::Real);
+            rest.iter_mut().zip(after).for_each(|(to, from)| *to = *from);
+        }
     }
 
     /// The section about what margins become; empty if there is none.

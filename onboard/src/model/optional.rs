@@ -1,13 +1,14 @@
 //! The optional sections: checked once, then found by their tags.
 
 use super::{
-    HAS_OUTPUTS, HAS_ROW_EVIDENCE, HAS_SENTINEL, HAS_SHARED_LEAVES, HAS_STRANGERS, HAS_WEIGHTS, MARKS, Stated,
+    HAS_OUTPUTS, HAS_ROW_EVIDENCE, HAS_SENTINEL, HAS_SEQUENCES, HAS_SHARED_LEAVES, HAS_STRANGERS, HAS_WEIGHTS, MARKS,
+    Stated,
 };
 use crate::bytes::Wrong;
 use crate::layouts::{Sections, built_in};
 use palpate_shared::format::{
-    Layout, OddsByObject, Outputs, Plan, Prediction, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag,
-    TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_section,
+    Guard, Layout, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence, Section, Sentinel, SharedLeaves,
+    Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_section,
 };
 
 /// The content of the section with this tag; empty if there is none; no section that is read is empty.
@@ -66,6 +67,15 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
             _ if cfg!(feature = "outputs") && tag == Tag::Outputs.code() => {
                 stated.by_object |= HAS_OUTPUTS;
                 Outputs::from_bytes(content, model.objects()).is_some()
+            }
+            _ if cfg!(feature = "sequences") && (tag == Tag::Position.code() || tag == Tag::Guard.code()) => {
+                stated.by_object |= HAS_SEQUENCES;
+                let features = usize::from(model.header().last_feature()) + 1;
+                let is_read = match tag == Tag::Position.code() {
+                    true => Position::from_bytes(content, features).is_some(),
+                    false => Guard::from_bytes(content, features).is_some(),
+                };
+                is_read && stated.descriptor.is_none()
             }
             _ if must_understand => return Err(Wrong::NotUnderstood(offset)),
             _ => true,

@@ -2,7 +2,7 @@
 
 use super::Model;
 use core::fmt;
-use palpate_shared::format::TrainedTouches;
+use palpate_shared::format::{Fault, TrainedTouches};
 use palpate_shared::{ContactPattern, Touch};
 
 /// Reason why a touch is not evidence. It was not counted, and nothing has changed.
@@ -20,6 +20,11 @@ pub enum Refused {
     NeedsFeatures,
     /// The model is over touches, and was given a row of features.
     NeedsTouches,
+    /// The model states which rows it takes, and was given a row without [`RowsSeen`](crate::RowsSeen), or with too few
+    /// features there.
+    NeedsSeen,
+    /// A feature of the row, by its number from 0, is not as in the rows that the model was calibrated on.
+    Guarded(u8, Fault),
 }
 
 impl fmt::Display for Refused {
@@ -47,6 +52,12 @@ impl fmt::Display for Refused {
             Self::NoPose => "the model needs the probe's pose, and the touch has none",
             Self::NeedsFeatures => "the model is over rows of features, not touches",
             Self::NeedsTouches => "the model is over touches, not rows of features",
+            Self::NeedsSeen => "the model states which rows it takes: they need a RowsSeen with room for its features",
+            Self::Guarded(_, Fault::Outside) => "a feature is outside of what the model was calibrated on",
+            Self::Guarded(_, Fault::Missing) => "a feature is missing, which never happened in calibration",
+            Self::Guarded(_, Fault::Stuck) => {
+                "a feature stayed the same for longer than in any sequence of calibration"
+            }
         })
     }
 }

@@ -19,6 +19,6 @@ pub(super) const fn refusal(refused: Refused) -> Refusal {
         Refused::Pattern(_) => Refusal::Pattern,
         Refused::Spread => Refusal::Spread,
         Refused::NoPose => Refusal::NoPose,
-        Refused::NeedsFeatures | Refused::NeedsTouches => Refusal::Features,
+        Refused::NeedsFeatures | Refused::NeedsTouches | Refused::NeedsSeen | Refused::Guarded(..) => Refusal::Features,
     }
 }

@@ -49,6 +49,10 @@ pub enum Tag {
     Columns,
     /// Maps of the heights that a fingertip meets on objects on a table, for a model of [`MAPS_LAYOUT`](super::MAPS_LAYOUT).
     Maps,
+    /// Feature that is the number of a row in its sequence: [`Position`](super::Position).
+    Position,
+    /// Rows that a model takes in a sequence: [`Guard`](super::Guard).
+    Guard,
 }
 
 impl Tag {
@@ -75,6 +79,8 @@ impl Tag {
             Self::Outputs => 18,
             Self::Columns => 19,
             Self::Maps => 20,
+            Self::Position => 21,
+            Self::Guard => 22,
         }
     }
 }

@@ -9,7 +9,7 @@ use super::strangers::StrangersArguments;
 use super::table::{self, TableArguments};
 use super::thresholds;
 use palpate::Result;
-use palpate::calibrate::{self, Calibrated, Gain, OfRecorded, OfRows, Per, Settings, Terms, Used};
+use palpate::calibrate::{self, Calibrated, Gain, Guarded, OfRecorded, OfRows, Per, Settings, Terms, Used};
 use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, EvaluateProblem, Place};
@@ -79,6 +79,9 @@ pub(crate) struct Arguments {
     plan: Option<u8>,
     #[command(flatten)]
     rows: SequenceArguments,
+    /// Refuse rows of dead, stuck or railed sensors, of a model over rows
+    #[arg(long, requires = "sequence_column")]
+    guard: bool,
     #[command(flatten)]
     strangers: StrangersArguments,
     #[command(flatten)]
@@ -257,6 +260,7 @@ fn on_rows(arguments: &Arguments, rows: &PathBuf, global: &Global) -> Result<Cal
         confidence = arguments.confidence,
         sequences = arguments.drawn(),
         max_rows = arguments.max_touches,
+        guard = arguments.guard,
         strangers = arguments.strangers.held().map(strangers).transpose()?,
         seed = global.seed()
     );
@@ -298,6 +302,10 @@ fn text(path: &Path, calibrated: &Calibrated, placements: &str) -> String {
     }
     text += ".\n";
     text += &calibrated.rows.as_ref().map_or_else(String::new, shape);
+    if let Some(Guarded { rows, refused }) = calibrated.guard {
+        let share = percent(refused as f64 / rows.max(1) as f64);
+        _ = writeln!(text, "Guard: refuses {refused} of {rows} rows ({share}) that it was not learned from");
+    }
     text += &thresholds::text(&calibrated.margins, &calibrated.errors, calibrated.uncalibrated_margin);
     if let Some(temperature) = calibrated.temperature {
         _ = writeln!(text, "Temperature of the posteriors that are shown: {temperature:.2}");

@@ -69,6 +69,9 @@ pub(crate) struct Arguments {
     /// Classes without walking all trees: yes, or a CSV file of rows not trained on, for where that takes fewer instructions
     #[arg(long, value_name = "ROWS")]
     early_exit: Option<PathBuf>,
+    /// Feature that is a row's number in its sequence, from 1; recognizers count it
+    #[arg(long, value_name = "FEATURE")]
+    position: Option<String>,
     /// Also print the table of layouts, the features to build in, and all notes
     #[arg(short, long)]
     verbose: bool,
@@ -225,7 +228,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         max_touches = arguments.max_touches,
         scales,
         priors = arguments.prior.of(&ensemble.objects, &shares_of(&ensemble)?)?,
-        early_exit = early_exit(&arguments, &ensemble)?
+        early_exit = early_exit(&arguments, &ensemble)?,
+        position = arguments.position.clone()
     );
     let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {
         1 => error.in_file(&arguments.ensemble),
@@ -339,6 +343,7 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
         ("shared_leaves", arguments.shared_leaves.0.is_some()),
         ("scale", !arguments.scale.is_empty()),
         ("early_exit", arguments.early_exit.is_some()),
+        ("position", arguments.position.is_some()),
         ("error_rate", arguments.error_rate != usual.error_rate),
         ("max_touches", arguments.max_touches != usual.max_touches),
         ("prior", arguments.prior.of(&compiled.names(), &[])?.is_some()),

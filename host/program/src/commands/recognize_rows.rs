@@ -5,8 +5,9 @@ use palpate::Result;
 use palpate::error::{Error, EvaluateProblem, Place, RowsProblem};
 use palpate::evaluate::verify::margins;
 use palpate::output;
-use palpate::rows::{Encoder, RowOf, SequencesBuilder};
-use palpate_onboard::{Recognizer, Verdict};
+use palpate::rows::{Encoder, Features, RowOf, SequencesBuilder};
+use palpate::stream::refusal;
+use palpate_onboard::{Recognizer, RowsSeen, Verdict};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -36,6 +37,9 @@ struct Line<'a> {
     values: Option<Vec<f32>>,
     /// The row's own, before any link.
     margins: Vec<f64>,
+    /// Reason why the row adds nothing, if it does not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refused: Option<String>,
 }
 
 /// Options for rows.
@@ -77,7 +81,8 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
         return Err(EvaluateProblem::OverTouches.into());
     }
     let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
-    let rows = read_rows(path, &model, sequence)?;
+    let features = if adds_up { Features::measured(&model) } else { Features::from(&model) };
+    let rows = read_rows(path, features, sequence)?;
     let starts = starts(&rows.labels).map_err(|problem| Error::at(Place::file(path), problem))?;
     if let Some(promise) = model.promise().filter(|_| adds_up && sequence.is_none()) {
         super::remark(&format!(
@@ -87,7 +92,8 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
             super::percent(promise.rate)
         ));
     }
-    let encoder = Encoder::of(&model);
+    let encoder = if adds_up { Encoder::measured(&model) } else { Encoder::of(&model) };
+    let mut seen = RowsSeen::<256>::new();
     let has_targets = model.prediction().targets;
     let has_classes = model.object_count() > 1 && !has_targets;
     let mut scratch = vec![0; model.object_count()];
@@ -101,8 +107,16 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
         }
         if is_first || !adds_up {
             reset(&mut recognizer, weights.as_deref());
+            seen.reset();
         }
-        recognizer.push_features(&encoded).map_err(|_| EvaluateProblem::OverTouches)?;
+        // Of a row by itself all features are given.
+        let taken = if adds_up { seen.next(&model, &encoded).map(Vec::from) } else { Ok(encoded.clone()) };
+        let refused = taken.as_ref().err().map(|refused| refusal(&model, *refused));
+        let encoded = taken.unwrap_or(encoded);
+        model.margins_of(&encoded, &mut scratch);
+        if refused.is_none() {
+            recognizer.push_margins(&scratch);
+        }
         let own = model.predict_class(&encoded, &mut scratch).unwrap_or_default();
         let class = if adds_up { recognizer.best() } else { own };
         let line = Line {
@@ -118,7 +132,8 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
                 model.predict_each(&encoded, &mut scratch, &mut values);
                 values
             }),
-            margins: margins(&model, &encoded),
+            margins: if refused.is_none() { margins(&model, &encoded) } else { Vec::new() },
+            refused,
         };
         print(&line, json)?;
     }
@@ -145,7 +160,8 @@ fn print(line: &Line<'_>, json: bool) -> Result<()> {
     let sequence = line.sequence.map_or_else(String::new, |sequence| format!("  {sequence}"));
     match (line.verdict, line.class, line.posterior) {
         (Some(verdict), Some(class), Some(posterior)) => {
-            output::print(&format!("{row:4}  {verdict:10}  {class} {posterior:.4}{sequence}\n"))
+            let refused = line.refused.as_ref().map_or_else(String::new, |refused| format!("  refused: {refused}"));
+            output::print(&format!("{row:4}  {verdict:10}  {class} {posterior:.4}{sequence}{refused}\n"))
         }
         (None, Some(class), Some(posterior)) => output::print(&format!("{row:4}  {class} {posterior:.4}\n")),
         _ => {

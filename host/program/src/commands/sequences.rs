@@ -7,7 +7,7 @@ use palpate::compile::{self, CompiledModel};
 use palpate::error::{Error, Place, RowsProblem};
 use palpate::evaluate::{Confusion, Finding};
 use palpate::output;
-use palpate::rows::{SequenceColumns, Sequences};
+use palpate::rows::{Features, SequenceColumns, Sequences};
 use palpate::stream::{self, Evaluated};
 use palpate::wording;
 use palpate_onboard::Model;
@@ -45,7 +45,7 @@ pub(crate) fn read(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>
 
 /// Reads sequences of these classes.
 fn read_of(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>, classes: &[String]) -> Result<Sequences> {
-    let sequences = stream::read(path, model, columns, classes)?;
+    let sequences = stream::read(path, Features::measured(model), columns, classes)?;
     super::rows::say_by_position(path, sequences.by_position);
     Ok(sequences)
 }
@@ -104,8 +104,9 @@ pub(crate) fn evaluate(asked: Evaluation<'_>, compiled: &CompiledModel, global: 
 fn evaluated_text(evaluated: &Evaluated) -> String {
     let Evaluated { sequences, rows, error, wrong, undecided, unknown, mean_rows, median_rows, .. } = evaluated;
     let groups = evaluated.groups.map_or_else(String::new, |groups| format!(" of {groups} groups"));
+    let refused = evaluated.refused.map_or_else(String::new, |refused| format!(", {refused} others refused"));
     let mut text = format!(
-        "{sequences} sequences{groups}, {rows} rows\n\
+        "{sequences} sequences{groups}, {rows} rows{refused}\n\
          of the names given {} wrong; of all sequences {} wrong, {} undecided, {} unknown\n\
          {mean_rows:.1} rows to the end on average, half of the sequences within {median_rows}\n",
         percent(*error),

@@ -19,7 +19,7 @@ from ._evaluate import Evaluation, Parity, Sequential, evaluate, parity
 from ._import import compile, to_ensemble
 from ._locate import CalibratedMaps, MapsEvaluation
 from ._native import DataSet, Ensemble, Locator, Maps, Model, Recognizer, Shape, Surface, capture, train
-from ._stream import Calibrated, Ends, SequenceRecognizer, calibrate, evaluate_sequences
+from ._stream import Calibrated, Ends, Estimated, SequenceRecognizer, calibrate, evaluate_sequences
 from ._touches import TouchRecognizer
 from ._types import Located, Meshes, Mode, Probe, Progress, Real, Touch, Verdict
 
@@ -30,6 +30,7 @@ __all__ = [
     "CalibratedMaps",
     "DataSet",
     "Ends",
+    "Estimated",
     "Ensemble",
     "Evaluation",
     "FileError",

@@ -12,7 +12,7 @@ from pandas import DataFrame
 from pathlib import Path
 from typing import Any, SupportsFloat, SupportsIndex, final
 
-__all__ = ["DataSet", "Ensemble", "Locator", "Maps", "Model", "Recognizer", "Shape", "Surface", "calibrate", "capture", "checksums", "compile", "evaluate", "evaluate_sequences", "parity", "sources", "train"]
+__all__ = ["DataSet", "Ensemble", "Locator", "Maps", "Model", "Recognizer", "Shape", "Surface", "calibrate", "capture", "checksums", "compile", "estimate_sequences", "evaluate", "evaluate_sequences", "parity", "sources", "train"]
 
 @final
 class DataSet:
@@ -325,7 +325,12 @@ class Maps:
         sure, such as (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing
         is named before the eighth approach then.
         """
-    def evaluate(self, /, meshes: Meshes, *, millimeters: SupportsFloat | SupportsIndex | None = None, sequences: SupportsIndex = 1000, max_touches: SupportsIndex = 25, aimed: str = "chosen", real: Real | None = None, pose: SupportsIndex = 10, until: tuple[SupportsFloat | SupportsIndex, SupportsFloat | SupportsIndex] | None = None, seed: SupportsIndex = 2, progress: Progress | None = None) -> MapsEvaluation:
+    def estimate_sequences(model: Model, folds: SupportsGetItem[int, tuple[Model, ArrayLike, SupportsGetItem[int, str], SupportsGetItem[int, str], SupportsGetItem[int, str] | None]], *, error_rate: SupportsFloat | SupportsIndex, max_rows: SupportsIndex | None, guard: bool) -> tuple[Model, str]:
+    """
+    Sets a model's threshold from the folds of its training, and returns the model and an estimate of its error rate.
+    """
+
+def evaluate(self, /, meshes: Meshes, *, millimeters: SupportsFloat | SupportsIndex | None = None, sequences: SupportsIndex = 1000, max_touches: SupportsIndex = 25, aimed: str = "chosen", real: Real | None = None, pose: SupportsIndex = 10, until: tuple[SupportsFloat | SupportsIndex, SupportsFloat | SupportsIndex] | None = None, seed: SupportsIndex = 2, progress: Progress | None = None) -> MapsEvaluation:
         """
         Plays sequences of approaches to these meshes on a simulated table, other ones than those of `calibrate` if the seed is
         another, to the maps' own threshold. The arguments are as for `calibrate`.
@@ -547,7 +552,7 @@ class Recognizer:
     def push_row(self, /, row: ArrayLike) -> Verdict:
         """
         Takes in a row of features, for a model over those, with NaN for a missing one. The features of a pandas series are
-        found by their names.
+        found by their names. A model with a `position` counts it itself since the last `reset`: the row has the other features.
         """
     def reset(self, /, weights: SupportsGetItem[int, SupportsIndex] | None = None) -> None:
         """
@@ -651,7 +656,7 @@ class Surface:
         The number of triangles.
         """
 
-def calibrate(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], sequence: SupportsGetItem[int, str], *, groups: SupportsGetItem[int, str] | None = None, error_rate: SupportsFloat | SupportsIndex = 0.01, per: str = "average", confidence: SupportsFloat | SupportsIndex = 0.95, max_rows: SupportsIndex | None = None, strangers: str | None = None, background: ArrayLike | None = None, background_sequence: SupportsGetItem[int, str] | None = None, seed: SupportsIndex = 1, progress: Progress | None = None) -> tuple[Model, str]:
+def calibrate(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], sequence: SupportsGetItem[int, str], *, groups: SupportsGetItem[int, str] | None = None, error_rate: SupportsFloat | SupportsIndex = 0.01, per: str = "average", confidence: SupportsFloat | SupportsIndex = 0.95, max_rows: SupportsIndex | None = None, strangers: str | None = None, background: ArrayLike | None = None, background_sequence: SupportsGetItem[int, str] | None = None, guard: bool = False, learned: SupportsGetItem[int, tuple[Model, ArrayLike, SupportsGetItem[int, str], SupportsGetItem[int, str], SupportsGetItem[int, str] | None]] | None = None, seed: SupportsIndex = 1, progress: Progress | None = None) -> tuple[Model, str]:
     """
     Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
     """
@@ -689,7 +694,7 @@ def checksums(meshes: Meshes) -> list[tuple[str, list[str]]]:
     their instances. All files are read.
     """
 
-def compile(ensemble: Ensemble, *, max_bytes: SupportsIndex | None = None, leaf: str = "i16", layout: str | None = None, goal: str = "balanced", error_rate: SupportsFloat | SupportsIndex = 0.01, max_touches: SupportsIndex = 200, priors: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None, scales: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None) -> Model:
+def compile(ensemble: Ensemble, *, max_bytes: SupportsIndex | None = None, leaf: str = "i16", layout: str | None = None, goal: str = "balanced", error_rate: SupportsFloat | SupportsIndex = 0.01, max_touches: SupportsIndex = 200, priors: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None, scales: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None, position: str | None = None) -> Model:
     """
     Compiles an ensemble to the bytes that a microcontroller reads. (`palpate.compile` also takes models of other
     libraries.)
@@ -698,7 +703,8 @@ def compile(ensemble: Ensemble, *, max_bytes: SupportsIndex | None = None, leaf:
     "patterns"; without one, the best for the `goal` is taken, which is "balanced", "speed" or "size". With `max_bytes` the
     layout is chosen for size and leaves are stored in fewer bits where the model would be larger; if it still is, that is an
     error. `error_rate` and `max_touches` are where recognizers stop; `priors` say how likely each object is. `scales` say how
-    many units make up 1 of each feature, for a chip that measures in whole numbers.
+    many units make up 1 of each feature, for a chip that measures in whole numbers. `position` names the feature that is a row's
+    number in its sequence, counted from 1.
 
     >>> import palpate
     >>> data = palpate.capture(["bowl", "mouse"], touches=300)

@@ -54,6 +54,24 @@ def take(rows: Any, chosen: npt.NDArray[np.bool_]) -> Any:
     return np.asarray(rows)[chosen] if names_of(rows) is None else rows.filter(chosen)
 
 
+POSITION = "position"
+"""The name of the column that is a row's number in its sequence."""
+
+
+def numbered(rows: Any, numbers: npt.NDArray[np.float64]) -> Any:
+    """The rows with their numbers as another column, the last one."""
+    names = names_of(rows)
+    if names is None:
+        return np.column_stack([rows, numbers])
+    if POSITION in names:
+        raise InputError(f"X has a column {POSITION!r}, which is what position=True adds. Leave the column out, or rename it.")
+    if hasattr(rows, "iloc"):
+        return rows.assign(**{POSITION: numbers})
+    if hasattr(rows, "append_column"):
+        return rows.append_column(POSITION, [numbers])
+    return rows.hstack([type(rows.to_series(0))(POSITION, numbers)])
+
+
 def _column(rows: Any, position: int) -> Any:
     if hasattr(rows, "iloc"):
         return rows.iloc[:, position]

@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from . import _native
 from ._errors import InputError, SettingError
-from ._import import compile
+from ._import import compile, to_ensemble
 from ._native import Model, Recognizer
-from ._rows import names_of, rows_of, take
+from ._rows import names_of, numbered, rows_of, take
 from ._types import Progress, Verdict
 
 _Ids = Sequence[object] | npt.NDArray[Any]
@@ -42,6 +42,24 @@ class Calibrated:
     """Groups that the promise rests on, and is for."""
     raw: dict[str, Any] = field(repr=False)
     """All figures, as `palpate calibrate --json` prints them."""
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """A model whose error rate is estimated, and not promised. Shares are between 0 and 1."""
+
+    model: Model
+    """The model with its threshold."""
+    error: float
+    """Cross-fitted share of the names given that were wrong: each fold under what the others gave."""
+    undecided: float
+    """Share of the sequences that ended without a name."""
+    mean_rows: float
+    """Rows used on average."""
+    sequences: int
+    """Sequences that the estimate is of."""
+    raw: dict[str, Any] = field(repr=False)
+    """All figures."""
 
 
 @dataclass(frozen=True)
@@ -118,8 +136,10 @@ def calibrate(
     strangers: str | None = None,
     background: npt.ArrayLike | None = None,
     background_sequence: _Ids | None = None,
+    guard: bool = False,
     seed: int = 1,
     progress: Progress | None = None,
+    _folds: list[Any] | None = None,
 ) -> Calibrated:
     """Sets a model's thresholds so that it keeps a promised error rate: verdicts of rows as early as that allows.
 
@@ -127,7 +147,8 @@ def calibrate(
     other, and are of one class. Without `groups` sequences must be independent of each other; with them, such as a person for
     each row, the promise is for new groups. The rows must be others than those of the training. `per` is what the rate is
     promised of: "average", "name" or "object". With `strangers` ("likely" or "certain") the model also tests whether rows fit
-    any class; rows of others can be given as a `background`, with their own sequences. `seed` says which sequences are learned
+    any class; rows of others can be given as a `background`, with their own sequences. With `guard` the model refuses rows of a
+    sensor that is dead, stuck or out of its range, which then add nothing. `seed` says which sequences are learned
     from: calibrate once. Of several seeds, rates or models tried on the same sequences, the one that looks best keeps its promise
     less often than stated.
 
@@ -143,9 +164,11 @@ def calibrate(
     True
     """
     compiled = model if isinstance(model, Model) else compile(model, max_touches=max_rows or 200)
+    # A recognizer's features are those that someone measures, without a row's number.
+    owner = Recognizer(compiled)
     calibrated, text = _native.calibrate(
         compiled,
-        rows_of(compiled, rows),
+        rows_of(owner, rows),
         _texts(labels),
         _ids(sequence, "sequence"),
         groups=None if groups is None else _ids(groups, "group"),
@@ -154,8 +177,10 @@ def calibrate(
         confidence=confidence,
         max_rows=max_rows,
         strangers=strangers,
-        background=None if background is None else rows_of(compiled, background),
+        background=None if background is None else rows_of(owner, background),
         background_sequence=None if background_sequence is None else _ids(background_sequence, "sequence"),
+        guard=guard,
+        learned=_folds,
         seed=seed,
         progress=progress,
     )
@@ -181,7 +206,7 @@ def evaluate_sequences(
     `calibrate`. Without an `error_rate` the model stops at its own thresholds."""
     text = _native.evaluate_sequences(
         model,
-        rows_of(model, rows),
+        rows_of(Recognizer(model), rows),
         _texts(labels),
         _ids(sequence, "sequence"),
         groups=None if groups is None else _ids(groups, "group"),
@@ -201,6 +226,14 @@ class SequenceRecognizer:
     groups, and calibrates on the others; `predict` gives a class for each sequence, or `None` without a verdict. A classifier that
     is fitted already is taken as it is with `prefit`, or in scikit-learn's `FrozenEstimator`; all sequences are calibrated on
     then, and must be others than those that it was trained on.
+
+    With `position` the classifier also gets the row's number in its sequence, counted from 1, as the last column (`"position"` of a
+    table), which whoever follows a sequence counts, also on a chip. `guard` is as for `calibrate`.
+
+    With `folds`, at least 2, what calibration learns (the shape of evidence, where it begins, the guard) comes from that many folds of
+    the training, each with the margins of a classifier that was trained on the others: so all other sequences are tested on. With
+    `promise=False` besides, all sequences are trained on, `estimated_` has a cross-fitted estimate of the error rate, and the model
+    promises nothing: losses of folds depend on each other, and the classifier itself was tested on nothing.
     """
 
     def __init__(
@@ -212,6 +245,10 @@ class SequenceRecognizer:
         confidence: float = 0.95,
         max_rows: int | None = None,
         strangers: str | None = None,
+        position: bool = False,
+        guard: bool = False,
+        folds: int | None = None,
+        promise: bool = True,
         train_share: float = 0.5,
         prefit: bool = False,
         seed: int = 1,
@@ -222,6 +259,10 @@ class SequenceRecognizer:
         self.confidence = confidence
         self.max_rows = max_rows
         self.strangers = strangers
+        self.position = position
+        self.guard = guard
+        self.folds = folds
+        self.promise = promise
         self.train_share = train_share
         self.prefit = prefit
         self.seed = seed
@@ -255,32 +296,97 @@ class SequenceRecognizer:
         _stretches(_ids(sequence, "sequence"))
         if groups is not None:
             _ids(groups, "group")
-        calibrated = np.ones(len(table), dtype=bool)
-        fitted = self._fitted()
+        known = numbered(table, _numbers(_texts(ids))) if self.position else table
+        units = ids if owners is None else owners
+        fitted, calibrated, folds = self._fitted(), np.ones(len(table), dtype=bool), None
+        if fitted is not None and (self.folds is not None or not self.promise):
+            raise SettingError("folds is given with a classifier that is fitted. Give one that folds of the sequences can train.")
         if fitted is None:
-            train = self._train(ids if owners is None else owners)
-            fitted = _clone(self.estimator).fit(take(table, train), labels[train])
+            train = self._train(units) if self.promise else calibrated
+            fitted = _clone(self.estimator).fit(take(known, train), labels[train])
+            folds = self._folded(table, known, labels, ids, owners, train, fitted)
             calibrated = ~train
         self.estimator_ = fitted
-        self.calibrated_ = calibrate(
-            fitted,
-            take(table, calibrated),
-            labels[calibrated],
-            sequence=ids[calibrated],
-            groups=None if owners is None else owners[calibrated],
-            error_rate=self.error_rate,
-            per=self.per,
-            confidence=self.confidence,
-            max_rows=self.max_rows,
-            strangers=self.strangers,
-            seed=self.seed,
-        )
-        self.model_ = self.calibrated_.model
+        model = self._compiled(fitted, table)
+        for name in ("calibrated_", "estimated_"):
+            vars(self).pop(name, None)
+        if self.promise:
+            self.calibrated_ = calibrate(
+                model,
+                take(table, calibrated),
+                labels[calibrated],
+                sequence=ids[calibrated],
+                groups=None if owners is None else owners[calibrated],
+                error_rate=self.error_rate,
+                per=self.per,
+                confidence=self.confidence,
+                max_rows=self.max_rows,
+                strangers=self.strangers,
+                guard=self.guard,
+                seed=self.seed,
+                _folds=folds,
+            )
+            self.model_ = self.calibrated_.model
+        else:
+            found, text = _native.estimate_sequences(
+                model, folds, error_rate=self.error_rate, max_rows=self.max_rows, guard=self.guard
+            )
+            raw: dict[str, Any] = json.loads(text)
+            shares = raw["error"], raw["undecided"], raw["mean_rows"], raw["sequences"]
+            self.estimated_ = Estimated(found, *shares, raw)
+            self.model_ = found
         self.classes_ = fitted.classes_
         for name in ("n_features_in_", "feature_names_in_"):
             if hasattr(fitted, name):
                 setattr(self, name, getattr(fitted, name))
+        if self.position:
+            self.n_features_in_ = table.shape[1]
+            if hasattr(self, "feature_names_in_"):
+                self.feature_names_in_ = self.feature_names_in_[:-1]
         return self
+
+    def _compiled(self, fitted: Any, table: Any) -> Model:
+        """The model of a fitted classifier."""
+        if not self.position:
+            return compile(fitted, max_touches=self.max_rows or 200)
+        ensemble = to_ensemble(fitted)
+        if len(ensemble.features) != table.shape[1] + 1:
+            raise InputError(
+                f"the trees take {len(ensemble.features)} features, and X has {table.shape[1]}, to which position=True adds one. Train on "
+                "all of them, at most 256."
+            )
+        return compile(ensemble, max_touches=self.max_rows or 200, position=ensemble.features[-1])
+
+    def _folded(
+        self,
+        table: Any,
+        known: Any,
+        labels: npt.NDArray[Any],
+        ids: npt.NDArray[Any],
+        owners: npt.NDArray[Any] | None,
+        train: npt.NDArray[np.bool_],
+        fitted: Any,
+    ) -> list[Any] | None:
+        """Folds of the training, whole sequences or groups, each with the model of the others."""
+        if self.folds is None and self.promise:
+            return None
+        names = np.unique((ids if owners is None else owners)[train])
+        count = 5 if self.folds is None else self.folds
+        if not 2 <= count <= len(names):
+            raise SettingError(f"folds is {count}. Use at least 2, and at most as many as sequences or groups are trained on: {len(names)}.")
+        np.random.default_rng(self.seed).shuffle(names)
+        folds = []
+        for names_of_fold in np.array_split(names, count):
+            own = train & np.isin(ids if owners is None else owners, names_of_fold)
+            others = train & ~own
+            classifier = _clone(self.estimator).fit(take(known, others), labels[others])
+            if list(classifier.classes_) != list(fitted.classes_):
+                raise InputError("a fold has all sequences of a class. Record more of each class, or use fewer folds.")
+            model = self._compiled(classifier, table)
+            rows = rows_of(Recognizer(model), take(table, own))
+            groups = None if owners is None else _texts(owners[own])
+            folds.append((model, rows, _texts(labels[own]), _texts(ids[own]), groups))
+        return folds
 
     def _fitted(self) -> Any:
         """The classifier that is fitted already, if one is given."""
@@ -346,6 +452,10 @@ _PARAMETERS = (
     "confidence",
     "max_rows",
     "strangers",
+    "position",
+    "guard",
+    "folds",
+    "promise",
     "train_share",
     "prefit",
     "seed",
@@ -369,6 +479,12 @@ def _clone(estimator: Any) -> Any:
     if importlib.util.find_spec("sklearn") is None:
         return copy.deepcopy(estimator)
     return importlib.import_module("sklearn.base").clone(estimator)
+
+
+def _numbers(sequence: list[str]) -> npt.NDArray[np.float64]:
+    """The number of each row in its sequence, from 1."""
+    lengths = [stretch.stop - stretch.start for stretch in _stretches(sequence)]
+    return np.concatenate([np.arange(1.0, length + 1) for length in lengths])
 
 
 def _not_fitted(estimator: object) -> Exception:

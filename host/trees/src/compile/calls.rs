@@ -67,7 +67,7 @@ impl Calls<'_> {
         let (name, bytes) = (self.name, self.model.bytes());
         let Places { parts, cuts } = Places::of(bytes);
         let at = |place: usize| format!("{name}_model + {place}");
-        let mut found: [Option<usize>; 19] = [None; 19];
+        let mut found: [Option<usize>; 23] = [None; 23];
         let (mut place, mut exits_end, mut row, mut known) = (parts[1], 0, (0, 0), self.model.object_count());
         // Without a section of what was trained: all times, of any spread, and directions if the descriptor has them.
         let mut trained = (0x20, u8::from(self.is_oriented()), u32::MAX);
@@ -94,6 +94,7 @@ impl Calls<'_> {
             "/* The model as palpate_open leaves it: its bytes were checked when it was exported. */\n\
              static const palpate_model {name}_opened_ = {{\n    {name}_model,\n    {{{parts}}},\n    \
              {cuts}, {odds}, {strangers}, {table}, {sentinel}, {weights}, {rows}, {start}, {most}u,\n\
+             #if PALPATE_SEQUENCES\n    {position}, {guard},\n#endif\n\
              #if PALPATE_OUTPUTS\n    {outputs},\n#endif\n#if PALPATE_EARLY\n    {exits}, {ends},\n#endif\n    \
              0, {spread}u, {objects}, {known}, {features}, {layout}, {leaf}, {descriptor}, {real}, {patterns}, {oriented}\n\
              #if PALPATE_LAYOUTS & PALPATE_CODE\n    , {code}\n#endif\n}};\n\n",
@@ -107,6 +108,8 @@ impl Calls<'_> {
             rows = pointer(16, 0),
             start = row.0,
             most = row.1,
+            position = pointer(21, 0),
+            guard = pointer(22, 0),
             outputs = pointer(18, 0),
             exits = pointer(17, 0),
             ends = found[17].map_or_else(|| "NULL".into(), |_| at(exits_end)),
@@ -222,6 +225,9 @@ impl Calls<'_> {
     /// Functions that add up rows of a stream, or steps of a model that computes its features.
     fn of_steps(&self) -> String {
         let (name, objects, features) = (self.name, self.model.object_count(), self.model.feature_count());
+        if super::emit::has_sequences(self.model) {
+            return self.of_sequences();
+        }
         let (step, parameter, body) = if self.model.descriptor().is_none() {
             let body = if self.code.is_some() {
                 format!(
@@ -249,6 +255,57 @@ impl Calls<'_> {
              static inline int {name}_push(palpate_recognizer *state, {parameter})\n{{\n{body}}}\n\n\
              /* The decision at the end, or without one the object with the most evidence; -1 if nothing was added. {OWN} */\n\
              static inline int {name}_end(const palpate_recognizer *state)\n{{\n    return palpate_ended_(state);\n}}\n\n"
+        )
+    }
+
+    /// The same for a model that numbers the rows of a sequence, or states which of them it takes.
+    fn of_sequences(&self) -> String {
+        let (name, features) = (self.name, self.model.feature_count());
+        let (row, missing) = self.row();
+        let place = self.model.position().map(|position| usize::from(position.feature));
+        let value = if row == "float" { "palpate_f32_key(*row++)" } else { "*row++" };
+        let value = match place {
+            Some(place) => format!("i == {place} ? 0 : {value}"),
+            None => value.into(),
+        };
+        let is_guarded = self.model.guard().is_some();
+        let (seen, argument) = match is_guarded {
+            true => (format!(", {name}_seen *seen"), "&seen->rows, seen->last"),
+            false => (String::new(), "&rows, NULL"),
+        };
+        let mut text = String::new();
+        if is_guarded {
+            text += &format!(
+                "/* Rows of a sequence so far, and the feature, counted from 1, for which the last row was refused, or 0. */\n\
+                 typedef struct {{\n    uint32_t rows;\n    uint16_t refused;\n    palpate_last last[{features}];\n}} {name}_seen;\n\n"
+            );
+        }
+        let number = if place.is_some() { ", whose number is counted here," } else { "" };
+        let (begin, push, refused) = match is_guarded {
+            true => (
+                "    seen->rows = 0;\n    seen->refused = 0;\n",
+                format!(
+                    "    seen->refused = palpate_next_row(&{name}_opened_, {argument}, keys);\n    \
+                         if (seen->refused != 0) {{\n        return -4;\n    }}\n"
+                ),
+                ", -4 if the model does not take the row, which adds nothing",
+            ),
+            false => ("", format!("    (void)palpate_next_row(&{name}_opened_, {argument}, keys);\n"), ""),
+        };
+        let rows = if is_guarded { "" } else { "    uint32_t rows = palpate_rows_(state);\n" };
+        text + &format!(
+            "/* Begins a sequence: nothing was added yet. {OWN} */\n\
+             static inline void {name}_begin(palpate_recognizer *state{seen})\n{{\n    \
+             palpate_start_(state, &{name}_opened_);\n{begin}}}\n\n\
+             /* Adds a row of {measured} features{number} {missing} where one is missing: the number of the object that is recognized; \
+             -1 while none is, -2 if none fits, -3 at the limit of steps{refused}. After a decision nothing changes until \
+             {name}_begin. {OWN} */\n\
+             static inline int {name}_push(palpate_recognizer *state{seen}, const {row} *row)\n{{\n    int32_t keys[{features}];\n\
+             {rows}    int i;\n    for (i = 0; i < {features}; i++) {{\n        keys[i] = {value};\n    }}\n{push}    \
+             (void)palpate_push_features(state, keys, {features});\n    return palpate_decided_(state);\n}}\n\n\
+             /* The decision at the end, or without one the object with the most evidence; -1 if nothing was added. {OWN} */\n\
+             static inline int {name}_end(const palpate_recognizer *state)\n{{\n    return palpate_ended_(state);\n}}\n\n",
+            measured = self.model.measured_count(),
         )
     }
 }

@@ -115,7 +115,7 @@ impl Memory {
 
 /// Features of palpate-onboard that models need, and the bytes of flash of each on a Cortex-M4F and a Cortex-M0+, beyond
 /// [`COMMON`]: `verdict` images of the firmware, which `cargo test -p palpate-tests --test images` compares.
-pub const FEATURES: [(&str, [usize; 2]); 14] = [
+pub const FEATURES: [(&str, [usize; 2]); 15] = [
     ("compact", [780, 1_012]),
     ("complete", [2_048, 1_932]),
     ("grid", [340, 292]),
@@ -128,6 +128,7 @@ pub const FEATURES: [(&str, [usize; 2]); 14] = [
     ("shared-leaves", [1_372, 1_160]),
     ("sentinel", [380, 420]),
     ("row-evidence", [492, 632]),
+    ("sequences", [92, 136]),
     ("strangers", [3_496, 4_736]),
     ("outputs", [1_764, 2_000]),
 ];
@@ -143,6 +144,7 @@ pub fn features(model: &Model<'_>) -> Vec<&'static str> {
         "sentinel" => model.sentinel().is_some(),
         "strangers" => model.strangers().is_some(),
         "row-evidence" => model.row_evidence().is_some() || model.weight_of(u32::MAX) != Weights::ONE,
+        "sequences" => model.position().is_some() || model.guard().is_some(),
         "outputs" => model.outputs().is_some(),
         _ => name == model.layout().name() || name.strip_suffix("-leaves") == Some(leaf.name()),
     };

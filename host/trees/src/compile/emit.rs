@@ -159,11 +159,14 @@ fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<(&Pro
     let early = if has_exits { "#ifndef PALPATE_EARLY\n#define PALPATE_EARLY 1\n#endif\n" } else { "" };
     let has_outputs = model.outputs().is_some();
     let outputs = if has_outputs { "#ifndef PALPATE_OUTPUTS\n#define PALPATE_OUTPUTS 1\n#endif\n" } else { "" };
+    let has_sequences = has_sequences(model);
+    let sequences = if has_sequences { "#ifndef PALPATE_SEQUENCES\n#define PALPATE_SEQUENCES 1\n#endif\n" } else { "" };
     let needed = [
         ("PALPATE_STRANGERS", strangers),
         ("PALPATE_SHARED", shared),
         ("PALPATE_SENTINEL", sentinel),
         ("PALPATE_ROW_EVIDENCE", row_evidence),
+        ("PALPATE_SEQUENCES", u8::from(has_sequences)),
         ("PALPATE_EARLY", u8::from(has_exits)),
         ("PALPATE_OUTPUTS", u8::from(has_outputs)),
     ];
@@ -179,7 +182,7 @@ fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<(&Pro
          #ifndef PALPATE_SHARED\n#define PALPATE_SHARED {shared}\n#endif\n\
          #ifndef PALPATE_SENTINEL\n#define PALPATE_SENTINEL {sentinel}\n#endif\n\
          #ifndef PALPATE_ROW_EVIDENCE\n#define PALPATE_ROW_EVIDENCE {row_evidence}\n#endif\n\
-         {early}{outputs}{too_long}\
+         {sequences}{early}{outputs}{too_long}\
          #ifndef PALPATE_MAX_OBJECTS\n#define PALPATE_MAX_OBJECTS {objects}\n#endif\n\
          #if defined(__AVR__) && !defined(PALPATE_BYTE)\n#include <avr/pgmspace.h>\n#define PALPATE_BYTE(p) pgm_read_byte(p)\n#endif\n\
          #include \"palpate.h\"\n\n\
@@ -219,7 +222,7 @@ fn checks(name: &str, layout: &str, leaf: &str, needed: &[(&str, u8)], objects: 
 
 fn rust(model: &Model<'_>, name: &str) -> String {
     format!(
-        "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}{sentinel}{row}.\n\n\
+        "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}{sentinel}{row}{sequences}.\n\n\
          /// The model: `Model::new(&{constant}.0)`.\n\
          #[rustfmt::skip]\n\
          pub static {constant}: palpate_onboard::Aligned<[u8; {length}]> = palpate_onboard::Aligned([\n\
@@ -230,6 +233,7 @@ fn rust(model: &Model<'_>, name: &str) -> String {
         shared = if model.shared_leaves().is_some() { ", shared-leaves" } else { "" },
         sentinel = if model.sentinel().is_some() { ", sentinel" } else { "" },
         row = if has_row_evidence(model) { ", row-evidence" } else { "" },
+        sequences = if has_sequences(model) { ", sequences" } else { "" },
         constant = name.to_uppercase(),
         length = model.bytes().len(),
         array = array(model.bytes()),
@@ -240,6 +244,11 @@ fn rust(model: &Model<'_>, name: &str) -> String {
 fn has_row_evidence(model: &Model<'_>) -> bool {
     let tags = [Tag::Weights, Tag::RowEvidence].map(Tag::code);
     model.optional_sections().any(|section| tags.contains(&section.tag))
+}
+
+/// True if the model numbers the rows of a sequence, or states which of them it takes.
+pub(super) fn has_sequences(model: &Model<'_>) -> bool {
+    model.position().is_some() || model.guard().is_some()
 }
 
 /// Description of the model, in one line.

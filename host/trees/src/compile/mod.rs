@@ -112,6 +112,9 @@ pub struct Settings {
     pub scales: Option<Vec<f32>>,
     /// For classes of rows: walks for a class alone end where the class is known. Nothing else changes.
     pub early_exit: Option<EarlyExit>,
+    /// For classes of rows: the feature, by name, that is the number of a row in its sequence, counted from 1. Recognizers
+    /// count it themselves.
+    pub position: Option<String>,
     /// Statements of whoever defines the features. The crate `palpate` fills them in from the ensemble.
     pub stated: Stated,
 }
@@ -147,6 +150,7 @@ impl Default for Settings {
             forms: Vec::new(),
             scales: None,
             early_exit: None,
+            position: None,
             stated: Stated::default(),
         }
     }

@@ -9,7 +9,7 @@ use crate::error::{CompileProblem, Error, Result};
 use crate::rows::whole;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{
-    CHECKSUM_LENGTH, HeaderBuilder, Layout, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, f32_key,
+    CHECKSUM_LENGTH, HeaderBuilder, Layout, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, f32_key,
 };
 
 /// The model's bytes; `hash` is that of the ensemble as it was read.
@@ -91,6 +91,9 @@ fn sections(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Re
             put(Tag::Sentinel, true, sentinel.to_bytes().to_vec());
         }
     }
+    if let Some(name) = &settings.position {
+        put(Tag::Position, true, position(ensemble, settings, name)?.to_bytes().to_vec());
+    }
     if let Some(columns) = imported.and_then(|imported| imported.columns.as_ref()) {
         // Their number was checked: it is the last one's number that is written.
         let number = |column: usize| u16::try_from(column).unwrap_or(u16::MAX).to_le_bytes();
@@ -110,6 +113,23 @@ pub(super) fn sentinel(ensemble: &Ensemble, settings: &Settings) -> Option<Senti
         Some(scale) => [whole(low, scale), whole(high, scale)],
     };
     Some(Sentinel { low, high })
+}
+
+/// The feature that is a row's number.
+fn position(ensemble: &Ensemble, settings: &Settings, name: &str) -> Result<Position> {
+    let wrong = |allowed: &str| Err(Error::setting("position", name, allowed));
+    if ensemble.schema().is_some() || ensemble.objects.len() < 2 || ensemble.prediction().targets {
+        return wrong("it with classes of rows, which a sequence has one of");
+    }
+    let names = ensemble.inputs.names();
+    let Some(feature) = names.iter().position(|own| *own == name) else {
+        return wrong(&format!("the name of a feature that the trees split on, such as {}", names.join(", ")));
+    };
+    let scale = settings.scales.as_ref().map_or(1.0, |scales| scales[feature]);
+    if names.len() < 2 || scale < 1.0 || scale.fract() != 0.0 || scale >= 2_147_483_648.0 {
+        return wrong("one feature of several, with a whole number as its scale");
+    }
+    Ok(Position { feature: byte(feature)?, step: scale as i32 })
 }
 
 /// Returns an error unless the features that stand for a missing value are the same whole numbers for every feature: a

@@ -72,6 +72,20 @@ pub fn columns_of(model: &Model<'_>) -> Option<(usize, Vec<usize>)> {
 }
 
 impl Features {
+    /// The features of a model that someone measures: all but its [position](Model::position).
+    pub fn measured(model: &Model<'_>) -> Self {
+        let mut own = Self::from(model);
+        if let Some(position) = model.position() {
+            own.names.remove(position.feature.into());
+            if let Some((all, used)) = &mut own.columns {
+                let column = used.remove(position.feature.into());
+                *all -= 1;
+                used.iter_mut().filter(|used| **used > column).for_each(|used| *used -= 1);
+            }
+        }
+        own
+    }
+
     /// Number of features.
     pub fn count(&self) -> usize {
         self.names.len()

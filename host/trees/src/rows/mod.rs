@@ -139,6 +139,23 @@ impl Encoder {
         Self::Scaled(stated.chain(std::iter::repeat(1.0)).take(model.feature_count()).collect())
     }
 
+    /// Encoder of the features that someone measures: all but the model's [position](Model::position).
+    pub fn measured(model: &Model<'_>) -> Self {
+        let mut own = Self::of(model);
+        if let (Self::Scaled(scales), Some(position)) = (&mut own, model.position()) {
+            scales.remove(position.feature.into());
+        }
+        own
+    }
+
+    /// Encoder of one of the features.
+    pub fn only(&self, feature: usize) -> Self {
+        match self {
+            Self::Real => Self::Real,
+            Self::Scaled(scales) => Self::Scaled(scales.get(feature).copied().into_iter().collect()),
+        }
+    }
+
     /// Encodes a row into the numbers that the model compares.
     pub fn row<V: Copy + Into<f64>>(&self, row: &[V]) -> Vec<i32> {
         match self {
