@@ -66,7 +66,11 @@ fn session(faults: &[(u64, Fault)]) -> (Cells, u32, Vec<u32>) {
     let mut cuts = run(&mut cells, first, &mut desk);
     // A step that failed may cost what the load wrote into one sector, and nothing else.
     assert_eq!(desk.outcomes.last(), Some(&Outcome::Done), "{faults:?}: {:?}", desk.outcomes);
-    assert!(desk.continued.iter().all(|&from| from as usize % SECTOR == 0), "{faults:?}: {:?}", desk.continued);
+    assert!(
+        desk.continued.iter().all(|&from| (from as usize).is_multiple_of(SECTOR)),
+        "{faults:?}: {:?}",
+        desk.continued
+    );
     desk.script.extend(after.iter().map(push));
     desk.script.push_back(Step::Ask(Query::Statistics));
     cuts += run(&mut cells, first, &mut desk);
