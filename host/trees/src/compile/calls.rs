@@ -258,7 +258,7 @@ impl Calls<'_> {
         )
     }
 
-    /// The same for a model that numbers the rows of a sequence, or states which of them it takes.
+    /// Functions of a model that numbers the rows of a sequence, or states which of them it takes.
     fn of_sequences(&self) -> String {
         let (name, features) = (self.name, self.model.feature_count());
         let (row, missing) = self.row();
