@@ -83,7 +83,7 @@ pub(crate) fn estimate_sequences(
 /// Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
 #[pyo3::pyfunction]
 #[pyo3(signature = (model, rows, labels, sequence, *, groups=None, error_rate=0.01, per="average", confidence=0.95,
-    max_rows=None, strangers=None, background=None, background_sequence=None, guard=false,
+    max_rows=None, strangers=None, background=None, background_sequence=None, guard=false, learned=None,
     seed=1, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn calibrate(

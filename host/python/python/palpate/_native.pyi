@@ -315,7 +315,7 @@ class Maps:
         Maps in memory; `content` is checked.
         """
     def __repr__(self, /) -> str: ...
-    def calibrate(self, /, meshes: Meshes, *, millimeters: SupportsFloat | SupportsIndex | None = None, error_rate: SupportsFloat | SupportsIndex = 0.01, confidence: SupportsFloat | SupportsIndex = 0.95, sequences: SupportsIndex = 1000, max_touches: SupportsIndex = 25, aimed: str = "chosen", real: Real | None = None, pose: SupportsIndex = 10, until: tuple[SupportsFloat | SupportsIndex, SupportsFloat | SupportsIndex] | None = None, unknown: bool = False, seed: SupportsIndex = 1, progress: Progress | None = None) -> CalibratedMaps:
+    def calibrate(self, /, meshes: Meshes, *, millimeters: SupportsFloat | SupportsIndex | None = None, error_rate: SupportsFloat | SupportsIndex = 0.01, confidence: SupportsFloat | SupportsIndex = 0.95, sequences: SupportsIndex = 1000, max_touches: SupportsIndex = 25, aimed: str = "chosen", real: Real | None = None, pose: SupportsIndex = 10, until: tuple[SupportsFloat | SupportsIndex, SupportsFloat | SupportsIndex] | None = None, unknown: bool = False, workspace: SupportsFloat | SupportsIndex | None = None, seed: SupportsIndex = 1, progress: Progress | None = None) -> CalibratedMaps:
         """
         Finds the loosest threshold at which at most a share of `error_rate` of the names is wrong, with a probability of
         `confidence`, on sequences of approaches to these meshes on a simulated table.
@@ -323,14 +323,10 @@ class Maps:
         `aimed` says how approaches are aimed, and which approaches the promise is for: "chosen" ones, as by `Locator.next`, or "random"
         ones about the place believed in. `real` is what the simulated hand and table add. `until` goes on until the place is as
         sure, such as (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing
-        is named before the eighth approach then.
+        is named before the eighth approach then. `workspace` is how far from the table's origin the middle finger comes down in x and
+        y, in millimeters, by default twice the range.
         """
-    def estimate_sequences(model: Model, folds: SupportsGetItem[int, tuple[Model, ArrayLike, SupportsGetItem[int, str], SupportsGetItem[int, str], SupportsGetItem[int, str] | None]], *, error_rate: SupportsFloat | SupportsIndex, max_rows: SupportsIndex | None, guard: bool) -> tuple[Model, str]:
-    """
-    Sets a model's threshold from the folds of its training, and returns the model and an estimate of its error rate.
-    """
-
-def evaluate(self, /, meshes: Meshes, *, millimeters: SupportsFloat | SupportsIndex | None = None, sequences: SupportsIndex = 1000, max_touches: SupportsIndex = 25, aimed: str = "chosen", real: Real | None = None, pose: SupportsIndex = 10, until: tuple[SupportsFloat | SupportsIndex, SupportsFloat | SupportsIndex] | None = None, seed: SupportsIndex = 2, progress: Progress | None = None) -> MapsEvaluation:
+    def evaluate(self, /, meshes: Meshes, *, millimeters: SupportsFloat | SupportsIndex | None = None, sequences: SupportsIndex = 1000, max_touches: SupportsIndex = 25, aimed: str = "chosen", real: Real | None = None, pose: SupportsIndex = 10, until: tuple[SupportsFloat | SupportsIndex, SupportsFloat | SupportsIndex] | None = None, workspace: SupportsFloat | SupportsIndex | None = None, seed: SupportsIndex = 2, progress: Progress | None = None) -> MapsEvaluation:
         """
         Plays sequences of approaches to these meshes on a simulated table, other ones than those of `calibrate` if the seed is
         another, to the maps' own threshold. The arguments are as for `calibrate`.
@@ -711,6 +707,11 @@ def compile(ensemble: Ensemble, *, max_bytes: SupportsIndex | None = None, leaf:
     >>> model = palpate.compile(palpate.train(data, rounds=5), max_bytes=4000)
     >>> model.size <= 4000
     True
+    """
+
+def estimate_sequences(model: Model, folds: SupportsGetItem[int, tuple[Model, ArrayLike, SupportsGetItem[int, str], SupportsGetItem[int, str], SupportsGetItem[int, str] | None]], *, error_rate: SupportsFloat | SupportsIndex, max_rows: SupportsIndex | None, guard: bool) -> tuple[Model, str]:
+    """
+    Sets a model's threshold from the folds of its training, and returns the model and an estimate of its error rate.
     """
 
 def evaluate(model: Model | Ensemble, data: DataSet, *, at: SupportsGetItem[int, SupportsIndex] | None = None, groups: SupportsIndex = 1000, error_rate: SupportsFloat | SupportsIndex | None = None, max_touches: SupportsIndex | None = None, noise: str = "", timer: str = "", seed: SupportsIndex = 1) -> str:
