@@ -422,9 +422,10 @@ class SequenceRecognizer:
         if wanted is not None and found != wanted and names_of(table) is None:
             kind = type(self).__name__
             raise InputError(f"X has {found} features, but {kind} is expecting {wanted} features as input. Give those of the fit.")
-        rows = rows_of(self.model_, table)
-        _agree(len(rows), sequence=len(ids))
         recognizer = Recognizer(self.model_)
+        # The features that someone measures, without a row's number.
+        rows = rows_of(recognizer, table)
+        _agree(len(rows), sequence=len(ids))
         return [_verdict(recognizer, rows[stretch]) for stretch in _stretches(ids)]
 
     def predict(self, X: npt.ArrayLike, *, sequence: _Ids) -> npt.NDArray[Any]:
