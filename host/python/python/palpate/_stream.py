@@ -329,7 +329,7 @@ class SequenceRecognizer:
             self.model_ = self.calibrated_.model
         else:
             found, text = _native.estimate_sequences(
-                model, folds, error_rate=self.error_rate, max_rows=self.max_rows, guard=self.guard
+                model, folds or [], error_rate=self.error_rate, max_rows=self.max_rows, guard=self.guard
             )
             raw: dict[str, Any] = json.loads(text)
             shares = raw["error"], raw["undecided"], raw["mean_rows"], raw["sequences"]
@@ -341,8 +341,8 @@ class SequenceRecognizer:
                 setattr(self, name, getattr(fitted, name))
         if self.position:
             self.n_features_in_ = table.shape[1]
-            if hasattr(self, "feature_names_in_"):
-                self.feature_names_in_ = self.feature_names_in_[:-1]
+            if hasattr(fitted, "feature_names_in_"):
+                self.feature_names_in_ = fitted.feature_names_in_[:-1]
         return self
 
     def _compiled(self, fitted: Any, table: Any) -> Model:

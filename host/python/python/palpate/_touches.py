@@ -68,7 +68,7 @@ class TouchRecognizer:
         self.classes_, objects = np.unique(np.asarray(y), return_inverse=True)
         _agree(len(touches), y=len(objects))
         names = [str(name) for name in self.classes_.tolist()]
-        posed = {"direction": touches[:, 3:6], "alignment": touches[:, 6:9]} if touches.shape[1] == 9 else {}
+        posed: dict[str, Any] = {"direction": touches[:, 3:6], "alignment": touches[:, 6:9]} if touches.shape[1] == 9 else {}
         is_partial = bool(np.isnan(touches[:, :3]).any())
         data = DataSet.from_arrays(touches[:, :3], objects, names, approaches=is_partial, **posed)
         given = {name: getattr(self, name) for name in _PARAMETERS if name != "leaf"}
