@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use palpate_onboard::{Model, Recognizer, Stopping};
+use palpate_onboard::{Model, Recognizer, RowsSeen, Stopping};
 use palpate_shared::Touch;
 use palpate_shared::format::{CHECKSUM_LENGTH, MAGIC, VERSION, checksum};
 
@@ -39,8 +39,10 @@ fn walk(model: &Model<'_>) {
         let _ = recognizer.push(&Touch::from_micros(times));
         recognizer.posterior(recognizer.best());
     }
+    let mut seen = RowsSeen::<256>::new();
     for row in [&[][..], &[i32::MIN; 256], &[i32::MAX; 256], &[0; 256], &[1000, -1000, 5]] {
         let _ = recognizer.push_features(row);
+        let _ = recognizer.push_seen(row, &mut seen);
         let mut margins = [0; 256];
         model.margins_of(row, &mut margins);
         recognizer.push_margins(&margins);

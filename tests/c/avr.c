@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #define PALPATE_MAX_OBJECTS 12
+#define REPLAY_GUARDED 64
 #include "replay.h"
 
 #include "commands.h"

@@ -5,6 +5,7 @@
  *   M u32 length, bytes      opens a model and starts a recognizer: "open ERROR PLACE"
  *   T 3 u32, u8, 6 i16       pushes a touch: times, whether it has a pose, direction and alignment
  *   R u16 count, i32 each    pushes a row of features
+ *   Q u16 count, i32 each    pushes the measured features of the next row of a sequence: "guarded FEATURE" if it is not taken
  *   E u16 count, i32 each    pushes margins
  *   P                        the posterior of every object
  *   N                        the name of every object
@@ -21,6 +22,13 @@
 #ifndef PALPATE_EARLY
 #define PALPATE_EARLY 1
 #endif
+/* The most features of a model with a guard. */
+#ifndef REPLAY_GUARDED
+#define REPLAY_GUARDED 256
+#endif
+#ifndef PALPATE_SEQUENCES
+#define PALPATE_SEQUENCES 1
+#endif
 #ifndef PALPATE_OUTPUTS
 #define PALPATE_OUTPUTS 1
 #endif
@@ -35,6 +43,10 @@ static uint8_t *replay_room(int which, size_t length);
 static palpate_model replay_model;
 static palpate_recognizer replay_recognizer;
 static int32_t replay_features[256], replay_margins[PALPATE_MAX_OBJECTS];
+#if PALPATE_SEQUENCES
+static palpate_last replay_last[REPLAY_GUARDED];
+static uint32_t replay_rows;
+#endif
 /* Room for margins. */
 #define REPLAY_ROOM (sizeof replay_margins / sizeof replay_margins[0])
 
@@ -189,6 +201,29 @@ static void replay_known(palpate_answer answer, uint16_t count)
     replay_evidence();
 }
 
+#if PALPATE_SEQUENCES
+/* Makes room for the number of the row among so many measured features, and pushes them. */
+static void replay_next(uint16_t count)
+{
+    uint16_t i, refused;
+    for (i = count; i < 256; i++) {
+        replay_features[i] = PALPATE_MISSING_FEATURE;
+    }
+    for (i = 255; replay_model.position_ != NULL && i > PALPATE_BYTE(replay_model.position_); i--) {
+        replay_features[i] = replay_features[i - 1];
+    }
+    refused = palpate_next_row(&replay_model, &replay_rows, replay_last, replay_features);
+    if (refused != 0) {
+        replay_text("guarded");
+        replay_i64((int64_t)refused);
+        replay_put('\n');
+        return;
+    }
+    count = replay_model.features;
+    replay_known(palpate_push_features(&replay_recognizer, replay_features, count), count);
+}
+#endif
+
 static void replay_touch(int is_open)
 {
     palpate_touch touch;
@@ -240,6 +275,9 @@ static int replay(void)
                     error = palpate_start(&replay_recognizer, &replay_model);
                 }
                 is_open = error == PALPATE_OK;
+#if PALPATE_SEQUENCES
+                replay_rows = 0;
+#endif
                 replay_text("open");
                 replay_i64((int64_t)error);
                 replay_i64(is_open ? 0 : (int64_t)replay_model.wrong);
@@ -259,6 +297,14 @@ static int replay(void)
                 replay_known(palpate_push_features(&replay_recognizer, replay_features, count), count);
             }
             break;
+#if PALPATE_SEQUENCES
+        case 'Q':
+            count = replay_row();
+            if (is_open) {
+                replay_next(count);
+            }
+            break;
+#endif
         case 'E':
             count = replay_row();
             if (is_open) {
@@ -313,6 +359,9 @@ static int replay(void)
         case 'X':
             if (is_open) {
                 palpate_reset(&replay_recognizer);
+#if PALPATE_SEQUENCES
+                replay_rows = 0;
+#endif
             }
             break;
         default:

@@ -8,8 +8,8 @@ use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::with;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
-    Axis, Counted, EarlyExit, Group, HEADER_LENGTH, Header, Held, Length, Link, MUST_UNDERSTAND, MisfitTerms,
-    ObjectMisfit, Outputs, Plan, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, TrainedNoise,
+    Axis, Counted, EarlyExit, Group, HEADER_LENGTH, Header, Held, Length, Limits, Link, MUST_UNDERSTAND, MisfitTerms,
+    ObjectMisfit, Outputs, Plan, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, TrainedNoise,
     TrainedProbe, TrainedTouches, checksum, write_section,
 };
 use palpate_shared::{Descriptor, Patterns, Poses};
@@ -172,6 +172,7 @@ pub fn cases() -> Vec<Abuse> {
     groups(&mut put);
     tables(&mut put);
     predictions(&mut put);
+    sequences(&mut put);
     shared_leaves(&mut put);
     cases
 }
@@ -471,6 +472,28 @@ fn predictions(put: Put<'_>) {
     with("evidence of a row that starts beyond all margins", &at(3, 0x41));
 }
 
+/// Damage to what a model says about rows of sequences.
+fn sequences(put: Put<'_>) {
+    let plain = model(Layout::Compact, Leaf::I8, true);
+    let rows = changed_to_rows(&plain);
+    let [optional, ..] = places(&plain);
+    let features = plain[15] + 1;
+    let position = Position { feature: features - 1, step: 1 };
+    let guard = Limits::NONE.to_bytes().repeat(features.into());
+    let mut with = |name: &str, model: &[u8], tag: Tag, content: &[u8]| {
+        put(name, "field", optional, with_sections(model, &section(tag.code() | MUST_UNDERSTAND, content)));
+    };
+    with("numbers of rows in a model over touches", &plain, Tag::Position, &position.to_bytes());
+    with("numbers of rows that are cut", &rows, Tag::Position, &position.to_bytes()[..7]);
+    let beyond = Position { feature: features, ..position };
+    with("numbers of rows as a feature that does not exist", &rows, Tag::Position, &beyond.to_bytes());
+    for (name, step) in [("numbers of rows that count nothing", 0), ("numbers of rows that fall", -1)] {
+        with(name, &rows, Tag::Position, &Position { step, ..position }.to_bytes());
+    }
+    with("a guard in a model over touches", &plain, Tag::Guard, &guard);
+    with("a guard of fewer features than there are", &rows, Tag::Guard, &guard[1..]);
+}
+
 /// The model over touches as one over rows of as many features.
 fn changed_to_rows(model: &[u8]) -> Vec<u8> {
     changed(model, 12, &[RAW_FEATURES])
@@ -637,6 +660,8 @@ fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
     let names = [0, 0, 0x80, 0x3f, 1, b'a', 0, 0, 0x80, 0x3f, 2, b'b', b'c'];
     let table = [0, 0, 0, 0, 4, 3, 0, 4, 0, 1, 1, 2, 9];
     let exits = EarlyExit { groups: 1, bound: 1 << 20 }.to_bytes();
+    let limits = Limits { low: -9, high: 1 << 20, may_miss: true, most_equal: 5 };
+    let guard = limits.to_bytes().repeat(usize::from(plain[15]) + 1);
     let mut prediction = Vec::new();
     let averaged = Prediction { link: Link::Identity, last_of_ties: true, scale: 0.5, targets: false, average: 5 };
     averaged.write(&mut |part| prediction.extend_from_slice(part));
@@ -647,6 +672,8 @@ fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
         (must(Tag::RowEvidence), table.to_vec(), table.len()),
         (Tag::EarlyExit.code(), exits.to_vec(), 0),
         (must(Tag::Outputs), outputs.clone(), outputs.len()),
+        (must(Tag::Position), Position { feature: 0, step: 3 }.to_bytes().to_vec(), Position::LENGTH),
+        (must(Tag::Guard), guard.clone(), guard.len()),
     ];
     let (base, cuts) = with_cuts(&plain, &sections);
     ("cut, rows with all sections".into(), base, cuts)

@@ -157,7 +157,7 @@ impl Parts {
                 "the other mark".into()
             }
             4 => {
-                let other = rng.random_range(0..22);
+                let other = rng.random_range(0..24);
                 self.sections[number].0 = other;
                 format!("now {other}")
             }
@@ -179,7 +179,7 @@ impl Parts {
         let (tag, mut content) = if from.is_empty() || rng.random_ratio(1, 4) {
             let most = if rng.random() { 12 } else { 60 };
             let numbers = (0..rng.random_range(0..most)).map(|_| rng.random_range(0..4)).collect();
-            (rng.random_range(1..20) | if rng.random() { MUST_UNDERSTAND } else { 0 }, numbers)
+            (rng.random_range(1..24) | if rng.random() { MUST_UNDERSTAND } else { 0 }, numbers)
         } else {
             from[rng.random_range(0..from.len())].clone()
         };

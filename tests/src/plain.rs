@@ -55,6 +55,13 @@ pub struct Plain<'a> {
     /// Weights by the number of touches, and the evidence of a row's margins, if the model has them.
     weights: Vec<u64>,
     row: Option<&'a [u8]>,
+    /// The feature that is a row's number, and its step, and the limits of each feature; of the rows of a sequence so far their
+    /// number, and each feature's last value with the number of rows that it has been the same.
+    position: Option<(usize, i32)>,
+    guard: &'a [u8],
+    is_real: bool,
+    rows: u32,
+    same: Vec<(i32, u32)>,
     /// Places where a class may be known: the groups before, and the lead.
     exits: Vec<(usize, i64)>,
     /// For each output the number of its object, if several belong together.
@@ -127,7 +134,8 @@ impl<'a> Plain<'a> {
         let (mut odds_by_object, mut sharpness, mut shared, mut sentinel) = (Vec::new(), 1 << 16, None, None);
         let (mut weights, mut row) = (Vec::new(), None);
         let (mut exits, mut last_of_ties, mut background) = (Vec::new(), false, false);
-        let mut together = Vec::new();
+        let (mut together, mut position, mut guard): (_, _, &[u8]) = (Vec::new(), None, &[]);
+        let features = usize::from(bytes[15]) + 1;
         // What a model without the section touches was trained on.
         let (mut patterns, mut needs_pose, mut largest) = (0b10_0000, matches!(descriptor, 2 | 3 | 5 | 6), u32::MAX);
         while !optional.is_empty() {
@@ -147,6 +155,8 @@ impl<'a> Plain<'a> {
                     exits = content.chunks_exact(8).map(exit).collect();
                 }
                 18 => together = content[4..][..4 * objects].chunks(4).map(|output| output[0]).collect(),
+                21 => position = Some((content[0].into(), signed(&content[4..8]))),
+                22 => guard = &content[..12 * features],
                 14 => sentinel = Some((signed(&content[..4]), signed(&content[4..8]))),
                 _ => {}
             }
@@ -177,6 +187,11 @@ impl<'a> Plain<'a> {
             shared,
             weights,
             row,
+            position,
+            guard,
+            is_real: bytes[13] == 1,
+            rows: 0,
+            same: vec![(0, 0); features],
             exits,
             last_of_ties,
             background,
@@ -192,7 +207,37 @@ impl<'a> Plain<'a> {
     /// Forgets all touches.
     pub fn reset(&mut self) {
         self.evidence = self.priors.iter().map(|&prior| prior.into()).collect();
-        (self.touches, self.decision) = (0, Decision::Undecided);
+        (self.touches, self.decision, self.rows) = (0, Decision::Undecided, 0);
+    }
+
+    /// All features of the next row of a sequence, from those that are measured, or the first one that the guard refuses.
+    pub fn next(&mut self, measured: &[i32]) -> Result<Vec<i32>, usize> {
+        self.rows += 1;
+        let mut features = measured.to_vec();
+        if let Some((feature, step)) = self.position {
+            features.resize(features.len().max(feature), MISSING);
+            let counted = i32::try_from(i64::from(self.rows.min(1 << 24)) * i64::from(step)).unwrap_or(i32::MAX);
+            features.insert(feature, if self.is_real { key(self.rows.min(1 << 24) as f32) } else { counted });
+        }
+        features.resize(self.same.len(), MISSING);
+        let mut refused = None;
+        for (feature, limits) in self.guard.chunks(12).enumerate() {
+            let is_missing = self.sentinel.is_some_and(|(low, high)| (low..=high).contains(&features[feature]));
+            let value = if is_missing { MISSING } else { features[feature] };
+            let (last, equal) = self.same[feature];
+            let equal = if self.rows > 1 && value == last { equal + 1 } else { 1 };
+            self.same[feature] = (value, equal);
+            let flags = number(&limits[8..]) as u32;
+            let fits = match value {
+                MISSING => flags >> 31 == 1,
+                _ => signed(&limits[..4]) <= value && value <= signed(&limits[4..8]),
+            };
+            let most = flags & 0x7fff_ffff;
+            if !fits || most > 0 && equal > most {
+                refused = refused.or(Some(feature));
+            }
+        }
+        refused.map_or(Ok(features), Err)
     }
 
     /// Another threshold and limit than the model's.

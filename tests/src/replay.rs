@@ -1,7 +1,9 @@
 //! Commands for the C header's test program (`tests/c/replay.h`), and its required answer to each: the crate's.
 
 use crate::abuse::places;
-use palpate_onboard::{Model, ModelError, Recognizer, Refused, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
+use palpate_onboard::{
+    Model, ModelError, Recognizer, Refused, RowsSeen, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict,
+};
 use palpate_shared::Touch;
 use palpate_shared::format::{Group, HEADER_LENGTH, Layout};
 use std::fmt::Write;
@@ -14,6 +16,9 @@ pub struct Script<'m> {
     /// Output that the program has to write.
     pub expected: String,
     recognizer: Option<Recognizer<'m, 256>>,
+    seen: RowsSeen<256>,
+    /// Number of rows of sequences so far.
+    pub next_rows: usize,
 }
 
 impl<'m> Script<'m> {
@@ -26,6 +31,7 @@ impl<'m> Script<'m> {
         let start =
             |model: &Model<'m>| Recognizer::new(model, Stopping::from_model(model)).expect("at most 256 objects");
         self.recognizer = opened.ok().as_ref().map(start);
+        self.seen.reset();
         self.recognizer.is_some()
     }
 
@@ -61,22 +67,50 @@ impl<'m> Script<'m> {
         self.row_known(features.as_slice());
     }
 
-    /// Pushes a row of features.
+    /// Pushes a row of all features, whatever the model says about sequences.
     pub fn row(&mut self, row: &[i32]) {
-        self.commands.push(b'R');
-        self.commands.extend((row.len() as u16).to_le_bytes());
-        self.commands.extend(row.iter().flat_map(|value| value.to_le_bytes()));
-        match self.known().push_features(row) {
+        self.row_command(b'R', row);
+        let model = *self.recognizer().model();
+        let pushed = if model.position().is_some() || model.guard().is_some() {
+            let mut margins = vec![0; model.object_count()];
+            model.margins_of(row, &mut margins);
+            Ok(self.known().push_margins(&margins))
+        } else {
+            self.known().push_features(row)
+        };
+        match pushed {
             Err(refused) => self.say(&format!("refused {}", refusal(refused))),
             Ok(_) => self.row_known(row),
         }
     }
 
+    /// Pushes the measured features of the next row of a sequence.
+    ///
+    /// # Panics
+    /// If the row is refused by one of [`RowsSeen::next`] and [`Recognizer::push_seen`] alone.
+    pub fn next_row(&mut self, measured: &[i32]) {
+        self.row_command(b'Q', measured);
+        self.next_rows += 1;
+        let model = *self.recognizer().model();
+        let features = self.seen.clone().next(&model, measured);
+        let pushed = self.recognizer.as_mut().expect("a model is open").push_seen(measured, &mut self.seen);
+        assert_eq!(pushed.err(), features.err());
+        match features {
+            Err(Refused::Guarded(feature, _)) => self.say(&format!("guarded {:x}", u16::from(feature) + 1)),
+            Err(refused) => self.say(&format!("refused {}", refusal(refused))),
+            Ok(features) => self.row_known(&features[..model.feature_count()]),
+        }
+    }
+
+    fn row_command(&mut self, command: u8, row: &[i32]) {
+        self.commands.push(command);
+        self.commands.extend((row.len() as u16).to_le_bytes());
+        self.commands.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+    }
+
     /// Pushes margins.
     pub fn margins(&mut self, margins: &[i32]) {
-        self.commands.push(b'E');
-        self.commands.extend((margins.len() as u16).to_le_bytes());
-        self.commands.extend(margins.iter().flat_map(|margin| margin.to_le_bytes()));
+        self.row_command(b'E', margins);
         self.known().push_margins(margins);
         self.evidence();
     }
@@ -85,6 +119,7 @@ impl<'m> Script<'m> {
     pub fn reset(&mut self) {
         self.commands.push(b'X');
         self.known().reset();
+        self.seen.reset();
     }
 
     /// The posteriors of all objects, and of one that does not exist.

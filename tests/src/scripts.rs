@@ -5,8 +5,8 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-    EarlyExit, Held, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Prediction, RowEvidence, Section,
-    Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
+    EarlyExit, Held, Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Position, Prediction,
+    RowEvidence, Section, Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;
@@ -99,6 +99,14 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
     if rng.random_bool(0.5) {
         write_section(Tag::Outputs, true, &outputs(objects, rng), &mut put);
     }
+    if model.descriptor().is_none() {
+        if rng.random_bool(0.5) {
+            write_section(Tag::Position, true, &position(model.feature_count(), rng).to_bytes(), &mut put);
+        }
+        if rng.random_bool(0.5) {
+            write_section(Tag::Guard, true, &guard(model.feature_count(), rng), &mut put);
+        }
+    }
     Section { tag: 300, must_understand: false, content: b"later" }.write(&mut put);
     with_sections(bytes, &sections)
 }
@@ -125,6 +133,26 @@ fn row_evidence(rng: &mut SmallRng) -> Vec<u8> {
     let shifts = Shifts { dropped, between, scale };
     RowEvidence::write(start, shifts, &values, &mut |part| content.extend_from_slice(part));
     content
+}
+
+/// The number of a row as any feature, in steps that now and then reach the largest number.
+fn position(features: usize, rng: &mut SmallRng) -> Position {
+    let step = [1, 1_000, rng.random_range(1..=i32::MAX)][rng.random_range(0..3)];
+    Position { feature: rng.random_range(0..features) as u8, step }
+}
+
+/// Limits, in part of the features, that most rows keep and some do not.
+fn guard(features: usize, rng: &mut SmallRng) -> Vec<u8> {
+    let limits = |_| {
+        // Of many features hardly a row would keep all.
+        if !rng.random_bool((1.0 / features as f64).clamp(0.01, 0.5)) {
+            return Limits::NONE;
+        }
+        let most = [i32::MAX, 1 << 30, f32_key(190.0), 150_000, 250][rng.random_range(0..5)];
+        let low = if rng.random_bool(0.5) { i32::MIN } else { -most };
+        Limits { low, high: most, may_miss: rng.random_bool(0.7), most_equal: rng.random_range(0..4) }
+    };
+    (0..features).map(limits).flat_map(Limits::to_bytes).collect()
 }
 
 /// A background, and mostly a misfit test, with limits that some touches pass and some do not.
@@ -206,9 +234,18 @@ fn row(features: usize, rng: &mut SmallRng) -> Vec<i32> {
 pub fn play(script: &mut Script<'_>, count: usize, rng: &mut SmallRng) {
     let model = *script.recognizer().model();
     let objects = model.object_count();
+    // Of a model that says nothing about sequences, rows in them are the same.
+    let in_sequences = if model.position().is_some() || model.guard().is_some() { 0.8 } else { 0.1 };
+    let mut measured = Vec::new();
     for index in 0..count {
         if model.descriptor().is_some() {
             script.touch(&touch(rng));
+        } else if rng.random_bool(in_sequences) {
+            // Now and then the same again, as of a sensor that is stuck.
+            if measured.is_empty() || rng.random_bool(0.7) {
+                measured = row(model.measured_count(), rng);
+            }
+            script.next_row(&measured);
         } else {
             script.row(&row(model.feature_count(), rng));
         }
@@ -263,6 +300,7 @@ pub fn script<'m>(models: &'m [Vec<u8>], touches: usize, rows: usize, rng: &mut 
         // What the other kind of model takes is refused.
         script.touch(&touch(rng));
         script.row(&[1, 2, 3]);
+        script.next_row(&[1, 2, 3]);
         let (all, of) = if is_touches(&bytes) { (touches, of_touches) } else { (rows, models.len() - of_touches) };
         play(&mut script, all.div_ceil(of), rng);
     }

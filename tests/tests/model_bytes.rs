@@ -2,12 +2,15 @@
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::with;
-use palpate_onboard::{Batch, Model, ModelError, Recognizer, Stopping};
-use palpate_shared::format::{Counted, HEADER_LENGTH, Trained, TrainedNoise, TrainedTouches, checksum};
+use palpate_onboard::{Batch, Model, ModelError, Recognizer, RowsSeen, Stopping};
+use palpate_shared::format::{
+    Counted, HEADER_LENGTH, Limits, MUST_UNDERSTAND, Position, RAW_FEATURES, Tag, Trained, TrainedNoise,
+    TrainedTouches, checksum,
+};
 use palpate_shared::{Descriptor, Patterns};
-use palpate_tests::abuse::places;
+use palpate_tests::abuse::{self, places, section};
 use palpate_tests::random::{self, Shape};
-use palpate_tests::sections::trained;
+use palpate_tests::sections::{trained, with_sections};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -45,6 +48,16 @@ fn models() -> Vec<Vec<u8>> {
     models
 }
 
+/// A model over rows that are numbered and guarded.
+fn sequences() -> Vec<u8> {
+    let rows = abuse::changed(&models()[0], 12, &[RAW_FEATURES]);
+    let features = usize::from(rows[15]) + 1;
+    let guard = Limits { low: -9, high: 1 << 20, may_miss: true, most_equal: 2 }.to_bytes().repeat(features);
+    let must = |tag: Tag, content: &[u8]| section(tag.code() | MUST_UNDERSTAND, content);
+    let position = Position { feature: 0, step: 1 << 29 }.to_bytes();
+    with_sections(&rows, &[must(Tag::Position, &position), must(Tag::Guard, &guard)].concat())
+}
+
 /// Walks a model with touches that reach all over it.
 fn walk(model: &Model<'_>) {
     let Ok(mut recognizer) = Recognizer::<256>::new(model, Stopping::from_model(model)) else { return };
@@ -54,6 +67,13 @@ fn walk(model: &Model<'_>) {
         model.margins_of(&[i32::MIN, i32::MAX], &mut margins);
         recognizer.push_margins(&margins);
         recognizer.posterior(0);
+    }
+    // With room for every feature, and for one.
+    let (mut seen, mut one) = (RowsSeen::<256>::new(), RowsSeen::<1>::new());
+    for row in [&[][..], &[0], &[0], &[0], &[i32::MIN, i32::MAX], &[7; 256], &[-7; 300]] {
+        let _ = recognizer.push_seen(row, &mut seen);
+        let _ = recognizer.push_seen(row, &mut one);
+        let _ = recognizer.push_features(row);
     }
     for object in 0..model.object_count() {
         model.object_name(object);
@@ -106,7 +126,8 @@ fn every_change_of_a_single_byte_is_refused() {
 #[test]
 fn a_change_with_a_right_checksum_is_refused_or_can_be_walked() {
     let mut accepted = 0;
-    for bytes in models() {
+    Model::new(&sequences()).unwrap();
+    for bytes in models().into_iter().chain([sequences()]) {
         for position in 0..bytes.len() - 4 {
             for wrong in [0, 1, 2, 3, 6, 8, 16, 127, 128, 254, 255] {
                 let mut bytes = bytes.clone();

@@ -1,7 +1,9 @@
 //! The test vectors of the model format: the chip's recognizer gives what they say, and so does one that was written from
 //! `FORMAT.md` alone.
 
-use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict, exp2_negative};
+use palpate_onboard::{
+    Model, Recognizer, Refused, RowsSeen, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict, exp2_negative,
+};
 use palpate_shared::Touch;
 use palpate_shared::format::{HEADER_LENGTH, MUST_UNDERSTAND, Temperature, checksum, f32_key};
 use palpate_tests::abuse;
@@ -20,13 +22,24 @@ struct Both<'m> {
     touch: Option<Touch>,
     features: Vec<i32>,
     refused: Option<&'static str>,
+    seen: RowsSeen<256>,
+    guarded: Option<usize>,
 }
 
 impl<'m> Both<'m> {
     fn new(bytes: &'m [u8]) -> Self {
         let model = Model::new(bytes).unwrap();
         let recognizer = Recognizer::new(&model, Stopping::from_model(&model)).unwrap();
-        Self { model, recognizer, plain: Plain::new(bytes), touch: None, features: Vec::new(), refused: None }
+        Self {
+            model,
+            recognizer,
+            plain: Plain::new(bytes),
+            touch: None,
+            features: Vec::new(),
+            refused: None,
+            seen: RowsSeen::new(),
+            guarded: None,
+        }
     }
 
     fn touch(&mut self, words: &str) {
@@ -46,6 +59,25 @@ impl<'m> Both<'m> {
         self.features = read_numbers(words);
         self.recognizer.push_features(&self.features).unwrap();
         self.plain.count(&self.plain.margins(&self.plain.sums(&self.features)));
+    }
+
+    fn next(&mut self, words: &str) {
+        let measured = read_numbers(words);
+        let features = self.seen.clone().next(&self.model, &measured);
+        let pushed = self.recognizer.push_seen(&measured, &mut self.seen);
+        assert_eq!(pushed.err(), features.err());
+        self.guarded = match features {
+            Ok(_) => None,
+            Err(Refused::Guarded(feature, _)) => Some(feature.into()),
+            Err(refused) => panic!("{refused}"),
+        };
+        let plain = self.plain.next(&measured);
+        assert_eq!(plain.as_ref().err(), self.guarded.as_ref());
+        if let (Ok(features), Ok(plain)) = (features, plain) {
+            assert_eq!(features[..self.model.feature_count()], plain);
+            self.features = plain;
+            self.plain.count(&self.plain.margins(&self.plain.sums(&self.features)));
+        }
     }
 
     fn restore(&mut self, words: &str) {
@@ -86,6 +118,7 @@ impl<'m> Both<'m> {
                 assert_eq!(self.model.object_name(object.parse().unwrap()), name);
             }
             "refused" => assert_eq!(self.refused, Some(words)),
+            "guarded" => assert_eq!(self.guarded, Some(words.parse().unwrap())),
             "features" => assert_eq!(numbers(&self.features), words),
             "sums" => {
                 let mut sums_here = vec![0.0; self.model.object_count()];
@@ -222,9 +255,14 @@ fn the_recognizer_and_a_plain_reading_of_the_specification_agree_with_the_vector
                     counts[1] += 1;
                     both.row(words);
                 }
+                "next" => {
+                    counts[1] += 1;
+                    both.next(words);
+                }
                 "restore" => both.restore(words),
                 "reset" => {
                     both.recognizer.reset();
+                    both.seen.reset();
                     both.plain.reset();
                 }
                 _ => {
@@ -258,6 +296,8 @@ fn the_vectors_have_every_layout_leaf_descriptor_and_verdict() {
     let verdicts: BTreeSet<&str> = of("verdict").iter().map(|words| words.split(' ').next().unwrap()).collect();
     assert_eq!(verdicts, BTreeSet::from(["gave-up", "recognized", "undecided"]));
     assert_eq!(of("refused"), BTreeSet::from(["features", "pattern", "pose", "spread"]));
+    let guarded: Vec<&str> = of("guarded").into_iter().collect();
+    assert_eq!(guarded, ["1", "3", "4"]);
     assert!(VECTORS.len() < 530_000, "{} bytes", VECTORS.len());
 }
 
@@ -279,7 +319,7 @@ fn the_vectors_cut_every_optional_section_and_every_part_of_every_layout() {
             _ => {}
         }
     }
-    assert_eq!(tags, (1..=18).collect());
+    assert_eq!(tags, (1..=18).chain([21, 22]).collect());
     let of = |layout: u8, fields: &[usize]| fields.iter().map(|&field| (layout, field)).collect::<Vec<_>>();
     let expected = [
         of(0, &[16, 18, 68, 80, 84, 88]),

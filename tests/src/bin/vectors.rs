@@ -7,8 +7,10 @@
 use palpate::compile::{EarlyExit, Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node};
 use palpate::with;
-use palpate_onboard::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict, exp2_negative};
-use palpate_shared::format::{Counted, Outputs, PatternShares, Trained, TrainedTouches, checksum, f32_key};
+use palpate_onboard::{Model, Recognizer, Refused, RowsSeen, SNAPSHOT_LENGTH, Stopping, Verdict, exp2_negative};
+use palpate_shared::format::{
+    Counted, Limits, Outputs, PatternShares, Position, Sentinel, Trained, TrainedTouches, checksum, f32_key,
+};
 use palpate_shared::{ContactTime, Descriptor, MISSING_FEATURE, Patterns, Pose, Touch};
 use palpate_tests::abuse::{self, changed, section};
 use palpate_tests::random::{self, Shape};
@@ -24,6 +26,7 @@ fn main() {
     descriptors(&mut text);
     sections(&mut text);
     rows(&mut text);
+    sequences(&mut text);
     decisions(&mut text);
     shared_leaves(&mut text);
     early_exits(&mut text);
@@ -315,6 +318,66 @@ fn play_rows(text: &mut String, name: &str, bytes: &[u8], real: bool) {
         if model.early_exits().next().is_some() {
             let class = model.class_of(&row, &mut vec![0; model.object_count()]).expect("as much room as classes");
             *text += &format!("class {class}\n");
+        }
+    }
+}
+
+/// Rows of sequences that are numbered, guarded, or both.
+fn sequences(text: &mut String) {
+    let settings = with!(Settings::default(), leaf = Leaf::I16, layout = Some(Layout::Compact));
+    let real = compile(&imported(random::ensemble(SHAPE, 14), 5), &settings).expect("it fits").bytes;
+    let whole = changed(&real, 13, &[0]);
+    let place = |feature, step| section(21 | 1 << 15, &Position { feature, step }.to_bytes());
+    let guard = |most: i32| {
+        let wide = Limits { low: -most, high: most, may_miss: true, most_equal: 0 };
+        let narrow = Limits { low: -most / 2, ..wide };
+        let all = [wide, Limits { most_equal: 2, ..wide }, Limits::NONE, narrow, Limits { may_miss: false, ..wide }];
+        section(22 | 1 << 15, &all.map(Limits::to_bytes).concat())
+    };
+    let sentinel = section(14 | 1 << 15, &Sentinel { low: -7, high: 7 }.to_bytes());
+    for (name, model, sections) in [
+        ("numbered rows of f32 features", &real, place(2, 1)),
+        ("numbered rows of whole features up to the largest number", &whole, place(4, 1 << 29)),
+        ("guarded rows of f32 features", &real, guard(f32_key(190.0))),
+        ("numbered and guarded rows of whole features", &whole, [sentinel, place(2, 30), guard(180)].concat()),
+    ] {
+        let bytes = with_sections(model, &sections);
+        play_sequences(text, name, &bytes);
+    }
+}
+
+fn play_sequences(text: &mut String, name: &str, bytes: &[u8]) {
+    let model = Model::new(bytes).expect("a model");
+    *text += &format!("model {} {name}\n", hex(bytes));
+    let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model)).expect("at most 256 objects");
+    let (mut seen, mut rng) = (RowsSeen::<256>::new(), SmallRng::seed_from_u64(16));
+    let is_real = bytes[13] == 1;
+    let mut row = Vec::new();
+    let all = model.measured_count();
+    for (index, length) in [all, all, all, all, all, all, all, all - 1, all, 0, all + 1, all].into_iter().enumerate() {
+        let value = |_| match rng.random_range(0..9) {
+            0 => MISSING_FEATURE,
+            1 => 0,
+            _ if is_real => f32_key(rng.random_range(-200.0..200.0_f32)),
+            _ => rng.random_range(-200..200),
+        };
+        // Three rows with the same features, also where a sequence begins.
+        if !(3..6).contains(&index) {
+            row = (0..length).map(value).collect();
+        }
+        if index == 4 {
+            *text += "reset\n";
+            recognizer.reset();
+            seen.reset();
+        }
+        *text += &format!("next {}\n", numbers(&row));
+        let features = seen.clone().next(&model, &row);
+        match (features, recognizer.push_seen(&row, &mut seen)) {
+            (Ok(features), Ok(verdict)) => {
+                known(text, &model, &recognizer, &features[..model.feature_count()], verdict)
+            }
+            (_, Err(Refused::Guarded(feature, _))) => *text += &format!("guarded {feature}\n"),
+            (_, refused) => panic!("{refused:?}"),
         }
     }
 }

@@ -1,8 +1,8 @@
 use super::Global;
 use super::chips::{core, instructions};
 use palpate::chip::inspect::{
-    Defaults, Feature, Inspected, Noise, OnChip, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches,
-    TrainedOn, inspect, on_chip,
+    Defaults, Feature, Inspected, Limited, Noise, OnChip, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested,
+    Touches, TrainedOn, inspect, on_chip,
 };
 use palpate::compile::{CompiledModel, Core, FEATURES, Memory};
 use palpate::locate::MapsFile;
@@ -124,6 +124,12 @@ fn what_it_is(lines: &mut Lines, inspected: &Inspected<'_>) {
         let used: Vec<String> = used.iter().map(ToString::to_string).collect();
         lines.line("columns", format!("{} (from 0) of the library's {all}", used.join(", ")));
     }
+    if let Some(feature) = &inspected.position {
+        lines.line("row number", format!("{feature}: recognizers count the rows of a sequence, from 1"));
+    }
+    if let Some(guard) = &inspected.guard {
+        guard_lines(lines, guard);
+    }
     let objects = inspected.objects.join(", ");
     match &inspected.predicts {
         Some(Predicts { what: "value", .. }) => lines.line("output", objects),
@@ -149,6 +155,23 @@ fn what_it_is(lines: &mut Lines, inspected: &Inspected<'_>) {
     match inspected.promise {
         None => lines.line("stopping", format!("error rate {}, at most {max_touches} {things}", rate(error_rate))),
         Some(_) => lines.line("stopping", format!("at most {max_touches} {things}")),
+    }
+}
+
+fn guard_lines(lines: &mut Lines, guard: &[Limited]) {
+    let limited: Vec<&Limited> = guard.iter().filter(|limited| limited.is_limited()).collect();
+    lines.line("guard", format!("{} of {} have limits", limited.len(), counted(guard.len(), "feature", "features")));
+    for Limited { feature, low, high, may_miss, most_equal } in limited {
+        // As precise as the values that most models compare.
+        let values = match (low, high) {
+            (Some(low), Some(high)) => format!("{} to {}", *low as f32, *high as f32),
+            (Some(low), None) => format!("from {}", *low as f32),
+            (None, Some(high)) => format!("up to {}", *high as f32),
+            (None, None) => "any value".into(),
+        };
+        let missing = if *may_miss { "may be missing" } else { "never missing" };
+        let equal = most_equal.map_or_else(String::new, |most| format!(", the same in at most {most} rows"));
+        lines.line("", format!("{feature}: {values}, {missing}{equal}"));
     }
 }
 

@@ -26,6 +26,7 @@ mod record;
 mod reports;
 mod rows;
 mod scan;
+mod sequences;
 mod shards;
 mod strangers;
 mod support;

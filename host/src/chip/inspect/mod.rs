@@ -3,7 +3,7 @@
 mod stated;
 
 pub use stated::{
-    Defaults, Feature, Noise, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches, TrainedOn,
+    Defaults, Feature, Limited, Noise, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches, TrainedOn,
 };
 
 use super::instructions::Chip;
@@ -13,7 +13,9 @@ use crate::evaluate;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH};
 use palpate_shared::{Pose, Q15_ONE, Touch};
-use stated::{evidence, features, noise, pattern, plan, predicts, priors, probe, promised, tested, trained_on};
+use stated::{
+    evidence, features, guard, noise, pattern, plan, position, predicts, priors, probe, promised, tested, trained_on,
+};
 use std::collections::BTreeMap;
 
 /// Contents and statements of a compiled model.
@@ -35,6 +37,12 @@ pub struct Inspected<'a> {
     /// Numbers of the columns of the library's rows, for a model over some of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<SomeColumns>,
+    /// Name of the feature that is a row's number in its sequence, for a model with one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position: Option<String>,
+    /// Limits of each feature in the rows of a sequence, for a model that states them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub guard: Option<Vec<Limited>>,
     /// The objects' names.
     pub objects: Vec<&'a str>,
     /// Predictions of a model over rows.
@@ -131,6 +139,8 @@ pub fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         features: model.feature_count(),
         feature_names: model.descriptor().is_none().then(|| features(model)),
         columns: palpate_trees::rows::columns_of(model).map(|(all, used)| SomeColumns { all, used }),
+        position: position(model),
+        guard: guard(model),
         objects: (0..model.known_count()).map(|object| model.object_name(object)).collect(),
         predicts: predicts(model),
         layout: model.layout().name(),

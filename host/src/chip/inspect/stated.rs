@@ -4,7 +4,7 @@ use crate::rows::{Encoder, feature_names};
 use crate::{calibrate, compile, evaluate, probe};
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::ContactPattern;
-use palpate_shared::format::{Length, MisfitTerms, TrainedNoise, TrainedProbe};
+use palpate_shared::format::{Length, Limits, MisfitTerms, TrainedNoise, TrainedProbe};
 use std::collections::BTreeMap;
 
 /// A feature of a model over rows.
@@ -14,6 +14,28 @@ pub struct Feature {
     pub name: String,
     /// Units that make up 1; null where f32 values are compared.
     pub scale: Option<f32>,
+}
+
+/// The values of a feature that a model takes in a row of a sequence, as a program measures them.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Limited {
+    /// The feature's name.
+    pub feature: String,
+    /// The least value; null for any.
+    pub low: Option<f64>,
+    /// The largest value; null for any.
+    pub high: Option<f64>,
+    /// True if the feature may be missing.
+    pub may_miss: bool,
+    /// The most rows one after the other with the same value, or without one; null for any number.
+    pub most_equal: Option<u32>,
+}
+
+impl Limited {
+    /// True if a row is refused for some value of the feature.
+    pub const fn is_limited(&self) -> bool {
+        self.low.is_some() || self.high.is_some() || !self.may_miss || self.most_equal.is_some()
+    }
 }
 
 /// Default end of recognizers' sequences.
@@ -199,6 +221,31 @@ pub(super) fn features(model: &Model<'_>) -> Vec<Feature> {
         Encoder::Scaled(scales) => scales.into_iter().map(Some).collect(),
     };
     feature_names(model).into_iter().zip(scales).map(|(name, scale)| Feature { name, scale }).collect()
+}
+
+/// The name of the feature that is a row's number in its sequence.
+pub(super) fn position(model: &Model<'_>) -> Option<String> {
+    let position = model.position()?;
+    feature_names(model).into_iter().nth(position.feature.into())
+}
+
+/// The limits of each feature in the rows of a sequence.
+pub(super) fn guard(model: &Model<'_>) -> Option<Vec<Limited>> {
+    let guard = model.guard()?;
+    let encoder = Encoder::of(model);
+    let limited = |((number, feature), limits): ((usize, String), Limits)| {
+        let value = |own: i32, end: i32| {
+            Some(own).filter(|own| *own != end).map(|own| encoder.value(number, own)).filter(|value| value.is_finite())
+        };
+        Limited {
+            feature,
+            low: value(limits.low, i32::MIN),
+            high: value(limits.high, i32::MAX),
+            may_miss: limits.may_miss,
+            most_equal: Some(limits.most_equal).filter(|most| *most > 0),
+        }
+    };
+    Some(feature_names(model).into_iter().enumerate().zip(guard.limits()).map(limited).collect())
 }
 
 /// The probe that a model states, or the one that its header assumes.

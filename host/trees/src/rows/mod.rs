@@ -156,6 +156,18 @@ impl Encoder {
         }
     }
 
+    /// The value that a number of a feature stands for; NaN if it stands for none.
+    pub fn value(&self, feature: usize, number: i32) -> f64 {
+        match self {
+            Self::Real => {
+                let magnitude = f64::from(f32::from_bits(number.unsigned_abs()));
+                if number < 0 { -magnitude } else { magnitude }
+            }
+            Self::Scaled(_) if number == MISSING_FEATURE => f64::NAN,
+            Self::Scaled(scales) => f64::from(number) / f64::from(scales.get(feature).copied().unwrap_or(1.0)),
+        }
+    }
+
     /// Encodes a row into the numbers that the model compares.
     pub fn row<V: Copy + Into<f64>>(&self, row: &[V]) -> Vec<i32> {
         match self {
