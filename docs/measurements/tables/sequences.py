@@ -79,7 +79,7 @@ def main():
                 booster.save_model(directory / "model.json")
                 write(directory / "calibrate.csv", [all_rows[i] for i in calibrated], y[calibrated], calibrated)
                 write(directory / "test.csv", [all_rows[i] for i in test], y[test], test)
-                position = ["--position", "number"] if numbered else []
+                position = ["--row-number", "number"] if numbered else []
                 run("export", directory / "model.json", "-o", directory / "model.palpate", *position)
                 options = [*columns, "--error-rate", "10%", *(["--guard"] if guard else [])]
                 sure = directory / "sure.palpate"

@@ -427,7 +427,7 @@ pub(crate) fn touch(numbers: &[f64]) -> Result<Touch, TouchesProblem> {
 /// "patterns"; without one, the best for the `goal` is taken, which is "balanced", "speed" or "size". With `max_bytes` the
 /// layout is chosen for size and leaves are stored in fewer bits where the model would be larger; if it still is, that is an
 /// error. `error_rate` and `max_touches` are where recognizers stop; `priors` say how likely each object is. `scales` say how
-/// many units make up 1 of each feature, for a chip that measures in whole numbers. `position` names the feature that is a row's
+/// many units make up 1 of each feature, for a chip that measures in whole numbers. `row_number` names the feature that is a row's
 /// number in its sequence, counted from 1.
 ///
 /// >>> import palpate
@@ -437,7 +437,7 @@ pub(crate) fn touch(numbers: &[f64]) -> Result<Touch, TouchesProblem> {
 /// True
 #[pyo3::pyfunction]
 #[pyo3(signature = (ensemble, *, max_bytes=None, leaf="i16", layout=None, goal="balanced", error_rate=0.01,
-    max_touches=200, priors=None, scales=None, position=None))]
+    max_touches=200, priors=None, scales=None, row_number=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn compile(
     py: Python<'_>,
@@ -450,7 +450,7 @@ pub(crate) fn compile(
     max_touches: u32,
     priors: Option<Vec<f64>>,
     scales: Option<Vec<f32>>,
-    position: Option<String>,
+    row_number: Option<String>,
 ) -> Result<Model, Failure> {
     let ensemble = &ensemble.get().ensemble;
     let layouts = "compact, complete, grid, wide or patterns";
@@ -485,7 +485,7 @@ pub(crate) fn compile(
         max_touches,
         priors,
         scales,
-        position
+        position = row_number
     );
     let compiled = py.detach(|| match max_bytes {
         None => library::compile(ensemble, &settings),

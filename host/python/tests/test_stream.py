@@ -299,11 +299,11 @@ def test_a_guard_names_the_feature_of_a_dead_sensor_and_its_row_adds_nothing() -
 def test_a_position_that_is_no_feature_or_no_class_is_an_error() -> None:
     X, y, _ = ramps(100, 1)
     own = ensemble.HistGradientBoostingClassifier(max_iter=3).fit(np.column_stack([X, X]), y)
-    with pytest.raises(palpate.SettingError, match="position is row"):
-        palpate.compile(own, position="row")
+    with pytest.raises(palpate.SettingError, match="row_number is row"):
+        palpate.compile(own, row_number="row")
     value = ensemble.HistGradientBoostingRegressor(max_iter=3).fit(np.column_stack([X, X]), np.arange(len(X)))
-    with pytest.raises(palpate.SettingError, match="position is f1"):
-        palpate.compile(value, position="f1")
+    with pytest.raises(palpate.SettingError, match="row_number is f1"):
+        palpate.compile(value, row_number="f1")
 
 
 def test_folds_leave_all_other_sequences_to_the_test_and_estimate_where_nothing_can_be_promised() -> None:

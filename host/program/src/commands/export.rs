@@ -71,7 +71,7 @@ pub(crate) struct Arguments {
     early_exit: Option<PathBuf>,
     /// Feature that is a row's number in its sequence, from 1; recognizers count it
     #[arg(long, value_name = "FEATURE")]
-    position: Option<String>,
+    row_number: Option<String>,
     /// Also print the table of layouts, the features to build in, and all notes
     #[arg(short, long)]
     verbose: bool,
@@ -229,7 +229,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         scales,
         priors = arguments.prior.of(&ensemble.objects, &shares_of(&ensemble)?)?,
         early_exit = early_exit(&arguments, &ensemble)?,
-        position = arguments.position.clone()
+        position = arguments.row_number.clone()
     );
     let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {
         1 => error.in_file(&arguments.ensemble),
@@ -343,7 +343,7 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
         ("shared_leaves", arguments.shared_leaves.0.is_some()),
         ("scale", !arguments.scale.is_empty()),
         ("early_exit", arguments.early_exit.is_some()),
-        ("position", arguments.position.is_some()),
+        ("row_number", arguments.row_number.is_some()),
         ("error_rate", arguments.error_rate != usual.error_rate),
         ("max_touches", arguments.max_touches != usual.max_touches),
         ("prior", arguments.prior.of(&compiled.names(), &[])?.is_some()),

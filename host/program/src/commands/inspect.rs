@@ -125,7 +125,7 @@ fn what_it_is(lines: &mut Lines, inspected: &Inspected<'_>) {
         lines.line("columns", format!("{} (from 0) of the library's {all}", used.join(", ")));
     }
     if let Some(feature) = &inspected.position {
-        lines.line("row number", format!("{feature}: recognizers count the rows of a sequence, from 1"));
+        lines.line("row number", format!("{feature}, which recognizers count"));
     }
     if let Some(guard) = &inspected.guard {
         guard_lines(lines, guard);
@@ -300,7 +300,7 @@ fn chip_lines(lines: &mut Lines, chip: &OnChip) {
     let [margins, verdict] = [chip.margin_instructions, chip.verdict_instructions].map(known);
     lines.line("instructions", format!("{margins} to the margins, {verdict} to the verdict (per touch, {})", chip.how));
     lines.line(
-        "at most",
+        "worst case",
         format!("{} to the margins, the longest way through all trees, estimated", known(chip.most_instructions)),
     );
     if let (Some(mhz), Some(microseconds)) = (chip.mhz, chip.microseconds) {

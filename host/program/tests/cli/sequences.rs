@@ -88,7 +88,7 @@ fn a_model_that_counts_rows_gives_the_verdicts_of_the_ensemble_with_the_numbers_
     // By keys of f32 values, and in units.
     for scale in [&[][..], &["--scale", "number=10,height=1000"]] {
         stdout(run([&["export", &ensemble, "-o", &plain][..], scale].concat()));
-        stdout(run([&["export", &ensemble, "-o", &counts, "--position", "number"][..], scale].concat()));
+        stdout(run([&["export", &ensemble, "-o", &counts, "--row-number", "number"][..], scale].concat()));
         let calibrate = |model: &str, rows: &str| {
             let output = format!("{model}-sure");
             let words = ["calibrate", model, rows, "-o", &output, "--error-rate", "10%", "--json"];
@@ -120,7 +120,7 @@ fn a_model_that_counts_rows_gives_the_verdicts_of_the_ensemble_with_the_numbers_
         let inspected = json(run(["inspect", &sure[1], "--json"]));
         assert_eq!((&inspected["position"], inspected.get("guard")), (&json!("number"), None));
         let text = stdout(run(["inspect", &sure[1]]));
-        assert!(text.contains("row number     number: recognizers count the rows of a sequence, from 1\n"), "{text}");
+        assert!(text.contains("row number     number, which recognizers count\n"), "{text}");
         assert!(!stdout(run(["inspect", &sure[0]])).contains("row number"));
     }
 }
@@ -129,7 +129,7 @@ fn a_model_that_counts_rows_gives_the_verdicts_of_the_ensemble_with_the_numbers_
 fn a_guard_names_the_sensor_that_is_stuck_missing_or_out_of_its_range() {
     let place = Place::new();
     let (counts, sure) = (place.path("counts"), place.path("sure"));
-    stdout(run(["export", &place.path("ramps.json"), "-o", &counts, "--position", "number"]));
+    stdout(run(["export", &place.path("ramps.json"), "-o", &counts, "--row-number", "number"]));
     let [fresh, _] = place.write("fresh.csv", &ramps(400, 1));
     let calibrate = ["calibrate", &counts, &fresh, "-o", &sure, "--error-rate", "10%", "--guard"];
     let text = stdout(run([&calibrate[..], &COLUMNS].concat()));
@@ -199,23 +199,23 @@ fn numbers_of_rows_and_guards_are_refused_where_there_is_no_such_feature_or_no_s
     let data = |name: &str| format!("{}/../../tests/data/import/{name}", env!("CARGO_MANIFEST_DIR"));
     let regression = data("catboost-1.2-regression.json");
     let export = |more: &[&str]| stderr(run([&["export", &ensemble, "-o", &output][..], more].concat()), 2);
-    let message = export(&["--position", "Number"]);
-    let expected = "--position is Number. Use the name of a feature that the trees split on, such as number, height";
+    let message = export(&["--row-number", "Number"]);
+    let expected = "--row-number is Number. Use the name of a feature that the trees split on, such as number, height";
     assert!(message.contains(expected), "{message}");
     for scale in ["number=0.5,height=1000", "number=1.5,height=1000"] {
-        let message = export(&["--position", "number", "--scale", scale]);
+        let message = export(&["--row-number", "number", "--scale", scale]);
         assert!(message.contains("one feature of several, with a whole number as its scale"), "{message}");
     }
-    let message = stderr(run(["export", &regression, "-o", &output, "--position", "width"]), 2);
+    let message = stderr(run(["export", &regression, "-o", &output, "--row-number", "width"]), 2);
     assert!(message.contains("Use it with classes of rows, which a sequence has one of"), "{message}");
     let touches = crate::compiled::Place::new();
     let over_touches = touches.text("ensemble.json");
-    let message = stderr(run(["export", &over_touches, "-o", &output, "--position", "curvature"]), 2);
+    let message = stderr(run(["export", &over_touches, "-o", &output, "--row-number", "curvature"]), 2);
     assert!(message.contains("Use it with classes of rows"), "{message}");
     assert!(!Path::new(&output).exists());
     let (model, rows) = (place.path("model.palpate"), place.write("fresh.csv", &ramps(400, 1)));
-    stdout(run(["export", &ensemble, "-o", &model, "--position", "number"]));
-    let message = stderr(run(["export", &model, "-o", &output, "--emit", "c", "--position", "number"]), 2);
+    stdout(run(["export", &ensemble, "-o", &model, "--row-number", "number"]));
+    let message = stderr(run(["export", &model, "-o", &output, "--emit", "c", "--row-number", "number"]), 2);
     assert!(message.contains("model.palpate is a compiled model"), "{message}");
     // Sequences of a model with one output, and none at all.
     let value = place.path("value.palpate");

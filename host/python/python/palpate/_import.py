@@ -74,7 +74,7 @@ def compile(
     scales: Sequence[float] | None = None,
     all_trees: bool = False,
     missing: float | None = None,
-    position: str | None = None,
+    row_number: str | None = None,
 ) -> Model:
     """Compiles an ensemble, or a model of another library, to the bytes that a microcontroller reads.
 
@@ -86,7 +86,7 @@ def compile(
     With `max_bytes`, the layout is chosen for size and leaves are stored in fewer bits where the model would be larger; if
     it still is, that is an error: no tree is left out. `error_rate` and `max_touches` are where recognizers stop, `priors`
     say how likely each object is, `scales` how many units make up 1 of each feature for a chip that measures in whole
-    numbers. `position` names the feature that is a row's number in its sequence, counted from 1: recognizers count it.
+    numbers. `row_number` names the feature that is a row's number in its sequence, counted from 1: recognizers count it.
 
     >>> import palpate
     >>> data = palpate.capture(["bowl", "mouse"], touches=300)
@@ -104,7 +104,7 @@ def compile(
         max_touches=max_touches,
         priors=None if priors is None else list(priors),
         scales=None if scales is None else list(scales),
-        position=position,
+        row_number=row_number,
     )
     for note in compiled.notes:
         warnings.warn(note, ModelWarning, stacklevel=2)

@@ -355,7 +355,7 @@ class SequenceRecognizer:
                 f"the trees take {len(ensemble.features)} features, and X has {table.shape[1]}, to which position=True adds one. Train on "
                 "all of them, at most 256."
             )
-        return compile(ensemble, max_touches=self.max_rows or 200, position=ensemble.features[-1])
+        return compile(ensemble, max_touches=self.max_rows or 200, row_number=ensemble.features[-1])
 
     def _folded(
         self,

@@ -117,7 +117,7 @@ pub(super) fn sentinel(ensemble: &Ensemble, settings: &Settings) -> Option<Senti
 
 /// The feature that is a row's number.
 fn position(ensemble: &Ensemble, settings: &Settings, name: &str) -> Result<Position> {
-    let wrong = |allowed: &str| Err(Error::setting("position", name, allowed));
+    let wrong = |allowed: &str| Err(Error::setting("row_number", name, allowed));
     if ensemble.schema().is_some() || ensemble.objects.len() < 2 || ensemble.prediction().targets {
         return wrong("it with classes of rows, which a sequence has one of");
     }
