@@ -226,7 +226,11 @@ impl Maps {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let maps = *self.maps();
         let promise = calibrate::Terms { rate: error_rate, confidence, per: Per::Average };
-        let terms = Terms { promise, unknown, ..terms(&maps, sequences, max_touches, aimed, real, pose, until, workspace, seed)? };
+        let terms = Terms {
+            promise,
+            unknown,
+            ..terms(&maps, sequences, max_touches, aimed, real, pose, until, workspace, seed)?
+        };
         let played = Played { objects: meshes, millimeters, terms };
         let found = long(py, progress.as_ref(), |progress| {
             played.play(&maps, progress, |standing, probe, terms| {
