@@ -76,6 +76,7 @@ fn noise_of_every_kind_is_added_to_the_touches_that_are_evaluated() {
     ] {
         assert!(accuracy(more).0 < clean, "{more:?}: {clean}");
     }
+    let evaluate: Vec<&str> = evaluate.iter().copied().filter(|word| *word != "--json").collect();
     fails(at, &[&evaluate[..], &["--real", "missed=200%"]].concat(), 2, "missed is \"200%\"; use a share from 0 to 1");
     fails(at, &[&evaluate[..], &["--real", "bent=9:1ms"]].concat(), 2, "bent is \"9:1ms\"; use a duration");
     fails(at, &[&evaluate[..], &["--real", "noise=5"]].concat(), 2, "such as 0..10ms");
