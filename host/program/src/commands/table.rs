@@ -34,7 +34,8 @@ pub(crate) struct TableArguments {
     /// Make a test for objects that the model does not know; names then take eight approaches or more
     #[arg(long, requires = "objects")]
     detect_unknown: bool,
-    /// Greatest x and y of the middle finger from the table's origin, in millimeters [default: twice the maps' range]
+    /// Proposed approaches send the middle finger at most so far from the table's origin in x and y; random ones, too [default:
+    /// twice the maps' range]
     #[arg(long, value_name = "MM", requires = "objects")]
     workspace: Option<f64>,
     #[command(flatten)]
