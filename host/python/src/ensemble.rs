@@ -19,6 +19,9 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// Feature, threshold, and whether a missing value goes left, of each split.
+type Splits = (Vec<usize>, Vec<f64>, Vec<bool>);
+
 /// The full model: boosted trees in f32, from `train` or from another library.
 ///
 /// >>> import palpate
@@ -133,7 +136,7 @@ impl Ensemble {
     }
 
     /// The feature and the threshold of each split, and whether a value that equals it goes left.
-    fn _splits(&self) -> Result<(Vec<usize>, Vec<f64>, Vec<bool>), Failure> {
+    fn _splits(&self) -> Result<Splits, Failure> {
         let imported = self.ensemble.origin.imported.as_ref();
         if imported.is_some_and(|imported| imported.sentinel.is_some() || imported.columns.is_some()) {
             let allowed = "a model of at most 256 columns in which NaN alone is missing";
