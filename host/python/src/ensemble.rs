@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Feature, threshold, and whether a missing value goes left, of each split.
+/// Feature, threshold, and whether a value that equals it goes left, of each split.
 type Splits = (Vec<usize>, Vec<f64>, Vec<bool>);
 
 /// The full model: boosted trees in f32, from `train` or from another library.
