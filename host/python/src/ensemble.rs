@@ -152,7 +152,7 @@ impl Ensemble {
         Ok(splits)
     }
 
-    /// The same trees with other thresholds, in the order of `_splits`; values below them go left.
+    /// Copies the trees with other thresholds, in the order of `_splits`; values below them go left.
     fn _with_thresholds(&self, thresholds: Vec<f32>) -> Self {
         let mut ensemble = (*self.ensemble).clone();
         for ((tree, node, _), new) in self.split_nodes().zip(thresholds) {

@@ -237,7 +237,7 @@ pub fn calibrate_recorded(
     promised(maps, &chosen, probe, terms, plain, Some(count))
 }
 
-/// The maps with a threshold that was chosen; on so many recordings, or on simulated approaches.
+/// Writes the chosen threshold into the maps, with the number of recordings if it rests on some.
 fn promised(
     maps: Maps<'_>,
     chosen: &Chosen,

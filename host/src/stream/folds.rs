@@ -64,7 +64,7 @@ impl Learned {
     }
 }
 
-/// A sequence behind so many rows and groups.
+/// Moves a sequence behind `rows` other rows and `groups` other groups.
 pub(super) fn moved(sequence: &RowSequence, rows: usize, groups: usize) -> RowSequence {
     RowSequence {
         rows: sequence.rows.start + rows..sequence.rows.end + rows,

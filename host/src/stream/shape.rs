@@ -322,7 +322,7 @@ fn rows_at(sequences: &[Sequence], rate: f64) -> Option<f64> {
     Some(totals(sequences, &Odds::All(odds_of(margin))).mean_touches())
 }
 
-/// That threshold, in nats.
+/// Loosest threshold at which these sequences keep the rate, in nats; `None` if there is none.
 pub(super) fn margin_at(sequences: &[Sequence], rate: f64) -> Option<f64> {
     let mut margins = (1..).map(|step| STEP * f64::from(step)).take_while(|margin| *margin < ROOM);
     margins.find(|margin| {

@@ -95,7 +95,7 @@ impl Limits {
         }
     }
 
-    /// Checks a value that was the same in so many rows, with this one.
+    /// Checks a value that has been the same in `equal` rows, including this one.
     ///
     /// Cost: a few instructions.
     ///

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 struct Place(TempDir);
 
 impl Place {
-    /// With an ensemble that tells a height that rises from one that falls by the number of the row.
+    /// Place with an ensemble that distinguishes rising from falling heights by the row number.
     fn new() -> Self {
         let split =
             |feature, threshold, left, right| Node::Split { feature, threshold, missing_left: true, left, right };

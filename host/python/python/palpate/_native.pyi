@@ -166,7 +166,7 @@ class Ensemble:
         """
     def _with_thresholds(self, /, thresholds: SupportsGetItem[int, SupportsFloat | SupportsIndex]) -> Ensemble:
         """
-        The same trees with other thresholds, in the order of `_splits`; values below them go left.
+        Copies the trees with other thresholds, in the order of `_splits`; values below them go left.
         """
     @property
     def descriptor(self, /) -> str | None:

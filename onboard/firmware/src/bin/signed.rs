@@ -39,7 +39,7 @@ fn verify(_: &[u8], _: &[u8; 64]) -> bool {
 fn main() -> ! {
     let Some(peripherals) = cortex_m::Peripherals::take() else { fail() };
     let mut meter = Meter::new(peripherals.SYST);
-    // A signature of other bytes is found out at the very end.
+    // A signature of other bytes is rejected at the very end.
     let is_wrong = || verify(black_box(MODEL), black_box(&SIGNATURE));
     if !verify(black_box(&[]), black_box(&SIGNATURE)) || cfg!(feature = "signed") && is_wrong() {
         fail();
