@@ -56,6 +56,7 @@ pub struct Limits {
 
 /// Reason why a feature is not within its [`Limits`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Fault {
     /// The value is below the least or above the largest.
     Outside,
