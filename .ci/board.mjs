@@ -21,10 +21,18 @@ class Uart extends BasePeripheral {
     this.shift = chip.clock.createAlarm(() => this.out());
   }
   level(at) { return [4, 8, 16, 24, 28][this.levels >> at & 7] ?? 16; }
-  update() { this.rp2040.setInterrupt(this.irq, (this.raw & this.mask) !== 0); }
+  update() {
+    this.rp2040.setInterrupt(this.irq, (this.raw & this.mask) !== 0);
+    // Requests to the DMA, by the data sheet's numbers.
+    const { dma } = this.rp2040, wanted = this.registers[0x48] ?? 0;
+    if (wanted & 1 && this.received.length) dma.setDREQ(21);
+    else dma.clearDREQ(21);
+    if (wanted & 2 && this.waiting.length < 32) dma.setDREQ(20);
+    else dma.clearDREQ(20);
+  }
   raise(bits) {
     this.raw |= bits;
-    if (this.raw & this.mask) this.update();
+    if (this.raw & this.mask || this.registers[0x48]) this.update();
   }
   // A byte from the line, with the errors that the receiver sees.
   take(byte, errors = 0) {
@@ -41,7 +49,7 @@ class Uart extends BasePeripheral {
   out() {
     this.sent.push(this.waiting.shift());
     if (this.waiting.length) this.shift.schedule(BYTE);
-    if (this.waiting.length === this.level(0)) this.raise(TX);
+    this.raise(this.waiting.length === this.level(0) ? TX : 0);
   }
   readUint32(offset) {
     switch (offset) {
@@ -81,6 +89,9 @@ class Uart extends BasePeripheral {
   }
 }
 
+// The boot ROM's functions for flash and memory, by the names under which the ROM has them.
+const FUNCTIONS = ["IF", "EX", "RE", "RP", "FC", "CX", "MS", "S4", "MC", "C4"], ERASE = FUNCTIONS.indexOf("RE");
+
 // A chip with the image in its flash, running, all switches open.
 const start = () => {
   const chip = new RP2040(), { clock, core } = chip;
@@ -92,38 +103,36 @@ const start = () => {
   }
   const uart = new Uart(chip, 20);
   chip.uart[0] = chip.peripherals[0x40034] = uart;
-  // The boot ROM's functions for flash and memory, by the names under which the ROM has them.
-  const functions = ["IF", "EX", "RE", "RP", "FC", "CX", "MS", "S4", "MC", "C4"];
   chip.bootrom[5] = 0x40 | 0x50 << 16; // tables of functions and of data
   chip.bootrom[6] = 0x61; // looks up r1 in a table
   const at = (address, half) => { chip.bootrom[address >> 2] |= half << 8 * (address & 2); };
-  [...functions, "lookup"].forEach((name, index) => {
+  [...FUNCTIONS, "lookup"].forEach((name, index) => {
     const address = name === "lookup" ? 0x60 : 0x80 + 4 * index;
     at(address, 0xde00 | index); // an undefined instruction, at which the emulator calls onBreak
     at(address + 2, 0x4770); // bx lr
   });
   chip.onBreak = (index) => {
     const { registers } = core, [a, b, c] = registers;
-    if (index === functions.length) {
-      const name = String.fromCharCode(b & 0xff, b >> 8 & 0xff), found = functions.indexOf(name);
+    if (index === FUNCTIONS.length) {
+      const name = String.fromCharCode(b & 0xff, b >> 8 & 0xff), found = FUNCTIONS.indexOf(name);
       if (found < 0) throw new Error(`the image asks the boot ROM for ${name}`);
       registers[0] = 0x81 + 4 * found;
-    } else if (functions[index] === "RE") {
+    } else if (index === ERASE) {
       chip.flash.fill(0xff, a, a + b);
       clock.tick(45e6);
-    } else if (functions[index] === "RP") {
+    } else if (FUNCTIONS[index] === "RP") {
       for (let byte = 0; byte < c; byte += 1) chip.flash[a + byte] &= chip.readUint8(b + byte);
       clock.tick(0.7e6);
-    } else if ("MS S4".includes(functions[index])) {
+    } else if ("MS S4".includes(FUNCTIONS[index])) {
       for (let byte = 0; byte < c; byte += 1) chip.writeUint8(a + byte, b & 0xff);
-    } else if ("MC C4".includes(functions[index])) {
+    } else if ("MC C4".includes(FUNCTIONS[index])) {
       for (let byte = 0; byte < c; byte += 1) chip.writeUint8(a + byte, chip.readUint8(b + byte));
     }
   };
   core.VTOR = 0x10000100;
   core.SP = chip.flashView.getUint32(0x100, true);
   core.PC = chip.flashView.getUint32(0x104, true) & ~1;
-  for (const pin of [2, 3, 4, 5]) chip.gpio[pin].setInputValue(true);
+  for (const pin of [1, 2, 3, 4, 5]) chip.gpio[pin].setInputValue(true);
   return { chip, clock, core, uart };
 };
 
@@ -152,6 +161,7 @@ const openLink = (clock) => {
 class Bench {
   constructor() {
     Object.assign(this, start());
+    this.awake = 0; // instructions so far
     this.line = [];
     this.wire = this.clock.createAlarm(() => this.pass());
     this.until(300);
@@ -163,6 +173,9 @@ class Bench {
     this.line.push(...bytes);
   }
   pass() {
+    // The start bit's edge, which the pin sees as well.
+    this.chip.gpio[1].setInputValue(false);
+    this.chip.gpio[1].setInputValue(true);
     this.uart.take(...[this.line.shift()].flat());
     if (this.line.length) this.wire.schedule(BYTE);
   }
@@ -174,7 +187,10 @@ class Bench {
         const next = clock.nanosToNextAlarm;
         clock.tick(Math.max(100, Math.min(next > 0 ? next : 1e6, end - clock.nanos)));
         if (core.interruptsUpdated) core.executeInstruction();
-      } else clock.tick(core.executeInstruction() * 8);
+      } else {
+        clock.tick(core.executeInstruction() * 8);
+        this.awake += 1;
+      }
     }
   }
   // What the chip has sent.
@@ -282,8 +298,52 @@ const touches = () => {
   return `${told} touches, times off by up to ${worst} µs`;
 };
 
+// Instructions that the chip is awake for: while nobody touches or asks, for a touch with its verdict, for a question.
+const awake = () => {
+  const bench = new Bench(), hello = openLink(bench.clock).connect().line;
+  bench.until(2000);
+  const count = (act, ms) => {
+    const before = bench.awake;
+    act();
+    bench.until(ms);
+    return bench.awake - before;
+  };
+  const quiet = Math.round(count(() => {}, 10_000) / 10);
+  const press = (isOpen) => [2, 3, 4].forEach((pin) => bench.chip.gpio[pin].setInputValue(isOpen));
+  const touch = count(() => { press(false); bench.until(60); press(true); }, 940) - quiet;
+  bench.sent();
+  const question = count(() => bench.send(hello), 1000) - quiet;
+  expect(frames(bench.sent()) >= 1, "a question to a chip that sleeps has no answer");
+  expect(quiet < 5000, `${quiet} instructions in a second in which nothing happens`);
+  return `instructions awake: ${quiet} in a quiet second, ${touch} for a touch, ${question} for a question`;
+};
+
+// Questions that arrive while the flash is erased, during which no interrupt is served: only DMA keeps more than 32 bytes.
+const erased = () => {
+  const bench = new Bench(), hello = openLink(bench.clock).connect().line, { onBreak } = bench.chip;
+  let erases = 0, answers = 0;
+  bench.chip.onBreak = (index) => {
+    if (index === ERASE) {
+      erases += 1;
+      bench.sent();
+      bench.send(Array(4).fill(hello).flat());
+    }
+    onBreak(index);
+  };
+  for (let touch = 0; touch < 600 && erases < 4; touch += 1) {
+    const before = erases;
+    for (const isOpen of [false, true]) {
+      for (const pin of [2, 3, 4]) bench.chip.gpio[pin].setInputValue(isOpen);
+      bench.until(100);
+    }
+    if (erases > before) answers += frames(bench.sent());
+  }
+  if (name.endsWith("dma")) expect(erases === 4 && answers >= 5 * erases, `${answers} frames after ${erases} erases with four questions and a touch each`);
+  return erases ? `${answers} frames sent after ${erases} erases with four questions in each` : "no flash";
+};
+
 const began = performance.now();
-const notes = [errors, touches].map((test) => (wrong.length ? "" : test()));
+const notes = [errors, touches, awake, erased].map((test) => (wrong.length ? "" : test()));
 const seconds = ((performance.now() - began) / 1000).toFixed(1);
 console.log(wrong.length ? wrong.map((what) => `WRONG ${name}: ${what}`).join("\n") : `${name}: right, ${seconds} s; ${notes.join("; ")}`);
 process.exitCode = wrong.length ? 1 : 0;

@@ -5,7 +5,7 @@ use super::folds::{Learned, moved};
 use super::follow::follow;
 use super::parts::Parts;
 use super::settings::Settings;
-use super::shape::{self, Fitted, STRICTEST};
+use super::shape::{self, Fitted, STRICTEST, shaped};
 use super::{Rows, check, check_columns, guard, rows_of, taken};
 use crate::calibrate::{
     Begin, Calibrated, Chosen, Guarded, Limit, Odds, OfRows, Stated, Stop, Terms, Used, Way, choose_groups,
@@ -14,8 +14,6 @@ use crate::calibrate::{
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};
 use crate::progress::Progress;
-#[cfg(feature = "train")]
-use crate::strangers;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{PromisedNoise, Tag};
 use palpate_trees::rows::{RowSequence, Sequences};
@@ -202,24 +200,6 @@ fn names(model: &Model<'_>) -> Vec<String> {
     let mut names = compile::names(model);
     names.truncate(model.known_count());
     names
-}
-
-/// The model with what a row adds and how much rows count together, and without what an earlier calibration stated.
-pub(super) fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Result<Vec<u8>> {
-    let unit = f64::from(model.unit());
-    let shape = &fitted.shape;
-    let sections = vec![
-        (Tag::Weights, shape.weights.as_ref().map(|weights| (true, shape::weights_section(weights)))),
-        (Tag::RowEvidence, shape.table.as_ref().map(|table| (true, table.section(unit)))),
-        (Tag::ThresholdsByObject, None),
-        (Tag::Promise, None),
-        (Tag::Temperature, None),
-    ];
-    let restated = Restated { max_touches: Some(max_rows), sections, ..Restated::default() };
-    let shaped = restate(model, &restated)?;
-    #[cfg(feature = "train")]
-    let shaped = strangers::without(&compile::open(&shaped)?)?;
-    Ok(shaped)
 }
 
 /// The thresholds at which a walk begins.

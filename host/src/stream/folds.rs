@@ -1,8 +1,7 @@
 //! More from few sequences: those that a model was trained on, with margins of models that were trained without them.
 
-use super::calibrate::shaped;
 use super::follow::follow;
-use super::shape::{self, STRICTEST};
+use super::shape::{self, STRICTEST, shaped};
 use super::{Rows, Settings, guard, taken};
 use crate::calibrate::{Limit, Odds, odds_of};
 use crate::compile::{self, Restated, restate};

@@ -2,9 +2,13 @@
 
 use super::Rows;
 use crate::calibrate::{Gain, Lead, Odds, Sequence, odds_of};
+use crate::compile::{self, Restated, restate};
+use crate::error::Result;
 use crate::evidence::totals;
+#[cfg(feature = "train")]
+use crate::strangers;
 use palpate_onboard::Model;
-use palpate_shared::format::{RowEvidence, Shifts, Weights};
+use palpate_shared::format::{RowEvidence, Shifts, Tag, Weights};
 use palpate_trees::rows::RowSequence;
 use rayon::prelude::*;
 
@@ -363,6 +367,24 @@ pub(super) fn fit(rows: &Rows<'_>, sequences: &[&RowSequence], rate: f64, max_ro
     fitted.shape = Shape { table, weights };
     (fitted.table, fitted.weights) = (Some(of_table), Some(of_weights));
     fitted
+}
+
+/// The model with what a row adds and how much rows count together, and without what an earlier calibration stated.
+pub(super) fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Result<Vec<u8>> {
+    let unit = f64::from(model.unit());
+    let shape = &fitted.shape;
+    let sections = vec![
+        (Tag::Weights, shape.weights.as_ref().map(|weights| (true, weights_section(weights)))),
+        (Tag::RowEvidence, shape.table.as_ref().map(|table| (true, table.section(unit)))),
+        (Tag::ThresholdsByObject, None),
+        (Tag::Promise, None),
+        (Tag::Temperature, None),
+    ];
+    let restated = Restated { max_touches: Some(max_rows), sections, ..Restated::default() };
+    let shaped = restate(model, &restated)?;
+    #[cfg(feature = "train")]
+    let shaped = strangers::without(&compile::open(&shaped)?)?;
+    Ok(shaped)
 }
 
 /// The section that stores weights.

@@ -35,6 +35,21 @@ fn initializer(row: &[f64], is_whole: bool) -> String {
     format!("{{{}}}", row.iter().map(cell).collect::<Vec<_>>().join(","))
 }
 
+/// Output of a C program with these functions and calls, built beside the headers in `directory` with warnings denied.
+fn printed(directory: &Path, functions: &str, calls: &str, macros: &[&str]) -> String {
+    let source =
+        format!("#include <math.h>\n#include <stdio.h>\n{functions}int main(void)\n{{\n{calls}    return 0;\n}}\n");
+    std::fs::write(directory.join("program.c"), source).unwrap();
+    let program = directory.join("program");
+    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
+    let mut command = Command::new(compiler);
+    command.args(["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-O1"]);
+    command.args(macros.iter().map(|macros| format!("-DPALPATE_{macros}"))).arg("program.c").arg("-o").arg(&program);
+    let built = command.current_dir(directory).output().unwrap();
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    String::from_utf8(Command::new(&program).output().unwrap().stdout).unwrap()
+}
+
 /// Models of every library and kind of prediction, without the extension of their margins.
 const CALLED: [&str; 16] = [
     "xgboost-3.4-softmax.json",
@@ -139,20 +154,8 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
             }
         }
     }
-    put(
-        "program.c",
-        &format!("#include <math.h>\n#include <stdio.h>\n{functions}int main(void)\n{{\n{calls}    return 0;\n}}\n"),
-    );
-    let program = directory.path().join("program");
-    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
     let wide = ["LAYOUTS=127", "LEAVES=7", "EARLY=1", "SENTINEL=1", "SHARED=1", "MAX_OBJECTS=32"];
-    let flags = wide.map(|macros| format!("-DPALPATE_{macros}"));
-    let mut command = Command::new(compiler);
-    command.args(["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-O1"]).args(flags);
-    let built = command.arg("program.c").arg("-o").arg(&program).current_dir(&directory).output().unwrap();
-    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-    let output = Command::new(&program).output().unwrap();
-    let text = String::from_utf8(output.stdout).unwrap();
+    let text = printed(directory.path(), &functions, &calls, &wide);
     assert_eq!(text.lines().count(), expected.len());
     let mut worst = 0.0_f64;
     for (line, (name, own, shares, bound)) in text.lines().zip(&expected) {
@@ -280,20 +283,8 @@ fn rows_of_a_sequence_are_numbered_and_refused_by_the_same_bits_as_in_rust() {
         );
         calls += &format!("    run_{name}();\n");
     }
-    put(
-        "program.c",
-        &format!("#include <math.h>\n#include <stdio.h>\n{functions}int main(void)\n{{\n{calls}    return 0;\n}}\n"),
-    );
-    let program = directory.path().join("program");
-    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
-    let flags =
-        ["LAYOUTS=127", "LEAVES=7", "SEQUENCES=1", "MAX_OBJECTS=32"].map(|macros| format!("-DPALPATE_{macros}"));
-    let mut command = Command::new(compiler);
-    command.args(["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-O1"]).args(flags);
-    let built = command.arg("program.c").arg("-o").arg(&program).current_dir(&directory).output().unwrap();
-    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-    let output = Command::new(&program).output().unwrap();
-    let text = String::from_utf8(output.stdout).unwrap();
+    let flags = ["LAYOUTS=127", "LEAVES=7", "SEQUENCES=1", "MAX_OBJECTS=32"];
+    let text = printed(directory.path(), &functions, &calls, &flags);
     for (number, (found, expected)) in text.lines().zip(expected.lines()).enumerate() {
         assert_eq!(found, expected, "line {number}");
     }

@@ -17,6 +17,11 @@ pub(super) struct Calls<'a> {
     pub(super) code: Option<&'a Program>,
 }
 
+/// True if the model numbers the rows of a sequence, or states which of them it takes.
+pub(super) fn has_sequences(model: &Model<'_>) -> bool {
+    model.position().is_some() || model.guard().is_some()
+}
+
 /// Start of the header's parts, and of its pieces with an address of their own.
 struct Places {
     parts: Vec<usize>,
@@ -225,7 +230,7 @@ impl Calls<'_> {
     /// Functions that add up rows of a stream, or steps of a model that computes its features.
     fn of_steps(&self) -> String {
         let (name, objects, features) = (self.name, self.model.object_count(), self.model.feature_count());
-        if super::emit::has_sequences(self.model) {
+        if has_sequences(self.model) {
             return self.of_sequences();
         }
         let (step, parameter, body) = if self.model.descriptor().is_none() {

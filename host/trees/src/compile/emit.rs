@@ -1,7 +1,7 @@
 //! A compiled model as source code, for programs that have no files.
 
 use super::Compiled;
-use super::calls::Calls;
+use super::calls::{Calls, has_sequences};
 use super::code::{Form, Program};
 use super::model::open_any;
 use crate::ensemble::Probability;
@@ -244,11 +244,6 @@ fn rust(model: &Model<'_>, name: &str) -> String {
 fn has_row_evidence(model: &Model<'_>) -> bool {
     let tags = [Tag::Weights, Tag::RowEvidence].map(Tag::code);
     model.optional_sections().any(|section| tags.contains(&section.tag))
-}
-
-/// True if the model numbers the rows of a sequence, or states which of them it takes.
-pub(super) fn has_sequences(model: &Model<'_>) -> bool {
-    model.position().is_some() || model.guard().is_some()
 }
 
 /// Description of the model, in one line.

@@ -13,12 +13,16 @@
 #![no_main]
 
 mod flash;
+#[cfg_attr(feature = "dma", path = "dma.rs")]
+#[cfg_attr(not(feature = "dma"), path = "fifo.rs")]
+mod line;
 mod shared;
 
 use core::convert::Infallible;
 use embedded_hal::digital::OutputPin;
-use hal::uart::{DataBits, StopBits, UartConfig, UartPeripheral, Writer};
+use hal::uart::{DataBits, StopBits, UartConfig, UartPeripheral};
 use hal::{Clock as _, Timer, fugit::RateExtU32, pac};
+use line::Sender;
 use palpate_onboard::effector::{Geometry, Scale, Sensed};
 use palpate_onboard::station::{Board, FlashStorage, Happened, ProbeSettings, ProbeStation, record_length};
 use panic_halt as _;
@@ -46,7 +50,7 @@ const PROBE: Geometry = MODEL_PROBE;
 static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_GENERIC_03H;
 
 /// The parts that remain with the main loop.
-struct Pico(Writer<pac::UART0, shared::Wires>);
+struct Pico(Sender);
 
 impl Board for Pico {
     type Error = Infallible;
@@ -60,7 +64,7 @@ impl Board for Pico {
     }
 
     fn send(&mut self, frame: &[u8]) -> Result<(), Infallible> {
-        self.0.write_full_blocking(frame);
+        self.0.send(frame);
         Ok(())
     }
 
@@ -101,9 +105,9 @@ fn run() -> Option<Infallible> {
         ProbeSettings { scale: Scale::new(MODEL_PROBE, PROBE)?, boot, program: PROGRAM, ..ProbeSettings::default() };
     let mut station = ProbeStation::<OBJECTS, _>::open(MODEL, storage, settings).ok()?;
     let switches = (pins.gpio2.reconfigure(), pins.gpio3.reconfigure(), pins.gpio4.reconfigure());
-    let (reader, writer) = uart.split();
-    shared::start(switches, pins.gpio5.reconfigure(), reader, timer.alarm_0()?, timer);
-    let mut pico = Pico(writer);
+    let (line, sender) = line::open(uart, pac.DMA, resets);
+    shared::start(switches, pins.gpio5.reconfigure(), line, timer.alarm_0()?, timer);
+    let mut pico = Pico(sender);
     loop {
         let Ok(happened) = station.step(&mut pico);
         match happened {

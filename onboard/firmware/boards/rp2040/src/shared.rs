@@ -1,5 +1,6 @@
-//! State that interrupts and the main loop share: the switches, what the UART has received, the alarm that wakes.
+//! State that interrupts and the main loop share: the switches, the line to the host, the alarm that wakes.
 
+use crate::line::{self, Line};
 use core::cell::RefCell;
 use critical_section::{CriticalSection, Mutex};
 use embedded_hal::digital::InputPin;
@@ -9,8 +10,7 @@ use hal::gpio::bank0::{Gpio0, Gpio1, Gpio2, Gpio3, Gpio4, Gpio5};
 use hal::gpio::{FunctionSioInput, FunctionUart, Interrupt, Pin, PullDown, PullUp};
 use hal::pac::{self, UART0, interrupt};
 use hal::timer::{Alarm, Alarm0};
-use hal::uart::Reader;
-use heapless::Deque;
+use hal::uart::{Enabled, UartPeripheral};
 use palpate_onboard::effector::{Active, Clock, Fingers, Sensed, Watcher};
 use rp2040_hal as hal;
 
@@ -23,8 +23,8 @@ pub type Over = Switch<Gpio5>;
 /// The link's wires.
 pub type Wires = (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>);
 
-/// Bytes that may wait for the main loop: everything that a host sends without an answer, 8 commands and a question.
-const WAITING: usize = 2048;
+/// The UART on them.
+pub type Uart = UartPeripheral<Enabled, UART0, Wires>;
 
 /// The chip's microsecond timer.
 #[derive(Clone, Copy)]
@@ -36,20 +36,20 @@ impl Clock for Micros {
     }
 }
 
-struct Shared {
+pub struct Shared {
     watcher: Watcher<Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>>,
     over: Over,
     /// The signal as the main loop has last seen it.
     was_over: bool,
     clock: Micros,
-    reader: Reader<UART0, Wires>,
-    received: Deque<u8, WAITING>,
+    pub line: Line,
     alarm: Alarm0,
 }
 
 static SHARED: Mutex<RefCell<Option<Shared>>> = Mutex::new(RefCell::new(None));
 
-fn with<T>(act: impl FnOnce(&mut Shared) -> T) -> Option<T> {
+/// Does something with what is shared, with interrupts held back.
+pub fn with<T>(act: impl FnOnce(&mut Shared) -> T) -> Option<T> {
     critical_section::with(|cs| within(cs, act))
 }
 
@@ -59,21 +59,20 @@ fn within<T>(cs: CriticalSection<'_>, act: impl FnOnce(&mut Shared) -> T) -> Opt
 
 /// Begins to watch and to listen.
 #[allow(unsafe_code)]
-pub fn start(switches: Switches, over: Over, mut reader: Reader<UART0, Wires>, mut alarm: Alarm0, timer: Timer) {
+pub fn start(switches: Switches, over: Over, line: Line, mut alarm: Alarm0, timer: Timer) {
     for kind in [Interrupt::EdgeLow, Interrupt::EdgeHigh] {
         over.set_interrupt_enabled(kind, true);
         switches.0.set_interrupt_enabled(kind, true);
         switches.1.set_interrupt_enabled(kind, true);
         switches.2.set_interrupt_enabled(kind, true);
     }
-    reader.enable_rx_interrupt();
     alarm.enable_interrupt();
     let clock = Micros(timer);
     let fingers = Fingers::new(switches.0, switches.1, switches.2, Active::Low);
     let watcher = Watcher::start(fingers, &clock);
-    let shared = Shared { watcher, over, was_over: false, clock, reader, received: Deque::new(), alarm };
+    let shared = Shared { watcher, over, was_over: false, clock, line, alarm };
     critical_section::with(|cs| SHARED.replace(cs, Some(shared)));
-    for interrupt in [pac::Interrupt::IO_IRQ_BANK0, pac::Interrupt::UART0_IRQ, pac::Interrupt::TIMER_IRQ_0] {
+    for interrupt in [pac::Interrupt::IO_IRQ_BANK0, line::INTERRUPT, pac::Interrupt::TIMER_IRQ_0] {
         // SAFETY: no critical section of this program is made by masking an interrupt.
         unsafe { pac::NVIC::unmask(interrupt) };
     }
@@ -97,7 +96,7 @@ pub fn is_over() -> bool {
 pub fn receive(buffer: &mut [u8]) -> usize {
     let mut count = 0;
     for slot in buffer {
-        let Some(byte) = with(|shared| shared.received.pop_front()).flatten() else { break };
+        let Some(byte) = with(|shared| shared.line.pop()).flatten() else { break };
         *slot = byte;
         count += 1;
     }
@@ -118,10 +117,11 @@ pub fn sleep(wait: impl FnOnce(u32) -> u32) {
     critical_section::with(|cs| {
         let busy = within(cs, |shared| {
             // Never so soon that the alarm is missed.
-            let wait = wait(shared.clock.micros()).max(20);
+            let now = shared.clock.micros();
+            let wait = shared.line.longest_sleep(wait(now), now).max(20);
             let set = shared.alarm.schedule(wait.micros()).is_ok();
             let is_seen = shared.over.is_low().unwrap_or(false) == shared.was_over;
-            !(set && is_seen && shared.watcher.is_idle() && shared.received.is_empty())
+            !(set && is_seen && shared.watcher.is_idle() && shared.line.is_empty())
         });
         // With interrupts held back none can come between the look and the sleep; a pending one ends the sleep.
         if busy == Some(false) {
@@ -143,26 +143,7 @@ fn IO_IRQ_BANK0() {
             shared.over.clear_interrupt(kind);
         }
         shared.watcher.interrupt(&shared.clock);
-    });
-}
-
-/// The UART's FIFO, which holds 2.8 ms, has something to take: also while the main loop sends, or works.
-#[interrupt]
-fn UART0_IRQ() {
-    with(|shared| {
-        let mut buffer = [0; 32];
-        loop {
-            let bytes = match shared.reader.read_raw(&mut buffer) {
-                Ok(count) => buffer.get(..count).unwrap_or_default(),
-                // A garbled byte is missing, and the host sends it again; those before it are here.
-                Err(nb::Error::Other(error)) => error.discarded,
-                Err(nb::Error::WouldBlock) => break,
-            };
-            for byte in bytes {
-                // No host that keeps to the window sends more.
-                let _ = shared.received.push_back(*byte);
-            }
-        }
+        shared.line.edge(shared.clock.micros());
     });
 }
 
