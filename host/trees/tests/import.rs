@@ -763,14 +763,20 @@ fn best_for(goal: Goal, candidates: &[compile::Candidate]) -> compile::Candidate
     let is_exact = candidates.iter().any(|candidate| candidate.margin_error == 0.0);
     let mut of = candidates.to_vec();
     of.retain(|candidate| !is_exact || candidate.margin_error == 0.0);
-    let least = of.iter().map(|candidate| candidate.bytes).min().unwrap();
-    of.sort_by_key(|candidate| match goal {
-        Goal::Size => (0, candidate.bytes as u64, candidate.instructions.m4f),
-        Goal::Speed => (0, candidate.instructions.m4f, candidate.bytes as u64),
-        Goal::Balanced(_) => {
-            (u8::from(candidate.bytes > 3 * least), candidate.instructions.m4f, candidate.bytes as u64)
+    let least = of.iter().min_by_key(|candidate| (candidate.bytes, candidate.instructions.m4f)).unwrap().clone();
+    let order = |candidate: &compile::Candidate| {
+        let (bytes, instructions) = (candidate.bytes as f64, candidate.instructions.m4f as f64);
+        match goal {
+            Goal::Size => (bytes, instructions),
+            Goal::Speed => (instructions, bytes),
+            Goal::Balanced(_) => {
+                let [bytes_of_least, of_least] = [least.bytes as f64, least.instructions.m4f as f64];
+                let is_out = bytes > if instructions <= of_least / 2.0 { 3.0 } else { 2.0 } * bytes_of_least;
+                (if is_out { f64::MAX } else { bytes.ln() + 4.0 * instructions.ln() }, bytes)
+            }
         }
-    });
+    };
+    of.sort_by(|a, b| order(a).partial_cmp(&order(b)).unwrap());
     of[0]
 }
 

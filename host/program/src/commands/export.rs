@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 ENSEMBLE is what `palpate train` saved, or a model of another library: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx).
 
-A --layout is compact, complete, grid, wide, patterns or code, or a goal, which is balanced, speed, size, m4f or m0+ (the fastest of at most three times the smallest). With --emit thumb, thumb-m4f or c-code the trees are code (docs/guide/code.md).
+A --layout is compact, complete, grid, wide, patterns or code, or a goal: speed, size, balanced (half the bytes are worth a fifth more instructions), m4f or m0+ (balanced for that processor). With --emit thumb, thumb-m4f or c-code the trees are code (docs/guide/code.md).
 
 Examples:
   palpate export ensemble.json -o model.palpate
