@@ -26,7 +26,7 @@ pub fn for_touches(objects: usize) -> Settings {
 /// Compiles an ensemble. The model states the ensemble's own probe, or the published one where the ensemble states none.
 ///
 /// # Errors
-/// As [`palpate_trees::compile::compile`]; [`EnsembleProblem::Attribute`](crate::error::EnsembleProblem::Attribute) if the
+/// Errors of [`palpate_trees::compile::compile`]; [`EnsembleProblem::Attribute`](crate::error::EnsembleProblem::Attribute) if the
 /// ensemble states something of its touches that cannot be read.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     trees::compile(ensemble, &stated(ensemble, settings)?)
@@ -35,7 +35,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
 /// Compiles an ensemble to at most `most` bytes, as [`compile`].
 ///
 /// # Errors
-/// As [`palpate_trees::compile::compile_within`], and as [`compile`].
+/// Errors of [`palpate_trees::compile::compile_within`], and as [`compile`].
 pub fn compile_within(ensemble: &Ensemble, settings: &Settings, most: usize) -> Result<Compiled> {
     trees::compile_within(ensemble, &stated(ensemble, settings)?, most)
 }

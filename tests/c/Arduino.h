@@ -1,4 +1,4 @@
-/* As much of Arduino as the example needs, so that a compiler can check it. The Arduino program includes its own. */
+/* Stub with as much of Arduino as the example needs, so that a compiler can check it. The Arduino program includes its own. */
 #ifndef ARDUINO_H
 #define ARDUINO_H
 

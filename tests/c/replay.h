@@ -244,7 +244,7 @@ static void replay_touch(int is_open)
         answer = palpate_push(&replay_recognizer, &touch);
         count = palpate_features(&replay_model, &touch, replay_features);
         if (answer == PALPATE_COUNTED) {
-            /* The same without a recognizer. */
+            /* Without a recognizer. */
             (void)palpate_margins(&replay_model, &touch, replay_margins, REPLAY_ROOM);
             replay_numbers("touch", replay_margins, replay_model.objects);
         }

@@ -22,7 +22,7 @@ pub fn with_sections(model: &[u8], sections: &[u8]) -> Vec<u8> {
 /// The model, with statements about its training.
 ///
 /// # Panics
-/// As [`with_sections`].
+/// Like [`with_sections`].
 pub fn trained(model: &[u8], trained: &Trained) -> Vec<u8> {
     let mut sections = Vec::new();
     trained.write(|bytes| sections.extend_from_slice(bytes));

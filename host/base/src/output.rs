@@ -154,7 +154,7 @@ pub fn refuse_foreign(path: &Path) -> Result<()> {
 /// same or [`replace_foreign`] allows it.
 ///
 /// # Errors
-/// As [`refuse_foreign`].
+/// Errors of [`refuse_foreign`].
 pub fn refuse_unlike(path: &Path, bytes: &[u8]) -> Result<()> {
     let line = |bytes: &[u8]| bytes.split(|&byte| byte == b'\n').next().unwrap_or_default().to_vec();
     refuse_unless(path, |head| line(head) == line(bytes))
@@ -187,7 +187,7 @@ fn refuse_unless(path: &Path, is_own: impl Fn(&[u8]) -> bool) -> Result<()> {
 /// output.
 ///
 /// # Errors
-/// What `fill` returns, or [`Error::Io`] naming `path`; [`Foreign`]; [`Error::Closed`] if the reader of standard output went
+/// Errors of `fill`; [`Error::Io`] naming `path`; [`Foreign`]; [`Error::Closed`] if the reader of standard output went
 /// away.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     refuse_foreign(path)?;
@@ -198,7 +198,7 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Re
 /// that another file of Palpate's names.
 ///
 /// # Errors
-/// As [`write_whole`], except [`Foreign`].
+/// Errors of [`write_whole`], except [`Foreign`].
 pub fn replace_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let io = |source| Error::io(path, "write", source);
     match target(path).map_err(io)? {
@@ -251,7 +251,7 @@ pub fn refuse_input<P: AsRef<Path>>(output: &Path, inputs: impl IntoIterator<Ite
 /// [`refuse_foreign`] does.
 ///
 /// # Errors
-/// As these.
+/// Errors of these.
 pub fn admit<P: AsRef<Path>>(output: &Path, inputs: impl IntoIterator<Item = P>) -> Result<()> {
     refuse_input(output, inputs)?;
     refuse_foreign(output)
@@ -280,7 +280,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 /// replaced if its first line is the same.
 ///
 /// # Errors
-/// As [`write_whole`].
+/// Errors of [`write_whole`].
 pub fn write_unmarked(path: &Path, bytes: &[u8]) -> Result<()> {
     refuse_unlike(path, bytes)?;
     replace_whole(path, |out| out.write_all(bytes))
@@ -289,7 +289,7 @@ pub fn write_unmarked(path: &Path, bytes: &[u8]) -> Result<()> {
 /// Writes `value` to `path` as indented JSON with a final newline, as [`write_whole`] does.
 ///
 /// # Errors
-/// As [`write_whole`].
+/// Errors of [`write_whole`].
 pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     write_whole(path, |out| fill_json(out, value))
 }
@@ -297,7 +297,7 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
 /// Writes `value` to `path` as [`write_json`] does, and replaces what is there as [`replace_whole`] does.
 ///
 /// # Errors
-/// As [`replace_whole`].
+/// Errors of [`replace_whole`].
 pub fn replace_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     replace_whole(path, |out| fill_json(out, value))
 }
@@ -336,7 +336,7 @@ fn to_stdout(source: std::io::Error) -> Error {
 /// went to standard output.
 ///
 /// # Errors
-/// As [`print()`].
+/// Errors of [`print()`].
 pub fn print_about(path: &Path, text: &str) -> Result<()> {
     if !matches!(target(path), Ok(Target::Stdout)) {
         return print(text);
@@ -347,7 +347,7 @@ pub fn print_about(path: &Path, text: &str) -> Result<()> {
 /// Prints `value` to standard output as indented JSON.
 ///
 /// # Errors
-/// As [`print()`].
+/// Errors of [`print()`].
 pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     print(&json(value)?)
 }
@@ -355,7 +355,7 @@ pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
 /// Prints `value` as indented JSON where [`print_about`] prints.
 ///
 /// # Errors
-/// As [`print()`].
+/// Errors of [`print()`].
 pub fn print_json_about(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     print_about(path, &json(value)?)
 }

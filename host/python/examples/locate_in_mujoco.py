@@ -41,7 +41,7 @@ class Thing:
 
 
 class Pose:
-    """Where an object lies: its direction that points up, the middle of its box (m) and its yaw (degrees)."""
+    """Pose of an object: its direction that points up, the middle of its box (m) and its yaw (degrees)."""
 
     def __init__(self, thing, state):
         """The pose of a body, in the frame that a placement of `palpate capture` has."""

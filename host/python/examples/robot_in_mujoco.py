@@ -36,7 +36,7 @@ BEFORE, AFTER = 0.002, 0.006  # simulated before a finger reaches the object's b
 
 @dataclass
 class Approach:
-    """Where the middle finger starts, unit vectors along the motion and the row, and where contacts are possible: m."""
+    """Start of the middle finger, unit vectors along the motion and the row, and where contacts are possible: m."""
 
     start: np.ndarray
     direction: np.ndarray

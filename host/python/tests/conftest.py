@@ -1,4 +1,4 @@
-"""What several tests share: small data sets and models."""
+"""Shared by several tests: small data sets and models."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a type checker must say about the package: `mypy --strict tests/typed.py`."""
+"""Expectations of a type checker about the package: `mypy --strict tests/typed.py`."""
 
 from __future__ import annotations
 

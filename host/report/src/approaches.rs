@@ -156,7 +156,7 @@ fn way(context: &Context, ensemble: &Ensemble, test: &Dataset) -> Result<Way> {
     Ok(Way::new(compiled.bytes.len(), &margins.approaches(&at, &settings)?))
 }
 
-/// The same approaches, without [`AVOIDED`] of those that touched nothing.
+/// Approaches without [`AVOIDED`] of those that touched nothing.
 fn fewer_misses(test: &Dataset) -> Dataset {
     test.each(|object| {
         // Of each instance alike.

@@ -59,7 +59,7 @@ impl Cache {
     /// measured again.
     ///
     /// # Errors
-    /// What `measure` returns, or [`Error::Io`].
+    /// Errors of `measure`, and [`Error::Io`].
     pub(super) fn stage<T: Serialize + DeserializeOwned>(
         &self,
         stage: &str,

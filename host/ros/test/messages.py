@@ -134,7 +134,7 @@ class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::Diagnosti
 
 @dataclass
 class RequestHeader(IdlStruct, typename="palpate_test::RequestHeader"):
-    """What rmw_cyclonedds_cpp puts before requests and responses, to say which belong together."""
+    """Header that rmw_cyclonedds_cpp puts before requests and responses, to say which belong together."""
 
     client: uint64
     number: int64

@@ -7,7 +7,7 @@ use palpate_onboard::{Model, Refused};
 use palpate_shared::Touch;
 use palpate_shared::format::TrainedTouches;
 
-/// As many touches as a robot's sequence often needs; each robot makes only one.
+/// Number of touches that a robot's sequence often needs; each robot makes only one.
 const AT_ONCE_OF_A_ROBOT: usize = 128;
 
 /// Source of a supply's touches.

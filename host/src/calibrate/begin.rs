@@ -214,7 +214,7 @@ mod tests {
         assert!((found - exact).abs() < 1e-4, "{found} {exact}");
     }
 
-    /// Where to begin after sequences that are named at a margin, rightly or not.
+    /// Start of the walk after sequences that are named at a margin, rightly or not.
     fn begin(at: &[(f64, bool)], tested: usize, rate: f64) -> Begin {
         let sequence = |&(margin, right): &(f64, bool)| {
             let mut sequence = Sequence::new(0);

@@ -26,7 +26,7 @@ pub(super) struct Demand<'a> {
 }
 
 impl<'a> Demand<'a> {
-    /// As many touches as there are places in `kept`; touch i is sample `first` + i.
+    /// Touches for all places in `kept`; touch i is sample `first` + i.
     pub(super) fn new(
         sampler: Sampler<'a>,
         first: u64,

@@ -50,7 +50,7 @@ impl<'d> TouchSupply<'d> {
         if is_once { Self { is_once, ..supply } } else { supply.shuffled(&touched.name, seed) }
     }
 
-    /// The same touches as if they were all captured before.
+    /// Touches as if they were all captured before.
     pub(super) fn on_demand(object: usize, demand: &'d Demand<'d>, seed: u64) -> Self {
         Self::of(object, Feed::Captured(demand), demand.pools()).shuffled(demand.name(), seed)
     }

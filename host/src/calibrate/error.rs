@@ -65,7 +65,7 @@ pub enum CalibrateProblem {
         found: u64,
         /// The sequences, or groups, that the names were given in, where it is names that are too few.
         names_in: Option<u64>,
-        /// As many as are needed.
+        /// Number needed.
         needed: u64,
         /// The least rate that as many as there are could promise, if any below one half.
         possible: Option<f64>,

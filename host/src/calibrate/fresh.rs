@@ -86,7 +86,7 @@ impl Captured<'_> {
 /// of the same meshes.
 ///
 /// # Errors
-/// As [`calibrate`] and [`capture::capture`](fn@crate::capture::capture).
+/// Errors of [`calibrate`] and [`capture::capture`](fn@crate::capture::capture).
 pub fn calibrate_fresh(
     model: &Model<'_>,
     objects: &[Object],
@@ -121,7 +121,7 @@ pub fn calibrate_fresh(
 /// which it is estimated how many these are, are captured here.
 ///
 /// # Errors
-/// As [`calibrate_fresh`].
+/// Errors of [`calibrate_fresh`].
 pub fn fresh<'a>(
     model: &Model<'_>,
     objects: &[(&'a str, &'a [Scene])],

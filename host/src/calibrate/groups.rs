@@ -32,7 +32,7 @@ struct Losses {
 }
 
 impl Losses {
-    /// As many groups as would have as many names, if all of their sequences got one.
+    /// Number of groups that would have as many names if all of their sequences got one.
     fn whole(&self) -> f64 {
         self.named.iter().sum()
     }

@@ -108,7 +108,7 @@ pub(crate) struct Start {
 /// Like [`calibrate`], from a given start instead of one that a few sequences suggest.
 ///
 /// # Errors
-/// As [`calibrate`].
+/// Errors of [`calibrate`].
 pub(crate) fn calibrate_from(
     model: &Model<'_>,
     mut dataset: Dataset,

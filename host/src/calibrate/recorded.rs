@@ -42,7 +42,7 @@ const RATES: [f64; 17] =
 /// their own. The model was trained on neither.
 ///
 /// # Errors
-/// As [`calibrate`](fn@super::calibrate); [`CalibrateProblem::NotSupported`] if the recordings do not support the rate.
+/// Errors of [`calibrate`](fn@super::calibrate); [`CalibrateProblem::NotSupported`] if the recordings do not support the rate.
 pub fn calibrate_recorded(
     model: &Model<'_>,
     mut simulated: Dataset,

@@ -75,7 +75,7 @@ fn in_turns(used: Vec<Vec<u32>>, count: u32) -> Vec<BTreeSet<u32>> {
     used.into_iter().map(|used| used.into_iter().map(|touch| touch % count).collect()).collect()
 }
 
-/// The same touches, made by `robots` robots in turn, whose biases change nothing.
+/// Equal touches, made by `robots` robots in turn, whose biases change nothing.
 fn of_robots(mut dataset: Dataset, robots: usize) -> Dataset {
     dataset.add_noise(&with!(Noise::default(), pose_bias = 1.0), 1, robots);
     dataset

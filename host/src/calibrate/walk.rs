@@ -56,7 +56,7 @@ pub(crate) enum Stop {
         position: usize,
         /// The most cases.
         found: u64,
-        /// As many as are needed, if none is an error.
+        /// Number needed if none is an error.
         needed: u64,
     },
     /// This tally had too many errors at each start, and the fewest too many here.

@@ -168,7 +168,7 @@ pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progre
 /// approach is kept.
 ///
 /// # Errors
-/// As [`scenes`].
+/// Errors of [`scenes`].
 pub fn untouchable(objects: &[Object], origin: &Origin, progress: &dyn Progress) -> Result<Option<CaptureProblem>> {
     let objects: Vec<&Object> = objects.iter().collect();
     let scenes = scenes(&objects, origin, progress)?;

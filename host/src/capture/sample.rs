@@ -77,7 +77,7 @@ impl<'a> Sampler<'a> {
     /// Sample `index`, with the contacts that the hand did not reach.
     ///
     /// # Errors
-    /// As [`sample`](Self::sample).
+    /// Errors of [`sample`](Self::sample).
     pub(crate) fn drawn(&self, index: u64) -> Result<Drawn> {
         let mut rng = self.rng(index);
         let probe = &self.origin.probe;
@@ -137,7 +137,7 @@ impl<'a> Sampler<'a> {
     /// Samples of each of its scenes: where one of them cannot be touched, the object cannot be captured.
     ///
     /// # Errors
-    /// As [`sample`](Self::sample).
+    /// Errors of [`sample`](Self::sample).
     pub(super) fn try_each(&self) -> Result<()> {
         let samples = self.origin.samples();
         let mut each = samples.take(self.scenes.len().max(1));

@@ -348,7 +348,7 @@ impl Connection {
     /// The approach straight down that the chip proposes, of a model of maps; `within` as in [`Query::NextPress`].
     ///
     /// # Errors
-    /// Those of [`places`](Self::places).
+    /// Errors of [`places`](Self::places).
     pub fn next_press(&mut self, within: Option<u32>) -> Result<Approach> {
         match self.ask(Query::NextPress { within })? {
             Reply::NextPress(approach) => Ok(approach),

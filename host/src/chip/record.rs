@@ -78,7 +78,7 @@ pub struct RecordSummary {
 /// Records what the chip reports until there are `count` touches or `each` breaks, and passes everything to `each`, in
 /// order. When `each` hears of a touch, it is on the disk.
 ///
-/// Where the line breaks, `reopen` is called until it succeeds. Touches that the chip reports meanwhile are lost: they are
+/// When the line breaks, `reopen` is called until it succeeds. Touches that the chip reports meanwhile are lost: they are
 /// counted as missed, unless the chip was without power too. No touch is recorded twice.
 ///
 /// # Errors

@@ -188,7 +188,7 @@ impl Comparison {
 /// Compares recorded touches with simulated ones of the same objects. Where approaches that touched nothing were not
 /// recorded, simulated ones are left out, and where only full touches were, partial ones.
 ///
-/// The same touches and settings give the same comparison on any number of threads.
+/// Equal touches and settings give equal comparisons on any number of threads.
 ///
 /// # Errors
 /// [`EvaluateProblem::Incomparable`] if the data sets share no object, if one holds approaches and the other full touches

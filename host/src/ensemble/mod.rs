@@ -25,7 +25,7 @@ use std::path::Path;
 /// Reads an ensemble, over touches or over rows, and checks its statements about touches.
 ///
 /// # Errors
-/// As [`Ensemble::load`]; [`EnsembleProblem::Attribute`] for statements that this
+/// Errors of [`Ensemble::load`]; [`EnsembleProblem::Attribute`] for statements that this
 /// crate did not write.
 pub fn load(path: impl AsRef<Path>) -> Result<Ensemble> {
     load_with(path, &Options::default())

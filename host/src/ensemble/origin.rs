@@ -285,7 +285,7 @@ impl StatedProbe {
     /// Cost: a pass over touches that no capture made.
     ///
     /// # Errors
-    /// As [`compare`](Self::compare), and [`ProbeProblem::OtherStroke`] with both strokes.
+    /// Errors of [`compare`](Self::compare), and [`ProbeProblem::OtherStroke`] with both strokes.
     pub fn compare_with(
         names: [&str; 2],
         probe: Option<TrainedProbe>,

@@ -34,7 +34,7 @@ pub struct CostOfNoise {
 /// object has fewer than 100 touches.
 ///
 /// # Errors
-/// As [`train`](fn@train) and [`Margins::new`].
+/// Errors of [`train`](fn@train) and [`Margins::new`].
 pub fn cost_of_noise(dataset: &Dataset, settings: &train::Settings, noise: &Noise) -> Result<Option<CostOfNoise>> {
     if dataset.objects.iter().any(|object| object.len() < LEAST) {
         return Ok(None);

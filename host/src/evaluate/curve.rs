@@ -52,7 +52,7 @@ impl Margins<'_> {
     /// state it.
     ///
     /// # Errors
-    /// As [`Margins::curve`], and `at` if `touches` is 0.
+    /// Errors of [`Margins::curve`], and `at` if `touches` is 0.
     pub fn confusion(&self, touches: usize, groups: usize, seed: u64) -> Result<Vec<Vec<usize>>> {
         self.confusion_of_first(touches, touches, groups, seed)
     }
@@ -61,7 +61,7 @@ impl Margins<'_> {
     /// `most` follows, so that the share on its diagonal is the curve's accuracy.
     ///
     /// # Errors
-    /// As [`Margins::confusion`].
+    /// Errors of [`Margins::confusion`].
     pub fn confusion_of_first(&self, touches: usize, most: usize, groups: usize, seed: u64) -> Result<Vec<Vec<usize>>> {
         self.check(touches, groups)?;
         let most = most.max(touches);
@@ -82,7 +82,7 @@ impl Margins<'_> {
     /// Confidence of the model after `touches` touches, for each group of each object; for calibration.
     ///
     /// # Errors
-    /// As [`Margins::curve`], and `at` if `touches` is 0.
+    /// Errors of [`Margins::curve`], and `at` if `touches` is 0.
     pub fn confidences(&self, touches: usize, groups: usize, seed: u64) -> Result<Vec<Confidence>> {
         self.check(touches, groups)?;
         // What is shown is a posterior at the model's temperature.

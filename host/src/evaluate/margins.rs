@@ -218,7 +218,7 @@ impl<'m> Margins<'m> {
     /// Margins for objects that the model does not know: no verdict on them is right.
     ///
     /// # Errors
-    /// As [`new`](Self::new), and [`EvaluateProblem::KnownObject`] if the model knows one.
+    /// Errors of [`new`](Self::new), and [`EvaluateProblem::KnownObject`] if the model knows one.
     pub(crate) fn of_strangers(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
         let descriptor = candidate.takes(dataset)?;
         let is_known = |name: &&String| !candidate.outputs_of(name).is_empty();

@@ -151,7 +151,7 @@ pub struct Evaluation {
     pub per_object: BTreeMap<String, BTreeMap<usize, f64>>,
     /// Results of the recognizer that stops by itself.
     pub sequential: Sequential,
-    /// The same counted in approaches, where the data set holds those; touches that are no evidence to the model cost an
+    /// Counted in approaches, where the data set holds those; touches that are no evidence to the model cost an
     /// approach and change nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub approaches: Option<Approaches>,

@@ -21,7 +21,7 @@ impl ModelFile {
     /// Reads a model; its first bytes say whether it is a compiled one.
     ///
     /// # Errors
-    /// As [`ensemble::load`] and [`CompiledModel::read`].
+    /// Errors of [`ensemble::load`] and [`CompiledModel::read`].
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the model", source))?;
@@ -52,7 +52,7 @@ impl ModelFile {
     /// Calls `evaluate` with the model, ready to be evaluated.
     ///
     /// # Errors
-    /// What `evaluate` returns.
+    /// Errors of `evaluate`.
     pub fn with<T>(&self, evaluate: impl FnOnce(Candidate<'_>) -> Result<T>) -> Result<T> {
         match self {
             Self::Full(ensemble) => evaluate(Candidate::Full(ensemble)),

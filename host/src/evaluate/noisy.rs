@@ -14,7 +14,7 @@ const LEAST: usize = 250;
 /// and sequence is then of one robot's touches. Touches that no noise changes stay as they are.
 ///
 /// # Errors
-/// As [`Noise::check`].
+/// Errors of [`Noise::check`].
 pub fn add_noise(dataset: &mut Dataset, noise: &Noise, seed: u64) -> Result<usize> {
     noise.check()?;
     let fewest = dataset.objects.iter().map(ObjectTouches::len).min().unwrap_or(0);

@@ -257,7 +257,7 @@ impl Wrong {
         self.wrong / self.given
     }
 
-    /// As many names of equal weight as say as much.
+    /// Effective number of names: as many of equal weight say as much.
     fn effective(&self) -> f64 {
         if self.spread > 0.0 { self.given * self.given / self.spread } else { 0.0 }
     }

@@ -47,7 +47,7 @@ pub struct OnStrangers {
 /// same settings. `strangers` are the model's margins for [objects that it does not know](Margins::of_strangers).
 ///
 /// # Errors
-/// As [`Margins::sequential`].
+/// Errors of [`Margins::sequential`].
 pub(crate) fn strangers(
     known: (&Margins<'_>, &Sequential),
     strangers: &Margins<'_>,

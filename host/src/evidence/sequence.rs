@@ -77,7 +77,7 @@ pub struct Sequence {
     /// The group that it is of, if it is not independent of all others.
     pub group: Option<usize>,
     leads: Vec<Lead>,
-    /// The same without what holds names back, once a name was.
+    /// Sequence without what holds names back, once a name was.
     ungated: Option<Vec<Lead>>,
 }
 
@@ -87,7 +87,7 @@ impl Sequence {
         Self { object, touches: 0, approaches: 0, group: None, leads: Vec::new(), ungated: None }
     }
 
-    /// The same sequence as one of a group.
+    /// Sequence as one of a group.
     pub(crate) fn of_group(self, group: Option<usize>) -> Self {
         Self { group, ..self }
     }
@@ -108,7 +108,7 @@ impl Sequence {
         }
     }
 
-    /// The same sequence as if no name had been held back.
+    /// Sequence as if no name had been held back.
     pub(crate) fn ungated(&self) -> Self {
         let leads = self.ungated.as_ref().unwrap_or(&self.leads).clone();
         Self { leads, ungated: None, ..*self }

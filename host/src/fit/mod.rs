@@ -139,7 +139,7 @@ pub const LEAST_TO_CHECK: u64 = 12_000;
 /// if there are any, with a half turn of the probe after each. Where the objects lie on a table, recordings that state their
 /// placement are compared with that one, others with all of the object's by their weights; the table is a plate too.
 ///
-/// The same recordings, objects and settings give the same fit on any number of threads. Cost: half a minute of a
+/// Equal recordings, objects and settings give equal fits on any number of threads. Cost: half a minute of a
 /// processor for ten meshes and 300 recorded approaches to four of them, twice that where touches have poses.
 ///
 /// # Errors

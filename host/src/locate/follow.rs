@@ -180,7 +180,7 @@ pub fn workspace(maps: &Maps<'_>, workspace: Option<f64>) -> Result<u32> {
 /// Half the side of a workspace that is stated, in micrometers.
 ///
 /// # Errors
-/// As [`workspace`].
+/// Errors of [`workspace`].
 pub fn within(millimeters: f64) -> Result<u32> {
     match (0.0..=1_000.0).contains(&millimeters) {
         true => Ok((millimeters * 1e3) as u32),

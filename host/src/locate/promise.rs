@@ -407,7 +407,7 @@ fn play(
 /// Plays sequences to the model's own threshold.
 ///
 /// # Errors
-/// As [`calibrate`](fn@calibrate).
+/// Errors of [`calibrate`](fn@calibrate).
 pub fn evaluate(
     maps: Maps<'_>,
     standing: &[Standing],

@@ -112,7 +112,7 @@ impl<'m> Game<'m> {
     /// Adds an object, scaled so that its longest side has `length` units; returns its number.
     ///
     /// # Errors
-    /// As [`Scene::new`], and as [`Probe::check`](crate::probe::Probe::check) for a probe that does not suit it.
+    /// Errors of [`Scene::new`], and as [`Probe::check`](crate::probe::Probe::check) for a probe that does not suit it.
     pub fn add_object(&mut self, name: &str, mesh: &Mesh, length: f64) -> Result<usize> {
         self.origin.probe.check(length)?;
         self.objects.push(Target { name: name.into(), scene: Scene::new(mesh, length)? });
@@ -134,7 +134,7 @@ impl<'m> Game<'m> {
     /// Sets the noise of touches from the next one on.
     ///
     /// # Errors
-    /// As [`Noise::check`]; nothing changes then.
+    /// Errors of [`Noise::check`]; nothing changes then.
     pub fn set_noise(&mut self, noise: Noise) -> Result<()> {
         noise.check()?;
         self.noise = noise;
@@ -172,7 +172,7 @@ impl<'m> Game<'m> {
     /// it proposes nothing.
     ///
     /// # Panics
-    /// As [`touch_at_random`](Self::touch_at_random).
+    /// Errors of [`touch_at_random`](Self::touch_at_random).
     pub fn touch_as_planned(&self, round: &mut Round<'m>, player: usize) -> Option<Approached> {
         let player = round.players.get(player)?;
         let (poses, proposal) = (player.recognizer.model().plan()?.poses(), player.proposal()?);
@@ -193,7 +193,7 @@ impl<'m> Game<'m> {
     /// finger touches nothing.
     ///
     /// # Panics
-    /// As [`touch_at_random`](Self::touch_at_random).
+    /// Errors of [`touch_at_random`](Self::touch_at_random).
     pub fn touch_along(&self, round: &mut Round<'m>, point: DVec3, direction: DVec3, roll: f64) -> Option<Approached> {
         let scene = &self.objects[round.object].scene;
         let bounds @ [low, high] = scene.bounds();

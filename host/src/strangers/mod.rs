@@ -7,7 +7,7 @@
 //!                       └─ the rest ───► sequences (follow) ──► its threshold, by Learn-then-Test
 //! ```
 //!
-//! Where there are recordings, one half of them is like another instance of the simulated objects, and the other half tests the
+//! If there are recordings, one half of them is like another instance of the simulated objects, and the other half tests the
 //! threshold too ([`calibrate_recorded`]).
 //!
 //! The misfit of n touches is half of the log-likelihood ratio of two normal distributions of the mean evidence: that of
@@ -98,7 +98,7 @@ pub struct Tested {
     pub alarms: usize,
     /// Touches used on average in these sequences.
     pub mean_touches: f64,
-    /// The same without a test.
+    /// Outcome without a test.
     pub mean_touches_without: f64,
     /// For each known object the share of its sequences that are detected after 30, 60 and 120 touches when the model
     /// does not use its column: an estimate of what happens to strangers.
@@ -179,7 +179,7 @@ pub fn calibrate(
 /// recordings are too few for the share of `settings`, the share that the model states is the one that they support.
 ///
 /// # Errors
-/// As [`calibrate`].
+/// Errors of [`calibrate`].
 pub fn calibrate_recorded(
     model: &Model<'_>,
     dataset: &Dataset,

@@ -39,7 +39,7 @@ const BEGUN: f64 = 0.25;
 /// as [`calibrate_recorded`] says; the error rate is promised for the simulated ones all the same.
 ///
 /// # Errors
-/// As [`strangers::calibrate`](fn@super::calibrate) and [`calibrate::calibrate`](fn@crate::calibrate::calibrate).
+/// Errors of [`strangers::calibrate`](fn@super::calibrate) and [`calibrate::calibrate`](fn@crate::calibrate::calibrate).
 pub fn calibrate_with_promise(
     model: &Model<'_>,
     dataset: &Dataset,

@@ -12,7 +12,7 @@ const TOUCHES: u64 = 300;
 /// [`BACKGROUND_SHAPES`](crate::mesh::builtin::BACKGROUND_SHAPES) of them.
 ///
 /// # Errors
-/// As a capture; none of the shapes cannot be touched at usual settings.
+/// Errors of a capture; all shapes can be touched at usual settings.
 pub fn captured(count: usize, origin: &Origin, progress: &dyn crate::progress::Progress) -> Result<ObjectTouches> {
     use crate::capture::Sampler;
     use crate::mesh::builtin::background;

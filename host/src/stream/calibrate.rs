@@ -38,7 +38,7 @@ pub fn calibrate(
 /// Like [`calibrate`], with what is learned from sequences of the model's training, so that all other sequences are tested on.
 ///
 /// # Errors
-/// As [`calibrate`]; [`CalibrateProblem::FoldDiffers`] if `learned` is of another model.
+/// Errors of [`calibrate`]; [`CalibrateProblem::FoldDiffers`] if `learned` is of another model.
 pub fn calibrate_with(
     model: &Model<'_>,
     sequences: &Sequences,

@@ -64,7 +64,7 @@ pub struct Evaluated {
     /// Check of the promise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promise: Option<PromiseOfSequences>,
-    /// The same sequences with as many rows for each.
+    /// These sequences with an equal number of rows for each.
     pub comparison: Comparison,
     /// The classes, in the model's order.
     pub names: Vec<String>,

@@ -28,7 +28,7 @@ impl Learned {
     /// Adds a fold, with a model of the same features and classes that was trained without it.
     ///
     /// # Errors
-    /// As [`evaluate`](super::evaluate()); [`CalibrateProblem::FoldDiffers`] for a model with other classes than those before.
+    /// Errors of [`evaluate`](super::evaluate()); [`CalibrateProblem::FoldDiffers`] for a model with other classes than those before.
     pub fn add(&mut self, model: &Model<'_>, fold: &Sequences) -> Result<()> {
         let rows = taken(model, fold)?;
         let margins = Rows::new(model, &rows);

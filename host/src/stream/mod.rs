@@ -89,7 +89,7 @@ fn check_columns(model: &Model<'_>, sequences: &Sequences) -> Result<()> {
 /// without the rows that its [guard](Model::guard) refuses.
 ///
 /// # Errors
-/// Those of [`check`]; [`RowsProblem::Columns`] for rows of another number of measured features.
+/// Errors of [`check`]; [`RowsProblem::Columns`] for rows of another number of measured features.
 fn taken<'s>(model: &Model<'_>, sequences: &'s Sequences) -> Result<Cow<'s, Sequences>> {
     check(model)?;
     check_columns(model, sequences)?;
@@ -160,7 +160,7 @@ pub fn refusal(model: &Model<'_>, refused: Refused) -> String {
 /// Reads sequences from CSV, or from Parquet if the file ends in `.parquet`.
 ///
 /// # Errors
-/// As [`Sequences::read`]; in Parquet rows are counted as lines of a CSV file, from 2.
+/// Errors of [`Sequences::read`]; in Parquet rows are counted as lines of a CSV file, from 2.
 pub fn read(
     path: &Path,
     features: impl Into<Features>,

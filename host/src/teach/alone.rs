@@ -24,7 +24,7 @@ const SHARES: [Division; 2] = [Division { parts: 4, used: 1 }, Division { parts:
 /// The noise of `training` is not added, since the touches have their own.
 ///
 /// # Errors
-/// As [`train`](fn@train) and [`teach`](fn@super::teach).
+/// Errors of [`train`](fn@train) and [`teach`](fn@super::teach).
 pub fn alone(
     recorded: &Dataset,
     training: &train::Settings,

@@ -39,7 +39,7 @@ impl Part<'_> {
 
 /// Fits columns of leaf values; the values of the objects that the trees know stay as they are.
 ///
-/// What is minimized is the softmax loss over all objects with Σ prior·v²/2 added for each column, which is convex:
+/// Minimizes the softmax loss over all objects with Σ prior·v²/2 added for each column, which is convex:
 /// Newton's steps leaf by leaf, tree after tree, as boosting takes them (Chen and Guestrin, XGBoost, 2016) on trees whose
 /// splits are given. `priors` are in touches of the column's object: a leaf that so many of its touches reach is half
 /// way to what they say.

@@ -137,7 +137,7 @@ pub struct TaughtObject {
     pub recognized: f64,
     /// The share of the others' groups that are mistaken for it, summed over the other objects.
     pub taken_for_it: f64,
-    /// The same results with fewer approaches, and with more.
+    /// Results with fewer approaches, and with more.
     pub curve: Curve,
 }
 

@@ -167,7 +167,7 @@ impl Dataset {
     /// Reads a data set that may hold a single object: a background, or a stranger.
     ///
     /// # Errors
-    /// Those of [`read`](Self::read), except that one object is enough.
+    /// Errors of [`read`](Self::read), except that one object is enough.
     pub fn read_any(directory: &Path) -> Result<Self> {
         let dataset = match is_log(directory) {
             true => {

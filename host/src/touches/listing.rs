@@ -145,7 +145,7 @@ impl Listing {
     /// Reads the bytes of a listing; errors name `path`.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// Errors of [`read`](Self::read).
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let listing: Self = serde_json::from_slice(bytes).map_err(|error| {
             let problem = TouchesProblem::BadListing { message: error.to_string() };

@@ -53,7 +53,7 @@ pub fn is_log(path: &Path) -> bool {
 /// The touches of a file: of a log, whichever objects they are of, or of lines of text.
 ///
 /// # Errors
-/// As [`Log::read`] and [`text::read`].
+/// Errors of [`Log::read`] and [`text::read`].
 pub fn read_touches(path: &Path) -> Result<Vec<Touch>> {
     match is_log(path) {
         true => Ok(Log::read(path)?.touches.iter().map(|logged| logged.touch).collect()),
@@ -79,7 +79,7 @@ impl Log {
     /// Reads a log from anywhere; errors name `path`.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// Errors of [`read`](Self::read).
     pub fn of(bytes: impl Read, path: &Path) -> Result<Self> {
         let (mut touches, mut objects, mut numbers, mut size) = (Vec::new(), Vec::new(), HashMap::new(), 0);
         let mut alike = text::Alike::default();
@@ -190,7 +190,7 @@ impl Log {
 
 /// A log that is being written: touches and verdicts, as JSON, in chunks with an index, uncompressed.
 ///
-/// The same touches and verdicts give the same bytes. What is written is kept in a temporary file until
+/// Equal touches and verdicts give equal bytes. They are kept in a temporary file until
 /// [`finish`](Self::finish).
 pub struct LogWriter {
     writer: mcap::Writer<BufWriter<File>>,

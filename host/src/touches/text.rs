@@ -73,7 +73,7 @@ pub(super) fn read_with_checksum(path: &Path) -> Result<(Vec<Touch>, u32)> {
 /// the position in millimeters.
 ///
 /// # Errors
-/// What is wrong with the line.
+/// Fault of the line.
 pub fn parse_touch(line: &str) -> Result<Touch, TouchesProblem> {
     let mut fields = [""; 12];
     let mut count = 0;

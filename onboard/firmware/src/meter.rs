@@ -67,7 +67,7 @@ impl Meter {
     /// The result of `f`, which runs once, and its instructions, to about a hundred: for what cannot be repeated.
     ///
     /// # Panics
-    /// As [`Meter::measure`].
+    /// Like [`Meter::measure`].
     pub fn once<T>(&mut self, f: impl FnOnce() -> T) -> (Option<T>, u64) {
         let (mut f, mut result) = (Some(f), None);
         let ticks = self.ticks(1, &mut || result = f.take().map(|f| f()));
@@ -77,7 +77,7 @@ impl Meter {
     /// Instructions that `f` takes for one of `items`, on average over all of them.
     ///
     /// # Panics
-    /// As [`Meter::measure`], for all items together, or when there is no item.
+    /// Like [`Meter::measure`], for all items together, or when there is no item.
     pub fn mean<I, T>(&mut self, items: &[I], mut f: impl FnMut(&I) -> T) -> u64 {
         assert!(!items.is_empty(), "no items to measure with");
         let all = self.measure(|| {

@@ -91,7 +91,7 @@ impl<const N: usize> Recognizer<'_, N> {
     /// Cost: that of `push`, and a few instructions for each object. Cannot fail otherwise.
     ///
     /// # Errors
-    /// As `push`.
+    /// Errors of `push`.
     pub fn push_forgetting(&mut self, touch: &Touch, forgetting: &mut Forgetting<N>) -> Result<Verdict, Refused> {
         self.model().accepts(touch)?;
         let mut margins = [0; N];
@@ -102,7 +102,7 @@ impl<const N: usize> Recognizer<'_, N> {
     /// Takes in a row of features like [`push_features`](Self::push_features), and forgets.
     ///
     /// # Errors
-    /// As `push_features`.
+    /// Errors of `push_features`.
     pub fn push_features_forgetting(
         &mut self,
         features: &[i32],

@@ -80,7 +80,7 @@ impl<const N: usize> Recognizer<'_, N> {
     /// Cost: that of `push_features`, and a few instructions for each feature. Cannot fail otherwise.
     ///
     /// # Errors
-    /// As [`RowsSeen::next`].
+    /// Errors of [`RowsSeen::next`].
     pub fn push_seen<const F: usize>(&mut self, measured: &[i32], seen: &mut RowsSeen<F>) -> Result<Verdict, Refused> {
         let features = seen.next(self.model(), measured)?;
         let mut margins = [0; N];

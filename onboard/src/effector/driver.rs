@@ -30,7 +30,7 @@ const LATEST: u32 = 1 << 15;
 
 /// The driver without pins or a clock: edges and the time go in, touches and faults come out.
 ///
-/// What comes out depends on the edges and their times alone, not on how often [`Effector::poll`] is called; but a touch
+/// Results depend on the edges and their times alone, not on how often [`Effector::poll`] is called; but a touch
 /// with a missing finger, and faults, are only seen at the first call after they are due.
 ///
 /// Cannot fail or panic with any edges.

@@ -1,6 +1,6 @@
 //! Blocks of rows that go down every tree together.
 //!
-//! The same bytes, the same sums: integers add up in any order, and f32 leaves are added in the trees' order. What is
+//! Equal bytes give equal sums: integers add up in any order, and f32 leaves are added in the trees' order. What is
 //! made ready for a tree (see [`masks`](super::masks), and its leaves as words) is for all rows of the block.
 
 use super::block::{Block, LANES, Leaves, ROWS, TREES};

@@ -215,7 +215,7 @@ fn add_whole_i8(margins: &mut [i32; 10], leaves: &[[u8; 10]], reached: &[u16]) {
 
 /// Adds bytes in lanes of 16 bits, which hold a block of trees.
 ///
-/// Of a word every second byte has a lane, which takes an instruction to cut out. The others are what is left of the sum of
+/// Every second byte of a word has a lane, which takes an instruction to cut out. The others are what is left of the sum of
 /// whole words without those lanes.
 #[inline(always)]
 fn add_lanes<'v>(margins: &mut [i32; 10], leaves: impl Iterator<Item = &'v [u8; 10]>) {

@@ -179,7 +179,7 @@ impl<'m> Cuts<'m> {
 
 /// Number of an axis's thresholds, of `width` bytes each, that are at or below `value`.
 ///
-/// Those of two or four bytes are loaded at once where they are aligned, which the exporter ensures if the model is aligned.
+/// Thresholds of two or four bytes are loaded at once where they are aligned, which the exporter ensures if the model is aligned.
 // By itself, so that all that it needs is in registers on a Cortex-M0+.
 #[inline(never)]
 pub(crate) fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {

@@ -1,4 +1,4 @@
-//! Where to touch next.
+//! Choice of the next approach.
 
 use super::cell::{Pool, YAWS, turn};
 use super::locator::Locator;

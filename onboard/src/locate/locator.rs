@@ -34,7 +34,7 @@ impl Default for Effort {
 pub enum Exhausted {
     /// The pool of cells was full.
     Cells,
-    /// As many heights were looked up as may be.
+    /// The limit of heights to look up was reached.
     Lookups,
 }
 

@@ -97,7 +97,7 @@ impl<'a> Maps<'a> {
     /// Opens a model without computing its checksum. Cost: some instructions for each placement.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Errors of [`new`](Self::new).
     pub(crate) fn read(model: &'a [u8]) -> Result<Self, ModelError> {
         let header = Header::of(model);
         // The layout, the threshold, the limit of touches.

@@ -24,7 +24,7 @@ impl<'a> Model<'a> {
     /// wrong.
     ///
     /// # Errors
-    /// As [`Model::new`]; [`ModelError::Field`] for a model whose trees are in its bytes.
+    /// Errors of [`Model::new`]; [`ModelError::Field`] for a model whose trees are in its bytes.
     pub fn with_code(bytes: &'a [u8], code: Code) -> Result<Self, ModelError> {
         let mut model = Self::opened_with_code(bytes)?;
         if model.layout() != Layout::Code {

@@ -85,7 +85,7 @@ pub fn serve<const N: usize, S: Storage, T: Read + Write>(
 /// Serves a host as [`serve`] does, with room for a model of maps too: a `&mut` [`Table`](super::Table).
 ///
 /// # Errors
-/// As [`serve`].
+/// Errors of [`serve`].
 pub fn serve_with<const N: usize, S: Storage, L: Locates, T: Read + Write>(
     built_in: &[u8],
     storage: &mut S,

@@ -69,7 +69,7 @@ pub trait Locates {
     }
 
     /// The next approach, with the middle finger within this many micrometers of the origin in x and y; none: twice the maps' range.
-    /// The same until the next touch.
+    /// It stays until the next touch.
     ///
     /// # Errors
     /// [`Refusal::NoModel`] without maps.

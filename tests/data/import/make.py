@@ -51,7 +51,7 @@ STRANGE = [np.nan, -1.0, -0.5, -0.0, 0.5, 2.9999, 7.5, 19.0, 20.0, 63.0, 64.0, 5
 
 
 def kinds(x, number=20):
-    """The same rows with a category whose neighbors have nothing in common, the label's share among others."""
+    """Rows with a category whose neighbors have nothing in common, the label's share among others."""
     x = x.copy()
     of_row = np.floor(np.abs(x[:, 0] * 37.7)) % number
     x[:, KIND] = (of_row * 7 + 3) % number
@@ -457,7 +457,7 @@ def make_catboost():
 
 
 def onnx_raw(model):
-    """The same model without its last transformation: its output are raw scores."""
+    """Model without its last transformation: its output are raw scores."""
     import copy
 
     import onnx
@@ -584,7 +584,7 @@ def make_onnxmltools():
 
 
 def make_predictions():
-    """What the libraries predict with the models that have no predictions yet, categories as the library takes them.
+    """Predictions of the libraries with the models that have no predictions yet, categories as the library takes them.
     XGBoost is not asked about files of later versions, whose dart it misreads, nor about leaves with several values of
     earlier ones, which it opens and does not survive."""
     import xgboost

@@ -31,7 +31,7 @@ class Refused(Exception):
 
 
 class Source:
-    """What is compiled: files, flags, and a static library to link; the rows' classes if the ensemble is the exporter's own."""
+    """Input of the compiler: files, flags, and a static library to link; the rows' classes if the ensemble is the exporter's own."""
 
     def __init__(self, files, flags=(), library=None, expected=None, by_chip=None, clang=False):
         self.files, self.flags, self.library, self.expected = files, list(flags), library, expected

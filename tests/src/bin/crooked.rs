@@ -4,7 +4,7 @@
 //! crooked DIR     # DIR/known, DIR/test, DIR/plate.txt, DIR/meshes
 //! ```
 //!
-//! What is wrong with the probe stands in [`CROOKED`]. None of this is shared with what fits a probe: it goes from the
+//! The probe's faults stand in [`CROOKED`]. None of this is shared with what fits a probe: it goes from the
 //! simulated contact times to the probe's by its own few lines.
 
 use palpate::capture;

@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
     /// Recorded touches of the objects; thresholds, or --strangers, are tested on them. Of a model of maps, without DIR: each recording is of an object that stood still
     #[arg(long, value_name = "DIR", conflicts_with_all = ["plan", "label"])]
     recorded: Option<PathBuf>,
-    /// Where to write; the calibrated model
+    /// Output; the calibrated model
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// The share of wrong names to accept, such as 1%; what is promised

@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
-    /// Where to write; a directory for the touches
+    /// Output; a directory for the touches
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Touches of each object; with all three fingers [default: 21000]

@@ -51,7 +51,7 @@ struct DesignArguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
-    /// Where to write; a directory for probe.toml and design.html
+    /// Output; a directory for probe.toml and design.html
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Trials instead of the usual: distances, radii and tilts of fingers, where approaches aim, the speed

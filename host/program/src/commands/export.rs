@@ -36,7 +36,7 @@ Examples:
 pub(crate) struct Arguments {
     /// An ensemble that `palpate train` or another library saved, or a compiled model to be written as source code
     ensemble: PathBuf,
-    /// Where to write; the model
+    /// Output; the model
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// The classes' names in order, or a file with one per line [default: the file's own, or 0, 1, …]

@@ -41,7 +41,7 @@ pub(super) struct FitArguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(value_name = "SOURCE")]
     sources: Vec<String>,
-    /// Where to write; the probe, such as probe.toml
+    /// Output; the probe, such as probe.toml
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Presses on a flat plate, half a turn of the probe after each, one line per press

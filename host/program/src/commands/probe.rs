@@ -276,7 +276,7 @@ impl SizeArguments {
     /// The objects without those that cannot be touched, if that is wanted.
     ///
     /// # Errors
-    /// As [`capture::untouchable`], and if no object is left.
+    /// Errors of [`capture::untouchable`], and if no object is left.
     pub(crate) fn touchable(&self, objects: Vec<Object>, origin: &Origin) -> Result<Vec<Object>> {
         if !self.units.skip_bad {
             return Ok(objects);

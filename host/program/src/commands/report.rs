@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(default_value = "builtin", value_name = "SOURCE")]
     sources: Vec<String>,
-    /// Where to write; a directory for the page, its figures and tables
+    /// Output; a directory for the page, its figures and tables
     #[arg(short, long, default_value = "report", value_name = "PATH")]
     output: PathBuf,
     /// Fewer folds, levels, touches and trees; the same figures

@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
-    /// Where to write; a directory for the results
+    /// Output; a directory for the results
     #[arg(short, long, value_name = "PATH", default_value = "out")]
     output: PathBuf,
     /// Touches of each object; a tenth of them to test on
@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if json { output::print_json(&summary) } else { output::print(&run::text(&summary, &out)) }
 }
 
-/// As many touches as can be divided and trained on.
+/// Fewest touches that can be divided and trained on.
 fn touches(text: &str) -> Result<u64, String> {
     match super::numbers::count(text)? {
         count if count < 100 => Err("give 100 or more".to_owned()),

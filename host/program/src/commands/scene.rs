@@ -94,7 +94,7 @@ impl SceneArguments {
 /// The placements of objects, in words: how many, with their weights, and what was left out.
 ///
 /// # Errors
-/// As [`placements::of_object`].
+/// Errors of [`placements::of_object`].
 pub(crate) fn described(objects: &[Object]) -> Result<String> {
     let mut text = String::new();
     for object in objects {

@@ -66,7 +66,7 @@ pub(crate) struct Evaluation<'a> {
     pub(crate) rows: &'a Path,
     pub(crate) columns: SequenceColumns<'a>,
     pub(crate) wanted: stream::Wanted,
-    /// Where to write a page.
+    /// Path of a page to write.
     pub(crate) page: Option<&'a Path>,
 }
 

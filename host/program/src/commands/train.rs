@@ -48,7 +48,7 @@ pub(crate) struct Arguments {
     directory: Option<PathBuf>,
     #[command(flatten)]
     teach: TeachArguments,
-    /// Where to write; the ensemble, or the model of maps
+    /// Output; the ensemble, or the model of maps
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Touches of many other shapes; they train a column for what the model does not know

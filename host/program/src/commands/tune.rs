@@ -29,10 +29,10 @@ pub(crate) struct Arguments {
     /// Touches: a directory that `palpate capture` filled
     #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// Where to write; the best model that fits
+    /// Output; the best model that fits
     #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
-    /// Where to save its ensemble
+    /// File for its ensemble
     #[arg(long, value_name = "FILE")]
     ensemble: Option<PathBuf>,
     /// The most bytes of the model, such as 16K

@@ -43,7 +43,7 @@ pub(crate) struct Arguments {
     /// A built-in object's name, a mesh (OBJ, STL, PLY, glTF, COLLADA) or scan (PLY, PCD, XYZ); touches with a position (TXT), one or two; with --play several, or directories
     #[arg(value_name = "SOURCE", required_unless_present_any = ["play", "port"])]
     sources: Vec<String>,
-    /// Where to write; the page
+    /// Output; the page
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Touches of each object; to show [default: 24], or with --play to train on [default: 10000; on a table 50000]

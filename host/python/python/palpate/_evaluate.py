@@ -43,13 +43,13 @@ class Evaluation:
     """Accuracy after a number of touches."""
     accuracy_standard_error: dict[int, float] = field(repr=False)
     per_object: dict[str, dict[int, float]] = field(repr=False)
-    """The same for each object."""
+    """Accuracy of each object after a number of touches."""
     sequential: Sequential
     """Figures when it stops by itself."""
     approach_accuracy: dict[int, float] = field(repr=False)
     """Accuracy after a number of approaches, where the data set holds those."""
     approach_sequential: Sequential | None = field(repr=False)
-    """The same counted in approaches."""
+    """Figures when it stops by itself, counted in approaches."""
     patterns: dict[str, float] = field(repr=False)
     """Share of each contact pattern among the touches."""
     raw: dict[str, object] = field(repr=False)

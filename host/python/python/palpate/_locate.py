@@ -1,4 +1,4 @@
-"""What playing on a simulated table finds."""
+"""Results of sequences that are played on a simulated table."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ class MapsEvaluation:
 
     @property
     def error(self) -> float:
-        """Of the names given, the share that was wrong."""
+        """Share of wrong ones among the names given."""
         return float(self.raw["wrong"] / max(self.raw["given"], 1))
 
     @property
     def undecided(self) -> float:
-        """Of all sequences, the share without a verdict."""
+        """Share of all sequences without a verdict."""
         return float(self.raw["undecided"] / self.raw["sequences"])
 
     @property
@@ -64,5 +64,5 @@ class MapsEvaluation:
 
     @property
     def placed(self) -> float:
-        """Of the right names, the share whose place was as true as `until` asked for; 1 without it."""
+        """Share of the right names whose place was as true as `until` asked for; 1 without it."""
         return float(self.raw["poses_within"] / max(self.raw["poses"], 1))

@@ -13,7 +13,7 @@ from ._errors import InputError, ModelWarning
 
 
 class _Named(Protocol):
-    """What rows are for: a model, an ensemble or a recognizer."""
+    """Receiver of rows: a model, an ensemble or a recognizer."""
 
     def _columns(self, header: Sequence[str]) -> tuple[list[int], str | None]:
         """The positions of the features among columns with these names, and what to know about that."""
@@ -33,7 +33,7 @@ def rows_of(owner: _Named, rows: Any) -> npt.NDArray[np.float64]:
 
 
 def row_of(owner: _Named, row: Any) -> npt.NDArray[np.float64]:
-    """The same of one row with names, such as a series of pandas."""
+    """Values of one row with names, such as a series of pandas."""
     first: npt.NDArray[np.float64] = rows_of(owner, row.to_frame().T)[0]
     return first
 
@@ -79,7 +79,7 @@ def _column(rows: Any, position: int) -> Any:
 
 
 _CATEGORIES = ("category", "categorical", "enum", "dictionary")
-"""What types of categories begin with, in pandas, polars and pyarrow."""
+"""Prefixes of types of categories, in pandas, polars and pyarrow."""
 
 
 def _numbers(column: Any, name: str) -> npt.NDArray[np.float64]:

@@ -67,11 +67,11 @@ class Ends:
     """Verdicts on sequences of rows. Shares are between 0 and 1."""
 
     error: float
-    """Of the names given, the share that was wrong."""
+    """Share of wrong ones among the names given."""
     undecided: float
-    """Of all sequences, the share without a verdict."""
+    """Share of all sequences without a verdict."""
     unknown: float
-    """Of all sequences, the share that was called unknown."""
+    """Share of all sequences that were called unknown."""
     mean_rows: float
     """Rows used on average."""
     fixed_rows: float | None
@@ -435,7 +435,7 @@ class SequenceRecognizer:
         return np.array([by_name.get(verdict.object or "") for verdict in verdicts], dtype=object)
 
     def __sklearn_tags__(self) -> Any:
-        """What scikit-learn asks of estimators. A verdict is on a sequence, not on a row: it is no classifier there."""
+        """Tags that scikit-learn reads from estimators. A verdict is on a sequence, not on a row: it is no classifier there."""
         utils, base = importlib.import_module("sklearn.utils"), importlib.import_module("sklearn.base")
         has_tags = hasattr(self.estimator, "__sklearn_tags__")
         inputs = base.get_tags(self.estimator).input_tags if has_tags else utils.InputTags()

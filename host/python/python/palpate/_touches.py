@@ -108,7 +108,7 @@ class TouchRecognizer:
         return float(np.mean(self.predict(X, sequence=sequence) == labels))
 
     def __sklearn_tags__(self) -> Any:
-        """What scikit-learn asks of estimators."""
+        """Tags that scikit-learn reads from estimators."""
         utils = importlib.import_module("sklearn.utils")
         return utils.Tags(
             estimator_type="classifier",

@@ -60,25 +60,25 @@ class Probe:
 
 @dataclass(frozen=True)
 class Real:
-    """What a hand and a table add to touches: to those that maps expect, and to simulated ones. Deviations are standard ones."""
+    """Noise that a hand and a table add to touches: to those that maps expect, and to simulated ones, as standard deviations."""
 
     height: float = 0.5
-    """Of each finger's height, in millimeters."""
+    """Deviation of each finger's height, in millimeters."""
     lost: float = 0.02
     """Share of contacts with the object that are lost."""
     position: float = 0.0
-    """Of the hand's position along each axis, in millimeters."""
+    """Deviation of the hand's position along each axis, in millimeters."""
     drift: float = 0.0
-    """Of the object's move along x and y in an approach, in millimeters."""
+    """Deviation of the object's move along x and y in an approach, in millimeters."""
     drift_yaw: float = 0.0
-    """Of its turn in an approach, in degrees."""
+    """Deviation of its turn in an approach, in degrees."""
     size: float = 1.0
     """Size of the objects relative to their meshes; maps expect 1."""
     bent: float = 0.0
-    """Of each fingertip's offset across the row and along it, in millimeters, the same in all approaches to an object; maps
+    """Deviation of each fingertip's offset across the row and along it, in millimeters, equal in all approaches to an object; maps
     expect none: state it as part of `position`."""
     tips: float = 0.0
-    """Of each fingertip's height, in millimeters, the same in all approaches to an object; maps expect none."""
+    """Deviation of each fingertip's height, in millimeters, equal in all approaches to an object; maps expect none."""
     table: float = 0.0
     """Height of the table in the frame that heights are stated in, in millimeters, and no deviation; maps expect 0."""
     turned: float = 0.0
@@ -120,7 +120,7 @@ class Located:
     touches: int
     """The number of touches taken in."""
     modes: tuple[Mode, ...]
-    """Where it may lie, at most four places, the most likely one first."""
+    """Possible places, at most four, the most likely one first."""
     table_alone: bool = False
     """True if no finger met more than the table so far: if the state is "unknown" or "gave-up", there is probably no object."""
 

@@ -79,9 +79,9 @@ class _Job:
     name: str
     mesh: str | Mesh = field(compare=False)
     checksums: list[str] = field(compare=False)
-    """Of the mesh as the caller read it; empty if it could not be read."""
+    """Checksums of the mesh as the caller read it; empty if it could not be read."""
     digest: str
-    """Of mesh, settings, version and target: what jobs are compared by."""
+    """Checksum of mesh, settings, version and target, by which jobs are compared."""
     options: dict[str, Any] = field(compare=False)
     part: int
     parts: int

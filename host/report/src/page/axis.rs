@@ -78,7 +78,7 @@ impl Axis {
         Self { low: 0.0, high: ticks.len().max(1) as f64, logarithmic: false, ticks, grid: false, is_names: true }
     }
 
-    /// The same upside down, or right to left.
+    /// Axis upside down, or right to left.
     pub(crate) fn reversed(mut self) -> Self {
         std::mem::swap(&mut self.low, &mut self.high);
         self
@@ -90,7 +90,7 @@ impl Axis {
         self
     }
 
-    /// The same without lines across the chart.
+    /// Axis without lines across the chart.
     pub(crate) fn without_grid(mut self) -> Self {
         self.grid = false;
         self

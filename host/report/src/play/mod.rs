@@ -127,7 +127,7 @@ fn about(model: &Model<'_>) -> Result<String> {
 /// simplified, which the page says. The same objects, models and settings give the same page.
 ///
 /// # Errors
-/// Those of [`surfaces()`]; [`CaptureProblem`] for an object whose true size is not known.
+/// Errors of [`surfaces()`]; [`CaptureProblem`] for an object whose true size is not known.
 pub fn page(objects: &[Object], contenders: &[Contender], settings: &Settings) -> Result<String> {
     let surfaces = surfaces(objects, &settings.origin)?;
     let json = data(&surfaces, contenders, settings)?;

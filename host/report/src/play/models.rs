@@ -42,7 +42,7 @@ pub struct Training {
 /// every contact, and oriented on every approach, with a plan. Three approaches are captured for each full touch.
 ///
 /// # Errors
-/// As [`capture`](fn@capture), [`train`](fn@trainer::train) and [`compile`](fn@compile).
+/// Errors of [`capture`](fn@capture), [`train`](fn@trainer::train) and [`compile`](fn@compile).
 pub fn train(objects: &[Object], training: &Training, progress: &dyn Progress) -> Result<Vec<Contender>> {
     let Training { origin, noise } = training;
     let scratch = tempfile::tempdir().map_err(|source| Error::io("a folder for touches", "create", source))?;
@@ -115,7 +115,7 @@ fn promising(
 /// that does not know all of the objects has no expected number.
 ///
 /// # Errors
-/// As [`Scene::new`], [`touches`] and [`Margins::new`]; as [`Contender::new`].
+/// Errors of [`Scene::new`], [`touches`] and [`Margins::new`]; as [`Contender::new`].
 pub fn expect(
     models: Vec<CompiledModel>,
     surfaces: &[Surface],

@@ -24,7 +24,7 @@ pub const MOST_OBJECTS: usize = 16;
 /// approaches to each object. The same objects and settings give the same page.
 ///
 /// # Errors
-/// Those of [`surfaces()`], [`in_memory`], [`learn`](fn@locate::learn) and [`write`](fn@locate::write); for noise that a table does not have.
+/// Errors of [`surfaces()`], [`in_memory`], [`learn`](fn@locate::learn) and [`write`](fn@locate::write); for noise that a table does not have.
 pub fn table(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<String> {
     let scene = Surroundings::Table { cone: 0.0 };
     let unit = Length::Millimeter;

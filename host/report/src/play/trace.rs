@@ -19,7 +19,7 @@ const ROUND: u64 = 100;
 /// evaluation's noise and a recognizer do, not as the page's game does.
 ///
 /// # Errors
-/// As [`Scene::new`] and [`touches`]; [`EvaluateProblem::TooManyObjects`].
+/// Errors of [`Scene::new`] and [`touches`]; [`EvaluateProblem::TooManyObjects`].
 pub fn trace(surfaces: &[Surface], contenders: &[Contender], settings: &Settings, rounds: u64) -> Result<String> {
     let mut text = String::new();
     for (number, surface) in surfaces.iter().enumerate() {

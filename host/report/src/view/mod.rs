@@ -68,7 +68,7 @@ const MOST_APPROACHES: u64 = 200_000;
 /// shown (the touches are those of the whole mesh). The same settings give the same page.
 ///
 /// # Errors
-/// As [`Scene::new`], [`Probe::check`] and [`placements::of_object`].
+/// Errors of [`Scene::new`], [`Probe::check`] and [`placements::of_object`].
 pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     settings.probe.check(settings.length)?;
     let facts = Facts::of(object.mesh());

@@ -35,7 +35,7 @@ pub fn read(path: &Path) -> Result<Mesh> {
 /// Memory: at most 256 bytes for each byte of the text, and 1 MB.
 ///
 /// # Errors
-/// As [`read`].
+/// Errors of [`read`].
 pub fn parse(text: impl BufRead, path: &Path) -> Result<Mesh> {
     parse_moved(text, path).map(|(mesh, _)| mesh)
 }
@@ -228,7 +228,7 @@ const FIRST: &str = "# Written by Palpate.";
 /// bit (vertices in the order in which the triangles use them).
 ///
 /// # Errors
-/// Those of `out`.
+/// Errors of `out`.
 pub fn write(mesh: &Mesh, out: &mut dyn Write) -> std::io::Result<()> {
     writeln!(out, "{FIRST}")?;
     for [x, y, z] in &mesh.vertices {

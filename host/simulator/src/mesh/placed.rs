@@ -62,7 +62,7 @@ impl Placed {
     /// The mesh of the whole scene.
     ///
     /// # Errors
-    /// As [`Mesh::usable`].
+    /// Errors of [`Mesh::usable`].
     pub(super) fn into_mesh(self) -> Result<Moved, MeshProblem> {
         let (mesh, moved) = Mesh::from_f64(&self.vertices, self.triangles);
         Ok((mesh.usable()?, moved))

@@ -116,7 +116,7 @@ impl ProbeFile {
     /// Reads the text of a probe file; errors name `path`.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// Errors of [`read`](Self::read).
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let document: Document = toml::from_str(text).map_err(|error| {
             let before = error.span().and_then(|span| text.get(..span.start));

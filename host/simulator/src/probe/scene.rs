@@ -42,7 +42,7 @@ impl Scene {
     /// rotated, and centered on the center of its box then. The z axis points up.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Errors of [`new`](Self::new).
     pub fn on_table(mesh: &Mesh, length: f64, rotation: DMat3, table: Table) -> Result<Self> {
         let mut triangles = corners(mesh)?;
         scale(&mut triangles, length)?;

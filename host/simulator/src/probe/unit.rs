@@ -11,7 +11,7 @@ pub fn tenth() -> Length {
 /// Writes the name, for serde.
 ///
 /// # Errors
-/// Those of the serializer.
+/// Errors of the serializer.
 pub fn serialize<S: Serializer>(unit: &Length, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(unit.name())
 }

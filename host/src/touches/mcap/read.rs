@@ -26,7 +26,7 @@ const LATEST: u64 = i64::MAX as u64;
 /// Reads a log from its first byte to its last, and hands on every touch and verdict in the order of the file.
 ///
 /// # Errors
-/// What `each` ends with; when the file cannot be read, is damaged or ends early, has no channel of touches, or a message on a
+/// Errors of `each`; when the file cannot be read, is damaged or ends early, has no channel of touches, or a message on a
 /// channel of touches or verdicts that is none. The byte is named at which the record, or the chunk with it, begins.
 pub fn read(mut bytes: impl Read, path: &Path, each: impl FnMut(Message) -> Result<()>) -> Result<Channels> {
     let options = LinearReaderOptions::default()

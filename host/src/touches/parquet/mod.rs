@@ -52,7 +52,7 @@ const POSITION: &str = "  OPTIONAL GROUP position (LIST) { REPEATED GROUP list {
 /// Writes touches of one object, as they come, to `file`. Either all have a position or none has one.
 ///
 /// # Errors
-/// What the touches end with, that some have a position and others have none, or that the file, called `path` in the message, cannot be written.
+/// Errors of the touches; some touches with a position and some without; a file, called `path` in the message, that cannot be written.
 pub fn write(path: &Path, file: &File, object: &str, touches: impl Iterator<Item = Result<Touch>>) -> Result<()> {
     let wrong = |error| write_error(path, error);
     let mut alike = Alike::default();

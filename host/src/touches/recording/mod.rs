@@ -232,7 +232,7 @@ impl Recording {
     /// Adds the touches of a file: all or, if one of them is wrong, none.
     ///
     /// # Errors
-    /// As [`add`](Self::add), and [`TouchesProblem::RecordedBefore`] if the same touches of the object were.
+    /// Errors of [`add`](Self::add), and [`TouchesProblem::RecordedBefore`] if the same touches of the object were.
     pub fn add_all(&mut self, touches: &[Touch]) -> Result<()> {
         let crc32 = CRC.checksum(lines(touches).as_bytes());
         let is_same = |other: &&Recorded| {

@@ -1,4 +1,4 @@
-//! The same trees in as many bytes as there is room for.
+//! Trees in as many bytes as there is room for.
 
 use super::{Compiled, Goal, Leaf, Settings, compile};
 use crate::ensemble::Ensemble;
@@ -8,7 +8,7 @@ use crate::error::{CompileProblem, Result};
 /// stored in fewer bits. Of what fits, the first is taken, so that margins are as exact as there is room for.
 ///
 /// # Errors
-/// As [`compile`], and [`CompileProblem::OverBudget`] with the fewest bytes that were found.
+/// Errors of [`compile`], and [`CompileProblem::OverBudget`] with the fewest bytes that were found.
 pub fn compile_within(ensemble: &Ensemble, settings: &Settings, most: usize) -> Result<Compiled> {
     let narrower = match settings.leaf {
         Leaf::F32 => &[Leaf::F32, Leaf::I16, Leaf::I8][..],

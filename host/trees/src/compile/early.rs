@@ -4,7 +4,7 @@
 //! which all trees that follow change any such difference, computed from their leaves. Where a margin leads by more than the
 //! bound, the sum of all trees leads there too.
 //!
-//! Where to look is chosen by the rows: every place costs a comparison of all margins, and groups of trees of its own.
+//! Rows determine where to look: every place costs a comparison of all margins, and groups of trees of its own.
 
 use super::forest::{Branch, Branches, Forest, each_leaf};
 use super::lowered::Lowered;

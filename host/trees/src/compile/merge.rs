@@ -49,7 +49,7 @@ struct Steps {
     values: Vec<i64>,
 }
 
-/// The same sums from as few trees as can be.
+/// Equal sums from as few trees as possible.
 pub(super) fn merge<'a>(forest: &Forest<'a>, leaf: LeafType, scale: &Scale) -> Merged<'a> {
     let most = match leaf {
         LeafType::I8 => 127,

@@ -35,7 +35,7 @@ impl CompiledModel {
     /// Checks a model that was read from `path`.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// Errors of [`read`](Self::read).
     pub fn from_file(path: &Path, bytes: Vec<u8>) -> Result<Self> {
         match Model::new(&bytes) {
             Ok(_) => Ok(Self { path: Some(path.into()), bytes }),
@@ -106,7 +106,7 @@ pub(super) fn open_any(bytes: &[u8]) -> Result<Model<'_>> {
 /// Opens a model of the layout code; margins are not to be asked for.
 ///
 /// # Errors
-/// As [`open`]; for a model of another layout.
+/// Errors of [`open`]; for a model of another layout.
 pub(crate) fn open_with_code(bytes: &[u8]) -> Result<Model<'_>> {
     Model::with_code(bytes, |_, _| {}).map_err(|error| CompileProblem::Model(error).into())
 }

@@ -37,7 +37,7 @@ impl Sharing {
     }
 }
 
-/// The same parts with each leaf once; as they are where they have no [`Sharing`].
+/// Parts with each leaf stored once; unchanged without a [`Sharing`].
 pub(super) fn share(mut parts: Parts, leaf: LeafType) -> Parts {
     let Some(length) = leaf_length(&parts.groups, leaf, parts.base.len()) else { return parts };
     let leaves = || parts.leaves.chunks_exact(length);

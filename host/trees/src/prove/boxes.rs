@@ -194,7 +194,7 @@ impl Keys {
 /// The ensemble's trees over keys, with the library's margins in their leaves.
 ///
 /// # Errors
-/// As [`Tree::new`].
+/// Errors of [`Tree::new`].
 pub(super) fn of_ensemble(ensemble: &Ensemble, keys: &Keys) -> Result<Vec<Tree>, ProofProblem> {
     let scale = f64::from(ensemble.prediction().scale);
     let step = |number: usize, index: usize, node: &Node| match node {

@@ -123,7 +123,7 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, C
 /// Proves a model of the layout code, whose trees are assembly that [`Compiled::sources`](compile::Compiled::sources) wrote.
 ///
 /// # Errors
-/// Those of [`prove`]; [`ProofProblem::Assembly`] for assembly that is not understood.
+/// Errors of [`prove`]; [`ProofProblem::Assembly`] for assembly that is not understood.
 pub fn prove_code(bytes: &[u8], code: &str, ensemble: &Ensemble, file: &[u8]) -> Result<(Proof, Certificate)> {
     let model = compile::open_with_code(bytes)?;
     let (plain, read) = with_code(bytes, code)?;
@@ -141,7 +141,7 @@ pub fn prove_code(bytes: &[u8], code: &str, ensemble: &Ensemble, file: &[u8]) ->
 /// Checks a certificate of a model of the layout code, from the leaves of its assembly on.
 ///
 /// # Errors
-/// As [`check`] and [`prove_code`].
+/// Errors of [`check`] and [`prove_code`].
 pub fn check_code(
     certificate: &Certificate,
     bytes: &[u8],

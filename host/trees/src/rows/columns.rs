@@ -98,7 +98,7 @@ impl Features {
 
     /// The features among the columns of a table with this header, except for the columns `others`.
     ///
-    /// Where both have names, each feature has to be one of the columns; there may be more of them, in any order. Names are
+    /// If both have names, each feature has to be one of the columns; there may be more of them, in any order. Names are
     /// equal also where one has `_` for the other one's blanks, brackets and control characters, as LightGBM writes them.
     /// `Column_3`, `f3` and `3` are no names, but numbers: they are found by them. Where one side has none, columns are taken by
     /// their position. Numbers alone are a row without a header, unless they count from 0 or are the features' own names.

@@ -166,7 +166,7 @@ impl Sequences {
     /// a number. Line 1 is the header's.
     ///
     /// # Errors
-    /// Those of [`Sequences::read`], and of the records.
+    /// Errors of [`Sequences::read`], and of the records.
     pub fn from_table(
         header: &[&str],
         records: impl Iterator<Item = Result<(u64, Vec<String>)>>,

@@ -3,7 +3,7 @@
 //!
 //! On the same bins trees of one output are those of XGBoost 1.6.2, bit for bit, and trees of all outputs those of XGBoost 3;
 //! cuts between bins are XGBoost 3's. All trees are those of hessboost 0.4, which Palpate trained with before.
-//! The same rows and parameters give the same trees on any number of threads: each sum is added up in the order of the rows.
+//! Equal rows and parameters give equal trees on any number of threads: each sum is added up in the order of the rows.
 
 mod bins;
 mod cuts;

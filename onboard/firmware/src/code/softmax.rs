@@ -15,7 +15,7 @@ unsafe extern "C" {
     pub safe fn softmax_margins(row: &[f32; 4], margins: &mut [i32; 3]);
 }
 
-/// The same function, for the bits of f32 values.
+/// This function for the bits of f32 values.
 #[allow(clashing_extern_declarations)]
 mod bits {
     // SAFETY: as above; an f32 and its bits are the same in memory.

@@ -1,1 +1,1 @@
-/* As much of ESP-IDF as the example needs, so that a compiler can check it. */
+/* Stub with as much of ESP-IDF as the example needs, so that a compiler can check it. */

@@ -29,7 +29,7 @@ pub(super) struct Arguments {
     /// The casts
     #[arg(value_name = "CASTS.csv")]
     casts: PathBuf,
-    /// Where to write; the lines [default: standard output]
+    /// Output; the lines [default: standard output]
     #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
     /// The longest side of the bounding box that the mesh is scaled to, centered at the origin

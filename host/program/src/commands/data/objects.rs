@@ -30,7 +30,7 @@ pub(super) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), files of touches with a position (TXT), directories of meshes
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
-    /// Where to write; a directory for NAME.obj of each object, NAME/INSTANCE.obj of several instances
+    /// Output; a directory for NAME.obj of each object, NAME/INSTANCE.obj of several instances
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Vary the proportions of built-in objects by up to about a fifth, with this seed

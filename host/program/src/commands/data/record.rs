@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
     /// A file of lines, a log (MCAP), - for standard input, or a chip: a serial port, tcp://HOST:PORT, or emulator
     #[arg(value_name = "SOURCE")]
     source: String,
-    /// Where to write; the data set's directory, such as recorded
+    /// Output; the data set's directory, such as recorded
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// The name of the object that was touched, such as bowl; or bowl/+z, if it lay on a table in that placement

@@ -36,7 +36,7 @@ impl RecordArguments {
     /// Opens the data set; its warnings go to stderr.
     ///
     /// # Errors
-    /// As [`Recording::open`], and when the probe file cannot be used.
+    /// Errors of [`Recording::open`], and when the probe file cannot be used.
     pub(crate) fn open(&self, directory: &Path, object: &str, source: &str, began: SystemTime) -> Result<Recording> {
         let (probe, unit) = match self.probe.read()? {
             Some(file) => (file.probe, file.unit),

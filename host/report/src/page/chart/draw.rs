@@ -186,7 +186,7 @@ fn written(text: &Text) -> String {
     format!("{tag}>{}</text>\n", content.into_string())
 }
 
-/// The same drawing shown in its natural size; the plotting library states the size that it drew in.
+/// Drawing shown in its natural size; the plotting library states the size that it drew in.
 fn with_natural_size(text: &str, width: u32, height: u32) -> String {
     let drawn = format!("<svg width=\"{}\" height=\"{}\"", width * FINE as u32, height * FINE as u32);
     text.replacen(&drawn, &format!("<svg width=\"{width}\" height=\"{height}\""), 1)

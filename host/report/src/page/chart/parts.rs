@@ -12,7 +12,7 @@ pub struct Svg {
     pub(crate) width: u32,
     /// Natural height.
     pub(crate) height: u32,
-    /// The same drawn for a phone's width, as an `<svg>` element; none where the drawing is narrow enough as it is, or
+    /// Chart drawn for a phone's width, as an `<svg>` element; none where the drawing is narrow enough as it is, or
     /// cannot be made narrower.
     pub(crate) narrow: Option<String>,
 }

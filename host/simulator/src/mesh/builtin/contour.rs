@@ -24,7 +24,7 @@ const DEPTH: u8 = 9;
 /// Meshes a form in one thread, so that the order of vertices and triangles is always the same. None if no resolution
 /// that is tried gives a closed mesh.
 ///
-/// Where two sheets pass through one cell, dual contouring may join them in an edge of four triangles. That depends on
+/// If two sheets pass through one cell, dual contouring may join them in an edge of four triangles. That depends on
 /// where the cells happen to lie, so a mesh that is not closed is made again with cells a hundredth larger.
 pub(super) fn mesh(form: &Form) -> Option<Mesh> {
     const ATTEMPTS: u8 = 12;

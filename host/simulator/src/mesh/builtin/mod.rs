@@ -92,7 +92,7 @@ pub fn varied(name: &str, seed: u64) -> Result<Object> {
 /// made.
 ///
 /// # Errors
-/// As [`varied`].
+/// Errors of [`varied`].
 pub fn instances(name: &str, count: usize, seed: u64) -> Result<Object> {
     let kind = kind(name)?;
     // A large prime: no two of the seeds that anyone gives share an instance.
@@ -147,7 +147,7 @@ const MANY_SHAPES: u64 = 7_000_000_049_000;
 /// Takes about a tenth of a second of one thread's time per object.
 ///
 /// # Errors
-/// As [`background`].
+/// Errors of [`background`].
 pub fn many(count: usize) -> Result<Vec<Object>> {
     let kinds = KINDS.len();
     let make = |number: usize| -> Result<Object> {
@@ -174,7 +174,7 @@ pub fn many(count: usize) -> Result<Vec<Object>> {
 /// The objects `names`, in that order: canonical, or with a seed [`varied`].
 ///
 /// # Errors
-/// As [`one`] and [`varied`].
+/// Errors of [`one`] and [`varied`].
 pub fn make(names: &[&str], seed: Option<u64>) -> Result<Vec<Object>> {
     let kinds = names.iter().map(|name| kind(name)).collect::<Result<Vec<_>>>()?;
     make_all(&kinds, seed)

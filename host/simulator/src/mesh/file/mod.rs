@@ -147,7 +147,7 @@ pub(super) fn chosen(path: &Path) -> Option<(PathBuf, u32)> {
 /// what they are.
 ///
 /// # Errors
-/// As [`read`]; and where a glTF file needs other files, which it cannot have.
+/// Errors of [`read`]; and where a glTF file needs other files, which it cannot have.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Contents> {
     parse_buffered(bytes, bytes.len() as u64, path, None)
 }

@@ -140,7 +140,7 @@ pub fn placements(mesh: &Mesh) -> Result<Placements> {
 /// The placements of each instance of an object, with the weights that the [object states](Object::placement_weights).
 ///
 /// # Errors
-/// As [`placements`]; [`MeshProblem::NoSuchPlacement`] for a stated name that no instance has, and
+/// Errors of [`placements`]; [`MeshProblem::NoSuchPlacement`] for a stated name that no instance has, and
 /// [`MeshProblem::NoPlacement`] if none of those of an instance has a weight above 0.
 pub fn of_object(object: &Object) -> Result<Vec<Placements>> {
     let mut all: Vec<Placements> =

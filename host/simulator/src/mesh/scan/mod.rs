@@ -113,7 +113,7 @@ struct Cloud {
 ///    *Screened Poisson Surface Reconstruction*, 2013).
 /// 3. The level is contoured by marching tetrahedra: each edge belongs to two triangles, and holes are closed.
 ///
-/// The same points give the same bytes on any number of threads. Its error is measured in `docs/measurements/scans.md`.
+/// Equal points give equal bytes on any number of threads. Its error is measured in `docs/measurements/scans.md`.
 ///
 /// # Errors
 /// [`MeshProblem::PointCount`], [`MeshProblem::NoSide`], [`MeshProblem::OnePlace`].

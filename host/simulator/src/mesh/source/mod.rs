@@ -63,7 +63,7 @@ pub struct Loaded {
 /// The objects of all `sources`, found as [`objects`](fn@objects) finds them, with notes on the search.
 ///
 /// # Errors
-/// As [`objects`](fn@objects); of several meshes all that cannot be read are named, in [`MeshProblem::Unread`].
+/// Errors of [`objects`](fn@objects); of several meshes all that cannot be read are named, in [`MeshProblem::Unread`].
 pub fn load(sources: &[String], search: Search) -> Result<Loaded> {
     let (found, note) = found(sources, search)?;
     let count = found.iter().map(Source::count).sum();
@@ -121,7 +121,7 @@ fn same(objects: &[Object]) -> Vec<String> {
 /// The only object of `source`, found as [`objects`](fn@objects) finds it.
 ///
 /// # Errors
-/// As [`objects`](fn@objects), and [`MeshProblem::SeveralObjects`].
+/// Errors of [`objects`](fn@objects), and [`MeshProblem::SeveralObjects`].
 pub fn object(source: &str) -> Result<Object> {
     let (mut found, note) = found(&[source.to_owned()], Search::default())?;
     match (found.pop(), found.len()) {
@@ -182,7 +182,7 @@ impl Source {
     /// The object itself.
     ///
     /// # Errors
-    /// As [`file::read`] and [`builtin::one`].
+    /// Errors of [`file::read`] and [`builtin::one`].
     pub fn read(self) -> Result<Object> {
         let count = self.count();
         let (object, errors) = self.read_each();
@@ -268,7 +268,7 @@ fn one_unit(instances: &mut [Instance], units: &[Option<f64>]) -> (Option<f64>, 
 /// as [`objects`](fn@objects) finds it.
 ///
 /// # Errors
-/// As [`objects`](fn@objects).
+/// Errors of [`objects`](fn@objects).
 pub fn objects_of_instances(sources: &[String]) -> Result<Vec<Object>> {
     load(sources, Search { instances: true, ..Search::default() }).map(|loaded| loaded.objects)
 }

@@ -36,7 +36,7 @@ fn bytes_of(count: u32) -> u64 {
 /// Reads the mesh of an STL file of `length` bytes, with remarks on the file; errors name `path`.
 ///
 /// # Errors
-/// Where the number of triangles is not the one that the file states, a word or a number of a text is not what must stand
+/// If the number of triangles is not the one that the file states, a word or a number of a text is not what must stand
 /// there, a coordinate is not finite, or no face is left.
 pub(super) fn parse(mut reader: impl BufRead, length: u64, path: &Path) -> Result<(Moved, Vec<String>)> {
     let head = reader.fill_buf().map_err(|source| Error::io(path, "read the mesh", source))?;

@@ -1,6 +1,6 @@
 //! Discs that bound the surface in the boxes of a fine mesh more closely than the boxes do.
 //!
-//! Where triangles are small compared with the sphere, the surface in a box is nearly flat, and mostly oblique: the box's
+//! If triangles are small compared with the sphere, the surface in a box is nearly flat, and mostly oblique: the box's
 //! corners stand out of it, toward the sphere. A disc about the box's center, perpendicular to the surface's mean normal
 //! and only a little thicker than the surface is bent, excludes boxes that the sphere passes close to without touching.
 

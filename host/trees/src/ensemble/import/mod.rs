@@ -59,7 +59,7 @@ impl Ensemble {
     /// Reads an ensemble as [`load`](Self::load) does, with facts that the file does not state.
     ///
     /// # Errors
-    /// As [`load`](Self::load); [`EnsembleProblem::Names`] if there are other names than outputs;
+    /// Errors of [`load`](Self::load); [`EnsembleProblem::Names`] if there are other names than outputs;
     /// [`EnsembleProblem::Unsupported`] for a missing value of an ensemble that is not over rows.
     pub fn load_with(path: impl AsRef<Path>, options: &Options<'_>) -> Result<Self> {
         let path = path.as_ref();

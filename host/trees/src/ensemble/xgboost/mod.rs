@@ -1,10 +1,10 @@
 //! Ensembles as files: XGBoost's JSON model schema.
 //!
-//! What is written opens in XGBoost 2 and later (one-output ensembles in 1.x too) and predicts the same margins there,
+//! A written model opens in XGBoost 2 and later (one-output ensembles in 1.x too) and predicts the same margins there,
 //! bit for bit. XGBoost's two layouts of a leaf that holds one value for each object stand side by side: `base_weights`
 //! indexed by node (2.x to 3.1) and `leaf_weights` indexed by leaf, with the leaf's number in `right_children` (later).
 //!
-//! What XGBoost does not know are attributes of the learner, which it keeps:
+//! Statements that XGBoost does not know are attributes of the learner, which it keeps:
 //!
 //! | attribute | value |
 //! |---|---|
@@ -14,7 +14,7 @@
 //! | `palpate_prediction` | optional: what the library that trained an ensemble over rows makes of margins, and which numbers stand for a missing value there, a JSON object |
 //! | `palpate_…` | others are kept as they are: [`Provenance::attributes`](super::Provenance::attributes) |
 //!
-//! What is read is checked as a whole before any of it is used: see [`Ensemble::load`]. UBJSON holds the same.
+//! A file is checked as a whole before any of it is used: see [`Ensemble::load`]. UBJSON holds the same.
 
 mod objective;
 mod outputs;
