@@ -34,6 +34,23 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! A model of another library, over rows of features:
+//!
+//! ```
+//! use palpate_onboard::{Model, f32_key, include_model};
+//!
+//! # macro_rules! model { () => { concat!(env!("CARGO_MANIFEST_DIR"), "/../models/household.palpate") } }
+//! # /*
+//! let model = Model::new(include_model!("wine.palpate"))?;
+//! # */
+//! # let model = Model::new(include_model!(model!()))?;
+//! let row = [13.2, 1.8, f32::NAN].map(f32_key); // NaN where a value is missing
+//! let mut margins = [0; 10]; // room for one number per class
+//! let class = model.predict_class(&row, &mut margins);
+//! # assert!(class.is_some());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! | module or item | what |
 //! |---|---|
 //! | [`effector`] | edges of three switches to touches |
@@ -98,6 +115,7 @@ pub use layouts::batch::Batch;
 pub use model::Code;
 pub use model::{Model, Refused, inverse_link, predicted_value};
 pub use palpate_shared as shared;
+pub use palpate_shared::format::f32_key;
 
 /// `palpate.h`, which reads the same models in C99 and gives the same bits: for programs that write it beside a model. No
 /// chip has it in flash unless it uses it.
