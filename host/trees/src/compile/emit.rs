@@ -175,7 +175,7 @@ fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<(&Pro
     format!(
         "/* {about}\n * Written by `palpate export`; not to be edited. */\n\
          #ifndef {guard}\n#define {guard}\n\n\
-         /* What of palpate.h this model needs. For several models in one file: define these before including the first. */\n\
+         /* Parts of palpate.h that this model needs. For several models in one file: define these before including the first. */\n\
          #ifndef PALPATE_LAYOUTS\n#define PALPATE_LAYOUTS PALPATE_{layout}\n#endif\n\
          #ifndef PALPATE_LEAVES\n#define PALPATE_LEAVES PALPATE_{leaf}\n#endif\n\
          #ifndef PALPATE_STRANGERS\n#define PALPATE_STRANGERS {strangers}\n#endif\n\

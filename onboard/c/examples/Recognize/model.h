@@ -3,7 +3,7 @@
 #ifndef MODEL_MODEL_H
 #define MODEL_MODEL_H
 
-/* What of palpate.h this model needs. For several models in one file: define these before including the first. */
+/* Parts of palpate.h that this model needs. For several models in one file: define these before including the first. */
 #ifndef PALPATE_LAYOUTS
 #define PALPATE_LAYOUTS PALPATE_COMPLETE
 #endif
