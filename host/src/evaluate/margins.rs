@@ -279,7 +279,8 @@ impl<'m> Margins<'m> {
         let has_weight = |output: &usize| weights.get(*output).is_some_and(|&weight| weight > 0);
         let is_there = |tested: &Tested<'_>| tested.outputs.iter().any(has_weight);
         if weights.len() != objects || !self.tested.iter().any(is_there) {
-            let allowed = format!("{objects} weights, one for each object, and above 0 for one object of the data set or more");
+            let allowed =
+                format!("{objects} weights, one for each object, and above 0 for one object of the data set or more");
             return Err(Error::setting("prior", format!("{weights:?}"), allowed));
         }
         let kept: Vec<bool> = self.tested.iter().map(is_there).collect();
