@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 /// The promise in words: its rate, its cases, and the meaning of its confidence.
 pub(super) fn promised(rate: f64, per: Per, cases: &str, confidence: f64) -> String {
     format!(
-        "Promised: at most {} % of {} wrong{cases}, with a confidence of {} %: of all calibrations, those included that promise \
+        "Promised: at most {} % of {} wrong{cases}, with a confidence of {} %: of all calibrations, including those that promise \
          nothing, at most {} % promise what does not hold.\n",
         super::percent(rate),
         of_what(per),

@@ -740,7 +740,7 @@ fn a_promise_for_groups_says_when_none_are_given_and_copies_are_noted() {
     );
     assert!(
         text.contains(
-            "of all calibrations, those included that promise nothing, at most 5 % promise what does not hold"
+            "of all calibrations, including those that promise nothing, at most 5 % promise what does not hold"
         ),
         "{text}"
     );
