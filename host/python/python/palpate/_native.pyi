@@ -743,7 +743,7 @@ def train(data: DataSet, *, preset: str = "compact", descriptor: str | None = No
     method); other arguments replace parts of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
     `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
     approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
-    Of objects on a table each placement is an output, or with `outputs` "objects" each object.
+    With objects on a table each placement is an output, or with `outputs` "objects" each object.
     `background` is a data set of many other shapes, which stand for everything that the model does not know.
     `different_leaves` grows trees for little flash: their leaves share at most this many leaf vectors. A new threshold has
     to reduce the mean loss of a touch by `threshold_cost` nats (2e-5 by default).
