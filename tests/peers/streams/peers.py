@@ -147,15 +147,17 @@ def methods() -> dict[str, Any]:
 def main() -> None:
     warnings.filterwarnings("ignore")
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("sets", nargs="*", default=SETS, choices=SETS)
+    parser.add_argument("sets", nargs="*", metavar="SET", help=f"of {', '.join(SETS)}; all by default")
     parser.add_argument("--splits", type=int, default=4)
     parser.add_argument("--rate", type=float, default=0.1)
     parser.add_argument("--program", default="palpate", help="the program palpate, for instructions")
     arguments = parser.parse_args()
+    if unknown := set(arguments.sets) - set(SETS):
+        parser.error(f"{', '.join(sorted(unknown))}: not one of {', '.join(SETS)}")
     columns = ["accuracy", "earliness", "harmonic", "wrong", "undecided", "bytes", "instructions"]
     print(f"| set | method | {' | '.join(columns)} | above {arguments.rate:.0%} | refused |")
     print("|---|---|" + "---|" * (len(columns) + 2))
-    for name in arguments.sets:
+    for name in arguments.sets or SETS:
         xs, y = series(name)
         longest = max(x.shape[1] for x in xs)
         data = ([windows(x, longest) for x in xs], y)
