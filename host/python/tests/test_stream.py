@@ -321,3 +321,23 @@ def test_folds_leave_all_other_sequences_to_the_test_and_estimate_where_nothing_
     assert "promise" not in ends.raw and abs(ends.error - estimated.estimated_.error) < 0.08, (ends, estimated.estimated_)
     with pytest.raises(palpate.SettingError, match="folds is 1"):
         palpate.SequenceRecognizer(estimators()[2], folds=1).fit(X, y, sequence=sequence)
+
+
+def test_a_class_with_few_sequences_is_in_every_fold_or_named() -> None:
+    X, y, sequence, _ = streams(160, 1)
+    rare = np.isin(sequence, [5, 8])
+    few = np.where(rare, "rare", y)
+    codes = np.unique(few, return_inverse=True)[1]
+    own = palpate.SequenceRecognizer(estimators()[0], error_rate=0.3, folds=5, promise=False)
+    for seed in range(5):
+        assert own.set_params(seed=seed).fit(X, codes, sequence=sequence).estimated_.sequences == 160
+    alone = np.where(sequence == 5, "rare", y)
+    with pytest.raises(palpate.InputError, match="a fold has all sequences of a class"):
+        palpate.SequenceRecognizer(estimators()[2], folds=5, promise=False).fit(X, alone, sequence=sequence)
+    errors = []
+    for seed in range(8):
+        try:
+            palpate.SequenceRecognizer(estimators()[2], error_rate=0.3, seed=seed).fit(X, alone, sequence=sequence)
+        except palpate.InputError as error:
+            errors.append(str(error))
+    assert any(error.startswith("no sequence of rare is among those to train on") for error in errors), errors

@@ -303,8 +303,12 @@ class SequenceRecognizer:
             raise SettingError("folds is given with a classifier that is fitted. Give one that folds of the sequences can train.")
         if fitted is None:
             train = self._train(units) if self.promise else calibrated
+            if missing := sorted(set(_texts(labels)) - set(_texts(labels[train]))):
+                raise InputError(
+                    f"no sequence of {', '.join(missing)} is among those to train on. Record more of each class, or use a larger train_share."
+                )
             fitted = _clone(self.estimator).fit(take(known, train), labels[train])
-            folds = self._folded(table, known, labels, ids, owners, train, fitted)
+            folds = self._folded(table, known, labels, ids, owners, train)
             calibrated = ~train
         self.estimator_ = fitted
         model = self._compiled(fitted, table)
@@ -365,23 +369,26 @@ class SequenceRecognizer:
         ids: npt.NDArray[Any],
         owners: npt.NDArray[Any] | None,
         train: npt.NDArray[np.bool_],
-        fitted: Any,
     ) -> list[Any] | None:
         """Folds of the training, whole sequences or groups, each with the model of the others."""
         if self.folds is None and self.promise:
             return None
-        names = np.unique((ids if owners is None else owners)[train])
+        units = ids if owners is None else owners
+        names, first = np.unique(units[train], return_index=True)
         count = 5 if self.folds is None else self.folds
         if not 2 <= count <= len(names):
             raise SettingError(f"folds is {count}. Use at least 2, and at most as many as sequences or groups are trained on: {len(names)}.")
-        np.random.default_rng(self.seed).shuffle(names)
+        # Dealt class by class, so that no fold takes all sequences of a class that has several.
+        order = np.random.default_rng(self.seed).permutation(len(names))
+        classes = np.unique(labels[train][first], return_inverse=True)[1]
+        names = names[order[np.argsort(classes[order], kind="stable")]]
         folds = []
-        for names_of_fold in np.array_split(names, count):
-            own = train & np.isin(ids if owners is None else owners, names_of_fold)
+        for start in range(count):
+            own = train & np.isin(units, names[start::count])
             others = train & ~own
-            classifier = _clone(self.estimator).fit(take(known, others), labels[others])
-            if list(classifier.classes_) != list(fitted.classes_):
+            if set(_texts(labels[others])) != set(_texts(labels[train])):
                 raise InputError("a fold has all sequences of a class. Record more of each class, or use fewer folds.")
+            classifier = _clone(self.estimator).fit(take(known, others), labels[others])
             model = self._compiled(classifier, table)
             rows = rows_of(Recognizer(model), take(table, own))
             groups = None if owners is None else _texts(owners[own])
