@@ -14,7 +14,7 @@ pub(super) fn text(program: &Program, name: &str, file: &str, checksum: u32) -> 
         if real { "f32 values, NaN where one is missing" } else { "whole numbers, `i32::MIN` where one is missing" };
     let bits = if real {
         format!(
-            "\n/// The same function, for the bits of f32 values.\n\
+            "\n/// This function for the bits of f32 values.\n\
              #[allow(clashing_extern_declarations)]\n\
              mod bits {{\n    \
              // SAFETY: as above; an f32 and its bits are the same in memory.\n    \
