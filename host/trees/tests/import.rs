@@ -763,7 +763,7 @@ fn best_for(goal: Goal, candidates: &[compile::Candidate]) -> compile::Candidate
     let is_exact = candidates.iter().any(|candidate| candidate.margin_error == 0.0);
     let mut of = candidates.to_vec();
     of.retain(|candidate| !is_exact || candidate.margin_error == 0.0);
-    let least = of.iter().min_by_key(|candidate| (candidate.bytes, candidate.instructions.m4f)).unwrap().clone();
+    let least = *of.iter().min_by_key(|candidate| (candidate.bytes, candidate.instructions.m4f)).unwrap();
     let order = |candidate: &compile::Candidate| {
         let (bytes, instructions) = (candidate.bytes as f64, candidate.instructions.m4f as f64);
         match goal {
