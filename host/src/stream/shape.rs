@@ -2,7 +2,7 @@
 
 use super::Rows;
 use crate::calibrate::{Gain, Lead, Odds, Sequence, odds_of};
-use crate::compile::{self, Restated, restate};
+use crate::compile::{Restated, restate};
 use crate::error::Result;
 use crate::evidence::totals;
 #[cfg(feature = "train")]
@@ -383,7 +383,7 @@ pub(super) fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Resul
     let restated = Restated { max_touches: Some(max_rows), sections, ..Restated::default() };
     let shaped = restate(model, &restated)?;
     #[cfg(feature = "train")]
-    let shaped = strangers::without(&compile::open(&shaped)?)?;
+    let shaped = strangers::without(&crate::compile::open(&shaped)?)?;
     Ok(shaped)
 }
 
