@@ -251,7 +251,7 @@ pub fn refuse_input<P: AsRef<Path>>(output: &Path, inputs: impl IntoIterator<Ite
 /// [`refuse_foreign`] does.
 ///
 /// # Errors
-/// Errors of these.
+/// Errors of both.
 pub fn admit<P: AsRef<Path>>(output: &Path, inputs: impl IntoIterator<Item = P>) -> Result<()> {
     refuse_input(output, inputs)?;
     refuse_foreign(output)

@@ -98,7 +98,7 @@ pub struct Tested {
     pub alarms: usize,
     /// Touches used on average in these sequences.
     pub mean_touches: f64,
-    /// Outcome without a test.
+    /// Touches used on average without a test.
     pub mean_touches_without: f64,
     /// For each known object the share of its sequences that are detected after 30, 60 and 120 touches when the model
     /// does not use its column: an estimate of what happens to strangers.

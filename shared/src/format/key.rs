@@ -2,8 +2,8 @@
 
 use crate::MISSING_FEATURE;
 
-/// An integer that stands to the keys of other values as `value` stands to those values: `a < b` in f32 is exactly
-/// `f32_key(a) < f32_key(b)`, with -0 equal to +0; NaN is a missing value.
+/// Integer key of a feature's value, as models compare it: `f32_key(a) < f32_key(b)` exactly if `a < b`. -0 has the key of +0,
+/// and NaN the key of a missing value, [`MISSING_FEATURE`].
 ///
 /// Cost: a few instructions, none of them in floating point. Cannot fail.
 pub const fn f32_key(value: f32) -> i32 {

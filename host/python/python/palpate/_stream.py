@@ -303,9 +303,9 @@ class SequenceRecognizer:
             raise SettingError("folds is given with a classifier that is fitted. Give one that folds of the sequences can train.")
         if fitted is None:
             train = self._train(units) if self.promise else calibrated
-            if missing := sorted(set(_texts(labels)) - set(_texts(labels[train]))):
+            if len(missing := np.setdiff1d(labels, labels[train])):
                 raise InputError(
-                    f"no sequence of {', '.join(missing)} is among those to train on. Record more of each class, or use a larger train_share."
+                    f"no sequence of {', '.join(_texts(missing))} is among those to train on. Record more of each class, or use a larger train_share."
                 )
             fitted = _clone(self.estimator).fit(take(known, train), labels[train])
             folds = self._folded(table, known, labels, ids, owners, train)
@@ -386,7 +386,7 @@ class SequenceRecognizer:
         for start in range(count):
             own = train & np.isin(units, names[start::count])
             others = train & ~own
-            if set(_texts(labels[others])) != set(_texts(labels[train])):
+            if len(np.setdiff1d(labels[train], labels[others])):
                 raise InputError("a fold has all sequences of a class. Record more of each class, or use fewer folds.")
             classifier = _clone(self.estimator).fit(take(known, others), labels[others])
             model = self._compiled(classifier, table)

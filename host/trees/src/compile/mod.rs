@@ -319,7 +319,8 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
     };
     let instructions =
         |candidate: &Candidate, core: Core| candidate.instructions.on(core).unwrap_or(candidate.instructions.m4f);
-    let (_, smallest) = eligible().min_by_key(|(_, candidate)| (candidate.bytes, candidate.instructions.m4f))?;
+    let (at_smallest, smallest) =
+        eligible().min_by_key(|(_, candidate)| (candidate.bytes, candidate.instructions.m4f))?;
     let pays = |candidate: &Candidate, core: Core| {
         let is_twice_as_fast = 2 * instructions(candidate, core) <= instructions(smallest, core);
         candidate.bytes <= if is_twice_as_fast { 3 } else { 2 } * smallest.bytes
@@ -328,7 +329,7 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
         u128::from(instructions(candidate, core)).pow(4).saturating_mul(candidate.bytes as u128)
     };
     let best = match goal {
-        Goal::Size => eligible().min_by_key(|(_, candidate)| (candidate.bytes, candidate.instructions.m4f)),
+        Goal::Size => Some((at_smallest, smallest)),
         Goal::Speed => eligible().min_by_key(|(_, candidate)| (candidate.instructions.m4f, candidate.bytes)),
         Goal::Balanced(core) => eligible()
             .filter(|(_, candidate)| pays(candidate, core))

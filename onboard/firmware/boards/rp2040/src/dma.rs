@@ -4,19 +4,17 @@
 //! A channel writes what arrives into a ring and never ends. The edge of a start bit wakes the chip, which then looks every
 //! two milliseconds until the line is quiet.
 
-use crate::shared::{Uart, with};
+use crate::shared::{Uart, WAITING, with};
 use core::sync::atomic::{AtomicU8, Ordering, fence};
 use hal::dma::{CH0, CH1, Channel, DMAExt, SingleChannel};
 use hal::pac::{self, interrupt};
 use rp2040_hal as hal;
 
-/// Bytes that may wait for the main loop: everything that a host sends without an answer, 8 commands and a question.
-const WAITING: usize = 2048;
 /// Microseconds between two looks at a line that is not quiet.
 const LOOK: u32 = 2_000;
-/// The UART's requests for a transfer, by the data sheet's numbers.
+/// Request of the UART for a byte to send, by the data sheet's number.
 const SEND: u8 = 20;
-/// See [`SEND`].
+/// Request of the UART to take a byte that it has received.
 const RECEIVE: u8 = 21;
 /// The falling edge of GP1, in the registers of the first eight pins' interrupts.
 const EDGE: u32 = 1 << 6;

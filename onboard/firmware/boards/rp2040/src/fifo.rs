@@ -1,13 +1,10 @@
 //! The UART with an interrupt: its FIFO of 32 bytes holds 2.8 ms.
 
-use crate::shared::{Uart, Wires, with};
+use crate::shared::{Uart, WAITING, Wires, with};
 use hal::pac::{self, UART0, interrupt};
 use hal::uart::{Reader, Writer};
 use heapless::Deque;
 use rp2040_hal as hal;
-
-/// Bytes that may wait for the main loop: everything that a host sends without an answer, 8 commands and a question.
-const WAITING: usize = 2048;
 
 /// Bytes that have come.
 pub struct Line {

@@ -26,6 +26,9 @@ pub type Wires = (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, P
 /// The UART on them.
 pub type Uart = UartPeripheral<Enabled, UART0, Wires>;
 
+/// Bytes that may wait for the main loop: everything that a host sends without an answer, 8 commands and a question.
+pub const WAITING: usize = 2048;
+
 /// The chip's microsecond timer.
 #[derive(Clone, Copy)]
 struct Micros(Timer);
