@@ -763,15 +763,14 @@ fn best_for(goal: Goal, candidates: &[compile::Candidate]) -> compile::Candidate
     let is_exact = candidates.iter().any(|candidate| candidate.margin_error == 0.0);
     let mut of = candidates.to_vec();
     of.retain(|candidate| !is_exact || candidate.margin_error == 0.0);
-    let least = *of.iter().min_by_key(|candidate| (candidate.bytes, candidate.instructions.m4f)).unwrap();
+    let least = of.iter().map(|candidate| candidate.bytes).min().unwrap();
     let order = |candidate: &compile::Candidate| {
         let (bytes, instructions) = (candidate.bytes as f64, candidate.instructions.m4f as f64);
         match goal {
             Goal::Size => (bytes, instructions),
             Goal::Speed => (instructions, bytes),
             Goal::Balanced(_) => {
-                let [bytes_of_least, of_least] = [least.bytes as f64, least.instructions.m4f as f64];
-                let is_out = bytes > if instructions <= of_least / 2.0 { 3.0 } else { 2.0 } * bytes_of_least;
+                let is_out = candidate.bytes > 3 * least;
                 (if is_out { f64::MAX } else { bytes.ln() + 4.0 * instructions.ln() }, bytes)
             }
         }

@@ -159,8 +159,8 @@ impl Default for Settings {
 /// Goal of the choice of a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Goal {
-    /// The least bytes × instructions⁴, so that half the bytes are worth a fifth more instructions. A layout of more than twice
-    /// the bytes of the smallest has to take at most half of its instructions, and none of more than three times is taken.
+    /// The least bytes × instructions⁴ of those layouts that have at most three times the bytes of the smallest: half the bytes are
+    /// worth a fifth more instructions.
     Balanced(Core),
     /// The fewest instructions.
     Speed,
@@ -321,10 +321,6 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
         |candidate: &Candidate, core: Core| candidate.instructions.on(core).unwrap_or(candidate.instructions.m4f);
     let (at_smallest, smallest) =
         eligible().min_by_key(|(_, candidate)| (candidate.bytes, candidate.instructions.m4f))?;
-    let pays = |candidate: &Candidate, core: Core| {
-        let is_twice_as_fast = 2 * instructions(candidate, core) <= instructions(smallest, core);
-        candidate.bytes <= if is_twice_as_fast { 3 } else { 2 } * smallest.bytes
-    };
     let cost = |candidate: &Candidate, core: Core| {
         u128::from(instructions(candidate, core)).pow(4).saturating_mul(candidate.bytes as u128)
     };
@@ -332,7 +328,7 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
         Goal::Size => Some((at_smallest, smallest)),
         Goal::Speed => eligible().min_by_key(|(_, candidate)| (candidate.instructions.m4f, candidate.bytes)),
         Goal::Balanced(core) => eligible()
-            .filter(|(_, candidate)| pays(candidate, core))
+            .filter(|(_, candidate)| candidate.bytes <= 3 * smallest.bytes)
             .min_by_key(|(_, candidate)| (cost(candidate, core), candidate.bytes)),
     };
     best.map(|(index, _)| index)
