@@ -102,6 +102,8 @@ mod model;
 pub mod station;
 
 pub use bytes::{Aligned, ModelError};
+#[cfg(feature = "sequences")]
+pub use decide::Ongoing;
 pub use decide::{
     CapacityError, Familiarity, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, RowsSeen,
     Stopping, Verdict,

@@ -60,6 +60,11 @@ pub struct Plain<'a> {
     position: Option<(usize, i32)>,
     guard: &'a [u8],
     is_real: bool,
+    /// Of a stream of events the background, the hold-off and the memory; of its rows so far the class that holds, and the rows
+    /// until the next verdict.
+    events: Option<(Option<usize>, u32, i64)>,
+    ongoing: Option<usize>,
+    silent: u32,
     rows: u32,
     same: Vec<(i32, u32)>,
     /// Places where a class may be known: the groups before, and the lead.
@@ -136,6 +141,7 @@ impl<'a> Plain<'a> {
         let (mut exits, mut last_of_ties, mut background) = (Vec::new(), false, false);
         let (mut together, mut position, mut guard): (_, _, &[u8]) = (Vec::new(), None, &[]);
         let features = usize::from(bytes[15]) + 1;
+        let mut events = None;
         // What a model without the section touches was trained on.
         let (mut patterns, mut needs_pose, mut largest) = (0b10_0000, matches!(descriptor, 2 | 3 | 5 | 6), u32::MAX);
         while !optional.is_empty() {
@@ -157,6 +163,10 @@ impl<'a> Plain<'a> {
                 18 => together = content[4..][..4 * objects].chunks(4).map(|output| output[0]).collect(),
                 21 => position = Some((content[0].into(), signed(&content[4..8]))),
                 22 => guard = &content[..12 * features],
+                23 => {
+                    let background = (content[1] == 1).then_some(content[0].into());
+                    events = Some((background, number(&content[4..8]) as u32, signed(&content[8..12]).into()));
+                }
                 14 => sentinel = Some((signed(&content[..4]), signed(&content[4..8]))),
                 _ => {}
             }
@@ -190,6 +200,9 @@ impl<'a> Plain<'a> {
             position,
             guard,
             is_real: bytes[13] == 1,
+            events,
+            ongoing: None,
+            silent: 0,
             rows: 0,
             same: vec![(0, 0); features],
             exits,
@@ -208,6 +221,7 @@ impl<'a> Plain<'a> {
     pub fn reset(&mut self) {
         self.evidence = self.priors.iter().map(|&prior| prior.into()).collect();
         (self.touches, self.decision, self.rows) = (0, Decision::Undecided, 0);
+        (self.ongoing, self.silent) = (None, 0);
     }
 
     /// All features of the next row of a sequence, from those that are measured, or the first one that the guard refuses.
@@ -444,22 +458,47 @@ impl<'a> Plain<'a> {
 
     /// Counts the margins of a touch.
     pub fn count(&mut self, margins: &[i32]) {
+        if let Some((background, hold_off, memory)) = self.events {
+            let most = *self.evidence.iter().max().expect("an object");
+            self.evidence.iter_mut().for_each(|evidence| *evidence = (*evidence - most).max(-memory));
+            self.add(margins);
+            self.decision = Decision::Undecided;
+            self.silent = self.silent.saturating_sub(1);
+            let leader = self.leader();
+            let is_sure = self.rivals(1 << 16) <= self.odds_of(leader).into();
+            let (is_other, is_background) = (self.ongoing != Some(leader), background == Some(leader));
+            if is_sure && is_other && (is_background || self.silent == 0) {
+                self.ongoing = Some(leader);
+                if !is_background {
+                    (self.silent, self.decision) = (hold_off, Decision::Recognized(leader, self.touches));
+                }
+            }
+            return;
+        }
         if self.decision != Decision::Undecided {
             return;
         }
+        self.add(margins);
+        let (leader, rivals) =
+            if self.together.is_empty() { (self.leader(), Some(self.rivals(1 << 16))) } else { self.leading() };
+        if rivals.is_some_and(|rivals| rivals <= u128::from(self.odds_of(leader))) {
+            self.decision = Decision::Recognized(leader, self.touches);
+        } else if self.touches >= self.limit {
+            self.decision = Decision::GaveUp;
+        }
+    }
+
+    /// Adds the margins of a touch, or their evidence.
+    fn add(&mut self, margins: &[i32]) {
         for (evidence, &margin) in self.evidence.iter_mut().zip(margins) {
             let margin = self.row.map_or(margin, |table| of_row(table, margin));
             *evidence = evidence.saturating_add(margin.into());
         }
         self.touches += 1;
-        let (leader, rivals) =
-            if self.together.is_empty() { (self.leader(), Some(self.rivals(1 << 16))) } else { self.leading() };
-        let odds = self.odds_by_object.get(leader).copied().unwrap_or(self.odds);
-        if rivals.is_some_and(|rivals| rivals <= u128::from(odds)) {
-            self.decision = Decision::Recognized(leader, self.touches);
-        } else if self.touches >= self.limit {
-            self.decision = Decision::GaveUp;
-        }
+    }
+
+    fn odds_of(&self, object: usize) -> u64 {
+        self.odds_by_object.get(object).copied().unwrap_or(self.odds)
     }
 
     /// The object with the most evidence.

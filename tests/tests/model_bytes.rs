@@ -4,7 +4,7 @@ use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::with;
 use palpate_onboard::{Batch, Model, ModelError, Recognizer, RowsSeen, Stopping};
 use palpate_shared::format::{
-    Counted, HEADER_LENGTH, Limits, MUST_UNDERSTAND, Position, RAW_FEATURES, Tag, Trained, TrainedNoise,
+    Counted, Events, HEADER_LENGTH, Limits, MUST_UNDERSTAND, Position, RAW_FEATURES, Tag, Trained, TrainedNoise,
     TrainedTouches, checksum,
 };
 use palpate_shared::{Descriptor, Patterns};
@@ -48,14 +48,25 @@ fn models() -> Vec<Vec<u8>> {
     models
 }
 
-/// A model over rows that are numbered and guarded.
+/// A model over rows that are numbered and guarded, and whose verdicts go on.
 fn sequences() -> Vec<u8> {
     let rows = abuse::changed(&models()[0], 12, &[RAW_FEATURES]);
     let features = usize::from(rows[15]) + 1;
     let guard = Limits { low: -9, high: 1 << 20, may_miss: true, most_equal: 2 }.to_bytes().repeat(features);
     let must = |tag: Tag, content: &[u8]| section(tag.code() | MUST_UNDERSTAND, content);
     let position = Position { feature: 0, step: 1 << 29 }.to_bytes();
-    with_sections(&rows, &[must(Tag::Position, &position), must(Tag::Guard, &guard)].concat())
+    let events = Events {
+        background: Some(1),
+        hold_off: 2,
+        memory: i32::MAX,
+        rows_per_hour: f32::NAN,
+        per_hour: f32::NAN,
+        confidence: f32::NAN,
+        grace: u32::MAX,
+        longest: 0,
+    };
+    let events = must(Tag::Events, &events.to_bytes());
+    with_sections(&rows, &[must(Tag::Position, &position), must(Tag::Guard, &guard), events].concat())
 }
 
 /// Walks a model with touches that reach all over it.

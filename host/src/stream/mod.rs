@@ -26,6 +26,7 @@ mod background;
 mod calibrate;
 mod copies;
 mod evaluate;
+mod events;
 mod folds;
 mod follow;
 mod guard;
@@ -39,6 +40,9 @@ mod tests;
 
 pub use calibrate::{calibrate, calibrate_with};
 pub use evaluate::{Comparison, Evaluated, Grown, Point, PromiseOfSequences, Switched, Wanted, evaluate};
+pub use events::{
+    EventCounts, EventSettings, EventsCalibrated, EventsEvaluated, RowRule, calibrate_events, evaluate_events,
+};
 pub use folds::{Estimated, Learned, estimate};
 pub use guard::{GUARD_MARGIN, GUARD_RUN};
 pub use settings::Settings;

@@ -94,7 +94,7 @@ impl Table {
     /// The table with which a softmax of a row's evidence explains the classes best: the least mean of −log of the right
     /// class's share, classes and sequences weighing the same. Values rise; where no margin is they stay the same. None if
     /// all margins are equal.
-    fn fit(rows: &Rows<'_>, sequences: &[&RowSequence]) -> Option<Self> {
+    pub(super) fn fit(rows: &Rows<'_>, sequences: &[&RowSequence]) -> Option<Self> {
         let objects = rows.objects;
         let cases = cases(rows, sequences);
         let mut all: Vec<i32> = cases.iter().flat_map(|case| rows.row(case.row).iter().copied()).collect();
@@ -379,6 +379,7 @@ pub(super) fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Resul
         (Tag::ThresholdsByObject, None),
         (Tag::Promise, None),
         (Tag::Temperature, None),
+        (Tag::Events, None),
     ];
     let restated = Restated { max_touches: Some(max_rows), sections, ..Restated::default() };
     let shaped = restate(model, &restated)?;

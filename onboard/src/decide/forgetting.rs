@@ -124,6 +124,10 @@ impl<const N: usize> Recognizer<'_, N> {
 
     /// Takes in evidence, and forgets: margins, or their evidence by the model's table.
     fn add_forgetting(&mut self, margins: &[i32; N], forgetting: &mut Forgetting<N>) -> Verdict {
+        // Events are forgotten by the model's own memory.
+        if self.model().events().is_some() {
+            return self.add(margins);
+        }
         if self.verdict() != Verdict::Undecided {
             return self.verdict();
         }

@@ -1,6 +1,8 @@
 //! Margins to a verdict: evidence, when to stop, what fits no object, and the state as bytes.
 
 mod approach;
+#[cfg(feature = "sequences")]
+mod events;
 mod evidence;
 mod expected;
 mod forgetting;
@@ -13,6 +15,8 @@ mod strangers;
 mod together;
 
 pub use approach::Proposal;
+#[cfg(feature = "sequences")]
+pub use events::Ongoing;
 pub use evidence::{Posterior, Rivals};
 pub use expected::NothingExpected;
 pub use forgetting::Forgetting;

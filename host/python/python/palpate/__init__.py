@@ -19,7 +19,17 @@ from ._evaluate import Evaluation, Parity, Sequential, evaluate, parity
 from ._import import compile, to_ensemble
 from ._locate import CalibratedMaps, MapsEvaluation
 from ._native import DataSet, Ensemble, Locator, Maps, Model, Recognizer, Shape, Surface, capture, train
-from ._stream import Calibrated, Ends, Estimated, SequenceRecognizer, calibrate, evaluate_sequences
+from ._stream import (
+    Calibrated,
+    Ends,
+    Estimated,
+    Events,
+    SequenceRecognizer,
+    calibrate,
+    calibrate_events,
+    evaluate_events,
+    evaluate_sequences,
+)
 from ._touches import TouchRecognizer
 from ._types import Located, Meshes, Mode, Probe, Progress, Real, Touch, Verdict
 
@@ -32,6 +42,7 @@ __all__ = [
     "Ends",
     "Ensemble",
     "Estimated",
+    "Events",
     "Evaluation",
     "FileError",
     "InputError",
@@ -58,9 +69,11 @@ __all__ = [
     "TouchRecognizer",
     "Verdict",
     "calibrate",
+    "calibrate_events",
     "capture",
     "compile",
     "evaluate",
+    "evaluate_events",
     "evaluate_sequences",
     "parity",
     "to_ensemble",

@@ -162,57 +162,6 @@ fn a_build_without_xgboost_says_how_to_get_it() {
     assert!(error.exit_code() == 2 && error.to_string().contains("--features xgboost"), "{error}");
 }
 
-/// The trainers compared; shown as ignored where XGBoost is not built in.
-mod xgboost {
-    use super::*;
-    use crate::evaluate::{Candidate, Margins};
-
-    /// Ensembles of both trainers from the same touches.
-    fn both(dataset: &Dataset, settings: &Settings) -> [Ensemble; 2] {
-        [Engine::Palpate, Engine::Xgboost]
-            .map(|trainer| train(dataset, &Settings { trainer, threads: Some(1), ..settings.clone() }, &()).unwrap())
-    }
-
-    #[test]
-    #[cfg_attr(not(feature = "xgboost"), ignore = "needs XGBoost: cargo test -p palpate --features xgboost")]
-    fn both_trainers_make_the_same_trees_bit_for_bit_over_the_same_bins() {
-        // So few different values leave nothing to the quantile sketch, which XGBoost changed after 1.6.
-        let settings = Settings { rounds: 30, feature_bins: Some(vec![40; 3]), ..Settings::paper() };
-        for counts in [[2_000, 2_000, 2_000], [2_000, 500, 1_000]] {
-            let mut dataset = synthetic::dataset(&counts, 10);
-            // XGBoost 1.6 has no threshold that tells a missing value from all others; ours has.
-            dataset.objects.iter_mut().for_each(|object| *object = object.filtered(Touch::is_full));
-            let [ours, theirs] = both(&dataset, &settings);
-            assert_eq!(ours, theirs);
-            eprintln!("{counts:?}: {} trees alike, bit for bit", ours.trees.len());
-        }
-    }
-
-    #[test]
-    #[cfg_attr(not(feature = "xgboost"), ignore = "needs XGBoost: cargo test -p palpate --features xgboost")]
-    fn both_trainers_are_as_accurate_with_the_published_method() {
-        let unseen = synthetic::dataset(&[2_000, 2_000, 2_000], 11);
-        for counts in [[6_000, 6_000, 6_000], [6_000, 2_000, 3_000]] {
-            let [ours, theirs] = both(&synthetic::dataset(&counts, 10), &Settings { rounds: 30, ..Settings::paper() })
-                .map(|ensemble| {
-                    let margins = Margins::new(Candidate::Full(&ensemble), &unseen).unwrap();
-                    margins.curve(10, 1_000, 1).unwrap().accuracy(10).value
-                });
-            eprintln!("{counts:?}: accuracy at 10 touches {ours:.3} with ours, {theirs:.3} with XGBoost");
-            // Bins at other values: other thresholds, and a percent or so either way.
-            assert!((ours - theirs).abs() < 0.02, "{ours} {theirs}");
-        }
-    }
-
-    #[test]
-    #[cfg_attr(not(feature = "xgboost"), ignore = "needs XGBoost: cargo test -p palpate --features xgboost")]
-    fn xgboost_refuses_multi_output_trees() {
-        let settings = Settings { trainer: Engine::Xgboost, ..quick() };
-        let error = train(&synthetic::dataset(&[50, 50], 12), &settings, &()).unwrap_err();
-        assert!(error.exit_code() == 2 && error.to_string().contains("leaves is each. Use one"), "{error}");
-    }
-}
-
 #[test]
 fn rounded_leaves_compile_without_any_error_and_add_up_exactly_in_f32() {
     let dataset = synthetic::dataset(&[300, 300, 300], 1);

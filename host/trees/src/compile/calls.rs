@@ -17,9 +17,9 @@ pub(super) struct Calls<'a> {
     pub(super) code: Option<&'a Program>,
 }
 
-/// True if the model numbers the rows of a sequence, or states which of them it takes.
+/// True if the model numbers the rows of a sequence, states which of them it takes, or goes on after a verdict.
 pub(super) fn has_sequences(model: &Model<'_>) -> bool {
-    model.position().is_some() || model.guard().is_some()
+    model.position().is_some() || model.guard().is_some() || model.events().is_some()
 }
 
 /// Start of the header's parts, and of its pieces with an address of their own.
@@ -72,7 +72,7 @@ impl Calls<'_> {
         let (name, bytes) = (self.name, self.model.bytes());
         let Places { parts, cuts } = Places::of(bytes);
         let at = |place: usize| format!("{name}_model + {place}");
-        let mut found: [Option<usize>; 23] = [None; 23];
+        let mut found: [Option<usize>; 24] = [None; 24];
         let (mut place, mut exits_end, mut row, mut known) = (parts[1], 0, (0, 0), self.model.object_count());
         // Without a section of what was trained: all times, of any spread, and directions if the descriptor has them.
         let mut trained = (0x20, u8::from(self.is_oriented()), u32::MAX);
@@ -99,7 +99,7 @@ impl Calls<'_> {
             "/* The model as palpate_open leaves it: its bytes were checked when it was exported. */\n\
              static const palpate_model {name}_opened_ = {{\n    {name}_model,\n    {{{parts}}},\n    \
              {cuts}, {odds}, {strangers}, {table}, {sentinel}, {weights}, {rows}, {start}, {most}u,\n\
-             #if PALPATE_SEQUENCES\n    {position}, {guard},\n#endif\n\
+             #if PALPATE_SEQUENCES\n    {position}, {guard}, {events},\n#endif\n\
              #if PALPATE_OUTPUTS\n    {outputs},\n#endif\n#if PALPATE_EARLY\n    {exits}, {ends},\n#endif\n    \
              0, {spread}u, {objects}, {known}, {features}, {layout}, {leaf}, {descriptor}, {real}, {patterns}, {oriented}\n\
              #if PALPATE_LAYOUTS & PALPATE_CODE\n    , {code}\n#endif\n}};\n\n",
@@ -115,6 +115,7 @@ impl Calls<'_> {
             most = row.1,
             position = pointer(21, 0),
             guard = pointer(22, 0),
+            events = pointer(23, 0),
             outputs = pointer(18, 0),
             exits = pointer(17, 0),
             ends = found[17].map_or_else(|| "NULL".into(), |_| at(exits_end)),
@@ -263,7 +264,7 @@ impl Calls<'_> {
         )
     }
 
-    /// Functions of a model that numbers the rows of a sequence, or states which of them it takes.
+    /// Functions of a model that numbers the rows of a sequence, states which of them it takes, or goes on after a verdict.
     fn of_sequences(&self) -> String {
         let (name, features) = (self.name, self.model.feature_count());
         let (row, missing) = self.row();
@@ -297,14 +298,22 @@ impl Calls<'_> {
             ),
             false => ("", format!("    (void)palpate_next_row(&{name}_opened_, {argument}, keys);\n"), ""),
         };
+        let answer = match self.model.events() {
+            None => format!(
+                "the number of the object that is recognized; -1 while none is, -2 if none fits, -3 at the limit of steps{refused}. After a \
+                 decision nothing changes until {name}_begin."
+            ),
+            Some(_) => format!(
+                "the number of an event's class in the row after which it is sure, and -1 in all others{refused}. \
+                 {name}_begin begins another recording; state->ongoing is the class that holds."
+            ),
+        };
         let rows = if is_guarded { "" } else { "    uint32_t rows = palpate_rows_(state);\n" };
         text + &format!(
             "/* Begins a sequence: nothing was added yet. {OWN} */\n\
              static inline void {name}_begin(palpate_recognizer *state{seen})\n{{\n    \
              palpate_start_(state, &{name}_opened_);\n{begin}}}\n\n\
-             /* Adds a row of {measured} features{number} {missing} where one is missing: the number of the object that is recognized; \
-             -1 while none is, -2 if none fits, -3 at the limit of steps{refused}. After a decision nothing changes until \
-             {name}_begin. {OWN} */\n\
+             /* Adds a row of {measured} features{number} {missing} where one is missing: {answer} {OWN} */\n\
              static inline int {name}_push(palpate_recognizer *state{seen}, const {row} *row)\n{{\n    int32_t keys[{features}];\n\
              {rows}    int i;\n    for (i = 0; i < {features}; i++) {{\n        keys[i] = {value};\n    }}\n{push}    \
              (void)palpate_push_features(state, keys, {features});\n    return palpate_decided_(state);\n}}\n\n\

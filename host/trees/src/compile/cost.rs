@@ -144,7 +144,7 @@ pub fn features(model: &Model<'_>) -> Vec<&'static str> {
         "sentinel" => model.sentinel().is_some(),
         "strangers" => model.strangers().is_some(),
         "row-evidence" => model.row_evidence().is_some() || model.weight_of(u32::MAX) != Weights::ONE,
-        "sequences" => model.position().is_some() || model.guard().is_some(),
+        "sequences" => super::calls::has_sequences(model),
         "outputs" => model.outputs().is_some(),
         _ => name == model.layout().name() || name.strip_suffix("-leaves") == Some(leaf.name()),
     };

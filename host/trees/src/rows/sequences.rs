@@ -42,6 +42,8 @@ pub struct SequenceColumns<'c> {
     pub sequence: &'c str,
     /// The group that the sequence belongs to, such as a person or a machine.
     pub group: Option<&'c str>,
+    /// True if the class may change within a sequence: see [`SequencesBuilder::by_run`].
+    pub by_run: bool,
 }
 
 /// Statements of a row beside its features.
@@ -65,12 +67,20 @@ pub struct SequencesBuilder {
     groups: HashMap<String, usize>,
     /// Name and label of the last sequence.
     last: Option<[String; 2]>,
+    by_run: bool,
 }
 
 impl SequencesBuilder {
     /// For rows of this many features, and these classes.
     pub fn new(features: usize, classes: &[String]) -> Self {
         Self { classes: classes.to_vec(), built: Sequences { features, ..Sequences::default() }, ..Self::default() }
+    }
+
+    /// The same where the class may change within a sequence: each run of rows with one class becomes a sequence, and the group of
+    /// a run is the sequence that it is of.
+    #[must_use]
+    pub fn by_run(self) -> Self {
+        Self { by_run: true, ..self }
     }
 
     /// Takes in a row; `values` are as many as there are features.
@@ -84,10 +94,11 @@ impl SequencesBuilder {
                 return Err(RowsProblem::Nameless { what });
             }
         }
+        let row = if self.by_run { RowOf { group: Some(row.sequence), ..row } } else { row };
         let number = self.built.len() + 1;
         let group = row.group.unwrap_or_default();
         match &self.last {
-            Some([sequence, label]) if sequence == row.sequence => {
+            Some([sequence, label]) if sequence == row.sequence && !(self.by_run && label != row.label) => {
                 if label != row.label {
                     let labels = [label.clone(), row.label.into()];
                     return Err(RowsProblem::TwoLabels { sequence: row.sequence.into(), labels });
@@ -101,7 +112,8 @@ impl SequencesBuilder {
             }
             _ => {
                 let count = self.built.sequences.len();
-                if self.seen.insert(row.sequence.into(), count).is_some() {
+                let goes_on = self.last.as_ref().is_some_and(|[sequence, _]| sequence == row.sequence);
+                if self.seen.insert(row.sequence.into(), count).is_some() && !goes_on {
                     return Err(RowsProblem::ComesBack { sequence: row.sequence.into() });
                 }
                 let class = class(&self.classes, row.label).ok_or_else(|| RowsProblem::Label {
@@ -184,7 +196,8 @@ impl Sequences {
         let others: Vec<usize> = [sequence].into_iter().chain(label).chain(group).collect();
         let features = features.into();
         let matched = features.among(header, &others).map_err(|problem| Error::at(place(1), problem))?;
-        let mut builder = SequencesBuilder::new(features.count(), classes);
+        let builder = SequencesBuilder::new(features.count(), classes);
+        let mut builder = if names.by_run { builder.by_run() } else { builder };
         let mut values = vec![0.0; features.count()];
         for record in records {
             let (line, record) = record?;
@@ -217,7 +230,8 @@ impl Sequences {
 mod tests {
     use super::*;
 
-    const COLUMNS: SequenceColumns<'_> = SequenceColumns { label: Some("kind"), sequence: "id", group: Some("who") };
+    const COLUMNS: SequenceColumns<'_> =
+        SequenceColumns { label: Some("kind"), sequence: "id", group: Some("who"), by_run: false };
 
     fn read(text: &str, columns: &SequenceColumns<'_>) -> Result<Sequences, String> {
         let file = tempfile::NamedTempFile::new().unwrap();
@@ -273,6 +287,20 @@ mod tests {
             let complaint = read(text, columns).unwrap_err();
             assert!(complaint.starts_with(expected), "{complaint}");
         }
+    }
+
+    #[test]
+    fn runs_of_a_label_are_sequences_of_their_recording() {
+        let text = "id,a,b,kind\n7,1,2,cup\n7,3,4,cup\n7,5,6,jug\n7,7,8,cup\nx,9,0,cup\n";
+        let columns = SequenceColumns { group: None, by_run: true, ..COLUMNS };
+        let read_all = read(text, &columns).unwrap();
+        let of = |rows, class, group| RowSequence { rows, class, group: Some(group) };
+        assert_eq!(read_all.sequences, [of(0..2, 0, 0), of(2..3, 1, 0), of(3..4, 0, 0), of(4..5, 0, 1)]);
+        assert_eq!(read_all.groups, ["7", "x"]);
+        let complaint = read("id,a,b,kind\n1,1,2,cup\n2,1,2,jug\n1,1,2,jug\n", &columns).unwrap_err();
+        assert!(complaint.starts_with(":4: the sequence \"1\" comes back after another"), "{complaint}");
+        let complaint = read("id,a,b,kind\n1,1,2,cup\n1,1,2,pan\n", &columns).unwrap_err();
+        assert!(complaint.starts_with(":3: the label \"pan\" in row 2 is none of"), "{complaint}");
     }
 
     #[test]
