@@ -298,7 +298,7 @@ fn the_vectors_have_every_layout_leaf_descriptor_and_verdict() {
     assert_eq!(of("refused"), BTreeSet::from(["features", "pattern", "pose", "spread"]));
     let guarded: Vec<&str> = of("guarded").into_iter().collect();
     assert_eq!(guarded, ["1", "3", "4"]);
-    assert!(VECTORS.len() < 530_000, "{} bytes", VECTORS.len());
+    assert!(VECTORS.len() < 545_000, "{} bytes", VECTORS.len());
 }
 
 #[test]

@@ -200,16 +200,8 @@ pub(crate) fn calibrate_events(
         })
         .transpose()?;
     let rows = sequences_of(opened, &rows, Some(&labels), &recording, None, true)?;
-    let settings = with!(
-        EventSettings::default(),
-        background,
-        rows_per_second,
-        false_per_hour,
-        hold_off,
-        grace,
-        confidence,
-        seed
-    );
+    let settings =
+        with!(EventSettings::default(), background, rows_per_second, false_per_hour, hold_off, grace, confidence, seed);
     let calibrated =
         long(py, progress.as_ref(), |progress| stream::calibrate_events(opened, &rows, &settings, progress))?;
     let text = json(&calibrated);

@@ -13,7 +13,7 @@
 //! tested recording decides on the evidence, the memory, the fraction, the length or the order of the thresholds.
 
 use super::Rows;
-use super::shape::Table;
+use super::shape::{STRICTEST, Table};
 use crate::calibrate::{margin_of, odds_of};
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Error, Result, RowsProblem};
@@ -35,8 +35,8 @@ use serde::Serialize;
 const LEARNED: usize = 4;
 /// Memories that are tried, in nats.
 const MEMORIES: [f64; 6] = [3.0, 5.0, 8.0, 12.0, 18.0, 27.0];
-/// Between two thresholds, in nats.
-const STEP: f64 = 0.1;
+/// Number of thresholds, evenly spaced by their logarithms.
+const STEPS: u32 = 200;
 /// The loosest threshold, in nats.
 const LOOSEST: f64 = 0.1;
 /// A table of evidence is kept if it finds this share of an event more, or finds it as much earlier.
@@ -326,17 +326,15 @@ fn tallies(recordings: &[Recording], led: &[Vec<Led>], events: &Events, margin: 
     recordings.iter().zip(led).map(of).collect()
 }
 
-/// Thresholds from strict to loose, in nats.
-fn thresholds(memory: f64) -> impl Iterator<Item = f64> {
-    let steps = ((memory - LOOSEST) / STEP) as u32;
-    (0..=steps).map(move |step| memory - STEP * f64::from(step))
+/// Thresholds from strict to loose, in nats: a row may add to the memory.
+fn thresholds() -> impl Iterator<Item = f64> {
+    (0..STEPS).map(|step| STRICTEST * (LOOSEST / STRICTEST).powf(f64::from(step) / f64::from(STEPS - 1)))
 }
 
 /// A model with events, and how they are recognized.
 struct Shaped {
     bytes: Vec<u8>,
     events: Events,
-    memory: f64,
     table: bool,
 }
 
@@ -354,17 +352,18 @@ impl Shaped {
             (Tag::Events, Some((true, events.to_bytes().to_vec()))),
         ];
         let bytes = restate(model, &Restated { sections, ..Restated::default() })?;
-        Ok(Self { bytes, events, memory, table: table.is_some() })
+        Ok(Self { bytes, events, table: table.is_some() })
     }
 
-    /// The best score of thresholds with which these recordings keep the rate, and that threshold. If none keeps it, its
+    /// The best score of thresholds with which these recordings keep a rate per hour, and that threshold. If none keeps it, its
     /// score is below 0.
-    fn best(&self, rows: &Rows<'_>, recordings: &[Recording]) -> Result<(f64, f64)> {
+    fn best(&self, rows: &Rows<'_>, recordings: &[Recording], rate: f64) -> Result<(f64, f64)> {
         let led = led(&compile::open(&self.bytes)?, rows, recordings);
-        let mut best = (f64::NEG_INFINITY, self.memory);
-        for margin in thresholds(self.memory) {
+        let mut best = (f64::NEG_INFINITY, STRICTEST);
+        let allowed = Events { per_hour: rate as f32, ..self.events };
+        for margin in thresholds() {
             let tallies = tallies(recordings, &led, &self.events, margin);
-            let over = loss(&tallies, &self.events);
+            let over = loss(&tallies, &allowed);
             let own = if over > 0.0 { -over } else { score(&tallies) };
             if own > best.0 {
                 best = (own, margin);
@@ -375,15 +374,15 @@ impl Shaped {
 }
 
 /// The evidence and the memory with which learned recordings are recognized best. A table is fitted to the first half of
-/// them and compared on the other.
-fn shape(model: &Model<'_>, rows: &Rows<'_>, learned: &[Recording], stated: Events) -> Result<Shaped> {
+/// them and compared on the other, at the `rate` per hour that the test will tolerate.
+fn shape(model: &Model<'_>, rows: &Rows<'_>, learned: &[Recording], stated: Events, rate: f64) -> Result<Shaped> {
     let (fitted, compared) = learned.split_at(learned.len() / 2);
     let fit = |recordings: &[Recording]| Table::fit(rows, &recordings.iter().flatten().collect::<Vec<_>>());
     let table = fit(fitted);
     let best_of = |table: Option<&Table>| -> Result<(f64, f64)> {
         let mut best = (f64::NEG_INFINITY, MEMORIES[0]);
         for memory in MEMORIES {
-            let (score, _) = Shaped::new(model, table, memory, stated)?.best(rows, compared)?;
+            let (score, _) = Shaped::new(model, table, memory, stated)?.best(rows, compared, rate)?;
             if score > best.0 {
                 best = (score, memory);
             }
@@ -463,17 +462,19 @@ pub fn calibrate_events(
         return Err(too_few().into());
     }
     let (learned, tested) = (&*learned, &*tested);
-    let shaped = shape(model, &rows, learned, stated)?;
-    let Shaped { bytes, events, memory, table } = &shaped;
+    // With small losses a bet of the fraction wins enough if about so many verdicts fewer than those allowed are false.
+    let tolerated = (settings.false_per_hour - enough / largest / hours).max(0.0);
+    let shaped = shape(model, &rows, learned, stated, tolerated)?;
+    let Shaped { bytes, events, table } = &shaped;
     let open = compile::open(bytes)?;
-    let (_, margin) = shaped.best(&rows, learned)?;
+    let (_, margin) = shaped.best(&rows, learned, tolerated)?;
     let losses = |tallies: &[Tallied]| -> Vec<f64> { tallies.iter().map(|one| one.loss(events)).collect() };
     let learned_led = led(&open, &rows, learned);
     let fraction = fraction(&losses(&tallies(learned, &learned_led, events, margin)), most);
     let led = led(&open, &rows, tested);
     let mut kept = None;
     let mut failed = None;
-    for margin in thresholds(*memory) {
+    for margin in thresholds() {
         let tallies = tallies(tested, &led, events, margin);
         let won: f64 = losses(&tallies).iter().map(|loss| (-fraction * loss).ln_1p()).sum();
         if won < enough {

@@ -114,9 +114,7 @@ fn a_tuned_model_has_an_output_for_each_placement() {
     let dataset = touched(1, 1_500);
     let settings =
         tune::Settings { descriptor: Descriptor::Gravity, max_bytes: Some(24 << 10), groups: 60, ..Default::default() };
-    // Threads of its own: a worker that waits takes up other tests' work, and its stack does not hold many of them.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).stack_size(16 << 20).build().unwrap();
-    let tuned = pool.install(|| tune::tune(&dataset, &settings, &())).unwrap();
+    let tuned = tune::tune(&dataset, &settings, &()).unwrap();
     assert_eq!(tuned.ensemble.objects, dataset.placement_shares().into_keys().collect::<Vec<_>>());
     let model = compile::open(&tuned.model).unwrap();
     assert_eq!(model.outputs().unwrap().most(), 2);

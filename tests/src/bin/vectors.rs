@@ -396,9 +396,9 @@ fn events(text: &mut String) {
         longest: 3_000,
     };
     for (name, background, memory, hold_off, rate) in
-        [("events between a background", Some(0), 4.0, 3, 0.2), ("events without a background", None, 6.0, 1, 0.02)]
+        [("events between a background", Some(0), 4.0, 2, 0.3), ("events without a background", None, 6.0, 1, 0.1)]
     {
-        let shape = Shape { leaf: 0.7, ..SHAPE };
+        let shape = Shape { leaf: 3.0, ..SHAPE };
         let settings = with!(Settings::default(), leaf = Leaf::I8, error_rate = rate);
         let bytes = compile(&imported(random::ensemble(shape, 31), 5), &settings).expect("it fits").bytes;
         let memory = (memory / Model::new(&bytes).expect("a model").unit()) as i32;

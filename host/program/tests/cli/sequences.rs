@@ -228,3 +228,117 @@ fn numbers_of_rows_and_guards_are_refused_where_there_is_no_such_feature_or_no_s
     assert!(stderr(calibrate(&model, &["--label", "kind"]), 2).contains("--sequence-column"));
     assert!(!Path::new(&output).exists());
 }
+
+/// Recordings of 100 rows: `low` between events of `middle` and `high`.
+fn recordings(count: usize, mut state: u64) -> String {
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut text = "id,kind,x\n".to_owned();
+    for id in 0..count {
+        for (class, name) in [(0.0, "low"), (3.0, "high"), (0.0, "low"), (1.5, "middle"), (0.0, "low")] {
+            for _ in 0..20 {
+                let noise = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+                writeln!(text, "{id},{name},{:.5}", class + noise).unwrap();
+            }
+        }
+    }
+    text
+}
+
+/// Trees whose margins are the log-densities of the classes, in steps.
+fn classes_of_recordings(place: &Place) -> String {
+    let cuts: Vec<f64> = (-12..=18).map(|step| f64::from(step) * 0.25).collect();
+    let leaf = |x: f64| Node::Leaf([0.0, 1.5, 3.0].map(|at: f64| (-0.5 * (x - at).powi(2)) as f32).to_vec());
+    let mut nodes = Vec::new();
+    for cut in &cuts {
+        let here = nodes.len();
+        let threshold = *cut as f32;
+        nodes.push(Node::Split { feature: 0, threshold, missing_left: true, left: here + 1, right: here + 2 });
+        nodes.push(leaf(cut - 0.125));
+    }
+    nodes.push(leaf(cuts[cuts.len() - 1] + 0.125));
+    let ensemble = Ensemble {
+        inputs: Inputs::Rows(vec!["x".into()]),
+        objects: ["low", "middle", "high"].map(String::from).to_vec(),
+        base_margins: vec![0.0; 3],
+        trees: vec![Tree { nodes, output: Output::Each }],
+        origin: Provenance::default(),
+    };
+    let (path, model) = (place.path("steps.json"), place.path("steps"));
+    ensemble.save(&path).unwrap();
+    stdout(run(["export", &path, "-o", &model]));
+    model
+}
+
+#[test]
+fn verdicts_go_on_through_recordings_of_events_at_a_promised_rate_and_as_evaluate_counts_them() {
+    let place = Place::new();
+    let (model, sure) = (classes_of_recordings(&place), place.path("events"));
+    let [known, unseen] = [(240, 1), (100, 2)].map(|(count, seed)| {
+        let path = place.path(&format!("recordings{seed}.csv"));
+        std::fs::write(&path, recordings(count, seed)).unwrap();
+        path
+    });
+    let events = ["--events", "low", "--rows-per-second", "10", "--false-per-hour", "120", "--hold-off", "1.5"];
+    let calibrate = [&["calibrate", &model, &known, "-o", &sure][..], &COLUMNS, &events].concat();
+    let text = stdout(run(calibrate.clone()));
+    assert!(
+        text.contains("Promised: at most 120 false or repeated verdicts per hour, with a probability of 95 %"),
+        "{text}"
+    );
+    assert!(text.contains("in the first 10.0 s of a recording") && text.contains("180 recordings"), "{text}");
+    let found = json(run([&["evaluate", &sure, &unseen, "--json"][..], &COLUMNS].concat()));
+    let number = |key: &str| found[key].as_f64().unwrap();
+    assert_eq!([number("recordings"), number("events"), number("too_long")], [100.0, 200.0, 0.0]);
+    assert!(number("named") > 150.0 && number("mean_delay") < 1.5 && found["finding"] == "kept", "{found}");
+    let text = stdout(run([&["evaluate", &sure, &unseen][..], &COLUMNS].concat()));
+    assert!(
+        text.contains("promised: at most 120 per hour") && text.contains("as few false by a majority of "),
+        "{text}"
+    );
+    assert!(text.contains("as few false by debouncing of "), "{text}");
+    let said =
+        stdout(run(["recognize", &sure, &unseen, "--features", "--add-up", "--sequence-column", "id", "--json"]));
+    let verdicts: Vec<Value> = lines(&said).into_iter().filter(|line| line["verdict"] == "recognized").collect();
+    assert_eq!(verdicts.len() as f64, number("named") + number("false") + number("repeated"));
+    assert!(verdicts.iter().all(|line| line["class"] != "low"));
+    let inspected = json(run(["inspect", &sure, "--json"]));
+    assert_eq!(inspected["events"]["background"], "low");
+    assert_eq!([&inspected["events"]["hold_off"], &inspected["events"]["grace"]], [1.5, 1.0]);
+    let text = stdout(run(["inspect", &sure]));
+    assert!(text.contains("between low, at 10.0 rows per second; 1.5 s from one verdict to the next"), "{text}");
+    // The same seed gives the same bytes.
+    let first = std::fs::read(&sure).unwrap();
+    stdout(run(calibrate));
+    assert_eq!(std::fs::read(&sure).unwrap(), first);
+}
+
+#[test]
+fn what_is_wrong_with_recordings_of_events_is_said_and_nothing_is_written() {
+    let place = Place::new();
+    let (model, sure, rows) = (classes_of_recordings(&place), place.path("events"), place.path("recordings.csv"));
+    std::fs::write(&rows, recordings(20, 1)).unwrap();
+    let calibrate =
+        |options: &[&str]| run([&["calibrate", &model, &rows, "-o", &sure][..], &COLUMNS, options].concat());
+    let message = stderr(calibrate(&["--events", "low", "--rows-per-second", "10"]), 1);
+    assert!(
+        message.contains("20 recordings")
+            && message.contains("are too few to promise 1 false verdicts per hour: about "),
+        "{message}"
+    );
+    let message = stderr(calibrate(&["--events", "none", "--rows-per-second", "10"]), 2);
+    assert!(message.contains("a class of the model: low, middle, high"), "{message}");
+    let message = stderr(calibrate(&["--events", "low", "--rows-per-second", "0"]), 2);
+    assert!(message.contains("rows_per_second"), "{message}");
+    for options in
+        [&["--events", "low"][..], &["--hold-off", "1"], &["--events", "low", "--rows-per-second", "9", "--guard"]]
+    {
+        stderr(calibrate(options), 2);
+    }
+    assert!(!Path::new(&sure).exists());
+    // Sequences have one label, unless they are recordings of events.
+    let message = stderr(calibrate(&[]), 1);
+    assert!(message.contains("has the labels"), "{message}");
+}
