@@ -60,8 +60,8 @@ pub struct Plain<'a> {
     position: Option<(usize, i32)>,
     guard: &'a [u8],
     is_real: bool,
-    /// Of a stream of events the background, the hold-off and the memory; of its rows so far the class that holds, and the rows
-    /// until the next verdict.
+    /// Background, hold-off and memory of a stream of events; the class that holds after the rows so far, and the rows until the
+    /// next verdict.
     events: Option<(Option<usize>, u32, i64)>,
     ongoing: Option<usize>,
     silent: u32,

@@ -113,7 +113,7 @@ pub enum CalibrateProblem {
         groups: bool,
     },
     /// There are too few recordings of events for a promise, even without a false verdict.
-    #[error("{found} recordings, of which {hours:.2} h are tested, are too few to promise {per_hour} false verdicts per hour: {} none of them false; the hold-off allows {most} verdicts in a recording", about(*needed))]
+    #[error("{found} recordings ({hours:.2} h of them tested) are too few to promise {per_hour} false verdicts per hour: {} none of them false; the hold-off allows {most} verdicts in a recording", about(*needed))]
     TooFewRecordings {
         /// Recordings.
         found: u64,

@@ -114,7 +114,7 @@ fn check_range(name: &'static str, value: f64, least: f64, most: f64) -> Result<
         return Ok(());
     }
     let least = if least > 0.0 { "above 0".into() } else { format!("at least {least}") };
-    Err(Error::setting(name, value, &format!("{least} and at most {most}")))
+    Err(Error::setting(name, value, format!("{least} and at most {most}")))
 }
 
 /// Verdicts on recordings, held against their events.
@@ -199,6 +199,9 @@ pub struct EventsEvaluated {
 /// A row's leader, and the weights of the others.
 type Led = (u8, u64);
 
+/// The class that a rule says after each row, and whether it is sure.
+type Said = Vec<(u8, bool)>;
+
 /// Verdicts on one recording.
 #[derive(Clone, Debug, Default)]
 struct Tallied {
@@ -206,7 +209,7 @@ struct Tallied {
     events: usize,
     wrong: usize,
     repeated: usize,
-    /// Of each event with a verdict the rows up to it, and those in which it counts.
+    /// For each event with a verdict, the rows up to it, and the rows in which a verdict counts.
     delays: Vec<(usize, usize)>,
 }
 
@@ -543,7 +546,7 @@ pub fn evaluate_events(model: &Model<'_>, sequences: &Sequences) -> Result<Event
             rows.map(|margins| class(margins, model.known_count())).collect()
         })
         .collect();
-    let as_few = |rule: fn(&[u8], usize) -> Vec<(u8, bool)>| {
+    let as_few = |rule: fn(&[u8], usize) -> Said| {
         let allowed = counted.wrong + counted.repeated;
         let of = |rows: usize| {
             let one = |(runs, classes): (&Recording, &Vec<u8>)| tally(runs, &events, rule(classes, rows).into_iter());
@@ -576,7 +579,7 @@ fn class(margins: &[i32], known: usize) -> u8 {
 }
 
 /// The class of most of the last rows, sure if it is that of more than half of them.
-fn majority(classes: &[u8], rows: usize) -> Vec<(u8, bool)> {
+fn majority(classes: &[u8], rows: usize) -> Said {
     let mut votes = [0_usize; 256];
     let said = classes.iter().enumerate().map(|(at, class)| {
         votes[usize::from(*class)] += 1;
@@ -590,7 +593,7 @@ fn majority(classes: &[u8], rows: usize) -> Vec<(u8, bool)> {
 }
 
 /// The class of a row, sure if it is that of all the last rows.
-fn debounced(classes: &[u8], rows: usize) -> Vec<(u8, bool)> {
+fn debounced(classes: &[u8], rows: usize) -> Said {
     let (mut last, mut run) = (None, 0);
     let said = classes.iter().map(|class| {
         run = if last == Some(*class) { run + 1 } else { 1 };
@@ -686,9 +689,8 @@ mod tests {
     #[test]
     fn rules_over_rows_are_sure_of_more_than_half_of_the_last_rows_or_of_equal_ones() {
         let classes = [1, 1, 2, 1, 2, 2, 2];
-        let sure = |said: Vec<(u8, bool)>| -> Vec<Option<u8>> {
-            said.iter().map(|(class, sure)| sure.then_some(*class)).collect()
-        };
+        let sure =
+            |said: Said| -> Vec<Option<u8>> { said.iter().map(|(class, sure)| sure.then_some(*class)).collect() };
         let [one, two] = [Some(1), Some(2)];
         assert_eq!(sure(majority(&classes, 3)), [None, one, one, one, two, two, two]);
         assert_eq!(sure(debounced(&classes, 2)), [None, one, None, None, None, two, two]);

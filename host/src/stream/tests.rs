@@ -791,14 +791,14 @@ fn drawn_recordings(all: &Sequences, count: usize, seed: u64) -> Sequences {
 }
 
 fn event_settings(seed: u64) -> EventSettings {
-    crate::with!(
-        EventSettings::default(),
-        background = Some(0),
-        rows_per_second = 10.0,
-        false_per_hour = 60.0,
-        hold_off = 3.0,
-        seed
-    )
+    EventSettings {
+        background: Some(0),
+        rows_per_second: 10.0,
+        false_per_hour: 60.0,
+        hold_off: 3.0,
+        seed,
+        ..EventSettings::default()
+    }
 }
 
 /// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::events -- --nocapture` repeats it as often.

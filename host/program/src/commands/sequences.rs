@@ -71,7 +71,7 @@ impl EventArguments {
         let names = known(model);
         let background = if class.is_empty() { None } else { names.iter().position(|name| name == class) };
         if background.is_none() && !class.is_empty() {
-            return Err(Error::setting("events", class, &format!("a class of the model: {}", names.join(", "))));
+            return Err(Error::setting("events", class, format!("a class of the model: {}", names.join(", "))));
         }
         let &Self { false_per_hour, hold_off, grace, .. } = self;
         let settings = EventSettings::default();

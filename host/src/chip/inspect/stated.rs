@@ -388,7 +388,7 @@ pub(super) fn plan(model: &Model<'_>) -> Option<PlanOf> {
     Some(PlanOf { rolls: poses.rolls(), poses: poses.count(), left_out })
 }
 
-/// How verdicts go on through a stream of rows, and what is promised of them.
+/// Events in a stream of rows, and the promise about their verdicts.
 pub(super) fn events(model: &Model<'_>) -> Option<OfEvents> {
     let events = model.events()?;
     let seconds = |rows: u32| f64::from(rows) * 3600.0 / f64::from(events.rows_per_hour);
