@@ -36,8 +36,7 @@ Examples:
   palpate calibrate model.palpate posed -o planned.palpate --plan 4
   palpate calibrate maps.palpate --objects meshes/ -o sure.palpate
   palpate calibrate maps.palpate --recorded stays/ -o sure.palpate
-  palpate calibrate a.palpate a.csv --label a --sequence-column id -o b.palpate
-  palpate calibrate a.palpate a.csv --label a --sequence-column id --events idle --rows-per-second 50 -o b.palpate")]
+  palpate calibrate a.palpate a.csv --label a --sequence-column id -o b.palpate")]
 pub(crate) struct Arguments {
     /// Compiled model
     model: PathBuf,

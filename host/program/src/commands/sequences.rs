@@ -104,7 +104,7 @@ fn counts_text(counts: &EventCounts) -> String {
     let EventCounts { recordings, hours, events, named, wrong, repeated, false_per_hour, mean_delay, median_delay } =
         counts;
     format!(
-        "{recordings} recordings, {} h: {named} of {events} events named, {} after their onset on average, half within {}; \
+        "{recordings} recordings, {} h: {named} of {events} events named, {} after their onset on average, a median of {}; \
          {wrong} false and {repeated} repeated verdicts, {} per hour",
         wording::decimal(*hours, 2),
         seconds(*mean_delay),

@@ -331,7 +331,7 @@ fn what_is_wrong_with_recordings_of_events_is_said_and_nothing_is_written() {
     let message = stderr(calibrate(&["--events", "none", "--rows-per-second", "10"]), 2);
     assert!(message.contains("a class of the model: low, middle, high"), "{message}");
     let message = stderr(calibrate(&["--events", "low", "--rows-per-second", "0"]), 2);
-    assert!(message.contains("rows_per_second"), "{message}");
+    assert!(message.contains("--rows-per-second is 0. Use above 0"), "{message}");
     for options in
         [&["--events", "low"][..], &["--hold-off", "1"], &["--events", "low", "--rows-per-second", "9", "--guard"]]
     {
