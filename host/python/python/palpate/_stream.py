@@ -308,8 +308,17 @@ def evaluate_events(model: Model, rows: npt.ArrayLike, labels: _Ids, *, recordin
 
 def _events(model: Model, text: str) -> Events:
     raw: dict[str, Any] = json.loads(text)
-    names = ("hours", "events", "named", "false", "repeated", "false_per_hour", "mean_delay")
-    return Events(model, *(raw[name] for name in names), raw)
+    return Events(
+        model,
+        raw["hours"],
+        raw["events"],
+        raw["named"],
+        raw["false"],
+        raw["repeated"],
+        raw["false_per_hour"],
+        raw["mean_delay"],
+        raw,
+    )
 
 
 class SequenceRecognizer:
