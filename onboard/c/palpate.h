@@ -2014,7 +2014,8 @@ static inline void palpate_push_event_(palpate_recognizer *recognizer, const int
     for (i = 0; is_sure && i < model->objects; i++) {
         if (i != best) {
             const uint64_t weight = palpate_exp2(palpate_behind_(recognizer, best, i, bits));
-            is_sure = weight <= left;
+            /* What is not known may lead. */
+            is_sure = weight <= left && recognizer->evidence[i] <= recognizer->evidence[best];
             left -= weight;
         }
     }

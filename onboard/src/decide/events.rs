@@ -71,8 +71,10 @@ impl<const N: usize> State<N> {
         }
         evidence.iter_mut().zip(margins).for_each(|(sum, &margin)| *sum = sum.saturating_add(margin.into()));
         let best = strangers::leader(model, evidence);
+        // What is not known may lead.
+        let is_known = !strangers::is_background(model, evidence, best.1);
         let odds = self.stopping().odds_of(best.0, model);
-        let rivals = evidence::rivals(self.evidence(model), best, odds, unit(model));
+        let rivals = evidence::rivals(self.evidence(model), best, odds, unit(model)).filter(|_| is_known);
         let leader = u8::try_from(best.0).unwrap_or(u8::MAX);
         let is_verdict = self.ongoing.take(events, leader, rivals.is_some());
         self.event(leader, rivals.filter(|_| is_verdict));
