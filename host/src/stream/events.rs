@@ -31,7 +31,7 @@ use rand::seq::SliceRandom;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// One recording in so many is learned from.
+/// One recording in this many is for learning.
 const LEARNED: usize = 4;
 /// Memories that are tried, in nats.
 const MEMORIES: [f64; 6] = [3.0, 5.0, 8.0, 12.0, 18.0, 27.0];
@@ -62,7 +62,7 @@ pub struct EventSettings {
     pub hold_off: f64,
     /// Time after the end of an event in which its verdict still counts, in seconds.
     pub grace: f64,
-    /// Seed of which recordings are learned from.
+    /// Seed that chooses the recordings to learn from.
     pub seed: u64,
 }
 
@@ -92,7 +92,7 @@ impl EventSettings {
         Err(Error::setting("confidence", self.confidence, "above 0 and below 1"))
     }
 
-    /// The section that states them, for recordings of at most so many rows.
+    /// Section that states them, for recordings of up to this many rows.
     fn stated(&self, longest: usize) -> Events {
         let rows = |seconds: f64| (seconds * self.rows_per_second).round().min(f64::from(u32::MAX)) as u32;
         Events {
@@ -117,7 +117,7 @@ fn check_range(name: &'static str, value: f64, least: f64, most: f64) -> Result<
     Err(Error::setting(name, value, format!("{least} and at most {most}")))
 }
 
-/// Verdicts on recordings, held against their events.
+/// Verdicts on recordings, compared with their events.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct EventCounts {
     /// Recordings.
@@ -214,7 +214,7 @@ struct Tallied {
 }
 
 impl Tallied {
-    /// Holds verdicts, as rows and classes, against the runs of a recording.
+    /// Compares verdicts, as rows and classes, with the runs of a recording.
     fn new(runs: &[RowSequence], events: &Events, verdicts: impl Iterator<Item = (usize, usize)>) -> Self {
         let is_event = |run: &&RowSequence| events.background.map(usize::from) != Some(run.class);
         let mut all: Vec<(&RowSequence, bool)> = runs.iter().filter(is_event).map(|run| (run, false)).collect();
@@ -288,7 +288,7 @@ fn rows_of(runs: &[RowSequence]) -> usize {
     runs.iter().map(|run| run.rows.len()).sum()
 }
 
-/// Cuts a recording after so many rows.
+/// Cuts a recording after this many rows.
 fn cut(mut runs: Recording, rows: usize) -> Recording {
     let end = runs.first().map_or(0, |run| run.rows.start) + rows;
     runs.retain(|run| run.rows.start < end);
@@ -358,18 +358,18 @@ impl Shaped {
         Ok(Self { bytes, events, table: table.is_some() })
     }
 
-    /// The best score of thresholds with which these recordings keep a rate per hour, and that threshold. If none keeps it, its
-    /// score is below 0.
-    fn best(&self, rows: &Rows<'_>, recordings: &[Recording], rate: f64) -> Result<(f64, f64)> {
+    /// The best score of thresholds with which these recordings keep a rate per hour, and the verdicts at that threshold. If none
+    /// keeps it, its score is below 0.
+    fn best(&self, rows: &Rows<'_>, recordings: &[Recording], rate: f64) -> Result<(f64, Vec<Tallied>)> {
         let led = led(&compile::open(&self.bytes)?, rows, recordings);
-        let mut best = (f64::NEG_INFINITY, STRICTEST);
+        let mut best = (f64::NEG_INFINITY, Vec::new());
         let allowed = Events { per_hour: rate as f32, ..self.events };
         for margin in thresholds() {
             let tallies = tallies(recordings, &led, &self.events, margin);
             let over = loss(&tallies, &allowed);
             let own = if over > 0.0 { -over } else { score(&tallies) };
             if own > best.0 {
-                best = (own, margin);
+                best = (own, tallies);
             }
         }
         Ok(best)
@@ -408,6 +408,15 @@ fn fraction(losses: &[f64], most: f64) -> f64 {
     fractions.max_by(|a, b| growth(*a).total_cmp(&growth(*b))).unwrap_or(0.5 / most)
 }
 
+/// Refuses models and rows that recordings of events cannot be of.
+fn check_rows(model: &Model<'_>, sequences: &Sequences) -> Result<()> {
+    super::check(model)?;
+    if model.position().is_some() {
+        return Err(RowsProblem::NumberedEvents.into());
+    }
+    super::check_columns(model, sequences)
+}
+
 /// Sets a model's threshold so that, on recordings like these, it has at most a promised rate of false or repeated verdicts per
 /// hour; also its memory, and evidence of a row if that finds more events. `sequences` are the runs of recordings that nothing was
 /// trained on ([`SequencesBuilder::by_run`](palpate_trees::rows::SequencesBuilder::by_run)), which must be independent.
@@ -422,11 +431,7 @@ pub fn calibrate_events(
     progress: &dyn Progress,
 ) -> Result<EventsCalibrated> {
     settings.check()?;
-    super::check(model)?;
-    super::check_columns(model, sequences)?;
-    if model.position().is_some() {
-        return Err(RowsProblem::NumberedEvents.into());
-    }
+    check_rows(model, sequences)?;
     if model.outputs().is_some() {
         return Err(RowsProblem::EventsOfOutputs.into());
     }
@@ -448,6 +453,7 @@ pub fn calibrate_events(
     let tested: Vec<Recording> = tested.into_iter().map(|runs| cut(runs, longest)).collect();
     let stated = settings.stated(longest);
     let most = longest.div_ceil(stated.hold_off as usize).max(1) as f64;
+    // Slack for the last bits of a sum.
     let enough = -(1.0 - settings.confidence).ln() - 1e-9;
     let hours = tested.iter().map(|runs| rows_of(runs)).sum::<usize>() as f64 / f64::from(stated.rows_per_hour);
     // Without a false verdict, with recordings of the mean length.
@@ -465,15 +471,13 @@ pub fn calibrate_events(
         return Err(too_few().into());
     }
     let (learned, tested) = (&*learned, &*tested);
-    // With small losses a bet of the fraction wins enough if about so many verdicts fewer than those allowed are false.
+    // While losses are small, the bet is won if about this rate of verdicts is false.
     let tolerated = (settings.false_per_hour - enough / largest / hours).max(0.0);
     let shaped = shape(model, &rows, learned, stated, tolerated)?;
     let Shaped { bytes, events, table } = &shaped;
     let open = compile::open(bytes)?;
-    let (_, margin) = shaped.best(&rows, learned, tolerated)?;
     let losses = |tallies: &[Tallied]| -> Vec<f64> { tallies.iter().map(|one| one.loss(events)).collect() };
-    let learned_led = led(&open, &rows, learned);
-    let fraction = fraction(&losses(&tallies(learned, &learned_led, events, margin)), most);
+    let fraction = fraction(&losses(&shaped.best(&rows, learned, tolerated)?.1), most);
     let led = led(&open, &rows, tested);
     let mut kept = None;
     let mut failed = None;
@@ -520,10 +524,9 @@ pub fn calibrate_events(
 /// Measures a model with [events](Model::events) on recordings, and what rules over the classes of single rows give.
 ///
 /// # Errors
-/// [`RowsProblem`] for a model without classes of rows, or without events.
+/// [`RowsProblem`] for a model without classes of rows, with row numbers, or without events.
 pub fn evaluate_events(model: &Model<'_>, sequences: &Sequences) -> Result<EventsEvaluated> {
-    super::check(model)?;
-    super::check_columns(model, sequences)?;
+    check_rows(model, sequences)?;
     let Some(events) = model.events() else { return Err(RowsProblem::NoEvents.into()) };
     let rows = Rows::new(model, sequences);
     let all = recordings(sequences);

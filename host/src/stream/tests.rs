@@ -751,7 +751,7 @@ fn folds_leave_all_sequences_to_the_test_keep_the_promise_and_estimate_the_error
     assert!(two.unwrap());
 }
 
-/// Recordings of so many rows, one after the other: the first class between events of the others.
+/// Recordings of `length` rows each: the first class between events of the others.
 fn recordings(kind: Kind, count: usize, length: usize, seed: u64) -> Sequences {
     let mut made = Sequences { features: 1, ..Sequences::default() };
     for number in 0..count {

@@ -6,6 +6,8 @@ mod events;
 mod evidence;
 mod expected;
 mod forgetting;
+#[cfg(feature = "sequences")]
+mod ongoing;
 mod recognizer;
 mod seen;
 #[cfg(feature = "link")]
@@ -15,11 +17,11 @@ mod strangers;
 mod together;
 
 pub use approach::Proposal;
-#[cfg(feature = "sequences")]
-pub use events::Ongoing;
 pub use evidence::{Posterior, Rivals};
 pub use expected::NothingExpected;
 pub use forgetting::Forgetting;
+#[cfg(feature = "sequences")]
+pub use ongoing::Ongoing;
 #[cfg(feature = "station")]
 pub(crate) use recognizer::State;
 pub use recognizer::{CapacityError, Recognizer, Verdict};

@@ -1,9 +1,9 @@
 //! Touch by touch to a verdict.
 
-#[cfg(feature = "sequences")]
-use super::events::Ongoing;
 use super::evidence::{self, Posterior, Rivals, SHARPNESS, Unit};
 use super::expected::{self, NothingExpected};
+#[cfg(feature = "sequences")]
+use super::ongoing::Ongoing;
 use super::stopping::Stopping;
 use super::strangers::{self, Familiarity};
 use super::together::{self, Leading};

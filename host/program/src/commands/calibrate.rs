@@ -277,7 +277,7 @@ fn on_rows(arguments: &Arguments, rows: &PathBuf, global: &Global) -> Result<Cal
 
 /// Calibrates on recordings of events, if that is asked for.
 fn on_events(arguments: &Arguments, rows: &PathBuf, global: &Global) -> Result<Option<EventsCalibrated>> {
-    let Some(columns) = arguments.rows.columns() else { return Ok(None) };
+    let Some(columns) = arguments.rows.columns().filter(|_| arguments.events.is_given()) else { return Ok(None) };
     let path = &arguments.model;
     output::admit(&arguments.output, [path, rows])?;
     let compiled = CompiledModel::read(path)?;

@@ -63,6 +63,11 @@ const NOT_OF_EVENTS: [&str; 8] =
     ["group_column", "guard", "strangers", "background", "per", "error_rate", "max_touches", "sequences"];
 
 impl EventArguments {
+    /// True if recordings of events are asked for.
+    pub(crate) fn is_given(&self) -> bool {
+        self.events.is_some()
+    }
+
     /// Settings of a promise about events, if there are any.
     pub(crate) fn settings(&self, model: &Model<'_>, confidence: f64, seed: u64) -> Result<Option<EventSettings>> {
         let (Some(class), Some(rows_per_second)) = (self.events.as_deref(), self.rows_per_second) else {

@@ -2,6 +2,7 @@
 //! is a constant.
 
 use super::code::Program;
+use super::cost::has_sequences;
 use crate::ensemble::Probability;
 use palpate_onboard::Model;
 use palpate_shared::format::Key;
@@ -15,11 +16,6 @@ pub(super) struct Calls<'a> {
     pub(super) probability: Probability,
     /// The trees, where they are code.
     pub(super) code: Option<&'a Program>,
-}
-
-/// True if the model numbers the rows of a sequence, states which of them it takes, or goes on after a verdict.
-pub(super) fn has_sequences(model: &Model<'_>) -> bool {
-    model.position().is_some() || model.guard().is_some() || model.events().is_some()
 }
 
 /// Start of the header's parts, and of its pieces with an address of their own.

@@ -136,6 +136,11 @@ pub const FEATURES: [(&str, [usize; 2]); 15] = [
 /// Flash of what all images of verdicts have.
 const COMMON: [usize; 2] = [5_948, 5_472];
 
+/// True if the model numbers the rows of a sequence, states which of them it takes, or goes on after a verdict.
+pub(super) fn has_sequences(model: &Model<'_>) -> bool {
+    model.position().is_some() || model.guard().is_some() || model.events().is_some()
+}
+
 /// Features of palpate-onboard that a model needs.
 pub fn features(model: &Model<'_>) -> Vec<&'static str> {
     let leaf = model.leaf_type();
@@ -144,7 +149,7 @@ pub fn features(model: &Model<'_>) -> Vec<&'static str> {
         "sentinel" => model.sentinel().is_some(),
         "strangers" => model.strangers().is_some(),
         "row-evidence" => model.row_evidence().is_some() || model.weight_of(u32::MAX) != Weights::ONE,
-        "sequences" => super::calls::has_sequences(model),
+        "sequences" => has_sequences(model),
         "outputs" => model.outputs().is_some(),
         _ => name == model.layout().name() || name.strip_suffix("-leaves") == Some(leaf.name()),
     };

@@ -1,8 +1,9 @@
 //! A compiled model as source code, for programs that have no files.
 
 use super::Compiled;
-use super::calls::{Calls, has_sequences};
+use super::calls::Calls;
 use super::code::{Form, Program};
+use super::cost::has_sequences;
 use super::model::open_any;
 use crate::ensemble::Probability;
 use crate::error::{Error, Result};

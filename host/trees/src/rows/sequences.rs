@@ -76,8 +76,8 @@ impl SequencesBuilder {
         Self { classes: classes.to_vec(), built: Sequences { features, ..Sequences::default() }, ..Self::default() }
     }
 
-    /// The same where the class may change within a sequence: each run of rows with one class becomes a sequence, and the group of
-    /// a run is the sequence that it is of.
+    /// Takes sequences in which the class may change: each run of rows with one class becomes a sequence, and its group is the
+    /// sequence that it is part of.
     #[must_use]
     pub fn by_run(self) -> Self {
         Self { by_run: true, ..self }
