@@ -11,7 +11,10 @@ fn run(name: &str) -> String {
     path.push("examples");
     path.push(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     let output = Command::new(&path).stdin(Stdio::null()).output().unwrap_or_else(|error| {
-        panic!("{}: {error}; `cargo test -p palpate` builds it, `cargo test --test examples` does not", path.display())
+        panic!(
+            "{}: {error}; `cargo test --release -p palpate` builds it, `cargo test --release --test examples` does not",
+            path.display()
+        )
     });
     assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()

@@ -18,3 +18,9 @@ pub mod stated;
 pub mod streams;
 pub mod unaligned;
 pub mod vectors;
+
+/// Number of repetitions: the one in the variable PALPATE_REPETITIONS, or `few`.
+#[must_use]
+pub fn repetitions(few: usize) -> usize {
+    std::env::var("PALPATE_REPETITIONS").map_or(few, |count| count.parse().expect("PALPATE_REPETITIONS is a number"))
+}

@@ -230,10 +230,10 @@ fn on_grid(moves: Moves) -> Moves {
     moves
 }
 
-/// `PALPATE_REPETITIONS=200 cargo test -p palpate-tests --test arduino` plays more.
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate-tests --test arduino` plays more.
 #[test]
 fn the_sketch_makes_the_crates_touches_and_verdicts_of_the_same_edges() {
-    let repetitions = std::env::var("PALPATE_REPETITIONS").map_or(6, |count| count.parse().expect("a number"));
+    let repetitions = palpate_tests::repetitions(6);
     let header = std::fs::read_to_string(Path::new(ROOT).join("onboard/c/examples/Recognize/model.h")).unwrap();
     let (_, array) = header.split_once("= {").unwrap();
     let (array, _) = array.split_once('}').unwrap();

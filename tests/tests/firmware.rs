@@ -1,7 +1,7 @@
 //! The firmware in an emulator: the chip decides as the host does, over good and bad lines, through resets, from pins.
 //!
 //! Needs `qemu-system-arm` and the targets thumbv7em-none-eabihf and thumbv6m-none-eabi, so it is asked for:
-//! `cargo test -p palpate-tests --test firmware -- --ignored`. It builds the images itself.
+//! `cargo test --release -p palpate-tests --test firmware -- --ignored`. It builds the images itself.
 
 use palpate::chip::{Asks, Connection, Emulator, Faults, Steps, Summary, Update, stream};
 use palpate::compile::{Leaf, Settings, compile};

@@ -291,10 +291,10 @@ fn is_cut(fault: Fault) -> bool {
     matches!(fault, Fault::CutBefore | Fault::CutDuring | Fault::CutAfter)
 }
 
-/// `PALPATE_REPETITIONS=100000 cargo test -p palpate-tests --test flash several_faults` tries more.
+/// `PALPATE_REPETITIONS=100000 cargo test --release -p palpate-tests --test flash several_faults` tries more.
 #[test]
 fn several_faults_lose_no_acknowledged_record() {
-    let repetitions = std::env::var("PALPATE_REPETITIONS").map_or(300, |count| count.parse().expect("a number"));
+    let repetitions = palpate_tests::repetitions(300);
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut unstored = 0;
     for _ in 0..repetitions {

@@ -2,7 +2,7 @@
 //! no float code.
 //!
 //! They are built for thumbv6m-none-eabi, so these tests only run where they are asked for:
-//! `cargo test -p palpate-tests --test images -- --ignored --nocapture`, which `.ci/firmware` does.
+//! `cargo test --release -p palpate-tests --test images -- --ignored --nocapture`, which `.ci/firmware` does.
 
 use palpate::compile::{Core, code_flash};
 use palpate_tests::stated::Readme;

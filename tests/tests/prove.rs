@@ -255,7 +255,7 @@ fn random_changes_of_large_models_that_change_a_margin_are_refused_in_both_ways(
         let ensemble = random::ensemble(Shape { each, descriptor: Descriptor::Oriented, ..shape }, 11);
         for original in models(&ensemble, None) {
             let original = Original::new(original, &ensemble);
-            for _ in 0..40 {
+            for _ in 0..20 {
                 let mut changed = original.bytes.clone();
                 let at = random.random_range(96..changed.len() - 4);
                 changed[at] = random.random();
@@ -264,7 +264,7 @@ fn random_changes_of_large_models_that_change_a_margin_are_refused_in_both_ways(
             }
         }
     }
-    assert!(refused > 100, "{refused}");
+    assert!(refused > 50, "{refused}");
 }
 
 #[test]
@@ -398,6 +398,7 @@ fn changed_bounds_of_early_exits_that_change_a_class_are_refused_in_both_ways() 
             };
             let rows: Vec<Vec<i32>> = (0..1_000).map(|_| encoder.row(&[0; 3].map(|_| value(&mut random)))).collect();
             let mut changes: Vec<Vec<u8>> = (0..8 * section.content.len())
+                .step_by(3)
                 .map(|bit| {
                     let mut changed = bytes.clone();
                     changed[at + bit / 8] ^= 1 << (bit % 8);

@@ -1,7 +1,7 @@
 //! Stated numbers of instructions, stack and bytes equal the measured ones.
 //!
 //! Measured by an emulator and by compilers for chips, so most of it is asked for:
-//! `cargo test -p palpate-tests --test stated -- --ignored --test-threads 1`, which `.ci/firmware` and `.ci/c` do. With
+//! `cargo test --release -p palpate-tests --test stated -- --ignored --test-threads 1`, which `.ci/firmware` and `.ci/c` do. With
 //! `PALPATE_RESTATE=1` it writes what it measures into the READMEs, as `--test images` does. Other compilers give other code, so a number may be a few percent off.
 
 use palpate_tests::stated::{Readme, measured_in};

@@ -48,7 +48,7 @@ fn error(bytes: &[u8], touches: &Dataset) -> f64 {
     margins.sequential(&settings).unwrap().error
 }
 
-/// `PALPATE_REPETITIONS=200 cargo test -p palpate --lib found_on_simulated -- --nocapture` repeats it as often.
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib found_on_simulated -- --nocapture` repeats it as often.
 #[test]
 fn thresholds_found_on_simulated_touches_and_tested_on_recorded_ones_keep_the_promise_for_recorded_ones() {
     let (compiled, simulated, repetitions) = (model(), simulated(30_000, 2), repetitions(20));

@@ -215,7 +215,7 @@ fn known_rates(odds: &Odds) -> (f64, Vec<f64>, Vec<f64>) {
     (1.0 - right / given.iter().flatten().sum::<f64>(), each(&of_name), each(&of_object))
 }
 
-/// `PALPATE_REPETITIONS=200 cargo test -p palpate --lib all_rates_promised -- --nocapture` repeats it as often.
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib all_rates_promised -- --nocapture` repeats it as often.
 #[test]
 fn all_rates_promised_are_kept_at_once_in_all_but_one_of_twenty_calibrations() {
     let (rate, repetitions) = (0.05, repetitions(20));

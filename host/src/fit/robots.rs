@@ -76,7 +76,7 @@ impl Bench {
     }
 }
 
-/// By default one set of each robot without poses, and fewer simulated approaches; `PALPATE_REPETITIONS=4 cargo test -p palpate
+/// By default one set of each robot without poses, and fewer simulated approaches; `PALPATE_REPETITIONS=4 cargo test --release -p palpate
 /// --lib honest_recordings -- --nocapture` has all four with and without, in 10 minutes.
 #[test]
 fn honest_recordings_of_compliant_robots_are_not_refused_and_a_plate_makes_no_fit_worse() {

@@ -425,7 +425,7 @@ mod tests {
         [apart, 0.0].map(|mean| numbers.iter().map(|number| -0.5 * (number - mean).powi(2)).collect())
     }
 
-    /// `PALPATE_REPETITIONS=200 cargo test -p palpate --lib looking_everywhere -- --nocapture` repeats it as often; by
+    /// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib looking_everywhere -- --nocapture` repeats it as often; by
     /// default it does too, in less than a second.
     #[test]
     fn looking_everywhere_in_a_recording_gives_no_more_false_alarms_than_ville_allows() {

@@ -122,7 +122,7 @@ fn contradicting_contacts_do_not_move_a_surface_that_most_agree_on() {
 #[test]
 fn exploring_knows_more_than_as_many_touches_at_random_and_ends() {
     let about = |[x, y]: [f64; 2]| ell([x + 30.0, y + 25.0]);
-    let mut shape = Shape::within(&probe(), [36.0, 31.0], 0.5);
+    let mut shape = Shape::within(&probe(), [36.0, 31.0], 1.0);
     let mut relief = shape.relief();
     let mut approaches = 0;
     while relief.known(2.0) < 0.7 && approaches < 120 {
@@ -136,7 +136,7 @@ fn exploring_knows_more_than_as_many_touches_at_random_and_ends() {
         approaches += 1;
     }
     assert!(relief.known(2.0) >= 0.7, "{} after {approaches}", relief.known(2.0));
-    let mut random = Shape::within(&probe(), [36.0, 31.0], 0.5);
+    let mut random = Shape::within(&probe(), [36.0, 31.0], 1.0);
     pressed([-30.0, -25.0], 0.0, approaches, ell).iter().for_each(|touch| random.push(touch).unwrap());
     assert!(random.relief().known(2.0) < relief.known(2.0));
 }

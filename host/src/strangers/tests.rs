@@ -234,7 +234,7 @@ fn a_promise_made_without_a_test_is_not_stated_with_one() {
     assert_eq!(compile::open(&without).unwrap().promise(), None);
 }
 
-/// `PALPATE_REPETITIONS=200 cargo test -p palpate --lib both_shares_promised -- --nocapture` repeats it as often.
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib both_shares_promised -- --nocapture` repeats it as often.
 #[test]
 fn both_shares_promised_are_kept_in_all_but_one_of_twenty_calibrations() {
     let fresh = of(0..KNOWN, 60_000, 5);

@@ -243,7 +243,7 @@ fn normal(count: usize, ahead: f64, run: u64) -> [Held; 2] {
     })
 }
 
-/// `PALPATE_REPETITIONS=1000 cargo test -p palpate --lib errors_stated_of_taught -- --nocapture` repeats it as often; by
+/// `PALPATE_REPETITIONS=1000 cargo test --release -p palpate --lib errors_stated_of_taught -- --nocapture` repeats it as often; by
 /// default 200 times.
 #[test]
 fn errors_stated_of_taught_objects_are_those_of_fresh_groups_and_not_of_the_groups_that_chose() {

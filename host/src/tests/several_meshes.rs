@@ -147,7 +147,7 @@ fn promised<T>(calibrated: crate::error::Result<T>) -> Option<T> {
         .ok()
 }
 
-/// Promises of `calibrate` and of `calibrate --strangers`, repeated: `PALPATE_REPETITIONS=40 cargo test -p palpate --lib
+/// Promises of `calibrate` and of `calibrate --strangers`, repeated: `PALPATE_REPETITIONS=40 cargo test --release -p palpate --lib
 /// several_meshes::promises -- --nocapture` says how many were broken.
 #[test]
 fn promises_are_kept_where_objects_have_several_meshes() {

@@ -31,7 +31,7 @@ fn a_crooked_probe_is_fitted_and_touches_are_captured_as_it_gives_them() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
     let (data, probe) = (recorded(at, "recorded", "400"), at.join("fitted.toml"));
-    let fit = arguments!["probe", "fit", &data, "bowl", "mouse", "-o", &probe, "--approaches", "15000"];
+    let fit = arguments!["probe", "fit", &data, "bowl", "mouse", "-o", &probe, "--approaches", "12000"];
     let found = json(run([&fit[..], &arguments!["--json"]].concat()));
     let number = |path: &str| found.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {found}"));
     assert!((number("/speed_factor/value") - 0.9).abs() < 0.05, "{found}");
@@ -82,7 +82,7 @@ fn recordings_that_look_wrong_are_named_and_nothing_is_written() {
     let at = directory.path();
     let (data, probe) = (recorded(at, "recorded", "250"), at.join("fitted.toml"));
     std::fs::copy(data.join("mouse.txt"), data.join("fork.txt")).unwrap();
-    let fit = arguments!["probe", "fit", &data, "bowl", "mouse", "fork", "-o", &probe, "--approaches", "15000"];
+    let fit = arguments!["probe", "fit", &data, "bowl", "mouse", "fork", "-o", &probe, "--approaches", "12000"];
     let error = stderr(run(fit), 1);
     assert!(
         error.contains("fork: these look like touches of the mouse") && error.contains("Nothing was written"),

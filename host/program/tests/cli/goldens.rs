@@ -77,9 +77,9 @@ fn calibration_and_evaluation_on_touches_stay() {
         "train full -o full.json --trees rounds=12,depth=4 --json",
         "export full.json -o full.palpate --json",
         "capture bowl camera mouse winebottle -o fresh --touches 4000 --seed 2 --json",
-        "calibrate full.palpate fresh -o average.palpate --sequences 20000 --error-rate 5% --json",
-        "calibrate full.palpate fresh -o name.palpate --sequences 20000 --error-rate 20% --per name --json",
-        "calibrate full.palpate fresh -o object.palpate --sequences 20000 --error-rate 20% --per object",
+        "calibrate full.palpate fresh -o average.palpate --sequences 5000 --error-rate 5% --json",
+        "calibrate full.palpate fresh -o name.palpate --sequences 5000 --error-rate 20% --per name --json",
+        "calibrate full.palpate fresh -o object.palpate --sequences 5000 --error-rate 20% --per object",
         "capture bowl camera mouse winebottle -o unseen --touches 1000 --seed 3 --json",
         "evaluate average.palpate unseen --sequences 200 --json",
         "evaluate name.palpate unseen --sequences 200 --confusion 5",
@@ -91,8 +91,8 @@ fn calibration_and_evaluation_on_touches_stay() {
         "train all -o all.json --evidence all --trees rounds=12,depth=4",
         "export all.json -o all.palpate",
         "capture bowl camera mouse winebottle -o fresh-all --approaches 8000 --pose --seed 2",
-        "calibrate all.palpate fresh-all -o all-5.palpate --sequences 20000 --error-rate 5% --real noise=1ms --json",
-        "calibrate all.palpate fresh-all -o likely.palpate --sequences 20000 --error-rate 10% --strangers likely --json",
+        "calibrate all.palpate fresh-all -o all-5.palpate --sequences 5000 --error-rate 5% --real noise=1ms --json",
+        "calibrate all.palpate fresh-all -o likely.palpate --sequences 5000 --error-rate 10% --strangers likely --json",
         "capture fork hammer -o unknown --approaches 800 --seed 4",
         "capture bowl camera mouse winebottle -o unseen-all --approaches 1000 --pose --seed 3",
         "evaluate all-5.palpate unseen-all --sequences 100 --json",
@@ -101,7 +101,7 @@ fn calibration_and_evaluation_on_touches_stay() {
         "train all -o oriented.json --descriptor oriented --evidence all --trees rounds=12,depth=4",
         "export oriented.json -o oriented.palpate",
         "calibrate oriented.palpate fresh-all -o planned.palpate --plan 1 --json",
-        "calibrate planned.palpate fresh-all -o active.palpate --active --sequences 20000 --error-rate 5% --json",
+        "calibrate planned.palpate fresh-all -o active.palpate --active --sequences 5000 --error-rate 5% --json",
         "evaluate active.palpate unseen-all --sequences 100 --active --json",
         "verify oriented.palpate oriented.json unseen-all --sequences 100 --json",
         // A table.
@@ -109,8 +109,8 @@ fn calibration_and_evaluation_on_touches_stay() {
         "train table -o table.json --descriptor gravity --evidence all --trees rounds=12,depth=4",
         "export table.json -o table.palpate",
         "capture bowl mouse -o fresh-table --approaches 12000 --scene table --pose --seed 2",
-        "calibrate table.palpate fresh-table -o table-5.palpate --sequences 20000 --error-rate 5% --json",
-        "calibrate table.palpate fresh-table -o table-object.palpate --sequences 20000 --error-rate 20% --per object --json",
+        "calibrate table.palpate fresh-table -o table-5.palpate --sequences 5000 --error-rate 5% --json",
+        "calibrate table.palpate fresh-table -o table-object.palpate --sequences 5000 --error-rate 20% --per object --json",
         "evaluate table-5.palpate fresh-table --sequences 50 --json",
     ] {
         script.step(line);
@@ -196,7 +196,7 @@ fn models_of_every_fixture_stay_in_every_layout() {
     let mut text = String::new();
     for file in &files {
         write!(text, "{}", file.file_name().unwrap().to_str().unwrap()).unwrap();
-        for layout in ["balanced", "speed", "size", "m0+", "compact", "complete", "grid", "wide"] {
+        for layout in ["balanced", "compact", "complete", "grid", "wide"] {
             let arguments = ["export", file.to_str().unwrap(), "-o", output.to_str().unwrap(), "--layout", layout];
             let exported = run(arguments);
             match exported.status.code() {

@@ -152,8 +152,8 @@ fn an_unknown_name_is_an_argument_error_that_lists_the_known_ones() {
 
 #[test]
 fn shapes_of_a_background_are_closed_right_side_out_and_of_their_own() {
-    let object = background(20, 5).unwrap();
-    assert_eq!(object.instances().len(), 20);
+    let object = background(10, 5).unwrap();
+    assert_eq!(object.instances().len(), 10);
     let mut volumes: Vec<f64> = Vec::new();
     for instance in object.instances() {
         assert_closed(&instance.name, &instance.mesh);
