@@ -103,7 +103,7 @@ fn a_probe_over_a_table_is_fitted_from_objects_that_stand_on_it() {
     );
     let error = stderr(palpate(at, "probe fit recorded bowl mouse -o probe.toml --cone 45"), 2);
     assert!(error.contains("--scene table"), "{error}");
-    let said = stdout(palpate(at, "probe fit recorded bowl mouse -o probe.toml --scene table --approaches 4000"));
+    let said = stdout(palpate(at, "probe fit recorded bowl mouse -o probe.toml --scene table --approaches 8000"));
     assert!(said.contains(" on a table: ") && said.contains("Wrote probe.toml"), "{said}");
     let speed = said.lines().find_map(|line| line.strip_prefix("speed over nominal")).unwrap();
     let speed: f64 = speed.split_whitespace().next().unwrap().parse().unwrap();
