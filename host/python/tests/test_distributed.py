@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import cloudpickle
@@ -60,18 +61,28 @@ class Cluster:
         self.processes = []
 
 
-@pytest.fixture
-def cluster() -> Iterator[Cluster]:
+@contextmanager
+def started() -> Iterator[tuple[distributed.Client, Cluster]]:
     cluster = Cluster()
-    yield cluster
-    cluster.kill()
+    try:
+        with distributed.Client(cluster.address, timeout=60) as client:
+            client.wait_for_workers(3, timeout=120)
+            yield client, cluster
+    finally:
+        cluster.kill()
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[distributed.Client]:
+    with started() as (client, _):
+        yield client
 
 
 @pytest.fixture
-def client(cluster: Cluster) -> Iterator[distributed.Client]:
-    with distributed.Client(cluster.address, timeout=60) as client:
-        client.wait_for_workers(3, timeout=120)
-        yield client
+def mortal() -> Iterator[tuple[distributed.Client, Cluster]]:
+    """Yields a cluster of its own, for tests that kill some of it."""
+    with started() as both:
+        yield both
 
 
 def files(directory: Path) -> dict[str, bytes]:
@@ -96,35 +107,39 @@ def test_the_result_is_that_of_one_machine(
     client: distributed.Client, tmp_path: Path, format: palpate.distributed.Format
 ) -> None:
     options = {"seed": 3, "approaches": True, "probe": palpate.Probe(spacing=1.25), "format": format}
-    palpate.capture(OBJECTS, touches=700, out=tmp_path / "one", **options)
+    palpate.capture(OBJECTS, touches=500, out=tmp_path / "one", **options)
     out = tmp_path / "many"
-    summary = palpate.distributed.capture(client, OBJECTS, 700, out, touches_per_shard=200, **options)
+    summary = palpate.distributed.capture(client, OBJECTS, 500, out, touches_per_shard=250, **options)
     assert files(out) == files(tmp_path / "one")
-    assert (summary.objects, summary.done, summary.kept, summary.refused) == (2, 8, 0, [])
+    assert (summary.objects, summary.done, summary.kept, summary.refused) == (2, 4, 0, [])
     # Once more: only a part that was damaged is done again.
-    (out / "parts" / "bowl" / "2-of-4.txt").write_bytes(b"0 0 0\n")
-    again = palpate.distributed.capture(client, OBJECTS, 700, out, touches_per_shard=200, **options)
-    assert (again.done, again.kept) == (1, 7) and files(out) == files(tmp_path / "one")
-    other = palpate.distributed.capture(client, OBJECTS, 700, out, touches_per_shard=200, **{**options, "seed": 4})
-    assert other.done == 8 and files(out) != files(tmp_path / "one")
+    (out / "parts" / "bowl" / "2-of-2.txt").write_bytes(b"0 0 0\n")
+    again = palpate.distributed.capture(client, OBJECTS, 500, out, touches_per_shard=250, **options)
+    assert (again.done, again.kept) == (1, 3) and files(out) == files(tmp_path / "one")
+    other = palpate.distributed.capture(client, OBJECTS, 500, out, touches_per_shard=250, **{**options, "seed": 4})
+    assert other.done == 4 and files(out) != files(tmp_path / "one")
 
 
-def test_a_worker_that_is_killed_costs_nothing_but_time(client: distributed.Client, cluster: Cluster, tmp_path: Path) -> None:
-    palpate.capture(OBJECTS, touches=6000, out=tmp_path / "one")
+def test_a_worker_that_is_killed_costs_nothing_but_time(
+    mortal: tuple[distributed.Client, Cluster], tmp_path: Path
+) -> None:
+    client, cluster = mortal
+    palpate.capture(OBJECTS, touches=2400, out=tmp_path / "one")
     out = tmp_path / "many"
     progress = once(cluster.processes[1].kill, after=3)
     summary = palpate.distributed.capture(
-        client, OBJECTS, 6000, out, format="text", touches_per_shard=300, progress=progress
+        client, OBJECTS, 2400, out, format="text", touches_per_shard=300, progress=progress
     )
     assert cluster.processes[1].wait() == -signal.SIGKILL
-    assert summary.refused == [] and summary.done == 40
+    assert summary.refused == [] and summary.done == 16
     assert files(out) == files(tmp_path / "one")
 
 
 def test_a_scheduler_that_is_restarted_costs_nothing_but_time(
-    client: distributed.Client, cluster: Cluster, tmp_path: Path
+    mortal: tuple[distributed.Client, Cluster], tmp_path: Path
 ) -> None:
-    palpate.capture(OBJECTS, touches=6000, out=tmp_path / "one")
+    client, cluster = mortal
+    palpate.capture(OBJECTS, touches=2400, out=tmp_path / "one")
     out = tmp_path / "many"
 
     def restart() -> None:
@@ -133,7 +148,7 @@ def test_a_scheduler_that_is_restarted_costs_nothing_but_time(
 
     progress = once(restart, after=3)
     summary = palpate.distributed.capture(
-        client, OBJECTS, 6000, out, format="text", touches_per_shard=300, progress=progress
+        client, OBJECTS, 2400, out, format="text", touches_per_shard=300, progress=progress
     )
     assert summary.refused == [] and summary.resubmitted > 0
     assert files(out) == files(tmp_path / "one")
@@ -217,7 +232,7 @@ def test_a_buffer_beside_a_gltf_that_was_changed_is_captured_again(client: distr
 
 
 def test_xgboost_trains_over_the_cluster_and_its_model_is_imported(client: distributed.Client, tmp_path: Path) -> None:
-    palpate.distributed.capture(client, OBJECTS, 3000, tmp_path / "data", touches_per_shard=1000)
+    palpate.distributed.capture(client, OBJECTS, 3000, tmp_path / "data", touches_per_shard=1500)
     assert json.loads((tmp_path / "data" / "dataset.json").read_text())["complete"]
     ensemble = palpate.distributed.train(client, tmp_path / "data", rounds=8)
     assert ensemble.objects == OBJECTS and ensemble.descriptor == "curvature" and ensemble.trees == 16
