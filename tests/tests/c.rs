@@ -220,8 +220,8 @@ impl<'m> Batch<'m> {
 /// Every damaged model is taken by both, or refused by both for the same reason at the same place; answers are the same except where
 /// `MARGINS_LEFT_OPEN` and `NAMES_LEFT_OPEN` say that FORMAT.md leaves them open.
 ///
-/// 100,000 models, or PALPATE_FUZZ_MODELS, or for PALPATE_FUZZ_SECONDS; an hour of it is `PALPATE_FUZZ_SECONDS=3600 cargo test -p
-/// palpate-tests --test c damaged -- --nocapture`. PALPATE_FUZZ_SEED gives other models, the same seed the same.
+/// 100,000 models, or PALPATE_FUZZ_MODELS, or for PALPATE_FUZZ_SECONDS; an hour of it is `PALPATE_FUZZ_SECONDS=3600 cargo test --release
+/// -p palpate-tests --test c damaged -- --nocapture`. PALPATE_FUZZ_SEED gives other models, the same seed the same.
 #[test]
 fn damaged_models_are_taken_or_refused_alike_at_the_same_place_and_give_the_same_answers() {
     let directory = tempfile::tempdir().unwrap();
