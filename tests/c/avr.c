@@ -1,4 +1,4 @@
-/* replay.h on an emulated ATmega2560: commands.h in flash, results over the UART, with a 0 at their end. */
+/* replay.h on an emulated ATmega2560: commands, of another file, in flash; results over the UART, with a 0 at their end. */
 #include <avr/io.h>
 #include <avr/pgmspace.h>
 #include <stddef.h>
@@ -8,13 +8,14 @@
 #define REPLAY_GUARDED 64
 #include "replay.h"
 
-#include "commands.h"
+extern const uint8_t commands[];
+extern const uint32_t commands_length;
 
 static uint32_t at;
 
 static int replay_get(void)
 {
-    return at < sizeof commands ? (int)pgm_read_byte_far(pgm_get_far_address(commands) + at++) : -1;
+    return at < commands_length ? (int)pgm_read_byte_far(pgm_get_far_address(commands) + at++) : -1;
 }
 
 static void replay_put(char byte)

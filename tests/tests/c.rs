@@ -796,7 +796,8 @@ fn run_avr(program: &Path, directory: &Path) -> String {
 #[ignore = "needs avr-gcc and an emulator: .ci/run c"]
 fn an_emulated_avr_gives_the_bits_of_the_crate() {
     let directory = tempfile::tempdir().unwrap();
-    let program = directory.path().join("replay");
+    let [object, source, program] = ["replay.o", "commands.c", "replay"].map(|name| directory.path().join(name));
+    compile("avr-gcc", &["-mmcu=atmega2560", "-c"], "avr.c", &object).unwrap();
     let mut rng = SmallRng::seed_from_u64(4);
     let mut models = all_models(&mut rng);
     // At most 12 objects and 64 features, as in avr.c.
@@ -814,10 +815,16 @@ fn an_emulated_avr_gives_the_bits_of_the_crate() {
     for batch in &batches {
         let script = script(batch, 25 * batch.len(), 25 * batch.len(), &mut rng);
         let bytes: Vec<String> = script.commands.iter().map(u8::to_string).collect();
-        let source = format!("static const uint8_t commands[] PROGMEM = {{{}}};\n", bytes.join(","));
-        std::fs::write(directory.path().join("commands.h"), source).unwrap();
-        let include = format!("-I{}", directory.path().display());
-        compile("avr-gcc", &["-mmcu=atmega2560", &include], "avr.c", &program).unwrap();
+        let commands = format!(
+            "#include <avr/pgmspace.h>\nextern const uint8_t commands[] PROGMEM;\nextern const uint32_t commands_length;\n\
+             const uint8_t commands[] = {{{}}};\nconst uint32_t commands_length = sizeof commands;\n",
+            bytes.join(",")
+        );
+        std::fs::write(&source, commands).unwrap();
+        let linked =
+            Command::new("avr-gcc").arg("-mmcu=atmega2560").args([&object, &source]).arg("-o").arg(&program).output();
+        let linked = linked.unwrap();
+        assert!(linked.status.success(), "{}", String::from_utf8_lossy(&linked.stderr));
         compare(&run_avr(&program, directory.path()), &script);
         counted = [counted[0] + count(&script, "touch"), counted[1] + count(&script, "verdict")];
     }
