@@ -168,13 +168,19 @@ fn repeated(population: &Population, count: usize, rate: f64, repetitions: u64) 
 }
 
 /// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::promises -- --nocapture` repeats it as often.
+/// Number of sequences of dependent rows, which take longest: fewer where a simulation is repeated a few times.
+fn dependent(repetitions: u64) -> usize {
+    if repetitions > 20 { 6_667 } else { 3_000 }
+}
+
 #[test]
 fn promises_are_kept_for_independent_rows_dependent_rows_and_new_groups() {
     let repetitions = repetitions(3);
-    let dependent = if repetitions > 20 { 6_667 } else { 3_000 };
-    for (kind, count, length) in
-        [(Kind::Independent, 6_667, 60), (Kind::Autoregressive(0.9), dependent, 160), (Kind::Groups(0.2), 1_400, 60)]
-    {
+    for (kind, count, length) in [
+        (Kind::Independent, 6_667, 60),
+        (Kind::Autoregressive(0.9), dependent(repetitions), 160),
+        (Kind::Groups(0.2), 1_400, 60),
+    ] {
         let population = Population::new(kind, 9_000, length);
         let rates = [(0.01, 0.6), (0.05, 0.8), (0.1, 0.8)].into_iter();
         for (rate, least) in rates.filter(|&(rate, _)| rate != 0.05 || repetitions > 20) {
@@ -342,11 +348,12 @@ fn at(place: f64, count: usize, length: usize) -> Sequences {
 #[test]
 fn false_alarms_stay_below_the_stated_rate_on_sequences() {
     let repetitions = repetitions(3);
-    let dependent = if repetitions > 20 { 6_667 } else { 3_000 };
     let model = compile::open(&MODEL).unwrap();
-    for (kind, count, length) in
-        [(Kind::Independent, 6_667, 60), (Kind::Autoregressive(0.9), dependent, 160), (Kind::Groups(0.2), 2_200, 60)]
-    {
+    for (kind, count, length) in [
+        (Kind::Independent, 6_667, 60),
+        (Kind::Autoregressive(0.9), dependent(repetitions), 160),
+        (Kind::Groups(0.2), 2_200, 60),
+    ] {
         let population = Population::new(kind, 9_000, length);
         let test = strangers(None);
         let (mut broken, mut alarms) = (0, Vec::new());
