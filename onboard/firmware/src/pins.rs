@@ -25,6 +25,8 @@ static EDGE: AtomicBool = AtomicBool::new(false);
 const OVER: u8 = 5;
 /// True once that signal has changed, until the main loop has looked.
 static SIGNALED: AtomicBool = AtomicBool::new(false);
+/// That signal, as the main loop last saw it.
+static SEEN_OVER: AtomicBool = AtomicBool::new(false);
 /// Time at which the main loop last found that nothing more had happened.
 static SEEN: AtomicU32 = AtomicU32::new(u32::MAX);
 
@@ -79,9 +81,17 @@ pub fn sense() -> Sensed {
 }
 
 /// True while no approach is under way, as a robot's controller would say.
+///
+/// On a board hardly any time passes between [`sense`] and this. Here the played time may have jumped in between; a signal
+/// that came with the jump waits for the next pass, which knows its time.
 pub fn is_over() -> bool {
-    SIGNALED.store(false, Ordering::Relaxed);
-    SWITCHES.load(Ordering::Relaxed) >> OVER & 1 == 1
+    critical_section::with(|_| {
+        if SEEN.load(Ordering::Relaxed) == TIME.load(Ordering::Relaxed) {
+            SEEN_OVER.store(SWITCHES.load(Ordering::Relaxed) >> OVER & 1 == 1, Ordering::Relaxed);
+            SIGNALED.store(false, Ordering::Relaxed);
+        }
+        SEEN_OVER.load(Ordering::Relaxed)
+    })
 }
 
 /// True if the pins have no message.
