@@ -165,8 +165,12 @@ pub(super) fn log_density(explained: &Explained<'_>, observed: &Observed, in_pos
     most + (TRUSTED * (posed - most).exp() + (1.0 - TRUSTED) * (all - most).exp()).ln()
 }
 
-/// The density among the approaches in its pose; none if they all say nothing.
+/// The density among the approaches in its pose; none if none of them can explain the touch, whatever the candidate. Where one
+/// could but hardly does, it is close to 0, so that the likelihood has no steps.
 fn density(explained: &Explained<'_>, observed: &Observed, in_pose: &InPose) -> Option<f64> {
+    if in_pose.explaining.is_empty() {
+        return None;
+    }
     let (Hypothesis { factor, late, noise, missed }, kept) = (&explained.candidate, explained.kept);
     // Of full touches alone it counts how many approaches would be full.
     let (mut sum, mut weights) = (0.0, if kept == Counted::Full { 0.0 } else { in_pose.count });
@@ -219,5 +223,34 @@ fn density(explained: &Explained<'_>, observed: &Observed, in_pose: &InPose) -> 
                 _ => 1.0,
             };
     }
-    (weights > 0.0 && sum > 0.0).then(|| sum / weights)
+    Some(if weights > 0.0 { sum / weights } else { 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::density::Densities;
+    use super::*;
+    use palpate_shared::ContactTime;
+
+    #[test]
+    fn the_likelihood_has_no_step_where_a_share_of_missed_contacts_reaches_zero() {
+        // Every approach in this pose touches with three fingers, the recorded touch has two: a contact was missed.
+        let touch = |i: u32| Touch::from_micros([0, 10_000 + 10 * (i % 500), 20_000]);
+        let touches: Vec<Touch> = (0..3_000).map(touch).collect();
+        let densities = Densities::new("one", &touches, None);
+        let explaining = vec![Simulated { touched: FULL, times: [0.0, 12.0, 20.0], gap: 1.0 }; 10];
+        let in_pose = InPose { explaining, count: 10.0 };
+        let observed = Observed::of(&Touch::new([
+            ContactTime::from_micros(0),
+            ContactTime::from_micros(12_000),
+            ContactTime::MISSING,
+        ]));
+        let at = |missed: f64, noise: f64| {
+            let candidate = Hypothesis { factor: 1.0, late: [0.0; 3], noise, missed: [0.0, 0.0, missed] };
+            log_density(&Explained::new(&candidate, &densities, Counted::Contacts), &observed, &in_pose)
+        };
+        let (none, hardly) = (at(0.0, 2.0), at(1e-12, 2.0));
+        assert!((none - hardly).abs() < 1e-6, "{none} {hardly}");
+        assert!(at(0.01, 2.0) > none + 1.0);
+    }
 }
