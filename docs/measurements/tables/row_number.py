@@ -1,6 +1,6 @@
 """What the number of the row, as a feature, saves: small sets that the package aeon ships, promised 10 %, over several splits.
 
-    pip install palpate xgboost aeon==1.6.0 && python docs/measurements/tables/row_number.py
+    pip install ./host/python xgboost aeon==1.6.0 && python docs/measurements/tables/row_number.py
 
 A row has the last value, and mean, spread and change of the last few. Of the sequences 60 % are fitted and calibrated on.
 """
