@@ -1668,7 +1668,9 @@ static inline void palpate_start_(palpate_recognizer *recognizer, const palpate_
     recognizer->max_touches = palpate_u32_(bytes + 56);
     recognizer->by_object = 1;
 #if PALPATE_ROW_EVIDENCE
+    recognizer->from_ = 0;
     recognizer->span_ = 0;
+    recognizer->unit_ = 0;
 #endif
     palpate_reset(recognizer);
 }

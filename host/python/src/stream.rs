@@ -39,8 +39,9 @@ fn sequences_of(
     let wanted = model.measured_count();
     let values = taken(&Features::measured(model), rows.rows()?)?;
     let count = values.len() / wanted;
+    let unit = if by_run { "recording" } else { "sequence" };
     let lengths =
-        [("y", labels.map(<[String]>::len)), ("sequence", Some(ids.len())), ("groups", groups.map(<[String]>::len))];
+        [("y", labels.map(<[String]>::len)), (unit, Some(ids.len())), ("groups", groups.map(<[String]>::len))];
     for (name, length) in lengths {
         if let Some(length) = length.filter(|length| *length != count) {
             return Err(Error::setting(name, format!("{length} values"), format!("{count}, one for each row")).into());

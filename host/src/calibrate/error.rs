@@ -316,7 +316,7 @@ impl Problem for CalibrateProblem {
             Self::NotKeptByRows { .. } => {
                 "Promise a higher error rate, give sequences of more rows, or train the model on rows like these."
             }
-            Self::TooFewRecordings { .. } => "Record more, accept more false verdicts (--false-per-hour), or lengthen the hold-off.",
+            Self::TooFewRecordings { .. } => "Record more, accept more false verdicts per hour, or lengthen the hold-off.",
             Self::NotKeptByEvents { .. } => {
                 "Accept more false verdicts (--false-per-hour), lengthen the hold-off or the grace, or train the model on more rows \
                  between events."

@@ -18,7 +18,7 @@ pub enum CaptureProblem {
         fix: String,
     },
     /// The true size of an object is needed and not known.
-    #[error("{name}: the unit of the mesh is not known, and so the true size is not")]
+    #[error("{name}: the true size is unknown, because the mesh states no unit")]
     NoTrueSize {
         /// The object.
         name: String,

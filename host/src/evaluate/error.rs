@@ -28,7 +28,7 @@ pub enum EvaluateProblem {
         known: Vec<String>,
     },
     /// The model knows an object that was to be one that it does not know.
-    #[error("the model knows the object {object}, so that it is no stranger")]
+    #[error("the model knows the object {object}, so it is not a stranger")]
     KnownObject {
         /// The object.
         object: String,

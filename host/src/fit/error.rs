@@ -7,7 +7,7 @@ use crate::error::Problem;
 #[non_exhaustive]
 pub enum FitProblem {
     /// A recorded object has no mesh.
-    #[error("{name} was recorded, and is none of the objects: {}", known.join(", "))]
+    #[error("{name} was recorded, but is not among the objects: {}", known.join(", "))]
     NotRecorded {
         /// The recorded object.
         name: String,

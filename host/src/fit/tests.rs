@@ -302,7 +302,10 @@ fn a_few_touches_give_warnings_and_too_few_an_error() {
 #[test]
 fn a_recorded_object_without_a_mesh_is_named() {
     let error = fit(&recorded(&objects(), 30, 13, &BENT), &objects()[..2], None, &settings(), &()).unwrap_err();
-    assert!(error.to_string().contains("wristwatch was recorded, and is none of the objects: bowl, mouse"), "{error}");
+    assert!(
+        error.to_string().contains("wristwatch was recorded, but is not among the objects: bowl, mouse"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -523,7 +526,7 @@ fn a_recording_in_another_placement_than_it_states_looks_wrong_and_one_that_is_u
     let lying = Recorded { object: "bowl".into(), placement: Some("+q".into()), ..Recorded::default() };
     let unknown = ObjectTouches::new("bowl", recorded.objects[0].touches().to_vec(), Source::Recording(lying));
     let error = fit(&Dataset::new(vec![unknown]), &objects(), None, &settings, &()).unwrap_err();
-    assert!(error.to_string().contains("bowl/+q was recorded, and is none of the objects: bowl/"), "{error}");
+    assert!(error.to_string().contains("bowl/+q was recorded, but is not among the objects: bowl/"), "{error}");
 }
 
 #[test]

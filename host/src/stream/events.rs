@@ -449,7 +449,9 @@ pub fn calibrate_events(
     all.shuffle(&mut random::generator(settings.seed, Purpose::Calibration, "recordings", 0));
     let tested = all.split_off(all.len() / LEARNED);
     let learned = all;
-    let longest = learned.iter().map(|runs| rows_of(runs)).max().unwrap_or(0);
+    // A single recording is tested on, and only tells how many more are needed.
+    let known = if learned.is_empty() { &tested } else { &learned };
+    let longest = known.iter().map(|runs| rows_of(runs)).max().unwrap_or(0);
     let tested: Vec<Recording> = tested.into_iter().map(|runs| cut(runs, longest)).collect();
     let stated = settings.stated(longest);
     let most = longest.div_ceil(stated.hold_off as usize).max(1) as f64;

@@ -46,7 +46,8 @@ fn limits(model: &Model<'_>, sequences: &Sequences, learned: &[&RowSequence], fe
             last = Some(own);
             longest = longest.max(run);
         }
-        is_whole |= run as usize == sequence.rows.len();
+        // A single row says nothing of runs.
+        is_whole |= run > 1 && run as usize == sequence.rows.len();
     }
     let room = GUARD_MARGIN * (high - low);
     let has_range = room.is_finite() && room > 0.0;

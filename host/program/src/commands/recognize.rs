@@ -45,7 +45,7 @@ pub(crate) struct Arguments {
     /// The file has rows of features, not touches
     #[arg(long)]
     features: bool,
-    /// Add up the evidence of rows until there is a verdict, as that of touches
+    /// Add up the evidence of rows, like that of touches, until there is a verdict
     #[arg(long, requires = "features")]
     add_up: bool,
     /// Column that says which rows are one sequence
@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
     /// With a model of maps: print each touch's verdict, place and next approach as JSON
     #[arg(long, conflicts_with_all = ["features", "active", "mcap"])]
     next: bool,
-    /// Explore an object that stands still, for its map: says as JSON where the map is least known, until as many millimeters are known of as large a share
+    /// Map an object that stands still: prints as JSON where to touch next, until the heights of this share of its cells are known to this many millimeters
     #[arg(long, value_name = "MM/SHARE", num_args = 0..=1, require_equals = true, default_missing_value = "2mm/50%")]
     #[arg(conflicts_with_all = ["next", "features", "active", "mcap"])]
     explore: Option<super::shape::Known>,
@@ -121,7 +121,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     }
     if arguments.next {
         let allowed =
-            "it with a model of maps (palpate train on touches with a position); of a plan --active says the next";
+            "it with a model of maps (palpate train on touches with a position); for a model with a plan, use --active";
         return Err(Error::setting("next", "given", allowed));
     }
     if arguments.active && model.plan().is_none() {

@@ -25,7 +25,7 @@ use std::time::Instant;
 /// Train an ensemble on captured touches, and save it as XGBoost JSON.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Of touches with a position (capture --position) a model of maps is made, ready for calibrate and recognize. The ensemble is XGBoost's JSON. Its features are in microseconds, where data sets have seconds, and cosines in units of 1/32767.
+From touches with a position (capture --position) it makes a model of maps, ready for calibrate and recognize. The ensemble is XGBoost's JSON. Its features are in microseconds, where data sets have seconds, and cosines in units of 1/32767.
 
 Presets: compact is small and accurate (leaves hold a value per object; curvature), paper the published method (one tree per object and round; contact times). Keys of --trees: rounds, depth, eta, min_child_weight, bins, leaves, leaf_bits, different_leaves, threshold_cost, trainer; docs/reference/options.md explains them, --teach and --evidence.
 
@@ -226,7 +226,7 @@ fn maps(arguments: &Arguments, simulated: Option<Dataset>, recorded: Option<Data
         return Err(Error::setting(
             option,
             "given",
-            "it with touches without a position; of these maps are made (--maps)",
+            "it with touches without a position; touches with one make maps (--maps)",
         ));
     }
     let file = arguments.probe.read()?;

@@ -14,11 +14,11 @@ use std::path::PathBuf;
 /// Compare a compiled model with what it was exported from.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Of a model of touches, every touch of DATA, a directory, goes through model and ensemble: margins, and the best object. Then random sequences of touches, each of one object, go through both until there is a verdict.
+For a model of touches, DATA is a directory: every touch goes through the model and the ensemble, and their margins and best objects are compared. Then random sequences of touches, each of one object, go through both until there is a verdict.
 
-Of a model of another library, every row of DATA, a CSV file, goes through the model and the file's own trees, and so do rows that are made at every split: at the threshold, one step to each side, missing. Columns are matched by name, or by position where one side has no names. With --library-margins the model is also compared with the library's own raw scores: no header, one row per line, one column per output; with --library-values with what its `predict` says: a class, or a value.
+For a model of another library, DATA is a CSV file: every row goes through the model and the file's own trees, and so do rows made at every split: at the threshold, one step to each side, missing. Columns are matched by name, or by position where one side has no names. With --library-margins the model is also compared with the library's own raw scores: no header, one row per line, one column per output; with --library-values with what its `predict` says: a class, or a value.
 
---prove needs no data: each tree of the model is compared with its trees in ENSEMBLE on every possible row, and a certificate is written. With a CSV file of rows it also says how far one feature can move before the class changes. --certificate checks a certificate with an independent reader of the model. Of a model whose trees are assembly, that is read back from the file beside it (.s).
+--prove needs no data: each tree of the model is compared with its trees in ENSEMBLE on every possible row, and a certificate is written. With a CSV file of rows it also says how far one feature can move before the class changes. --certificate checks a certificate with an independent reader of the model. If the model's trees are assembly, they are read back from the .s file beside it.
 
 The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class, or predicts another value, where the stated rounding does not explain it.
 

@@ -94,7 +94,7 @@ fn recordings_that_look_wrong_are_named_and_nothing_is_written() {
     assert!(std::fs::read_to_string(&probe).unwrap().contains("# LOOKS WRONG: fork: "));
     assert!(listing(at).contains(&"fitted.toml".to_owned()));
     let error = stderr(run(arguments!["probe", "fit", &data, "bowl", "mouse", "-o", &probe]), 1);
-    assert!(error.contains("fork was recorded, and is none of the objects"), "{error}");
+    assert!(error.contains("fork was recorded, but is not among the objects"), "{error}");
 }
 
 #[test]

@@ -146,6 +146,19 @@ def _stretches(sequence: list[str]) -> list[slice]:
     return [slice(start, end) for start, end in zip(starts, [*starts[1:], len(sequence)])]
 
 
+_ONE = "A sequence is of one class and one group: give the rows of another one another id."
+
+
+def _of_one(stretches: list[slice], ids: npt.NDArray[Any], owners: npt.NDArray[Any], what: str) -> None:
+    """Refuses a sequence whose rows do not all have the same label or group."""
+    for rows in stretches:
+        first, own = owners[rows.start], owners[rows]
+        if len(others := np.flatnonzero(own != first)):
+            row = rows.start + int(others[0])
+            raise InputError(f'row {row + 1}: the sequence "{ids[row]}" {what} "{first}" and "{owners[row]}". {_ONE}')
+
+
+
 def calibrate(
     model: object,
     rows: npt.ArrayLike,
@@ -395,14 +408,20 @@ class SequenceRecognizer:
         labels, ids = np.asarray(y), np.asarray(sequence)
         owners = None if groups is None else np.asarray(groups)
         _agree(len(table), y=len(labels), sequence=len(ids), groups=None if owners is None else len(owners))
-        _stretches(_ids(sequence, "sequence"))
-        if groups is not None:
+        stretches = _stretches(_ids(sequence, "sequence"))
+        _of_one(stretches, ids, labels, "has the labels")
+        if owners is not None:
             _ids(groups, "group")
+            _of_one(stretches, ids, owners, "belongs to the groups")
         known = numbered(table, _numbers(_texts(ids))) if self.position else table
         units = ids if owners is None else owners
         fitted, calibrated, folds = self._fitted(), np.ones(len(table), dtype=bool), None
         if fitted is not None and (self.folds is not None or not self.promise):
             raise SettingError("folds is given with a classifier that is fitted. Give one that folds of the sequences can train.")
+        if not self.promise:
+            for name, default in (("strangers", None), ("per", "average"), ("confidence", 0.95)):
+                if (given := getattr(self, name)) != default:
+                    raise SettingError(f"{name} is {given}, but an estimate has none. Leave it out, or promise=False.")
         if fitted is None:
             train = self._train(units) if self.promise else calibrated
             if len(missing := np.setdiff1d(labels, labels[train])):

@@ -400,6 +400,7 @@ pub(super) fn events(model: &Model<'_>) -> Option<OfEvents> {
         rows_per_second: f64::from(events.rows_per_hour) / 3600.0,
         memory: f64::from(events.memory) * f64::from(model.unit()),
         false_per_hour: Some(f64::from(events.per_hour)).filter(|promised| *promised > 0.0),
-        confidence: f64::from(events.confidence),
+        // An f32 in the model.
+        confidence: (f64::from(events.confidence) * 1e6).round() / 1e6,
     })
 }

@@ -283,12 +283,17 @@ impl Calls<'_> {
             );
         }
         let number = if place.is_some() { ", whose number is counted here," } else { "" };
+        // After an event the next row is another matter; a decision stays.
+        let otherwise = match self.model.events() {
+            None => "state->verdict == PALPATE_UNDECIDED ? -4 : palpate_decided_(state)",
+            Some(_) => "-4",
+        };
         let (begin, push, refused) = match is_guarded {
             true => (
                 "    seen->rows = 0;\n    seen->refused = 0;\n",
                 format!(
                     "    seen->refused = palpate_next_row(&{name}_opened_, {argument}, keys);\n    \
-                         if (seen->refused != 0) {{\n        return -4;\n    }}\n"
+                         if (seen->refused != 0) {{\n        return {otherwise};\n    }}\n"
                 ),
                 ", -4 if the model does not take the row, which adds nothing",
             ),

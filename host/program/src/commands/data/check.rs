@@ -16,9 +16,9 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-Of one data set, every line that cannot be read is named, and what reads well but would train badly: a file that was appended to itself, one object under two names, times that are no seconds, a capture that is not complete. The exit code is 1 if training would be wrong; what may be meant is a note.
+For one data set, the command names every line that it cannot read, and data that can be read but would train badly: a file appended to itself, one object under two names, times that are not in seconds, an incomplete capture. The exit code is 1 if training would go wrong; anything that may be intended is only a note.
 
-Of two, the verdict is what their difference costs a model that is trained on the simulated touches: the accuracy that it loses on recorded ones, the names that it confuses there, whether a promise made on simulated touches is kept. Below stands how often a classifier tells recorded from simulated touches (50 % is guessing), and how each feature differs.
+For two data sets, the verdict states what their difference costs a model trained on the simulated touches: the accuracy that it loses on recorded ones, the names that it confuses there, whether a promise made on simulated touches is kept. Below the verdict are the accuracy of a classifier that distinguishes recorded from simulated touches (50 % is guessing) and the difference of each feature.
 
 Examples:
   palpate data check recorded

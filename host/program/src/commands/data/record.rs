@@ -14,7 +14,7 @@ use std::time::SystemTime;
 #[command(after_help = "\
 A line is a touch: three contact times in seconds on any clock, - for a finger that did not touch, and optionally the probe's direction and alignment (six numbers), and behind them the hand's position in millimeters (three). Lines `- - -` for approaches that touched nothing are recorded too; a chip reports those if it is told when an approach is over (GP5 on a Pico). SOURCE may also be a robot's log (MCAP), of which the touches of NAME are taken, or a chip, whose touches are added as soon as it reports them, until Ctrl-C; if the cable is pulled, this waits for it.
 
-On a table the object may be called after its placement, as `palpate capture --scene table` names it; without it the touches may be of any.
+On a table, the object's name may end with its placement, as `palpate capture --scene table` names it; without one, the touches may be of any placement.
 
 The directory gets NAME.txt and dataset.json. All lines are added, or none if one of them is wrong. Touches of an object that is there already are added to it.
 

@@ -143,7 +143,7 @@ impl Arguments {
             (true, _, true) => {
                 ("active", "it with a model of trees; a model of maps says with --next where to touch next")
             }
-            (_, true, false) => ("next", "it with a model of maps; of a plan --active says the next"),
+            (_, true, false) => ("next", "it with a model of maps; for a model with a plan, use --active"),
             (true, ..) => return Ok(Asks::Approach),
             (_, true, _) => return Ok(Asks::Place { within: self.workspace.map(locate::within).transpose()? }),
             _ => return Ok(Asks::Nothing),
