@@ -67,6 +67,7 @@ fn settings(Real(real): &Real, cell: f64, range: f64, error_rate: f64, max_touch
     if cell != 1.0 && cell != 2.0 {
         return Err(Error::setting("cell", cell, "1 or 2, in millimeters"));
     }
+    real.check()?;
     let settings = with!(Settings::default(), fine = cell < 2.0, range, error_rate, max_touches).expecting(real);
     settings.check()?;
     Ok(settings)
@@ -74,6 +75,9 @@ fn settings(Real(real): &Real, cell: f64, range: f64, error_rate: f64, max_touch
 
 /// Objects at their true size.
 fn sized(meshes: Meshes, millimeters: Option<f64>) -> palpate::Result<Vec<Object>> {
+    if let Some(wrong) = millimeters.filter(|length| !length.is_finite() || *length <= 0.0) {
+        return Err(Error::setting("millimeters", wrong, "a finite number above 0"));
+    }
     let mut objects = meshes.objects(false)?;
     objects.iter_mut().for_each(|object| object.millimeters = object.millimeters.or(millimeters));
     Ok(objects)
@@ -471,7 +475,7 @@ impl Locator {
         let touch = touch_of_seconds(times, Some([0.0, 0.0, -1.0]), Some(alignment.0))
             .and_then(|touch| located(touch, position.all()))
             .map_err(Error::from)?;
-        let seen = self.hand.seen(&touch).ok_or(Error::from(TouchesProblem::PositionWithoutPose))?;
+        let seen = locate::seen(&self.hand, &touch).map_err(Error::from)?;
         self.take(py, seen)
     }
 
@@ -497,6 +501,10 @@ impl Locator {
         }
         let row = [across, along].map(|share| (share * spacing).round() as i32);
         let Three(heights) = heights;
+        // As for times: a finger cannot have stopped far below the table.
+        if let Some(below) = heights.iter().flatten().map(|height| -height).find(|below| *below > locate::BELOW) {
+            return Err(Error::from(LocateProblem::Below { millimeters: below }).into());
+        }
         let seen = Seen::new([x, y].map(micrometers), row, heights.map(contact), micrometers(lowest));
         self.take(py, seen)
     }

@@ -162,6 +162,32 @@ def test_settings_out_of_range_are_named(settings: dict[str, object], message: s
         palpate.Maps.of_meshes(["bowl"], probe=PROBE, millimeters=UNIT, **settings)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("real", [{"height": -1.0}, {"height": math.nan}, {"lost": 2.0}, {"size": 0.0}, {"table": math.nan}])
+def test_noise_that_is_none_is_named(maps: palpate.Maps, real: dict[str, float]) -> None:
+    with pytest.raises(palpate.SettingError, match=next(iter(real))):
+        maps.evaluate(OBJECTS, millimeters=UNIT, sequences=2, real=palpate.Real(**real))
+
+
+@pytest.mark.parametrize("millimeters", [math.nan, -1.0, 0.0])
+def test_a_length_of_a_unit_that_is_none_is_named(maps: palpate.Maps, millimeters: float) -> None:
+    with pytest.raises(palpate.SettingError, match="millimeters"):
+        palpate.Maps.of_meshes(OBJECTS, probe=PROBE, millimeters=millimeters)
+    with pytest.raises(palpate.SettingError, match="millimeters"):
+        maps.evaluate(OBJECTS, millimeters=millimeters, sequences=2)
+
+
+def test_a_finger_far_below_the_table_and_more_touches_than_there_is_room_for_are_refused(maps: palpate.Maps) -> None:
+    locator = palpate.Locator(maps)
+    with pytest.raises(palpate.InputError, match="below the table"):
+        locator.push((0.0, None, 0.1), (0.0, 0.0, -30.0), 0.0)
+    with pytest.raises(palpate.InputError, match="below the table"):
+        locator.push_heights((-100.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+    assert locator.touches == 0
+    for max_touches in (0, 33):
+        with pytest.raises(palpate.SettingError, match="max_touches"):
+            maps.calibrate(OBJECTS, millimeters=UNIT, sequences=2, max_touches=max_touches)
+
+
 def test_wrong_touches_are_refused(maps: palpate.Maps, tmp_path: Path) -> None:
     locator = palpate.Locator(maps)
     with pytest.raises(ValueError, match="2 numbers, where 3 are needed"):

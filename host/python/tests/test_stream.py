@@ -296,6 +296,27 @@ def test_a_guard_names_the_feature_of_a_dead_sensor_and_its_row_adds_nothing() -
     assert ends.raw["refused"] == 900 * (LENGTH - 1)
 
 
+def test_a_sequence_of_two_labels_or_groups_is_named_by_its_row_wherever_it_falls() -> None:
+    X, y, sequence, _ = streams(60, 1)
+    groups = sequence // 2
+    for number in range(60):
+        row = number * LENGTH + 5
+        labels, owners = y.copy(), groups.copy()
+        labels[row], owners[row] = "cup" if y[row] != "cup" else "jug", 99
+        recognizer = palpate.SequenceRecognizer(estimators()[2], error_rate=0.3)
+        with pytest.raises(palpate.InputError, match=f'row {row + 1}: the sequence "{number}" has the labels'):
+            recognizer.fit(X, labels, sequence=sequence)
+        with pytest.raises(palpate.InputError, match=f'row {row + 1}: the sequence "{number}" belongs to the groups'):
+            recognizer.fit(X, y, sequence=sequence, groups=owners)
+
+
+@pytest.mark.parametrize("given", [{"strangers": "likely"}, {"per": "name"}, {"confidence": 0.9}])
+def test_an_estimate_refuses_what_only_a_promise_has(given: dict[str, Any]) -> None:
+    X, y, sequence, _ = streams(60, 1)
+    with pytest.raises(palpate.SettingError, match=next(iter(given))):
+        palpate.SequenceRecognizer(estimators()[2], promise=False, **given).fit(X, y, sequence=sequence)
+
+
 def test_a_position_that_is_no_feature_or_no_class_is_an_error() -> None:
     X, y, _ = ramps(100, 1)
     own = ensemble.HistGradientBoostingClassifier(max_iter=3).fit(np.column_stack([X, X]), y)

@@ -306,7 +306,9 @@ impl StatedProbe {
         if is_simulated {
             return Ok(());
         }
-        if probe.is_some_and(|probe| probe.cone == 0) && !dataset.placement_shares().is_empty() {
+        // Touches with a position are of a table, whatever the probe states.
+        let is_located = dataset.touches().any(|touch| touch.position().is_some());
+        if probe.is_some_and(|probe| probe.cone == 0) && !is_located && !dataset.placement_shares().is_empty() {
             let [first, second] = names.map(str::to_owned);
             return Err(ProbeProblem::Differs { first, second, differences: "scene floating and table".into() });
         }

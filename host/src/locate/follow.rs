@@ -16,7 +16,7 @@ pub const CELLS: usize = 14_336;
 /// Cells and objects on a host that follows many objects.
 const MANY: usize = 65_536;
 /// Distance below the table at which a finger cannot have stopped, in millimeters.
-const BELOW: f64 = 15.0;
+pub const BELOW: f64 = 15.0;
 
 /// Heights that a touch met.
 ///

@@ -30,7 +30,7 @@ mod tests;
 mod world;
 mod write;
 
-pub use follow::{CELLS, Locating, TOUCHES, locating, seen, within, workspace};
+pub use follow::{BELOW, CELLS, Locating, TOUCHES, locating, seen, within, workspace};
 pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspect, names, stated};
 pub use learn::{learn, probe_of};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, POSE, Pose, Seen, TESTED};

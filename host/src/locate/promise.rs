@@ -48,6 +48,16 @@ pub struct Terms {
     pub effort: Option<Effort>,
 }
 
+impl Terms {
+    /// Checks the limit of approaches and the noise.
+    fn check(&self) -> Result<()> {
+        if !(1..=super::TOUCHES as u32).contains(&self.max_touches) {
+            return Err(Error::setting("max_touches", self.max_touches, format!("1 to {}", super::TOUCHES)));
+        }
+        self.real.check()
+    }
+}
+
 /// A calibrated model of maps.
 #[derive(Clone, Debug, Serialize)]
 pub struct Calibrated {
@@ -196,6 +206,7 @@ pub fn calibrate_recorded(
     terms: &Terms,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
+    terms.check()?;
     check_all(maps, recorded.objects.iter().map(|object| &object.name))?;
     let hand = Hand::of(&maps).ok_or(LocateProblem::NoHand)?;
     let plain = Restated { odds: 0, max_touches: terms.max_touches, misfit: None, stretch: 0, promise: None };
@@ -370,6 +381,7 @@ fn play(
     (odds, least): (u64, usize),
     progress: &dyn Progress,
 ) -> Result<Vec<Played>> {
+    terms.check()?;
     let setup = Setup::new(maps, standing, probe, terms)?;
     let equivalents = Equivalents::new(maps, standing, probe);
     progress.begin("sequences", Some(terms.sequences as u64));

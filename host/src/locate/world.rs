@@ -2,7 +2,7 @@
 
 use super::error::LocateProblem;
 use crate::capture;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mesh::Object;
 use crate::probe::approach::{FINGERS, Probe, to_q15};
 use crate::probe::noise::{Deviation, Noise};
@@ -72,6 +72,36 @@ impl Default for Real {
 }
 
 impl Real {
+    /// Checks that these are deviations, a share and a size.
+    ///
+    /// # Errors
+    /// [`SettingError`](crate::error::SettingError) with the name of the first that is not.
+    pub fn check(&self) -> Result<()> {
+        let &Self { height, lost, position, drift, drift_yaw, size, bent, tips, table, turned } = self;
+        let deviations = [
+            ("height", height),
+            ("position", position),
+            ("drift", drift),
+            ("drift_yaw", drift_yaw),
+            ("bent", bent),
+            ("tips", tips),
+        ];
+        let is_none = |number: f64| !number.is_finite() || number < 0.0;
+        if let Some((name, number)) = deviations.into_iter().find(|(_, number)| is_none(*number)) {
+            return Err(Error::setting(name, number, "a finite number, 0 or more"));
+        }
+        if !(0.0..=1.0).contains(&lost) {
+            return Err(Error::setting("lost", lost, "a share from 0 to 1"));
+        }
+        if !size.is_finite() || size <= 0.0 {
+            return Err(Error::setting("size", size, "a finite number above 0"));
+        }
+        match [("table", table), ("turned", turned)].into_iter().find(|(_, number)| !number.is_finite()) {
+            Some((name, number)) => Err(Error::setting(name, number, "a finite number")),
+            None => Ok(()),
+        }
+    }
+
     /// Noise of a hand of this speed, in millimeters per second.
     ///
     /// # Errors

@@ -663,6 +663,16 @@ fn a_guard_refuses_dead_stuck_and_railed_sensors_and_hardly_any_other_row() {
         println!("{what}: {refused} of {dead} rows refused");
         assert!(refused as f64 >= least * dead as f64, "{what}: {refused} of {dead}");
     }
+    // Sequences of one row say nothing of how long a value stays the same.
+    let mut mixed = sequences(Kind::Independent, 900, 30, 3);
+    for row in 0..60 {
+        let start = mixed.values.len();
+        mixed.values.push(PLACES[row % CLASSES]);
+        mixed.sequences.push(RowSequence { rows: start..start + 1, class: row % CLASSES, group: None });
+    }
+    let calibrated = calibrate(&model, &mixed, &settings, &()).unwrap();
+    let guarded = compile::open(&calibrated.model).unwrap();
+    assert!(guarded.guard().unwrap().limits().all(|limits| limits.most_equal > 0));
     // The same model calibrated again without one has none.
     let without =
         calibrate(&guarded, &sequences(Kind::Independent, 900, 30, 3), &Settings { guard: false, ..settings }, &());

@@ -14,8 +14,9 @@ pub(super) fn core(name: &str) -> Result<Core, String> {
 
 /// The estimates as a text.
 pub(super) fn instructions(instructions: Instructions) -> String {
-    let m0_plus =
-        instructions.m0_plus.map_or_else(|| "unknown (f32 leaves)".into(), |instructions| instructions.to_string());
+    let m0_plus = instructions
+        .m0_plus
+        .map_or_else(|| "unknown (f32 leaves, or code for an M4F)".into(), |instructions| instructions.to_string());
     format!("{} on a Cortex-M4F, {m0_plus} on a Cortex-M0+", instructions.m4f)
 }
 

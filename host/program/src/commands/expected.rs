@@ -12,6 +12,17 @@ pub(crate) struct ExpectedArguments {
     only: Vec<String>,
 }
 
+impl ExpectedArguments {
+    /// The first option that is given.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        match (self.prior.prior.is_empty(), self.only.is_empty()) {
+            (false, _) => Some("prior"),
+            (_, false) => Some("only"),
+            _ => None,
+        }
+    }
+}
+
 /// Frequencies with which objects are touched.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct PriorArguments {

@@ -206,6 +206,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     }
     output::admit(&arguments.output, arguments.inputs())?;
     let emitted = places(&arguments)?;
+    let outputs = emitted.iter().map(|(_, path)| path).chain([&arguments.output]);
+    if let Some(directory) = outputs.into_iter().find(|path| path.is_dir()) {
+        return Err(Error::setting("output", directory.display(), "another file: this is a directory"));
+    }
     let names = arguments.names.as_deref().map(names).transpose()?;
     let mut ensemble = ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(names.as_deref()))?;
     set_link(&mut ensemble, arguments.link)?;

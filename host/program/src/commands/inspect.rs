@@ -313,7 +313,9 @@ fn training_lines(lines: &mut Lines, inspected: &Inspected<'_>) {
 }
 
 fn chip_lines(lines: &mut Lines, chip: &OnChip) {
-    let known = |number: Option<u64>| number.map_or("unknown (f32 leaves)".into(), |number| number.to_string());
+    let known = |number: Option<u64>| {
+        number.map_or("unknown (f32 leaves, or code for an M4F)".into(), |number| number.to_string())
+    };
     let Memory { model_flash, code_flash, ram, stack, .. } = chip.memory;
     lines.line("", "");
     lines.line("on a", chip.core.name());

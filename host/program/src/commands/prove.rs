@@ -107,6 +107,9 @@ impl Proved {
             Err(error) if needs_code(&error) => {
                 let io = |path: &Path, source| Error::io(path, "read", source);
                 let assembly = path.with_extension("s");
+                if !assembly.exists() {
+                    return Err(error);
+                }
                 let bytes = std::fs::read(path).map_err(|source| io(path, source))?;
                 let text = std::fs::read_to_string(&assembly);
                 text.map(|text| Self::Code(bytes, text))

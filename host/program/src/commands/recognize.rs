@@ -77,8 +77,21 @@ pub(crate) struct Arguments {
     expected: ExpectedArguments,
 }
 
+impl Arguments {
+    /// Refuses options of a verdict where an object is mapped.
+    fn check_exploring(&self) -> Result<()> {
+        let rate = self.error_rate.map(|_| "error_rate");
+        let given = rate.or(self.max_touches.map(|_| "max_touches")).or(self.expected.given());
+        match given {
+            Some(option) => Err(Error::setting(option, "given", "it without --explore, which names no object")),
+            None => Ok(()),
+        }
+    }
+}
+
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if let Some(goal) = arguments.explore {
+        arguments.check_exploring()?;
         return super::shape::explore(goal, &arguments.model, &arguments.file, arguments.workspace);
     }
     if arguments.workspace.is_some() && !arguments.next {

@@ -116,7 +116,7 @@ pub(super) fn run(file: &MapsFile, touches: &Path, asked: &Asked<'_>, global: &G
     let maps = file.maps();
     let own = maps.stopping();
     let max_touches = asked.max_touches.unwrap_or(own.max_touches());
-    if max_touches as usize > locate::TOUCHES {
+    if !(1..=locate::TOUCHES as u32).contains(&max_touches) {
         return Err(Error::setting("max_touches", max_touches, format!("1 to {}", locate::TOUCHES)));
     }
     let stopping = match asked.error_rate {

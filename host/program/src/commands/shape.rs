@@ -101,6 +101,10 @@ pub(super) fn explore(goal: Known, model: &Path, touches: &Path, workspace: Opti
     let file =
         if is_probe { Some(ProbeFile::read(model)?) } else { MapsFile::read(model)?.map(of_maps).transpose()? };
     let allowed = "it with a probe file in millimeters (hand.toml) or a model of maps, which states its hand";
+    if file.is_none() {
+        // A file that holds no trees either says itself what is wrong.
+        palpate::compile::CompiledModel::read(model)?;
+    }
     let file = in_millimeters(file).ok_or_else(|| Error::setting("explore", "given", allowed))?;
     let half = workspace.unwrap_or(WORKSPACE);
     if !(1.0..=200.0).contains(&half) {

@@ -89,8 +89,11 @@ impl TableArguments {
     }
 
     fn table(&self, wanted: &Wanted<'_>) -> Result<Table> {
-        let trees = || Error::at(palpate::error::Place::file(wanted.model), LocateProblem::Trees);
-        let file = MapsFile::read(wanted.model)?.ok_or_else(trees)?;
+        let Some(file) = MapsFile::read(wanted.model)? else {
+            // A file that holds no trees either says itself what is wrong.
+            palpate::compile::CompiledModel::read(wanted.model)?;
+            return Err(Error::at(palpate::error::Place::file(wanted.model), LocateProblem::Trees));
+        };
         let maps = file.maps();
         let probe = locate::hand(&maps).map_err(|error| error.in_file(wanted.model))?;
         let noise = wanted.real.on_table(locate::stated(&maps).noise(probe.speed))?;
@@ -158,9 +161,12 @@ impl TableArguments {
         let evaluated = locate::evaluate(file.maps(), &standing, &probe, &terms, &Bar::new())
             .map_err(|error| error.in_file(wanted.model))?;
         let noise = terms.real.noise(probe.speed).to_string();
+        let is_here = |name: &String| standing.iter().any(|object| object.name == *name);
+        let names = locate::names(&file.maps());
+        let are_others = names.len() != standing.len() || !names.iter().all(is_here);
         match global.json {
             true => output::print_json(&Evaluated { aimed: terms.aimed, noise, evaluation: &evaluated }),
-            false => output::print(&evaluated_text(&evaluated, &terms, &noise)),
+            false => output::print(&evaluated_text(&evaluated, &terms, &noise, are_others)),
         }
     }
 }
@@ -206,7 +212,7 @@ fn calibrated_text(path: &Path, calibrated: &Calibrated, before: u64) -> String 
         + &format!("{}: {} bytes\n", path.display(), count(calibrated.model.len()))
 }
 
-fn evaluated_text(evaluated: &Evaluation, terms: &Terms, noise: &str) -> String {
+fn evaluated_text(evaluated: &Evaluation, terms: &Terms, noise: &str, are_others: bool) -> String {
     let Evaluation { sequences, given, wrong, undecided, unknown, off: [half, most], .. } = *evaluated;
     let mut text = format!(
         "{} sequences of {}, for {noise}\n\
@@ -241,9 +247,11 @@ fn evaluated_text(evaluated: &Evaluation, terms: &Terms, noise: &str) -> String 
                 Finding::Untested => "no name was given",
             },
         );
-        for (is_other, what) in
-            [(promised.aimed != terms.aimed, how(promised.aimed)), (promised.noise != noise, promised.noise.as_str())]
-        {
+        for (is_other, what) in [
+            (promised.aimed != terms.aimed, how(promised.aimed)),
+            (promised.noise != noise, promised.noise.as_str()),
+            (are_others, "the objects of the model, all of them"),
+        ] {
             if is_other {
                 _ = writeln!(text, "Void here: it was made for {what}.");
             }

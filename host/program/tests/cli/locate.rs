@@ -379,4 +379,8 @@ fn exploring_says_where_to_touch_next_until_the_map_is_known() {
     assert!(known["next"].is_null() && known["known"].as_f64().unwrap() >= 0.3, "{known}");
     refused(at, "recognize hand.toml --explore=2mm lines.txt", 2, "such as 2mm/80%");
     refused(at, "recognize hand.toml --explore --workspace 900 lines.txt", 2, "from 1 to 200");
+    refused(at, "recognize hand.toml --explore --max-touches 5 lines.txt", 2, "--max-touches is given");
+    refused(at, "recognize hand.toml --explore --only pot lines.txt", 2, "--only is given");
+    refused(at, "recognize nothing.palpate --explore lines.txt", 1, "nothing.palpate: cannot read the model");
+    refused(at, "evaluate nothing.palpate --objects bowl", 1, "nothing.palpate: cannot read the model");
 }

@@ -827,6 +827,21 @@ fn every_kind_is_proved_for_every_row_and_its_certificate_holds_or_says_what_cha
     );
     let text = stdout(run(["verify", &model, &source, "--certificate", &proof]));
     assert!(text.contains("proof.txt holds: on every possible row"), "{text}");
+    // Another missing number, in the rows as in the proof.
+    let other = path("missing.palpate");
+    stdout(run(["export", &source, "-o", &other, "--missing=-999"]));
+    for arguments in [&[&*data("xgboost-3.4-binary.rows.csv")][..], &["--prove", &path("other.txt")]] {
+        let message = stderr(run([&["verify", &other, &source], arguments].concat()), 1);
+        assert!(message.contains("NaN and -999") && message.contains("NaN alone"), "{message}");
+    }
+    // A certificate whose end is missing.
+    let whole = std::fs::read_to_string(&proof).unwrap();
+    let cut = path("cut.txt");
+    for lines in [4, whole.lines().count() - 1] {
+        std::fs::write(&cut, whole.lines().take(lines).map(|line| format!("{line}\n")).collect::<String>()).unwrap();
+        let message = stderr(run(["verify", &model, &source, "--certificate", &cut]), 1);
+        assert!(message.contains("the certificate is cut off"), "{message}");
+    }
     // Another model, another file, a damaged certificate.
     let message = stderr(run(["verify", &model, &data("xgboost-3.4-softprob.ubj"), "--prove", &proof]), 1);
     assert!(message.contains("model.palpate: the model's outputs are not the ensemble's"), "{message}");

@@ -158,8 +158,8 @@ pub fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         bytes: model.bytes().len(),
         bytes_by_part: parts(model),
         checksum: format!("{:08x}", model.checksum()),
-        unit: model.unit(),
-        margin_error: model.margin_error(),
+        unit: crate::trees::verify::unit(model) as f32,
+        margin_error: crate::trees::verify::bound(model) as f32,
         stopping: Defaults {
             error_rate: evaluate::significant(stopping.error_rate()),
             max_touches: stopping.max_touches(),

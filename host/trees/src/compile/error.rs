@@ -127,6 +127,9 @@ impl Problem for CompileProblem {
             Self::Model(ModelError::Length { .. } | ModelError::Checksum { .. }) => {
                 "Copy the model again, or export it again."
             }
+            Self::Model(ModelError::NeedsCode) => {
+                "Assembly is proved with the .s file beside the model; trees as C code can be neither proved nor inspected: export the model without --emit for that."
+            }
             Self::Model(_) => "Export the model again with `palpate export`.",
             Self::Objects { .. } => "Give 1 to 256 objects, and one base margin for each.",
             Self::Tree { .. } => "Train it again, or check the program that wrote it.",
@@ -139,7 +142,7 @@ impl Problem for CompileProblem {
                     "Train on features in whole units: {units}. If it is not a model of {of}, remove its attribute palpate_descriptor: then its features are compared as they are."
                 );
             }
-            Self::DoesNotFit { .. } => "Choose another layout, or leave the choice to the compiler (auto).",
+            Self::DoesNotFit { .. } => "Choose leaves of i16 or i8, or another layout; without one stated, the compiler chooses.",
             Self::FitsNoLayout | Self::TooLarge | Self::OverBudget { .. } => "Train fewer trees, or trees with fewer splits.",
             Self::NameTooLong { .. } => "Use names of at most 255 bytes.",
         }

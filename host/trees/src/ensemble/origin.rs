@@ -70,8 +70,8 @@ impl Probability {
         let each = |margin: &f64| match self {
             Self::Softmax => (margin - most).exp() / all,
             Self::Logistic => 1.0 / (1.0 + (-margin).exp()),
-            // Votes for each class, of any unit.
-            Self::Shares | Self::Unknown => margin / margins.iter().sum::<f64>(),
+            // Shares of the votes; rounded leaves need not add up to 1, on a chip neither.
+            Self::Shares | Self::Unknown => *margin,
         };
         (self != Self::Unknown).then(|| margins.iter().map(each).collect())
     }

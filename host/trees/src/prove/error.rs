@@ -6,6 +6,14 @@ use crate::error::Problem;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProofProblem {
+    /// A certificate has no end.
+    #[error("the certificate is cut off: it states {stated} of {outputs} outputs")]
+    Cut {
+        /// Number of outputs that it states.
+        stated: usize,
+        /// Number of the ensemble's outputs.
+        outputs: usize,
+    },
     /// A statement of the model is not the ensemble's.
     #[error("the model's {what} are not the ensemble's: {model}, and not {ensemble}")]
     Statement {
@@ -131,7 +139,7 @@ impl Problem for ProofProblem {
     fn fix(&self) -> String {
         match self {
             Self::Assembly { .. } => "Export the code again. Leaves with a value for each class are read only where they are votes.",
-            Self::Line { .. } => "Give the file that `palpate verify --prove FILE` wrote, unchanged.",
+            Self::Line { .. } | Self::Cut { .. } => "Give the file that `palpate verify --prove FILE` wrote, unchanged.",
             Self::OtherFile { .. } | Self::Understated { .. } => {
                 "Give the files that the certificate was made of, or make another with `palpate verify --prove FILE`."
             }

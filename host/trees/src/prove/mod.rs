@@ -31,6 +31,7 @@ use crate::compile::code::Form;
 use crate::compile::{self, Compiled, Instructions, Language, Source, code};
 use crate::ensemble::{Ensemble, Inputs};
 use crate::error::Result;
+use crate::rows::{Encoder, missing_text};
 use boxes::{Keys, Rows, Tree, Values, of_ensemble};
 use chip::Chip;
 use format::Plain;
@@ -156,7 +157,7 @@ pub fn check_code(
     }
     compile::open_with_code(bytes)?;
     let (plain, read) = with_code(bytes, code)?;
-    is_about(certificate, bytes, file)?;
+    is_about(certificate, bytes, file, ensemble)?;
     statements(&plain, ensemble)?;
     let sources = of_ensemble(ensemble, &plain.keys)?;
     let subject = Subject { plain: &plain, sources: &sources, ensemble };
@@ -255,14 +256,16 @@ fn with_code(bytes: &[u8], code: &str) -> Result<(Plain, assembly::Code), ProofP
 }
 
 /// Returns an error unless a certificate is about these files.
-fn is_about(certificate: &Certificate, bytes: &[u8], file: &[u8]) -> Result<(), ProofProblem> {
+fn is_about(certificate: &Certificate, bytes: &[u8], file: &[u8], ensemble: &Ensemble) -> Result<(), ProofProblem> {
     for (what, stated, bytes) in [("a model", certificate.model, bytes), ("an ensemble", certificate.ensemble, file)] {
         let found = checksum(bytes);
         if found != stated {
             return Err(ProofProblem::OtherFile { what, stated, found });
         }
     }
-    Ok(())
+    // Outputs come last.
+    let (stated, outputs) = (certificate.outputs.len(), ensemble.objects.len());
+    if stated < outputs { Err(ProofProblem::Cut { stated, outputs }) } else { Ok(()) }
 }
 
 /// Checks a certificate of a model, given by its bytes, and of `ensemble`, which was read from `file`, in another way than
@@ -272,7 +275,7 @@ fn is_about(certificate: &Certificate, bytes: &[u8], file: &[u8]) -> Result<(), 
 /// [`CompileProblem::Model`](crate::error::CompileProblem::Model) if the bytes are no model; [`ProofProblem`] that says what
 /// is not as the certificate states.
 pub fn check(certificate: &Certificate, bytes: &[u8], ensemble: &Ensemble, file: &[u8]) -> Result<Proof> {
-    is_about(certificate, bytes, file)?;
+    is_about(certificate, bytes, file, ensemble)?;
     // Only what may run on a chip is certified.
     let model = compile::open(bytes)?;
     let plain = format::read(bytes)?;
@@ -458,5 +461,10 @@ fn statements(plain: &Plain, ensemble: &Ensemble) -> Result<(), ProofProblem> {
         Keys::Real | Keys::Whole => f32_key(end),
     };
     let missing = missing.map(|ends| ends.map(|end| i64::from(number(end))));
-    same("missing values", format!("{:?}", plain.sentinel), format!("{missing:?}"))
+    let value = |number: i64| match &plain.keys {
+        Keys::Scaled(scales) => number as f64 / f64::from(scales[0]),
+        Keys::Real | Keys::Whole => Encoder::Real.value(0, number as i32),
+    };
+    let text = |ends: Option<[i64; 2]>| missing_text(ends.map(|ends| ends.map(value)));
+    same("missing values", text(plain.sentinel), text(missing))
 }

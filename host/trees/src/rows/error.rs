@@ -163,6 +163,14 @@ pub enum RowsProblem {
         /// Numbers of the ensemble.
         ensemble: [usize; 3],
     },
+    /// A model and an ensemble take other numbers for missing values.
+    #[error("missing values are {model} in the model, {ensemble} in the ensemble")]
+    OtherMissing {
+        /// The model's.
+        model: String,
+        /// The ensemble's.
+        ensemble: String,
+    },
     /// Margins are farther apart than the model states.
     #[error("{whose} margins differ by up to {error:.3e}, more than the {bound:.3e} that the model states{}", tree.as_ref().map(|tree| format!("; {tree}")).unwrap_or_default())]
     Beyond {
@@ -311,6 +319,9 @@ impl Problem for RowsProblem {
             Self::ComputesFeatures => "Give a model that takes rows of features.",
             Self::OtherModel { .. } => {
                 "Give the file that the model was exported from, and --all-trees if it was exported with that."
+            }
+            Self::OtherMissing { .. } => {
+                "Give the file that the model was exported from, and --missing as it was exported with."
             }
             Self::Beyond { .. } => {
                 "Check that the model was exported from this file, with the same --missing and --all-trees, and the margins are the library's raw scores of these rows."

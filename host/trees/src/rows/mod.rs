@@ -177,6 +177,15 @@ impl Encoder {
     }
 }
 
+/// The numbers from one to another that stand for a missing value.
+pub(crate) fn missing_text(ends: Option<[f64; 2]>) -> String {
+    match ends {
+        None => "NaN alone".into(),
+        Some([low, high]) if low == high => format!("NaN and {low}"),
+        Some([low, high]) => format!("NaN and {low} to {high}"),
+    }
+}
+
 /// A value as a whole number of its feature's units: the nearest, halves away from zero; values beyond ±(2³¹ − 1) become
 /// that, and NaN a missing value.
 pub fn whole(value: impl Into<f64>, scale: f32) -> i32 {

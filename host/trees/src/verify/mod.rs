@@ -18,10 +18,11 @@ pub use score::{Classes, Regression, RowsEvaluation, evaluate_rows};
 
 use crate::ensemble::{Ensemble, Threshold};
 use crate::error::{Result, RowsProblem};
-use crate::rows::{Encoder, Rows, ValueDiffers, generate};
+use crate::rows::{Encoder, Rows, ValueDiffers, generate, missing_text};
 use different::first_different_tree;
 use palpate_base::progress::{self, Progress};
 use palpate_onboard::Model;
+use palpate_shared::format::Sentinel;
 use predict::class_by;
 use rayon::prelude::*;
 use reference::{Reference, Rounding};
@@ -161,6 +162,7 @@ pub fn verify(
         return Err(RowsProblem::OtherModel { model: own, ensemble: of_ensemble }.into());
     }
     let reference = Reference::new(ensemble, model);
+    same_missing(ensemble, &reference)?;
     progress.begin("comparing", None);
     let mut difference = compare_all(model, &reference, &rows.values, 0, progress)?;
     let mut generated = 0;
@@ -216,6 +218,20 @@ pub fn verify(
         first_tree,
         scaling: scaling(&reference, rows),
     })
+}
+
+/// Refuses a model that takes other numbers for missing values than the ensemble. The model's trees would go the ensemble's way in
+/// each row that is made, since those hold the ensemble's numbers alone.
+fn same_missing(ensemble: &Ensemble, reference: &Reference<'_>) -> Result<()> {
+    let encoder = reference.encoder.only(0);
+    let theirs = ensemble.origin.imported.as_ref().and_then(|imported| imported.sentinel);
+    let theirs = theirs.map(|ends| ends.map(|end| encoder.row(&[end])[0]));
+    let own = reference.sentinel.map(|Sentinel { low, high }| [low, high]);
+    if own == theirs {
+        return Ok(());
+    }
+    let text = |ends: Option<[i32; 2]>| missing_text(ends.map(|ends| ends.map(|end| encoder.value(0, end))));
+    Err(RowsProblem::OtherMissing { model: text(own), ensemble: text(theirs) }.into())
 }
 
 /// The values next to a threshold and at it: the nearest f32, or whole numbers of the feature's units.

@@ -91,6 +91,12 @@ fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
         objects.push(with!(Object::new(name, shape.relief().solid(file.probe.radius)), millimeters = Some(1.0)));
         files.push(source.into());
     }
+    for (index, object) in objects.iter().enumerate() {
+        if objects[..index].iter().any(|other| other.name == object.name) {
+            let twice = format!("two objects of the name {}", object.name);
+            return Err(Error::setting("source", twice, "one file for each object, or another directory"));
+        }
+    }
     Ok((objects, files))
 }
 
