@@ -201,7 +201,7 @@ def test_wrong_touches_are_refused(maps: palpate.Maps, tmp_path: Path) -> None:
     # A file of this format does not state its unit; the built-in objects have one.
     wedge = tmp_path / "wedge.obj"
     wedge.write_text("v 0 0 0\nv 40 0 0\nv 0 40 0\nv 0 0 40\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
-    with pytest.raises(palpate.PalpateError, match="unit of the mesh is not known"):
+    with pytest.raises(palpate.PalpateError, match="the true size is unknown"):
         palpate.Maps.of_meshes([str(wedge)], probe=PROBE)
     with pytest.raises(palpate.PalpateError, match="no objects"):
         palpate.Maps.of_meshes({}, probe=PROBE)

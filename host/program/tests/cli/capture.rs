@@ -231,7 +231,7 @@ fn touches_with_a_position_are_captured_straight_down_and_other_combinations_are
         capture(directory.path(), "out", &["--position", "--scene", "table", "--probe", located[4]]).output().unwrap(),
         1,
     );
-    assert!(error.contains("the unit of the mesh is not known") && error.contains("--true-size"), "{error}");
+    assert!(error.contains("the true size is unknown") && error.contains("--true-size"), "{error}");
     stdout(
         capture(directory.path(), "out", &[&table[..], &["--approaches", "40", "--within", "2"]].concat())
             .output()

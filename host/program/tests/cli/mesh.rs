@@ -192,7 +192,7 @@ fn objects_without_a_known_unit_are_named_together_and_files_that_state_one_are_
     globe(&at.join("set"), "cup", 4);
     globe(&at.join("set"), "jug", 4);
     let stated = "set -o data --touches 5 --true-size stated --probe probe.toml";
-    assert!(captured(at, stated, 1).contains("palpate: cup, jug: the unit of the mesh is not known"));
+    assert!(captured(at, stated, 1).contains("palpate: cup, jug: the true size is unknown"));
     // Triangles in meters, beside the mesh that states none.
     let positions: Vec<u8> = [[0.0_f32, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]
         .into_iter()

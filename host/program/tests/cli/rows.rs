@@ -903,7 +903,7 @@ fn a_class_from_fewer_trees_is_decided_by_rows_and_said_and_proved_in_data_and_i
     assert!(message.contains("a file of assembly"), "{message}");
     std::fs::remove_file(&assembly).unwrap();
     let message = stderr(run(["verify", &model, &source, "--prove", &proof]), 1);
-    assert!(message.contains("model.s"), "{message}");
+    assert!(message.contains("the .s file beside the model"), "{message}");
     let message = stderr(run(["export", &source, "-o", &model, "--leaf", "f32", "--early-exit", "yes"]), 2);
     assert!(message.contains("sums of f32"), "{message}");
     let one = data("xgboost-2.1-squarederror.ubj");
