@@ -38,10 +38,7 @@ fn objects_keep_their_true_sizes_and_the_manifest_says_so() {
     let data = directory.path().join("data");
     let capture = arguments!["capture", &meshes, "-o", &data, "--touches", "200", "--probe", &probe, "--true-size"];
     let error = stderr(run([&capture[..], &arguments!["stated"]].concat()), 1);
-    assert!(
-        error.contains("globe, lump: the true size is unknown") && error.contains("See --true-size"),
-        "{error}"
-    );
+    assert!(error.contains("globe, lump: the true size is unknown") && error.contains("See --true-size"), "{error}");
     stdout(run([&capture[..], &arguments!["mm,lump=cm"]].concat()));
     let stated = listing(&data);
     assert_eq!(stated["settings"]["unit"], "mm");
