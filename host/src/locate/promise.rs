@@ -165,6 +165,7 @@ pub fn calibrate(
     terms: &Terms,
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
+    terms.check()?;
     check_all(maps, standing.iter().map(|object| &object.name))?;
     let plain = Restated { odds: 0, max_touches: terms.max_touches, misfit: None, stretch: 0, promise: None };
     let bytes = restated(maps, &plain)?;

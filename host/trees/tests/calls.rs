@@ -148,8 +148,11 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
                 // A binary model has one column in the file: the score of its second class, or its share.
                 let other = if probability == Probability::Shares { 1.0 - margins[0] } else { 0.0 };
                 let first = vec![other; outputs - margins.len()];
-                let nats: Vec<f64> = first.iter().chain(margins).map(|margin| margin / scale).collect();
-                let shares = if has_posteriors && !is_whole { probability.of(&nats).unwrap() } else { Vec::new() };
+                // Shares are the library's own; all else is in nats.
+                let unit = if probability == Probability::Shares { 1.0 } else { scale };
+                let own_margins: Vec<f64> = first.iter().chain(margins).map(|margin| margin / unit).collect();
+                let shares =
+                    if has_posteriors && !is_whole { probability.of(&own_margins).unwrap() } else { Vec::new() };
                 expected.push((format!("{name}, row {row}"), own, shares, bound));
             }
         }

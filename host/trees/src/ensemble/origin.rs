@@ -63,7 +63,7 @@ impl Probability {
         *self == Self::Softmax
     }
 
-    /// Probabilities from a row's margins in nats; `None` where there is no rule.
+    /// Probabilities from a row's margins, in nats or as shares of votes; `None` where there is no rule.
     pub fn of(self, margins: &[f64]) -> Option<Vec<f64>> {
         let most = margins.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let all: f64 = margins.iter().map(|margin| (margin - most).exp()).sum();
