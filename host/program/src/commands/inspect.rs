@@ -157,7 +157,7 @@ fn what_it_is(lines: &mut Lines, inspected: &Inspected<'_>) {
     let Defaults { error_rate, max_touches } = inspected.stopping;
     match inspected.promise {
         None if inspected.events.is_some() => {
-            lines.line("stopping", format!("error rate {} %", wording::decimal(100.0 * f64::from(error_rate), 2)));
+            lines.line("stopping", format!("error rate {} %", wording::decimal(100.0 * error_rate, 2)));
         }
         None => lines.line("stopping", format!("error rate {}, at most {max_touches} {things}", rate(error_rate))),
         Some(_) => lines.line("stopping", format!("at most {max_touches} {things}")),
