@@ -11,7 +11,7 @@ use crate::work::{Callback, long};
 use palpate::calibrate::{self, Per};
 use palpate::capture::{self, Settings as Capture};
 use palpate::compile;
-use palpate::error::{Error, LocateProblem, Place, TouchesProblem};
+use palpate::error::{Error, LocateProblem, Place};
 use palpate::locate::{self, Aimed, Approach, Hand, MapsFile, Promised, Seen, Settings, Terms, Until};
 use palpate::mesh::Object;
 use palpate::onboard::Verdict;

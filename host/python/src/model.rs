@@ -306,7 +306,7 @@ impl Model {
     /// The largest possible difference of a margin from the full model's, in nats.
     #[getter]
     fn margin_error(&self) -> f32 {
-        palpate::trees::verify::bound(&self.model()) as f32
+        palpate::trees::verify::bound(self.model()) as f32
     }
 
     /// A number that identifies the model: models with the same number are the same.

@@ -410,7 +410,7 @@ class SequenceRecognizer:
         _agree(len(table), y=len(labels), sequence=len(ids), groups=None if owners is None else len(owners))
         stretches = _stretches(_ids(sequence, "sequence"))
         _of_one(stretches, ids, labels, "has the labels")
-        if owners is not None:
+        if groups is not None and owners is not None:
             _ids(groups, "group")
             _of_one(stretches, ids, owners, "belongs to the groups")
         known = numbered(table, _numbers(_texts(ids))) if self.position else table
