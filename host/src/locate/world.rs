@@ -86,8 +86,8 @@ impl Real {
             ("bent", bent),
             ("tips", tips),
         ];
-        let is_none = |number: f64| !number.is_finite() || number < 0.0;
-        if let Some((name, number)) = deviations.into_iter().find(|(_, number)| is_none(*number)) {
+        let is_wrong = |number: f64| !number.is_finite() || number < 0.0;
+        if let Some((name, number)) = deviations.into_iter().find(|(_, number)| is_wrong(*number)) {
             return Err(Error::setting(name, number, "a finite number, 0 or more"));
         }
         if !(0.0..=1.0).contains(&lost) {

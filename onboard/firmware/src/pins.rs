@@ -25,7 +25,7 @@ static EDGE: AtomicBool = AtomicBool::new(false);
 const OVER: u8 = 5;
 /// True once that signal has changed, until the main loop has looked.
 static SIGNALED: AtomicBool = AtomicBool::new(false);
-/// That signal, as the main loop last saw it.
+/// Signal that no approach is under way, as the main loop last saw it.
 static SEEN_OVER: AtomicBool = AtomicBool::new(false);
 /// Time at which the main loop last found that nothing more had happened.
 static SEEN: AtomicU32 = AtomicU32::new(u32::MAX);

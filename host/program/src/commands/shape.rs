@@ -102,7 +102,7 @@ pub(super) fn explore(goal: Known, model: &Path, touches: &Path, workspace: Opti
         if is_probe { Some(ProbeFile::read(model)?) } else { MapsFile::read(model)?.map(of_maps).transpose()? };
     let allowed = "it with a probe file in millimeters (hand.toml) or a model of maps, which states its hand";
     if file.is_none() {
-        // A file that holds no trees either says itself what is wrong.
+        // If the file holds no trees either, its own error says why.
         palpate::compile::CompiledModel::read(model)?;
     }
     let file = in_millimeters(file).ok_or_else(|| Error::setting("explore", "given", allowed))?;

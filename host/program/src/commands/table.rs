@@ -90,7 +90,7 @@ impl TableArguments {
 
     fn table(&self, wanted: &Wanted<'_>) -> Result<Table> {
         let Some(file) = MapsFile::read(wanted.model)? else {
-            // A file that holds no trees either says itself what is wrong.
+            // If the file holds no trees either, its own error says why.
             palpate::compile::CompiledModel::read(wanted.model)?;
             return Err(Error::at(palpate::error::Place::file(wanted.model), LocateProblem::Trees));
         };

@@ -283,7 +283,7 @@ impl Calls<'_> {
             );
         }
         let number = if place.is_some() { ", whose number is counted here," } else { "" };
-        // After an event the next row is another matter; a decision stays.
+        // A decision stays; after an event the next row counts again.
         let otherwise = match self.model.events() {
             None => "state->verdict == PALPATE_UNDECIDED ? -4 : palpate_decided_(state)",
             Some(_) => "-4",

@@ -70,7 +70,7 @@ impl Probability {
         let each = |margin: &f64| match self {
             Self::Softmax => (margin - most).exp() / all,
             Self::Logistic => 1.0 / (1.0 + (-margin).exp()),
-            // Shares of the votes; rounded leaves need not add up to 1, on a chip neither.
+            // Shares of the votes; rounded leaves need not add up to 1, here or on a chip.
             Self::Shares | Self::Unknown => *margin,
         };
         (self != Self::Unknown).then(|| margins.iter().map(each).collect())
