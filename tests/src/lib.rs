@@ -19,6 +19,9 @@ pub mod streams;
 pub mod unaligned;
 pub mod vectors;
 
+/// The project's root.
+pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+
 /// Number of repetitions: the one in the variable PALPATE_REPETITIONS, or `few`.
 #[must_use]
 pub fn repetitions(few: usize) -> usize {

@@ -1,6 +1,8 @@
 //! Random ensembles and the touches that could distinguish them.
 
+use palpate::compile::{Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
+use palpate::with;
 use palpate_shared::{ContactTime, Descriptor, Pose, Touch};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
@@ -52,6 +54,14 @@ pub fn ensemble(shape: Shape, seed: u64) -> Ensemble {
     let objects = (0..shape.objects).map(|object| format!("object {object}")).collect();
     let base_margins = (0..shape.objects).map(|_| rng.random_range(-0.5..=0.5)).collect();
     Ensemble { inputs: inputs(shape.descriptor), objects, base_margins, trees, origin: Provenance::default() }
+}
+
+/// A random model with leaves of this type, in the layout that is chosen for it.
+///
+/// # Panics
+/// If the shape fits no model.
+pub fn model(shape: Shape, seed: u64, leaf: Leaf) -> Vec<u8> {
+    compile(&ensemble(shape, seed), &with!(Settings::default(), leaf)).expect("it fits").bytes
 }
 
 /// The trees with at most this many of their different leaves.

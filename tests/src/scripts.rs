@@ -1,5 +1,6 @@
 //! Models, touches and rows that the C header is compared on.
 
+use crate::ROOT;
 use crate::replay::Script;
 use crate::sections::with_sections;
 use crate::vectors;
@@ -13,7 +14,6 @@ use rand::RngExt;
 use rand::rngs::SmallRng;
 use std::path::Path;
 
-const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 const VECTORS: &str = include_str!("../../shared/vectors/vectors.txt");
 
 /// The test vectors' models: every layout, type of leaf, and descriptor, and rows of features; and the real one.

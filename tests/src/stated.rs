@@ -2,6 +2,7 @@
 //!
 //! `PALPATE_RESTATE=1` replaces stated figures by measured ones, so that a README follows the code.
 
+use crate::ROOT;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +19,7 @@ impl Readme {
     /// # Panics
     /// If it cannot be read.
     pub fn open(path: &str) -> Self {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
+        let path = Path::new(ROOT).join(path);
         let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         Self { path, text, wrong: Vec::new() }
     }

@@ -1,5 +1,7 @@
-//! Crates depend on each other in one direction, and so do rooms, the top-level modules of a crate. Trees know no touch.
+//! Crates depend on each other in one direction, and so do rooms, the top-level modules of a crate. Trees know no touch. The
+//! features that a document lists are those of the code.
 
+use palpate_tests::ROOT;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
@@ -100,7 +102,7 @@ fn circle(mut uses: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTre
 
 #[test]
 fn crates_are_built_on_those_below_them_alone() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let root = Path::new(ROOT);
     for (folder, expected) in BUILT_ON {
         let manifest = read_to_string(root.join(folder).join("Cargo.toml")).unwrap();
         let lines = manifest.lines().skip_while(|line| *line != "[dependencies]").skip(1);
@@ -112,7 +114,7 @@ fn crates_are_built_on_those_below_them_alone() {
 
 #[test]
 fn zephyrs_options_are_the_macros_that_the_c_header_takes() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("onboard/c");
+    let root = Path::new(ROOT).join("onboard/c");
     let options = read_to_string(root.join("zephyr/Kconfig")).unwrap();
     let options: BTreeSet<&str> = options.lines().filter_map(|line| line.strip_prefix("config PALPATE_")).collect();
     let header = read_to_string(root.join("palpate.h")).unwrap();
@@ -129,7 +131,7 @@ fn zephyrs_options_are_the_macros_that_the_c_header_takes() {
 fn trees_know_no_touch() {
     // The format's limit of steps, and ordinary words.
     let others = ["max_touches", "compos", "dispos", "expos", "oppos", "propos", "purpos", "suppos", "transpos"];
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let root = Path::new(ROOT);
     for file in sources(&root.join("host/trees/src")) {
         for (number, line) in read_to_string(&file).unwrap().lines().enumerate() {
             let words = others.iter().fold(line.to_lowercase(), |line, other| line.replace(other, ""));
@@ -141,7 +143,7 @@ fn trees_know_no_touch() {
 
 #[test]
 fn rooms_have_no_circle() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let root = Path::new(ROOT);
     for source in CRATES.map(|source| root.join(source)).iter().filter(|source| source.exists()) {
         let uses = uses(source);
         assert!(uses.len() > 2, "{}: {uses:?}", source.display());
@@ -165,4 +167,52 @@ fn a_circle_is_found_whatever_way_paths_are_written() {
     };
     assert!(circle(uses(&[("a", "b"), ("b", "c"), ("a", "c")])).is_empty());
     assert_eq!(circle(uses(&[("a", "b"), ("b", "c"), ("c", "a"), ("a", "d")])).len(), 3);
+}
+
+/// Names between back quotes.
+fn names(text: &str) -> impl Iterator<Item = &str> {
+    text.split('`').skip(1).step_by(2)
+}
+
+/// Features of the manifest, and those that each brings in.
+fn features() -> BTreeMap<&'static str, Vec<&'static str>> {
+    let manifest = include_str!("../../../onboard/Cargo.toml");
+    let (_, section) = manifest.split_once("[features]\n").expect("a section of features");
+    let section = section.split("\n[").next().expect("its lines");
+    let lines = section.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());
+    let feature = |line: &'static str| {
+        let (name, others) = line.split_once(" = ").expect("a feature of one line");
+        (name, others.split('"').skip(1).step_by(2).collect())
+    };
+    lines.map(feature).collect()
+}
+
+#[test]
+fn the_crates_table_of_features_has_all_that_there_are_and_says_which_are_off() {
+    let features = features();
+    let documentation = include_str!("../../../onboard/src/lib.rs");
+    let mut on: BTreeSet<&str> = BTreeSet::new();
+    let mut next = features["default"].clone();
+    while let Some(feature) = next.pop() {
+        if on.insert(feature) {
+            next.extend(features.get(feature).into_iter().flatten());
+        }
+    }
+    let table = documentation.lines().skip_while(|line| !line.starts_with("//! | feature |")).skip(2);
+    let rows = table.map_while(|line| line.strip_prefix("//! | ")?.strip_suffix(" |")?.split_once(" | "));
+    let (mut stated, mut off) = (BTreeSet::new(), BTreeSet::new());
+    for (first, what) in rows {
+        for name in names(first) {
+            assert!(stated.insert(name), "{name} is there twice");
+            if what.ends_with("off by default") {
+                off.insert(name);
+            }
+        }
+    }
+    let all: BTreeSet<&str> = features.keys().copied().filter(|name| *name != "default").collect();
+    assert_eq!(stated, all);
+    assert_eq!(off, all.iter().copied().filter(|name| !on.contains(name)).collect());
+    // The documentation mentions no other defaults.
+    let text: String = documentation.lines().take_while(|line| line.starts_with("//!")).collect();
+    assert_eq!(text.matches("by default").count(), off.len());
 }

@@ -10,8 +10,7 @@ use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::trained;
 
 fn model(descriptor: Descriptor) -> Vec<u8> {
-    let shape = Shape { descriptor, objects: 3, trees: 5, depth: 3, each: true, thresholds: 20, leaf: 0.5 };
-    compile(&random::ensemble(shape, 1), &with!(Settings::default(), leaf = Leaf::I16)).unwrap().bytes
+    random::model(Shape { descriptor, thresholds: 20, leaf: 0.5, ..Shape::SMALL }, 1, Leaf::I16)
 }
 
 /// Result of a recognizer for a touch; checks that it changed nothing if it refused it.

@@ -1,17 +1,14 @@
 //! Misfit tests in models: bytes that make no sense are refused, and those that pass can be walked.
 
-use palpate::compile::{Settings, compile};
+use palpate::compile::Settings;
 use palpate_onboard::{Familiarity, Forgetting, Model, Recognizer, Rivals, SNAPSHOT_LENGTH, Stopping, Verdict};
-use palpate_shared::Descriptor;
 use palpate_shared::format::{Held, MisfitTerms, ObjectMisfit, Strangers, Tag};
 use palpate_tests::random::{self, Shape};
 
 const OBJECTS: usize = 4;
 
 fn model() -> Vec<u8> {
-    let descriptor = Descriptor::Curvature;
-    let shape = Shape { descriptor, objects: OBJECTS, trees: 4, depth: 3, each: true, thresholds: 6, leaf: 1.0 };
-    compile(&random::ensemble(shape, 5), &Settings::default()).unwrap().bytes
+    random::model(Shape { objects: OBJECTS, ..Shape::SMALL }, 5, Settings::default().leaf)
 }
 
 const TERMS: MisfitTerms = MisfitTerms {

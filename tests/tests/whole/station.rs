@@ -3,7 +3,6 @@
 
 use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate::compile::{Leaf, Settings, compile};
-use palpate::with;
 use palpate_onboard::station::{
     ERRORS_IN_A_ROW, Memory, NoStorage, RecordsTooShort, ServeError, Station, record_length, serve,
 };
@@ -12,7 +11,7 @@ use palpate_shared::link::{
     Command, DeviceEnd, FRAME_MAX, Frame, HostEnd, HostSettings, Incoming, LinkError, Message, Outcome, Payload,
     Progress, Query, Refusal, encode,
 };
-use palpate_shared::{ContactTime, Descriptor, Patterns, Pose, Touch};
+use palpate_shared::{ContactTime, Patterns, Pose, Touch};
 use palpate_tests::desk::{Desk, OBJECTS, PowerCut, Step, answers_to_touches, expected, load, push};
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::trained;
@@ -32,17 +31,8 @@ const CONTACTS: Trained = Trained {
 };
 
 fn model(seed: u64) -> Vec<u8> {
-    let shape = Shape {
-        descriptor: Descriptor::Curvature,
-        objects: 10,
-        trees: 10,
-        depth: 4,
-        each: true,
-        thresholds: 100,
-        leaf: 0.05,
-    };
-    let settings = with!(Settings::default(), leaf = Leaf::I16);
-    trained(&compile(&random::ensemble(shape, seed), &settings).unwrap().bytes, &CONTACTS)
+    let shape = Shape { objects: 10, trees: 10, depth: 4, thresholds: 100, leaf: 0.05, ..Shape::SMALL };
+    trained(&random::model(shape, seed, Leaf::I16), &CONTACTS)
 }
 
 /// A chip's memory, which outlasts its program.
@@ -496,15 +486,7 @@ fn both_ends_of_the_link_go_on_after_an_error_before_every_byte() {
 
 #[test]
 fn a_loaded_model_of_more_objects_than_the_next_program_has_room_for_falls_back_to_the_built_in_one() {
-    let shape = Shape {
-        descriptor: Descriptor::Curvature,
-        objects: 3,
-        trees: 4,
-        depth: 3,
-        each: true,
-        thresholds: 40,
-        leaf: 0.3,
-    };
+    let shape = Shape { thresholds: 40, leaf: 0.3, ..Shape::SMALL };
     let small = compile(&random::ensemble(shape, 1), &Settings::default()).unwrap().bytes;
     let mut chip = Chip::new(small.clone());
     let mut desk = Desk::new(load(model(1).leak(), Payload::Model), 0);

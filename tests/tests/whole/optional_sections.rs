@@ -1,8 +1,7 @@
 //! Statements of a model about its training are read back, and those that a reader does not know are refused or skipped
 //! by name.
 
-use palpate::compile::{Leaf, Settings, compile};
-use palpate::with;
+use palpate::compile::Leaf;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{
@@ -19,8 +18,7 @@ const TRAINED: Trained = Trained {
 };
 
 fn model(descriptor: Descriptor) -> Vec<u8> {
-    let shape = Shape { descriptor, objects: 3, trees: 5, depth: 3, each: true, thresholds: 20, leaf: 0.5 };
-    compile(&random::ensemble(shape, 1), &with!(Settings::default(), leaf = Leaf::I16)).unwrap().bytes
+    random::model(Shape { descriptor, thresholds: 20, leaf: 0.5, ..Shape::SMALL }, 1, Leaf::I16)
 }
 
 /// A model with one section of any tag and content.

@@ -1,27 +1,18 @@
 //! Promises of a model are read back, thresholds by object decide on the chip as on the host, and priors and subsets
 //! are exact.
 
-use palpate::compile::{Leaf, Restated, RestatedSection, Settings, compile, restate};
-use palpate::with;
+use palpate::compile::{Leaf, Restated, RestatedSection, restate};
 use palpate_onboard::{Model, ModelError, NothingExpected, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict};
+use palpate_shared::Touch;
 use palpate_shared::format::{OddsByObject, Per, Promise, PromisedNoise, Tag, Temperature, TrainedNoise};
-use palpate_shared::{Descriptor, Touch};
 use palpate_tests::random::{self, Shape};
 
 const OBJECTS: usize = 4;
 const ONE: u64 = 1 << 56;
 
 fn plain() -> Vec<u8> {
-    let shape = Shape {
-        descriptor: Descriptor::Curvature,
-        objects: OBJECTS,
-        trees: 6,
-        depth: 4,
-        each: true,
-        thresholds: 30,
-        leaf: 0.5,
-    };
-    compile(&random::ensemble(shape, 1), &with!(Settings::default(), leaf = Leaf::I16)).unwrap().bytes
+    let shape = Shape { objects: OBJECTS, trees: 6, depth: 4, thresholds: 30, leaf: 0.5, ..Shape::SMALL };
+    random::model(shape, 1, Leaf::I16)
 }
 
 /// Full touches, which such a model takes.

@@ -11,7 +11,7 @@ use palpate_shared::link::{
 use palpate_shared::{Pose, Touch};
 use std::collections::VecDeque;
 
-const MODEL: &[u8] = include_bytes!("../../models/household.palpate");
+const MODEL: &[u8] = include_bytes!("../../../models/household.palpate");
 const OBJECTS: usize = 16;
 
 /// From the beginning of one approach to that of the next.

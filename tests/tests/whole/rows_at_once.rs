@@ -4,8 +4,8 @@ use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node, OverTouches};
 use palpate::with;
 use palpate_onboard::{Batch, Model};
+use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Header, checksum};
-use palpate_shared::{Descriptor, MISSING_FEATURE};
 use palpate_tests::random::{self, Shape};
 use proptest::prelude::*;
 use rand::rngs::SmallRng;
@@ -16,16 +16,6 @@ const COUNTS: [usize; 12] = [0, 1, 7, 8, 9, 15, 16, 17, 127, 128, 2001, MOST];
 
 /// More than one block.
 const MOST: usize = 2100;
-
-fn shapes() -> impl Strategy<Value = Shape> {
-    let descriptors = prop::sample::select(Descriptor::ALL.to_vec());
-    (descriptors, 1..20_usize, 1..=60_usize, 0..=9_usize, any::<bool>(), 0..900_usize, 0.01..30.0_f32).prop_map(
-        |(descriptor, objects, trees, depth, each, thresholds, leaf)| {
-            let trees = if depth > 6 { 1 + trees / 10 } else { trees };
-            Shape { descriptor, objects, trees, depth, each, thresholds, leaf }
-        },
-    )
-}
 
 fn models(ensemble: &Ensemble) -> Vec<Vec<u8>> {
     let layouts = || std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
@@ -99,7 +89,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
     #[test]
-    fn rows_at_once_have_the_margins_of_each_row_in_every_layout_and_leaf_type(shape in shapes(), seed: u64) {
+    fn rows_at_once_have_the_margins_of_each_row_in_every_layout_and_leaf_type(shape in crate::shapes(20, 60, 9, 900), seed: u64) {
         let ensemble = random::ensemble(shape, seed);
         let mut batch = Box::new(Batch::new());
         let models = models(&ensemble);
@@ -111,7 +101,7 @@ proptest! {
     }
 
     #[test]
-    fn rows_of_up_to_256_features_at_once_have_the_margins_of_each(shape in shapes(), features in 1..=256_usize, seed: u64) {
+    fn rows_of_up_to_256_features_at_once_have_the_margins_of_each(shape in crate::shapes(20, 60, 9, 900), features in 1..=256_usize, seed: u64) {
         let ensemble = spread(random::ensemble(shape, seed), features);
         let mut batch = Box::new(Batch::new());
         for bytes in models(&ensemble) {
@@ -121,7 +111,7 @@ proptest! {
     }
 
     #[test]
-    fn whatever_bytes_pass_as_a_model_give_rows_at_once_the_margins_of_each(shape in shapes(), seed: u64) {
+    fn whatever_bytes_pass_as_a_model_give_rows_at_once_the_margins_of_each(shape in crate::shapes(20, 60, 9, 900), seed: u64) {
         let shape = Shape { trees: shape.trees.min(12), ..shape };
         let ensemble = random::ensemble(shape, seed);
         let mut random = SmallRng::seed_from_u64(seed);

@@ -4,7 +4,7 @@
 //! `cargo test --release -p palpate-tests --test firmware -- --ignored`. It builds the images itself.
 
 use palpate::chip::{Asks, Connection, Emulator, Faults, Steps, Summary, Update, stream};
-use palpate::compile::{Leaf, Settings, compile};
+use palpate::compile::Leaf;
 use palpate::mesh::builtin;
 use palpate::probe::approach::Probe;
 use palpate::touches::{Dataset, ObjectTouches, Origin, Source, Surroundings};
@@ -16,6 +16,7 @@ use palpate_shared::link::{
     Decision, Decoder, Detail, Event, FaultKind, HostSettings, Message, TouchMessage, VerdictMessage,
 };
 use palpate_shared::{ContactTime, Descriptor, Patterns, Touch};
+use palpate_tests::ROOT;
 use palpate_tests::pins::{APPROACH, Edges, edges};
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::trained;
@@ -39,7 +40,7 @@ fn build(image: &str, target: &str, model: Option<&Path>) -> PathBuf {
 }
 
 fn build_with(image: &str, target: &str, model: Option<&Path>, features: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../onboard/firmware").canonicalize().unwrap();
+    let folder = Path::new(ROOT).join("onboard/firmware").canonicalize().unwrap();
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["build", "--release", "--quiet", "--bin", image, "--target", target, "--features", features]);
     cargo.current_dir(&folder);
@@ -53,15 +54,15 @@ fn build_with(image: &str, target: &str, model: Option<&Path>, features: &str) -
 }
 
 fn model(descriptor: Descriptor, seed: u64) -> Vec<u8> {
-    let shape = Shape { descriptor, objects: OBJECTS, trees: 20, depth: 5, each: true, thresholds: 200, leaf: 0.05 };
+    let shape =
+        Shape { descriptor, objects: OBJECTS, trees: 20, depth: 5, thresholds: 200, leaf: 0.05, ..Shape::SMALL };
     let touches = TrainedTouches {
         patterns: Patterns::CONTACTS,
         counted: Counted::Contacts,
         needs_pose: descriptor.needs_pose(),
         largest_spread: 1_000_000,
     };
-    let compiled = compile(&random::ensemble(shape, seed), &with!(Settings::default(), leaf = Leaf::I8)).unwrap();
-    trained(&compiled.bytes, &Trained { touches: Some(touches), ..Trained::default() })
+    trained(&random::model(shape, seed, Leaf::I8), &Trained { touches: Some(touches), ..Trained::default() })
 }
 
 fn dataset(count: usize) -> Dataset {
@@ -104,7 +105,7 @@ fn parity(
 }
 
 #[test]
-#[ignore = "needs an emulator; see the top of tests/tests/firmware.rs"]
+#[ignore = "needs an emulator; see the top of tests/tests/whole/firmware.rs"]
 fn ten_thousand_touches_give_the_hosts_verdicts_on_both_chips_and_for_both_descriptors() {
     for target in [M4F, M0] {
         for descriptor in [Descriptor::Curvature, Descriptor::Oriented] {
@@ -121,7 +122,7 @@ fn ten_thousand_touches_give_the_hosts_verdicts_on_both_chips_and_for_both_descr
 }
 
 #[test]
-#[ignore = "needs an emulator; see the top of tests/tests/firmware.rs"]
+#[ignore = "needs an emulator; see the top of tests/tests/whole/firmware.rs"]
 fn ten_thousand_touches_arrive_exactly_once_over_a_bad_line() {
     let faults = "0.0005,0.0005,0.01,2".parse().unwrap();
     let summary = parity(M4F, &model(Descriptor::Curvature, 1), 10_000, Some(faults), HASTY, |_, _| ());
@@ -136,7 +137,7 @@ fn ten_thousand_touches_arrive_exactly_once_over_a_bad_line() {
 }
 
 #[test]
-#[ignore = "needs an emulator; see the top of tests/tests/firmware.rs"]
+#[ignore = "needs an emulator; see the top of tests/tests/whole/firmware.rs"]
 fn touches_with_a_position_give_the_hosts_verdicts_places_and_approaches_over_a_bad_line() {
     let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
     let mut objects = builtin::make(&["bowl", "camera", "mouse"], None).unwrap();
@@ -178,7 +179,7 @@ fn touches_with_a_position_give_the_hosts_verdicts_places_and_approaches_over_a_
 }
 
 #[test]
-#[ignore = "needs an emulator; see the top of tests/tests/firmware.rs"]
+#[ignore = "needs an emulator; see the top of tests/tests/whole/firmware.rs"]
 fn a_chip_that_is_reset_a_hundred_times_loses_and_doubles_nothing() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let (mut resets, mut wait) = (0, 50);
@@ -300,7 +301,7 @@ impl Known<'_> {
 }
 
 #[test]
-#[ignore = "needs an emulator; see the top of tests/tests/firmware.rs"]
+#[ignore = "needs an emulator; see the top of tests/tests/whole/firmware.rs"]
 fn edges_and_power_cuts_that_come_at_any_instruction_become_the_hosts_verdicts() {
     let bytes = model(Descriptor::Curvature, 1);
     let file = tempfile::NamedTempFile::new().unwrap();
@@ -425,11 +426,11 @@ fn run_gpio(
 }
 
 #[test]
-#[ignore = "needs an emulator; see the top of tests/tests/firmware.rs"]
+#[ignore = "needs an emulator; see the top of tests/tests/whole/firmware.rs"]
 fn a_core_that_faults_on_unaligned_loads_gives_the_hosts_margins_and_verdicts_wherever_the_model_stands() {
-    let bytes = include_bytes!("../../models/household.palpate");
+    let bytes = include_bytes!("../../../models/household.palpate");
     let digest = palpate_tests::identity::digest(&Model::new(bytes).unwrap());
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../onboard/firmware").canonicalize().unwrap();
+    let folder = Path::new(ROOT).join("onboard/firmware").canonicalize().unwrap();
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["build", "--release", "--quiet", "--bin", "alignment", "--target", M0, "--target-dir"]);
     // Not among images with another memory.

@@ -5,12 +5,10 @@
 
 use ed25519_compact::{KeyPair, Signature};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_write};
-use palpate::compile::{Leaf, Settings, compile};
-use palpate::with;
+use palpate::compile::Leaf;
 use palpate_onboard::station::{
     FlashError, FlashStorage, MappedFlash, Place, ServeError, Signed, Station, Storage, record_length, serve,
 };
-use palpate_shared::Descriptor;
 use palpate_shared::link::{
     CHUNK, Command, Decision, Device, DeviceEnd, Event, NotStored, Outcome, Payload, Query, Refusal,
 };
@@ -26,17 +24,7 @@ const LOG: usize = 3;
 const MODEL: usize = 4;
 
 fn model(seed: u64) -> &'static [u8] {
-    let shape = Shape {
-        descriptor: Descriptor::Curvature,
-        objects: 5,
-        trees: 4,
-        depth: 3,
-        each: true,
-        thresholds: 40,
-        leaf: 0.3,
-    };
-    let settings = with!(Settings::default(), leaf = Leaf::I8);
-    compile(&random::ensemble(shape, seed), &settings).unwrap().bytes.leak()
+    random::model(Shape { objects: 5, thresholds: 40, leaf: 0.3, ..Shape::SMALL }, seed, Leaf::I8).leak()
 }
 
 /// Runs the chip's program until the script is done, with the power switched on again whenever it went; says how often.
@@ -434,7 +422,7 @@ fn wear(cells: &Cells, touches: usize) -> f64 {
 
 #[test]
 fn the_log_wears_as_little_as_the_readme_states_under_touches_from_a_host() {
-    let bytes = include_bytes!("../../models/household.palpate");
+    let bytes = include_bytes!("../../../models/household.palpate");
     let touches = random::touches(4_000, 3);
     let mut cells = Cells::new(LOG + 2 * 44, 1);
     let mut script: Vec<Step> = Vec::new();
@@ -452,7 +440,7 @@ fn the_log_wears_as_little_as_the_readme_states_under_touches_from_a_host() {
 
 #[test]
 fn the_log_wears_as_little_as_the_readme_states_under_touches_of_its_own() {
-    let bytes = include_bytes!("../../models/household.palpate");
+    let bytes = include_bytes!("../../../models/household.palpate");
     let touches = random::touches(4_000, 3);
     let mut cells = Cells::new(LOG + 2 * 44, 1);
     let storage = FlashStorage::<_, RECORD>::new(Driver(&mut cells), LOG * SECTOR).unwrap();

@@ -3,6 +3,7 @@
 use palpate_onboard::effector::{Edge, Effector, Fault, Finger, Scale, Settings};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
+use palpate_tests::ROOT;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use std::fmt::Write as _;
@@ -10,9 +11,8 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 /// A model of ten objects, whose fingers may touch a second apart.
-const HOUSEHOLD: &[u8] = include_bytes!("../../models/household.palpate");
+const HOUSEHOLD: &[u8] = include_bytes!("../../../models/household.palpate");
 /// The time between two looks of the sketch at its switches, in microseconds. Edges are at its multiples, so that the sketch
 /// sees each when it happens.
 const LOOK: u32 = 50;

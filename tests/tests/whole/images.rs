@@ -5,6 +5,7 @@
 //! `cargo test --release -p palpate-tests --test images -- --ignored --nocapture`, which `.ci/firmware` does.
 
 use palpate::compile::{Core, code_flash};
+use palpate_tests::ROOT;
 use palpate_tests::stated::Readme;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -46,7 +47,7 @@ const PERCENT: u64 = 2;
 
 /// Builds an image; it links only if nothing in it can panic, since its panic handler calls what is defined nowhere.
 fn image(name: &str, features: &str) -> Image {
-    let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../onboard/firmware");
+    let firmware = Path::new(ROOT).join("onboard/firmware");
     let mut command = Command::new(env!("CARGO"));
     command.current_dir(&firmware).args(["build", "--locked", "--release", "--quiet", "--no-default-features"]);
     command.args(["--target", TARGET, "--bin", name, "--features", features]);

@@ -1,7 +1,6 @@
 //! Proposals of the next approach, and the weight of recent touches against the evidence.
 
-use palpate::compile::{Leaf, Restated, Settings, compile, restate};
-use palpate::with;
+use palpate::compile::{Leaf, Restated, restate};
 use palpate_onboard::station::{NoStorage, Station, serve};
 use palpate_onboard::{Forgetting, Model, Proposal, Recognizer, Stopping, Verdict};
 use palpate_shared::format::{Plan, Tag};
@@ -13,16 +12,9 @@ use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
 fn model(objects: usize) -> Vec<u8> {
-    let shape = Shape {
-        descriptor: Descriptor::ContactsOriented,
-        objects,
-        trees: 8,
-        depth: 4,
-        each: true,
-        thresholds: 100,
-        leaf: 0.1,
-    };
-    compile(&random::ensemble(shape, 1), &with!(Settings::default(), leaf = Leaf::I16)).unwrap().bytes
+    let descriptor = Descriptor::ContactsOriented;
+    let shape = Shape { descriptor, objects, trees: 8, depth: 4, thresholds: 100, leaf: 0.1, ..Shape::SMALL };
+    random::model(shape, 1, Leaf::I16)
 }
 
 /// The model with a plan of random separations; every pose whose number is 3 modulo 10 never touches.

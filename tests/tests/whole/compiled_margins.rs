@@ -4,21 +4,10 @@ use palpate::compile::{Compiled, Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node, OverTouches};
 use palpate::with;
 use palpate_onboard::Model;
+use palpate_shared::Touch;
 use palpate_shared::format::f32_key;
-use palpate_shared::{Descriptor, Touch};
-use palpate_tests::random::{self, Shape};
+use palpate_tests::random;
 use proptest::prelude::*;
-
-fn shapes() -> impl Strategy<Value = Shape> {
-    let descriptors = prop::sample::select(Descriptor::ALL.to_vec());
-    (descriptors, 1..12_usize, 1..=300_usize, 0..=10_usize, any::<bool>(), 0..900_usize, 0.01..30.0_f32).prop_map(
-        |(descriptor, objects, trees, depth, each, thresholds, leaf)| {
-            // Deep trees are many nodes: fewer of them keep a case quick.
-            let trees = if depth > 6 { 1 + trees / 20 } else { trees };
-            Shape { descriptor, objects, trees, depth, each, thresholds, leaf }
-        },
-    )
-}
 
 /// The largest difference of a margin, checked against the stated error.
 fn hold(ensemble: &Ensemble, compiled: &Compiled, touches: &[Touch]) {
@@ -78,7 +67,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(10))]
 
     #[test]
-    fn integer_margins_stay_within_the_stated_error_in_every_layout(shape in shapes(), seed: u64, wide: bool) {
+    fn integer_margins_stay_within_the_stated_error_in_every_layout(shape in crate::shapes(12, 300, 10, 900), seed: u64, wide: bool) {
         let ensemble = random::ensemble(shape, seed);
         let touches = random::touches(200, seed);
         let models = layouts(&ensemble, if wide { Leaf::I16 } else { Leaf::I8 });
@@ -89,7 +78,7 @@ proptest! {
     }
 
     #[test]
-    fn integer_margins_are_the_same_in_every_layout_that_walks_trees(shape in shapes(), seed: u64) {
+    fn integer_margins_are_the_same_in_every_layout_that_walks_trees(shape in crate::shapes(12, 300, 10, 900), seed: u64) {
         let ensemble = random::ensemble(shape, seed);
         let models = layouts(&ensemble, Leaf::I16);
         let mut first = vec![0; shape.objects];
@@ -106,7 +95,7 @@ proptest! {
     }
 
     #[test]
-    fn f32_margins_are_the_ensembles_bit_for_bit_in_every_layout(shape in shapes(), seed: u64) {
+    fn f32_margins_are_the_ensembles_bit_for_bit_in_every_layout(shape in crate::shapes(12, 300, 10, 900), seed: u64) {
         let ensemble = random::ensemble(shape, seed);
         let mut margins = vec![0.0; shape.objects];
         for compiled in layouts(&ensemble, Leaf::F32) {
@@ -122,7 +111,7 @@ proptest! {
     }
 
     #[test]
-    fn real_features_split_as_f32_does_in_every_layout(shape in shapes(), features in 1..=256_usize, seed: u64) {
+    fn real_features_split_as_f32_does_in_every_layout(shape in crate::shapes(12, 300, 10, 900), features in 1..=256_usize, seed: u64) {
         let ensemble = imported(random::ensemble(shape, seed), features);
         let mut margins = vec![0.0; shape.objects];
         let mut models = 0;

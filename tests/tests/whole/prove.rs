@@ -17,21 +17,6 @@ use rand::{RngExt, SeedableRng};
 /// Stands for the ensemble's file.
 const FILE: &[u8] = b"an ensemble";
 
-fn shapes() -> impl Strategy<Value = Shape> {
-    let descriptors = prop::sample::select(Descriptor::ALL.to_vec());
-    (descriptors, 1..8_usize, 1..=30_usize, 0..=6_usize, any::<bool>(), 0..60_usize, 0.01..30.0_f32).prop_map(
-        |(descriptor, objects, trees, depth, each, thresholds, leaf)| Shape {
-            descriptor,
-            objects,
-            trees,
-            depth,
-            each,
-            thresholds,
-            leaf,
-        },
-    )
-}
-
 /// An ensemble's trees over rows of this many features, with fractions as thresholds.
 fn over_rows(mut ensemble: Ensemble, features: usize) -> Ensemble {
     for (number, tree) in ensemble.trees.iter_mut().enumerate() {
@@ -97,7 +82,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
     #[test]
-    fn models_of_touches_are_proved_in_every_layout_and_their_certificates_hold(shape in shapes(), seed: u64) {
+    fn models_of_touches_are_proved_in_every_layout_and_their_certificates_hold(shape in crate::shapes(8, 30, 6, 60), seed: u64) {
         let ensemble = random::ensemble(shape, seed);
         for bytes in models(&ensemble, None) {
             is_proved(&bytes, &ensemble)?;
@@ -106,7 +91,7 @@ proptest! {
 
     #[test]
     fn a_class_stays_until_the_stated_value_of_a_feature_and_is_another_one_there(
-        shape in shapes(), features in 1..=6_usize, seed: u64,
+        shape in crate::shapes(8, 30, 6, 60), features in 1..=6_usize, seed: u64,
     ) {
         let ensemble = over_rows(random::ensemble(Shape { objects: shape.objects.max(2), ..shape }, seed), features);
         let mut random = SmallRng::seed_from_u64(seed);
@@ -147,7 +132,7 @@ proptest! {
     }
 
     #[test]
-    fn models_of_rows_are_proved_by_keys_and_in_units(shape in shapes(), features in 1..=40_usize, seed: u64) {
+    fn models_of_rows_are_proved_by_keys_and_in_units(shape in crate::shapes(8, 30, 6, 60), features in 1..=40_usize, seed: u64) {
         let ensemble = over_rows(random::ensemble(shape, seed), features);
         for scales in [None, Some(vec![100.0; features])] {
             for bytes in models(&ensemble, scales.clone()).into_iter().chain(early_exits(&ensemble, scales)) {

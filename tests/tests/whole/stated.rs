@@ -4,11 +4,11 @@
 //! `cargo test --release -p palpate-tests --test stated -- --ignored --test-threads 1`, which `.ci/firmware` and `.ci/c` do. With
 //! `PALPATE_RESTATE=1` it writes what it measures into the READMEs, as `--test images` does. Other compilers give other code, so a number may be a few percent off.
 
+use palpate_tests::ROOT;
 use palpate_tests::stated::{Readme, measured_in};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 const M4F: &str = "thumbv7em-none-eabihf";
 const M0: &str = "thumbv6m-none-eabi";
 /// Tolerance of a number, in percent.
@@ -55,7 +55,7 @@ const BENCHMARK: [(&str, &str, usize); 8] = [
 ];
 
 #[test]
-#[ignore = "needs an emulator; see the top of tests/tests/stated.rs"]
+#[ignore = "needs an emulator; see the top of tests/tests/whole/stated.rs"]
 fn the_firmwares_readme_states_what_the_emulator_counts() {
     let mut readme = Readme::open("onboard/firmware/README.md");
     for (column, target) in [(1, M4F), (3, M0)] {
@@ -80,7 +80,7 @@ fn the_firmwares_readme_states_what_the_emulator_counts() {
 }
 
 #[test]
-#[ignore = "needs targets for chips; see the top of tests/tests/stated.rs"]
+#[ignore = "needs targets for chips; see the top of tests/tests/whole/stated.rs"]
 fn the_firmwares_readme_states_the_flash_and_ram_of_its_images() {
     let mut readme = Readme::open("onboard/firmware/README.md");
     for (image, row) in [("uart", "`uart`, no model in it"), ("gpio", "`gpio`, its model included")] {
@@ -125,7 +125,7 @@ impl Sizes {
 }
 
 #[test]
-#[ignore = "needs an emulator; see the top of tests/tests/stated.rs"]
+#[ignore = "needs an emulator; see the top of tests/tests/whole/stated.rs"]
 fn the_crates_readme_states_what_exponentials_and_state_cost() {
     let mut readme = Readme::open("onboard/README.md");
     for (column, target) in [(1, M4F), (2, M0)] {
@@ -330,7 +330,7 @@ fn no_comment_states_instructions_or_memory_that_no_test_measures() {
         .collect();
     assert!(
         stated.is_empty(),
-        "measure these in tests/tests/stated.rs and state them in a README, or say it without a number:\n{}",
+        "measure these in tests/tests/whole/stated.rs and state them in a README, or say it without a number:\n{}",
         stated.join("\n")
     );
 }

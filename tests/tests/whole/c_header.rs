@@ -3,6 +3,7 @@
 use palpate::compile::{Language, Layout, Leaf, Restated, emit, restate};
 use palpate_onboard::{Model, Verdict};
 use palpate_shared::format::{Tag, Temperature};
+use palpate_tests::ROOT;
 use palpate_tests::abuse::{self, cuts, forgetful, snapshot};
 use palpate_tests::mutants::{Parts, mutant, sweep};
 use palpate_tests::replay::{MARGINS_LEFT_OPEN, NAMES_LEFT_OPEN, Script, is_specified};
@@ -18,8 +19,7 @@ use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
-const VECTORS: &str = include_str!("../../shared/vectors/vectors.txt");
+const VECTORS: &str = include_str!("../../../shared/vectors/vectors.txt");
 
 /// The test program of a machine.
 fn compile(compiler: &str, flags: &[&str], source: &str, program: &Path) -> Result<(), String> {
@@ -290,7 +290,7 @@ fn damaged_models_are_taken_or_refused_alike_at_the_same_place_and_give_the_same
 
 #[test]
 fn what_may_differ_is_what_the_specification_leaves_open() {
-    let format = include_str!("../../shared/FORMAT.md").split_whitespace().collect::<Vec<_>>().join(" ");
+    let format = include_str!("../../../shared/FORMAT.md").split_whitespace().collect::<Vec<_>>().join(" ");
     for (sentence, _) in MARGINS_LEFT_OPEN.into_iter().chain([NAMES_LEFT_OPEN]) {
         assert!(format.contains(sentence), "{sentence}");
     }

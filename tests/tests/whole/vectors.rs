@@ -11,8 +11,8 @@ use palpate_tests::plain::{self, Approach, Decision, Plain};
 use palpate_tests::vectors::{Cut, bytes, hex, numbers, read_numbers, read_touch, refusal};
 use std::collections::BTreeSet;
 
-const VECTORS: &str = include_str!("../../shared/vectors/vectors.txt");
-const FORMAT: &str = include_str!("../../shared/FORMAT.md");
+const VECTORS: &str = include_str!("../../../shared/vectors/vectors.txt");
+const FORMAT: &str = include_str!("../../../shared/FORMAT.md");
 
 /// A recognizer and the other one, with their last answers.
 struct Both<'m> {
