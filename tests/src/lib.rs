@@ -9,7 +9,6 @@ pub mod identity;
 pub mod located;
 pub mod mutants;
 pub mod pins;
-pub mod plain;
 pub mod random;
 pub mod replay;
 pub mod scripts;
