@@ -3,7 +3,7 @@
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
 use palpate::with;
-use palpate_onboard::{Model, ModelError};
+use palpate_onboard::Model;
 use palpate_shared::{ContactTime, Descriptor, Touch};
 
 /// Two trees over curvature: κ < 1000.5 (missing left), then slope < -3 (missing right) on the right; and one split.
@@ -46,39 +46,36 @@ fn over_patterns() -> Ensemble {
     Ensemble { inputs: inputs(Descriptor::ContactsCurvature), trees, ..ensemble() }
 }
 
-/// Compiles with the version and the ensemble's hash, which may change with a release, set to zero.
-fn body(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> String {
-    let compiled = compile(ensemble, &with!(Settings::default(), leaf, layout = Some(layout))).unwrap();
-    let version = env!("CARGO_PKG_VERSION");
-    let text = 96;
-    assert_eq!(&compiled.bytes[text + 1..text + 1 + version.len()], version.as_bytes());
-    let bytes = &compiled.bytes[text + 1 + version.len()..compiled.bytes.len() - 4];
+fn compiled(ensemble: &Ensemble, leaf: Leaf, layout: Layout, shared: bool) -> Vec<u8> {
+    let settings = with!(Settings::default(), leaf, layout = Some(layout), shared_leaves = Some(shared));
+    compile(ensemble, &settings).unwrap().bytes
+}
+
+/// All after the version, up to the checksum.
+fn body(bytes: &[u8]) -> String {
+    let (version, text) = (env!("CARGO_PKG_VERSION"), 96);
+    assert_eq!(&bytes[text + 1..text + 1 + version.len()], version.as_bytes());
+    let bytes = &bytes[text + 1 + version.len()..bytes.len() - 4];
     bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
 }
 
 #[test]
-fn the_header_is_pinned() {
-    let settings = with!(Settings::default(), leaf = Leaf::I8, layout = Some(Layout::Complete));
-    let compiled = compile(&ensemble(), &settings).unwrap();
-    let mut header = compiled.bytes[..96].to_vec();
+fn the_bytes_of_every_layout_are_pinned() {
+    let mut header = compiled(&ensemble(), Leaf::I8, Layout::Complete, false)[..96].to_vec();
+    // The ensemble's hash has the version in it.
     header[72..80].fill(0);
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
-    let rows: Vec<String> = header.chunks(16).map(hex).collect();
-    assert_eq!(rows, HEADER);
-}
-
-#[test]
-fn the_sections_of_every_layout_are_pinned() {
-    let bodies = SECTIONS.map(|(leaf, layout, _)| body(&ensemble(), leaf, layout));
+    assert_eq!(header.chunks(16).map(hex).collect::<Vec<_>>(), HEADER);
+    let bodies = SECTIONS.map(|(leaf, layout, _)| body(&compiled(&ensemble(), leaf, layout, false)));
     assert_eq!(bodies, SECTIONS.map(|(.., expected)| expected));
+    assert_eq!(body(&compiled(&over_patterns(), Leaf::I8, Layout::Patterns, false)), PATTERNS);
+    assert_eq!(body(&compiled(&ensemble(), Leaf::I8, Layout::Compact, true)), SHARED);
 }
 
 #[test]
-fn the_sections_of_tables_by_contact_pattern_are_pinned_and_read_as_worked_out_by_hand() {
-    assert_eq!(body(&over_patterns(), Leaf::I8, Layout::Patterns), PATTERNS);
-    let settings = with!(Settings::default(), leaf = Leaf::I8, layout = Some(Layout::Patterns));
-    let compiled = compile(&over_patterns(), &settings).unwrap();
-    let model = Model::new(&compiled.bytes).unwrap();
+fn tables_by_contact_pattern_give_the_margins_worked_out_by_hand() {
+    let bytes = compiled(&over_patterns(), Leaf::I8, Layout::Patterns, false);
+    let model = Model::new(&bytes).unwrap();
     let (some, missing) = (ContactTime::from_micros, ContactTime::MISSING);
     for (times, expected) in [
         ([missing; 3], [1.375, -1.4375]),
@@ -99,39 +96,6 @@ fn the_sections_of_tables_by_contact_pattern_are_pinned_and_read_as_worked_out_b
 }
 
 #[test]
-fn tables_by_contact_pattern_with_other_axes_are_refused() {
-    let settings = with!(Settings::default(), leaf = Leaf::I8, layout = Some(Layout::Patterns));
-    let compiled = compile(&over_patterns(), &settings).unwrap().bytes;
-    let axes = compiled.windows(4).position(|axis| axis == [1, 1, 4, 1]).unwrap();
-    let refused = |change: &dyn Fn(&mut Vec<u8>)| {
-        let mut bytes = compiled.clone();
-        change(&mut bytes);
-        bytes.truncate(bytes.len() - 4);
-        bytes.extend(palpate_shared::format::checksum(&bytes).to_le_bytes());
-        Model::new(&bytes).map(|_| ()).unwrap_err()
-    };
-    // Axes of other features, or in another order; another descriptor with as many features.
-    assert_eq!(refused(&|bytes| bytes[axes] = 2), ModelError::Section { offset: axes });
-    assert_eq!(refused(&|bytes| bytes[axes + 4] = 3), ModelError::Section { offset: axes });
-    assert_eq!(refused(&|bytes| bytes[12] = Descriptor::Gravity.code()), ModelError::Section { offset: axes });
-    // A layout that no release knows.
-    assert_eq!(refused(&|bytes| bytes[6] = 5), ModelError::Field { offset: 6 });
-}
-
-#[test]
-fn the_sections_of_a_model_with_shared_leaves_are_pinned() {
-    let settings =
-        with!(Settings::default(), leaf = Leaf::I8, layout = Some(Layout::Compact), shared_leaves = Some(true));
-    let compiled = compile(&ensemble(), &settings).unwrap();
-    let at = 97 + env!("CARGO_PKG_VERSION").len();
-    let body = &compiled.bytes[at..compiled.bytes.len() - 4];
-    assert_eq!(body.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" "), SHARED);
-    // Who does not know the section must not take numbers for values.
-    let tag = u16::from_le_bytes([compiled.bytes[at + 6], compiled.bytes[at + 7]]);
-    assert_eq!((compiled.bytes[4], tag), (2, 12 | 1 << 15));
-}
-
-#[test]
 fn a_golden_model_gives_the_margins_worked_out_by_hand() {
     let touches = [
         // κ = 80000, slope = 20000: right, right; right.
@@ -141,14 +105,10 @@ fn a_golden_model_gives_the_margins_worked_out_by_hand() {
         // κ missing, slope missing: left; left.
         (Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::MISSING]), [1.625, -1.5]),
     ];
-    let compiled = SECTIONS.map(|(leaf, layout, _)| {
-        compile(&ensemble(), &with!(Settings::default(), leaf, layout = Some(layout))).unwrap().bytes
-    });
-    let shared = [Layout::Compact, Layout::Complete, Layout::Wide].map(|layout| {
-        let settings = with!(Settings::default(), layout = Some(layout), shared_leaves = Some(true));
-        compile(&ensemble(), &settings).unwrap().bytes
-    });
-    for bytes in compiled.iter().chain(&shared).chain([&palpate_tests::unaligned::model()]) {
+    let plain = SECTIONS.map(|(leaf, layout, _)| compiled(&ensemble(), leaf, layout, false));
+    let shared = [Layout::Compact, Layout::Complete, Layout::Wide]
+        .map(|layout| compiled(&ensemble(), Settings::default().leaf, layout, true));
+    for bytes in plain.iter().chain(&shared).chain([&palpate_tests::unaligned::model()]) {
         let model = Model::new(bytes).unwrap();
         for (touch, expected) in touches {
             let mut margins = [0; 2];
