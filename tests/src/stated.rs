@@ -98,33 +98,3 @@ fn with_commas(number: u64) -> String {
     }
     text
 }
-
-/// Words of a comment that state a number of instructions, or of bytes of code, flash, stack or RAM.
-pub fn measured_in(comment: &str) -> Vec<String> {
-    const NUMBERS: [&str; 14] = [
-        "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "fifteen", "dozen",
-        "hundred",
-    ];
-    let words: Vec<&str> = comment.split_whitespace().collect();
-    let is_number = |word: &str| {
-        let word = word.trim_matches(|character: char| !character.is_alphanumeric());
-        word.starts_with(|first: char| first.is_ascii_digit()) || NUMBERS.contains(&word)
-    };
-    let found = words.iter().enumerate().filter(|(index, word)| {
-        let next =
-            |ahead: usize| words.get(index + ahead).map_or("", |word| word.trim_matches(['.', ',', ';', ':', ')']));
-        let is_memory = |ahead: usize| {
-            matches!(next(ahead), "bytes" | "KB")
-                && next(ahead + 1) == "of"
-                && matches!(next(ahead + 2), "code" | "flash" | "stack" | "RAM" | "state")
-        };
-        is_number(word) && (next(1) == "instructions" || next(2) == "instructions" || next(1) == "KB" || is_memory(1))
-    });
-    let of_memory = ["RAM:", "Stack:", "State:"].iter().filter_map(|start| {
-        let sentence = comment.split_once(start)?.1.split_once(". ").map_or(comment, |(sentence, _)| sentence);
-        let counts = sentence.split_whitespace().zip(sentence.split_whitespace().skip(1));
-        counts.into_iter().find(|(number, unit)| is_number(number) && unit.starts_with("bytes"))
-    });
-    let of_memory: Vec<String> = of_memory.map(|(number, unit)| format!("{number} {unit}")).collect();
-    found.map(|(index, _)| words[index..(index + 3).min(words.len())].join(" ")).chain(of_memory).collect()
-}

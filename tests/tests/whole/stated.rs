@@ -1,11 +1,11 @@
 //! Stated numbers of instructions, stack and bytes equal the measured ones.
 //!
 //! Measured by an emulator and by compilers for chips, so most of it is asked for:
-//! `cargo test --release -p palpate-tests --test stated -- --ignored --test-threads 1`, which `.ci/firmware` and `.ci/c` do. With
-//! `PALPATE_RESTATE=1` it writes what it measures into the READMEs, as `--test images` does. Other compilers give other code, so a number may be a few percent off.
+//! `cargo test --release -p palpate-tests --test whole stated:: -- --ignored --test-threads 1`, which `.ci/firmware` and `.ci/c` do. With
+//! `PALPATE_RESTATE=1` it writes what it measures into the READMEs, as those of `images` do. Other compilers give other code, so a number may be a few percent off.
 
 use palpate_tests::ROOT;
-use palpate_tests::stated::{Readme, measured_in};
+use palpate_tests::stated::Readme;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -80,51 +80,6 @@ fn the_firmwares_readme_states_what_the_emulator_counts() {
 }
 
 #[test]
-#[ignore = "needs targets for chips; see the top of tests/tests/whole/stated.rs"]
-fn the_firmwares_readme_states_the_flash_and_ram_of_its_images() {
-    let mut readme = Readme::open("onboard/firmware/README.md");
-    for (image, row) in [("uart", "`uart`, no model in it"), ("gpio", "`gpio`, its model included")] {
-        let [m4f, m0] = [M4F, M0].map(|target| {
-            assert!(cargo("build", image, target).status().expect("cargo runs").success(), "{image} does not build");
-            let path = format!("{ROOT}/onboard/firmware/target/{target}/release/{image}");
-            Sizes::read(&std::fs::read(path).expect("the image"))
-        });
-        println!("{image}: {m4f:?} {m0:?}");
-        readme.cell(row, 1, m4f.flash, PERCENT);
-        readme.cell(row, 2, m0.flash, PERCENT);
-        readme.cell(row, 3, m4f.ram, PERCENT);
-        assert!(m4f.ram.abs_diff(m0.ram) * 100 <= PERCENT * m0.ram, "one number is not enough: {m4f:?} {m0:?}");
-    }
-    readme.finish();
-}
-
-/// Sizes of an image.
-#[derive(Debug)]
-struct Sizes {
-    flash: u64,
-    ram: u64,
-}
-
-impl Sizes {
-    /// Reads a 32-bit little-endian ELF file: loaded bytes count as flash, written ones as RAM.
-    fn read(elf: &[u8]) -> Self {
-        let half = |at: usize| usize::from(u16::from_le_bytes([elf[at], elf[at + 1]]));
-        let word = |at: usize| u32::from_le_bytes(elf[at..at + 4].try_into().expect("four bytes"));
-        let names = word(word(32) as usize + half(50) * half(46) + 16) as usize;
-        let (mut flash, mut ram) = (0, 0);
-        for section in (0..half(48)).map(|index| word(32) as usize + index * half(46)) {
-            let name = &elf[names + word(section) as usize..];
-            let name = name.split(|&byte| byte == 0).next().unwrap_or_default();
-            let (kind, flags, length) = (word(section + 4), word(section + 8), u64::from(word(section + 20)));
-            // PROGBITS and ALLOC; `uart` keeps models and state in memory of its own.
-            flash += if kind == 1 && flags & 2 != 0 { length } else { 0 };
-            ram += if matches!(name, b".data" | b".bss" | b".uninit") { length } else { 0 };
-        }
-        Self { flash, ram }
-    }
-}
-
-#[test]
 #[ignore = "needs an emulator; see the top of tests/tests/whole/stated.rs"]
 fn the_crates_readme_states_what_exponentials_and_state_cost() {
     let mut readme = Readme::open("onboard/README.md");
@@ -145,7 +100,7 @@ fn the_crates_readme_states_what_exponentials_and_state_cost() {
     }
     let lines = printed("evaluator", M4F);
     let state = numbers(&lines, "state:", 0);
-    readme.cell("state for ten objects", 1, state[0], 0);
+    readme.after("State for ten objects takes ", state[0], 0);
     readme.after("bytes, including ", state[1], 0);
     readme.finish();
 }
@@ -194,22 +149,19 @@ const CHIPS: [(usize, &str, &str); 4] = [
 const C_ROWS: [(&str, &str); 5] = [
     (
         "rows, one layout (complete), i8 leaves",
-        "-DROWS -DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0",
+        "-DROWS -DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0",
     ),
     (
         "touches, one layout (complete), i8 leaves",
-        "-DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0",
+        "-DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0",
     ),
-    (
-        "touches, all layouts and leaves",
-        "-DPALPATE_STRANGERS=0 -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0",
-    ),
-    ("… and a misfit test", "-DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0"),
-    (
-        "everything: also posteriors, snapshots, names",
-        "-DEVERYTHING -DPALPATE_SHARED=0 -DPALPATE_SENTINEL=0 -DPALPATE_ROW_EVIDENCE=0",
-    ),
+    ("touches, all layouts and leaves", "-DPALPATE_STRANGERS=0"),
+    ("… and a misfit test", "-DPALPATE_STRANGERS=1"),
+    ("everything: also posteriors, snapshots, names", "-DEVERYTHING"),
 ];
+
+/// Macros of all of these rows.
+const C_LEFT_OUT: [&str; 3] = ["-DPALPATE_SHARED=0", "-DPALPATE_SENTINEL=0", "-DPALPATE_ROW_EVIDENCE=0"];
 
 /// The columns of instructions: tools, flags, emulator.
 const C_EMULATORS: [(usize, &str, &str, &str); 2] = [
@@ -232,7 +184,7 @@ fn the_c_headers_readme_states_what_it_takes() {
             let object = directory.path().join("o");
             let mut command = Command::new(format!("{tools}-gcc"));
             command.args(flags.split(' ')).args(["-std=c99", "-ffreestanding", "-Os", "-I"]);
-            command.arg(format!("{ROOT}/onboard/c")).args(defined.split(' ')).arg("-c");
+            command.arg(format!("{ROOT}/onboard/c")).args(defined.split(' ')).args(C_LEFT_OUT).arg("-c");
             command.arg(format!("{ROOT}/tests/c/size.c")).arg("-o").arg(&object);
             let Ok(status) = command.status() else {
                 println!("SKIPPED: there is no {tools}-gcc");
@@ -284,72 +236,4 @@ fn the_c_headers_readme_states_what_it_takes() {
         readme.cell("instructions of a touch with its verdict, `-Os`", column, number, PERCENT);
     }
     readme.finish();
-}
-
-/// The comments of a file: of Rust line by line with what follows on the next ones, of C as they are.
-fn comments(path: &Path) -> Vec<(usize, String)> {
-    let text = std::fs::read_to_string(path).expect("a file");
-    let (mut all, mut last): (Vec<(usize, String)>, usize) = (Vec::new(), 0);
-    let mut is_inside = false;
-    for (number, line) in text.lines().enumerate() {
-        let line = line.trim();
-        let starts = if path.extension().is_some_and(|extension| extension == "rs") { "//" } else { "/*" };
-        let start = line.find(starts).filter(|_| !line.contains("://"));
-        let content = if is_inside {
-            Some(line)
-        } else {
-            start.map(|start| line[start..].trim_start_matches(['/', '!', '*', ' ']))
-        };
-        is_inside = starts == "/*" && (is_inside || start.is_some()) && !line.ends_with("*/");
-        let Some(content) = content else { continue };
-        match all.last_mut().filter(|_| last + 1 == number && !content.is_empty()) {
-            Some((_, comment)) => *comment += &format!(" {content}"),
-            None => all.push((number + 1, content.to_string())),
-        }
-        last = number;
-    }
-    all
-}
-
-#[test]
-fn no_comment_states_instructions_or_memory_that_no_test_measures() {
-    let mut folders = vec![Path::new(ROOT).join("shared/src"), Path::new(ROOT).join("onboard/src")];
-    let mut files = vec![Path::new(ROOT).join("onboard/c/palpate.h")];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
-            if entry.is_dir() { folders.push(entry) } else { files.push(entry) }
-        }
-    }
-    assert!(files.len() > 60, "{} files", files.len());
-    let stated: Vec<String> = files
-        .iter()
-        .flat_map(|path| comments(path).into_iter().map(move |(line, comment)| (path, line, comment)))
-        .flat_map(|(path, line, comment)| {
-            measured_in(&comment).into_iter().map(move |words| format!("{}:{line}: {words}", path.display()))
-        })
-        .collect();
-    assert!(
-        stated.is_empty(),
-        "measure these in tests/tests/whole/stated.rs and state them in a README, or say it without a number:\n{}",
-        stated.join("\n")
-    );
-}
-
-#[test]
-fn a_number_of_instructions_in_a_comment_is_found() {
-    let found = |comment: &str| !measured_in(comment).is_empty();
-    for comment in [
-        "Cost: about 30 instructions. Cannot fail.",
-        "Cost: about fifteen instructions for each.",
-        "takes 700 bytes of flash",
-        "RAM: 176 bytes.",
-        "State: 8 bytes per object, and 40; and more",
-        "RAM: 2 KB.",
-        "12 more instructions",
-    ] {
-        assert!(found(comment), "{comment}");
-    }
-    for comment in ["Cost: a few instructions.", "a split has three bytes: column", "of 4 bytes each", "in two steps"] {
-        assert!(!found(comment), "{comment}: {:?}", measured_in(comment));
-    }
 }
