@@ -1,5 +1,6 @@
-/* Commands on models, touches, rows and snapshots, played through palpate.h; what comes out is text, which tests/tests/c.rs
- * compares with what the crate gives; numbers in hexadecimal digits. No library: the same for this machine and for bare chips.
+/* Commands on models, touches, rows and snapshots, played through palpate.h; what comes out is text, which
+ * tests/tests/whole/c_header.rs compares with what the crate gives; numbers in hexadecimal digits. No library: the same
+ * for this machine and for bare chips.
  *
  * Commands, numbers little endian:
  *   M u32 length, bytes      opens a model and starts a recognizer: "open ERROR PLACE"

@@ -221,7 +221,7 @@ impl<'m> Batch<'m> {
 /// `MARGINS_LEFT_OPEN` and `NAMES_LEFT_OPEN` say that FORMAT.md leaves them open.
 ///
 /// 100,000 models, or PALPATE_FUZZ_MODELS, or for PALPATE_FUZZ_SECONDS; an hour of it is `PALPATE_FUZZ_SECONDS=3600 cargo test --release
-/// -p palpate-tests --test c damaged -- --nocapture`. PALPATE_FUZZ_SEED gives other models, the same seed the same.
+/// -p palpate-tests --test whole damaged_models -- --nocapture`. PALPATE_FUZZ_SEED gives other models, the same seed the same.
 #[test]
 fn damaged_models_are_taken_or_refused_alike_at_the_same_place_and_give_the_same_answers() {
     let directory = tempfile::tempdir().unwrap();

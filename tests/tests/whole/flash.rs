@@ -279,7 +279,7 @@ fn is_cut(fault: Fault) -> bool {
     matches!(fault, Fault::CutBefore | Fault::CutDuring | Fault::CutAfter)
 }
 
-/// `PALPATE_REPETITIONS=100000 cargo test --release -p palpate-tests --test flash several_faults` tries more.
+/// `PALPATE_REPETITIONS=100000 cargo test --release -p palpate-tests --test whole several_faults` tries more.
 #[test]
 fn several_faults_lose_no_acknowledged_record() {
     let repetitions = palpate_tests::repetitions(300);

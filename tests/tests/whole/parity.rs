@@ -1,5 +1,5 @@
 //! The compiled model against the full one: 200,000 touches, or 50,000 where margins are exact or others repeat it, and ten
-//! thousand sequences. `PALPATE_REPETITIONS=5 cargo test --release -p palpate-tests --test parity` compares a million touches.
+//! thousand sequences. `PALPATE_REPETITIONS=5 cargo test --release -p palpate-tests --test whole parity::` compares a million touches.
 
 use palpate::capture::capture;
 use palpate::compile::{Layout, Leaf, Settings, compile};

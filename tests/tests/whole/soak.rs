@@ -1,6 +1,6 @@
 //! A day of touches, shortened: the chip's whole program in one process, the host in another, the link between them.
 //!
-//! 100,000 touches; `PALPATE_SOAK=1000000 cargo test --release -p palpate-tests --test soak -- --nocapture` for a million.
+//! 100,000 touches; `PALPATE_SOAK=1000000 cargo test --release -p palpate-tests --test whole soak:: -- --nocapture` for a million.
 
 use palpate::chip::{Asks, Connection, Emulator, Port, Steps, Update, stream};
 use palpate::compile::Leaf;
