@@ -21,6 +21,9 @@ pub mod vectors;
 /// The project's root.
 pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
+/// A model of ten objects, whose fingers may touch a second apart.
+pub const HOUSEHOLD: &[u8] = include_bytes!("../../models/household.palpate");
+
 /// Number of repetitions: the one in the variable PALPATE_REPETITIONS, or `few`.
 #[must_use]
 pub fn repetitions(few: usize) -> usize {

@@ -1,6 +1,6 @@
 //! Models, touches and rows that the C header is compared on.
 
-use crate::ROOT;
+use crate::HOUSEHOLD;
 use crate::replay::Script;
 use crate::sections::with_sections;
 use crate::vectors;
@@ -12,7 +12,6 @@ use palpate_shared::format::{
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;
 use rand::rngs::SmallRng;
-use std::path::Path;
 
 const VECTORS: &str = include_str!("../../shared/vectors/vectors.txt");
 
@@ -25,7 +24,7 @@ pub fn models() -> Vec<Vec<u8>> {
     let models = words.map(|words| vectors::bytes(words.split(' ').next().expect("bytes")));
     let mut models: Vec<Vec<u8>> = models.collect();
     assert!(models.len() > 60, "{} models", models.len());
-    models.push(std::fs::read(Path::new(ROOT).join("models/household.palpate")).expect("the committed model"));
+    models.push(HOUSEHOLD.to_vec());
     models
 }
 

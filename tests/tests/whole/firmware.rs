@@ -17,10 +17,10 @@ use palpate_shared::link::{
     Decision, Decoder, Detail, Event, FaultKind, HostSettings, Message, TouchMessage, VerdictMessage,
 };
 use palpate_shared::{ContactTime, Descriptor, Patterns, Touch};
-use palpate_tests::ROOT;
 use palpate_tests::pins::{APPROACH, Edges, edges};
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::trained;
+use palpate_tests::{HOUSEHOLD, ROOT};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use std::io::{Read, Write};
@@ -417,8 +417,7 @@ fn run_gpio(
 #[test]
 #[ignore = "needs an emulator; see the top of tests/tests/whole/firmware.rs"]
 fn a_core_that_faults_on_unaligned_loads_gives_the_hosts_margins_and_verdicts_wherever_the_model_stands() {
-    let bytes = include_bytes!("../../../models/household.palpate");
-    let digest = palpate_tests::identity::digest(&Model::new(bytes).unwrap());
+    let digest = palpate_tests::identity::digest(&Model::new(HOUSEHOLD).unwrap());
     let folder = Path::new(ROOT).join("onboard/firmware").canonicalize().unwrap();
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["build", "--release", "--quiet", "--bin", "alignment", "--target", M0, "--target-dir"]);

@@ -12,6 +12,7 @@ use palpate_onboard::station::{
 use palpate_shared::link::{
     CHUNK, Command, Decision, Device, DeviceEnd, Event, NotStored, Outcome, Payload, Query, Refusal,
 };
+use palpate_tests::HOUSEHOLD;
 use palpate_tests::desk::{Desk, OBJECTS, PowerCut, Step, answers_to_touches, expected, load, push};
 use palpate_tests::flash::{Cells, Driver, Fault, Misread, SECTOR};
 use palpate_tests::random::{self, Shape};
@@ -422,7 +423,6 @@ fn wear(cells: &Cells, touches: usize) -> f64 {
 
 #[test]
 fn the_log_wears_as_little_as_the_readme_states_under_touches_from_a_host() {
-    let bytes = include_bytes!("../../../models/household.palpate");
     let touches = random::touches(4_000, 3);
     let mut cells = Cells::new(LOG + 2 * 44, 1);
     let mut script: Vec<Step> = Vec::new();
@@ -433,19 +433,18 @@ fn the_log_wears_as_little_as_the_readme_states_under_touches_from_a_host() {
         script.push(push(touch));
     }
     let mut desk = Desk::new(script, 0);
-    run(&mut cells, bytes, &mut desk);
+    run(&mut cells, HOUSEHOLD, &mut desk);
     let per_million = wear(&cells, touches.len());
     assert!((42_000.0..48_000.0).contains(&per_million), "{per_million}");
 }
 
 #[test]
 fn the_log_wears_as_little_as_the_readme_states_under_touches_of_its_own() {
-    let bytes = include_bytes!("../../../models/household.palpate");
     let touches = random::touches(4_000, 3);
     let mut cells = Cells::new(LOG + 2 * 44, 1);
     let storage = FlashStorage::<_, RECORD>::new(Driver(&mut cells), LOG * SECTOR).unwrap();
     // As a ProbeStation does it.
-    let (mut station, progress, starts) = Station::<OBJECTS, _>::open(bytes, storage).unwrap();
+    let (mut station, progress, starts) = Station::<OBJECTS, _>::open(HOUSEHOLD, storage).unwrap();
     let mut end = DeviceEnd::new(progress, starts);
     for touch in &touches {
         let outcome = station.push(touch, true);

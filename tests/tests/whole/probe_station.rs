@@ -9,9 +9,9 @@ use palpate_shared::link::{
     Command, Decision, Decoder, Event, HostEnd, HostSettings, Incoming, Message, Outcome, Refusal, VerdictMessage,
 };
 use palpate_shared::{Pose, Touch};
+use palpate_tests::HOUSEHOLD as MODEL;
 use std::collections::VecDeque;
 
-const MODEL: &[u8] = include_bytes!("../../../models/household.palpate");
 const OBJECTS: usize = 16;
 
 /// From the beginning of one approach to that of the next.
