@@ -1,7 +1,7 @@
 //! Random ensembles and the touches that could distinguish them.
 
-use palpate::compile::{Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
+use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree, inputs};
 use palpate::with;
 use palpate_shared::{ContactTime, Descriptor, Pose, Touch};
 use rand::rngs::SmallRng;
@@ -62,6 +62,30 @@ pub fn ensemble(shape: Shape, seed: u64) -> Ensemble {
 /// If the shape fits no model.
 pub fn model(shape: Shape, seed: u64, leaf: Leaf) -> Vec<u8> {
     compile(&ensemble(shape, seed), &with!(Settings::default(), leaf)).expect("it fits").bytes
+}
+
+/// Its models in every layout of data and type of leaves that it fits, and in the layouts that are chosen for it; with these scales of
+/// features.
+pub fn models(ensemble: &Ensemble, scales: Option<Vec<f32>>) -> Vec<Vec<u8>> {
+    let layouts = || std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
+    let all = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
+    let compiled = all.filter_map(|(leaf, layout)| {
+        compile(ensemble, &with!(Settings::default(), leaf, layout, scales = scales.clone())).ok()
+    });
+    compiled.map(|compiled| compiled.bytes).collect()
+}
+
+/// The trees over this many features of rows, their thresholds scaled.
+pub fn over_rows(mut ensemble: Ensemble, features: usize, scale: f32) -> Ensemble {
+    for (number, tree) in ensemble.trees.iter_mut().enumerate() {
+        for (index, node) in tree.nodes.iter_mut().enumerate() {
+            if let Node::Split { feature, threshold, .. } = node {
+                *feature = (*feature * 37 + number * 11 + index) % features;
+                *threshold *= scale;
+            }
+        }
+    }
+    Ensemble { inputs: Inputs::unnamed(features), ..ensemble }
 }
 
 /// The trees with at most this many of their different leaves.

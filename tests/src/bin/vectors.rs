@@ -5,7 +5,7 @@
 //! only where something must be added.
 
 use palpate::compile::{EarlyExit, Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Inputs, Node};
+use palpate::ensemble::Node;
 use palpate::with;
 use palpate_onboard::{Model, Recognizer, Refused, RowsSeen, SNAPSHOT_LENGTH, Stopping, Verdict, exp2_negative};
 use palpate_shared::format::{
@@ -252,20 +252,6 @@ fn sections(text: &mut String) {
     }
 }
 
-/// An ensemble's trees over this many features of rows.
-fn imported(mut ensemble: Ensemble, features: usize) -> Ensemble {
-    ensemble.inputs = Inputs::unnamed(features);
-    for (number, tree) in ensemble.trees.iter_mut().enumerate() {
-        for (index, node) in tree.nodes.iter_mut().enumerate() {
-            if let Node::Split { feature, threshold, .. } = node {
-                *feature = (*feature * 37 + number * 11 + index) % features;
-                *threshold *= 1.000_001e-3;
-            }
-        }
-    }
-    ensemble
-}
-
 /// Models over rows of features.
 fn rows(text: &mut String) {
     for (layout, leaf) in [
@@ -274,7 +260,7 @@ fn rows(text: &mut String) {
         (Layout::Complete, Leaf::I8),
         (Layout::Complete, Leaf::F32),
     ] {
-        let ensemble = imported(random::ensemble(SHAPE, 14), 5);
+        let ensemble = random::over_rows(random::ensemble(SHAPE, 14), 5, 1.000_001e-3);
         let settings = with!(Settings::default(), leaf, layout = Some(layout));
         let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
         play_rows(text, &format!("rows of f32 features, {} {}", layout.name(), leaf.name()), &bytes, true);
@@ -285,7 +271,8 @@ fn rows(text: &mut String) {
     let table = [&(-(1_i32 << 17)).to_le_bytes()[..], &[3, 10, 2, 32], &values].concat();
     let sections = [section(4 | 1 << 15, &[&[4, 0][..], &weights].concat()), section(16 | 1 << 15, &table)].concat();
     let settings = with!(Settings::default(), leaf = Leaf::I16, layout = Some(Layout::Compact));
-    let bytes = compile(&imported(random::ensemble(SHAPE, 14), 5), &settings).expect("it fits").bytes;
+    let bytes =
+        compile(&random::over_rows(random::ensemble(SHAPE, 14), 5, 1.000_001e-3), &settings).expect("it fits").bytes;
     play_rows(text, "rows whose evidence is weighed, by a table", &with_sections(&bytes, &sections), true);
 }
 
@@ -326,7 +313,8 @@ fn play_rows(text: &mut String, name: &str, bytes: &[u8], real: bool) {
 /// Rows of sequences that are numbered, guarded, or both.
 fn sequences(text: &mut String) {
     let settings = with!(Settings::default(), leaf = Leaf::I16, layout = Some(Layout::Compact));
-    let real = compile(&imported(random::ensemble(SHAPE, 14), 5), &settings).expect("it fits").bytes;
+    let real =
+        compile(&random::over_rows(random::ensemble(SHAPE, 14), 5, 1.000_001e-3), &settings).expect("it fits").bytes;
     let whole = changed(&real, 13, &[0]);
     let place = |feature, step| section(21 | 1 << 15, &Position { feature, step }.to_bytes());
     let guard = |most: i32| {
@@ -400,7 +388,9 @@ fn events(text: &mut String) {
     {
         let shape = Shape { leaf: 3.0, ..SHAPE };
         let settings = with!(Settings::default(), leaf = Leaf::I8, error_rate = rate);
-        let bytes = compile(&imported(random::ensemble(shape, 31), 5), &settings).expect("it fits").bytes;
+        let bytes = compile(&random::over_rows(random::ensemble(shape, 31), 5, 1.000_001e-3), &settings)
+            .expect("it fits")
+            .bytes;
         let memory = (memory / Model::new(&bytes).expect("a model").unit()) as i32;
         let section = section(23 | 1 << 15, &Events { background, memory, hold_off, ..stated }.to_bytes());
         play_rows(text, name, &with_sections(&bytes, &section), true);
@@ -415,7 +405,7 @@ fn early_exits(text: &mut String) {
         (Layout::Complete, Leaf::I8, true),
         (Layout::Complete, Leaf::I16, false),
     ] {
-        let ensemble = imported(random::ensemble(Shape { trees: 24, each, ..SHAPE }, 26), 5);
+        let ensemble = random::over_rows(random::ensemble(Shape { trees: 24, each, ..SHAPE }, 26), 5, 1.000_001e-3);
         let early_exit = Some(EarlyExit::Always);
         let settings = with!(Settings::default(), leaf, layout = Some(layout), early_exit);
         let bytes = compile(&ensemble, &settings).expect("it fits").bytes;

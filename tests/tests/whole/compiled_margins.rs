@@ -1,7 +1,7 @@
 //! A compiled model's margins are those of its ensemble: exactly with f32 leaves, within the stated error otherwise.
 
 use palpate::compile::{Compiled, Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Inputs, Node, OverTouches};
+use palpate::ensemble::{Ensemble, Node, OverTouches};
 use palpate::with;
 use palpate_onboard::Model;
 use palpate_shared::Touch;
@@ -31,19 +31,6 @@ fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
     let shared = walked.get(ensemble.trees.len() % walked.len()).copied();
     let shared = shared.map(|layout| with!(settings(Some(layout)), shared_leaves = Some(true)));
     plain.chain(shared).filter_map(|settings| compile(ensemble, &settings).ok()).collect()
-}
-
-/// An ensemble's trees over this many f32 features, as an imported model has them.
-fn imported(mut ensemble: Ensemble, features: usize) -> Ensemble {
-    for (number, tree) in ensemble.trees.iter_mut().enumerate() {
-        for (index, node) in tree.nodes.iter_mut().enumerate() {
-            if let Node::Split { feature, threshold, .. } = node {
-                *feature = (*feature * 37 + number * 11 + index) % features;
-                *threshold *= 1.000_001e-3;
-            }
-        }
-    }
-    Ensemble { inputs: Inputs::unnamed(features), ..ensemble }
 }
 
 /// A row next to some of the thresholds, and with all that is special about f32.
@@ -112,7 +99,7 @@ proptest! {
 
     #[test]
     fn real_features_split_as_f32_does_in_every_layout(shape in crate::shapes(12, 300, 10, 900), features in 1..=256_usize, seed: u64) {
-        let ensemble = imported(random::ensemble(shape, seed), features);
+        let ensemble = random::over_rows(random::ensemble(shape, seed), features, 1.000_001e-3);
         let mut margins = vec![0.0; shape.objects];
         let mut models = 0;
         for layout in [None, Some(Layout::Compact), Some(Layout::Wide), Some(Layout::Complete), Some(Layout::Grid)] {

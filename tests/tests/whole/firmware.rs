@@ -17,6 +17,7 @@ use palpate_shared::link::{
     Decision, Decoder, Detail, Event, FaultKind, HostSettings, Message, TouchMessage, VerdictMessage,
 };
 use palpate_shared::{ContactTime, Descriptor, Patterns, Touch};
+use palpate_tests::chips::{M0, M4F, build, cargo};
 use palpate_tests::pins::{APPROACH, Edges, edges};
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::trained;
@@ -26,33 +27,12 @@ use rand::{RngExt, SeedableRng};
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
-const M4F: &str = "thumbv7em-none-eabihf";
-const M0: &str = "thumbv6m-none-eabi";
 const OBJECTS: usize = 10;
-
-/// Builds an image, with a model in it where one is given.
-fn build(image: &str, target: &str, model: Option<&Path>) -> PathBuf {
-    build_with(image, target, model, "")
-}
-
-fn build_with(image: &str, target: &str, model: Option<&Path>, features: &str) -> PathBuf {
-    let folder = Path::new(ROOT).join("onboard/firmware").canonicalize().unwrap();
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["build", "--release", "--quiet", "--bin", image, "--target", target, "--features", features]);
-    cargo.current_dir(&folder);
-    // What this test was built with is not what the firmware is built with.
-    cargo.env_remove("CARGO_TARGET_DIR").env_remove("RUSTFLAGS").env_remove("PALPATE_MODEL");
-    if let Some(model) = model {
-        cargo.env("PALPATE_MODEL", model);
-    }
-    assert!(cargo.status().unwrap().success(), "the firmware does not build");
-    folder.join("target").join(target).join("release").join(image)
-}
 
 fn model(descriptor: Descriptor, seed: u64) -> Vec<u8> {
     let shape =
@@ -89,7 +69,7 @@ fn parity(
     settings: HostSettings,
     mut each: impl FnMut(&mut Connection, &Update),
 ) -> Summary {
-    let firmware = build("uart", target, None);
+    let firmware = build("uart", target, &[], None);
     let mut transport = Emulator::for_firmware(firmware).start().unwrap();
     if let Some(faults) = faults {
         transport = transport.with_faults(faults, 1);
@@ -163,7 +143,8 @@ fn touches_with_a_position_give_the_hosts_verdicts_places_and_approaches_over_a_
     let surfaces = locate::learn(&dataset, &settings).unwrap();
     let model = locate::write(&surfaces, &dataset.names(), &probe, &settings).unwrap();
     for (faults, settings, touches) in [(None, PATIENT, 100), (Some("0.0005,0.0005,0.01,2"), BRISK, 40)] {
-        let mut transport = Emulator::for_firmware(build_with("uart", M4F, None, "locate")).start().unwrap();
+        let mut transport =
+            Emulator::for_firmware(build("uart", M4F, &["--features", "locate"], None)).start().unwrap();
         if let Some(faults) = faults {
             transport = transport.with_faults(faults.parse().unwrap(), 1);
         }
@@ -311,7 +292,7 @@ fn edges_and_power_cuts_that_come_at_any_instruction_become_the_hosts_verdicts()
         let mut known = Known { recognizer, counted: 0 };
         let (mut boots, mut sequences, mut heard) = (Vec::<u32>::new(), 0, 0);
         let (mut last, mut again) = (None, 0);
-        let image = build("gpio", target, Some(file.path()));
+        let image = build("gpio", target, &[], Some(file.path()));
         run_gpio(&image, machine, segments, |boot, sequence, event| {
             if event == Event::Started {
                 assert!(!boots.contains(&boot), "{target}: boot number {boot} comes again");
@@ -418,14 +399,10 @@ fn run_gpio(
 #[ignore = "needs an emulator; see the top of tests/tests/whole/firmware.rs"]
 fn a_core_that_faults_on_unaligned_loads_gives_the_hosts_margins_and_verdicts_wherever_the_model_stands() {
     let digest = palpate_tests::identity::digest(&Model::new(HOUSEHOLD).unwrap());
-    let folder = Path::new(ROOT).join("onboard/firmware").canonicalize().unwrap();
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["build", "--release", "--quiet", "--bin", "alignment", "--target", M0, "--target-dir"]);
     // Not among images with another memory.
-    let target = folder.join("target/microbit");
-    cargo.arg(&target).current_dir(&folder).env("PALPATE_MEMORY", "microbit.x");
-    cargo.env_remove("CARGO_TARGET_DIR").env_remove("RUSTFLAGS").env_remove("PALPATE_MODEL");
-    assert!(cargo.status().unwrap().success(), "the firmware does not build");
+    let target = Path::new(ROOT).join("onboard/firmware/target/microbit");
+    let mut cargo = cargo("build", "alignment", M0, &["--target-dir", target.to_str().unwrap()]);
+    assert!(cargo.env("PALPATE_MEMORY", "microbit.x").status().unwrap().success(), "the firmware does not build");
     let mut qemu = Command::new("qemu-system-arm");
     qemu.args(["-machine", "microbit", "-nographic", "-semihosting-config", "enable=on,target=native", "-kernel"]);
     let output = qemu.arg(target.join(M0).join("release/alignment")).stdin(Stdio::null()).output().unwrap();

@@ -5,13 +5,9 @@
 //! `cargo test --release -p palpate-tests --test whole images:: -- --ignored --nocapture`, which `.ci/firmware` does.
 
 use palpate::compile::{Core, code_flash};
-use palpate_tests::ROOT;
+use palpate_tests::chips::{M0, M4F, build};
 use palpate_tests::stated::Readme;
-use std::path::Path;
-use std::process::Command;
 
-const M4F: &str = "thumbv7em-none-eabihf";
-const M0: &str = "thumbv6m-none-eabi";
 /// Tolerance, in percent, of a README's figures under another compiler.
 const PERCENT: u64 = 2;
 
@@ -38,13 +34,7 @@ const IMAGES: [(&str, &str, &str); 8] = [
 /// Builds an image; of those in `IMAGES` none links if anything in it can panic, since its panic handler calls what is defined
 /// nowhere.
 fn image(name: &str, target: &str, features: &str) -> Image {
-    let firmware = Path::new(ROOT).join("onboard/firmware");
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.current_dir(&firmware).args(["build", "--locked", "--release", "--quiet", "--no-default-features"]);
-    cargo.args(["--target", target, "--bin", name, "--features", features]);
-    cargo.env_remove("CARGO_TARGET_DIR").env_remove("RUSTFLAGS").env_remove("PALPATE_MODEL");
-    assert!(cargo.status().expect("cargo runs").success(), "the image {name} does not link");
-    let path = firmware.join("target").join(target).join("release").join(name);
+    let path = build(name, target, &["--no-default-features", "--features", features], None);
     let image = Image::read(&std::fs::read(path).expect("the image"));
     println!("{name:9} {target:21} {features:60} {} bytes of flash, {} of RAM", image.flash, image.ram);
     image

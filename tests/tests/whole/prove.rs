@@ -1,44 +1,22 @@
 //! Proofs: every model of an ensemble is proved, and no change of a model's meaning is.
 
 use palpate::compile::{EarlyExit, Instructions, Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Inputs, Node, Tree};
+use palpate::ensemble::{Ensemble, Node, Tree};
 use palpate::error::ProofProblem;
 use palpate::prove::{Certificate, check, moves, prove};
 use palpate::rows::Encoder;
 use palpate::with;
 use palpate_onboard::Model;
-use palpate_shared::format::{Header, Tag, checksum};
+use palpate_shared::format::{Header, Tag};
 use palpate_shared::{Descriptor, MISSING_FEATURE};
 use palpate_tests::random::{self, Shape};
+use palpate_tests::scripts::sealed;
 use proptest::prelude::*;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
 /// Stands for the ensemble's file.
 const FILE: &[u8] = b"an ensemble";
-
-/// An ensemble's trees over rows of this many features, with fractions as thresholds.
-fn over_rows(mut ensemble: Ensemble, features: usize) -> Ensemble {
-    for (number, tree) in ensemble.trees.iter_mut().enumerate() {
-        for (index, node) in tree.nodes.iter_mut().enumerate() {
-            if let Node::Split { feature, threshold, .. } = node {
-                *feature = (*feature * 37 + number * 11 + index) % features;
-                *threshold /= 7.0;
-            }
-        }
-    }
-    Ensemble { inputs: Inputs::unnamed(features), ..ensemble }
-}
-
-/// Its models in every layout of data and type of leaves that it fits.
-fn models(ensemble: &Ensemble, scales: Option<Vec<f32>>) -> Vec<Vec<u8>> {
-    let layouts = || std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
-    let all = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
-    let compiled = all.filter_map(|(leaf, layout)| {
-        compile(ensemble, &with!(Settings::default(), leaf, layout, scales = scales.clone())).ok()
-    });
-    compiled.map(|compiled| compiled.bytes).collect()
-}
 
 /// Its models whose walks for a class alone may end early.
 fn early_exits(ensemble: &Ensemble, scales: Option<Vec<f32>>) -> Vec<Vec<u8>> {
@@ -84,7 +62,7 @@ proptest! {
     #[test]
     fn models_of_touches_are_proved_in_every_layout_and_their_certificates_hold(shape in crate::shapes(8, 30, 6, 60), seed: u64) {
         let ensemble = random::ensemble(shape, seed);
-        for bytes in models(&ensemble, None) {
+        for bytes in random::models(&ensemble, None) {
             is_proved(&bytes, &ensemble)?;
         }
     }
@@ -93,10 +71,10 @@ proptest! {
     fn a_class_stays_until_the_stated_value_of_a_feature_and_is_another_one_there(
         shape in crate::shapes(8, 30, 6, 60), features in 1..=6_usize, seed: u64,
     ) {
-        let ensemble = over_rows(random::ensemble(Shape { objects: shape.objects.max(2), ..shape }, seed), features);
+        let ensemble = random::over_rows(random::ensemble(Shape { objects: shape.objects.max(2), ..shape }, seed), features, 0.1);
         let mut random = SmallRng::seed_from_u64(seed);
         for scales in [None, Some(vec![10.0; features])] {
-            for bytes in models(&ensemble, scales) {
+            for bytes in random::models(&ensemble, scales) {
                 let model = Model::new(&bytes).unwrap();
                 let encoder = Encoder::of(&model);
                 let row: Vec<f64> = (0..features).map(|_| f64::from(random.random_range(-40_000..40_000_i32)) / 8.0).collect();
@@ -133,9 +111,9 @@ proptest! {
 
     #[test]
     fn models_of_rows_are_proved_by_keys_and_in_units(shape in crate::shapes(8, 30, 6, 60), features in 1..=40_usize, seed: u64) {
-        let ensemble = over_rows(random::ensemble(shape, seed), features);
+        let ensemble = random::over_rows(random::ensemble(shape, seed), features, 0.1);
         for scales in [None, Some(vec![100.0; features])] {
-            for bytes in models(&ensemble, scales.clone()).into_iter().chain(early_exits(&ensemble, scales)) {
+            for bytes in random::models(&ensemble, scales.clone()).into_iter().chain(early_exits(&ensemble, scales)) {
                 is_proved(&bytes, &ensemble)?;
             }
         }
@@ -190,9 +168,7 @@ impl Original {
 /// Tries a changed model: `None` if it is not accepted as a model, else true if it is refused in both ways. Panics if its
 /// margins are others, and it is not.
 fn is_refused(changed: &mut [u8], original: &Original, ensemble: &Ensemble, what: &str) -> Option<bool> {
-    let body = changed.len() - 4;
-    let sum = checksum(&changed[..body]);
-    changed[body..].copy_from_slice(&sum.to_le_bytes());
+    sealed(changed);
     let model = Model::new(changed).ok()?;
     let proved = prove(changed, ensemble, FILE);
     // A certificate of the original that claims to be about the changed model is judged in the other way.
@@ -215,7 +191,7 @@ fn every_bit_that_changes_a_margin_of_a_small_model_is_refused_in_both_ways() {
     for (number, descriptor) in [Descriptor::Curvature, Descriptor::ContactsCurvature].into_iter().enumerate() {
         let shape = Shape { descriptor, thresholds: 3, trees: 3, depth: 2, ..Shape::SMALL };
         let ensemble = random::ensemble(shape, 7 + number as u64);
-        for original in models(&ensemble, None) {
+        for original in random::models(&ensemble, None) {
             let original = Original::new(original, &ensemble);
             for bit in 0..8 * (original.bytes.len() - 4) {
                 let mut changed = original.bytes.clone();
@@ -238,7 +214,7 @@ fn random_changes_of_large_models_that_change_a_margin_are_refused_in_both_ways(
     let mut refused = 0;
     for each in [false, true] {
         let ensemble = random::ensemble(Shape { each, descriptor: Descriptor::Oriented, ..shape }, 11);
-        for original in models(&ensemble, None) {
+        for original in random::models(&ensemble, None) {
             let original = Original::new(original, &ensemble);
             for _ in 0..20 {
                 let mut changed = original.bytes.clone();
@@ -338,8 +314,7 @@ fn trees_deeper_than_any_ensemble_are_refused_and_not_walked() {
     for split in 0..count {
         bytes[start + 2 + 6 * split + 4..][..2].fill(0);
     }
-    let sum = checksum(&bytes[..body]);
-    bytes[body..].copy_from_slice(&sum.to_le_bytes());
+    sealed(&mut bytes);
     Model::new(&bytes).unwrap();
     let error = prove(&bytes, &ensemble, FILE).unwrap_err();
     assert!(
@@ -370,7 +345,7 @@ fn changed_bounds_of_early_exits_that_change_a_class_are_refused_in_both_ways() 
     let [mut refused, mut harmless, mut wrong] = [0; 3];
     for each in [false, true] {
         let shape = Shape { objects: 3, trees: 24, depth: 4, thresholds: 20, each, ..Shape::SMALL };
-        let ensemble = over_rows(random::ensemble(shape, 12), 3);
+        let ensemble = random::over_rows(random::ensemble(shape, 12), 3, 0.1);
         for bytes in early_exits(&ensemble, None).into_iter().step_by(2) {
             let (_, certificate) = prove(&bytes, &ensemble, FILE).unwrap();
             let model = Model::new(&bytes).unwrap();
@@ -396,9 +371,7 @@ fn changed_bounds_of_early_exits_that_change_a_class_are_refused_in_both_ways() 
                 changed
             }));
             for mut changed in changes {
-                let body = changed.len() - 4;
-                let sum = checksum(&changed[..body]);
-                changed[body..].copy_from_slice(&sum.to_le_bytes());
+                sealed(&mut changed);
                 let model = Model::new(&changed).unwrap();
                 let of_changed = crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(&changed);
                 let certificate = Certificate { model: of_changed, ..certificate.clone() };

@@ -1,12 +1,12 @@
 //! Rows that go through a model together have the margins that each has by itself, to the bit.
 
-use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate::ensemble::{Ensemble, Inputs, Node, OverTouches};
-use palpate::with;
+use palpate::compile::{Settings, compile};
+use palpate::ensemble::{Ensemble, OverTouches};
 use palpate_onboard::{Batch, Model};
 use palpate_shared::MISSING_FEATURE;
-use palpate_shared::format::{Header, checksum};
+use palpate_shared::format::Header;
 use palpate_tests::random::{self, Shape};
+use palpate_tests::scripts::sealed;
 use proptest::prelude::*;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
@@ -16,16 +16,6 @@ const COUNTS: [usize; 12] = [0, 1, 7, 8, 9, 15, 16, 17, 127, 128, 2001, MOST];
 
 /// More than one block.
 const MOST: usize = 2100;
-
-fn models(ensemble: &Ensemble) -> Vec<Vec<u8>> {
-    let layouts = || std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
-    let settings = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
-    let compiled = settings.filter_map(|(leaf, layout)| {
-        let settings = with!(Settings::default(), leaf, layout);
-        compile(ensemble, &settings).ok()
-    });
-    compiled.map(|compiled| compiled.bytes).collect()
-}
 
 /// Rows near what trees compare with, every seventh value missing.
 fn rows(ensemble: &Ensemble, model: &Model<'_>, seed: u64) -> Vec<i32> {
@@ -73,18 +63,6 @@ fn compare(model: &Model<'_>, features: &[i32], batch: &mut Batch) -> Result<(),
     Ok(())
 }
 
-/// An ensemble's trees over this many features.
-fn spread(mut ensemble: Ensemble, features: usize) -> Ensemble {
-    for (number, tree) in ensemble.trees.iter_mut().enumerate() {
-        for (index, node) in tree.nodes.iter_mut().enumerate() {
-            if let Node::Split { feature, .. } = node {
-                *feature = (*feature * 37 + number * 11 + index) % features;
-            }
-        }
-    }
-    Ensemble { inputs: Inputs::unnamed(features), ..ensemble }
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
@@ -92,7 +70,7 @@ proptest! {
     fn rows_at_once_have_the_margins_of_each_row_in_every_layout_and_leaf_type(shape in crate::shapes(20, 60, 9, 900), seed: u64) {
         let ensemble = random::ensemble(shape, seed);
         let mut batch = Box::new(Batch::new());
-        let models = models(&ensemble);
+        let models = random::models(&ensemble, None);
         prop_assert!(models.len() >= 6, "{} models", models.len());
         for bytes in models {
             let model = Model::new(&bytes).unwrap();
@@ -102,9 +80,9 @@ proptest! {
 
     #[test]
     fn rows_of_up_to_256_features_at_once_have_the_margins_of_each(shape in crate::shapes(20, 60, 9, 900), features in 1..=256_usize, seed: u64) {
-        let ensemble = spread(random::ensemble(shape, seed), features);
+        let ensemble = random::over_rows(random::ensemble(shape, seed), features, 1.0);
         let mut batch = Box::new(Batch::new());
-        for bytes in models(&ensemble) {
+        for bytes in random::models(&ensemble, None) {
             let model = Model::new(&bytes).unwrap();
             compare(&model, &rows(&ensemble, &model, seed), &mut batch)?;
         }
@@ -117,7 +95,7 @@ proptest! {
         let mut random = SmallRng::seed_from_u64(seed);
         let mut batch = Box::new(Batch::new());
         let (mut tried, mut passed) = (0, 0);
-        for bytes in models(&ensemble) {
+        for bytes in random::models(&ensemble, None) {
             let body = bytes.len() - 4;
             let header = Header::of(&bytes);
             let sections = (header.nodes_length() + header.leaves_length()) as usize;
@@ -129,8 +107,7 @@ proptest! {
                     // Thresholds, splits and leaves, which are not checked when a model is opened.
                     changed[random.random_range(body - sections..body)] = random.random();
                 }
-                let sum = checksum(&changed[..body]);
-                changed[body..].copy_from_slice(&sum.to_le_bytes());
+                sealed(&mut changed);
                 if let Ok(model) = Model::new(&changed) {
                     passed += 1;
                     compare(&model, &rows(&ensemble, &model, seed), &mut batch)?;

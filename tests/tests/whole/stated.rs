@@ -5,27 +5,17 @@
 //! `PALPATE_RESTATE=1` it writes what it measures into the READMEs, as those of `images` do. Other compilers give other code, so a number may be a few percent off.
 
 use palpate_tests::ROOT;
+use palpate_tests::chips::{M0, M4F, cargo};
 use palpate_tests::stated::Readme;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-const M4F: &str = "thumbv7em-none-eabihf";
-const M0: &str = "thumbv6m-none-eabi";
 /// Tolerance of a number, in percent.
 const PERCENT: u64 = 3;
 
-/// Cargo in the firmware's workspace, with the release profile.
-fn cargo(what: &str, image: &str, target: &str) -> Command {
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args([what, "--locked", "--release", "--quiet", "--bin", image, "--target", target]);
-    cargo.current_dir(Path::new(ROOT).join("onboard/firmware"));
-    cargo.env_remove("CARGO_TARGET_DIR").env_remove("RUSTFLAGS").env_remove("PALPATE_MODEL").stdin(Stdio::null());
-    cargo
-}
-
 /// Output of an image in the emulator, line by line in words.
 fn printed(image: &str, target: &str) -> Vec<Vec<String>> {
-    let output = cargo("run", image, target).output().expect("cargo runs");
+    let output = cargo("run", image, target, &[]).output().expect("cargo runs");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
     print!("{target}, {image}\n{text}");

@@ -258,23 +258,8 @@ fn newest(records: &[Vec<u8>; 2]) -> usize {
     usize::from(odd > even)
 }
 
-/// A UART that lost or garbled a byte.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Garbled;
-
-impl core::fmt::Display for Garbled {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("garbled")
-    }
-}
-
-impl core::error::Error for Garbled {}
-
-impl embedded_io::Error for Garbled {
-    fn kind(&self) -> ErrorKind {
-        ErrorKind::Other
-    }
-}
+/// The error of a UART that lost or garbled a byte.
+const GARBLED: ErrorKind = ErrorKind::Other;
 
 /// A UART that hands out the bytes of a desk one by one, with errors.
 struct Uart<'d, F> {
@@ -300,32 +285,32 @@ enum Call {
 }
 
 impl<F> ErrorType for Uart<'_, F> {
-    type Error = Garbled;
+    type Error = ErrorKind;
 }
 
 impl<F: FnMut(Call) -> bool> Read for Uart<'_, F> {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Garbled> {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, ErrorKind> {
         self.reads += 1;
         let errs = (self.errs)(Call::Read(self.reads - 1));
         if errs && !self.loses {
-            return Err(Garbled);
+            return Err(GARBLED);
         }
-        let count = self.desk.read(&mut buffer[..1]).map_err(|PowerCut| Garbled)?;
+        let count = self.desk.read(&mut buffer[..1]).map_err(|PowerCut| GARBLED)?;
         // The end is no byte.
-        if errs && count > 0 { Err(Garbled) } else { Ok(count) }
+        if errs && count > 0 { Err(GARBLED) } else { Ok(count) }
     }
 }
 
 impl<F: FnMut(Call) -> bool> Write for Uart<'_, F> {
-    fn write(&mut self, buffer: &[u8]) -> Result<usize, Garbled> {
+    fn write(&mut self, buffer: &[u8]) -> Result<usize, ErrorKind> {
         self.writes += 1;
         if (self.errs)(Call::Write(self.writes - 1)) {
-            return Err(Garbled);
+            return Err(GARBLED);
         }
-        self.desk.write(buffer).map_err(|PowerCut| Garbled)
+        self.desk.write(buffer).map_err(|PowerCut| GARBLED)
     }
 
-    fn flush(&mut self) -> Result<(), Garbled> {
+    fn flush(&mut self) -> Result<(), ErrorKind> {
         Ok(())
     }
 }
@@ -374,7 +359,7 @@ fn a_uart_that_only_errs_ends_the_program_and_its_storage_serves_on_over_another
     let mut desk = Desk::new(touches.iter().map(push), 0);
     let mut uart = Uart::new(&mut desk, true, |call| matches!(call, Call::Read(number) if number >= 500));
     let ended = serve::<OBJECTS, _, _>(built_in, &mut storage, 0, &mut uart);
-    assert_eq!((ended, uart.reads), (Err(ServeError::Transport(Garbled)), 500 + u32::from(ERRORS_IN_A_ROW)));
+    assert_eq!((ended, uart.reads), (Err(ServeError::Transport(GARBLED)), 500 + u32::from(ERRORS_IN_A_ROW)));
     let before = desk.outcomes.len();
     assert!((1..touches.len()).contains(&before), "{before}");
     let mut uart = Uart::new(&mut desk, true, |_| false);
@@ -389,11 +374,11 @@ struct Mute {
 }
 
 impl ErrorType for Mute {
-    type Error = Garbled;
+    type Error = ErrorKind;
 }
 
 impl Read for Mute {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Garbled> {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, ErrorKind> {
         self.frame.rotate_left(1);
         buffer[0] = self.frame[self.frame.len() - 1];
         Ok(1)
@@ -401,12 +386,12 @@ impl Read for Mute {
 }
 
 impl Write for Mute {
-    fn write(&mut self, _: &[u8]) -> Result<usize, Garbled> {
+    fn write(&mut self, _: &[u8]) -> Result<usize, ErrorKind> {
         self.writes += 1;
-        Err(Garbled)
+        Err(GARBLED)
     }
 
-    fn flush(&mut self) -> Result<(), Garbled> {
+    fn flush(&mut self) -> Result<(), ErrorKind> {
         Ok(())
     }
 }
@@ -417,7 +402,7 @@ fn a_uart_on_which_nothing_can_be_sent_ends_the_program_although_bytes_come() {
     let frame = encode(&Frame { session: 1, message }, &mut [0; FRAME_MAX]).to_vec();
     let mut uart = Mute { frame, writes: 0 };
     let ended = serve::<OBJECTS, _, _>(&[], &mut NoStorage, 0, &mut uart);
-    assert_eq!((ended, uart.writes), (Err(ServeError::Transport(Garbled)), u32::from(ERRORS_IN_A_ROW)));
+    assert_eq!((ended, uart.writes), (Err(ServeError::Transport(GARBLED)), u32::from(ERRORS_IN_A_ROW)));
 }
 
 /// A wire whose read is an error before every byte, and that is ready.
@@ -429,14 +414,14 @@ struct Wire {
 }
 
 impl ErrorType for Wire {
-    type Error = Garbled;
+    type Error = ErrorKind;
 }
 
 impl Read for Wire {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Garbled> {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, ErrorKind> {
         self.is_garbled = !self.is_garbled;
         if self.is_garbled {
-            return Err(Garbled);
+            return Err(GARBLED);
         }
         let byte = self.bytes.pop_front();
         byte.into_iter().zip(buffer).for_each(|(from, to)| *to = from);
@@ -445,18 +430,18 @@ impl Read for Wire {
 }
 
 impl embedded_io::ReadReady for Wire {
-    fn read_ready(&mut self) -> Result<bool, Garbled> {
+    fn read_ready(&mut self) -> Result<bool, ErrorKind> {
         Ok(!self.bytes.is_empty())
     }
 }
 
 impl Write for Wire {
-    fn write(&mut self, buffer: &[u8]) -> Result<usize, Garbled> {
+    fn write(&mut self, buffer: &[u8]) -> Result<usize, ErrorKind> {
         self.written.extend(buffer);
         Ok(buffer.len())
     }
 
-    fn flush(&mut self) -> Result<(), Garbled> {
+    fn flush(&mut self) -> Result<(), ErrorKind> {
         Ok(())
     }
 }
@@ -477,7 +462,7 @@ fn both_ends_of_the_link_go_on_after_an_error_before_every_byte() {
         to_host.bytes.extend(to_chip.written.drain(..));
         match host.exchange(&mut to_host, now, |incoming| opened |= matches!(incoming, Incoming::Opened)) {
             Ok(ticked) => ticked.unwrap(),
-            Err(Garbled) => errors += 1,
+            Err(_) => errors += 1,
         }
         to_chip.bytes.extend(to_host.written.drain(..));
     }
