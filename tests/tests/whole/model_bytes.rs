@@ -113,6 +113,9 @@ fn statements_about_the_training_are_read_back_and_change_no_margin() {
     }
 }
 
+/// More rows than one pass of a batch takes, and some for which it is not whole.
+const ROWS: usize = 140;
+
 #[test]
 fn changed_bytes_that_are_accepted_give_the_same_margins_at_every_address_and_alone_as_many_at_once() {
     // With thresholds of two and of four bytes, and enough of them for every kind of search.
@@ -124,7 +127,7 @@ fn changed_bytes_that_are_accepted_give_the_same_margins_at_every_address_and_al
     });
     let models: Vec<Vec<u8>> = models().into_iter().chain(many).collect();
     let (mut accepted, mut batch) = (0, Batch::new());
-    for round in 0..3_000 {
+    for round in 0..1_500 {
         let mut bytes = models[round % models.len()].clone();
         let [_, _, axes, cuts, groups, ..] = places(&bytes);
         for _ in 0..rng.random_range(0..3) {
@@ -140,10 +143,10 @@ fn changed_bytes_that_are_accepted_give_the_same_margins_at_every_address_and_al
         let Ok(model) = Model::new(&bytes) else { continue };
         accepted += 1;
         let (width, objects) = (model.feature_count(), model.object_count());
-        let rows: Vec<i32> = (0..20 * width).map(|_| rng.random_range(-300_000..300_000)).collect();
+        let rows: Vec<i32> = (0..ROWS * width).map(|_| rng.random_range(-300_000..300_000)).collect();
         let margins = |bytes: &[u8]| -> Vec<i32> {
             let model = Model::new(bytes).unwrap();
-            let mut margins = vec![0; 20 * objects];
+            let mut margins = vec![0; ROWS * objects];
             for (row, margins) in rows.chunks(width).zip(margins.chunks_mut(objects)) {
                 assert!(model.margins_of(row, margins));
             }
@@ -154,11 +157,11 @@ fn changed_bytes_that_are_accepted_give_the_same_margins_at_every_address_and_al
             let shifted = [vec![0; offset], bytes.clone()].concat();
             assert_eq!(margins(&shifted[offset..]), expected, "round {round} at address {offset}");
         }
-        let mut at_once = vec![0; 20 * objects];
+        let mut at_once = vec![0; ROWS * objects];
         assert!(model.margins_of_rows(&rows, &mut at_once, &mut batch));
         assert_eq!(at_once, expected, "round {round}");
     }
-    assert!(accepted > 800, "{accepted}");
+    assert!(accepted > 500, "{accepted}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Misfit tests in models: bytes that make no sense are refused, and those that pass can be walked.
+//! Misfit tests in models, and backgrounds.
 
 use palpate::compile::Settings;
 use palpate_onboard::{Familiarity, Forgetting, Model, Recognizer, Rivals, SNAPSHOT_LENGTH, Stopping, Verdict};
@@ -130,24 +130,6 @@ fn verdicts_survive_a_snapshot() {
     let mut other = Recognizer::<4>::new(&plain, stopping).unwrap();
     other.restore(snapshot).unwrap();
     assert_eq!(other.verdict(), Verdict::GaveUp);
-}
-
-#[test]
-fn a_changed_byte_of_the_section_is_refused_or_can_be_walked() {
-    let bytes = model();
-    let original = section(TERMS, true, 3, 5, 77);
-    for position in 0..original.len() {
-        for wrong in [0, 1, 16, 127, 255] {
-            let mut section = original.clone();
-            section[position] = wrong;
-            let Ok(bytes) = with(&bytes, section) else { continue };
-            let model = Model::new(&bytes).unwrap();
-            let mut recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model)).unwrap();
-            for touch in random::touches(8, 3) {
-                _ = recognizer.push(&touch);
-            }
-        }
-    }
 }
 
 /// Units by which a touch speaks for an object: the largest power of two that is at most a nat.
