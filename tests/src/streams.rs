@@ -57,7 +57,7 @@ pub fn streams(rows: usize) -> Vec<Stream> {
         let ensemble = ensemble.expect("an ensemble");
         let plain = compile(&ensemble, &with!(Settings::default(), max_touches = 9)).expect("a model").bytes;
         let model = compile::open(&plain).expect("a model");
-        let csv = path.with_extension("rows.csv");
+        let csv = path.with_extension("csv");
         let names = feature_names(&model);
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let table = Rows::read(&csv, &names, None).expect("rows");

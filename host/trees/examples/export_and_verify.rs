@@ -21,8 +21,8 @@ use std::path::PathBuf;
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
     let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/import/");
-    let tested = ["xgboost-3.2-vector-leaves.json", "xgboost-3.2-vector-leaves.rows.csv"]
-        .map(|name| PathBuf::from(data).join(name));
+    let tested = ["xgboost-3.2-vector-leaves.json", "xgboost-3.2-vector-leaves.csv"];
+    let tested = tested.map(|name| PathBuf::from(data).join(name));
     let (model, rows) = match &arguments[..] {
         [model, rows, ..] => (model, rows),
         _ => (&tested[0], &tested[1]),

@@ -5,16 +5,18 @@
 
 and the same with XGBoost 1.6.2, 1.7.6, 3.0.5, 3.2.0 and (Python 3.12) 3.4.0, then, each with the packages that it imports,
 `make.py lightgbm`, `make.py catboost`, `make.py onnx` (scikit-learn, skl2onnx, onnx, onnxruntime) and `make.py onnxmltools`
-(onnxmltools, xgboost, lightgbm). `make.py predictions`, with all of these packages, opens the models that have no
-NAME.predictions.csv yet with the installed library, and asks it. Every model gets three files beside it:
+(onnxmltools, xgboost, lightgbm). `make.py predictions`, with all of these packages, opens the models whose tables have no
+predictions yet with the installed library, and asks it. Objectives that differ by their name alone have one model: what each
+predicts is in `host/trees/tests/trees/objectives.rs`. Beside every model is its table, NAME.csv, with 20 rows like the
+training's, 20 with values that equal thresholds of the model, the numbers beside them or zero, and 20 with missing values
+(empty). Its columns:
 
-NAME.rows.csv     a header with the features' names, then 20 rows like the training's, 20 with values that equal thresholds
-                  of the model, the numbers beside them or zero, and 20 with missing values (empty)
-NAME.margins.csv  the library's raw scores of these rows: one column per output, one for a binary model. f32 scores have as
-                  many digits as distinguish them, f64 scores seventeen
-NAME.predictions.csv  what the library's `predict` says: a class by name or number, of boosters that with the largest
-                  probability; or the value, a column for each of several targets
-NAME.probabilities.csv  of some: the probability of each class
+features     by name, or f0 and so on where the model's file has no names
+margin       the library's raw scores: one column per output (margin0 and so on), one for a binary model. f32 scores have as
+             many digits as distinguish them, f64 scores seventeen
+prediction   the library's `predict`: a class by name or number, of boosters that with the largest probability; or the value, a
+             column for each of several targets
+probability  of some: the probability of each class
 """
 
 import sys
@@ -24,6 +26,7 @@ import numpy as np
 
 HERE = Path(__file__).parent
 NAMES = ["width", "height", "count", "angle"]
+UNNAMED = ["f0", "f1", "f2", "f3"]
 ROWS = 20
 
 
@@ -92,24 +95,22 @@ def text(value):
     return repr(float(value)) if isinstance(value, np.float64) else str(value)
 
 
-def write(name, x, margins, names=NAMES, predictions=None):
-    margins = np.asarray(margins)
-    margins = margins.reshape(len(x), -1)
-    lines = [",".join(names)] + [",".join(text(value) for value in row) for row in x]
-    (HERE / f"{name}.rows.csv").write_text("\n".join(lines) + "\n")
-    lines = [",".join(text(value) for value in row) for row in margins]
-    (HERE / f"{name}.margins.csv").write_text("\n".join(lines) + "\n")
-    if predictions is not None:
-        write_predictions(name, predictions)
-    print(name, margins.dtype, margins.shape)
-
-
-def write_predictions(name, predictions):
-    predictions = np.asarray(predictions)
-    rows = predictions.reshape(len(predictions), -1)
+def columns(kind, values):
+    """Lines of cells, the first of which are the columns' names."""
+    values = np.asarray(values)
+    values = values.reshape(len(values), -1)
     plain = lambda value: str(value) if isinstance(value, (str, np.integer)) else text(value)
-    lines = [",".join(plain(value) for value in row) for row in rows]
-    (HERE / f"{name}.predictions.csv").write_text("\n".join(lines) + "\n")
+    head = [kind] if values.shape[1] == 1 else [f"{kind}{index}" for index in range(values.shape[1])]
+    return [head] + [[plain(value) for value in row] for row in values]
+
+
+def write(name, x, margins, names=NAMES, predictions=None, probabilities=None):
+    kinds = {"margin": margins, "prediction": predictions, "probability": probabilities}
+    parts = [columns(kind, values) for kind, values in kinds.items() if values is not None]
+    parts.insert(0, [names] + columns("", x)[1:])
+    lines = [",".join(sum(cells, [])) for cells in zip(*parts)]
+    (HERE / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    print(name, np.asarray(margins).dtype, np.asarray(margins).shape)
 
 
 def most_likely(probabilities):
@@ -137,12 +138,11 @@ def make_xgboost():
     release = tuple(int(part) for part in version.split("."))
     plain = {"max_depth": 2, "eta": 0.4, "tree_method": "hist", "max_bin": 16, "seed": 1, "nthread": 1}
 
-    def save(kind, extension, classes, settings, rounds=3, missing=True, label=None, predict=False, about=lambda train: None):
+    def save(kind, extension, classes, settings, rounds=3, missing=True, label=None, predict=False):
         x, y = data(max(classes, 2))
         x = with_missing(x) if missing else x
         y = y if label is None else label(x, y)
         train = xgb.DMatrix(x, y, feature_names=NAMES)
-        about(train)
         booster = xgb.train({**plain, **settings}, train, rounds)
         name = f"xgboost-{version}-{kind}"
         booster.save_model(HERE / f"{name}.{extension}")
@@ -188,16 +188,15 @@ def make_xgboost():
     softprob = {"objective": "multi:softprob", "num_class": 3}
     amount = lambda x, y: np.abs(x[:, 0]) * 3 + y
     dart = {"booster": "dart", "rate_drop": 0.5, "one_drop": 1, "skip_drop": 0.0}
-    save("binary", "json", 2, binary)
-    if release in [(1, 6), (2, 1), (3, 2), (3, 4)]:
+    if release not in [(1, 7), (2, 1)]:
+        save("binary", "json", 2, binary)
+    if release in [(1, 6), (2, 1), (3, 4)]:
         save("softprob", "ubj", 3, softprob, rounds=2)
     if release in [(1, 6), (3, 2), (3, 4)]:
         save("dart", "json", 3, {**softprob, **dart}, rounds=2)
-    if release in [(1, 6), (2, 1), (3, 4)]:
-        save("dart-binary", "ubj", 2, {**binary, **dart}, rounds=5)
-    if release in [(1, 6), (3, 4)]:
+    if release == (3, 4):
         save("softmax", "json", 3, {**softprob, "objective": "multi:softmax", "base_score": 0.25}, rounds=2)
-        save("poisson", "json", 0, {"objective": "count:poisson", "base_score": 2.5}, label=amount)
+    if release == (1, 6):
         save("logitraw", "ubj", 2, {**binary, "objective": "binary:logitraw"})
     if release == (3, 2):
         # Not in the file: the estimator's missing value, and that it predicts with the trees up to the best round.
@@ -213,41 +212,31 @@ def make_xgboost():
         for kind, (model, test) in estimators.items():
             name = f"xgboost-{version}-{kind}"
             model.save_model(HERE / f"{name}.json")
-            write(name, test, model.predict(test, output_margin=True), predictions=model.predict(test))
-        for objective in ["count:poisson", "reg:logistic"]:
-            target = amount if objective == "count:poisson" else (lambda x, y: y * 0.8 + 0.1)
-            kind = objective.replace(":", "-")
-            save(kind, "json", 0, {"objective": objective}, label=target, predict=True)
-        # Every other objective whose trees can be read.
-        for objective in ["squarederror", "squaredlogerror", "pseudohubererror", "absoluteerror", "quantileerror", "gamma",
-                          "tweedie"]:
-            more = {"quantile_alpha": 0.7} if objective == "quantileerror" else {}
-            save(f"reg-{objective}", "json", 0, {"objective": f"reg:{objective}", **more}, rounds=2, label=amount, predict=True)
-        for objective in ["pairwise", "ndcg", "map"]:
-            relevant = (lambda x, y: y) if objective == "map" else (lambda x, y: np.digitize(x[:, 0], [-1, 0, 1]))
-            save(f"rank-{objective}", "json", 0, {"objective": f"rank:{objective}"}, rounds=2, label=relevant, predict=True,
-                 about=lambda train: train.set_info(qid=np.arange(400) // 20))
-        save("survival-cox", "json", 0, {"objective": "survival:cox"}, rounds=2, label=amount, predict=True)
-        times = lambda train: (train.set_float_info("label_lower_bound", train.get_label()),
-                               train.set_float_info("label_upper_bound", train.get_label()))
-        save("survival-aft", "json", 0, {"objective": "survival:aft"}, rounds=2, label=amount, predict=True, about=times)
+            names = model.get_booster().feature_names or UNNAMED
+            write(name, test, model.predict(test, output_margin=True), names, predictions=model.predict(test))
+        save("count-poisson", "json", 0, {"objective": "count:poisson"}, label=amount, predict=True)
+        save("reg-logistic", "json", 0, {"objective": "reg:logistic"}, label=lambda x, y: y * 0.8 + 0.1, predict=True)
+        for objective in ["squarederror", "gamma"]:
+            save(f"reg-{objective}", "json", 0, {"objective": f"reg:{objective}"}, rounds=2, label=amount, predict=True)
         save("hinge", "json", 2, {"objective": "binary:hinge"}, rounds=2, predict=True)
         save("one-class", "json", 2, {"objective": "binary:logistic"}, rounds=2, label=lambda x, y: 0 * y, predict=True)
     if release == (2, 1):
+        save("dart-binary", "ubj", 2, {**binary, **dart}, rounds=5)
         save("forest", "json", 2, {**binary, "num_parallel_tree": 3, "subsample": 0.7, "eta": 1}, rounds=2)
         save("squarederror", "ubj", 0, {"objective": "reg:squarederror"}, label=amount)
-    if release >= (2, 0):
+    if release in [(2, 1), (3, 2)]:
         save("vector-leaves", "json", 3, {**softprob, "multi_strategy": "multi_output_tree"})
-    if release in [(1, 6), (1, 7), (2, 1), (3, 2)]:
-        # By sets of categories, one category at a time, and for each class or with a value for each.
-        by_set = {"tree_method": "hist" if release > (1, 6) else "approx", "max_cat_to_onehot": 2, "max_depth": 3}
+    if release in [(1, 7), (2, 1), (3, 2)]:
+        # By sets of categories, and one category at a time.
+        by_set = {"max_cat_to_onehot": 2, "max_depth": 3}
         save_kinds("categorical", {**binary, **by_set})
         if release == (3, 2):
             save_kinds("one-hot", {**binary, **by_set, "max_cat_to_onehot": 100})
-    if release in [(2, 1), (3, 2)]:
+    if release == (3, 2):
         save_targets("targets", {})
+    if release in [(2, 1), (3, 2)]:
         save_targets("targets-vector", {"multi_strategy": "multi_output_tree"})
-    if release >= (3, 1):
+    if release == (3, 2):
         # A vector of intercepts, fitted to the labels.
         save("intercepts", "ubj", 3, softprob, label=lambda x, y: np.where(y == 2, 0, y), rounds=2)
 
@@ -273,11 +262,11 @@ def make_lightgbm():
              "min_data_in_leaf": 5, "deterministic": True}
 
     def save(kind, classes, settings, rounds=3, missing=False, label=None, change=lambda x: x, predict=False,
-             test=None, group=None):
+             test=None):
         x, y = data(max(classes, 2))
         x = change(with_missing(x) if missing else x)
         y = y if label is None else label(x, y)
-        booster = lgb.train({**plain, **settings}, lgb.Dataset(x, y, feature_name=NAMES, group=group), rounds)
+        booster = lgb.train({**plain, **settings}, lgb.Dataset(x, y, feature_name=NAMES), rounds)
         name = f"lightgbm-{lgb.__version__.rsplit('.', 1)[0]}-{kind}"
         # The same without the parameters of the training (half of the file).
         booster.save_model(HERE / f"{name}.txt")
@@ -290,40 +279,27 @@ def make_lightgbm():
                 at = np.float32(threshold)
                 thresholds[NAMES.index(feature)].append(at)
         test = rows(thresholds, True, max(classes, 2)) if test is None else test
-        predictions = booster.predict(test)
-        if classes and predict:
-            shares = np.asarray(predictions).reshape(len(test), -1)
-            lines = [",".join(text(value) for value in row) for row in shares]
-            (HERE / f"{name}.probabilities.csv").write_text("\n".join(lines) + "\n")
-        predictions = most_likely(predictions) if classes else predictions
-        write(name, test, booster.predict(test, raw_score=True), predictions=predictions if predict else None)
+        shares = predictions = booster.predict(test) if predict else None
+        predictions = most_likely(shares) if classes and predict else predictions
+        write(name, test, booster.predict(test, raw_score=True), predictions=predictions,
+              probabilities=shares if classes else None)
 
     amount = lambda x, y: np.abs(x[:, 0]) * 3 + y
     often_missing = lambda x: np.where(np.random.default_rng(9).uniform(size=x.shape) < 0.3, np.nan, x)
     # Missing values carry most of the information: splits of them against all others, whose threshold is infinite.
     save("missing-alone", 2, {"objective": "binary", "num_leaves": 6}, change=often_missing,
          label=lambda x, y: np.isnan(x[:, 0]) ^ (np.isnan(x[:, 3]) & (y == 1)))
-    for objective in ["poisson", "gamma", "cross_entropy", "cross_entropy_lambda"]:
+    for objective in ["poisson", "cross_entropy", "cross_entropy_lambda"]:
         share = "entropy" in objective
         save(objective, 0, {"objective": objective}, predict=True,
              label=(lambda x, y: y * 0.8 + 0.1) if share else (lambda x, y: amount(x, y) + 0.1))
     save("sqrt", 0, {"objective": "regression", "reg_sqrt": True}, label=lambda x, y: amount(x, y) - 4, predict=True)
-    # Objectives that are derived from it: all of them may learn roots, except huber, which then says that it does not.
-    positive = lambda x, y: amount(x, y) + 0.1
-    for objective in ["regression_l1", "huber", "fair", "quantile", "mape"]:
-        save(objective, 0, {"objective": objective}, label=positive, predict=True)
-        save(f"sqrt-{objective}", 0, {"objective": objective, "reg_sqrt": True}, label=lambda x, y: amount(x, y) - 4, predict=True)
-    save("tweedie", 0, {"objective": "tweedie"}, label=positive, predict=True)
     save("multiclassova", 3, {"objective": "multiclassova", "num_class": 3}, predict=True)
     save("sigmoid", 2, {"objective": "binary", "sigmoid": 2.5}, predict=True)
-    relevant = lambda x, y: np.digitize(x[:, 0], [-1, 0, 1])
-    for objective in ["lambdarank", "rank_xendcg"]:
-        save(objective, 0, {"objective": objective}, label=relevant, predict=True, group=[20] * 20)
     # Predictions of a forest are those of its trees' mean.
     forest = {"boosting": "rf", "bagging_fraction": 0.6, "bagging_freq": 1}
     save("forest-regression", 0, {"objective": "regression", **forest}, rounds=5, label=amount, predict=True)
-    save("forest-sqrt", 0, {"objective": "quantile", "reg_sqrt": True, **forest}, rounds=5, label=amount, predict=True)
-    save("forest-gamma", 0, {"objective": "gamma", **forest}, rounds=5, label=positive, predict=True)
+    save("forest-gamma", 0, {"objective": "gamma", **forest}, rounds=5, label=lambda x, y: amount(x, y) + 0.1, predict=True)
     save("forest-multiclass", 3, {"objective": "multiclass", "num_class": 3, **forest}, rounds=5, predict=True)
     save("large-target", 0, {"objective": "regression"}, label=lambda x, y: 1e6 * amount(x, y), predict=True)
     save("small-target", 0, {"objective": "regression"}, label=lambda x, y: 1e-6 * amount(x, y), predict=True)
@@ -340,7 +316,7 @@ def make_lightgbm():
     save("forest", 2, {"objective": "binary", "boosting": "rf", "bagging_fraction": 0.6, "bagging_freq": 1}, missing=True,
          predict=True)
     save("regression", 0, {"objective": "regression"}, label=lambda x, y: np.abs(x[:, 0]) * 3 + y)
-    save("dart", 3, {"objective": "multiclass", "num_class": 3, "boosting": "dart", "drop_rate": 0.5}, missing=True)
+
     def save_kinds(kind, settings, number=20):
         x, y = data(2)
         x = kinds(with_missing(x), number)
@@ -380,14 +356,7 @@ def make_catboost():
         booster = model(**settings)
         booster.fit(catboost.Pool(x, y, feature_names=NAMES))
         name = f"catboost-{version}-{kind}"
-        booster.save_model(str(HERE / f"{name}.json"), format="json")
-        # The same without what is known about the training (5 of 8 KB) and without indentation.
-        path = HERE / f"{name}.json"
-        document = json.loads(path.read_text())
-        about = document["model_info"]
-        about["params"] = {"loss_function": about["params"]["loss_function"]}
-        del about["output_options"], about["training"]
-        path.write_text(json.dumps(document, separators=(",", ":")) + "\n")
+        shorten(booster, name)
         borders = booster.get_borders()
         test = rows([borders[index] for index in range(4)], missing, max(classes, 2))
         write(name, test, booster.predict(test, prediction_type="RawFormulaVal"), predictions=booster.predict(test))
@@ -412,7 +381,7 @@ def make_catboost():
                                           prediction_type="RawFormulaVal"))
 
     def shorten(booster, name):
-        """Saves a model without what is known about the training, and without indentation."""
+        """Saves a model without what is known about the training (5 of 8 KB), and without indentation."""
         path = HERE / f"{name}.json"
         booster.save_model(str(path), format="json")
         document = json.loads(path.read_text())
@@ -448,12 +417,9 @@ def make_catboost():
     save("depthwise", catboost.CatBoostClassifier, 2, {"grow_policy": "Depthwise"})
     save("regression", catboost.CatBoostRegressor, 0, {}, label=amount)
     positive = lambda x, y: amount(x, y) + 0.1
-    for loss in ["MAE", "Quantile:alpha=0.7", "LogLinQuantile:alpha=0.7", "MAPE", "Poisson", "Tweedie:variance_power=1.5",
-                 "Huber:delta=1", "Expectile:alpha=0.7", "Lq:q=1.5", "Cox"]:
-        save(loss.split(":")[0].lower(), catboost.CatBoostRegressor, 0, {"loss_function": loss}, label=positive)
+    save("tweedie", catboost.CatBoostRegressor, 0, {"loss_function": "Tweedie:variance_power=1.5"}, label=positive)
     save("onevsall", catboost.CatBoostClassifier, 3, {"loss_function": "MultiClassOneVsAll"})
     save("crossentropy", catboost.CatBoostClassifier, 2, {"loss_function": "CrossEntropy"})
-    save("focal", catboost.CatBoostClassifier, 2, {"loss_function": "Focal:focal_alpha=0.5;focal_gamma=2"})
 
 
 def onnx_raw(model):
@@ -499,7 +465,7 @@ def save_onnx(name, model, classes, pick=lambda scores: scores, missing=True):
     kind = session.get_inputs()[0].type
     given = test.astype(np.float64 if "double" in kind else np.float32)
     (scores,) = session.run(None, {session.get_inputs()[0].name: given})
-    write(name, test, pick(scores))
+    write(name, test, pick(scores), UNNAMED)
 
 
 def make_onnx():
@@ -530,7 +496,7 @@ def make_onnx():
         name = f"sklearn-{version}-{kind}"
         (HERE / f"{name}.onnx").write_bytes(to_onnx(model, x[:1]).SerializeToString())
         shares = model.predict_proba(test)
-        write(name, test, shares if shares.shape[1] > 2 else shares[:, 1], predictions=model.predict(test))
+        write(name, test, shares if shares.shape[1] > 2 else shares[:, 1], UNNAMED, predictions=model.predict(test))
     convert("forest", ensemble.RandomForestClassifier(**few), 3, label=lambda x, y: words[y])
     convert("forest-binary", ensemble.RandomForestClassifier(**few), 2, second)
     convert("forest-regression", ensemble.RandomForestRegressor(**few), 0, label=amount)
@@ -592,15 +558,13 @@ def make_predictions():
     number = lambda version: tuple(int(part) for part in version.split(".")[:2])
     version = number(xgboost.__version__)
 
-    def table(name):
-        lines = (HERE / f"{name}.rows.csv").read_text().splitlines()[1:]
-        return np.array([[float(cell or "nan") for cell in line.split(",")] for line in lines], np.float32)
-
     for path in sorted(HERE.iterdir()):
         name = path.name.rsplit(".", 1)[0]
-        if path.suffix not in (".json", ".ubj", ".txt", ".onnx") or (HERE / f"{name}.predictions.csv").exists():
+        table = HERE / f"{name}.csv"
+        if path.suffix not in (".json", ".ubj", ".txt", ".onnx") or "prediction" in table.read_text():
             continue
-        x = table(name)
+        lines = table.read_text().splitlines()
+        x = np.array([[float(cell or "nan") for cell in line.split(",")[:4]] for line in lines[1:]], np.float32)
         if name.startswith("xgboost"):
             own, several = number(name.split("-")[1]), "-targets" in name or "-vector-leaves" in name
             if own > version or (several and own != version):
@@ -638,7 +602,8 @@ def make_predictions():
             predictions = session.run(None, {session.get_inputs()[0].name: given})[0]
             # It does not say that its outputs are classes, but is taken for such.
             predictions = predictions.argmax(axis=1) if name == "onnx-opset5" else predictions
-        write_predictions(name, predictions)
+        lines = [",".join([line, *cells]) for line, cells in zip(lines, columns("prediction", predictions))]
+        table.write_text("\n".join(lines) + "\n")
         print(name)
 
 

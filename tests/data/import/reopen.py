@@ -23,9 +23,11 @@ HERE = Path(__file__).parent
 VERSION = tuple(int(part) for part in xgboost.__version__.split(".")[:2])
 
 
-def table(path, header):
-    lines = path.read_text().splitlines()[header:]
-    return np.array([[float(cell or "nan") for cell in line.split(",")] for line in lines])
+def columns(path, wanted):
+    """The numbers in the columns with these names."""
+    head, *lines = (line.split(",") for line in path.read_text().splitlines())
+    own = [at for at, name in enumerate(head) if wanted(name)]
+    return np.array([[float(line[at] or "nan") for at in own] for line in lines])
 
 
 wrong = compared = 0
@@ -36,7 +38,8 @@ for path in sorted(Path(sys.argv[1]).glob("*.json")):
         print(f"{path.stem}: not for XGBoost {xgboost.__version__}")
         continue
     booster = xgboost.Booster(model_file=path)
-    rows = table(HERE / f"{path.stem}.rows.csv", 1).astype(np.float32)
+    table = HERE / f"{path.stem}.csv"
+    rows = columns(table, lambda name: not name.startswith(("margin", "prediction", "probability"))).astype(np.float32)
     stated = json.loads(learner["attributes"].get("palpate_prediction", "{}"))
     low, high = (float(end) for end in stated.get("sentinel", ["nan", "nan"]))
     # XGBoost takes no infinities.
@@ -45,7 +48,7 @@ for path in sorted(Path(sys.argv[1]).glob("*.json")):
     rows[(low <= rows) & (rows <= high)] = np.nan
     matrix = xgboost.DMatrix(rows, feature_names=booster.feature_names)
     own = booster.predict(matrix, output_margin=True).reshape(len(rows), -1) * np.float32(stated.get("scale", 1))
-    expected = table(HERE / f"{path.stem}.margins.csv", 0)[finite]
+    expected = columns(table, lambda name: name.startswith("margin"))[finite]
     if own.shape[1] == 2 and expected.shape[1] == 1:
         own = own[:, 1:]
     exact = path.stem.startswith("xgboost")

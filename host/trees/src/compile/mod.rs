@@ -60,8 +60,6 @@ mod restate;
 mod rounding;
 mod share;
 mod table;
-#[cfg(test)]
-mod tests;
 mod trees;
 mod write;
 

@@ -12,6 +12,7 @@ use palpate_shared::format::{Key, f32_key};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::LazyLock;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
@@ -33,6 +34,7 @@ impl Numbers {
 }
 
 /// Ensembles that code is written of in different ways.
+#[derive(Clone)]
 pub(crate) struct Case {
     pub(crate) name: String,
     pub(crate) ensemble: Ensemble,
@@ -99,8 +101,8 @@ impl Random {
     }
 }
 
-/// Thresholds of every kind of column, leaves of every kind of sum.
-pub(crate) fn cases() -> Vec<Case> {
+/// Thresholds of every kind of column, leaves of every kind of sum; and models that other libraries trained.
+pub(crate) static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
     let anywhere: fn(&mut Numbers) -> f32 = |numbers| numbers.value(100.0);
     let usual = || Random {
         inputs: Inputs::unnamed(6),
@@ -148,19 +150,14 @@ pub(crate) fn cases() -> Vec<Case> {
     }
     cases.extend(imported());
     cases
-}
+});
 
 /// Some of them, which a compiler takes a few seconds for.
 fn few() -> Vec<Case> {
-    let mut cases = cases();
-    let mut index = 0;
-    cases.retain(|case| {
-        index += 1;
-        let is_slow =
-            ["many columns", "thresholds past", "deep", "seventy"].iter().any(|name| case.name.contains(name));
-        index % 6 == 0 && !is_slow
-    });
-    cases
+    let is_slow = |case: &&Case| {
+        ["many columns", "thresholds past", "deep", "seventy"].iter().any(|name| case.name.contains(name))
+    };
+    CASES.iter().skip(5).step_by(6).filter(|case| !is_slow(case)).cloned().collect()
 }
 
 /// Models that other libraries trained.
@@ -283,7 +280,7 @@ fn program(compiled: &Compiled) -> &Program {
 
 #[test]
 fn programs_give_the_margins_of_the_layouts_of_data_at_every_threshold() {
-    for case in cases() {
+    for case in CASES.iter() {
         let compiled = case.compiled(Some(Form::C));
         let program = program(&compiled);
         let rows: Vec<Vec<i32>> = case.rows(150).iter().map(|row| keys(row, program.key)).collect();
@@ -311,7 +308,7 @@ fn with_ties() -> Vec<Case> {
             leaf: Leaf::I16,
         })
         .collect();
-    cases.extend(self::cases());
+    cases.extend(CASES.iter().cloned());
     cases.retain(Case::has_classes);
     cases
 }
@@ -396,7 +393,7 @@ fn walks_that_end_early_give_the_class_of_all_trees_and_the_others_change_no_dif
 
 #[test]
 fn rows_decide_where_walks_may_end_and_models_without_a_place_are_as_before() {
-    let mut case = cases().remove(0);
+    let mut case = CASES[0].clone();
     // As of a boosted ensemble: later trees change less.
     for (number, tree) in case.ensemble.trees.iter_mut().enumerate() {
         for node in &mut tree.nodes {
@@ -452,7 +449,7 @@ fn random_of(objects: usize) -> Random {
 #[test]
 fn columns_are_made_by_conversion_where_thresholds_are_on_a_grid() {
     let kinds = |name: &str| {
-        let case = cases().into_iter().find(|case| case.name == name).unwrap();
+        let case = CASES.iter().find(|case| case.name == name).unwrap();
         let compiled = case.compiled(Some(Form::C));
         program(&compiled).columns.iter().map(|column| format!("{:?}", column.kind)).collect::<Vec<_>>()
     };
@@ -465,7 +462,7 @@ fn columns_are_made_by_conversion_where_thresholds_are_on_a_grid() {
 
 #[test]
 fn f32_leaves_are_no_code() {
-    let case = Case { leaf: Leaf::F32, ..cases().remove(0) };
+    let case = Case { leaf: Leaf::F32, ..CASES[0].clone() };
     let settings =
         Settings { layout: Some(Layout::Code), forms: vec![Form::C], leaf: Leaf::F32, ..Settings::default() };
     let error = compile(&case.ensemble, &settings).unwrap_err().to_string();
@@ -694,7 +691,7 @@ fn emulate(emulator: &str, machine: &[&str], program: &Path) -> String {
 #[test]
 #[ignore = "needs compilers for chips and emulators"]
 fn assembly_and_c_give_the_margins_of_the_layouts_of_data_on_emulated_chips() {
-    let (all, few) = (cases(), few());
+    let few = few();
     let root = Path::new(ROOT);
     let (mps2, virt) = (root.join("tests/c/mps2.ld"), root.join("tests/c/virt.ld"));
     let (mps2, virt) = (mps2.to_str().unwrap(), virt.to_str().unwrap());
@@ -723,7 +720,7 @@ fn assembly_and_c_give_the_margins_of_the_layouts_of_data_on_emulated_chips() {
         println!("{chip}");
         let directory = tempfile::tempdir().unwrap();
         // An assembler takes less time.
-        let cases = if form == Form::C { &few } else { &all };
+        let cases = if form == Form::C { &few } else { &*CASES };
         let sources = write(directory.path(), cases, form, 15, early_exit);
         let flags = [flags, &bare, &[mps2]].concat();
         let program = build("arm-none-eabi-gcc", &flags, directory.path(), &sources, &["-lgcc"]).unwrap();

@@ -2,7 +2,7 @@
 
 use super::{Code, Stated, read};
 use crate::compile::code::Chip;
-use crate::compile::code::tests::{Case, Numbers, cases};
+use crate::compile::code::tests::{CASES, Case, Numbers};
 use crate::ensemble::Ensemble;
 use crate::prove::boxes::{Rows, Tree, Values};
 use crate::prove::{check_code, format, prove_code};
@@ -36,10 +36,10 @@ fn is_same(one: &Code, other: &Code, rows: &mut [Values]) -> bool {
 }
 
 /// Each kind of code, with its case.
-fn all() -> impl Iterator<Item = (Case, Chip, bool)> {
+fn all() -> impl Iterator<Item = (&'static Case, Chip, bool)> {
     [(Chip::M0Plus, false), (Chip::M4F, false), (Chip::M0Plus, true), (Chip::M4F, true)]
         .into_iter()
-        .flat_map(|(chip, early_exit)| cases().into_iter().map(move |case| (case, chip, early_exit)))
+        .flat_map(|(chip, early_exit)| CASES.iter().map(move |case| (case, chip, early_exit)))
 }
 
 #[test]
@@ -183,7 +183,7 @@ fn assembly_that_begins_again_without_end_is_refused_in_little_time_and_memory()
 
 #[test]
 fn assembly_of_another_export_is_refused_by_its_checksum_and_without_one_it_is_read() {
-    let case = cases().remove(0);
+    let case = &CASES[0];
     let (bytes, text) = case.assembly(Chip::M0Plus, false);
     let own = format!("{:08x}", crate::prove::checksum_of(&bytes));
     assert!(is_proved(&bytes, &text, &case.ensemble));

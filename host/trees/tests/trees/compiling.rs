@@ -1,0 +1,396 @@
+//! Compiling by hand-made ensembles: layouts, exactness, what the header says, and what is refused.
+
+use crate::fixtures::computed;
+use palpate_base::with;
+use palpate_onboard::{ModelError, Stopping};
+use palpate_trees::compile::{
+    Compiled, CompiledModel, Goal, Layout, Leaf, Restated, Settings, compile, compile_within, names, open, restate,
+};
+use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
+use palpate_trees::error::{CompileProblem, Setting, TreeProblem};
+use palpate_trees::shared::{Descriptor, MISSING_FEATURE};
+
+fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
+    Node::Split { feature, threshold, missing_left: true, left, right }
+}
+
+fn leaf(values: &[f32]) -> Node {
+    Node::Leaf(values.into())
+}
+
+/// An ensemble of two objects over these trees, whose leaves have a value for each.
+fn ensemble(descriptor: Descriptor, trees: Vec<Vec<Node>>) -> Ensemble {
+    Ensemble {
+        inputs: computed(descriptor).into(),
+        objects: vec!["bowl".into(), "fork".into()],
+        base_margins: vec![0.0; 2],
+        trees: trees.into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
+        origin: Provenance::default(),
+    }
+}
+
+/// One split.
+fn stump(threshold: f32, leaves: [[f32; 2]; 2]) -> Ensemble {
+    ensemble(Descriptor::Curvature, vec![vec![split(0, threshold, 1, 2), leaf(&leaves[0]), leaf(&leaves[1])]])
+}
+
+/// A tree that is a chain of splits, one below the other to the right, at whole thresholds.
+fn chain(splits: usize, feature: impl Fn(usize) -> usize) -> Vec<Node> {
+    let mut nodes = Vec::new();
+    for number in 0..splits {
+        nodes.push(split(feature(number), 1_000.0 * (number + 1) as f32, 2 * number + 1, 2 * number + 2));
+        nodes.push(leaf(&[0.5, -0.5]));
+    }
+    nodes.push(leaf(&[-0.5, 0.5]));
+    nodes
+}
+
+fn settings_of(layout: Option<Layout>, leaf: Leaf) -> Settings {
+    with!(Settings::default(), layout, leaf)
+}
+
+fn refusal(ensemble: &Ensemble, settings: &Settings) -> CompileProblem {
+    let error = compile(ensemble, settings).unwrap_err();
+    error.problem::<CompileProblem>().unwrap_or_else(|| panic!("{error}")).clone()
+}
+
+/// Name of the setting that was refused.
+fn setting(settings: &Settings) -> &'static str {
+    let error = compile(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), settings).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    match error.problem() {
+        Some(Setting { name, .. }) => name,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn half_the_bytes_are_worth_a_fifth_more_instructions_and_three_times_the_smallest_are_too_many() {
+    let shallow: Vec<Vec<Node>> = (0..40).map(|_| chain(2, |number| number)).collect();
+    let deep: Vec<Vec<Node>> = (0..10).map(|_| chain(20, |number| number % 8)).collect();
+    let full = {
+        // Seven splits over eight features: no table.
+        let mut nodes: Vec<Node> = (0..7).map(|n| split(n, 1_000.0 * n as f32, 2 * n + 1, 2 * n + 2)).collect();
+        nodes.extend((0..8).map(|_| leaf(&[0.5, 0.25])));
+        vec![nodes; 30]
+    };
+    for (ensemble, expected) in [
+        (ensemble(Descriptor::Curvature, shallow), Layout::Grid),
+        (ensemble(Descriptor::Oriented, deep), Layout::Compact),
+        (ensemble(Descriptor::Oriented, full), Layout::Complete),
+    ] {
+        let chosen = compile(&ensemble, &Settings::default()).unwrap();
+        assert_eq!(chosen.layout, expected);
+        let smallest = chosen.candidates.iter().map(|candidate| candidate.bytes).min().unwrap();
+        let cost = |bytes: usize, instructions: u64| bytes as f64 * (instructions as f64).powi(4);
+        for other in &chosen.candidates {
+            let shared_leaves = Some(other.shared_leaves);
+            let how = with!(settings_of(Some(other.layout), Leaf::I16), shared_leaves);
+            let compiled = compile(&ensemble, &how).unwrap();
+            assert_eq!((other.bytes, other.instructions), (compiled.bytes.len(), compiled.instructions));
+            let is_large = other.bytes > 3 * smallest;
+            let own = cost(chosen.bytes.len(), chosen.instructions.m4f);
+            assert!(is_large || cost(other.bytes, other.instructions.m4f) >= own, "{:?}", other.layout);
+        }
+        let goal = |goal| compile(&ensemble, &with!(Settings::default(), goal)).unwrap();
+        assert_eq!(goal(Goal::Size).bytes.len(), smallest);
+        let fastest = chosen.candidates.iter().map(|candidate| candidate.instructions.m4f).min().unwrap();
+        assert_eq!(goal(Goal::Speed).instructions.m4f, fastest);
+    }
+}
+
+#[test]
+fn an_ensemble_that_does_not_fit_a_layout_says_so_in_a_variant() {
+    let deep = ensemble(Descriptor::Oriented, vec![chain(9, |number| number % 8)]);
+    for layout in [Layout::Complete, Layout::Grid] {
+        assert_eq!(refusal(&deep, &settings_of(Some(layout), Leaf::I16)), CompileProblem::DoesNotFit { layout });
+    }
+    assert!(compile(&deep, &settings_of(Some(Layout::Compact), Leaf::I16)).is_ok());
+}
+
+#[test]
+fn trees_with_more_left_splits_than_a_byte_counts_take_the_wide_layout() {
+    /// A full tree: 2^depth − 1 splits, then the leaves.
+    fn full(depth: u32) -> Vec<Node> {
+        let splits = 2_usize.pow(depth) - 1;
+        let mut nodes: Vec<Node> =
+            (0..splits).map(|n| split(n % 8, 1_000.0 * (n % 100) as f32, 2 * n + 1, 2 * n + 2)).collect();
+        nodes.extend((0..=splits).map(|_| leaf(&[0.5, 0.25])));
+        nodes
+    }
+    // 255 splits below the root's left side, then 511.
+    for (depth, expected) in [(9, Layout::Compact), (10, Layout::Wide)] {
+        let deep = ensemble(Descriptor::Oriented, vec![full(depth)]);
+        assert_eq!(compile(&deep, &settings_of(Some(Layout::Compact), Leaf::I16)).unwrap().layout, expected);
+    }
+}
+
+#[test]
+fn the_stated_margin_error_is_what_rounding_does_and_no_more() {
+    // Leaves that no power of two divides: i8 has 127 units for 1 nat.
+    let leaves = [[1.0, -0.3], [0.123_456, 0.7]];
+    let ensemble = stump(500.0, leaves);
+    for (kind, most) in [(Leaf::I8, 127.0), (Leaf::I16, 32_767.0), (Leaf::F32, f64::INFINITY)] {
+        for layout in [Layout::Compact, Layout::Complete, Layout::Grid] {
+            let compiled = compile(&ensemble, &settings_of(Some(layout), kind)).unwrap();
+            let model = open(&compiled.bytes).unwrap();
+            let mut worst = 0.0_f64;
+            for (curvature, leaf) in [(0, leaves[0]), (500, leaves[1])] {
+                let mut margins = [0; 2];
+                model.margins_of(&[curvature, curvature], &mut margins);
+                for (margin, value) in margins.into_iter().zip(leaf) {
+                    worst = worst.max((f64::from(margin) * f64::from(model.unit()) - f64::from(value)).abs());
+                }
+            }
+            let stated = f64::from(compiled.margin_error);
+            assert_eq!(model.margin_error(), compiled.margin_error);
+            assert!(worst <= stated, "{worst} > {stated} with {kind:?} in {layout:?}");
+            assert!(stated <= 0.5 / most * 1.01 || kind == Leaf::F32, "{stated} with {kind:?} in {layout:?}");
+            if kind != Leaf::F32 {
+                assert!(worst > 0.0 && stated <= 1.001 * worst, "{stated} for {worst} with {kind:?} in {layout:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn sums_that_f32_rounds_are_not_stated_to_be_exact_where_no_leaf_is_rounded() {
+    // Leaves of 127 times the unit, whose threefold has more digits than an f32.
+    let value = 127.0 * 131_071.0 * 0.5_f32.powi(24);
+    let tree = |feature| vec![split(feature, 500.0, 1, 2), leaf(&[value, -value]), leaf(&[-value, value])];
+    for features in [[0, 0, 0], [0, 1, 2]] {
+        let ensemble = ensemble(Descriptor::Oriented, features.map(tree).into());
+        let compiled = compile(&ensemble, &settings_of(Some(Layout::Compact), Leaf::I8)).unwrap();
+        let model = open(&compiled.bytes).unwrap();
+        let mut margins = [0; 2];
+        model.margins_of(&[0; 8], &mut margins);
+        let error = f64::from(margins[0]) * f64::from(model.unit()) - f64::from(value + value + value);
+        assert!(error != 0.0 && error.abs() <= f64::from(compiled.margin_error), "{error} {}", compiled.margin_error);
+    }
+}
+
+#[test]
+fn leaves_of_a_common_power_of_two_are_exact_in_every_width() {
+    for kind in [Leaf::I8, Leaf::I16] {
+        let compiled = compile(&stump(500.0, [[1.5, -0.25], [0.75, 0.5]]), &settings_of(None, kind)).unwrap();
+        assert_eq!(compiled.margin_error, 0.0);
+    }
+}
+
+#[test]
+fn the_header_says_what_was_compiled() {
+    let mut ensemble = stump(500.0, [[1.0, -0.3], [0.1, 0.7]]);
+    let settings = with!(Settings::default(), error_rate = 0.05, max_touches = 77, priors = Some(vec![1.0, 4.0]));
+    let compiled = compile(&ensemble, &settings).unwrap();
+    let model = open(&compiled.bytes).unwrap();
+    let header = model.header();
+    assert_eq!(usize::try_from(header.length()).unwrap(), compiled.bytes.len());
+    assert_eq!((header.trees(), header.splits(), header.leaves()), (1, 1, 2));
+    assert_eq!((compiled.splits, compiled.leaves), (1, 2));
+    assert_eq!((model.descriptor(), model.layout()), (Some(Descriptor::Curvature), compiled.layout));
+    assert_eq!(model.leaf_type(), Leaf::I16);
+    assert_eq!(model.tool_version(), env!("CARGO_PKG_VERSION"));
+    assert_eq!(names(&model), ["bowl", "fork"]);
+    let stopping = Stopping::from_model(&model);
+    assert!((stopping.error_rate() - 0.05).abs() < 1e-12 && stopping.max_touches() == 77);
+    let prior = f64::from(model.prior(0)) * f64::from(model.unit());
+    assert!((prior - 0.25_f64.ln()).abs() <= f64::from(model.unit()) && model.prior(1) == 0, "{prior}");
+    // Which ensemble it was, wherever that came from.
+    let hash = |ensemble: &Ensemble| open(&compile(ensemble, &settings).unwrap().bytes).unwrap().header().ensemble();
+    let first = hash(&ensemble);
+    ensemble.origin.attributes.insert("palpate_other".into(), "{}".into());
+    assert_eq!(hash(&ensemble), first);
+    ensemble.base_margins[0] = 0.25;
+    assert_ne!(hash(&ensemble), first);
+}
+
+#[test]
+fn every_ensemble_that_contradicts_itself_is_refused_by_what_is_wrong() {
+    let sound = || stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]);
+    let refused = |change: &dyn Fn(&mut Ensemble)| {
+        let mut changed = sound();
+        change(&mut changed);
+        refusal(&changed, &Settings::default())
+    };
+    let tree = |problem| CompileProblem::Tree { tree: 0, problem };
+    assert_eq!(refused(&|e| e.objects.push("cup".into())), CompileProblem::Objects { objects: 3, base_margins: 2 });
+    assert_eq!(
+        refused(&|e| {
+            e.objects.clear();
+            e.base_margins.clear();
+        }),
+        CompileProblem::Objects { objects: 0, base_margins: 0 }
+    );
+    assert_eq!(refused(&|e| e.trees[0].nodes.clear()), tree(TreeProblem::NoNodes));
+    assert_eq!(refused(&|e| e.trees[0].output = Output::One(2)), tree(TreeProblem::Object { object: 2, objects: 2 }));
+    assert_eq!(
+        refused(&|e| e.trees[0].output = Output::One(1)),
+        tree(TreeProblem::LeafValues { node: 1, found: 2, wanted: 1 })
+    );
+    assert_eq!(
+        refused(&|e| e.trees[0].nodes[0] = split(2, 500.0, 1, 2)),
+        tree(TreeProblem::Feature { node: 0, feature: 2, features: 2 })
+    );
+    assert_eq!(
+        refused(&|e| e.trees[0].nodes[0] = split(0, 500.0, 9, 2)),
+        tree(TreeProblem::Child { node: 0, side: "left", child: 9, nodes: 3 })
+    );
+    assert_eq!(refused(&|e| e.trees[0].nodes = chain(257, |_| 0)), tree(TreeProblem::TooDeep { most: 256 }));
+    assert!(matches!(
+        refused(&|e| e.trees[0].nodes[0] = split(0, f32::NAN, 1, 2)),
+        CompileProblem::Tree { problem: TreeProblem::Threshold { node: 0, .. }, .. }
+    ));
+    assert!(matches!(
+        refused(&|e| e.trees[0].nodes[0] = split(0, 500.0, 0, 2)),
+        CompileProblem::Tree { problem: TreeProblem::ReachedTwice { .. } | TreeProblem::TooDeep { .. }, .. }
+    ));
+    assert_eq!(
+        refused(&|e| e.trees[0].nodes[2] = leaf(&[0.0, f32::INFINITY])),
+        tree(TreeProblem::LeafValue { node: 2, value: f32::INFINITY })
+    );
+    match refused(&|e| e.trees[0].nodes[2] = leaf(&[0.0, 1e5])) {
+        CompileProblem::MarginRange { of, largest, .. }
+            if of.starts_with("the object ") && (1e5..1.1e5).contains(&f64::from(largest)) => {}
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(refused(&|e| e.objects[0] = "x".repeat(256)), CompileProblem::NameTooLong { name: "x".repeat(256) });
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    assert_eq!(setting(&with!(Settings::default(), error_rate = 0.5)), "error_rate");
+    assert_eq!(setting(&with!(Settings::default(), error_rate = f64::NAN)), "error_rate");
+    assert_eq!(setting(&with!(Settings::default(), max_touches = 0)), "max_touches");
+    assert_eq!(setting(&with!(Settings::default(), priors = Some(vec![1.0]))), "priors");
+    assert_eq!(setting(&with!(Settings::default(), priors = Some(vec![1.0, 0.0]))), "priors");
+    // Features that a model computes are whole numbers already, and a row has a scale for each feature.
+    assert_eq!(setting(&with!(Settings::default(), scales = Some(vec![1.0, 1.0]))), "scales");
+}
+
+#[test]
+fn thresholds_that_fall_together_when_rounded_are_refused_by_their_feature() {
+    // Trained on seconds: curvature from -0.2 to 0.2.
+    let seconds: Vec<Vec<Node>> = (0..9)
+        .map(|number| vec![split(0, number as f32 * 0.05 - 0.2, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])])
+        .collect();
+    let problem = refusal(&ensemble(Descriptor::Curvature, seconds.clone()), &Settings::default());
+    let (of, whole, units) = ("things", "whole units", "units");
+    let (feature, thresholds, rounded, example) = ("curvature", 9, 2, -0.2);
+    assert_eq!(problem, CompileProblem::Thresholds { feature, thresholds, rounded, example, of, whole, units });
+    // Rows of features are compared as they are, fractions and all.
+    let rows = Ensemble { inputs: Inputs::unnamed(2), ..ensemble(Descriptor::Curvature, seconds) };
+    compile(&rows, &with!(Settings::default(), leaf = Leaf::F32)).unwrap();
+    for scales in [vec![1.0], vec![1.0, 0.0], vec![f32::NAN, 1.0]] {
+        let error = compile(&rows, &with!(Settings::default(), scales = Some(scales))).unwrap_err();
+        assert!(matches!(error.problem::<Setting>(), Some(Setting { name: "scales", .. })), "{error}");
+    }
+    // Whole thresholds, and halves between neighbors, are what trainers put between whole numbers.
+    for step in [1.0, 0.5] {
+        let whole = (0..9).map(|n| vec![split(0, n as f32 * step, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])]);
+        compile(&ensemble(Descriptor::Curvature, whole.collect()), &Settings::default()).unwrap();
+    }
+}
+
+#[test]
+fn a_compiled_model_opens_in_one_place_and_says_what_is_wrong_at_which_byte() {
+    let compiled = compile(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), &Settings::default()).unwrap();
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("model.palpate");
+    std::fs::write(&path, &compiled.bytes).unwrap();
+    let read = CompiledModel::read(&path).unwrap();
+    assert_eq!((read.bytes(), read.path()), (&compiled.bytes[..], Some(&*path)));
+    assert_eq!(read.names(), ["bowl", "fork"]);
+    assert_eq!(read.model().checksum(), open(&compiled.bytes).unwrap().checksum());
+    let cut = &compiled.bytes[..50];
+    std::fs::write(&path, cut).unwrap();
+    let problem = CompileProblem::Model(ModelError::Length { expected: 96, found: 50 });
+    let error = CompiledModel::read(&path).unwrap_err();
+    assert!(error.to_string().contains("model.palpate: byte 50: the model is truncated"), "{error}");
+    for error in [error, CompiledModel::from_bytes(cut.to_vec()).unwrap_err(), open(cut).map(|_| ()).unwrap_err()] {
+        assert_eq!(error.problem(), Some(&problem));
+    }
+}
+
+#[test]
+fn what_fits_a_budget_is_as_exact_as_there_is_room_for() {
+    let leaf_of = |compiled: &Compiled| open(&compiled.bytes).unwrap().leaf_type();
+    let trees = (0..40).map(|i| vec![split(0, 10.0 * i as f32, 1, 2), leaf(&[0.7, -0.3]), leaf(&[-0.123, 0.456])]);
+    let ensemble = ensemble(Descriptor::Oriented, trees.collect());
+    let settings = settings_of(Some(Layout::Compact), Leaf::F32);
+    let [f32, i16, i8] = [Leaf::F32, Leaf::I16, Leaf::I8]
+        .map(|leaf| compile(&ensemble, &settings_of(Some(Layout::Compact), leaf)).unwrap().bytes.len());
+    assert!(f32 > i16 && i16 > i8);
+    for (most, leaf) in
+        [(usize::MAX, Leaf::F32), (f32, Leaf::F32), (f32 - 1, Leaf::I16), (i16 - 1, Leaf::I8), (i8, Leaf::I8)]
+    {
+        let compiled = compile_within(&ensemble, &settings, most).unwrap();
+        assert!(compiled.bytes.len() <= most && leaf_of(&compiled) == leaf, "{most}");
+    }
+    let problem = compile_within(&ensemble, &settings, i8 - 1).unwrap_err().problem::<CompileProblem>().cloned();
+    let over = CompileProblem::OverBudget { bytes: i8, most: i8 - 1 };
+    assert_eq!(problem, Some(over));
+}
+
+/// Trees of three splits over eight features, whose leaves are taken from the start of a sequence.
+fn few_leaves(trees: usize, different: usize) -> Ensemble {
+    let values = |number: usize| leaf(&[(number % different) as f32 / 1024.0, -((number % different) as f32) / 2048.0]);
+    let tree = |tree: usize| {
+        let at = |number: usize| 1_000.0 * ((7 * tree + number) % 90) as f32;
+        let splits =
+            [split(tree % 8, at(0), 1, 2), split((tree + 1) % 8, at(1), 3, 4), split((tree + 3) % 8, at(2), 5, 6)];
+        splits.into_iter().chain((0..4).map(|number| values(4 * tree + number))).collect()
+    };
+    ensemble(Descriptor::Oriented, (0..trees).map(tree).collect())
+}
+
+#[test]
+fn equal_leaves_stand_once_where_that_is_smaller_and_give_the_same_margins() {
+    let forest = few_leaves(100, 5);
+    for layout in [Layout::Compact, Layout::Complete, Layout::Wide] {
+        for &leaf in Leaf::ALL {
+            let how = |shared| with!(settings_of(Some(layout), leaf), shared_leaves = Some(shared));
+            let (plain, shared) = (compile(&forest, &how(false)).unwrap(), compile(&forest, &how(true)).unwrap());
+            assert_eq!((plain.shared_leaves, shared.shared_leaves), (None, Some(5)));
+            assert!(shared.bytes.len() < plain.bytes.len(), "{layout:?} {leaf:?}");
+            let model = open(&shared.bytes).unwrap();
+            let mut margins = [[0; 2]; 2];
+            for at in 0..50 {
+                let mut row = [MISSING_FEATURE; 8];
+                row[..2].copy_from_slice(&[2_600 * at, 1_200 * at]);
+                open(&plain.bytes).unwrap().margins_of(&row, &mut margins[0]);
+                model.margins_of(&row, &mut margins[1]);
+                assert_eq!(margins[0], margins[1]);
+            }
+        }
+        let small = compile(&forest, &with!(settings_of(Some(layout), Leaf::I16), goal = Goal::Size)).unwrap();
+        assert_eq!((small.candidates.len(), small.shared_leaves), (2, Some(5)));
+    }
+    // Where all of them differ, a number is only more.
+    let all = compile(&few_leaves(100, 400), &with!(settings_of(None, Leaf::I16), goal = Goal::Size)).unwrap();
+    assert!(all.candidates.iter().all(|candidate| !candidate.shared_leaves), "{:?}", all.candidates);
+    // Tables have none.
+    let table = with!(settings_of(Some(Layout::Grid), Leaf::I16), shared_leaves = Some(true));
+    assert_eq!(compile(&stump(500.0, [[1.0, -1.0], [1.0, -1.0]]), &table).unwrap().shared_leaves, None);
+}
+
+#[test]
+fn the_number_of_a_leaf_has_two_bytes_if_more_than_256_leaves_differ() {
+    for (different, width) in [(256, 1), (257, 2)] {
+        let how = with!(settings_of(Some(Layout::Compact), Leaf::I16), shared_leaves = Some(true));
+        let compiled = compile(&few_leaves(100, different), &how).unwrap();
+        assert_eq!(compiled.shared_leaves, Some(different));
+        let model = open(&compiled.bytes).unwrap();
+        assert_eq!(model.shared_leaves().unwrap().number_length(), width);
+        assert_eq!(model.header().leaves_length(), 400 * width as u32);
+    }
+}
+
+#[test]
+fn what_is_restated_about_a_model_leaves_its_table_of_leaves_alone() {
+    let how = with!(settings_of(Some(Layout::Compact), Leaf::I16), shared_leaves = Some(true));
+    let compiled = compile(&few_leaves(20, 5), &how).unwrap();
+    let restated = Restated { max_touches: Some(7), priors: Some(vec![0, -5]), ..Restated::default() };
+    let bytes = restate(&open(&compiled.bytes).unwrap(), &restated).unwrap();
+    let (model, own) = (open(&bytes).unwrap(), open(&compiled.bytes).unwrap());
+    assert_eq!((model.shared_leaves(), model.header().max_touches(), model.prior(1)), (own.shared_leaves(), 7, -5));
+}

@@ -1,0 +1,117 @@
+//! Models that other libraries wrote, each read once: `tests/data/import`.
+
+use crate::table::cells;
+use palpate_trees::ensemble::import::Options;
+use palpate_trees::ensemble::{Ensemble, Schema};
+use palpate_trees::rows::Rows;
+use palpate_trees::shared::Descriptor;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::sync::LazyLock;
+
+/// A model that another library wrote.
+pub(crate) struct Fixture {
+    /// Name of its file, without the extension.
+    pub(crate) name: String,
+    pub(crate) path: PathBuf,
+    pub(crate) ensemble: Ensemble,
+    pub(crate) rows: Rows,
+    pub(crate) margins: Vec<Vec<f64>>,
+    /// Empty where the library was not asked, as are probabilities.
+    pub(crate) predictions: Vec<Vec<String>>,
+    pub(crate) probabilities: Vec<Vec<f64>>,
+}
+
+/// Files of models that no compiled model can be.
+pub(crate) const REFUSED: [&str; 3] = ["catboost-1.2-one-hot-words", "catboost-1.2-statistics", "lightgbm-4.7-linear"];
+
+/// The models that can be compiled, in the order of their names.
+pub(crate) static FIXTURES: LazyLock<Vec<Fixture>> = LazyLock::new(|| {
+    let all = files().into_iter().filter_map(Fixture::read).collect::<Vec<_>>();
+    assert!(all.len() > 80, "{} models", all.len());
+    all
+});
+
+/// The directory of the files.
+pub(crate) fn directory() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/import")
+}
+
+/// Files of all models, in order.
+pub(crate) fn files() -> Vec<PathBuf> {
+    let is_model = |path: &PathBuf| {
+        let extension = path.extension().and_then(|extension| extension.to_str());
+        matches!(extension, Some("json" | "ubj" | "txt" | "onnx"))
+    };
+    let entries = std::fs::read_dir(directory()).unwrap().map(|entry| entry.unwrap().path());
+    let mut files: Vec<PathBuf> = entries.filter(is_model).collect();
+    files.sort();
+    files
+}
+
+/// The model with this name.
+pub(crate) fn fixture(name: &str) -> &'static Fixture {
+    FIXTURES.iter().find(|fixture| fixture.name == name).unwrap_or_else(|| panic!("{name}"))
+}
+
+fn numbers<T: FromStr>(table: &str, kind: &str) -> Vec<Vec<T>> {
+    let number = |cell: &str| cell.parse().unwrap_or_else(|_| panic!("{cell}"));
+    cells(table, kind).into_iter().map(|row| row.into_iter().map(number).collect()).collect()
+}
+
+impl Fixture {
+    /// None for a file that is refused.
+    fn read(path: PathBuf) -> Option<Self> {
+        let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        // The file does not say that zeros were missing.
+        let missing = name.contains("missing-0").then_some(0.0);
+        let read = Ensemble::load_with(&path, &Options { missing, ..Options::default() });
+        assert_eq!(read.is_err(), REFUSED.contains(&name.as_str()), "{name}");
+        let (ensemble, file) = (read.ok()?, directory().join(format!("{name}.csv")));
+        let table = std::fs::read_to_string(&file).unwrap();
+        let texts = |row: Vec<&str>| row.into_iter().map(String::from).collect();
+        Some(Self {
+            rows: Rows::read(&file, &ensemble, None).unwrap(),
+            margins: numbers(&table, "margin"),
+            predictions: cells(&table, "prediction").into_iter().map(texts).collect(),
+            probabilities: numbers(&table, "probability"),
+            name,
+            path,
+            ensemble,
+        })
+    }
+
+    /// The content of its file.
+    pub(crate) fn bytes(&self) -> Vec<u8> {
+        std::fs::read(&self.path).unwrap()
+    }
+
+    /// Its rows as f32 values.
+    pub(crate) fn singles(&self) -> Vec<Vec<f32>> {
+        self.rows.iter().map(|row| row.iter().map(|&value| value as f32).collect()).collect()
+    }
+
+    /// The largest of the errors that rounding may make of a margin.
+    pub(crate) fn rounding(&self) -> f64 {
+        self.ensemble.origin.imported.as_ref().unwrap().rounding
+    }
+
+    /// True if it splits by categories.
+    pub(crate) fn is_categorical(&self) -> bool {
+        self.name.contains("-categorical") || self.name.contains("-one-hot")
+    }
+}
+
+/// Schema of a descriptor's features, without planes.
+pub(crate) fn computed(descriptor: Descriptor) -> Schema {
+    Schema {
+        code: descriptor.code(),
+        name: descriptor.name(),
+        features: descriptor.feature_names(),
+        of: "things",
+        whole: "whole units",
+        units: "units",
+        planes: &[],
+        is_tabled: false,
+    }
+}
