@@ -81,7 +81,9 @@ const isAccessible = async () => {
 const visit = async () => {
   const theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
   expect(theme === given.theme, `the browser shows the ${theme} theme`);
-  await pause(300);
+  // Sizes are observed once a frame is drawn, and what follows from them is done in a task after it.
+  for (let frames = 0; frames < 2; frames += 1) await new Promise((resume) => requestAnimationFrame(resume));
+  await pause(100);
   const pictures = looksRight();
   return `${pictures} figures and pictures${typeof axe === "object" ? `, ${await isAccessible()} rules` : ""}`;
 };
