@@ -1,4 +1,4 @@
-use crate::{command, globe, listing, run, stderr, stdout};
+use crate::{command, fails, figures, globe, listing, palpate, read, stderr, stdout, succeeds};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -27,9 +27,7 @@ fn files(directory: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 fn is_complete(directory: &Path) -> bool {
-    let manifest: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(directory.join("dataset.json")).unwrap()).unwrap();
-    manifest["complete"].as_bool().unwrap()
+    read(&directory.join("dataset.json"))["complete"].as_bool().unwrap()
 }
 
 /// Waits until the capture has written its first checkpoint, or a minute.
@@ -68,8 +66,7 @@ fn touches_are_lines_of_three_times_and_the_manifest_says_how_they_were_made() {
             "{line}"
         );
     }
-    let manifest: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(out.join("dataset.json")).unwrap()).unwrap();
+    let manifest = read(&out.join("dataset.json"));
     assert_eq!(manifest["settings"]["seed"], 7);
     assert_eq!(manifest["settings"]["probe"]["spacing"], 1.5);
     assert_eq!(manifest["objects"][1]["name"], "globe");
@@ -79,53 +76,60 @@ fn touches_are_lines_of_three_times_and_the_manifest_says_how_they_were_made() {
 }
 
 #[test]
-fn the_summary_as_json_holds_what_the_manifest_holds() {
-    let directory = meshes();
-    let more = ["--touches", "50", "--pose", "--json", "--threads", "1"];
-    let summary: serde_json::Value =
-        serde_json::from_str(&stdout(capture(directory.path(), "out", &more).output().unwrap())).unwrap();
-    assert_eq!(summary["objects"][0]["name"], "apple");
-    assert_eq!(summary["objects"][0]["touches"], 50);
-    assert!(summary["seconds"].as_f64().unwrap() > 0.0);
-    let text = std::fs::read_to_string(directory.path().join("out/apple.txt")).unwrap();
-    assert!(text.lines().all(|line| line.split(' ').count() == 9));
-}
-
-#[test]
 fn every_approach_is_kept_when_asked_and_one_that_touches_nothing_is_three_dashes() {
     let directory = meshes();
-    stdout(capture(directory.path(), "out", &["--approaches", "400"]).output().unwrap());
-    let text = std::fs::read_to_string(directory.path().join("out/globe.txt")).unwrap();
-    assert_eq!(text.lines().count(), 400);
-    assert!(text.lines().any(|line| line == "- - -"));
-    assert!(text.lines().any(|line| line != "- - -" && line.contains('-')));
-    assert!(text.lines().any(|line| !line.contains('-')));
+    let at = directory.path();
+    let summary = figures(at, "capture meshes -o out --approaches 400 --pose --threads 1");
+    assert_eq!((&summary["objects"][0]["name"], &summary["objects"][0]["touches"]), (&"apple".into(), &400.into()));
+    assert!(summary["seconds"].as_f64().unwrap() > 0.0);
+    let text = std::fs::read_to_string(at.join("out/globe.txt")).unwrap();
+    let times: Vec<Vec<&str>> = text.lines().map(|line| line.split(' ').collect()).collect();
+    assert!(times.len() == 400 && times.iter().all(|line| line.len() == 9));
+    let missing = times.iter().map(|line| line[..3].iter().filter(|time| **time == "-").count());
+    let missing: std::collections::BTreeSet<usize> = missing.collect();
+    assert_eq!(missing.into_iter().collect::<Vec<_>>(), [0, 1, 2, 3]);
 }
 
 #[test]
-fn wrong_input_is_refused_and_nothing_is_left_behind() {
+fn wrong_arguments_are_refused_by_name_and_nothing_is_left_behind() {
     let directory = meshes();
-    for (name, text, what) in [
-        ("empty.obj", "", "empty.obj: the mesh has no faces"),
-        ("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "range.obj:4: vertex 4 of a face is out of range"),
-        ("nan.obj", "v 0 nan 0\n", "nan.obj:1: the coordinate y = \"nan\" is not finite"),
-        ("point.obj", "v 1 1 1\nf 1 1 1\n", "point.obj: the mesh has no extent"),
+    let at = directory.path();
+    std::fs::write(at.join("probe.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\n").unwrap();
+    let located = "capture meshes -o out --position --true-size mm --probe probe.toml";
+    let table = &format!("{located} --scene table");
+    let capture = "capture meshes -o out";
+    for (command, more, code, expected) in [
+        ("capture nowhere.obj -o out", "", 1, "nowhere.obj: cannot read the mesh"),
+        ("capture meshes -o -", "", 2, "Use a directory"),
+        (capture, "--length -1", 2, "-1"),
+        (capture, "--threads 0", 2, "--threads"),
+        (capture, "--touches 0", 2, "--touches"),
+        (capture, "--touches 1e6", 2, "write the number out: 1000000"),
+        (capture, "--touches 1_000_000", 2, "write the number out: 1000000"),
+        (capture, "--sed 1", 2, "--sed"),
+        (capture, "--format csv", 2, "\"csv\" is not a format of touches. Use text or parquet."),
+        (capture, "--shard 3/2", 2, "Give K/N with K from 1 to N, like 2/5."),
+        (capture, "--cone 30", 2, "--scene table"),
+        (capture, "--placements globe/+z=1", 2, "--scene table"),
+        (capture, "--scene table --cone 91", 2, "at most 90 degrees"),
+        (capture, "--scene moon", 2, "use one of floating, table"),
+        (capture, "--scene table --placements globe/+q=1", 1, "globe has no placement +q: it has "),
+        (capture, "--scene table --placements cup/+z=1", 2, "the name of an object: apple, globe"),
+        (capture, "--scene table --placements globe", 2, "such as mug/+z=3"),
+        (capture, "--within 30", 2, "within is 30. Use it with --position"),
+        (capture, "--position --scene table", 2, "probe is not given"),
+        (capture, "--position --scene table --probe probe.toml", 1, "the true size is unknown"),
+        (capture, "--position --scene table --probe probe.toml", 1, "--true-size"),
+        (located, "", 2, "scene is floating. Use table with --position"),
+        (table, "--cone 30", 2, "cone is 30. Use 0 with --position"),
+        (table, "--touches 30", 2, "touches is 30. Use --approaches N with --position"),
+        (table, "--aim mass", 2, "aim is mass. Use --within MM with --position"),
+        (table, "--within=-1", 2, "within is"),
     ] {
-        let path = directory.path().join(name);
-        std::fs::write(&path, text).unwrap();
-        let out = directory.path().join("out");
-        let error = stderr(command(["capture", "-o"]).args([&out, &path]).output().unwrap(), 1);
-        assert!(error.contains(what), "{error}");
-        assert!(!out.exists());
+        fails(at, &format!("{command} {more}"), code, expected);
+        assert!(!at.join("out/globe.txt").exists(), "{more}");
     }
-    let error = stderr(run(["capture", "nowhere.obj", "-o", "never"]), 1);
-    assert!(error.contains("nowhere.obj: cannot read the mesh"), "{error}");
-    for wrong in
-        [&["--length", "-1"][..], &["--threads", "0"], &["--touches", "0"], &["--shard", "3/2"], &["--sed", "1"]]
-    {
-        stderr(capture(directory.path(), "out", wrong).output().unwrap(), 2);
-        assert!(!directory.path().join("out").exists());
-    }
+    assert_eq!(listing(&at.join("meshes")), ["apple.obj", "globe.obj"]);
 }
 
 #[test]
@@ -146,130 +150,84 @@ fn a_capture_that_is_killed_again_and_again_ends_with_the_same_bytes() {
     let more = ["--touches", "60000", "--seed", "3", "--resume"];
     stdout(capture(directory.path(), "whole", &more).output().unwrap());
     let killed = directory.path().join("killed");
-    let mut cut_short = 0;
-    for kill in 0..10_u64 {
+    for _ in 0..2 {
         let mut running = capture(directory.path(), "killed", &more);
         let mut running = Running(running.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
-        // The first kill comes when a capture has surely begun; the others from before the first checkpoint to well after
-        // it, in no order.
-        if kill == 0 {
-            wait_for(&killed.join("apple.part"));
-        } else {
-            std::thread::sleep(Duration::from_millis(30 + kill * 379 % 900));
-        }
+        wait_for(&killed.join("apple.part"));
         running.0.kill().unwrap();
         running.0.wait().unwrap();
-        cut_short += u32::from(killed.join("dataset.json").exists() && !is_complete(&killed));
+        assert!(!is_complete(&killed), "no kill came while the capture was writing");
     }
-    assert!(cut_short > 0, "no kill came while the capture was writing");
     stdout(capture(directory.path(), "killed", &more).output().unwrap());
-    assert!(files(&killed) == files(&directory.path().join("whole")), "after {cut_short} kills on the way");
+    assert!(files(&killed) == files(&directory.path().join("whole")));
     assert!(is_complete(&killed));
 }
 
 #[test]
 fn objects_on_a_table_are_captured_in_their_placements_which_the_output_and_the_data_set_name() {
     let directory = meshes();
-    let table = ["--scene", "table", "--approaches", "300", "--pose"];
-    let said = stdout(capture(directory.path(), "out", &[&table[..], &["--cone", "45"]].concat()).output().unwrap());
+    let at = directory.path();
+    let said = succeeds(at, "capture meshes -o out --scene table --approaches 300 --pose --cone 45");
     assert!(said.contains("globe: ") && said.contains(" placement") && said.contains("of its volume"), "{said}");
-    let out = directory.path().join("out");
-    let text = std::fs::read_to_string(out.join("dataset.json")).unwrap();
-    let listing: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let out = at.join("out");
+    let listing = read(&out.join("dataset.json"));
     assert_eq!(listing["settings"]["scene"], serde_json::json!({"table": {"cone": 45.0}}));
     let first = &listing["objects"][1]["placements"][0];
     let name = first["name"].as_str().unwrap();
     assert!(first["weight"].as_f64().unwrap() > 0.0 && said.contains(&format!(": {name} ")), "{said}");
     // What is added is touched as the rest, and cannot be touched otherwise.
-    std::fs::remove_file(directory.path().join("meshes/globe.obj")).unwrap();
-    globe(&directory.path().join("meshes"), "pear", 9);
-    std::fs::remove_file(directory.path().join("meshes/apple.obj")).unwrap();
-    let error = stderr(capture(directory.path(), "out", &["--add", "--cone", "30"]).output().unwrap(), 1);
-    assert!(error.contains("cannot add to these touches: other settings: scene"), "{error}");
-    stdout(capture(directory.path(), "out", &["--add"]).output().unwrap());
+    globe(at, "pear", 9);
+    let expected = "cannot add to these touches: other settings: scene";
+    fails(at, "capture pear.obj -o out --add --cone 30", 1, expected);
+    succeeds(at, "capture pear.obj -o out --add");
     assert!(out.join("pear.txt").exists());
 }
 
 #[test]
-fn options_of_a_table_are_refused_where_there_is_none_or_where_they_name_nothing() {
+fn touches_with_a_position_are_captured_straight_down_and_recorded_with_it() {
     let directory = meshes();
-    for (more, code, what) in [
-        (&["--cone", "30"][..], 2, "--scene table"),
-        (&["--placements", "globe/+z=1"], 2, "--scene table"),
-        (&["--scene", "table", "--cone", "91"], 2, "at most 90 degrees"),
-        (&["--scene", "moon"], 2, "use one of floating, table"),
-        (&["--scene", "table", "--placements", "globe/+q=1"], 1, "globe has no placement +q: it has "),
-        (&["--scene", "table", "--placements", "cup/+z=1"], 2, "the name of an object: apple, globe"),
-        (&["--scene", "table", "--placements", "globe"], 2, "such as mug/+z=3"),
-    ] {
-        let error = stderr(capture(directory.path(), "out", more).output().unwrap(), code);
-        assert!(error.contains(what), "{more:?}: {error}");
-        assert!(!directory.path().join("out/globe.txt").exists());
-    }
-}
-
-#[test]
-fn touches_with_a_position_are_captured_straight_down_and_other_combinations_are_refused_by_name() {
-    let directory = meshes();
-    let probe = directory.path().join("probe.toml");
-    std::fs::write(&probe, "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\n").unwrap();
-    let located = ["--position", "--true-size", "mm", "--probe", probe.to_str().unwrap()];
-    let table = [&located[..], &["--scene", "table"]].concat();
-    for (arguments, more, what) in [
-        (&located[..], &[][..], "scene is floating. Use table with --position"),
-        (&table, &["--cone", "30"], "cone is 30. Use 0 with --position"),
-        (&table, &["--touches", "30"], "touches is 30. Use --approaches N with --position"),
-        (&table, &["--aim", "mass"], "aim is mass. Use --within MM with --position"),
-        (&table, &["--within=-1"], "within is"),
-        (&table[..1], &["--scene", "table"], "probe is not given"),
-        (&[], &["--within", "30"], "within is 30. Use it with --position"),
-    ] {
-        let error = stderr(capture(directory.path(), "out", &[arguments, more].concat()).output().unwrap(), 2);
-        assert!(error.contains(what), "{more:?}: {error}");
-    }
-    let error = stderr(
-        capture(directory.path(), "out", &["--position", "--scene", "table", "--probe", located[4]]).output().unwrap(),
-        1,
-    );
-    assert!(error.contains("the true size is unknown") && error.contains("--true-size"), "{error}");
-    stdout(
-        capture(directory.path(), "out", &[&table[..], &["--approaches", "40", "--within", "2"]].concat())
-            .output()
-            .unwrap(),
-    );
-    let out = directory.path().join("out");
-    let listing: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("dataset.json")).unwrap()).unwrap();
+    let at = directory.path();
+    std::fs::write(at.join("probe.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\n").unwrap();
+    let table = "--scene table --position --true-size mm --probe probe.toml";
+    succeeds(at, &format!("capture meshes -o out {table} --approaches 40 --within 2"));
+    let listing = read(&at.join("out/dataset.json"));
     let settings = &listing["settings"];
     assert_eq!(settings["scene"], serde_json::json!({"table": {"cone": 0.0}}));
     assert_eq!([&settings["position"], &settings["pose"], &settings["approaches"]], [true, true, true]);
     assert_eq!((settings["within"].as_f64(), settings["touches"].as_u64()), (Some(2.0), Some(40)));
-    let lines = std::fs::read_to_string(out.join("globe.txt")).unwrap();
+    let lines = std::fs::read_to_string(at.join("out/globe.txt")).unwrap();
     assert_eq!(lines.lines().count(), 40);
     assert!(lines.lines().all(|line| line.split(' ').count() == 12), "{lines}");
     // What is recorded from such lines states the position too.
-    let mut record = command(["data", "record"]);
-    record.arg(out.join("globe.txt")).arg("-o").arg(directory.path().join("recorded"));
-    record.args(["--object", "globe", "--pose", "--probe", located[4]]);
-    let error = stderr(record.output().unwrap(), 1);
-    assert!(error.contains("globe.txt: a position, where the touches recorded here have none"), "{error}");
-    stdout(record.arg("--position").output().unwrap());
-    let recorded = std::fs::read_to_string(directory.path().join("recorded/globe.txt")).unwrap();
-    assert_eq!(recorded, lines);
+    let record = "data record out/globe.txt -o recorded --object globe --pose --probe probe.toml";
+    fails(at, record, 1, "globe.txt: a position, where the touches recorded here have none");
+    succeeds(at, &format!("{record} --position"));
+    assert_eq!(std::fs::read_to_string(at.join("recorded/globe.txt")).unwrap(), lines);
 }
 
 #[test]
 fn resuming_with_other_arguments_is_refused() {
     let directory = meshes();
-    stdout(capture(directory.path(), "out", &["--touches", "20"]).output().unwrap());
-    let before = files(&directory.path().join("out"));
-    for other in [&["--touches", "30", "--resume"][..], &["--touches", "20", "--seed", "2", "--resume"]] {
-        let error = stderr(capture(directory.path(), "out", other).output().unwrap(), 1);
+    let at = directory.path();
+    succeeds(at, "capture meshes -o out --touches 20");
+    let before = files(&at.join("out"));
+    for other in ["--touches 30 --resume", "--touches 20 --seed 2 --resume"] {
+        let error = stderr(palpate(at, &format!("capture meshes -o out {other}")), 1);
         assert!(error.contains("dataset.json: cannot resume: other settings"), "{error}");
         assert!(error.contains(" there and "), "what differs: {error}");
     }
-    stdout(capture(directory.path(), "out", &["--touches", "20", "--resume"]).output().unwrap());
-    assert_eq!(files(&directory.path().join("out")), before);
+    succeeds(at, "capture meshes -o out --touches 20 --resume");
+    assert_eq!(files(&at.join("out")), before);
+}
+
+/// Resumes a capture of 50,000 touches, which ends as one that was never stopped.
+#[cfg(unix)]
+fn resumes(at: &Path) {
+    assert!(!is_complete(&at.join("out")));
+    for output in ["out", "whole"] {
+        succeeds(at, &format!("capture meshes -o {output} --touches 50000 --resume"));
+    }
+    assert!(files(&at.join("out")) == files(&at.join("whole")));
 }
 
 /// Runs a shell script, which gets the program as $1 and the directory as $2; none where it cannot be run.
@@ -286,11 +244,7 @@ fn a_file_that_may_not_grow_stops_the_capture_which_can_be_resumed() {
     let script = "trap '' XFSZ; ulimit -f 400; exec \"$1\" capture \"$2/meshes\" -o \"$2/out\" --touches 50000";
     let error = stderr(shell(script, directory.path()), 1);
     assert!(error.contains("apple.part: cannot write the touches") && error.contains("--resume"), "{error}");
-    assert!(!is_complete(&directory.path().join("out")));
-    let more = ["--touches", "50000", "--resume"];
-    stdout(capture(directory.path(), "out", &more).output().unwrap());
-    stdout(capture(directory.path(), "whole", &more).output().unwrap());
-    assert!(files(&directory.path().join("out")) == files(&directory.path().join("whole")));
+    resumes(directory.path());
 }
 
 #[cfg(target_os = "linux")]
@@ -310,10 +264,7 @@ fn a_full_disk_stops_the_capture_which_can_be_resumed() {
     }
     let error = stderr(output, 1);
     assert!(error.contains("No space left on device") && error.contains("--resume"), "{error}");
-    let more = ["--touches", "50000", "--resume"];
-    stdout(capture(directory.path(), "out", &more).output().unwrap());
-    stdout(capture(directory.path(), "whole", &more).output().unwrap());
-    assert!(files(&directory.path().join("out")) == files(&directory.path().join("whole")));
+    resumes(directory.path());
 }
 
 #[cfg(target_os = "linux")]
@@ -343,41 +294,34 @@ fn memory_does_not_grow_with_the_number_of_touches() {
 #[test]
 fn touches_of_other_objects_are_kept_unless_the_capture_is_forced() {
     let directory = meshes();
-    let one = |mesh: &str, more: &[&str]| {
-        let mesh = directory.path().join("meshes").join(mesh);
-        let mut command = command(["capture", "--touches", "20"]);
-        command.arg(mesh).arg("-o").arg(directory.path().join("real")).args(more).output().unwrap()
-    };
-    let real = directory.path().join("real");
-    stdout(one("apple.obj", &[]));
-    let before = files(&real);
-    let error = stderr(one("globe.obj", &[]), 1);
+    let at = directory.path();
+    let (apple, globe) =
+        ("capture meshes/apple.obj -o real --touches 20", "capture meshes/globe.obj -o real --touches 20");
+    succeeds(at, apple);
+    let before = files(&at.join("real"));
+    let error = stderr(palpate(at, globe), 1);
     assert!(error.contains("real: holds 20 touches of apple, which this capture would not write"), "{error}");
     assert!(error.contains("--add") && error.contains("--force"), "{error}");
-    assert_eq!(files(&real), before);
-    stdout(one("globe.obj", &["--force"]));
-    assert_eq!(files(&real).keys().collect::<Vec<_>>(), ["dataset.json", "globe.txt"]);
-    stderr(one("apple.obj", &["--force", "--add"]), 2);
+    assert_eq!(files(&at.join("real")), before);
+    succeeds(at, &format!("{globe} --force"));
+    assert_eq!(files(&at.join("real")).keys().collect::<Vec<_>>(), ["dataset.json", "globe.txt"]);
+    fails(at, &format!("{apple} --force --add"), 2, "--force");
 }
 
 #[test]
 fn an_object_is_added_with_the_settings_of_the_others() {
     let directory = meshes();
-    let one = |mesh: &str, more: &[&str]| {
-        let mesh = directory.path().join("meshes").join(mesh);
-        command(["capture"]).arg(mesh).arg("-o").arg(directory.path().join("real")).args(more).output().unwrap()
-    };
-    let probe = directory.path().join("probe.toml");
-    std::fs::write(&probe, "radius = 0.15\nspacing = 2\nspeed = 10\n").unwrap();
-    let settings = ["--touches", "30", "--seed", "5", "--probe", probe.to_str().unwrap(), "--pose"];
-    stdout(one("globe.obj", &settings));
-    stdout(one("apple.obj", &["--add"]));
-    stdout(capture(directory.path(), "together", &settings).output().unwrap());
-    assert!(files(&directory.path().join("real")) == files(&directory.path().join("together")));
-    let error = stderr(one("apple.obj", &["--add"]), 1);
-    assert!(error.contains("already holds touches of apple"), "{error}");
-    let error = stderr(one("apple.obj", &["--add", "--seed", "6"]), 1);
-    assert!(error.contains("cannot add to these touches: other settings: seed is 5 there and 6 here"), "{error}");
+    let at = directory.path();
+    std::fs::write(at.join("probe.toml"), "radius = 0.15\nspacing = 2\nspeed = 10\n").unwrap();
+    let settings = "--touches 30 --seed 5 --probe probe.toml --pose";
+    let add = "capture meshes/apple.obj -o real --add";
+    succeeds(at, &format!("capture meshes/globe.obj -o real {settings}"));
+    succeeds(at, add);
+    succeeds(at, &format!("capture meshes -o together {settings}"));
+    assert!(files(&at.join("real")) == files(&at.join("together")));
+    fails(at, add, 1, "already holds touches of apple");
+    let expected = "cannot add to these touches: other settings: seed is 5 there and 6 here";
+    fails(at, &format!("{add} --seed 6"), 1, expected);
 }
 
 #[test]
@@ -399,47 +343,6 @@ fn an_unfinished_capture_is_neither_overwritten_nor_forgotten() {
     assert!(is_complete(&directory.path().join("out")));
 }
 
-#[test]
-fn a_run_replaces_its_own_results_and_keeps_touches_of_other_objects() {
-    let directory = meshes();
-    let run = |sources: &[PathBuf]| {
-        let mut command = command(["run", "--touches", "200", "-o"]);
-        command.arg(directory.path().join("mine")).args(sources).output().unwrap()
-    };
-    let both = [directory.path().join("meshes")];
-    let data = directory.path().join("mine/data");
-    stdout(run(&both));
-    let before = files(&data);
-    stdout(run(&both));
-    assert_eq!(files(&data), before);
-    let error = stderr(run(&["bowl".into(), "mouse".into()]), 1);
-    assert!(error.contains("the directory holds results of another run"), "{error}");
-    assert_eq!(files(&data), before);
-}
-
-#[test]
-fn numbers_in_another_notation_are_refused_with_a_hint() {
-    let directory = meshes();
-    for text in ["1e6", "1_000_000"] {
-        let error = stderr(capture(directory.path(), "out", &["--touches", text]).output().unwrap(), 2);
-        assert!(error.contains("write the number out: 1000000"), "{error}");
-    }
-    let error = stderr(capture(directory.path(), "out", &["--format", "csv"]).output().unwrap(), 2);
-    assert!(error.contains("\"csv\" is not a format of touches. Use text or parquet."), "{error}");
-    let error = stderr(capture(directory.path(), "out", &["--shard", "3/2"]).output().unwrap(), 2);
-    assert!(error.contains("Give K/N with K from 1 to N, like 2/5."), "{error}");
-    assert!(!directory.path().join("out").exists());
-}
-
-#[test]
-fn a_capture_to_standard_output_is_refused() {
-    let directory = meshes();
-    let mut command = command(["capture", "-o", "-"]);
-    let output = command.arg(directory.path().join("meshes")).current_dir(directory.path()).output().unwrap();
-    assert!(stderr(output, 2).contains("Use a directory"));
-    assert_eq!(listing(directory.path()), ["meshes"]);
-}
-
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_that_the_system_refuses_are_an_error_and_no_panic() {
@@ -457,10 +360,7 @@ fn an_edited_line_is_a_warning_and_a_cut_file_an_error() {
     stdout(capture(directory.path(), "out", &["--touches", "400"]).output().unwrap());
     let path = directory.path().join("out/apple.txt");
     let text = std::fs::read_to_string(&path).unwrap();
-    let train = || {
-        let mut command = command(["train", "--trees", "rounds=2", "-o"]);
-        command.args([directory.path().join("ensemble.json"), directory.path().join("out")]).output().unwrap()
-    };
+    let train = || palpate(directory.path(), "train out -o ensemble.json --trees rounds=2");
     let untouched = train();
     assert!(untouched.stderr.is_empty(), "{}", String::from_utf8_lossy(&untouched.stderr));
     std::fs::write(&path, text.replacen("0.0", "0.1", 1)).unwrap();
@@ -505,9 +405,4 @@ fn results_go_through_links_and_to_standard_output_and_never_onto_what_is_read()
     let export = command(["export", "-o"]).args([at("ensemble.json"), at("ensemble.json")]).output().unwrap();
     assert!(stderr(export, 2).contains("Use another file than what is read"));
     assert_eq!(std::fs::read(at("ensemble.json")).unwrap(), ensemble);
-}
-
-#[test]
-fn help_has_examples() {
-    assert!(stdout(run(["capture", "--help"])).contains("Examples:\n  palpate capture builtin -o data"));
 }

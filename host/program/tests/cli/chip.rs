@@ -1,10 +1,10 @@
 //! The commands that talk to a chip: link and watch, with a chip's whole program behind a TCP connection.
 
 use crate::compiled::Place;
-use crate::locate::{located, recognized, refused};
-use crate::{command, json, run, stderr, stdout};
+use crate::fixtures::LOCATED;
+use crate::locate::{of_one_placement, recognized};
+use crate::{command, fails, json, lines, run, stderr, stdout, succeeds};
 use palpate_onboard::station::{Memory, NoStorage, Table, record_length, serve, serve_with};
-use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Output, Stdio};
@@ -68,19 +68,16 @@ fn chip_with_table() -> String {
 
 #[test]
 fn a_chip_with_maps_says_verdicts_places_and_approaches_as_the_host_does() {
-    let directory = located();
+    let directory = LOCATED.folder();
     let at = directory.path();
-    let listing: Value = serde_json::from_slice(&std::fs::read(at.join("data/dataset.json")).unwrap()).unwrap();
-    let placements = listing["objects"][0]["placements"].as_array().unwrap().len();
-    let text = std::fs::read_to_string(at.join("data/brick.txt")).unwrap();
     // An empty line begins another object.
-    let mut lines = text.lines().step_by(placements).take(12).map(|line| format!("{line}\n")).collect::<Vec<_>>();
-    lines.insert(2, "\n".into());
-    let said = recognized(at, "maps.palpate --next", &lines.concat());
+    let mut touches = of_one_placement(at, 12);
+    touches.insert(2, "\n".into());
+    let said = recognized(at, "maps.palpate --next", &touches.concat());
     assert!(said.iter().any(|line| line["verdict"] == "recognized"), "{said:?}");
-    let link = |chip: String, words: &str| crate::locate::run(at, &format!("link {chip} {words}"));
+    let link = |chip: String, words: &str| succeeds(at, &format!("link {chip} {words}"));
     let text = link(chip_with_table(), "lines.txt --load maps.palpate --next");
-    assert_eq!(text.lines().map(|line| serde_json::from_str(line).unwrap()).collect::<Vec<Value>>(), said);
+    assert_eq!(lines(&text), said);
     let words = "--parity data --stop-after 12 --per-object 6 --next --workspace 15 --bad-line 0.001,0.001,0.02,0";
     let text = link(chip_with_table(), &format!("--load maps.palpate {words}"));
     assert!(text.contains("compared with the host: 12 touches and 12 proposed approaches, 0 differences"), "{text}");
@@ -89,7 +86,7 @@ fn a_chip_with_maps_says_verdicts_places_and_approaches_as_the_host_does() {
 
 #[test]
 fn touches_with_a_position_and_a_chip_without_maps_do_not_go_together() {
-    let directory = located();
+    let directory = LOCATED.folder();
     let at = directory.path();
     std::fs::copy(Place::new().path("model.palpate"), at.join("trees.palpate")).unwrap();
     std::fs::write(at.join("located.txt"), "0 0 0 0 0 -1 1 0 0 0 0 20\n").unwrap();
@@ -110,9 +107,9 @@ fn touches_with_a_position_and_a_chip_without_maps_do_not_go_together() {
         (chip_with_table(), "nan.txt --load maps.palpate", 1, "nan.txt:1: "),
         (chip_with_table(), "located.txt --load maps.palpate --next --workspace 2000", 2, "--workspace"),
     ] {
-        refused(at, &format!("link {chip} {words}"), code, expected);
+        fails(at, &format!("link {chip} {words}"), code, expected);
     }
-    let text = crate::locate::run(at, &format!("link {} free.txt --load maps.palpate", chip_with_table()));
+    let text = succeeds(at, &format!("link {} free.txt --load maps.palpate", chip_with_table()));
     let refused = "not counted: the chip's model is of maps, and the touch has no position\nnot counted: it does not come straight down\n";
     assert!(text.starts_with(refused), "{text}");
 }
@@ -152,8 +149,7 @@ fn link_recognizes_as_the_host_does_and_watch_shows_its_journal() {
     );
     assert_eq!((&summary["right"], &summary["wrong"], &summary["undecided"]), (&8.into(), &0.into(), &0.into()));
 
-    let entries = std::fs::read_to_string(&journal).unwrap();
-    let entries: Vec<Value> = entries.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let entries = lines(&std::fs::read_to_string(&journal).unwrap());
     let kinds = |kind: &str| entries.iter().filter(|entry| entry["is"] == kind).count();
     assert_eq!((kinds("model"), kinds("object"), kinds("touch"), kinds("link")), (1, 8, 40, 1));
 

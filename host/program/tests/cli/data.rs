@@ -1,10 +1,11 @@
-use crate::{command, json, stderr, stdout};
+use crate::{command, globe, json, stderr, stdout, succeeds};
 
 #[test]
 fn a_data_set_is_summed_up_and_one_that_would_train_badly_ends_with_1() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("touches");
-    stdout(command(["capture", "bowl", "fork", "--touches", "120", "-o"]).arg(&out).output().unwrap());
+    ["bowl", "fork"].into_iter().zip([4, 5]).for_each(|(name, rings)| _ = globe(directory.path(), name, rings));
+    succeeds(directory.path(), "capture bowl.obj fork.obj --touches 120 -o touches");
     let check = || command(["data", "check"]).arg(&out).output().unwrap();
     let said = stdout(check());
     for expected in ["bowl", "fork", "curvature", "slope", "probe: radius 0.15 units", "2 objects, 240 touches"] {

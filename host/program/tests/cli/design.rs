@@ -1,15 +1,22 @@
 //! `palpate probe design`, as a user calls it.
 
-use crate::{command, globe, json, listing, run, stderr, stdout};
+use crate::{command, globe, json, listing, run, shapes, stderr, stdout};
 use std::path::Path;
 
-/// Two built-in objects, and as little work as there is.
-const QUICK: [&str; 11] =
-    ["probe", "design", "bowl", "mouse", "--approaches", "200", "--sequences", "30", "--error-rate", "5%", "-o"];
+/// As little work as there is.
+const QUICK: [&str; 10] =
+    ["probe", "design", "meshes", "--approaches", "200", "--sequences", "30", "--error-rate", "5%", "-o"];
 
 /// A search of one probe, with the settings of `more`.
 fn search(more: &str) -> String {
     format!("radius=0.15,tilt=10,aim=box,{more}")
+}
+
+/// A folder with meshes.
+fn place() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    shapes(directory.path());
+    directory
 }
 
 fn design(directory: &Path, more: &[&str]) -> std::process::Output {
@@ -19,7 +26,7 @@ fn design(directory: &Path, more: &[&str]) -> std::process::Output {
 
 #[test]
 fn a_probe_is_designed_for_two_objects_and_written_with_a_page() {
-    let directory = tempfile::tempdir().unwrap();
+    let directory = place();
     let at = directory.path();
     let found = json(design(at, &["one", "--search", &search("spacing=0.5..2"), "--json"]));
     assert_eq!(listing(&at.join("one")), ["design.html", "probe.toml"]);
@@ -35,12 +42,12 @@ fn a_probe_is_designed_for_two_objects_and_written_with_a_page() {
         assert_eq!(stated(key).parse::<f64>().unwrap(), found["best"][key].as_f64().unwrap());
     }
     let page = std::fs::read_to_string(at.join("one/design.html")).unwrap();
-    assert!(page.contains("<svg") && page.contains("The best probe to build") && page.contains("mouse"));
+    assert!(page.contains("<svg") && page.contains("The best probe to build") && page.contains("cigar"));
 }
 
 #[test]
 fn the_same_seed_designs_the_same_files_on_any_number_of_threads() {
-    let directory = tempfile::tempdir().unwrap();
+    let directory = place();
     let at = directory.path();
     let search = search("spacing=1..1.5");
     let words: Vec<&str> = QUICK.iter().copied().chain(["out", "--search", &search]).collect();
@@ -57,7 +64,7 @@ fn the_same_seed_designs_the_same_files_on_any_number_of_threads() {
 
 #[test]
 fn a_probe_design_that_cannot_be_says_which_option_is_wrong() {
-    let directory = tempfile::tempdir().unwrap();
+    let directory = place();
     let error = stderr(design(directory.path(), &["out", "--search", "spacing=2..1"]), 2);
     assert!(error.contains("0.5..3"), "{error}");
     let error = stderr(design(directory.path(), &["out", "--search", "speed=0"]), 2);
@@ -79,13 +86,13 @@ fn a_probe_design_that_cannot_be_says_which_option_is_wrong() {
 
 #[test]
 fn a_capture_aims_where_it_is_told_and_its_data_set_says_so() {
-    let directory = tempfile::tempdir().unwrap();
+    let directory = place();
     let capture = |name: &str, more: &[&str]| {
-        let words = ["capture", "fork", "bowl", "--approaches", "200", "-o", name];
+        let words = ["capture", "meshes", "--approaches", "200", "-o", name];
         stdout(command(words.iter().chain(more)).current_dir(directory.path()).output().unwrap());
         let read = |file: &str| std::fs::read_to_string(directory.path().join(name).join(file)).unwrap();
-        let touched = read("fork.txt").lines().filter(|line| *line != "- - -").count();
-        (read("dataset.json").contains("\"aim\""), touched, read("fork.txt"))
+        let touched = read("cigar.txt").lines().filter(|line| *line != "- - -").count();
+        (read("dataset.json").contains("\"aim\""), touched, read("cigar.txt"))
     };
     let (states, usual, text) = capture("usual", &[]);
     let (_, _, named) = capture("named", &["--aim", "box"]);

@@ -1,6 +1,6 @@
 //! Meshes in other formats than OBJ, wherever a mesh is read.
 
-use crate::{command, globe, stderr, stdout};
+use crate::{fails, globe, palpate, stderr, succeeds};
 use palpate::mesh::Mesh;
 use std::path::Path;
 
@@ -29,12 +29,9 @@ fn ply(mesh: &Mesh) -> String {
     text
 }
 
-fn capture(source: &Path, out: &Path) -> (Vec<u8>, String) {
-    let output = command(["capture", "--touches", "50", "-o"]).args([out, source]).output().unwrap();
-    let error = String::from_utf8(output.stderr.clone()).unwrap();
-    stdout(output);
-    let name = source.file_stem().unwrap().to_str().unwrap();
-    (std::fs::read(out.join(format!("{name}.txt"))).unwrap(), error)
+/// What a capture of these meshes says.
+fn capture(at: &Path, source: &str) -> String {
+    stderr(palpate(at, &format!("capture {source} -o touches-{source} --touches 50")), 0)
 }
 
 #[test]
@@ -44,8 +41,10 @@ fn one_object_in_three_formats_gives_the_same_touches_to_the_byte() {
     let mesh = palpate::mesh::obj::read(&obj).unwrap();
     std::fs::write(directory.path().join("cup.stl"), stl(&mesh)).unwrap();
     std::fs::write(directory.path().join("cup.ply"), ply(&mesh)).unwrap();
-    let touches =
-        |name: &str| capture(&directory.path().join(name), &directory.path().join(format!("{name}-touches"))).0;
+    let touches = |name: &str| {
+        capture(directory.path(), name);
+        std::fs::read(directory.path().join(format!("touches-{name}/cup.txt"))).unwrap()
+    };
     let expected = touches("cup.obj");
     assert!(expected == touches("cup.stl") && expected == touches("cup.ply"));
     // The content counts, not the name.
@@ -60,10 +59,7 @@ fn one_name_in_several_formats_is_touched_once_with_a_note() {
     std::fs::create_dir(&meshes).unwrap();
     std::fs::write(meshes.join("cup.ply"), ply(&Mesh::globe(6))).unwrap();
     std::fs::write(meshes.join("cup.stl"), stl(&Mesh::globe(5))).unwrap();
-    let output =
-        command(["capture", "--touches", "10", "-o"]).args([&directory.path().join("out"), &meshes]).output().unwrap();
-    let error = String::from_utf8(output.stderr.clone()).unwrap();
-    stdout(output);
+    let error = capture(directory.path(), "meshes");
     let note = error.lines().find(|line| line.contains("passed over")).unwrap_or_default();
     assert!(note.starts_with("cup: ") && note.contains("cup.stl is used; cup.ply is passed over"), "{error}");
 }
@@ -71,12 +67,10 @@ fn one_name_in_several_formats_is_touched_once_with_a_note() {
 #[test]
 fn view_says_in_words_what_is_wrong_with_a_mesh_on_the_page_and_in_the_terminal() {
     let directory = tempfile::tempdir().unwrap();
-    let page = directory.path().join("page.html");
+    let at = directory.path();
     let view = |mesh: &Mesh| {
-        let path = directory.path().join("cup.stl");
-        std::fs::write(&path, stl(mesh)).unwrap();
-        let said = stdout(command(["view", "-o"]).args([&page, &path]).output().unwrap());
-        (said, std::fs::read_to_string(&page).unwrap())
+        std::fs::write(at.join("cup.stl"), stl(mesh)).unwrap();
+        (succeeds(at, "view cup.stl -o page.html"), std::fs::read_to_string(at.join("page.html")).unwrap())
     };
     let good = Mesh::globe(6);
     let (said, _) = view(&good);
@@ -98,7 +92,7 @@ fn view_says_in_words_what_is_wrong_with_a_mesh_on_the_page_and_in_the_terminal(
         assert!(said.contains(expected), "{said}");
         assert!(shown.contains(expected), "the page lacks: {expected}");
     }
-    let (_, error) = capture(&directory.path().join("cup.stl"), &directory.path().join("touches"));
+    let error = capture(at, "cup.stl");
     let line = error.lines().find(|line| line.starts_with("cup: The mesh is open")).unwrap_or_default();
     assert!(
         line.contains("partly inside out") && line.contains("stray parts") && line.contains("an implausible size"),
@@ -109,22 +103,20 @@ fn view_says_in_words_what_is_wrong_with_a_mesh_on_the_page_and_in_the_terminal(
 #[test]
 fn a_damaged_mesh_of_any_format_is_refused_with_its_place_and_a_cure() {
     let directory = tempfile::tempdir().unwrap();
-    let (out, cut) = (directory.path().join("out"), stl(&Mesh::globe(4)));
+    let (at, cut) = (directory.path(), stl(&Mesh::globe(4)));
+    std::fs::write(at.join("casts.csv"), "a,0,0,9,0,0,-1\n").unwrap();
     for (name, bytes, expected) in [
         ("cup.stl", &cut[..cut.len() - 50], "cup.stl: byte 80: the STL file is damaged: it states 48 triangles"),
         ("cup.ply", b"ply\nformat ascii 1.0\nelement face 3\nend_header\n", "cup.ply:3: the PLY file is damaged"),
         ("cup.glb", b"glTF\x02\0\0\0\xff\0\0\0", "cup.glb: byte 8: the GLB file is damaged"),
         ("cup.dae", b"<COLLADA>\n<a></b></COLLADA>", "cup.dae:2: the COLLADA file is damaged"),
     ] {
-        let path = directory.path().join(name);
-        std::fs::write(&path, bytes).unwrap();
-        for name in ["capture", "view", "run"] {
-            let error = stderr(command([name, "-o"]).args([&out, &path]).output().unwrap(), 1);
+        std::fs::write(at.join(name), bytes).unwrap();
+        for command in ["capture", "view", "run"] {
+            let error = stderr(palpate(at, &format!("{command} {name} -o out")), 1);
             assert!(error.contains(expected) && error.contains("Export the mesh again"), "{error}");
         }
-        let casts = directory.path().join("casts.csv");
-        std::fs::write(&casts, "a,0,0,9,0,0,-1\n").unwrap();
-        assert!(stderr(command(["data", "cast"]).args([&path, &casts]).output().unwrap(), 1).contains(expected));
+        fails(at, &format!("data cast {name} casts.csv"), 1, expected);
     }
-    assert!(!out.exists());
+    assert!(!at.join("out").exists());
 }

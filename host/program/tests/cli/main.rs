@@ -1,6 +1,5 @@
 //! The program as its user sees it: one module per group of commands.
 
-mod captions;
 mod capture;
 mod cast;
 mod chip;
@@ -8,6 +7,7 @@ mod compiled;
 mod data;
 mod design;
 mod fit;
+mod fixtures;
 mod formats;
 mod goldens;
 mod help;
@@ -34,4 +34,7 @@ mod table;
 mod teach;
 mod view;
 
-use support::{command, fails, globe, json, listing, palpate, run, stderr, stdout, succeeds, touches};
+use support::{
+    command, cut, fails, figures, globe, json, lines, listing, palpate, read, run, shapes, stderr, stdout, succeeds,
+    touches,
+};

@@ -1,16 +1,14 @@
 //! Meshes that something is wrong with, given to `capture` and `view` alike.
 
-use crate::{command, globe, run, stderr, stdout};
+use crate::{command, fails, globe, palpate, stderr, stdout, succeeds};
 use palpate::mesh::builtin;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A copy of an OBJ file with its lines changed.
-fn changed(mesh: &Path, name: &str, change: impl Fn(usize, &str) -> Option<String>) -> PathBuf {
+fn changed(mesh: &Path, name: &str, change: impl Fn(usize, &str) -> Option<String>) {
     let text = std::fs::read_to_string(mesh).unwrap();
     let lines: Vec<String> = text.lines().enumerate().filter_map(|(index, line)| change(index, line)).collect();
-    let path = mesh.with_file_name(name);
-    std::fs::write(&path, lines.join("\n")).unwrap();
-    path
+    std::fs::write(mesh.with_file_name(name), lines.join("\n")).unwrap();
 }
 
 #[test]
@@ -18,37 +16,29 @@ fn a_capture_of_an_open_or_inside_out_mesh_says_so_in_one_line_for_each() {
     let directory = tempfile::tempdir().unwrap();
     let good = globe(directory.path(), "good", 6);
     let first_face = std::fs::read_to_string(&good).unwrap().lines().position(|line| line.starts_with("f ")).unwrap();
-    let open = changed(&good, "open.obj", |index, line| (index != first_face).then(|| line.to_owned()));
-    let inside_out = changed(&good, "turned.obj", |_, line| match line.split(' ').collect::<Vec<_>>()[..] {
+    changed(&good, "open.obj", |index, line| (index != first_face).then(|| line.to_owned()));
+    changed(&good, "turned.obj", |_, line| match line.split(' ').collect::<Vec<_>>()[..] {
         ["f", a, b, c] => Some(format!("f {a} {c} {b}")),
         _ => Some(line.to_owned()),
     });
-    let capture = |meshes: &[&Path], out: &str| {
-        let mut command = command(["capture", "--touches", "10", "-o"]);
-        let output = command.arg(directory.path().join(out)).args(meshes).output().unwrap();
-        assert!(output.status.success());
-        String::from_utf8(output.stderr).unwrap()
-    };
-    let said = capture(&[&good, &open, &inside_out], "touches");
+    let said = captured(directory.path(), "good.obj open.obj turned.obj -o touches --touches 10", 0);
     let lines: Vec<&str> = said.lines().filter(|line| line.contains("The mesh is")).collect();
     assert_eq!(lines.len(), 2, "{said}");
     assert!(lines[0].starts_with("open: The mesh is open: 3 edges belong to one triangle only"), "{said}");
     assert!(lines[1].starts_with("turned: The mesh is inside out: "), "{said}");
-    assert!(!capture(&[&good], "more").contains("The mesh is"));
+    assert!(!captured(directory.path(), "good.obj -o more --touches 10", 0).contains("The mesh is"));
 }
 
 #[test]
 fn a_capture_of_a_misspelled_object_lists_the_names_as_view_does() {
     let directory = tempfile::tempdir().unwrap();
-    let (touches, page) = (directory.path().join("touches"), directory.path().join("mug.html"));
-    let captured = stderr(command(["capture", "builtin", "mug", "-o"]).arg(&touches).output().unwrap(), 1);
-    let viewed = stderr(command(["view", "mug", "-o"]).arg(&page).output().unwrap(), 1);
-    for error in [&captured, &viewed] {
+    for words in ["capture builtin mug -o out", "view mug -o out"] {
+        let error = stderr(palpate(directory.path(), words), 1);
         assert!(error.contains("mug: cannot read the mesh: this is neither a file"), "{error}");
         assert!(builtin::names().iter().all(|name| error.contains(name)), "{error}");
         assert!(!error.contains("os error"), "{error}");
     }
-    assert!(!touches.exists() && !page.exists());
+    assert!(crate::listing(directory.path()).is_empty());
 }
 
 #[test]
@@ -56,16 +46,16 @@ fn a_file_named_like_a_built_in_object_comes_first_in_capture_and_view_alike() {
     let directory = tempfile::tempdir().unwrap();
     let mesh = globe(directory.path(), "globe", 6);
     std::fs::rename(mesh, directory.path().join("fork")).unwrap();
-    let here = |arguments: &[&str]| stdout(command(arguments).current_dir(&directory).output().unwrap());
-    here(&["view", "fork", "-o", "file.html"]);
+    let here = |words: &str| succeeds(directory.path(), words);
+    here("view fork -o file.html");
     let page = |name: &str| std::fs::read_to_string(directory.path().join(name)).unwrap();
     // 4 · 6 · 5 triangles, where the built-in fork has thousands.
     assert!(page("file.html").contains("<dt>Triangles</dt><dd>120"));
-    here(&["capture", "fork", "-o", "file", "--touches", "5"]);
+    here("capture fork -o file --touches 5");
     std::fs::remove_file(directory.path().join("fork")).unwrap();
-    here(&["view", "fork", "-o", "built-in.html"]);
+    here("view fork -o built-in.html");
     assert!(!page("built-in.html").contains("<dt>Triangles</dt><dd>120"));
-    here(&["capture", "fork", "-o", "built-in", "--touches", "5"]);
+    here("capture fork -o built-in --touches 5");
     let touches = |name: &str| std::fs::read(directory.path().join(name).join("fork.txt")).unwrap();
     assert_ne!(touches("file"), touches("built-in"));
 }
@@ -73,32 +63,29 @@ fn a_file_named_like_a_built_in_object_comes_first_in_capture_and_view_alike() {
 #[test]
 fn a_broken_mesh_is_refused_with_its_file_its_line_and_a_cure() {
     let directory = tempfile::tempdir().unwrap();
-    let (mesh, out) = (directory.path().join("cup.obj"), directory.path().join("out"));
-    for (text, expected) in [
-        (
-            "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n",
-            "cup.obj:4: vertex 4 of a face is out of range: the file has 3 vertices.",
-        ),
-        ("v 0 0 0\nv 1 zero 0\n", "cup.obj:2: \"zero\" is not a number."),
-        ("v 0 0 0\n\nf 1 1 x\n", "cup.obj:3: \"x\" is not a vertex of a face."),
+    let at = directory.path();
+    let cure = "Correct the line, or export the mesh again.";
+    let range = "cup.obj:4: vertex 4 of a face is out of range: the file has 3 vertices.";
+    for (text, expected, cure) in [
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", range, cure),
+        ("v 0 nan 0\n", "cup.obj:1: the coordinate y = \"nan\" is not finite", cure),
+        ("v 0 0 0\nv 1 zero 0\n", "cup.obj:2: \"zero\" is not a number.", cure),
+        ("v 0 0 0\n\nf 1 1 x\n", "cup.obj:3: \"x\" is not a vertex of a face.", cure),
+        ("v 0 0 0\n", "cup.obj: the mesh has no faces. Export the mesh as", ""),
+        ("v 1 1 1\nf 1 1 1\n", "cup.obj: the mesh has no extent", ""),
     ] {
-        std::fs::write(&mesh, text).unwrap();
-        for name in ["capture", "view"] {
-            let error = stderr(command([name, "-o"]).args([&out, &mesh]).output().unwrap(), 1);
-            assert!(error.contains(expected), "{error}");
-            assert!(error.contains("Correct the line, or export the mesh again."), "{error}");
+        std::fs::write(at.join("cup.obj"), text).unwrap();
+        for command in ["capture", "view"] {
+            let error = stderr(palpate(at, &format!("{command} cup.obj -o out")), 1);
+            assert!(error.contains(expected) && error.contains(cure), "{error}");
         }
     }
-    std::fs::write(&mesh, "v 0 0 0\n").unwrap();
-    let error = stderr(run(["view", mesh.to_str().unwrap(), "-o", out.to_str().unwrap()]), 1);
-    assert!(error.contains("cup.obj: the mesh has no faces. Export the mesh as"), "{error}");
-    assert!(!out.exists());
+    assert!(!at.join("out").exists());
 }
 
 /// Runs `palpate capture` in a directory: what it prints to stderr.
 fn captured(at: &Path, words: &str, code: i32) -> String {
-    let output = command(["capture"].into_iter().chain(words.split(' '))).current_dir(at).output().unwrap();
-    stderr(output, code)
+    stderr(palpate(at, &format!("capture {words}")), code)
 }
 
 #[test]
@@ -134,8 +121,7 @@ fn bad_meshes_are_named_at_once_and_with_skip_bad_the_rest_is_captured() {
     let listed = std::fs::read_to_string(at.join("data/dataset.json")).unwrap();
     assert_eq!(listed.matches("\"name\"").count(), 3, "{listed}");
     // Every command with such a set has the option.
-    let objects = ["data", "objects", "set", "-o", "written", "--skip-bad"];
-    stdout(command(objects).current_dir(at).output().unwrap());
+    succeeds(at, "data objects set -o written --skip-bad");
     assert_eq!(crate::listing(&at.join("written")), ["one.obj", "twin.obj", "two.obj"]);
 }
 
@@ -243,22 +229,20 @@ fn a_probe_file_may_be_a_pipe() {
 #[test]
 fn touches_of_one_object_of_a_model_are_evaluated() {
     let directory = tempfile::tempdir().unwrap();
-    let data = directory.path().join("one");
-    stdout(command(["capture", "bowl", "--approaches", "150", "-o"]).arg(&data).output().unwrap());
-    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/household.palpate");
-    let evaluate =
-        |more: &[&str]| command(["evaluate", "--sequences", "20"]).arg(&model).arg(&data).args(more).output().unwrap();
-    let text = stdout(evaluate(&["--confusion", "5"]));
+    let at = directory.path();
+    globe(at, "bowl", 6);
+    succeeds(at, "capture bowl.obj --approaches 150 -o one");
+    let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
+    let evaluate = format!("evaluate {model} one --sequences 20");
+    let text = succeeds(at, &format!("{evaluate} --confusion 5"));
     assert!(
         text.contains("\nbowl ") && text.contains("promised for all 10 objects of the model, tested on 1"),
         "{text}"
     );
     assert!(text.contains("Taken for, after 5 touches"), "{text}");
     // What needs a second object says so, and neither a model nor a promise comes of one.
-    let error = stderr(evaluate(&["--switch"]), 1);
-    assert!(error.contains("nothing to exchange it for"), "{error}");
-    let train = command(["train", "-o"]).arg(directory.path().join("e.json")).arg(&data).output().unwrap();
-    assert!(stderr(train, 1).contains("only one object here, bowl"));
-    let check = stdout(command(["data", "check"]).arg(&data).output().unwrap());
+    fails(at, &format!("{evaluate} --switch"), 1, "nothing to exchange it for");
+    fails(at, "train one -o e.json", 1, "only one object here, bowl");
+    let check = succeeds(at, "data check one");
     assert!(check.contains("only bowl is here") && check.contains("1 object, 150 touches"), "{check}");
 }

@@ -1,6 +1,6 @@
 //! Guidance for someone who uses the program for the first time.
 
-use crate::{command, globe, stderr, stdout};
+use crate::{fails, figures, globe, palpate, stderr, succeeds};
 use serde_json::Value;
 use std::path::Path;
 
@@ -28,32 +28,28 @@ fn a_promise_that_is_tested_on_other_data_than_it_was_made_for_says_so_and_wheth
     approaches(&at.join("fresh"), 20_000, 1_000_000, false);
     approaches(&at.join("unseen"), 4_000, 2_000_000, false);
     approaches(&at.join("full"), 4_000, 3_000_000, true);
-    let run = |arguments: &[&str]| stdout(command(arguments).current_dir(at).output().unwrap());
-    run(&["train", "train", "-o", "e.json", "--trees", "rounds=10"]);
-    run(&["export", "e.json", "-o", "m.palpate"]);
-    run(&["calibrate", "m.palpate", "fresh", "-o", "c.palpate", "--error-rate", "5%"]);
-    let json = |data: &str, more: &[&str]| -> Value {
-        let arguments = [&["evaluate", "c.palpate", data, "--json"], more].concat();
-        serde_json::from_str(&run(&arguments)).unwrap()
-    };
-    let own = json("unseen", &[]);
+    succeeds(at, "train train -o e.json --trees rounds=10");
+    succeeds(at, "export e.json -o m.palpate");
+    succeeds(at, "calibrate m.palpate fresh -o c.palpate --error-rate 5%");
+    let json = |data: &str| figures(at, &format!("evaluate c.palpate {data}"));
+    let own = json("unseen");
     assert_eq!(own["promise"]["void"], serde_json::json!([]));
     assert_eq!(own["promise"]["finding"], "kept", "{}", own["promise"]);
-    assert!(run(&["evaluate", "c.palpate", "unseen"]).contains("the promise is kept."));
+    assert!(succeeds(at, "evaluate c.palpate unseen").contains("the promise is kept."));
     // All touches are full, which the model takes for evidence.
-    let other = json("full", &[]);
+    let other = json("full");
     let void = other["promise"]["void"].as_array().unwrap();
     assert_eq!(void[0], "promised for every approach, tested on full touches only", "{void:?}");
     assert!(["kept", "unclear", "broken"].contains(&other["promise"]["finding"].as_str().unwrap()));
     // Of which noise is the worst: what differs is said, and that it broke.
-    let noisy = json("unseen", &["--real", "noise=60ms"]);
+    let noisy = json("unseen --real noise=60ms");
     assert_eq!(noisy["promise"]["finding"], "broken", "{}", noisy["promise"]);
     // One of the objects is never touched.
     std::fs::create_dir(at.join("two")).unwrap();
     for name in ["cup.txt", "jug.txt"] {
         std::fs::copy(at.join("unseen").join(name), at.join("two").join(name)).unwrap();
     }
-    let two = json("two", &[]);
+    let two = json("two");
     assert_eq!(two["promise"]["void"][0], "promised for all 3 objects of the model, tested on 2", "{two}");
 
     // The share of wrong names is of the names given, where it is of all sequences as well.
@@ -65,12 +61,12 @@ fn a_promise_that_is_tested_on_other_data_than_it_was_made_for_says_so_and_wheth
         let shown = number(&sequential["error_of_given_per_object"][name]);
         assert!((shown - expected).abs() < 1e-12, "{name}: {shown} {expected}");
     }
-    let text = run(&["evaluate", "c.palpate", "unseen", "--max-touches", "2"]);
+    let text = succeeds(at, "evaluate c.palpate unseen --max-touches 2");
     assert!(text.contains("of names undecided") && text.contains("of names: of those that got a name"), "{text}");
     // A model without a test for strangers says that it has none, instead of a table of noughts.
     std::fs::create_dir(at.join("others")).unwrap();
     std::fs::copy(at.join("full/cup.txt"), at.join("others/vase.txt")).unwrap();
-    let strangers = run(&["evaluate", "c.palpate", "unseen", "--unknown", "others"]);
+    let strangers = succeeds(at, "evaluate c.palpate unseen --unknown others");
     assert!(strangers.contains("has no test") && !strangers.contains("detected by"), "{strangers}");
 }
 
@@ -78,19 +74,16 @@ fn a_promise_that_is_tested_on_other_data_than_it_was_made_for_says_so_and_wheth
 fn messages_name_the_option_that_is_wrong_and_what_to_write() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    let fails = |arguments: &[&str], code| stderr(command(arguments).current_dir(at).output().unwrap(), code);
-    for arguments in [
-        &["calibrate", "m.palpate", "fresh", "-o", "c.palpate", "--error-rate", "2"][..],
-        &["evaluate", "m.palpate", "fresh", "--error-rate", "2"],
-        &["tune", "data", "--error-rate", "2"],
-    ] {
-        let error = fails(arguments, 2);
-        assert!(error.contains("--error-rate") && error.contains("for 2 percent write 2%"), "{error}");
-    }
     globe(at, "cup", 6);
-    let error = fails(&["capture", "cup.obj", "-o", "data", "--true-size", "mm"], 2);
-    assert!(error.contains("unit = \"mm\", radius = 1.5, spacing = 15, speed = 100"), "{error}");
-    let error = fails(&["report", "--touches", "5"], 2);
+    for (words, expected) in [
+        ("calibrate m.palpate fresh -o c.palpate --error-rate 2", "for 2 percent write 2%"),
+        ("evaluate m.palpate fresh --error-rate 2", "for 2 percent write 2%"),
+        ("tune data --error-rate 2", "for 2 percent write 2%"),
+        ("capture cup.obj -o data --true-size mm", "unit = \"mm\", radius = 1.5, spacing = 15, speed = 100"),
+    ] {
+        fails(at, words, 2, expected);
+    }
+    let error = stderr(palpate(at, "report --touches 5"), 2);
     assert!(error.contains("unexpected argument '--touches'") && !error.contains("-- --touches"), "{error}");
 }
 
@@ -100,14 +93,12 @@ fn every_approach_is_not_summed_up_as_a_touch_and_a_mesh_gets_a_verdict() {
     let at = directory.path();
     globe(at, "cup", 6);
     globe(at, "jug", 8);
-    let run = |arguments: &[&str]| stdout(command(arguments).current_dir(at).output().unwrap());
-    let said = run(&["capture", "cup.obj", "jug.obj", "-o", "data", "--approaches", "300"]);
+    let said = succeeds(at, "capture cup.obj jug.obj -o data --approaches 300");
     assert!(!said.contains("share") && said.contains("Every approach was kept"), "{said}");
-    assert!(run(&["view", "cup.obj", "-o", "cup.html"]).contains("cup: usable"));
-    run(&["train", "data", "-o", "e.json", "--trees", "rounds=3"]);
-    run(&["export", "e.json", "-o", "m.palpate"]);
+    assert!(succeeds(at, "view cup.obj -o cup.html").contains("cup: usable"));
+    succeeds(at, "train data -o e.json --trees rounds=3");
+    succeeds(at, "export e.json -o m.palpate");
     std::fs::write(at.join("rows.csv"), "a,b,c\n1,2,3\n").unwrap();
-    let verified = command(["verify", "m.palpate", "e.json", "rows.csv"]).current_dir(at).output().unwrap();
-    let error = stderr(verified, 1);
+    let error = stderr(palpate(at, "verify m.palpate e.json rows.csv"), 1);
     assert!(error.contains("the model is over touches") && !error.contains("inspect"), "{error}");
 }

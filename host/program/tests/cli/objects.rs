@@ -1,4 +1,4 @@
-use crate::{command, listing, run, stderr, stdout};
+use crate::{command, fails, globe, listing, run, stderr, stdout, succeeds};
 use palpate::mesh::facts::Facts;
 use palpate::mesh::{Mesh, builtin, obj};
 
@@ -62,22 +62,18 @@ fn a_directory_that_cannot_be_made_is_named() {
 #[test]
 fn a_mesh_is_written_but_neither_varied_nor_written_onto_itself() {
     let directory = tempfile::tempdir().unwrap();
-    let bowl = directory.path().join("bowl.obj");
-    stdout(command(["data", "objects", "bowl", "-o"]).arg(directory.path()).output().unwrap());
+    let at = directory.path();
+    let bowl = globe(at, "bowl", 6);
     let before = std::fs::read(&bowl).unwrap();
-    let again = directory.path().join("again");
-    let said = stdout(command(["data", "objects"]).arg(&bowl).arg("-o").arg(&again).output().unwrap());
-    assert!(said.contains("bowl.obj: ") && listing(&again) == ["bowl.obj"], "{said}");
-    let read = |path: &std::path::Path| corners(&obj::read(path).unwrap());
-    assert!(read(&again.join("bowl.obj")) == read(&bowl));
-    let error =
-        stderr(command(["data", "objects", "--varied", "1"]).arg(&bowl).arg("-o").arg(&again).output().unwrap(), 2);
-    assert!(error.contains("only they can be varied"), "{error}");
-    let error = stderr(command(["data", "objects"]).arg(&bowl).arg("-o").arg(directory.path()).output().unwrap(), 2);
-    assert!(error.contains("another file than what is read"), "{error}");
-    assert!(std::fs::read(&bowl).unwrap() == before);
-    let mut command = command(["data", "objects"]);
-    let error = stderr(command.arg(&bowl).arg("-o").arg(&again).arg("--picture").arg(&bowl).output().unwrap(), 2);
-    assert!(error.contains("another file than what is read"), "{error}");
-    assert!(std::fs::read(&bowl).unwrap() == before);
+    let said = succeeds(at, "data objects bowl.obj -o again");
+    assert!(said.contains("bowl.obj: ") && listing(&at.join("again")) == ["bowl.obj"], "{said}");
+    assert!(corners(&obj::read(&at.join("again/bowl.obj")).unwrap()) == corners(&obj::read(&bowl).unwrap()));
+    for (words, expected) in [
+        ("data objects --varied 1 bowl.obj -o again", "only they can be varied"),
+        ("data objects bowl.obj -o .", "another file than what is read"),
+        ("data objects bowl.obj -o again --picture bowl.obj", "another file than what is read"),
+    ] {
+        fails(at, words, 2, expected);
+        assert!(std::fs::read(&bowl).unwrap() == before);
+    }
 }

@@ -1,30 +1,27 @@
-use crate::{command, globe, listing, stderr, stdout};
-use std::path::Path;
+use crate::{fails, globe, listing, succeeds};
+use std::fs;
 
 /// The model that the repository ships.
-fn household() -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/household.palpate")
-}
+const HOUSEHOLD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
 
 #[test]
 fn a_page_is_made_of_a_model_and_objects_with_a_trace_of_a_thousand_approaches_to_each() {
     let directory = tempfile::tempdir().unwrap();
-    let page = directory.path().join("pages/play.html");
-    let trace = directory.path().join("pages/trace.txt");
-    let mesh = globe(directory.path(), "my globe", 8);
+    let at = directory.path();
+    globe(at, "my_globe", 8);
+    let words =
+        format!("view --play mouse my_globe.obj --model {HOUSEHOLD} -o pages/play.html --trace pages/trace.txt");
     let play = || {
-        let mut command = command(["view", "--play", "mouse"]);
-        command.arg(&mesh).arg("--model").arg(household()).arg("-o").arg(&page).arg("--trace").arg(&trace);
-        let said = stdout(command.output().unwrap());
+        let said = succeeds(at, &words);
         assert!(said.contains("play.html"), "{said}");
-        std::fs::read_to_string(&page).unwrap()
+        fs::read_to_string(at.join("pages/play.html")).unwrap()
     };
     let text = play();
-    assert!(text.contains("my globe") && text.contains("curvature, every contact"));
+    assert!(text.contains("my_globe") && text.contains("curvature, every contact"));
     // The model does not know one of the objects, so nobody knows what to expect.
     assert!(text.contains("\"expected\":null"));
-    assert_eq!(listing(page.parent().unwrap()), ["play.html", "trace.txt"]);
-    assert_eq!(std::fs::read_to_string(&trace).unwrap().lines().count(), 2_000);
+    assert_eq!(listing(&at.join("pages")), ["play.html", "trace.txt"]);
+    assert_eq!(fs::read_to_string(at.join("pages/trace.txt")).unwrap().lines().count(), 2_000);
     // The same seed gives the same page.
     assert_eq!(play(), text);
 }
@@ -32,10 +29,12 @@ fn a_page_is_made_of_a_model_and_objects_with_a_trace_of_a_thousand_approaches_t
 #[test]
 fn a_page_without_a_model_trains_four_and_says_what_each_is_expected_to_cost() {
     let directory = tempfile::tempdir().unwrap();
-    let page = directory.path().join("play.html");
-    let meshes = [("round", 8), ("rough", 5)].map(|(name, rings)| globe(directory.path(), name, rings));
-    stdout(command(["view", "--play", "--touches", "300", "-o"]).arg(&page).args(meshes).output().unwrap());
-    let text = std::fs::read_to_string(&page).unwrap();
+    let at = directory.path();
+    for (name, rings) in [("round", 8), ("rough", 5)] {
+        globe(at, name, rings);
+    }
+    succeeds(at, "view --play --touches 300 -o play.html round.obj rough.obj");
+    let text = fs::read_to_string(at.join("play.html")).unwrap();
     for name in
         ["times, full touches", "curvature, full touches", "curvature, every contact", "oriented, every approach"]
     {
@@ -47,43 +46,36 @@ fn a_page_without_a_model_trains_four_and_says_what_each_is_expected_to_cost() {
 #[test]
 fn a_page_of_a_table_holds_maps_of_its_objects_and_says_what_they_were_learned_from() {
     let directory = tempfile::tempdir().unwrap();
-    let page = directory.path().join("table.html");
-    let made = |arguments: &[&str]| {
-        let mut command = command(["view", "--play", "--scene", "table", "--touches", "4000", "-o"]);
-        command.arg(&page).args(arguments).output().unwrap()
-    };
-    stdout(made(&["bowl", "mouse", "--placements", "bowl/+z=1", "--real", "missed=5%"]));
-    let text = std::fs::read_to_string(&page).unwrap();
+    let at = directory.path();
+    let table = "view --play --scene table --touches 4000 -o table.html";
+    succeeds(at, &format!("{table} bowl mouse --placements bowl/+z=1 --real missed=5%"));
+    let text = fs::read_to_string(at.join("table.html")).unwrap();
     assert!(text.contains("from 4,000 simulated approaches") && text.contains("5 % of contacts to be lost"));
     assert!(text.contains("\"maps\":") && text.contains("\"name\":\"mouse\""));
-    std::fs::remove_file(&page).unwrap();
-    for (wrong, said) in [
-        (&["bowl"][..], "2 to 16 objects"),
-        (&["bowl", "mouse", "--model", household().to_str().unwrap()], "model"),
-        (&["bowl", "mouse", "--trace", "trace.txt"], "trace"),
-        (&["bowl", "mouse", "--cone", "30"], "cone"),
-        (&["bowl", "mouse", "--real", "debounce=1ms"], "noise"),
+    fs::remove_file(at.join("table.html")).unwrap();
+    for (wrong, code, expected) in [
+        ("bowl", 2, "2 to 16 objects"),
+        (&format!("bowl mouse --model {HOUSEHOLD}"), 2, "model"),
+        ("bowl mouse --trace trace.txt", 2, "trace"),
+        ("bowl mouse --cone 30", 2, "cone"),
+        ("bowl mouse --real debounce=1ms", 1, "noise"),
     ] {
-        let error = String::from_utf8(made(wrong).stderr).unwrap();
-        assert!(error.contains(said) && !page.exists(), "{wrong:?}: {error}");
+        fails(at, &format!("{table} {wrong}"), code, expected);
     }
+    assert!(listing(at).is_empty());
 }
 
 #[test]
 fn what_cannot_be_played_with_writes_no_page() {
     let directory = tempfile::tempdir().unwrap();
-    let page = directory.path().join("play.html");
-    let with = |arguments: &[&str], code| {
-        let mut command = command(["view", "--play", "-o"]);
-        stderr(command.arg(&page).args(arguments).output().unwrap(), code)
-    };
-    let bad = directory.path().join("bad.palpate");
-    std::fs::write(&bad, b"no model").unwrap();
-    let error = with(&["bowl", "--model", bad.to_str().unwrap()], 1);
-    assert!(error.contains("bad.palpate"), "{error}");
-    let error = with(&["bowl", "--true-size", "stated", "--model", household().to_str().unwrap()], 2);
-    assert!(error.contains("probe"), "{error}");
-    let error = with(&["bowl", "--real", "noise=much"], 2);
-    assert!(error.contains("5ms"), "{error}");
-    assert!(!page.exists());
+    let at = directory.path();
+    fs::write(at.join("bad.palpate"), b"no model").unwrap();
+    for (wrong, code, expected) in [
+        ("--model bad.palpate", 1, "bad.palpate"),
+        (&format!("--true-size stated --model {HOUSEHOLD}"), 2, "probe"),
+        ("--real noise=much", 2, "5ms"),
+    ] {
+        fails(at, &format!("view --play bowl -o play.html {wrong}"), code, expected);
+    }
+    assert_eq!(listing(at), ["bad.palpate"]);
 }

@@ -1,6 +1,6 @@
 //! Touches of a real probe become a data set: from a file of lines, and from a chip whose cable is pulled.
 
-use crate::{command, json, listing, run, stderr, stdout};
+use crate::{command, globe, json, listing, run, stderr, stdout};
 use palpate::touches::Dataset;
 use palpate_shared::link::{
     Decision, Device, DeviceEnd, Event, FaultKind, ModelInfo, Outcome, Payload, Progress, Refusal, TouchMessage,
@@ -108,8 +108,9 @@ fn what_is_no_touch_is_refused_with_its_line_and_nothing_is_written() {
 fn recorded_and_simulated_touches_are_never_mixed() {
     let place = tempfile::tempdir().unwrap();
     let [simulated, data] = ["simulated", "recorded"].map(|name| place.path().join(name));
+    let bowl = globe(place.path(), "bowl", 4);
     let capture = |directory: &Path, more: &[&str]| {
-        let arguments = ["capture", "bowl", "--touches", "20", "-o", directory.to_str().unwrap()];
+        let arguments = ["capture", bowl.to_str().unwrap(), "--touches", "20", "-o", directory.to_str().unwrap()];
         command(arguments.iter().chain(more)).output().unwrap()
     };
     stdout(capture(&simulated, &[]));

@@ -1,22 +1,22 @@
 //! The commands that do everything and write pages: run and report.
 
-use crate::{command, globe, listing, stdout};
-use serde_json::Value;
+use crate::{globe, listing, read, succeeds};
+use std::fs;
 use std::path::Path;
 
 /// Two meshes that can be distinguished.
 fn meshes(directory: &Path) {
-    std::fs::create_dir(directory.join("meshes")).unwrap();
+    fs::create_dir(directory.join("meshes")).unwrap();
     globe(&directory.join("meshes"), "globe", 12);
     globe(&directory.join("meshes"), "lump", 3);
 }
 
 #[test]
-fn run_goes_from_meshes_to_models_and_a_page() {
+fn run_goes_from_meshes_to_models_and_a_page_with_noise_which_its_command_states() {
     let directory = tempfile::tempdir().unwrap();
     meshes(directory.path());
-    let mut command = command(["run", "meshes", "-o", "out", "--touches", "300", "--seed", "3"]);
-    let text = stdout(command.current_dir(&directory).output().unwrap());
+    let words = "run meshes -o out --touches 300 --seed 3 --real noise=0..20ms,timer=1ms";
+    let text = succeeds(directory.path(), words);
     assert!(text.contains("report.html"), "{text}");
     let out = directory.path().join("out");
     for name in
@@ -24,46 +24,28 @@ fn run_goes_from_meshes_to_models_and_a_page() {
     {
         assert!(listing(&out).iter().any(|file| file == name), "{name}: {:?}", listing(&out));
     }
-    let summary: Value = serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+    let summary = read(&out.join("summary.json"));
     assert_eq!(
         (&summary["seed"], &summary["touches"]["train"], &summary["touches"]["test"]),
         (&3.into(), &540.into(), &60.into())
     );
-    assert_eq!(summary["ours"]["model_bytes"], std::fs::metadata(out.join("model.palpate")).unwrap().len());
-    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
-    assert!(page.contains("globe") && page.contains("lump") && page.contains("</html>"));
-}
-
-#[test]
-fn run_trains_and_tests_with_noise_and_says_so_in_its_command() {
-    let directory = tempfile::tempdir().unwrap();
-    meshes(directory.path());
-    let mut command = command(["run", "meshes", "-o", "out", "--touches", "300", "--real", "noise=0..20ms,timer=1ms"]);
-    stdout(command.current_dir(&directory).output().unwrap());
-    let read = |name: &str| -> Value {
-        serde_json::from_slice(&std::fs::read(directory.path().join("out").join(name)).unwrap()).unwrap()
-    };
-    let summary = read("summary.json");
+    assert_eq!(summary["ours"]["model_bytes"], fs::metadata(out.join("model.palpate")).unwrap().len());
     assert!(summary["command"].as_str().unwrap().ends_with("--real noise=0..20ms,timer=1ms"), "{}", summary["command"]);
     assert_eq!(summary["made_from"]["noise"]["deviation"]["largest"], 20_000.0);
     // Ours is trained for it, the paper's method stays as published.
-    assert!(read("ensemble.json")["learner"]["attributes"]["palpate_noise"].is_string());
-    assert!(read("paper.json")["learner"]["attributes"]["palpate_noise"].is_null());
+    let noise = |name: &str| read(&out.join(name))["learner"]["attributes"]["palpate_noise"].take();
+    assert!(noise("ensemble.json").is_string() && noise("paper.json").is_null());
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("globe") && page.contains("lump") && page.contains("</html>"));
 }
 
 #[test]
 fn report_writes_a_page_with_every_figure_it_names() {
     let directory = tempfile::tempdir().unwrap();
     meshes(directory.path());
-    let text = stdout(
-        command(["report", "meshes", "-o", "report", "--quick", "--real", "noise=0..10ms"])
-            .current_dir(&directory)
-            .output()
-            .unwrap(),
-    );
-    let page = directory.path().join("report/index.html");
+    let text = succeeds(directory.path(), "report meshes -o report --quick --real noise=0..10ms");
     assert!(text.trim_end().ends_with("index.html"), "{text}");
-    let page = std::fs::read_to_string(page).unwrap();
+    let page = fs::read_to_string(directory.path().join("report/index.html")).unwrap();
     assert!(page.contains("globe") && page.contains("lump"));
     assert!(page.contains("<svg") && page.contains("</html>"));
     assert!(page.contains("touches with noise of 0 to 10 ms") && page.contains("2 % of contacts missed"));

@@ -1,4 +1,4 @@
-use crate::{command, globe, stdout};
+use crate::{command, shapes, succeeds};
 use std::process::Command;
 
 /// The lines for a capture without Dask, as the documentation has them.
@@ -12,11 +12,8 @@ fn documented(start: &str) -> &'static str {
 fn the_documented_lines_capture_in_parts_that_are_the_whole_together() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path();
-    std::fs::create_dir(path.join("meshes")).unwrap();
-    globe(&path.join("meshes"), "globe", 12);
-    globe(&path.join("meshes"), "apple", 6);
-    let one = ["capture", "meshes/", "-o", "one", "--touches", "500"];
-    stdout(command(one).current_dir(path).output().unwrap());
+    shapes(path);
+    succeeds(path, "capture meshes/ -o one --touches 500");
     let program = command([""; 0]).get_program().to_owned();
     // A few touches only.
     let script = format!(
@@ -26,7 +23,7 @@ fn the_documented_lines_capture_in_parts_that_are_the_whole_together() {
     );
     let ran = Command::new("bash").arg("-c").arg(script).env("PROGRAM", program).current_dir(path).output().unwrap();
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-    for file in ["apple.txt", "globe.txt"] {
+    for file in ["ball.txt", "disc.txt"] {
         let read = |part: &str| std::fs::read(path.join(part).join(file)).unwrap();
         assert!(read("one") == read("whole"), "{file}");
         assert_eq!(read("whole").split(|&byte| byte == b'\n').count(), 501);

@@ -1,5 +1,6 @@
 //! Running the program, and files for it.
 
+use palpate::mesh::{Mesh, obj};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -36,24 +37,47 @@ pub(crate) fn stderr(output: Output, code: i32) -> String {
     error
 }
 
-/// Runs the program in a directory.
-pub(crate) fn palpate(directory: &Path, arguments: &[&str]) -> Output {
-    command(arguments).current_dir(directory).output().unwrap()
+/// Runs the program in a directory, with these words.
+pub(crate) fn palpate(directory: &Path, words: &str) -> Output {
+    command(words.split_whitespace()).current_dir(directory).output().unwrap()
 }
 
 /// The output of a run in a directory that must succeed.
 #[track_caller]
-pub(crate) fn succeeds(directory: &Path, arguments: &[&str]) -> String {
-    stdout(palpate(directory, arguments))
+pub(crate) fn succeeds(directory: &Path, words: &str) -> String {
+    stdout(palpate(directory, words))
+}
+
+/// The JSON that a command prints with `--json`.
+#[track_caller]
+pub(crate) fn figures(directory: &Path, words: &str) -> serde_json::Value {
+    json(palpate(directory, &format!("{words} --json")))
 }
 
 /// Runs and fails with this exit code; the message must contain `expected`.
 #[track_caller]
-pub(crate) fn fails(directory: &Path, arguments: &[&str], code: i32, expected: &str) {
-    let output = palpate(directory, arguments);
-    assert!(output.stdout.is_empty());
+pub(crate) fn fails(directory: &Path, words: &str, code: i32, expected: &str) {
+    let output = palpate(directory, words);
+    assert!(output.stdout.is_empty(), "{words}");
     let message = stderr(output, code);
-    assert!(message.contains(expected), "{message}");
+    assert!(message.contains(expected), "{words}: {message}");
+}
+
+/// The JSON of a file.
+pub(crate) fn read(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// The JSON of each line.
+pub(crate) fn lines(text: &str) -> Vec<serde_json::Value> {
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// Copies the first lines of a file into another one.
+pub(crate) fn cut(from: &Path, to: &Path, count: usize) {
+    let text = std::fs::read_to_string(from).unwrap();
+    std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+    std::fs::write(to, text.split_inclusive('\n').take(count).collect::<String>()).unwrap();
 }
 
 /// Writes touches of an object that bends by up to `most` microseconds, in any order; other seeds are other touches. A touch
@@ -74,11 +98,21 @@ pub(crate) fn touches(path: &Path, [most, count, seed]: [u64; 3], partial: bool,
     std::fs::write(path, (0..count).map(|_| line()).collect::<String>()).unwrap();
 }
 
+/// Three shapes in `meshes`, each of few triangles.
+pub(crate) fn shapes(directory: &Path) {
+    std::fs::create_dir(directory.join("meshes")).unwrap();
+    for (name, sides) in [("ball", [1.0, 1.0, 1.0]), ("cigar", [1.0, 0.4, 0.4]), ("disc", [1.0, 1.0, 0.3])] {
+        let mut text = Vec::new();
+        obj::write(&Mesh::globe(8).stretched(sides), &mut text).unwrap();
+        std::fs::write(directory.join(format!("meshes/{name}.obj")), text).unwrap();
+    }
+}
+
 /// A mesh of this many triangles, roughly, as an OBJ file.
 pub(crate) fn globe(directory: &Path, name: &str, rings: u32) -> PathBuf {
     let path = directory.join(format!("{name}.obj"));
     let mut text = Vec::new();
-    palpate::mesh::obj::write(&palpate::mesh::Mesh::globe(rings), &mut text).unwrap();
+    obj::write(&Mesh::globe(rings), &mut text).unwrap();
     std::fs::write(&path, text).unwrap();
     path
 }

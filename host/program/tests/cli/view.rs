@@ -1,4 +1,4 @@
-use crate::{command, globe, listing, run, stderr, stdout};
+use crate::{command, fails, globe, listing, stderr, stdout};
 
 #[test]
 fn a_page_shows_a_mesh_of_ones_own_with_the_touches_that_were_asked_for() {
@@ -32,15 +32,14 @@ fn wrong_arguments_write_no_page() {
     let directory = tempfile::tempdir().unwrap();
     let page = directory.path().join("page.html");
     for (wrong, expected) in [
-        (["--misses", "-1"], "-1"),
-        (["--real", "noise=5ms"], "--real is given. Use it with --play"),
-        (["--length", "9"], "unexpected argument '--length'"),
-        (["--touches", "many"], "many"),
+        ("-o page.html --misses -1", "-1"),
+        ("-o page.html --real noise=5ms", "--real is given. Use it with --play"),
+        ("-o page.html --length 9", "unexpected argument '--length'"),
+        ("-o page.html --touches many", "many"),
+        ("", "--output"),
     ] {
-        let error = stderr(command(["view", "bowl", "-o"]).arg(&page).args(wrong).output().unwrap(), 2);
-        assert!(error.contains(expected), "{error}");
+        fails(directory.path(), &format!("view bowl {wrong}"), 2, expected);
     }
-    stderr(run(["view", "bowl"]), 2);
     assert!(!page.exists());
 }
 
