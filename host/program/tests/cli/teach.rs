@@ -124,7 +124,7 @@ fn what_does_not_go_together_is_named_and_nothing_is_written() {
         ("train data --teach pot.txt --teach unseen -o t.json", 1, "pot was given twice"),
         ("train data --teach known -o t.json --trees rounds=2 --page p.html", 2, "page is p.html"),
         ("train --teach pot.txt -o t.json", 1, "there is only one object to train on"),
-        ("train --teach pot.txt --teach unseen -o t.json --real noise=5ms", 2, "recorded ones have noise of their own"),
+        ("train --teach pot.txt --teach known -o t.json --real noise=5ms", 2, "recorded ones have noise of their own"),
         ("train -o t.json", 2, "<DIRECTORY>"),
         ("train data --extend ensemble.json -o t.json", 2, "--teach"),
         ("train data --extend ensemble.json --teach pot.txt -o t.json --trees rounds=2", 2, "--trees"),
