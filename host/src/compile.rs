@@ -1,8 +1,5 @@
 //! From an ensemble to the bytes that the chip reads: `palpate_trees::compile`, with the ensemble's statements about touches.
 
-#[cfg(test)]
-mod tests;
-
 pub use palpate_trees::compile::*;
 
 use crate::ensemble::{Ensemble, OverTouches, TouchOrigin};

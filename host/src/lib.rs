@@ -132,6 +132,10 @@ pub mod chip;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 
+// Helpers of tests name the library as those in `tests/palpate` do.
+#[cfg(all(test, feature = "train"))]
+extern crate self as palpate;
+
 pub use error::{Error, Result};
 pub use glam;
 pub use palpate_base::{output, progress, with, wording};

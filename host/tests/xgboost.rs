@@ -1,11 +1,10 @@
-//! The trainers compared; shown as ignored where XGBoost is not built in.
+//! The trainers compared: `cargo test --release -p palpate --features xgboost --test xgboost`.
 
 use palpate::ensemble::Ensemble;
 use palpate::ensemble::train::{Engine, Settings, train};
 use palpate::evaluate::{Candidate, Margins};
+use palpate::touches::Dataset;
 use palpate::with;
-pub(crate) use palpate::{random, touches};
-use touches::Dataset;
 
 #[allow(dead_code, reason = "the library's own tests use all of it")]
 #[path = "../src/tests/synthetic.rs"]
@@ -18,10 +17,6 @@ fn both(dataset: &Dataset, settings: &Settings) -> [Ensemble; 2] {
 }
 
 #[test]
-#[cfg_attr(
-    not(feature = "xgboost"),
-    ignore = "needs XGBoost: cargo test --release -p palpate --features xgboost --test xgboost"
-)]
 fn both_trainers_make_the_same_trees_bit_for_bit_over_the_same_bins() {
     // So few different values leave nothing to the quantile sketch, which XGBoost changed after 1.6.
     let settings = with!(Settings::paper(), rounds = 30, feature_bins = Some(vec![40; 3]));
@@ -38,10 +33,6 @@ fn both_trainers_make_the_same_trees_bit_for_bit_over_the_same_bins() {
 }
 
 #[test]
-#[cfg_attr(
-    not(feature = "xgboost"),
-    ignore = "needs XGBoost: cargo test --release -p palpate --features xgboost --test xgboost"
-)]
 fn both_trainers_are_as_accurate_with_the_published_method() {
     let unseen = synthetic::dataset(&[2_000, 2_000, 2_000], 11);
     for counts in [[6_000, 6_000, 6_000], [6_000, 2_000, 3_000]] {
@@ -57,10 +48,6 @@ fn both_trainers_are_as_accurate_with_the_published_method() {
 }
 
 #[test]
-#[cfg_attr(
-    not(feature = "xgboost"),
-    ignore = "needs XGBoost: cargo test --release -p palpate --features xgboost --test xgboost"
-)]
 fn xgboost_refuses_multi_output_trees() {
     let settings = with!(Settings::compact(), trainer = Engine::Xgboost);
     let error = train(&synthetic::dataset(&[50, 50], 12), &settings, &()).unwrap_err();

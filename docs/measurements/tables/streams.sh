@@ -56,5 +56,5 @@ streams "$out/vowels.csv" label id 10%
 streams "$out/vowels.csv" label id 5%
 streams "$out/wrist.csv" label id 10%
 echo "--- promises and false alarms, repeated"
-PALPATE_REPETITIONS=${REPETITIONS:-200} cargo test --release -p palpate --lib stream::tests -- --nocapture promises_are_kept false_alarms |
+PALPATE_REPETITIONS=${REPETITIONS:-200} cargo test --release -p palpate --test palpate stream:: -- --nocapture promises_are_kept false_alarms |
     grep -E "broken|above"

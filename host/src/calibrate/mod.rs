@@ -89,7 +89,5 @@ pub fn of_what(per: Per) -> &'static str {
 
 #[cfg(feature = "train")]
 pub(crate) use walk::allowed;
-#[cfg(all(test, feature = "train"))]
-pub(crate) use walk::enough;
 pub(crate) use walk::{Stop, binomial_tail};
 pub use walk::{Tally, needed};

@@ -1,26 +1,17 @@
 use super::*;
-use crate::compile::{self, CompiledModel, compile};
-use crate::ensemble::train;
+use crate::compile;
 use crate::error::CalibrateProblem;
 use crate::evaluate::{Candidate, Margins, SequentialSettings};
 use crate::evidence::{Chip, Sequences, Supplier, chip, sequences};
 use crate::probe::noise::Noise;
 use crate::random::{Purpose, generator};
-use crate::tests::repetitions::{assert_rare, repetitions};
-use crate::tests::synthetic;
+use crate::tests::synthetic::{self, MODEL};
 use crate::touches::{Dataset, ObjectTouches};
 use crate::with;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
-use rand::RngExt;
 use std::collections::BTreeSet;
 
 const OBJECTS: usize = 3;
-
-fn model() -> CompiledModel {
-    let settings = train::Settings { rounds: 20, depth: 4, eta: 0.3, ..train::Settings::compact() };
-    let ensemble = train::train(&synthetic::dataset(&[2_000; OBJECTS], 1), &settings, &()).unwrap();
-    CompiledModel::from_bytes(compile(&ensemble, &compile::Settings::default()).unwrap().bytes).unwrap()
-}
 
 fn fresh(count: usize, seed: u64) -> Dataset {
     synthetic::dataset(&[count; OBJECTS], seed)
@@ -81,182 +72,6 @@ fn of_robots(mut dataset: Dataset, robots: usize) -> Dataset {
     dataset
 }
 
-fn problem<T>(result: crate::Result<T>) -> CalibrateProblem {
-    match result.err().unwrap().problem() {
-        Some(problem) => CalibrateProblem::clone(problem),
-        other => panic!("{other:?}"),
-    }
-}
-
-/// Places of made-up objects; the first two are hard to tell apart.
-const PLACES: [[f64; 2]; 4] = [[0.0, 0.0], [0.45, 0.0], [2.0, 0.5], [0.0, 2.0]];
-
-/// Sequences of made-up touches: an object's place with Gaussian noise, and the exact evidence of it.
-fn walks(sequences: usize, seed: u64) -> Vec<Sequence> {
-    let sequence = |index: usize| {
-        let object = index % PLACES.len();
-        let mut random = generator(seed, Purpose::Calibration, "walks", index as u64);
-        let (mut sequence, mut evidence) = (Sequence::new(object), [0.0_f64; PLACES.len()]);
-        for touches in 1..=200 {
-            let at = PLACES[object].map(|place| place + (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0);
-            for (evidence, place) in evidence.iter_mut().zip(PLACES) {
-                *evidence -= 0.5 * ((at[0] - place[0]).powi(2) + (at[1] - place[1]).powi(2));
-            }
-            let name = (0..4).max_by(|&a, &b| evidence[a].total_cmp(&evidence[b])).unwrap();
-            let others: f64 = (0..4).filter(|&o| o != name).map(|o| (evidence[o] - evidence[name]).exp()).sum();
-            let odds = odds_of(-others.ln());
-            sequence.take(Lead { name, odds, touches, approaches: touches }, true);
-            if odds <= odds_of(10.0) {
-                break;
-            }
-        }
-        sequence
-    };
-    (0..sequences).map(sequence).collect()
-}
-
-fn names(objects: usize) -> Vec<String> {
-    (0..objects).map(|object| format!("object{object}")).collect()
-}
-
-fn terms(rate: f64, per: Per) -> Terms {
-    Terms { rate, confidence: 0.95, per }
-}
-
-/// Wrong names of those given on fresh sequences: of all, of each name, of each object.
-fn errors(sequences: &[Sequence], odds: &Odds, objects: usize) -> (f64, Vec<f64>, Vec<f64>) {
-    let given: Vec<(usize, usize)> = sequences.iter().filter_map(|s| Some((s.object, s.given(odds)?.name))).collect();
-    let share = |keep: &dyn Fn(&(usize, usize)) -> bool| {
-        let of: Vec<_> = given.iter().filter(|case| keep(case)).collect();
-        of.iter().filter(|(object, name)| object != name).count() as f64 / of.len() as f64
-    };
-    let each =
-        |keep: &dyn Fn(&(usize, usize), usize) -> bool| (0..objects).map(|o| share(&|case| keep(case, o))).collect();
-    (share(&|_| true), each(&|case, o| case.1 == o), each(&|case, o| case.0 == o))
-}
-
-#[test]
-fn a_promise_is_kept_on_fresh_sequences_and_used_up() {
-    let (sequences, fresh) = (walks(20_000, 1), walks(20_000, 2));
-    for rate in [0.1, 0.05, 0.02, 0.01] {
-        let chosen = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Average)).unwrap();
-        let (error, ..) = errors(&fresh, &chosen.odds, 4);
-        // Calibrated to within its 95 % bound, and a standard error of the fresh ones.
-        let spread = (rate / 20_000.0).sqrt();
-        assert!(error <= rate + 2.0 * spread && error > rate - 5.0 * spread, "{rate}: {error}");
-        // Sooner than the posterior's threshold.
-        let Odds::All(odds) = chosen.odds else { panic!("{chosen:?}") };
-        assert!(margin_of(odds) < ((1.0 - rate) / rate).ln(), "{rate}: {}", margin_of(odds));
-        assert!(chosen.wrong as u64 == chosen.tallies[0].wrong && chosen.given > 19_800);
-    }
-}
-
-#[test]
-fn a_promise_per_name_or_object_is_kept_for_each_of_them() {
-    let (sequences, fresh) = (walks(40_000, 1), walks(40_000, 2));
-    let rate = 0.02;
-    let spread = (rate / 10_000.0_f64).sqrt();
-    let average = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Average)).unwrap();
-    let (_, by_name, by_object) = errors(&fresh, &average.odds, 4);
-    assert!(
-        by_name[0] > rate + spread && by_object[1] > rate + spread,
-        "an average says nothing of each: {by_name:?} {by_object:?}"
-    );
-    let name = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Name)).unwrap();
-    let (_, by_name, _) = errors(&fresh, &name.odds, 4);
-    assert!(by_name.iter().all(|error| *error <= rate + 2.0 * spread), "{by_name:?}");
-    assert!(by_name.iter().all(|error| *error > 0.6 * rate), "{by_name:?} is not used up");
-    let object = choose(&sequences, &names(4), 10.0, &terms(rate, Per::Object)).unwrap();
-    let (_, _, by_object) = errors(&fresh, &object.odds, 4);
-    assert!(by_object.iter().all(|error| *error <= rate + 2.0 * spread), "{by_object:?}");
-    assert!(object.mean_touches > average.mean_touches, "each object costs more than their average");
-    assert_eq!((name.tallies.len(), object.tallies.len(), object.sequences), (4, 4, 40_000));
-    assert!(name.mean_touches < 1.2 * average.mean_touches, "{} {}", name.mean_touches, average.mean_touches);
-}
-
-/// Objects of made-up sequences whose error rates are known.
-const KNOWN: usize = 6;
-
-/// The probability that a sequence leads by this margin for a wrong object: for the first wrong one and, if that
-/// is not named, for the second. Each name has its own.
-fn led_wrongly(name: usize, margin: f64) -> [f64; 2] {
-    [0.4, 0.3].map(|share| share * 1.5_f64.powi(name as i32 % 3) * (-margin).exp())
-}
-
-/// A sequence of an object: the next object may lead first, then the one after it, and in the end the right one.
-fn known(object: usize, random: &mut impl rand::Rng) -> Sequence {
-    let mut sequence = Sequence::new(object);
-    let wrong = [1, 2].map(|step| (object + step) % KNOWN);
-    for (touches, (turn, name)) in (1..).zip(wrong.into_iter().enumerate()) {
-        // Where a uniform number is the probability.
-        let margin = led_wrongly(name, 0.0)[turn].ln() - random.random::<f64>().ln();
-        sequence.take(Lead { name, odds: odds_of(margin), touches, approaches: touches }, true);
-    }
-    sequence.take(Lead { name: object, odds: odds_of(12.0), touches: 3, approaches: 3 }, true);
-    sequence
-}
-
-/// The true error rates of thresholds: of all names, of each name, of the names given to each object.
-fn known_rates(odds: &Odds) -> (f64, Vec<f64>, Vec<f64>) {
-    let margins: Vec<f64> = (0..KNOWN).map(|name| margin_of(odds.of(name))).collect();
-    let mut given = vec![[0.0; KNOWN]; KNOWN];
-    for (object, given) in given.iter_mut().enumerate() {
-        let mut left = 1.0;
-        for (turn, name) in [1, 2].map(|step| (object + step) % KNOWN).into_iter().enumerate() {
-            given[name] = left * led_wrongly(name, margins[name])[turn];
-            left -= given[name];
-        }
-        given[object] = left;
-    }
-    let of_object = |object: usize| 1.0 - given[object][object] / given[object].iter().sum::<f64>();
-    let of_name = |name: usize| 1.0 - given[name][name] / given.iter().map(|given| given[name]).sum::<f64>();
-    let right: f64 = (0..KNOWN).map(|object| given[object][object]).sum();
-    let each = |of: &dyn Fn(usize) -> f64| (0..KNOWN).map(of).collect();
-    (1.0 - right / given.iter().flatten().sum::<f64>(), each(&of_name), each(&of_object))
-}
-
-/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib all_rates_promised -- --nocapture` repeats it as often.
-#[test]
-fn all_rates_promised_are_kept_at_once_in_all_but_one_of_twenty_calibrations() {
-    let (rate, repetitions) = (0.05, repetitions(20));
-    let mut broken = [0; 3];
-    let mut used = [0.0; 3];
-    for run in 0..repetitions {
-        let mut random = generator(run, Purpose::Synthetic, "known", 0);
-        let sequences: Vec<Sequence> = (0..4_800).map(|index| known(index % KNOWN, &mut random)).collect();
-        for (way, per) in [Per::Average, Per::Name, Per::Object].into_iter().enumerate() {
-            let chosen = choose(&sequences, &names(KNOWN), 6.0, &terms(rate, per)).unwrap();
-            let (all, names, objects) = known_rates(&chosen.odds);
-            let rates = [vec![all], names, objects][way].clone();
-            used[way] += rates.iter().sum::<f64>() / (rates.len() as f64 * rate * repetitions as f64);
-            broken[way] += u64::from(rates.iter().any(|of| *of > rate));
-        }
-    }
-    for (way, per) in ["average", "name", "object"].into_iter().enumerate() {
-        println!("{per}: {:.0} % of the rate is used on average", 100.0 * used[way]);
-        assert_rare(per, broken[way], repetitions, 0.05);
-        // A promise that is kept by not giving names is none.
-        assert!(used[way] > [0.8, 0.35, 0.35][way], "{per}: {}", used[way]);
-    }
-}
-
-#[test]
-fn thresholds_by_name_are_learned_on_other_sequences_than_they_are_tested_on() {
-    let sequences = walks(12_000, 1);
-    let chosen = choose(&sequences, &names(4), 10.0, &terms(0.05, Per::Name)).unwrap();
-    assert_eq!(chosen.sequences, 8_000);
-    // Each object's later sequences, whatever instance or robot they are of in turn.
-    let tested: Vec<Sequence> = sequences[4_000..].to_vec();
-    let wrong: Vec<_> = tested.iter().filter(|s| s.given(&chosen.odds).is_some_and(|l| l.name != s.object)).collect();
-    assert_eq!(wrong.len(), chosen.wrong);
-    // What was tested on decides at which of the learned thresholds the walk ends, and no more: with its objects
-    // confused nothing is promised, instead of something stricter.
-    let mut confused = sequences;
-    confused[4_000..].iter_mut().step_by(9).for_each(|sequence| sequence.object = (sequence.object + 1) % 4);
-    let problem = problem(choose(&confused, &names(4), 10.0, &terms(0.05, Per::Name)));
-    assert!(matches!(problem, CalibrateProblem::NotKept { object: Some(_), .. }), "{problem:?}");
-}
-
 #[test]
 fn an_object_that_is_wrong_more_often_than_all_names_together_is_named() {
     // Three objects are recognized; of the fourth few sequences end with a name, and of these many with a wrong one.
@@ -272,8 +87,9 @@ fn an_object_that_is_wrong_more_often_than_all_names_together_is_named() {
         sequence.take(Lead { name, odds: odds_of(9.0), touches: 5, approaches: 5 }, true);
         sequence
     };
+    let names = ["object0", "object1", "object2", "object3"].map(String::from);
     let sequences: Vec<Sequence> = (0..8_000).map(sequence).collect();
-    let chosen = choose(&sequences, &names(4), 8.0, &terms(0.05, Per::Average)).unwrap();
+    let chosen = choose(&sequences, &names, 8.0, &Terms { rate: 0.05, confidence: 0.95, per: Per::Average }).unwrap();
     assert_eq!(chosen.touched[3], Tally { wrong: 200, all: 600 });
     assert_eq!(chosen.named[0], Tally { wrong: 200, all: 2_200 });
     assert_eq!(chosen.touched[0].wrong + chosen.touched[1].wrong + chosen.touched[2].wrong, 0);
@@ -283,43 +99,20 @@ fn an_object_that_is_wrong_more_often_than_all_names_together_is_named() {
         named: chosen.named[object].all,
         named_wrongly: chosen.named[object].wrong,
     };
-    let worse = calibrated::worse(&names(4).into_iter().zip((0..4).map(of)).collect(), 0.05);
+    let worse = calibrated::worse(&names.into_iter().zip((0..4).map(of)).collect(), 0.05);
     let [first, last] = &worse[..] else { panic!("{worse:?}") };
     assert_eq!((first.object.as_str(), first.given, first.named), ("object0", None, Some(200.0 / 2_200.0)));
     assert_eq!((last.object.as_str(), last.given, last.named), ("object3", Some(200.0 / 600.0), None));
 }
 
 #[test]
-fn too_few_sequences_promise_nothing_and_say_how_many_it_takes() {
-    let sequences = walks(400, 1);
-    assert!(choose(&sequences, &names(4), 10.0, &terms(0.05, Per::Average)).is_ok());
-    let few = problem(choose(&sequences, &names(4), 10.0, &terms(0.001, Per::Average)));
-    assert!(matches!(few, CalibrateProblem::TooFew { object: None, needed: 2_995, found: 399..=400, .. }), "{few:?}");
-    let few = problem(choose(&sequences, &names(4), 10.0, &terms(0.02, Per::Object)));
-    assert!(matches!(few, CalibrateProblem::TooFew { object: Some(_), needed: 149, found: 100, .. }), "{few:?}");
-    assert!(matches!(
-        problem(choose(&[], &names(4), 10.0, &terms(0.1, Per::Average))),
-        CalibrateProblem::TooFew { found: 0, .. }
-    ));
-}
-
-#[test]
-fn a_model_that_is_wrong_however_sure_it_is_keeps_no_promise() {
-    let mut sequences = walks(2_000, 1);
-    // Every twentieth is of another object than it seems.
-    sequences.iter_mut().step_by(20).for_each(|sequence| sequence.object = (sequence.object + 1) % 4);
-    let problem = problem(choose(&sequences, &names(4), 10.0, &terms(0.01, Per::Average)));
-    assert!(matches!(problem, CalibrateProblem::NotKept { wrong: 90..=110, given: 1_800..=2_000, .. }), "{problem:?}");
-}
-
-#[test]
 fn sequences_are_whole_and_use_no_touch_twice() {
-    let (compiled, dataset) = (model(), fresh(3_000, 2));
+    let dataset = fresh(3_000, 2);
     let limit = Limit { margin: 6.0, max_touches: 50 };
-    let sequences = follow(&compiled.model(), &mut supplies(&dataset), &[90; 3], limit, &()).unwrap();
+    let sequences = follow(&MODEL.model(), &mut supplies(&dataset), &[90; 3], limit, &()).unwrap();
     assert_eq!(sequences.len(), 270);
     for mut supply in supplies(&dataset) {
-        let used = used(&compiled.model(), &mut supply, limit).concat();
+        let used = used(&MODEL.model(), &mut supply, limit).concat();
         assert_eq!(used.iter().collect::<BTreeSet<_>>().len(), used.len());
     }
     for sequence in &sequences {
@@ -329,7 +122,7 @@ fn sequences_are_whole_and_use_no_touch_twice() {
     }
     // Fewer touches make fewer sequences, equally many of each object.
     let few = synthetic::dataset(&[300, 3_000, 3_000], 2);
-    let sequences = follow(&compiled.model(), &mut supplies(&few), &[90; 3], limit, &());
+    let sequences = follow(&MODEL.model(), &mut supplies(&few), &[90; 3], limit, &());
     let sequences = sequences.unwrap();
     let of = |object| sequences.iter().filter(|sequence| sequence.object == object).count();
     assert!(of(0) > 3 && of(0) < 90 && of(0) == of(1) && of(0) == of(2), "{}", of(0));
@@ -337,12 +130,12 @@ fn sequences_are_whole_and_use_no_touch_twice() {
 
 #[test]
 fn every_robot_makes_one_sequence() {
-    let (compiled, dataset) = (model(), of_robots(fresh(1_000, 2), 20));
+    let dataset = of_robots(fresh(1_000, 2), 20);
     let limit = Limit { margin: 6.0, max_touches: 50 };
-    let sequences = follow(&compiled.model(), &mut supplies(&dataset), &[90; 3], limit, &()).unwrap();
+    let sequences = follow(&MODEL.model(), &mut supplies(&dataset), &[90; 3], limit, &()).unwrap();
     assert_eq!(sequences.len(), 3 * 20);
     for mut supply in supplies(&dataset) {
-        let robots: Vec<BTreeSet<u32>> = in_turns(used(&compiled.model(), &mut supply, limit), 20);
+        let robots: Vec<BTreeSet<u32>> = in_turns(used(&MODEL.model(), &mut supply, limit), 20);
         assert!(robots.iter().all(|robots| robots.len() == 1), "{robots:?}");
         assert_eq!(robots.into_iter().flatten().collect::<BTreeSet<_>>().len(), 20);
     }
@@ -350,21 +143,21 @@ fn every_robot_makes_one_sequence() {
 
 #[test]
 fn every_sequence_is_of_one_instance() {
-    let (compiled, dataset) = (model(), fresh(1_000, 2));
+    let dataset = fresh(1_000, 2);
     let names = ["a", "b", "c"].map(String::from);
     let touched = ObjectTouches::in_turn("object0", dataset.objects[0].touches().to_vec(), &names, 0);
     let limit = Limit { margin: 6.0, max_touches: 50 };
     let mut supply = [TouchSupply::new(0, &touched, 1)];
-    let sequences = follow(&compiled.model(), &mut supply, &[30], limit, &()).unwrap();
+    let sequences = follow(&MODEL.model(), &mut supply, &[30], limit, &()).unwrap();
     assert_eq!(sequences.len(), 30);
-    let instances = in_turns(used(&compiled.model(), &mut TouchSupply::new(0, &touched, 1), limit), 3);
+    let instances = in_turns(used(&MODEL.model(), &mut TouchSupply::new(0, &touched, 1), limit), 3);
     assert!(instances.len() > 30 && instances.iter().all(|instances| instances.len() == 1), "{instances:?}");
 }
 
 #[test]
 fn sequences_stop_where_the_recognizer_stops() {
-    let (compiled, dataset) = (model(), fresh(3_000, 2));
-    let model = compiled.model();
+    let dataset = fresh(3_000, 2);
+    let model = MODEL.model();
     let limit = Limit { margin: 8.0, max_touches: 60 };
     let sequences = follow(&model, &mut supplies(&dataset), &[40; 3], limit, &()).unwrap();
     // The same touches in the same order, pushed into a recognizer that stops by itself.
@@ -411,104 +204,9 @@ fn replay(dataset: &Dataset, object: usize) -> impl Iterator<Item = palpate_shar
 }
 
 #[test]
-fn a_calibrated_model_states_its_promise_and_keeps_it_on_fresh_touches() {
-    let compiled = model();
-    for per in [Per::Average, Per::Name, Per::Object] {
-        let settings = Settings { rate: 0.05, per, sequences: 6_000, max_touches: Some(60), ..Settings::default() };
-        let calibrated = calibrate(&compiled.model(), fresh(60_000, 2), &settings, &()).unwrap();
-        let model = Model::new(&calibrated.model).unwrap();
-        assert_eq!(model.promise(), Some(calibrated.promise));
-        assert_eq!((calibrated.promise.rate, calibrated.promise.per, calibrated.promise.max_touches), (0.05, per, 60));
-        assert_eq!(model.odds_of(0).is_some(), per == Per::Name);
-        assert!((model.temperature().value() - calibrated.temperature.unwrap()).abs() < 1e-12);
-        assert!(
-            calibrated.temperature.is_some_and(|found| (0.8..2.0).contains(&found)),
-            "{:?}",
-            calibrated.temperature
-        );
-        // No margin changes.
-        let touch = fresh(1, 3).objects[0].touches()[0];
-        let mut margins = [[0; OBJECTS]; 2];
-        assert!(compiled.model().margins(&touch, &mut margins[0]) && model.margins(&touch, &mut margins[1]));
-        assert_eq!(margins[0], margins[1]);
-        let unseen = fresh(4_000, 4);
-        let margins = Margins::new(Candidate::Compiled(&model), &unseen).unwrap();
-        let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 1_000, seed: 1 };
-        let sequential = margins.sequential(&settings).unwrap();
-        assert!(sequential.error <= 0.05 + 2.0 * sequential.error_standard_error, "{sequential:?}");
-        assert_eq!((sequential.promised, sequential.per), (Some(0.05), Some(per.name())));
-        let naive = margins.sequential(&SequentialSettings { error_rate: Some(0.05), ..settings }).unwrap();
-        let touches = [sequential.mean_touches, naive.mean_touches];
-        assert!(per != Per::Average || touches[0] < touches[1], "{touches:?}");
-        assert_eq!((naive.promised, naive.per), (None, None));
-    }
-}
-
-#[test]
-fn calibrating_again_replaces_what_an_earlier_calibration_stated() {
-    let compiled = model();
-    let settings = |per, rate| Settings { per, rate, sequences: 3_000, ..Settings::default() };
-    let once = calibrate(&compiled.model(), fresh(30_000, 2), &settings(Per::Name, 0.1), &()).unwrap();
-    let model = CompiledModel::from_bytes(once.model).unwrap();
-    let twice = calibrate(&model.model(), fresh(30_000, 2), &settings(Per::Average, 0.05), &()).unwrap();
-    let direct = calibrate(&compiled.model(), fresh(30_000, 2), &settings(Per::Average, 0.05), &()).unwrap();
-    assert_eq!(twice.model, direct.model);
-}
-
-#[test]
-fn the_same_seed_gives_the_same_model_on_any_number_of_threads() {
-    let compiled = model();
-    let settings = Settings { rate: 0.05, per: Per::Name, sequences: 3_000, ..Settings::default() };
-    let with = |threads, seed| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let settings = Settings { seed, ..settings.clone() };
-        pool.install(|| calibrate(&compiled.model(), fresh(30_000, 2), &settings, &()).unwrap().model)
-    };
-    assert_eq!(with(1, 1), with(3, 1));
-    assert_ne!(with(1, 1), with(1, 2));
-}
-
-#[test]
-fn noise_is_stated_and_a_bias_makes_every_sequence_a_robots() {
-    let compiled = model();
-    let noise = with!(Noise::gaussian(1_000.0), speed_bias = 0.02);
-    let settings = Settings { rate: 0.2, max_touches: Some(20), noise, ..Settings::default() };
-    let calibrated = calibrate(&compiled.model(), fresh(4_000, 2), &settings, &()).unwrap();
-    assert_eq!(Noise::of_promise(&calibrated.promise.noise), noise);
-    // 190 robots of 20 touches or more that are evidence, less a few for the pilot.
-    assert!((3 * 175..3 * 200).contains(&calibrated.sequences), "{}", calibrated.sequences);
-}
-
-#[test]
-fn what_cannot_be_calibrated_says_so() {
-    let compiled = model();
-    let refused = |settings: Settings| calibrate(&compiled.model(), fresh(100, 2), &settings, &()).unwrap_err();
-    for (settings, expected) in [
-        (Settings { rate: 0.5, ..Settings::default() }, "error_rate is 0.5"),
-        (Settings { rate: f64::NAN, ..Settings::default() }, "error_rate is NaN"),
-        (Settings { confidence: 1.0, ..Settings::default() }, "confidence is 1"),
-        (Settings { sequences: 0, ..Settings::default() }, "sequences is 0"),
-        (Settings { max_touches: Some(0), ..Settings::default() }, "max_touches is 0"),
-        (Settings { noise: Noise::gaussian(-1.0), ..Settings::default() }, "noise is -1"),
-    ] {
-        let error = refused(settings);
-        assert!(error.exit_code() == 2 && error.to_string().contains(expected), "{error}");
-    }
-    let few = refused(Settings::default());
-    assert!(few.exit_code() == 1 && few.to_string().contains("too few to promise 1 %: at least 299"), "{few}");
-    assert!(few.to_string().contains(" approaches of each object or more; there are 100 of one"), "{few}");
-    let less = synthetic::dataset(&[100, 100], 2);
-    let missing = problem(calibrate(&compiled.model(), less, &Settings::default(), &()));
-    assert_eq!(missing, CalibrateProblem::Missing { objects: vec!["object2".into()] });
-    let more = synthetic::dataset(&[100; 4], 2);
-    assert!(calibrate(&compiled.model(), more, &Settings::default(), &()).is_err());
-}
-
-#[test]
 fn with_other_priors_or_fewer_objects_errors_stay_below_what_theory_says() {
-    let compiled = model();
     let settings = Settings { rate: 0.05, sequences: 6_000, max_touches: Some(60), ..Settings::default() };
-    let calibrated = calibrate(&compiled.model(), fresh(60_000, 2), &settings, &()).unwrap();
+    let calibrated = calibrate(&MODEL.model(), fresh(60_000, 2), &settings, &()).unwrap();
     let model = Model::new(&calibrated.model).unwrap();
     let bound = crate::evaluate::by_theory(&model);
     // The threshold is looser than the posterior's, so that is its largest value.
@@ -532,11 +230,10 @@ fn with_other_priors_or_fewer_objects_errors_stay_below_what_theory_says() {
 
 #[test]
 fn as_many_touches_as_a_refusal_says_keep_the_rate_that_was_refused() {
-    let compiled = model();
     let settings = Settings { rate: 0.05, max_touches: Some(60), ..Settings::default() };
     let calibrated = |count: usize, seed: u64, strictest: f64| {
         let start = Start { margin: strictest, loosest: None };
-        calibrate_from(&compiled.model(), fresh(count, seed), &settings, Some(start), &())
+        calibrate_from(&MODEL.model(), fresh(count, seed), &settings, Some(start), &())
     };
     // From loose to strict, the first that is refused though fewer names are wrong than promised.
     let refused = (0..60).find_map(|step| {
@@ -556,6 +253,6 @@ fn as_many_touches_as_a_refusal_says_keep_the_rate_that_was_refused() {
     // Touches with another noise are named.
     let noisy = Settings { noise: Noise::gaussian(40_000.0), ..settings.clone() };
     let start = Start { margin: 0.5, loosest: None };
-    let error = calibrate_from(&compiled.model(), fresh(6_000, 2), &noisy, Some(start), &()).unwrap_err().to_string();
+    let error = calibrate_from(&MODEL.model(), fresh(6_000, 2), &noisy, Some(start), &()).unwrap_err().to_string();
     assert!(error.contains("it was trained for no noise, and they have noise of 40 ms"), "{error}");
 }

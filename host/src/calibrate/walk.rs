@@ -407,4 +407,25 @@ mod tests {
         // 50 at most are expected, with a standard deviation of 7.
         assert!(broken.iter().all(|broken| (1..=65).contains(broken)), "{broken:?}");
     }
+
+    #[test]
+    fn the_guides_least_numbers_are_those_of_the_test() {
+        let guide = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guide/streams.md");
+        let guide = std::fs::read_to_string(guide).unwrap();
+        let mut rows = guide.lines().skip_while(|line| !line.starts_with("| promise |")).skip(2);
+        let stated: Vec<(f64, Vec<u64>)> = rows
+            .by_ref()
+            .map_while(|row| row.strip_prefix("| "))
+            .map(|row| {
+                let mut cells = row.trim_end_matches(" |").split(" | ");
+                let rate: f64 = cells.next().unwrap().trim_end_matches(" %").parse().unwrap();
+                (rate / 100.0, cells.map(|cell| cell.replace(',', "").parse().unwrap()).collect())
+            })
+            .collect();
+        assert_eq!(stated.len(), 3, "{stated:?}");
+        for (rate, least) in stated {
+            let one_wrong = enough(1, rate, 0.95);
+            assert_eq!(least, [needed(rate, 0.95), one_wrong], "{rate}");
+        }
+    }
 }

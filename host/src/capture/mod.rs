@@ -27,8 +27,6 @@
 
 mod admission;
 pub(crate) mod error;
-#[cfg(test)]
-mod located_tests;
 mod memory;
 mod pipeline;
 mod sample;

@@ -3,8 +3,6 @@
 //! [`train::train`] makes an [`Ensemble`] from a [`Dataset`](crate::touches::Dataset), and [`load`] reads one. Ensembles and
 //! their files are those of `palpate_trees`; what touches state of themselves is a [`TouchOrigin`] in their attributes.
 
-#[cfg(all(test, feature = "train"))]
-mod file_tests;
 mod origin;
 mod schema;
 #[cfg(feature = "train")]

@@ -370,12 +370,6 @@ impl<'m> Margins<'m> {
         self.tested.iter().map(|tested| tested.touches).sum()
     }
 
-    /// All touches of all tested objects together, evidence or not: approaches, if the data set holds those.
-    #[cfg(all(test, feature = "train"))]
-    pub(crate) fn approach_count(&self) -> usize {
-        self.tested.iter().map(|tested| tested.approaches.len()).sum()
-    }
-
     /// The fewest approaches that one robot made of a tested object, or of one of its instances or recordings.
     pub fn fewest_approaches(&self) -> usize {
         (0..self.tested.len()).map(|position| self.most_approaches(position)).min().unwrap_or(0)

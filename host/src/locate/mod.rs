@@ -25,8 +25,6 @@ mod shape_tests;
 mod surface;
 #[cfg(feature = "train")]
 mod table;
-#[cfg(test)]
-mod tests;
 mod world;
 mod write;
 

@@ -278,6 +278,3 @@ impl<'m> Player<'m> {
         self.recognizer.next_approach(0..poses.count())
     }
 }
-
-#[cfg(test)]
-mod tests;

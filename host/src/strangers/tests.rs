@@ -1,15 +1,9 @@
 use super::*;
 use crate::compile::{Settings as Compilation, compile};
 use crate::ensemble::train::{self, train, train_with_background};
-use crate::with;
-
-use crate::evaluate::{self, Margins, SequentialSettings};
-use crate::tests::repetitions::{assert_rare, repetitions};
 use crate::tests::synthetic;
-use palpate_onboard::{Recognizer, Stopping, Verdict};
-use std::sync::LazyLock;
 
-/// Object k bends up to 80 ms · (k + 1). Three are known; objects 5 and 9 are not.
+/// Object k bends up to 80 ms · (k + 1). Three are known.
 const KNOWN: usize = 3;
 
 fn of(objects: std::ops::Range<usize>, count: usize, seed: u64) -> Dataset {
@@ -18,61 +12,17 @@ fn of(objects: std::ops::Range<usize>, count: usize, seed: u64) -> Dataset {
     all
 }
 
-fn training() -> train::Settings {
-    train::Settings { rounds: 20, depth: 4, ..train::Settings::compact() }
-}
-
-/// A model of three objects, without and with a background.
-static MODELS: LazyLock<[Vec<u8>; 2]> = LazyLock::new(|| {
-    let touches = of(0..KNOWN, 4_000, 1);
-    let background = of(4..9, 2_000, 1);
-    let with = train_with_background(&touches, &background, &training(), &()).unwrap();
-    [train(&touches, &training(), &()).unwrap(), with]
-        .map(|ensemble| compile(&ensemble, &Compilation::default()).unwrap().bytes)
-});
-
-fn shapes() -> Vec<ObjectTouches> {
-    of(4..9, 400, 7).objects
-}
-
-fn calibrated(bytes: &[u8], held: Held) -> Tested {
-    let model = compile::open(bytes).unwrap();
-    let fresh = of(0..KNOWN, 30_000, 2);
-    calibrate(&model, &fresh, &shapes(), &Settings { held, ..Settings::default() }).unwrap()
-}
-
-#[test]
-fn strangers_are_found_out_and_known_objects_are_not_taken_for_them() {
-    for bytes in &*MODELS {
-        for held in [Held::Likely, Held::Certain] {
-            let calibrated = calibrated(bytes, held);
-            let model = compile::open(&calibrated.bytes).unwrap();
-            let (known, unknown) = (of(0..KNOWN, 5_000, 3), of(9..10, 5_000, 3));
-            let margins = Margins::new(Candidate::Compiled(&model), &known).unwrap();
-            let strangers = Margins::of_strangers(Candidate::Compiled(&model), &unknown).unwrap();
-            let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 1_000, seed: 1 };
-            let of_known = margins.sequential(&settings).unwrap();
-            let found = evaluate::strangers((&margins, &of_known), &strangers, &settings).unwrap();
-            // 2 % promised; the standard error of 3,000 sequences is a quarter of a percent.
-            assert!(found.false_alarms < 0.028, "{found:?}");
-            assert!((found.false_alarms - of_known.unknown).abs() < 1e-12);
-            assert!(found.detected[&120] + found.wrong_name + found.undecided <= 1.0 + 1e-9);
-            assert!(found.detected[&30] <= found.detected[&60] && found.detected[&60] <= found.detected[&120]);
-            if held == Held::Certain {
-                assert!(found.detected[&120] > 0.9 && found.wrong_name < 0.05, "{found:?}");
-            }
-            assert!(of_known.error < 0.02, "{of_known:?}");
-        }
-    }
-}
-
 #[test]
 fn the_chip_computes_the_misfit_that_was_learned() {
-    for bytes in &*MODELS {
-        let model = compile::open(bytes).unwrap();
+    let (touches, shapes) = (of(0..KNOWN, 4_000, 1), of(4..9, 400, 7));
+    let settings = train::Settings { rounds: 20, depth: 4, ..train::Settings::compact() };
+    for ensemble in [train(&touches, &settings, &()), train_with_background(&touches, &shapes, &settings, &())] {
+        let bytes = compile(&ensemble.unwrap(), &Compilation::default()).unwrap().bytes;
+        let model = compile::open(&bytes).unwrap();
         let (objects, unit) = (model.object_count(), f64::from(model.unit()));
         let supplies = supplies(&model, &of(0..KNOWN, 4_000, 2), 1).unwrap();
-        let moments = Moments::new(&supplies, None, &of_shapes(&model, &shapes()), model.known_count(), objects, unit);
+        let others = of_shapes(&model, &shapes.objects);
+        let moments = Moments::new(&supplies, None, &others, model.known_count(), objects, unit);
         let misfits = misfit::misfits(&moments, None).unwrap();
         let settings = Settings::default();
         let tested = stated(&model, &terms(&settings, &misfits, 0.0, FIRST), &misfits).unwrap();
@@ -89,229 +39,4 @@ fn the_chip_computes_the_misfit_that_was_learned() {
             }
         }
     }
-}
-
-#[test]
-fn a_background_is_a_rival_and_is_never_named() {
-    let model = compile::open(&MODELS[1]).unwrap();
-    assert_eq!((model.object_count(), model.known_count(), model.background()), (4, 3, Some(3)));
-    assert_eq!(model.object_name(3), "background");
-    let mut led = 0;
-    for object in &of(4..9, 2_000, 5).objects {
-        for touches in object.touches().chunks_exact(200) {
-            let mut recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model)).unwrap();
-            touches.iter().for_each(|touch| _ = recognizer.push(touch));
-            assert!(recognizer.best() < 3);
-            led += u32::from(recognizer.evidence()[3] > recognizer.evidence()[recognizer.best()]);
-            assert_ne!(recognizer.verdict(), Verdict::Unknown, "there is no test");
-            if let Verdict::Recognized { object, .. } = recognizer.verdict() {
-                assert!(object < 3);
-            }
-        }
-    }
-    assert!(led > 30, "the background leads on its own touches: {led} of 50");
-}
-
-#[test]
-fn full_and_compiled_model_agree_on_a_background() {
-    let touches = of(0..KNOWN, 4_000, 1);
-    let ensemble = train_with_background(&touches, &of(4..9, 2_000, 1), &training(), &()).unwrap();
-    assert_eq!((ensemble.objects.len(), ensemble.known_count()), (4, 3));
-    let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("ensemble.json");
-    ensemble.save(&path).unwrap();
-    let loaded = crate::ensemble::load(&path).unwrap();
-    assert_eq!(loaded, ensemble);
-    let model = compile::open(&MODELS[1]).unwrap();
-    let parity = evaluate::parity::parity(&loaded, &model, &of(0..KNOWN, 2_000, 3), 500, 1, &()).unwrap();
-    assert_eq!(parity.verdict_differs, 0);
-}
-
-#[test]
-fn what_was_learned_does_not_depend_on_threads() {
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let three = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
-    let make = || calibrated(&MODELS[1], Held::Likely);
-    assert_eq!(one.install(make), three.install(make));
-}
-
-#[test]
-fn a_test_is_replaced_and_taken_out_again() {
-    let bytes = &MODELS[1];
-    let once = calibrated(bytes, Held::Likely).bytes;
-    assert_eq!(calibrated(&once, Held::Likely).bytes, once);
-    assert_eq!(&without(&compile::open(&once).unwrap()).unwrap(), bytes);
-    let plain = calibrated(&MODELS[0], Held::Certain).bytes;
-    assert_eq!(&without(&compile::open(&plain).unwrap()).unwrap(), &MODELS[0]);
-}
-
-#[test]
-fn without_other_shapes_a_test_is_made_too() {
-    let model = compile::open(&MODELS[0]).unwrap();
-    let settings = Settings { held: Held::Certain, ..Settings::default() };
-    let calibrated = calibrate(&model, &of(0..KNOWN, 30_000, 2), &[], &settings).unwrap();
-    assert!(calibrated.terms.least >= FIRST && calibrated.terms.sequences > 300);
-    assert!(calibrated.alarms as f64 <= 0.02 * f64::from(calibrated.terms.sequences));
-}
-
-#[test]
-fn what_cannot_be_calibrated_says_so() {
-    let model = compile::open(&MODELS[0]).unwrap();
-    let message =
-        |dataset: &Dataset, settings: &Settings| calibrate(&model, dataset, &[], settings).unwrap_err().to_string();
-    let usual = Settings::default();
-    assert!(message(&of(0..2, 1_000, 2), &usual).contains("no touches of object2"));
-    assert!(message(&of(0..4, 1_000, 2), &usual).contains("object3"));
-    let few = message(&of(0..KNOWN, 200, 2), &usual);
-    assert!(few.contains("sequences of object") && few.contains("times as many touches of object"), "{few}");
-    assert!(message(&of(0..KNOWN, 1_000, 2), &Settings { alarms: 0.0, ..usual }).contains("alarms is 0"));
-    let strangers = Margins::of_strangers(Candidate::Compiled(&model), &of(0..KNOWN, 100, 1));
-    assert!(matches!(
-        strangers.err().unwrap().problem::<EvaluateProblem>(), Some(EvaluateProblem::KnownObject { object }) if object == "object0"
-    ));
-}
-
-/// Touches of the known objects for a promise, and what is promised.
-fn promised(seed: u64, held: Held, rate: f64) -> (crate::calibrate::Calibrated, Tested) {
-    let model = compile::open(&MODELS[0]).unwrap();
-    let promise = crate::calibrate::Settings { rate, max_touches: Some(60), seed, ..Default::default() };
-    let settings = Settings { held, alarms: 0.05, seed, ..Settings::default() };
-    calibrate_with_promise(&model, &of(0..KNOWN, 15_000, 100 + seed), None, &shapes(), &settings, &promise, &())
-        .unwrap()
-}
-
-/// Results of a model on sequences of touches that nothing was made from, each touch in one of them: shares of the
-/// names that are wrong, and of the sequences that are unknown; and the touches used on average.
-fn on_fresh_touches(bytes: &[u8], fresh: &Dataset) -> [f64; 3] {
-    let model = compile::open(bytes).unwrap();
-    let (mut sequences, mut given, mut wrong, mut unknown, mut used) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (object, touched) in fresh.objects.iter().enumerate() {
-        let mut recognizer = Recognizer::<4>::new(&model, Stopping::from_model(&model)).unwrap();
-        for touch in touched.touches() {
-            let Ok(verdict) = recognizer.push(touch) else { continue };
-            let (is_given, is_wrong, is_unknown) = match verdict {
-                Verdict::Undecided => continue,
-                Verdict::Recognized { object: name, .. } => {
-                    (1.0, f64::from(u8::from(usize::from(name) != object)), 0.0)
-                }
-                Verdict::Unknown => (0.0, 0.0, 1.0),
-                Verdict::GaveUp => (0.0, 0.0, 0.0),
-            };
-            (sequences, given, wrong) = (sequences + 1.0, given + is_given, wrong + is_wrong);
-            (unknown, used) = (unknown + is_unknown, used + f64::from(recognizer.touches()));
-            recognizer.reset();
-        }
-    }
-    [wrong / given, unknown / sequences, used / sequences]
-}
-
-#[test]
-fn a_promise_beside_a_test_for_strangers_is_one_of_the_model_with_its_test() {
-    let fresh = of(0..KNOWN, 60_000, 5);
-    for held in [Held::Likely, Held::Certain] {
-        let (promised, tested) = promised(1, held, 0.05);
-        let model = compile::open(&tested.bytes).unwrap();
-        assert_eq!((&promised.model, model.promise()), (&tested.bytes, Some(promised.promise)));
-        let [wrong, unknown, touches] = on_fresh_touches(&tested.bytes, &fresh);
-        assert!(wrong < 0.06 && unknown < 0.06, "{held:?}: {wrong} {unknown}");
-        // As many touches as the promise says: those of a model that waits for its test.
-        assert!((touches / promised.used.mean() - 1.0).abs() < 0.1, "{held:?}: {touches} {}", promised.used.mean());
-        assert!((touches / tested.mean_touches - 1.0).abs() < 0.1, "{held:?}: {touches} {}", tested.mean_touches);
-        // And without a name as often: unknown, or undecided.
-        assert!(promised.undecided > 0.3 * unknown, "{held:?}: {} {unknown}", promised.undecided);
-    }
-}
-
-#[test]
-fn a_promise_made_without_a_test_is_not_stated_with_one() {
-    let model = compile::open(&MODELS[0]).unwrap();
-    let settings = crate::calibrate::Settings { rate: 0.05, ..Default::default() };
-    let promised = crate::calibrate::calibrate(&model, of(0..KNOWN, 30_000, 3), &settings, &()).unwrap().model;
-    let with = calibrated(&promised, Held::Likely).bytes;
-    assert_eq!(compile::open(&with).unwrap().promise(), None);
-    let (_, with) = self::promised(1, Held::Likely, 0.05);
-    let without = without(&compile::open(&with.bytes).unwrap()).unwrap();
-    assert_eq!(compile::open(&without).unwrap().promise(), None);
-}
-
-/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib both_shares_promised -- --nocapture` repeats it as often.
-#[test]
-fn both_shares_promised_are_kept_in_all_but_one_of_twenty_calibrations() {
-    let fresh = of(0..KNOWN, 60_000, 5);
-    let repetitions = repetitions(3);
-    let (mut wrong, mut alarms) = (0, 0);
-    for seed in 0..repetitions {
-        let (_, tested) = promised(seed, Held::Likely, 0.05);
-        let [names, unknown, _] = on_fresh_touches(&tested.bytes, &fresh);
-        wrong += u64::from(names > 0.05);
-        alarms += u64::from(unknown > 0.05);
-    }
-    assert_rare("wrong names", wrong, repetitions, 0.05);
-    assert_rare("false alarms", alarms, repetitions, 0.05);
-}
-
-/// Touches of the known objects as a robot makes them of which the simulation knows nothing.
-fn of_robot(count: usize, seed: u64) -> Dataset {
-    let mut dataset = of(0..KNOWN, count, seed);
-    dataset.add_noise(&with!(crate::probe::noise::Noise::gaussian(10_000.0), speed = 1.25), seed, 1);
-    dataset
-}
-
-#[test]
-fn a_test_that_is_calibrated_on_recordings_keeps_its_false_alarms_on_them_and_warns_where_simulated_ones_do_not() {
-    let model = compile::open(&MODELS[0]).unwrap();
-    let (simulated, robot) = (of(0..KNOWN, 30_000, 2), of_robot(2_000, 5));
-    let settings = Settings { held: Held::Certain, ..Settings::default() };
-    let alarms = |calibrated: &Tested, seed| {
-        let model = compile::open(&calibrated.bytes).unwrap();
-        let alarms = recorded::alarms(&model, &of_robot(20_000, seed), &settings).unwrap();
-        alarms.all() as f64 / alarms.sequences as f64
-    };
-    let alone = calibrate(&model, &simulated, &shapes(), &settings).unwrap();
-    assert!(alarms(&alone, 6) > 0.04, "{}", alarms(&alone, 6));
-    let both = calibrate_recorded(&model, &simulated, &robot, &shapes(), &settings).unwrap();
-    let found = both.recorded.clone().unwrap();
-    assert!(found.before.differs && found.before.objects.len() == KNOWN, "{found:?}");
-    assert!(found.alarms as f64 <= found.supported * found.sequences as f64, "{found:?}");
-    assert!(alarms(&both, 6) < found.supported + 0.005, "{} {found:?}", alarms(&both, 6));
-    assert_eq!(
-        (both.terms.sequences as usize, f64::from(both.terms.alarms) * 1e-6),
-        (found.sequences, found.supported)
-    );
-    // Recordings that are like the simulation raise no warning.
-    let same = calibrate_recorded(&model, &simulated, &of(0..KNOWN, 2_000, 5), &shapes(), &settings).unwrap();
-    assert!(!same.recorded.unwrap().before.differs);
-}
-
-#[test]
-fn few_recordings_state_the_share_of_false_alarms_that_they_support() {
-    let model = compile::open(&MODELS[0]).unwrap();
-    let settings = Settings::default();
-    let few = calibrate_recorded(&model, &of(0..KNOWN, 30_000, 2), &of_robot(300, 5), &shapes(), &settings).unwrap();
-    let found = few.recorded.unwrap();
-    assert!((10..149).contains(&found.sequences) && found.alarms == 0, "{found:?}");
-    assert!((found.supported - (1.0 - 0.05_f64.powf(1.0 / found.sequences as f64))).abs() < 2e-6, "{found:?}");
-    let none = calibrate_recorded(&model, &of(0..KNOWN, 30_000, 2), &of_robot(4, 5), &shapes(), &settings);
-    let none = none.unwrap_err();
-    let Some(EvaluateProblem::TooFewRecorded { object, approaches: 4, tested: 2, enough: Some(enough) }) =
-        none.problem()
-    else {
-        panic!("{none}")
-    };
-    let said = none.to_string();
-    assert!(
-        said.starts_with(&format!("the 4 recorded approaches to {object} make no sequence that ends with a name")),
-        "{said}"
-    );
-    // Three objects with a sequence each: 1 - .05^(1/3).
-    assert!(said.contains("supports a false alarm rate of 63.16 %, and 2 % takes about"), "{said}");
-    // As many approaches as it says make one.
-    let one = calibrate_recorded(
-        &model,
-        &of(0..KNOWN, 30_000, 2),
-        &of_robot(2 * enough.one.ceil() as usize, 5),
-        &shapes(),
-        &settings,
-    );
-    assert!(one.is_ok_and(|one| one.recorded.is_some_and(|found| found.supported <= 0.6317)));
 }

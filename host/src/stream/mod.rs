@@ -35,8 +35,6 @@ mod parquet;
 mod parts;
 mod settings;
 mod shape;
-#[cfg(all(test, feature = "train"))]
-mod tests;
 
 pub use calibrate::{calibrate, calibrate_with};
 pub use evaluate::{Comparison, Evaluated, Grown, Point, PromiseOfSequences, Switched, Wanted, evaluate};

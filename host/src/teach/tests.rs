@@ -4,117 +4,18 @@ use super::curve::expected;
 use super::held_out::{places, repeated};
 use super::rows::{Leaves, Rows};
 use super::*;
-use crate::compile;
 use crate::ensemble::OverTouches;
-use crate::ensemble::train::{self, train, train_with_background};
-use crate::error::TeachProblem;
-use crate::evaluate::{Candidate, Margins};
+use crate::ensemble::train::{self, train};
 use crate::probe::noise::Noise;
 use crate::tests::repetitions::repetitions;
-use crate::tests::synthetic;
-use crate::with;
-use palpate_shared::{Descriptor, Pose, Q15_ONE};
+use crate::tests::synthetic::{self, few_trees, to_teach};
+use palpate_shared::Descriptor;
 use rand_distr::{Distribution, StandardNormal};
-
-/// Few trees on known objects, and few groups.
-fn quick() -> train::Settings {
-    train::Settings { rounds: 8, depth: 4, min_child_weight: 5.0, ..train::Settings::compact() }
-}
-
-fn few_groups() -> Settings {
-    Settings { approaches: 30, groups: 100, ..Settings::default() }
-}
-
-/// Two objects to train on and one that is recorded, with this many touches; all three with other touches, to test on.
-fn setting(recorded: usize) -> [Dataset; 3] {
-    let mut known = synthetic::dataset(&[3_000, 3_000, recorded], 1);
-    let taught = known.objects.split_off(2);
-    [known, Dataset::new(taught), synthetic::dataset(&[3_000, 3_000, 3_000], 2)]
-}
-
-#[test]
-fn a_taught_object_is_recognized_and_the_others_still_are() {
-    let [known, recorded, unseen] = setting(300);
-    let ensemble = train(&known, &quick(), &()).unwrap();
-    let (extended, taught) = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap();
-    let figures = Margins::new(Candidate::Full(&extended), &unseen).unwrap();
-    let curve = figures.curve(30, 400, 1).unwrap();
-    for (object, least) in [(0, 0.9), (1, 0.8), (2, 0.9)] {
-        let accuracy = curve.object_accuracy(object, 30).value;
-        assert!(accuracy > least, "object {object}: {accuracy}");
-    }
-    let [object] = &taught.objects[..] else { panic!("{taught:?}") };
-    assert_eq!((object.name.as_str(), object.approaches, object.touches), ("object2", 300, 300));
-    // What was said beforehand came true.
-    assert!((object.recognized - curve.object_accuracy(2, 30).value).abs() < 0.08, "{taught:?}");
-    let points = &object.curve.points;
-    assert_eq!(points.iter().map(|point| point.approaches).collect::<Vec<_>>(), [38, 75, 150, 270]);
-    assert!(points[0].error >= points[3].error, "{points:?}");
-}
-
-#[test]
-fn the_values_of_known_objects_and_the_splits_do_not_change() {
-    let [known, recorded, unseen] = setting(60);
-    let ensemble = train(&known, &train::Settings { leaf_bits: None, ..quick() }, &()).unwrap();
-    let settings = Settings { leaf_bits: None, ..few_groups() };
-    let (extended, _) = teach(&ensemble, &known, &recorded, &settings, &()).unwrap();
-    assert_eq!(extended.objects, ["object0", "object1", "object2"]);
-    for touch in unseen.touches() {
-        assert_eq!(extended.margins(touch)[..2], ensemble.margins(touch));
-    }
-}
-
-#[test]
-fn threads_change_no_bit_and_seeds_do() {
-    let [known, recorded, _] = setting(60);
-    let ensemble = train(&known, &quick(), &()).unwrap();
-    let with =
-        |threads, seed| teach(&ensemble, &known, &recorded, &Settings { threads, seed, ..few_groups() }, &()).unwrap();
-    let one = with(Some(1), 1);
-    assert_eq!(one, with(Some(3), 1));
-    assert_eq!(one, with(None, 1));
-    assert_ne!(one.0, with(None, 2).0);
-}
-
-#[test]
-fn a_taught_ensemble_is_saved_loaded_and_compiled_without_error() {
-    let [known, recorded, unseen] = setting(60);
-    let ensemble = train(&known, &quick(), &()).unwrap();
-    let (extended, _) = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap();
-    let file = tempfile::NamedTempFile::new().unwrap();
-    extended.save(file.path()).unwrap();
-    assert_eq!(crate::ensemble::load(file.path()).unwrap(), extended);
-    assert_eq!(TouchOrigin::of(&extended.origin).unwrap().trained_on(&recorded), ["object2"]);
-    let compiled = compile::compile(&extended, &compile::Settings::default()).unwrap();
-    assert_eq!(compiled.margin_error, 0.0);
-    let model = compile::open(&compiled.bytes).unwrap();
-    for touch in unseen.objects.iter().flat_map(|object| object.touches().iter().take(200)) {
-        let mut margins = [0; 3];
-        model.margins(touch, &mut margins);
-        assert_eq!(extended.margins(touch), margins.map(|units| units as f32 * model.unit()));
-    }
-}
-
-#[test]
-fn a_background_stays_the_last_and_is_no_name() {
-    let [known, recorded, _] = setting(60);
-    let shapes = synthetic::dataset(&[500; 6], 3);
-    let ensemble = train_with_background(&known, &shapes, &quick(), &()).unwrap();
-    let mut all = known.clone();
-    all.objects.push(ObjectTouches::joined(crate::mesh::BACKGROUND, &shapes.objects));
-    let (extended, taught) = teach(&ensemble, &all, &recorded, &few_groups(), &()).unwrap();
-    assert_eq!(extended.objects, ["object0", "object1", "object2", crate::mesh::BACKGROUND]);
-    assert_eq!((extended.known_count(), taught.promise.of_each), (3, 100));
-    // Without the background's touches there is nothing to compare with.
-    let error = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap_err();
-    let missing = TeachProblem::Missing { objects: vec![crate::mesh::BACKGROUND.into()] };
-    assert_eq!(error.problem(), Some(&missing));
-}
 
 #[test]
 fn no_touch_nor_its_copy_is_fitted_on_while_it_is_held_out() {
-    let [known, recorded, unseen] = setting(200);
-    let ensemble = train(&known, &quick(), &()).unwrap();
+    let [known, recorded, unseen] = to_teach(200);
+    let ensemble = train(&known, &few_trees(), &()).unwrap();
     let descriptor = ensemble.descriptor().unwrap();
     let known: Vec<Vec<Touch>> = known.objects.into_iter().map(|object| object.touches().to_vec()).collect();
     let smoothing = Smoothing { jitter: 1.0, prior: 4.0 };
@@ -169,8 +70,8 @@ fn copies_stand_for_the_touch_that_they_are_of() {
 
 #[test]
 fn a_prior_counts_touches_and_not_their_copies() {
-    let [known, recorded, _] = setting(40);
-    let ensemble = train(&known, &quick(), &()).unwrap();
+    let [known, recorded, _] = to_teach(40);
+    let ensemble = train(&known, &few_trees(), &()).unwrap();
     let leaves = Leaves::of(&ensemble);
     let rows = |touches: &[Touch], given| Rows::new(&ensemble, &leaves, Descriptor::ContactsCurvature, touches, given);
     let known: Vec<Rows> = known.objects.iter().map(|object| rows(object.touches(), 3_000)).collect();
@@ -320,89 +221,15 @@ fn errors_that_fall_with_a_power_are_carried_on() {
     assert!(expected(&[point(100, 0.0), point(200, 0.0)], 400) <= 1.001e-3);
 }
 
-fn problem(ensemble: &Ensemble, known: &Dataset, recorded: &Dataset) -> TeachProblem {
-    teach(ensemble, known, recorded, &few_groups(), &()).unwrap_err().problem::<TeachProblem>().cloned().unwrap()
-}
-
-#[test]
-fn what_cannot_be_taught_says_why() {
-    let [known, recorded, _] = setting(60);
-    let ensemble = train(&known, &quick(), &()).unwrap();
-    let one_value = train(&known, &train::Settings { multi_output: false, ..quick() }, &()).unwrap();
-    assert_eq!(problem(&one_value, &known, &recorded), TeachProblem::OneValue);
-    let mut renamed = recorded.clone();
-    renamed.objects[0].name = "object1".into();
-    assert_eq!(problem(&ensemble, &known, &renamed), TeachProblem::Known { object: "object1".into() });
-    let first = known.only(|name| name == "object0");
-    let missing = TeachProblem::Missing { objects: vec!["object1".into()] };
-    assert_eq!(problem(&ensemble, &first, &recorded), missing);
-    assert_eq!(problem(&ensemble, &known, &Dataset::default()), TeachProblem::Nothing);
-    let mut few = recorded.clone();
-    few.objects[0] = few.objects[0].select(0..19);
-    let too_few = TeachProblem::TooFew { object: "object2".into(), touches: 19, least: 20 };
-    assert_eq!(problem(&ensemble, &known, &few), too_few);
-    let mut full = recorded.clone();
-    full.objects[0] = full.objects[0].filtered(Touch::is_full);
-    let counted = palpate_shared::format::Counted::Contacts;
-    assert_eq!(problem(&ensemble, &known, &full), TeachProblem::FullTouches { counted });
-    let groups = Settings { groups: 0, ..few_groups() };
-    let error = teach(&ensemble, &known, &recorded, &groups, &()).unwrap_err();
-    assert_eq!(error.exit_code(), 2);
-}
-
-#[test]
-fn another_probe_and_a_missing_pose_are_refused() {
-    let [mut known, mut recorded, _] = setting(60);
-    let with_pose = |dataset: &mut Dataset| {
-        let pose = Pose { direction: [0, 0, Q15_ONE], alignment: [Q15_ONE, 0, 0] };
-        *dataset = dataset.each(|object| object.changed(|touch| touch.with_pose(pose)));
-    };
-    let origin = |spacing| {
-        let probe = with!(crate::probe::approach::Probe::default(), spacing);
-        Some(crate::touches::Origin { probe, approaches: true, ..Default::default() })
-    };
-    with_pose(&mut known);
-    known.origin = origin(1.5);
-    let settings = train::Settings { descriptor: Descriptor::Oriented, ..quick() };
-    let probe = crate::ensemble::StatedProbe::of(&known);
-    let ensemble = train(&known, &train::Settings { probe, ..settings }, &()).unwrap();
-    let no_pose = TeachProblem::NoPose { object: "object2".into(), descriptor: Descriptor::ContactsOriented };
-    assert_eq!(problem(&ensemble, &known, &recorded), no_pose);
-    with_pose(&mut recorded);
-    teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap();
-    recorded.origin = origin(2.0);
-    let different = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap_err();
-    assert!(different.to_string().contains("spacing 1.5 and 2"), "{different}");
-}
-
-#[test]
-fn recorded_touches_alone_make_an_ensemble_that_states_them() {
-    let recorded = synthetic::dataset(&[150, 150], 1);
-    let unseen = synthetic::dataset(&[2_000, 2_000], 2);
-    let (ensemble, taught) = alone(&recorded, &quick(), &few_groups(), &()).unwrap();
-    let margins = Margins::new(Candidate::Full(&ensemble), &unseen).unwrap();
-    let accuracy = margins.curve(20, 300, 1).unwrap().accuracy(20).value;
-    assert!(accuracy > 0.85, "{accuracy}");
-    assert_eq!(TouchOrigin::of(&ensemble.origin).unwrap().trained_on(&recorded).len(), 2);
-    assert!(TouchOrigin::of(&ensemble.origin).unwrap().noise.is_none() && taught.others.is_none());
-    let ends: Vec<usize> = taught.objects[0].curve.points.iter().map(|point| point.approaches).collect();
-    assert_eq!(ends, [38, 75, 120]);
-    let again = alone(&recorded, &quick(), &Settings { threads: Some(1), ..few_groups() }, &()).unwrap();
-    assert_eq!(again, (ensemble, taught));
-    let few = synthetic::dataset(&[150, 10], 1);
-    let error = alone(&few, &quick(), &few_groups(), &()).unwrap_err();
-    assert!(error.to_string().contains("only 10 recorded touches of object1"), "{error}");
-}
-
 #[test]
 fn known_touches_get_the_noise_that_the_ensemble_was_trained_for_once() {
-    let [known, _, _] = setting(60);
-    let ensemble = train(&known, &train::Settings { noise: Noise::gaussian(5_000.0), ..quick() }, &()).unwrap();
+    let [known, _, _] = to_teach(60);
+    let ensemble = train(&known, &train::Settings { noise: Noise::gaussian(5_000.0), ..few_trees() }, &()).unwrap();
     let noise = |ensemble: &Ensemble, known: &Dataset| super::check::missing_noise(ensemble, known);
     let added = noise(&ensemble, &known).unwrap();
     let touches = known_touches(&ensemble, &known, &added, 1);
     assert_eq!(touches[0].touches(), Noise::gaussian(5_000.0).add("object0", known.objects[0].touches(), 1));
-    let clean = train(&known, &quick(), &()).unwrap();
+    let clean = train(&known, &few_trees(), &()).unwrap();
     assert!(noise(&clean, &known).unwrap().is_none());
     assert_eq!(known_touches(&clean, &known, &Noise::default(), 1)[1], known.objects[1]);
     // Touches that have it already get it once only, and other noise is named.

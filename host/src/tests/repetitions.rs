@@ -1,7 +1,5 @@
 //! Repetitions of tests that may fail by chance, and the allowed probability of failure.
 
-use crate::calibrate::{Tally, binomial_tail};
-
 /// Number of repetitions of a simulation: as the variable PALPATE_REPETITIONS says, else `few` times.
 pub(crate) fn repetitions(few: u64) -> u64 {
     std::env::var("PALPATE_REPETITIONS").map_or(few, |count| count.parse().expect("PALPATE_REPETITIONS is a number"))
@@ -10,8 +8,14 @@ pub(crate) fn repetitions(few: u64) -> u64 {
 /// Asserts that what fails with a probability of at most `share` did not fail more often than that: a binomial test at 1 %.
 pub(crate) fn assert_rare(what: &str, failures: u64, repetitions: u64, share: f64) {
     // Of 40 at most 6, of 200 at most 18, where the share is 5 %.
-    let below = |wrong: u64| binomial_tail(Tally { wrong, all: repetitions }, share);
-    let most = (0..repetitions).find(|&wrong| below(wrong) >= 0.99).unwrap_or(repetitions);
+    let (mut most, all) = (0, repetitions as f64);
+    let mut exactly = (1.0 - share).powf(all);
+    let mut at_most = exactly;
+    while at_most < 0.99 {
+        exactly *= (all - most as f64) / (most as f64 + 1.0) * share / (1.0 - share);
+        at_most += exactly;
+        most += 1;
+    }
     println!("{what}: {failures} of {repetitions} failed; at most {most} may");
     assert!(failures <= most, "{what}: {failures} of {repetitions} failed; at most {most} may");
 }

@@ -1,138 +1,18 @@
 use super::*;
-use crate::compile;
 use crate::ensemble::OverTouches;
-use crate::error::{EnsembleProblem, NameProblem, Setting};
 use crate::tests::synthetic;
-use crate::touches::{ObjectTouches, Source};
+use crate::touches::{ObjectTouches, Origin, Source};
 use crate::with;
-use palpate_shared::ContactTime;
+use crate::{compile, probe::Probe};
 
 fn quick() -> Settings {
     Settings { rounds: 8, depth: 3, counted: Some(Counted::Full), ..Settings::compact() }
 }
 
 #[test]
-fn threads_change_no_bit() {
-    let dataset = synthetic::dataset(&[700, 900, 800], 2);
-    let with =
-        |threads| train(&dataset, &Settings { threads, noise: Noise::gaussian(3_000.0), ..quick() }, &()).unwrap();
-    assert_eq!(with(Some(1)), with(Some(3)));
-    assert_eq!(with(Some(1)), with(None));
-}
-
-#[test]
-fn margins_do_not_count_how_many_touches_an_object_had() {
-    // The same two objects, once with equally many touches and once with ten times as many of the first.
-    let even = synthetic::dataset(&[4_000, 4_000], 3);
-    let mut uneven = even.clone();
-    uneven.objects[1] = uneven.objects[1].select(0..400);
-    let settings = Settings { min_child_weight: 5.0, ..quick() };
-    let [even_margins, uneven_margins] = [&even, &uneven].map(|data| {
-        let ensemble = train(data, &settings, &()).unwrap();
-        let touches = synthetic::dataset(&[2_000, 2_000], 4);
-        let all = touches.touches();
-        let advantage = all.map(|touch| ensemble.margins(touch)).map(|m| f64::from(m[0] - m[1]));
-        advantage.sum::<f64>() / 4_000.0
-    });
-    // The prior, had it been counted, would shift the mean by ln 10 ≈ 2.3.
-    assert!((even_margins - uneven_margins).abs() < 0.3, "{even_margins} {uneven_margins}");
-}
-
-#[test]
-fn touches_with_missing_contacts_train_and_predict() {
-    let dataset = synthetic::dataset(&[500, 500], 5);
-    let touches = dataset.touches();
-    let partial: Vec<&Touch> = touches.filter(|touch| !touch.is_full()).collect();
-    assert!(partial.len() > 20);
-    let ensemble = train(&dataset, &quick(), &()).unwrap();
-    assert!(partial.iter().flat_map(|touch| ensemble.margins(touch)).all(f32::is_finite));
-}
-
-#[test]
-fn settings_out_of_range_are_refused_by_name() {
-    let dataset = synthetic::dataset(&[50, 50], 6);
-    for (settings, expected) in [
-        (Settings { rounds: 0, ..quick() }, "rounds"),
-        (Settings { depth: 0, ..quick() }, "depth"),
-        (Settings { depth: 17, ..quick() }, "depth"),
-        (Settings { eta: 0.0, ..quick() }, "eta"),
-        (Settings { eta: f64::NAN, ..quick() }, "eta"),
-        (Settings { min_child_weight: -1.0, ..quick() }, "min_child_weight"),
-        (Settings { bins: 1, ..quick() }, "bins"),
-        (Settings { feature_bins: Some(vec![9]), ..quick() }, "bins"),
-        (Settings { feature_bins: Some(vec![9, 1]), ..quick() }, "bins"),
-        (Settings { leaf_bits: Some(3), ..quick() }, "leaf_bits"),
-        (Settings { noise: Noise::gaussian(f64::INFINITY), ..quick() }, "noise"),
-        (Settings { threads: Some(0), ..quick() }, "threads"),
-    ] {
-        let error = train(&dataset, &settings, &()).unwrap_err();
-        assert!(
-            matches!(error.problem::<Setting>(), Some(Setting { name, .. }) if *name == expected)
-                && error.exit_code() == 2,
-            "{error}"
-        );
-        assert!(!error.to_string().contains("--"), "the library names an option: {error}");
-    }
-}
-
-#[test]
-fn no_feature_has_more_thresholds_than_its_bins_leave() {
-    let settings = Settings { rounds: 20, feature_bins: Some(vec![12, 5]), ..quick() };
-    let ensemble = train(&synthetic::dataset(&[2_000, 2_000], 7), &settings, &()).unwrap();
-    let mut thresholds = [const { std::collections::BTreeSet::new() }; 2];
-    for node in ensemble.trees.iter().flat_map(|tree| &tree.nodes) {
-        if let Node::Split { feature, threshold, .. } = node {
-            thresholds[*feature].insert(threshold.to_bits());
-        }
-    }
-    let [curvature, slope] = thresholds.map(|set| set.len());
-    // One threshold fewer than bins, and one that tells missing values from all others.
-    assert!((6..=12).contains(&curvature) && (2..=5).contains(&slope), "{curvature} {slope}");
-}
-
-#[test]
-fn a_pose_descriptor_without_poses_says_how_to_get_them() {
-    let settings = Settings { descriptor: Descriptor::Gravity, ..quick() };
-    let error = train(&synthetic::dataset(&[50, 50], 7), &settings, &()).unwrap_err();
-    assert!(error.to_string().contains("with their pose"), "{error}");
-    let problem = TrainProblem::NoPose { descriptor: Descriptor::Gravity };
-    assert_eq!(error.problem::<TrainProblem>(), Some(&problem));
-}
-
-#[test]
-fn more_objects_or_other_names_than_a_model_can_hold_are_refused_before_training() {
-    /// Fails the test as soon as the training begins.
-    struct Never;
-    impl Progress for Never {
-        fn begin(&self, stage: &str, _: Option<u64>) {
-            panic!("{stage} began");
-        }
-    }
-    let error = train(&synthetic::dataset(&[2; 300], 8), &quick(), &Never).unwrap_err();
-    assert_eq!(error.problem(), Some(&TrainProblem::TooManyObjects { objects: 300 }), "{error}");
-    for (name, why) in [("", NameProblem::Empty), ("fo\trk", NameProblem::Control), ("object0", NameProblem::Twice)] {
-        let mut dataset = synthetic::dataset(&[50, 50], 8);
-        dataset.objects[1].name = name.into();
-        let error = train(&dataset, &quick(), &Never).unwrap_err();
-        let problem = EnsembleProblem::ObjectName { name: name.into(), why };
-        assert_eq!(error.problem(), Some(&problem), "{error}");
-    }
-}
-
-#[test]
-fn the_most_objects_that_can_be_trained_can_be_saved_loaded_and_compiled() {
-    let dataset = synthetic::dataset(&[4; 256], 8);
-    let ensemble = train(&dataset, &Settings { rounds: 1, depth: 2, ..quick() }, &()).unwrap();
-    let file = tempfile::NamedTempFile::new().unwrap();
-    ensemble.save(file.path()).unwrap();
-    assert_eq!(crate::ensemble::load(file.path()).unwrap(), ensemble);
-    compile::compile(&ensemble, &compile::Settings::default()).unwrap();
-}
-
-#[test]
 fn an_ensemble_states_the_probe_and_knows_its_touches_again_after_saving() {
     let dataset = synthetic::dataset(&[60, 60], 8);
-    let probe = with!(crate::probe::approach::Probe::default(), spacing = 2.0);
+    let probe = with!(Probe::default(), spacing = 2.0);
     let probe = Some(StatedProbe { probe, length: 12.5, ..StatedProbe::default() });
     let stated = train(&dataset, &Settings { probe, ..quick() }, &()).unwrap();
     let silent = train(&dataset, &quick(), &()).unwrap();
@@ -147,124 +27,14 @@ fn an_ensemble_states_the_probe_and_knows_its_touches_again_after_saving() {
 }
 
 #[test]
-fn one_object_or_an_empty_one_cannot_be_trained() {
-    let error = train(&synthetic::dataset(&[50], 8), &quick(), &()).unwrap_err();
-    assert!(error.to_string().contains("only one object"), "{error}");
-    let error = train(&synthetic::dataset(&[50, 0], 8), &quick(), &()).unwrap_err();
-    assert!(error.to_string().contains("object1 has no touches"), "{error}");
-}
-
-#[test]
-#[cfg(not(feature = "xgboost"))]
-fn a_build_without_xgboost_says_how_to_get_it() {
-    let settings = Settings { trainer: Engine::Xgboost, ..Settings::paper() };
-    let error = train(&synthetic::dataset(&[50, 50], 9), &settings, &()).unwrap_err();
-    assert!(error.exit_code() == 2 && error.to_string().contains("--features xgboost"), "{error}");
-}
-
-#[test]
-fn rounded_leaves_compile_without_any_error_and_add_up_exactly_in_f32() {
-    let dataset = synthetic::dataset(&[300, 300, 300], 1);
-    let ensemble = train(&dataset, &Settings { rounds: 20, ..Settings::compact() }, &()).unwrap();
-    let compiled = compile::compile(&ensemble, &compile::Settings::default()).unwrap();
-    assert_eq!(compiled.margin_error, 0.0);
-    let model = palpate_onboard::Model::new(&compiled.bytes).unwrap();
-    for touch in dataset.touches() {
-        let mut margins = [0; 3];
-        model.margins(touch, &mut margins);
-        assert_eq!(ensemble.margins(touch), margins.map(|units| units as f32 * model.unit()));
-    }
-}
-
-#[test]
-fn rounding_moves_no_leaf_by_more_than_half_a_unit_and_uses_the_bits_it_was_given() {
-    let dataset = synthetic::dataset(&[300, 300, 300], 1);
-    let settings = |leaf_bits| Settings { rounds: 5, leaf_bits, ..Settings::compact() };
-    let plain = train(&dataset, &settings(None), &()).unwrap();
-    let leaves = |ensemble: &crate::ensemble::Ensemble| -> Vec<f32> {
-        ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(|node| node.leaf()).flatten().copied().collect()
-    };
-    let largest = leaves(&plain).iter().fold(0.0_f32, |most, leaf| most.max(leaf.abs()));
-    for bits in [4, 8, 12] {
-        let rounded = leaves(&train(&dataset, &settings(Some(bits)), &()).unwrap());
-        let unit = (1..=15)
-            .rev()
-            .map(|digits| 0.5_f32.powi(digits))
-            .find(|unit| (largest / unit).round() < 2.0_f32.powi(bits as i32 - 1))
-            .unwrap();
-        for (before, after) in leaves(&plain).into_iter().zip(rounded) {
-            assert!(
-                (before - after).abs() <= unit / 2.0 && after % unit == 0.0,
-                "{bits} bits: {before} became {after}"
-            );
-        }
-    }
-}
-
-/// The approaches of two objects: every pattern occurs.
-fn approaches() -> Dataset {
-    let touch = |index: u32, bend: u32| {
-        let missing = |finger: u32| index >> finger & 1 == 1;
-        let times = [0, 1_000 + index % 7 * bend, 3_000 + index % 5 * 100].map(ContactTime::from_micros);
-        let mut fingers = 0..;
-        Touch::new(times.map(|time| if missing(fingers.next().unwrap()) { ContactTime::MISSING } else { time }))
-    };
-    let object =
-        |name: &str, bend| ObjectTouches::new(name, (0..800).map(|index| touch(index, bend)).collect(), Source::Object);
-    Dataset::new(vec![object("cup", 100), object("fork", 400)])
-}
-
-#[test]
-fn approaches_are_trained_on_by_their_contacts_unless_full_touches_or_all_are_asked_for() {
-    let dataset = approaches();
-    assert!(dataset.holds_approaches());
-    let trained = |counted, descriptor| {
-        let settings = Settings { counted, descriptor, ..quick() };
-        train(&dataset, &settings, &()).unwrap()
-    };
-    for (counted, descriptor, expected, patterns) in [
-        (None, Descriptor::Curvature, Descriptor::ContactsCurvature, Patterns::CONTACTS),
-        (Some(Counted::All), Descriptor::Curvature, Descriptor::ContactsCurvature, Patterns::ALL),
-        (Some(Counted::Full), Descriptor::Curvature, Descriptor::Curvature, Patterns::FULL),
-        (Some(Counted::Full), Descriptor::ContactsCurvature, Descriptor::Curvature, Patterns::FULL),
-        (None, Descriptor::Times, Descriptor::Times, Patterns::CONTACTS),
-    ] {
-        let ensemble = trained(counted, descriptor);
-        assert_eq!(ensemble.descriptor(), Some(expected));
-        let stated = ensemble.trained_touches();
-        assert_eq!((stated.patterns, stated.needs_pose), (patterns, false), "{descriptor:?}");
-        assert!((3_000..=3_400).contains(&stated.largest_spread), "{stated:?}");
-        let shares = TouchOrigin::of(&ensemble.origin).unwrap().trained.unwrap().shares.unwrap();
-        assert_eq!(shares, [0.125, 0.25, 0.125, 0.25, 0.125, 0.125]);
-        // The file and every compiled model state the same.
-        let file = tempfile::NamedTempFile::new().unwrap();
-        ensemble.save(file.path()).unwrap();
-        assert_eq!(crate::ensemble::load(file.path()).unwrap(), ensemble);
-        let compiled = crate::compile::compile(&ensemble, &crate::compile::Settings::default()).unwrap();
-        let model = crate::compile::open(&compiled.bytes).unwrap();
-        assert_eq!(model.trained_touches(), stated);
-        assert_eq!(model.pattern_shares().unwrap().0, shares.map(|share| (share * 65_535.0).round() as u16));
-    }
-    // The paper's preset stays with full touches.
-    let paper = train(&dataset, &Settings { rounds: 2, ..Settings::paper() }, &()).unwrap();
-    assert_eq!(paper.trained_touches().patterns, Patterns::FULL);
-}
-
-#[test]
-fn an_object_without_a_touch_that_counts_is_named() {
-    let mut dataset = approaches();
-    dataset.objects[1] = dataset.objects[1].filtered(|touch| !touch.is_full());
-    let error = train(&dataset, &Settings { counted: Some(Counted::Full), ..quick() }, &()).unwrap_err();
-    let problem = TrainProblem::NothingCounts { object: "fork".into(), counted: Counted::Full };
-    assert_eq!(error.problem::<TrainProblem>(), Some(&problem), "{error}");
-}
-
-#[test]
 fn a_stroke_is_the_largest_spread_of_the_ensemble_and_of_every_compiled_model() {
-    let mut dataset = approaches();
-    let probe = with!(crate::probe::Probe::default(), stroke = Some(0.05), travel = Some(20.0));
-    dataset.origin = Some(crate::touches::Origin { probe, approaches: true, ..Default::default() });
-    dataset = dataset.each(|own| own.clone().of_stroke(probe.window()));
+    let probe = with!(Probe::default(), stroke = Some(0.05), travel = Some(20.0));
+    let object = |name: &str, bend| {
+        let touch = |index: u32| Touch::from_micros([0, 1_000 + index % 7 * bend, 3_000 + index % 5 * 100]);
+        ObjectTouches::new(name, (0..800).map(touch).collect(), Source::Object).of_stroke(probe.window())
+    };
+    let origin = Some(Origin { probe, approaches: true, ..Origin::default() });
+    let dataset = Dataset { origin, ..Dataset::new(vec![object("cup", 100), object("fork", 400)]) };
     let noise = Noise::gaussian(2_000.0);
     let settings = Settings { probe: StatedProbe::of(&dataset), noise, ..quick() };
     let ensemble = train(&dataset, &settings, &()).unwrap();
@@ -272,8 +42,8 @@ fn a_stroke_is_the_largest_spread_of_the_ensemble_and_of_every_compiled_model() 
     let file = tempfile::NamedTempFile::new().unwrap();
     ensemble.save(file.path()).unwrap();
     assert_eq!(crate::ensemble::load(file.path()).unwrap(), ensemble);
-    let compiled = crate::compile::compile(&ensemble, &crate::compile::Settings::default()).unwrap();
-    let model = crate::compile::open(&compiled.bytes).unwrap();
+    let compiled = compile::compile(&ensemble, &compile::Settings::default()).unwrap();
+    let model = compile::open(&compiled.bytes).unwrap();
     assert_eq!(model.trained_touches().largest_spread, 5_000);
     let stated = model.probe().unwrap();
     assert_eq!((stated.stroke, stated.travel), (Some(0.05), Some(20.0)));

@@ -1,16 +1,17 @@
 //! Robots' logs: reading, rejected logs with their errors, and writing.
 
+#[path = "../mcap/files.rs"]
 mod files;
 
 use files::{channel, chunk, file, message, python, record, schema, touches};
 use palpate::chip::{Step, Steps};
 use palpate::error::{Error, Place, Problem, TouchesProblem};
+use palpate::shared::Touch;
 use palpate::touches::check::Check;
 use palpate::touches::mcap::{self, TOUCH, VERDICT, Writer};
 use palpate::touches::{
     Content, Dataset, Log, LoggedVerdict, Message, is_log, parse_touch, read_touches, touch_of_seconds,
 };
-use palpate_shared::Touch;
 use std::io::Cursor;
 use std::path::Path;
 

@@ -4,22 +4,16 @@
 //! A sequence is of one mesh. Sequences of touches of several would agree with each other, and with nothing that a robot
 //! meets: an object would be known from the mean of its meshes.
 
-use crate::calibrate::{self, Limit, Odds, Per, TouchSupply, follow};
-use crate::compare;
-use crate::compile::{self, CompiledModel, compile};
-use crate::ensemble::Ensemble;
-use crate::ensemble::train::{self, train};
-use crate::error::CalibrateProblem;
-use crate::evaluate::{self, Candidate, Evaluation, Margins, Sequential, SequentialSettings};
-use crate::probe::noise::Noise;
-use crate::tests::repetitions::{assert_rare, repetitions};
-use crate::tests::synthetic;
-use crate::touches::{Dataset, ObjectTouches, Source, folds};
-use crate::with;
-use crate::{strangers, teach, tune};
-use palpate_onboard::Stopping;
-use palpate_shared::format::Held;
-use std::sync::LazyLock;
+use crate::fixtures::*;
+use crate::synthetic;
+use palpate::calibrate::{self};
+use palpate::compare;
+use palpate::compile::{self, compile};
+use palpate::ensemble::train::{self, train};
+use palpate::error::Result;
+use palpate::evaluate::{self, Evaluation, Sequential};
+use palpate::touches::folds;
+use palpate::{strangers, teach, tune};
 
 /// The instances of each object: none is like the others of its object, and some are nearer to another object's.
 const KINDS: [&[usize]; 3] = [&[5, 8], &[28, 39], &[15, 24]];
@@ -30,8 +24,16 @@ const MOST: u32 = 100;
 const RATE: f64 = 0.05;
 const LARGER_RATE: f64 = 0.1;
 
+/// Touches of the objects, of their instances in turn.
 fn touches(count: usize, seed: u64) -> Dataset {
-    synthetic::of_instances(&KINDS, count, seed)
+    let object = |(index, kinds): (usize, &&[usize])| {
+        let name = format!("object{index}");
+        let mut random = generator(seed, Purpose::Synthetic, &name, 1);
+        let touches = (0..count).map(|turn| synthetic::touch(kinds[turn % kinds.len()], &mut random)).collect();
+        let names: Vec<String> = kinds.iter().map(|kind| format!("kind {kind}")).collect();
+        ObjectTouches::in_turn(name, touches, &names, 0)
+    };
+    Dataset::new(KINDS.iter().enumerate().map(object).collect())
 }
 
 /// Touches as if all of an object were of one mesh.
@@ -40,7 +42,7 @@ fn forgotten(dataset: &Dataset) -> Dataset {
 }
 
 fn recipe() -> train::Settings {
-    train::Settings { rounds: 20, depth: 4, ..train::Settings::compact() }
+    with!(train::Settings::compact(), rounds = 20, depth = 4)
 }
 
 static ENSEMBLE: LazyLock<Ensemble> = LazyLock::new(|| train(&touches(4_000, 1), &recipe(), &()).unwrap());
@@ -80,7 +82,7 @@ fn cases(groups: usize, touches: usize, length: f64) -> f64 {
 /// Results of a candidate on touches of `dataset`: its accuracy after ten, and wrong and unknown ends of its sequences.
 fn measured(candidate: Candidate<'_>, dataset: &Dataset) -> [Share; 3] {
     let margins = Margins::new(candidate, dataset).unwrap();
-    let settings = evaluate::Settings { at: vec![10], at_approaches: vec![10], ..evaluate::Settings::default() };
+    let settings = with!(evaluate::Settings::default(), at = vec![10], at_approaches = vec![10]);
     figures(&evaluate::evaluate(&margins, &settings).unwrap(), dataset)
 }
 
@@ -99,21 +101,25 @@ fn agree(what: &str, stated: [Share; 3], fresh: [Share; 3]) {
     }
 }
 
-/// The share of wrong names among those that thresholds give, of all and of the object that is mistaken most often, over
-/// sequences that were drawn once.
-fn wrong_names(odds: &Odds) -> [f64; 2] {
-    static SEQUENCES: LazyLock<Vec<calibrate::Sequence>> = LazyLock::new(|| {
-        let fresh = touches(60_000, 78);
-        let mut supplies: Vec<TouchSupply<'_>> =
-            fresh.objects.iter().enumerate().map(|(object, of)| TouchSupply::new(object, of, 1)).collect();
-        let limit = Limit { margin: 13.0, max_touches: MOST };
-        follow(&MODEL.model(), &mut supplies, &[usize::MAX; KINDS.len()], limit, &()).unwrap()
-    });
+/// The share of wrong names among those that a calibrated model gives, of all and of the object that is mistaken most often.
+fn wrong_names(model: &[u8]) -> [f64; 2] {
+    static TOUCHED: LazyLock<Dataset> = LazyLock::new(|| touches(60_000, 78));
+    let model = compile::open(model).unwrap();
+    let mut recognizer = Recognizer::<{ KINDS.len() }>::new(&model, Stopping::from_model(&model)).unwrap();
     let mut tallies = [[0.0; 2]; KINDS.len()];
-    for sequence in &*SEQUENCES {
-        if let Some(look) = sequence.given(odds) {
-            tallies[sequence.object][0] += f64::from(u8::from(look.name != sequence.object));
-            tallies[sequence.object][1] += 1.0;
+    for (object, touched) in TOUCHED.objects.iter().enumerate() {
+        // One mesh after the other.
+        let kinds = KINDS[object].len();
+        for touch in (0..kinds).flat_map(|kind| touched.touches().iter().skip(kind).step_by(kinds)) {
+            match recognizer.push(touch) {
+                Ok(Verdict::Recognized { object: name, .. }) => {
+                    tallies[object][0] += f64::from(u8::from(usize::from(name) != object));
+                    tallies[object][1] += 1.0;
+                    recognizer.reset();
+                }
+                Ok(Verdict::GaveUp) => recognizer.reset(),
+                _ => {}
+            }
         }
     }
     let all = tallies.iter().fold([0.0, 0.0], |[wrong, given], of| [wrong + of[0], given + of[1]]);
@@ -121,16 +127,10 @@ fn wrong_names(odds: &Odds) -> [f64; 2] {
     [all[0] / all[1], worst]
 }
 
-/// The thresholds of a calibrated model of one threshold.
-fn odds(calibrated: &calibrate::Calibrated) -> Odds {
-    let model = compile::open(&calibrated.model).unwrap();
-    Odds::All(Stopping::from_model(&model).odds_of(0, &model))
-}
-
 fn promise(per: Per, seed: u64) -> calibrate::Settings {
     let max_touches = Some(MOST);
     let rate = if per == Per::Average { RATE } else { LARGER_RATE };
-    calibrate::Settings { rate, per, sequences: 1_500, max_touches, seed, ..calibrate::Settings::default() }
+    with!(calibrate::Settings::default(), rate, per, sequences = 1_500, max_touches, seed)
 }
 
 fn calibrated(dataset: Dataset, per: Per, seed: u64) -> calibrate::Calibrated {
@@ -138,7 +138,7 @@ fn calibrated(dataset: Dataset, per: Per, seed: u64) -> calibrate::Calibrated {
 }
 
 /// The promise; none where no threshold keeps the rate on these touches, which is said and breaks nothing.
-fn promised<T>(calibrated: crate::error::Result<T>) -> Option<T> {
+fn promised<T>(calibrated: Result<T>) -> Option<T> {
     calibrated
         .map_err(|error| match error.problem() {
             Some(CalibrateProblem::NotKept { .. }) => {}
@@ -147,8 +147,8 @@ fn promised<T>(calibrated: crate::error::Result<T>) -> Option<T> {
         .ok()
 }
 
-/// Promises of `calibrate` and of `calibrate --strangers`, repeated: `PALPATE_REPETITIONS=40 cargo test --release -p palpate --lib
-/// several_meshes::promises -- --nocapture` says how many were broken.
+/// Promises of `calibrate` and of `calibrate --strangers`, repeated: `PALPATE_REPETITIONS=40 cargo test --release -p palpate --test
+/// palpate several_meshes::promises -- --nocapture` says how many were broken.
 #[test]
 fn promises_are_kept_where_objects_have_several_meshes() {
     let repetitions = repetitions(2);
@@ -156,14 +156,14 @@ fn promises_are_kept_where_objects_have_several_meshes() {
     for seed in 0..repetitions {
         let fresh = touches(12_000, 1_000 + seed);
         let calibrated = |per| calibrate::calibrate(&MODEL.model(), fresh.clone(), &promise(per, seed), &());
-        let average = promised(calibrated(Per::Average)).map(|average| wrong_names(&odds(&average))[0]);
+        let average = promised(calibrated(Per::Average)).map(|average| wrong_names(&average.model)[0]);
         broken[0] += u64::from(average > Some(RATE));
-        let each = promised(calibrated(Per::Object)).map(|each| wrong_names(&odds(&each))[1]);
+        let each = promised(calibrated(Per::Object)).map(|each| wrong_names(&each.model)[1]);
         broken[1] += u64::from(each > Some(LARGER_RATE));
         // Of a model with the test also known objects that are taken for unknown.
-        let settings = strangers::Settings { sequences: 1_500, seed, ..strangers::Settings::default() };
+        let settings = with!(strangers::Settings::default(), sequences = 1_500, seed);
         let shapes = synthetic::dataset(&[400; 30], 5).objects;
-        let terms = calibrate::Settings { rate: LARGER_RATE, ..promise(Per::Average, seed) };
+        let terms = with!(promise(Per::Average, seed), rate = LARGER_RATE);
         let (model, other) = (MODEL.model(), touches(16_000, 2_000 + seed));
         let tested = strangers::calibrate_with_promise(&model, &other, None, &shapes, &settings, &terms, &());
         let tested = promised(tested).map(|(tested, _)| ends(&tested.model));
@@ -193,7 +193,7 @@ fn ends(model: &[u8]) -> [f64; 2] {
 fn a_promise_would_be_broken_by_touches_that_forgot_their_meshes() {
     let average = calibrated(forgotten(&touches(12_000, 3)), Per::Average, 1);
     assert!(average.error <= RATE, "{}", average.error);
-    let [wrong, _] = wrong_names(&odds(&average));
+    let [wrong, _] = wrong_names(&average.model);
     assert!(wrong > 1.4 * RATE, "the meshes are too much alike to show anything: {wrong}");
     // And what is measured on them is not what a robot meets.
     let model = compile::open(&average.model).unwrap();
@@ -205,12 +205,12 @@ fn a_promise_would_be_broken_by_touches_that_forgot_their_meshes() {
 #[test]
 fn what_calibrations_count_is_what_fresh_touches_give() {
     let average = calibrated(touches(12_000, 3), Per::Average, 1);
-    let [wrong, _] = wrong_names(&odds(&average));
+    let [wrong, _] = wrong_names(&average.model);
     let given = (average.sequences as f64) * (1.0 - average.undecided);
     Share::of(average.error, given).agrees("calibrate, wrong names", Share::of(wrong, 2_000.0));
     let model = compile::open(&average.model).unwrap();
     for held in [Held::Likely, Held::Certain] {
-        let settings = strangers::Settings { held, sequences: 1_500, ..strangers::Settings::default() };
+        let settings = with!(strangers::Settings::default(), held, sequences = 1_500);
         let tested = strangers::calibrate(&model, &touches(12_000, 4), &[], &settings).unwrap();
         let sequences = f64::from(tested.terms.sequences);
         let stated = Share::of(tested.alarms as f64 / sequences, sequences);
@@ -229,9 +229,9 @@ fn figures_of_a_part_of_the_touches_are_those_of_fresh_ones() {
     agree("fold", measured(candidate, &folds::fold(&all, 1, 4, 1).unwrap().test), fresh);
     // A copy on the disk is as good.
     let directory = tempfile::tempdir().unwrap();
-    let origin = crate::touches::Origin { approaches: true, ..Default::default() };
+    let origin = palpate::touches::Origin { approaches: true, ..Default::default() };
     let stated = Dataset { origin: Some(origin), ..test };
-    stated.write(directory.path(), crate::touches::Format::Text, None).unwrap();
+    stated.write(directory.path(), palpate::touches::Format::Text, None).unwrap();
     agree("a copy", measured(candidate, &Dataset::read(directory.path()).unwrap()), fresh);
     // With noise too, whose robots differ.
     let noise = with!(Noise::gaussian(5_000.0), speed_bias = 0.1);
@@ -246,7 +246,7 @@ fn figures_of_a_part_of_the_touches_are_those_of_fresh_ones() {
 
 #[test]
 fn what_tune_states_is_what_its_model_does() {
-    let settings = tune::Settings { error_rate: 0.2, groups: 300, ..tune::Settings::default() };
+    let settings = with!(tune::Settings::default(), error_rate = 0.2, groups = 300);
     let tuned = tune::tune(&touches(10_000, 6), &settings, &()).unwrap();
     let model = compile::open(&tuned.model).unwrap();
     let tested = touches(1_000, 6);
@@ -261,7 +261,7 @@ fn what_tune_states_is_what_its_model_does() {
 #[test]
 fn what_a_comparison_states_is_what_its_model_does() {
     let (recorded, simulated) = (touches(2_000, 7), touches(6_000, 8));
-    let settings = compare::Settings { groups: 500, ..compare::Settings::default() };
+    let settings = with!(compare::Settings::default(), groups = 500);
     let compared = compare::compare(&recorded, &simulated, &settings, &()).unwrap();
     assert!(compared.told_apart.low < 0.51, "{:?}", compared.told_apart);
     let split = folds::split(&simulated, 0.25, settings.seed).unwrap();
@@ -292,20 +292,12 @@ fn what_teaching_states_is_what_the_taught_ensemble_does() {
     let mut known = touches(4_000, 1);
     known.objects.truncate(2);
     let recorded = touches(1_200, 10);
-    let settings = teach::Settings { approaches: 10, groups: 400, ..teach::Settings::default() };
+    let settings = with!(teach::Settings::default(), approaches = 10, groups = 400);
     let ensemble = train(&known, &recipe(), &()).unwrap();
     let third = recorded.only(|name| name == "object2");
     let (extended, taught) = teach::teach(&ensemble, &known, &third, &settings, &()).unwrap();
     taught_agrees("teach", &extended, &taught);
-    let training = train::Settings { rounds: 4, ..recipe() };
+    let training = with!(recipe(), rounds = 4);
     let (alone, taught) = teach::alone(&recorded, &training, &settings, &()).unwrap();
     taught_agrees("teach alone", &alone, &taught);
-}
-
-#[test]
-fn known_touches_are_thinned_within_each_mesh() {
-    // Every second touch would be of one mesh only.
-    let known = touches(24_000, 1);
-    let thinned = known.objects[0].thinned(12_000);
-    assert_eq!(thinned.by_source().iter().map(Vec::len).collect::<Vec<_>>(), [6_000; 2]);
 }

@@ -1,21 +1,19 @@
 //! Promises on simulated streams, whose error rates are known: a population of sequences, from which calibrations draw with
 //! replacement, so that its own error rate is the true one.
 
-use super::calibrate::calibrate_margins;
-use super::*;
-use crate::calibrate::Per;
-use crate::compile::{self, Settings as Compilation, compile};
-use crate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
-use crate::error::CalibrateProblem;
-use crate::evaluate::Finding;
-use crate::random::{Purpose, generator};
-use crate::tests::repetitions::{assert_rare, repetitions};
-use palpate_onboard::Stopping;
-use palpate_shared::format::Weights;
-use palpate_trees::rows::RowSequence;
+use crate::fixtures::*;
+use palpate::compile::{self, Settings as Compilation, compile};
+use palpate::evaluate::Finding;
+use palpate::onboard::RowsSeen;
+use palpate::rows::{Encoder, RowSequence, Sequences};
+use palpate::shared::format::Weights;
+use palpate::strangers;
+use palpate::stream::{
+    EventCounts, EventSettings, Learned, Point, Settings, StrangerTest, Switched, Wanted, calibrate, calibrate_events,
+    calibrate_with, estimate, evaluate, evaluate_events,
+};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
-use std::sync::LazyLock;
 
 const CLASSES: usize = 3;
 /// Places of the classes' rows, on a line each.
@@ -48,7 +46,8 @@ fn ensemble() -> Ensemble {
     }
 }
 
-static MODEL: LazyLock<Vec<u8>> = LazyLock::new(|| compile(&ensemble(), &Compilation::default()).unwrap().bytes);
+static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| compile(&ensemble(), &Compilation::default()).unwrap().bytes);
+static MODEL: LazyLock<Model<'static>> = LazyLock::new(|| compile::open(&BYTES).unwrap());
 
 /// Dependence of the rows of a sequence on each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,46 +91,79 @@ fn sequences(kind: Kind, count: usize, length: usize, seed: u64) -> Sequences {
     made
 }
 
-/// A population, and its margins.
+/// A population.
 struct Population {
-    rows: Rows<'static>,
-    sequences: Vec<RowSequence>,
+    all: Sequences,
     kind: Kind,
 }
 
 impl Population {
     fn new(kind: Kind, count: usize, length: usize) -> Self {
-        let made = sequences(kind, count, length, 7);
-        let rows = Rows::new(&compile::open(&MODEL).unwrap(), &made);
-        Self { rows, sequences: made.sequences, kind }
+        Self { all: sequences(kind, count, length, 7), kind }
     }
 
     /// Sequences drawn with replacement; of groups whole ones, which get new numbers.
-    fn drawn(&self, count: usize, seed: u64) -> Vec<RowSequence> {
-        let mut random = generator(seed, Purpose::Synthetic, "drawn", 0);
-        let all = self.sequences.len();
-        match self.kind {
-            Kind::Groups(_) => (0..count)
-                .flat_map(|group| {
-                    let own = random.random_range(0..all / IN_GROUP);
-                    (0..IN_GROUP).map(move |at| (own * IN_GROUP + at, group))
-                })
-                .map(|(at, group)| RowSequence { group: Some(group), ..self.sequences[at].clone() })
-                .collect(),
-            _ => (0..count).map(|_| self.sequences[random.random_range(0..all)].clone()).collect(),
+    fn drawn(&self, count: usize, seed: u64) -> Sequences {
+        if !matches!(self.kind, Kind::Groups(_)) {
+            return drawn(&self.all, count, seed);
         }
+        let mut random = generator(seed, Purpose::Synthetic, "drawn", 0);
+        let groups = self.all.sequences.len() / IN_GROUP;
+        let whole = |group| {
+            let first = random.random_range(0..groups) * IN_GROUP;
+            let own = self.all.sequences[first..first + IN_GROUP].iter();
+            own.map(move |sequence| RowSequence { group: Some(group), ..sequence.clone() })
+        };
+        Sequences { sequences: (0..count).flat_map(whole).collect(), ..self.all.clone() }
     }
 
-    /// The true error rate of a model.
-    fn error(&self, model: &[u8]) -> Evaluated {
-        let model = compile::open(model).unwrap();
-        evaluate_ends(&model, &self.rows, &self.sequences)
+    /// The true figures of a model.
+    fn of(&self, model: &[u8]) -> Ends {
+        ends(&compile::open(model).unwrap(), &self.all)
     }
 }
 
-/// Without curves, which are not needed here.
-fn evaluate_ends(model: &Model<'_>, rows: &Rows<'_>, sequences: &[RowSequence]) -> Evaluated {
-    super::evaluate::measured(model, rows, sequences, &Wanted::default(), false).unwrap()
+/// Sequences drawn with replacement.
+fn drawn(all: &Sequences, count: usize, seed: u64) -> Sequences {
+    let mut random = generator(seed, Purpose::Synthetic, "drawn", 0);
+    let of = |_| all.sequences[random.random_range(0..all.sequences.len())].clone();
+    Sequences { sequences: (0..count).map(of).collect(), ..all.clone() }
+}
+
+/// Ends of sequences that a chip follows: the share of wrong ones among the names given, that of sequences that end as unknown,
+/// the number of names, and the rows used on average.
+#[derive(Debug)]
+struct Ends {
+    error: f64,
+    unknown: f64,
+    named: u32,
+    mean_rows: f64,
+}
+
+fn ends(model: &Model<'_>, all: &Sequences) -> Ends {
+    let encoder = Encoder::measured(model);
+    let mut recognizer = Recognizer::<CLASSES>::new(model, Stopping::from_model(model)).unwrap();
+    let [mut named, mut wrong, mut unknown, mut rows] = [0; 4];
+    for sequence in &all.sequences {
+        recognizer.reset();
+        for row in sequence.rows.clone() {
+            rows += 1;
+            match recognizer.push_features(&encoder.row(&all.values[row..=row])) {
+                // A guard refuses rows.
+                Err(_) | Ok(Verdict::Undecided) => continue,
+                Ok(Verdict::Recognized { object, .. }) => {
+                    named += 1;
+                    wrong += u32::from(usize::from(object) != sequence.class);
+                }
+                Ok(Verdict::Unknown) => unknown += 1,
+                Ok(Verdict::GaveUp) => {}
+            }
+            break;
+        }
+    }
+    let count = all.sequences.len() as f64;
+    let error = f64::from(wrong) / f64::from(named);
+    Ends { error, unknown: f64::from(unknown) / count, named, mean_rows: f64::from(rows) / count }
 }
 
 /// Figures of repeated calibrations.
@@ -152,13 +184,12 @@ impl Figures {
 
 /// Calibrates again and again on fresh draws, and counts how often the true error rate is above the promised one.
 fn repeated(population: &Population, count: usize, rate: f64, repetitions: u64) -> Figures {
-    let model = compile::open(&MODEL).unwrap();
     let mut figures = Figures::default();
     for run in 0..repetitions {
         let drawn = population.drawn(count, run);
-        let settings = Settings { rate, max_rows: Some(200), seed: run, ..Settings::default() };
-        let calibrated = calibrate_margins(&model, &population.rows, &drawn, &settings).unwrap();
-        let found = population.error(&calibrated.model);
+        let settings = with!(Settings::default(), rate, max_rows = Some(200), seed = run);
+        let calibrated = calibrate(&MODEL, &drawn, &settings, &()).unwrap();
+        let found = population.of(&calibrated.model);
         // Every group of the population has as many sequences, and every sequence is named or nearly so.
         figures.broken += u64::from(found.error > rate);
         figures.used.push(found.error / rate);
@@ -167,21 +198,21 @@ fn repeated(population: &Population, count: usize, rate: f64, repetitions: u64) 
     figures
 }
 
-/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::promises -- --nocapture` repeats it as often.
-/// Number of sequences of dependent rows, which take longest: fewer where a simulation is repeated a few times.
-fn dependent(repetitions: u64) -> usize {
-    if repetitions > 20 { 6_667 } else { 3_000 }
+/// So many where a simulation is often repeated, else a few.
+fn many_or(few: usize, repetitions: u64, many: usize) -> usize {
+    if repetitions > 20 { many } else { few }
 }
 
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --test palpate stream::promises -- --nocapture` repeats it as often.
 #[test]
 fn promises_are_kept_for_independent_rows_dependent_rows_and_new_groups() {
     let repetitions = repetitions(3);
     for (kind, count, length) in [
-        (Kind::Independent, 6_667, 60),
-        (Kind::Autoregressive(0.9), dependent(repetitions), 160),
+        (Kind::Independent, many_or(3_000, repetitions, 6_667), 60),
+        (Kind::Autoregressive(0.9), many_or(3_000, repetitions, 6_667), 160),
         (Kind::Groups(0.2), 1_400, 60),
     ] {
-        let population = Population::new(kind, 9_000, length);
+        let population = Population::new(kind, many_or(3_000, repetitions, 9_000), length);
         let rates = [(0.01, 0.6), (0.05, 0.8), (0.1, 0.8)].into_iter();
         for (rate, least) in rates.filter(|&(rate, _)| rate != 0.05 || repetitions > 20) {
             let figures = repeated(&population, count, rate, repetitions);
@@ -200,11 +231,10 @@ fn promises_are_kept_for_independent_rows_dependent_rows_and_new_groups() {
 
 #[test]
 fn too_few_sequences_or_groups_say_how_many_it_takes_and_what_these_could_promise() {
-    let model = compile::open(&MODEL).unwrap();
     let few = |kind: Kind, count: usize, rate: f64| {
         let made = sequences(kind, count, 40, 1);
-        let settings = Settings { rate, ..Settings::default() };
-        calibrate(&model, &made, &settings, &()).map(|_| ()).unwrap_err().to_string()
+        let settings = with!(Settings::default(), rate);
+        calibrate(&MODEL, &made, &settings, &()).map(|_| ()).unwrap_err().to_string()
     };
     assert_eq!(
         few(Kind::Independent, 298, 0.01),
@@ -221,11 +251,10 @@ fn too_few_sequences_or_groups_say_how_many_it_takes_and_what_these_could_promis
 
 #[test]
 fn weights_are_kept_where_rows_resemble_each_other_and_not_where_they_are_independent() {
-    let model = compile::open(&MODEL).unwrap();
     let of = |kind: Kind, length: usize| {
         let made = sequences(kind, 3_000, length, 3);
-        let settings = Settings { rate: 0.05, ..Settings::default() };
-        calibrate(&model, &made, &settings, &()).unwrap()
+        let settings = with!(Settings::default(), rate = 0.05);
+        calibrate(&MODEL, &made, &settings, &()).unwrap()
     };
     let independent = of(Kind::Independent, 60);
     assert!(!independent.rows.as_ref().unwrap().weights.unwrap().kept, "{independent:?}");
@@ -242,13 +271,12 @@ fn weights_are_kept_where_rows_resemble_each_other_and_not_where_they_are_indepe
 
 #[test]
 fn a_promise_is_kept_per_class_and_per_name() {
-    let model = compile::open(&MODEL).unwrap();
     for per in [Per::Object, Per::Name] {
-        for (kind, count) in [(Kind::Independent, 9_000), (Kind::Groups(0.2), 4_500)] {
-            let made = sequences(kind, count, 60, 3);
-            let settings = Settings { rate: 0.05, per, max_rows: Some(60), ..Settings::default() };
-            let calibrated = calibrate(&model, &made, &settings, &()).unwrap();
-            let fresh = sequences(kind, 9_000, 60, 4);
+        for kind in [Kind::Independent, Kind::Groups(0.2)] {
+            let made = sequences(kind, 4_500, 60, 3);
+            let settings = with!(Settings::default(), rate = 0.05, per, max_rows = Some(60));
+            let calibrated = calibrate(&MODEL, &made, &settings, &()).unwrap();
+            let fresh = sequences(kind, 4_500, 60, 4);
             let found = evaluate(&compile::open(&calibrated.model).unwrap(), &fresh, &Wanted::default()).unwrap();
             let promise = found.promise.unwrap();
             assert!(promise.finding != Finding::Broken && promise.found > 0.01, "{per:?} {kind:?}: {promise:?}");
@@ -259,17 +287,16 @@ fn a_promise_is_kept_per_class_and_per_name() {
 
 #[test]
 fn early_stopping_takes_at_least_two_fifths_fewer_rows_than_a_fixed_number() {
-    let model = compile::open(&MODEL).unwrap();
-    let made = sequences(Kind::Independent, 6_000, 60, 3);
-    let calibrated = calibrate(&model, &made, &Settings::default(), &()).unwrap();
-    let fresh = sequences(Kind::Independent, 6_000, 60, 4);
+    let made = sequences(Kind::Independent, 3_000, 60, 3);
+    let calibrated = calibrate(&MODEL, &made, &Settings::default(), &()).unwrap();
+    let fresh = sequences(Kind::Independent, 3_000, 60, 4);
     let found = evaluate(&compile::open(&calibrated.model).unwrap(), &fresh, &Wanted::default()).unwrap();
     let (fixed, vote) = (found.comparison.fixed_rows.unwrap(), found.comparison.vote_rows);
     println!("{:.1} rows, fixed {fixed}, vote {vote:?}", found.mean_rows);
     assert!(found.mean_rows < 0.6 * fixed, "{} {fixed}", found.mean_rows);
     assert!(vote.is_none_or(|vote| vote > fixed));
     let counts: usize = found.confusion.iter().flatten().sum();
-    assert_eq!(counts, 6_000);
+    assert_eq!(counts, 3_000);
 }
 
 #[test]
@@ -292,10 +319,9 @@ fn a_regression_and_a_model_over_touches_are_refused_by_name() {
 
 #[test]
 fn a_class_without_a_sequence_is_named() {
-    let model = compile::open(&MODEL).unwrap();
     let mut made = sequences(Kind::Independent, 900, 5, 1);
     made.sequences.retain(|sequence| sequence.class != 1);
-    let refused = calibrate(&model, &made, &Settings::default(), &()).unwrap_err();
+    let refused = calibrate(&MODEL, &made, &Settings::default(), &()).unwrap_err();
     assert_eq!(
         refused.problem::<CalibrateProblem>(),
         Some(&CalibrateProblem::MissingSequences { objects: vec!["b".into()] })
@@ -304,12 +330,11 @@ fn a_class_without_a_sequence_is_named() {
 
 #[test]
 fn the_same_seed_gives_the_same_model_on_any_number_of_threads() {
-    let model = compile::open(&MODEL).unwrap();
     let made = sequences(Kind::Autoregressive(0.9), 1_000, 60, 3);
     let with = |threads, seed| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let settings = Settings { rate: 0.1, seed, ..Settings::default() };
-        pool.install(|| calibrate(&model, &made, &settings, &()).unwrap().model)
+        let settings = with!(Settings::default(), rate = 0.1, seed);
+        pool.install(|| calibrate(&MODEL, &made, &settings, &()).unwrap().model)
     };
     assert_eq!(with(1, 1), with(3, 1));
     assert_ne!(with(1, 1), with(1, 2));
@@ -317,10 +342,9 @@ fn the_same_seed_gives_the_same_model_on_any_number_of_threads() {
 
 #[test]
 fn a_calibrated_model_is_calibrated_again_as_if_it_had_not_been() {
-    let model = compile::open(&MODEL).unwrap();
     let made = sequences(Kind::Autoregressive(0.9), 1_000, 60, 3);
-    let settings = Settings { rate: 0.1, ..Settings::default() };
-    let once = calibrate(&model, &made, &settings, &()).unwrap().model;
+    let settings = with!(Settings::default(), rate = 0.1);
+    let once = calibrate(&MODEL, &made, &settings, &()).unwrap().model;
     let twice = calibrate(&compile::open(&once).unwrap(), &made, &settings, &()).unwrap().model;
     assert_eq!(once, twice);
     assert_eq!(Stopping::from_model(&compile::open(&once).unwrap()).max_touches(), 200);
@@ -328,9 +352,8 @@ fn a_calibrated_model_is_calibrated_again_as_if_it_had_not_been() {
 
 /// A test for what the model does not know, with a background of sequences at `place` if there is one.
 fn strangers(place: Option<f64>) -> StrangerTest {
-    let model = compile::open(&MODEL).unwrap();
     let others = place.map(|place| at(place, 300, 40));
-    StrangerTest::new(crate::strangers::Settings::default(), &model, others.as_ref()).unwrap()
+    StrangerTest::new(strangers::Settings::default(), &MODEL, others.as_ref()).unwrap()
 }
 
 /// Sequences of rows about a place where no class is.
@@ -344,25 +367,24 @@ fn at(place: f64, count: usize, length: usize) -> Sequences {
     made
 }
 
-/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::false_alarms -- --nocapture` repeats it as often.
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --test palpate stream::false_alarms -- --nocapture` repeats it as often.
 #[test]
 fn false_alarms_stay_below_the_stated_rate_on_sequences() {
     let repetitions = repetitions(3);
-    let model = compile::open(&MODEL).unwrap();
     for (kind, count, length) in [
-        (Kind::Independent, 6_667, 60),
-        (Kind::Autoregressive(0.9), dependent(repetitions), 160),
+        (Kind::Independent, many_or(3_000, repetitions, 6_667), 60),
+        (Kind::Autoregressive(0.9), many_or(3_000, repetitions, 6_667), 160),
         (Kind::Groups(0.2), 2_200, 60),
     ] {
-        let population = Population::new(kind, 9_000, length);
+        let population = Population::new(kind, many_or(3_000, repetitions, 9_000), length);
         let test = strangers(None);
         let (mut broken, mut alarms) = (0, Vec::new());
         for run in 0..repetitions {
             let drawn = population.drawn(count, run);
             let strangers = Some(test.clone());
-            let settings = Settings { rate: 0.05, max_rows: Some(200), strangers, seed: run, ..Settings::default() };
-            let calibrated = calibrate_margins(&model, &population.rows, &drawn, &settings).unwrap();
-            let found = population.error(&calibrated.model);
+            let settings = with!(Settings::default(), rate = 0.05, max_rows = Some(200), strangers, seed = run);
+            let calibrated = calibrate(&MODEL, &drawn, &settings, &()).unwrap();
+            let found = population.of(&calibrated.model);
             broken += u64::from(found.unknown > test.settings.alarms);
             alarms.push(found.unknown);
             assert!(found.error < 0.06, "{found:?}");
@@ -374,11 +396,10 @@ fn false_alarms_stay_below_the_stated_rate_on_sequences() {
 
 #[test]
 fn rows_of_no_class_are_detected_with_a_background_and_without() {
-    let model = compile::open(&MODEL).unwrap();
-    let made = sequences(Kind::Independent, 6_000, 60, 3);
+    let made = sequences(Kind::Independent, 3_000, 60, 3);
     for place in [None, Some(5.0)] {
-        let settings = Settings { rate: 0.05, strangers: Some(strangers(place)), ..Settings::default() };
-        let calibrated = calibrate(&model, &made, &settings, &()).unwrap();
+        let settings = with!(Settings::default(), rate = 0.05, strangers = Some(strangers(place)));
+        let calibrated = calibrate(&MODEL, &made, &settings, &()).unwrap();
         let found = calibrated.strangers.as_ref().unwrap();
         assert!(found.false_alarms <= 0.02, "{found:?}");
         let tested = compile::open(&calibrated.model).unwrap();
@@ -393,28 +414,24 @@ fn rows_of_no_class_are_detected_with_a_background_and_without() {
 
 #[test]
 fn a_test_for_strangers_names_no_more_rows_between_the_classes_than_no_test() {
-    let model = compile::open(&MODEL).unwrap();
     // Between the classes, and less noisy than theirs: what is at rest.
     let mut idle = at(0.6, 500, 12);
     idle.values.iter_mut().for_each(|value| *value = 0.6 + 0.3 * (*value - 0.6));
     let mut had_names = false;
     for (seed, per, kind, count) in [
-        (1, Per::Average, Kind::Independent, 1_500),
-        (2, Per::Average, Kind::Autoregressive(0.5), 1_500),
-        (3, Per::Object, Kind::Independent, 3_000),
-        (4, Per::Name, Kind::Independent, 4_500),
+        (1, Per::Average, Kind::Independent, 1_000),
+        (2, Per::Average, Kind::Autoregressive(0.5), 1_000),
+        (3, Per::Object, Kind::Independent, 2_100),
+        (4, Per::Name, Kind::Independent, 2_400),
         (5, Per::Average, Kind::Groups(0.2), 2_400),
     ] {
         let made = sequences(kind, count, 12, seed);
-        let settings = Settings { rate: 0.1, per, ..Settings::default() };
-        let without = calibrate(&model, &made, &settings, &()).unwrap();
-        let named = |calibrated: &[u8]| {
-            let found = evaluate_ends(&compile::open(calibrated).unwrap(), &Rows::new(&model, &idle), &idle.sequences);
-            (500.0 * (1.0 - found.undecided - found.unknown)).round() as u32
-        };
+        let settings = with!(Settings::default(), rate = 0.1, per);
+        let without = calibrate(&MODEL, &made, &settings, &()).unwrap();
+        let named = |calibrated: &[u8]| ends(&compile::open(calibrated).unwrap(), &idle).named;
         for background in [None, Some(5.0)] {
             let strangers = Some(strangers(background));
-            let with = calibrate(&model, &made, &Settings { strangers, ..settings.clone() }, &()).unwrap();
+            let with = calibrate(&MODEL, &made, &with!(settings.clone(), strangers), &()).unwrap();
             println!("{kind:?} {per:?}: {} without, {} with", named(&without.model), named(&with.model));
             assert!(with.margins.iter().all(|(name, margin)| *margin >= without.margins[name] - 1e-9), "{with:?}");
             assert!(named(&with.model) <= named(&without.model));
@@ -426,12 +443,11 @@ fn a_test_for_strangers_names_no_more_rows_between_the_classes_than_no_test() {
 
 #[test]
 fn names_that_a_test_never_lets_be_given_are_no_lack_of_sequences() {
-    let model = compile::open(&MODEL).unwrap();
     let short = sequences(Kind::Independent, 3_000, 12, 3);
-    let certain = crate::strangers::Settings { held: palpate_shared::format::Held::Certain, ..Default::default() };
-    let strangers = Some(StrangerTest::new(certain, &model, None).unwrap());
-    let settings = Settings { rate: 0.05, strangers, ..Settings::default() };
-    let refused = calibrate(&model, &short, &settings, &()).unwrap_err().to_string();
+    let certain = with!(strangers::Settings::default(), held = Held::Certain);
+    let strangers = Some(StrangerTest::new(certain, &MODEL, None).unwrap());
+    let settings = with!(Settings::default(), rate = 0.05, strangers);
+    let refused = calibrate(&MODEL, &short, &settings, &()).unwrap_err().to_string();
     assert!(
         refused.starts_with("0 names given in ") && refused.contains(" sequences are too few to promise 5 %"),
         "{refused}"
@@ -445,9 +461,8 @@ fn names_that_a_test_never_lets_be_given_are_no_lack_of_sequences() {
 
 #[test]
 fn sequences_that_are_too_few_for_a_test_of_strangers_are_counted_as_sequences() {
-    let model = compile::open(&MODEL).unwrap();
-    let settings = Settings { rate: 0.1, strangers: Some(strangers(None)), ..Settings::default() };
-    let refused = calibrate(&model, &sequences(Kind::Independent, 400, 40, 3), &settings, &()).unwrap_err().to_string();
+    let settings = with!(Settings::default(), rate = 0.1, strangers = Some(strangers(None)));
+    let refused = calibrate(&MODEL, &sequences(Kind::Independent, 400, 40, 3), &settings, &()).unwrap_err().to_string();
     let expected =
         "400 sequences are too few for a test of strangers with at most 2 % false alarms: at least 619 are needed";
     assert!(refused.starts_with(expected), "{refused}");
@@ -459,19 +474,18 @@ fn sequences_that_are_too_few_for_a_test_of_strangers_are_counted_as_sequences()
         sequence.class != 2 || rare <= 50
     });
     assert_eq!(enough.sequences.len(), 690);
-    calibrate(&model, &enough, &settings, &()).unwrap();
+    calibrate(&MODEL, &enough, &settings, &()).unwrap();
 }
 
 #[test]
 fn a_refusal_states_the_names_that_were_seen_and_how_many_it_takes() {
-    let model = compile::open(&MODEL).unwrap();
     // One of a hundred labels is wrong: too many for so few sequences, and not for many.
     let refusals: Vec<String> = (0..40)
         .filter_map(|seed| {
             let mut made = sequences(Kind::Independent, 100, 40, seed);
             made.sequences.iter_mut().step_by(50).for_each(|sequence| sequence.class = (sequence.class + 1) % CLASSES);
-            let settings = Settings { rate: 0.05, seed, ..Settings::default() };
-            calibrate(&model, &made, &settings, &()).map(|_| ()).err().map(|error| error.to_string())
+            let settings = with!(Settings::default(), rate = 0.05, seed);
+            calibrate(&MODEL, &made, &settings, &()).map(|_| ()).err().map(|error| error.to_string())
         })
         .collect();
     println!("{refusals:#?}");
@@ -486,49 +500,27 @@ fn a_refusal_states_the_names_that_were_seen_and_how_many_it_takes() {
     // A rate that is not kept is said not to be kept.
     let mut made = sequences(Kind::Independent, 600, 40, 1);
     made.sequences.iter_mut().step_by(5).for_each(|sequence| sequence.class = (sequence.class + 1) % CLASSES);
-    let settings = Settings { rate: 0.05, ..Settings::default() };
-    let refused = calibrate(&model, &made, &settings, &()).unwrap_err().to_string();
+    let settings = with!(Settings::default(), rate = 0.05);
+    let refused = calibrate(&MODEL, &made, &settings, &()).unwrap_err().to_string();
     assert!(refused.starts_with("no threshold that was tested keeps 5 %: at the best "), "{refused}");
 }
 
 #[test]
 fn a_promise_depends_little_on_which_sequences_are_learned_from() {
-    let model = compile::open(&MODEL).unwrap();
     let (mut refused, mut broken) = (0, 0);
     let fresh = Population::new(Kind::Independent, 3_000, 12);
     for set in 0..10 {
         let made = sequences(Kind::Independent, 150, 12, 100 + set);
         for seed in 1..=8 {
-            let settings = Settings { rate: 0.1, seed, ..Settings::default() };
-            match calibrate(&model, &made, &settings, &()) {
-                Ok(calibrated) => broken += u64::from(fresh.error(&calibrated.model).error > 0.1),
+            let settings = with!(Settings::default(), rate = 0.1, seed);
+            match calibrate(&MODEL, &made, &settings, &()) {
+                Ok(calibrated) => broken += u64::from(fresh.of(&calibrated.model).error > 0.1),
                 Err(_) => refused += 1,
             }
         }
     }
     println!("{refused} of 80 refused, {broken} broken");
     assert!(refused <= 8, "{refused} of 80");
-}
-
-#[test]
-fn the_guides_least_numbers_are_those_of_the_test() {
-    let guide = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guide/streams.md");
-    let guide = std::fs::read_to_string(guide).unwrap();
-    let mut rows = guide.lines().skip_while(|line| !line.starts_with("| promise |")).skip(2);
-    let stated: Vec<(f64, Vec<u64>)> = rows
-        .by_ref()
-        .map_while(|row| row.strip_prefix("| "))
-        .map(|row| {
-            let mut cells = row.trim_end_matches(" |").split(" | ");
-            let rate: f64 = cells.next().unwrap().trim_end_matches(" %").parse().unwrap();
-            (rate / 100.0, cells.map(|cell| cell.replace(',', "").parse().unwrap()).collect())
-        })
-        .collect();
-    assert_eq!(stated.len(), 3, "{stated:?}");
-    for (rate, least) in stated {
-        let one_wrong = crate::calibrate::enough(1, rate, 0.95);
-        assert_eq!(least, [crate::calibrate::needed(rate, 0.95), one_wrong], "{rate}");
-    }
 }
 
 #[test]
@@ -544,9 +536,8 @@ fn forgetting_helps_if_it_makes_fewer_names_wrong_than_chance_explains() {
 
 #[test]
 fn forgetting_finds_the_class_that_comes_later() {
-    let model = compile::open(&MODEL).unwrap();
-    let made = sequences(Kind::Independent, 6_000, 60, 3);
-    let calibrated = calibrate(&model, &made, &Settings::default(), &()).unwrap();
+    let made = sequences(Kind::Independent, 3_000, 60, 3);
+    let calibrated = calibrate(&MODEL, &made, &Settings::default(), &()).unwrap();
     let fresh = sequences(Kind::Independent, 3_000, 60, 4);
     let wanted = Wanted { switch: Some(5.0), ..Wanted::default() };
     let found = evaluate(&compile::open(&calibrated.model).unwrap(), &fresh, &wanted).unwrap().switched.unwrap();
@@ -586,7 +577,7 @@ fn ramp_model(position: usize, scales: Option<Vec<f32>>) -> Vec<u8> {
         trees: vec![Tree { nodes, output: Output::Each }],
         origin: Provenance::default(),
     };
-    let settings = crate::with!(Compilation::default(), position = Some(format!("f{position}")), scales);
+    let settings = with!(Compilation::default(), position = Some(format!("f{position}")), scales);
     compile(&ensemble, &settings).unwrap().bytes
 }
 
@@ -594,13 +585,13 @@ fn ramp_model(position: usize, scales: Option<Vec<f32>>) -> Vec<u8> {
 fn a_recognizer_counts_the_rows_and_gives_the_verdicts_that_the_evaluation_counts() {
     for (position, scales) in [(0, None), (1, None), (1, Some(vec![1000.0, 2.0])), (0, Some(vec![1.0, 1000.0]))] {
         let bytes = ramp_model(position, scales);
-        let settings = Settings { rate: 0.05, ..Settings::default() };
+        let settings = with!(Settings::default(), rate = 0.05);
         let calibrated = calibrate(&compile::open(&bytes).unwrap(), &ramps(900, 1), &settings, &()).unwrap();
         let model = compile::open(&calibrated.model).unwrap();
         let fresh = ramps(900, 2);
         let found = evaluate(&model, &fresh, &Wanted::default()).unwrap();
         assert!(found.error < 0.05 && found.undecided < 0.2, "{} {}", found.error, found.undecided);
-        let mut recognizer = palpate_onboard::Recognizer::<2>::new(&model, Stopping::from_model(&model)).unwrap();
+        let mut recognizer = Recognizer::<2>::new(&model, Stopping::from_model(&model)).unwrap();
         let mut seen = RowsSeen::<2>::new();
         let encoder = Encoder::measured(&model);
         let mut confusion = vec![vec![0; 3]; 2];
@@ -613,7 +604,7 @@ fn a_recognizer_counts_the_rows_and_gives_the_verdicts_that_the_evaluation_count
                     let row = encoder.row(&fresh.values[row..=row]);
                     let pushed =
                         if way == 0 { recognizer.push_features(&row) } else { recognizer.push_seen(&row, &mut seen) };
-                    if let palpate_onboard::Verdict::Recognized { object, .. } = pushed.unwrap() {
+                    if let Verdict::Recognized { object, .. } = pushed.unwrap() {
                         *name = usize::from(object);
                         break;
                     }
@@ -641,9 +632,8 @@ fn broken_from(sequences: &Sequences, from: usize, with: impl Fn(f64) -> f64) ->
 
 #[test]
 fn a_guard_refuses_dead_stuck_and_railed_sensors_and_hardly_any_other_row() {
-    let model = compile::open(&MODEL).unwrap();
-    let settings = Settings { rate: 0.05, guard: true, ..Settings::default() };
-    let calibrated = calibrate(&model, &sequences(Kind::Independent, 900, 30, 3), &settings, &()).unwrap();
+    let settings = with!(Settings::default(), rate = 0.05, guard = true);
+    let calibrated = calibrate(&MODEL, &sequences(Kind::Independent, 900, 30, 3), &settings, &()).unwrap();
     let guarded = compile::open(&calibrated.model).unwrap();
     let of = |sequences: &Sequences| evaluate(&guarded, sequences, &Wanted::default()).unwrap();
     let good = sequences(Kind::Independent, 3_000, 30, 4);
@@ -670,12 +660,11 @@ fn a_guard_refuses_dead_stuck_and_railed_sensors_and_hardly_any_other_row() {
         mixed.values.push(PLACES[row % CLASSES]);
         mixed.sequences.push(RowSequence { rows: start..start + 1, class: row % CLASSES, group: None });
     }
-    let calibrated = calibrate(&model, &mixed, &settings, &()).unwrap();
+    let calibrated = calibrate(&MODEL, &mixed, &settings, &()).unwrap();
     let guarded = compile::open(&calibrated.model).unwrap();
     assert!(guarded.guard().unwrap().limits().all(|limits| limits.most_equal > 0));
     // The same model calibrated again without one has none.
-    let without =
-        calibrate(&guarded, &sequences(Kind::Independent, 900, 30, 3), &Settings { guard: false, ..settings }, &());
+    let without = calibrate(&guarded, &sequences(Kind::Independent, 900, 30, 3), &with!(settings, guard = false), &());
     assert!(compile::open(&without.unwrap().model).unwrap().guard().is_none());
 }
 
@@ -685,7 +674,7 @@ fn assert_at_most_15_of_200(what: &str, broken: u64, repetitions: u64) {
     assert!(broken <= most, "{what}: {broken} of {repetitions} broken; at most {most} may");
 }
 
-/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::promises -- --nocapture` repeats it as often.
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --test palpate stream::promises -- --nocapture` repeats it as often.
 #[test]
 fn promises_are_kept_with_row_numbers_and_with_guards_on_sensors_that_fail() {
     let repetitions = repetitions(3);
@@ -704,21 +693,18 @@ fn promises_are_kept_with_row_numbers_and_with_guards_on_sensors_that_fail() {
     let ramp = ramp_model(0, None);
     let cases = [
         ("numbers", ramp.clone(), false, ramps(2_000, 7), 150),
-        ("guard", MODEL.clone(), true, failing(sequences(Kind::Independent, 2_001, 30, 8)), 300),
+        ("guard", BYTES.clone(), true, failing(sequences(Kind::Independent, 2_001, 30, 8)), 300),
         ("both", ramp, true, failing(ramps(2_000, 9)), 150),
     ];
     for (what, bytes, guard, all, count) in cases {
         let model = compile::open(&bytes).unwrap();
         let (mut broken, mut refused) = (0, 0);
         for run in 0..repetitions {
-            let mut random = generator(run, Purpose::Synthetic, "drawn", 0);
-            let of = |_| all.sequences[random.random_range(0..all.sequences.len())].clone();
-            let drawn = Sequences { sequences: (0..count).map(of).collect(), ..all.clone() };
-            let settings = Settings { rate: 0.1, guard, seed: run, max_rows: Some(60), ..Settings::default() };
+            let drawn = drawn(&all, count, run);
+            let settings = with!(Settings::default(), rate = 0.1, guard, seed = run, max_rows = Some(60));
             match calibrate(&model, &drawn, &settings, &()) {
                 Ok(made) => {
-                    let found = evaluate(&compile::open(&made.model).unwrap(), &all, &Wanted::default()).unwrap();
-                    broken += u64::from(found.error > 0.1);
+                    broken += u64::from(ends(&compile::open(&made.model).unwrap(), &all).error > 0.1);
                 }
                 Err(_) => refused += 1,
             }
@@ -729,32 +715,29 @@ fn promises_are_kept_with_row_numbers_and_with_guards_on_sensors_that_fail() {
     }
 }
 
-/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::folds -- --nocapture` repeats it as often.
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --test palpate stream::folds -- --nocapture` repeats it as often.
 #[test]
 fn folds_leave_all_sequences_to_the_test_keep_the_promise_and_estimate_the_error_rate() {
     let repetitions = repetitions(3);
-    let model = compile::open(&MODEL).unwrap();
     let all = sequences(Kind::Autoregressive(0.5), 2_001, 30, 8);
     let (mut broken, mut refused, mut plain_refused, mut estimates) = (0, 0, 0, Vec::new());
     for run in 0..repetitions {
         let mut learned = Learned::default();
         for fold in 0..4 {
-            learned.add(&model, &sequences(Kind::Autoregressive(0.5), 21, 30, 1_000 + 4 * run + fold)).unwrap();
+            learned.add(&MODEL, &sequences(Kind::Autoregressive(0.5), 21, 30, 1_000 + 4 * run + fold)).unwrap();
         }
-        let mut random = generator(run, Purpose::Synthetic, "drawn", 0);
-        let of = |_| all.sequences[random.random_range(0..all.sequences.len())].clone();
-        let drawn = Sequences { sequences: (0..60).map(of).collect(), ..all.clone() };
-        let settings = Settings { rate: 0.1, seed: run, max_rows: Some(30), ..Settings::default() };
+        let drawn = drawn(&all, 60, run);
+        let settings = with!(Settings::default(), rate = 0.1, seed = run, max_rows = Some(30));
         let error = |bytes: &[u8]| evaluate(&compile::open(bytes).unwrap(), &all, &Wanted::default()).unwrap();
-        match calibrate_with(&model, &drawn, &learned, &settings, &()) {
+        match calibrate_with(&MODEL, &drawn, &learned, &settings, &()) {
             Ok(made) => {
                 assert_eq!((made.sequences, made.learned), (60, Some(84)));
                 broken += u64::from(error(&made.model).error > 0.1);
             }
             Err(_) => refused += 1,
         }
-        plain_refused += u64::from(calibrate(&model, &drawn, &settings, &()).is_err());
-        let estimated = estimate(&model, &learned, &settings).unwrap();
+        plain_refused += u64::from(calibrate(&MODEL, &drawn, &settings, &()).is_err());
+        let estimated = estimate(&MODEL, &learned, &settings).unwrap();
         let found = error(&estimated.model);
         assert!(found.promise.is_none());
         estimates.push(estimated.error - found.error);
@@ -810,26 +793,25 @@ fn drawn_recordings(all: &Sequences, count: usize, seed: u64) -> Sequences {
 }
 
 fn event_settings(seed: u64) -> EventSettings {
-    EventSettings {
-        background: Some(0),
-        rows_per_second: 10.0,
-        false_per_hour: 60.0,
-        hold_off: 3.0,
-        seed,
-        ..EventSettings::default()
-    }
+    with!(
+        EventSettings::default(),
+        background = Some(0),
+        rows_per_second = 10.0,
+        false_per_hour = 60.0,
+        hold_off = 3.0,
+        seed
+    )
 }
 
-/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --lib stream::tests::events -- --nocapture` repeats it as often.
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --test palpate stream::events -- --nocapture` repeats it as often.
 #[test]
 fn events_keep_the_promised_rate_of_false_verdicts_on_independent_and_dependent_rows() {
     let repetitions = repetitions(3);
-    let model = compile::open(&MODEL).unwrap();
     for kind in [Kind::Independent, Kind::Autoregressive(0.7)] {
-        let all = recordings(kind, 1_000, 300, 7);
+        let all = recordings(kind, many_or(400, repetitions, 1_000), 300, 7);
         let (mut broken, mut refused, mut named) = (0, 0, Vec::new());
         for run in 0..repetitions {
-            match calibrate_events(&model, &drawn_recordings(&all, 200, run), &event_settings(run), &()) {
+            match calibrate_events(&MODEL, &drawn_recordings(&all, 200, run), &event_settings(run), &()) {
                 Ok(made) => {
                     let found = evaluate_events(&compile::open(&made.model).unwrap(), &all).unwrap();
                     broken += u64::from(found.counts.false_per_hour > 60.0);
@@ -849,14 +831,13 @@ fn events_keep_the_promised_rate_of_false_verdicts_on_independent_and_dependent_
 
 #[test]
 fn events_of_the_chip_are_those_that_the_evaluation_counts_and_more_than_rules_over_rows_name() {
-    let model = compile::open(&MODEL).unwrap();
-    let made = calibrate_events(&model, &recordings(Kind::Independent, 200, 300, 1), &event_settings(1), &()).unwrap();
+    let made = calibrate_events(&MODEL, &recordings(Kind::Independent, 200, 300, 1), &event_settings(1), &()).unwrap();
     println!("{:?}", made.counts);
     let stated = compile::open(&made.model).unwrap();
     let fresh = recordings(Kind::Independent, 300, 300, 2);
     let found = evaluate_events(&stated, &fresh).unwrap();
     println!("{found:#?}");
-    let mut recognizer = palpate_onboard::Recognizer::<3>::new(&stated, Stopping::from_model(&stated)).unwrap();
+    let mut recognizer = Recognizer::<3>::new(&stated, Stopping::from_model(&stated)).unwrap();
     let encoder = Encoder::of(&stated);
     let mut verdicts = 0;
     for runs in fresh.sequences.chunk_by(|one, next| one.group == next.group) {
@@ -864,7 +845,7 @@ fn events_of_the_chip_are_those_that_the_evaluation_counts_and_more_than_rules_o
         let mut last = None;
         for row in runs.iter().flat_map(|run| run.rows.clone()) {
             let verdict = recognizer.push_features(&encoder.row(&fresh.values[row..=row])).unwrap();
-            if let palpate_onboard::Verdict::Recognized { object, .. } = verdict {
+            if let Verdict::Recognized { object, .. } = verdict {
                 assert_ne!(object, 0, "the background is no event");
                 assert!(last.is_none_or(|last| row >= last + 30), "within the hold-off");
                 assert_eq!(recognizer.ongoing(), Some(object));
@@ -879,20 +860,15 @@ fn events_of_the_chip_are_those_that_the_evaluation_counts_and_more_than_rules_o
         assert!(rule.counts.named < named, "{rule:?}");
     }
     // Sequences with stated ends are calibrated again as if there had been no events.
-    let again = calibrate(
-        &stated,
-        &sequences(Kind::Independent, 300, 30, 3),
-        &Settings { rate: 0.1, ..Settings::default() },
-        &(),
-    );
+    let again =
+        calibrate(&stated, &sequences(Kind::Independent, 300, 30, 3), &with!(Settings::default(), rate = 0.1), &());
     assert!(compile::open(&again.unwrap().model).unwrap().events().is_none());
 }
 
 #[test]
 fn too_few_recordings_say_how_many_are_needed_and_so_many_are_enough() {
-    let model = compile::open(&MODEL).unwrap();
     let refused = |count, settings: &EventSettings| {
-        calibrate_events(&model, &recordings(Kind::Independent, count, 300, 1), settings, &()).unwrap_err()
+        calibrate_events(&MODEL, &recordings(Kind::Independent, count, 300, 1), settings, &()).unwrap_err()
     };
     let few = refused(20, &event_settings(1));
     let Some(CalibrateProblem::TooFewRecordings { needed, found: 20, most: 10, .. }) = few.problem() else {
@@ -901,18 +877,18 @@ fn too_few_recordings_say_how_many_are_needed_and_so_many_are_enough() {
     assert!(few.to_string().contains(&format!("about {needed} like these are needed, none of them false")), "{few}");
     // With thresholds at which nothing is false they are enough: what is refused is refused for what is false.
     let enough =
-        calibrate_events(&model, &recordings(Kind::Independent, *needed as usize + 1, 300, 1), &event_settings(1), &());
+        calibrate_events(&MODEL, &recordings(Kind::Independent, *needed as usize + 1, 300, 1), &event_settings(1), &());
     assert!(!enough.is_err_and(|error| matches!(error.problem(), Some(CalibrateProblem::TooFewRecordings { .. }))));
     // Labels without an event: every verdict is false.
     let mut wrong = recordings(Kind::Independent, 200, 300, 1);
     wrong.sequences.iter_mut().for_each(|run| run.class = 0);
-    let error = calibrate_events(&model, &wrong, &event_settings(1), &()).unwrap_err();
+    let error = calibrate_events(&MODEL, &wrong, &event_settings(1), &()).unwrap_err();
     assert!(matches!(error.problem(), Some(CalibrateProblem::NotKeptByEvents { .. })), "{error}");
     for (settings, part) in [
-        (EventSettings { hold_off: 0.0, ..event_settings(1) }, "hold_off"),
-        (EventSettings { rows_per_second: f64::NAN, ..event_settings(1) }, "rows_per_second"),
-        (EventSettings { background: Some(3), ..event_settings(1) }, "background"),
-        (EventSettings { confidence: 1.0, ..event_settings(1) }, "confidence"),
+        (with!(event_settings(1), hold_off = 0.0), "hold_off"),
+        (with!(event_settings(1), rows_per_second = f64::NAN), "rows_per_second"),
+        (with!(event_settings(1), background = Some(3)), "background"),
+        (with!(event_settings(1), confidence = 1.0), "confidence"),
     ] {
         let error = refused(200, &settings).to_string();
         assert!(error.contains(part), "{error}");
@@ -921,6 +897,6 @@ fn too_few_recordings_say_how_many_are_needed_and_so_many_are_enough() {
     let error =
         calibrate_events(&compile::open(&numbered).unwrap(), &ramps(10, 1), &event_settings(1), &()).unwrap_err();
     assert!(error.to_string().contains("row number"), "{error}");
-    let error = evaluate_events(&model, &recordings(Kind::Independent, 2, 300, 1)).unwrap_err();
+    let error = evaluate_events(&MODEL, &recordings(Kind::Independent, 2, 300, 1)).unwrap_err();
     assert!(error.to_string().contains("no events"), "{error}");
 }

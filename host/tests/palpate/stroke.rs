@@ -1,19 +1,14 @@
 //! A stroke from the probe through the model to recorded touches: equal strokes pass, and different ones are refused
 //! with both values.
 
-use crate::calibrate;
-use crate::capture::in_memory;
-use crate::compile::{self, CompiledModel};
-use crate::ensemble::train::{self, train};
-use crate::ensemble::{Ensemble, StatedProbe};
-use crate::error::ProbeProblem;
-use crate::evaluate::{Candidate, Margins, delivered};
-use crate::mesh::{Mesh, Object};
-use crate::probe::{Probe, hand};
-use crate::strangers;
-use crate::touches::{Dataset, ObjectTouches, Origin, Recorded, Source};
-use crate::with;
-use palpate_shared::Touch;
+use crate::fixtures::*;
+use palpate::calibrate;
+use palpate::capture::in_memory;
+use palpate::compile::{self};
+use palpate::ensemble::train::{self, train};
+use palpate::evaluate::delivered;
+use palpate::probe::hand;
+use palpate::strangers;
 
 /// Two objects whose contacts come up to a second apart.
 fn captured(stroke: Option<f64>, seed: u64) -> Dataset {
@@ -37,14 +32,14 @@ fn recorded(dataset: &Dataset, stroke: Option<f64>) -> Dataset {
         ObjectTouches::new(&own.name, own.touches().to_vec(), source)
     };
     let probe = with!(Probe::default(), stroke);
-    let origin = Origin::recorded(probe, palpate_shared::format::Length::Tenth, false);
+    let origin = Origin::recorded(probe, palpate::shared::format::Length::Tenth, false);
     Dataset { origin: Some(origin), ..Dataset::new(dataset.objects.iter().map(one).collect()) }
 }
 
 /// A model of touches with this stroke.
 fn model(stroke: Option<f64>) -> Ensemble {
     let dataset = captured(stroke, 1);
-    let recipe = train::Settings { rounds: 3, probe: StatedProbe::of(&dataset), ..train::Settings::compact() };
+    let recipe = with!(train::Settings::compact(), rounds = 3, probe = StatedProbe::of(&dataset));
     train(&dataset, &recipe, &()).unwrap()
 }
 
@@ -95,9 +90,9 @@ fn touches_of_the_models_stroke_are_taken_and_of_another_refused_with_both_value
 fn a_recorded_contact_a_little_after_the_stroke_is_missing_as_on_the_chip() {
     let limited = model(Some(2.0));
     let late = lines(&captured(Some(2.0), 2))
-        .each(|own| own.changed(|touch| if touch.spread() > 190_000 { stretched(touch) } else { *touch }));
+        .each(|own| changed(own, |touch| if touch.spread() > 190_000 { stretched(touch) } else { *touch }));
     assert!(late.touches().any(|touch| touch.spread() > 200_000));
-    let cut = late.each(|own| own.changed(|touch| hand::within(touch, Some(200_000))));
+    let cut = late.each(|own| changed(own, |touch| hand::within(touch, Some(200_000))));
     let accuracy = |dataset: &Dataset| {
         let margins = Margins::new(Candidate::Full(&limited), dataset).unwrap();
         margins.confusion(5, 500, 1).unwrap()
@@ -106,9 +101,9 @@ fn a_recorded_contact_a_little_after_the_stroke_is_missing_as_on_the_chip() {
 }
 
 /// A touch on a clock that is 1.5 % slow.
-fn stretched(touch: &palpate_shared::Touch) -> palpate_shared::Touch {
-    let slow = |micros: u32| palpate_shared::ContactTime::from_micros(micros + micros * 3 / 200);
-    palpate_shared::Touch::new(touch.times().map(|time| time.micros().map_or(time, slow)))
+fn stretched(touch: &Touch) -> Touch {
+    let slow = |micros: u32| ContactTime::from_micros(micros + micros * 3 / 200);
+    Touch::new(touch.times().map(|time| time.micros().map_or(time, slow)))
 }
 
 /// A model of touches with a stroke of 2 that is known to an interval: contacts up to 2.3 are of the same hand.
@@ -118,7 +113,7 @@ fn estimated() -> Ensemble {
         let probe = with!(stated.probe, stroke_tolerance = Some(0.3));
         StatedProbe { probe, ..stated }
     });
-    let recipe = train::Settings { rounds: 3, probe, ..train::Settings::compact() };
+    let recipe = with!(train::Settings::compact(), rounds = 3, probe);
     train(&dataset, &recipe, &()).unwrap()
 }
 
@@ -138,17 +133,17 @@ fn a_contact_later_than_an_estimated_stroke_by_less_than_it_is_known_to_is_late_
         assert!(refused.contains("a stroke of 2 (0.200 s), which explains contacts up to 0.230 s"), "{refused}");
     }
     // Whoever looks at them, late contacts are missing: margins, sequences, a test for strangers, and a line at a time.
-    let cut = same.each(|own| own.changed(|touch| hand::within(touch, Some(200_000))));
+    let cut = same.each(|own| changed(own, |touch| hand::within(touch, Some(200_000))));
     let accuracy = |dataset: &Dataset| {
         let margins = Margins::new(Candidate::Compiled(&model), dataset).unwrap();
         margins.confusion(5, 500, 1).unwrap()
     };
     assert_eq!(accuracy(&same), accuracy(&cut));
-    let settings = calibrate::Settings { rate: 0.3, sequences: 400, max_touches: Some(60), ..Default::default() };
+    let settings = with!(calibrate::Settings::default(), rate = 0.3, sequences = 400, max_touches = Some(60));
     let calibrated = |dataset: &Dataset| calibrate::calibrate(&model, dataset.clone(), &settings, &()).unwrap().model;
     assert_eq!(calibrated(&same), calibrated(&cut));
     let tested = |dataset: &Dataset| {
-        let settings = strangers::Settings { alarms: 0.2, sequences: 2_000, ..Default::default() };
+        let settings = with!(strangers::Settings::default(), alarms = 0.2, sequences = 2_000);
         strangers::calibrate(&model, dataset, &[], &settings).unwrap().bytes
     };
     assert_eq!(tested(&same), tested(&cut));

@@ -1,13 +1,10 @@
 //! Captures of touches with the hand's position, of objects on a table.
 
-use super::*;
-use crate::mesh::Mesh;
-use crate::probe::Probe;
-use crate::probe::noise::Noise;
-use crate::touches::{Captured, Dataset, Format, Surroundings};
-use crate::with;
+use crate::fixtures::*;
 use glam::DVec3;
-use palpate_shared::{Q15_ONE, Touch};
+use palpate::capture::{Settings, capture, in_memory, scenes};
+use palpate::probe::approach::FINGERS;
+use palpate::touches::{Captured, Format};
 
 /// A brick of 60 by 40 by 30 mm.
 fn brick() -> Object {
@@ -126,11 +123,11 @@ fn contacts_later_than_the_stroke_are_missing_and_a_short_travel_meets_nothing()
 #[test]
 fn noise_and_lost_contacts_are_added_and_the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let real = with!(Noise::gaussian(5_000.0), position = 1_000.0, missed = [0.05; 3]);
-    for format in Format::ALL.into_iter().filter(|format| format.is_built_in()) {
+    for format in Format::ALL {
         let origin = Origin { real, format, ..origin(700) };
         let directories = [1, 3].map(|threads| {
             let directory = tempfile::tempdir().unwrap();
-            let settings = Settings { threads: Some(threads), ..origin.clone().into() };
+            let settings = with!(Settings::from(origin.clone()), threads = Some(threads));
             capture(&[brick()], &settings, directory.path(), &()).unwrap();
             directory
         });
@@ -176,7 +173,7 @@ fn what_a_position_needs_is_named() {
         (Origin { unit: Length::Tenth, ..origin(1) }, "true_size is not given. Use it with --position"),
         (Origin { pose: false, ..origin(1) }, "pose is false. Use it with --position"),
         (Origin { approaches: false, ..origin(1) }, "approaches is false. Use it with --position"),
-        (Origin { aim: crate::probe::Aim::Mass, ..origin(1) }, "aim is mass. Use --within MM"),
+        (Origin { aim: palpate::probe::Aim::Mass, ..origin(1) }, "aim is mass. Use --within MM"),
         (Origin { within: Some(-1.0), ..origin(1) }, "within is -1. Use a length"),
         (Origin { within: Some(f64::NAN), ..origin(1) }, "within is NaN. Use a length"),
         (Origin { within: Some(1.0), ..Origin::default() }, "within is 1. Use it with --position"),

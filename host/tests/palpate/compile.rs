@@ -1,8 +1,7 @@
-use super::*;
-use crate::ensemble::{Inputs, Node, Output, Provenance, StatedProbe, Tree, inputs};
-use crate::error::CompileProblem;
-use crate::with;
-use palpate_shared::{ContactTime, Descriptor, Touch};
+use crate::fixtures::*;
+use palpate::compile::{Instructions, Layout, Leaf, Settings, compile, longest_time, open};
+use palpate::ensemble::inputs;
+use palpate::error::CompileProblem;
 
 fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
     Node::Split { feature, threshold, missing_left: true, left, right }

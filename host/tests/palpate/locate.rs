@@ -1,14 +1,14 @@
 //! Located objects, from touches to verdicts.
 
-use super::*;
-use crate::calibrate;
-use crate::capture;
-use crate::mesh::{Mesh, Object};
-use crate::play::Hidden;
-use crate::probe::approach::Probe;
-use crate::touches::{Dataset, Origin, Surroundings};
-use crate::with;
-use palpate_shared::format::{Length, Per};
+use crate::fixtures::*;
+use palpate::calibrate as promises;
+use palpate::capture;
+use palpate::locate::{
+    Aimed, Approach, Maps, Real, Settings, Standing, TOUCHES, Terms, Until, World, calibrate, evaluate, learn,
+    locating, standing, write,
+};
+use palpate::onboard::locate::{Contact, Seen};
+use palpate::play::Hidden;
 
 fn probe() -> Probe {
     with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0))
@@ -49,16 +49,23 @@ fn touched(objects: &[Object], touches: u64) -> Dataset {
     capture::in_memory(objects, &origin.into(), &()).unwrap().0
 }
 
+/// The objects, touched.
+static TOUCHED: LazyLock<Dataset> = LazyLock::new(|| touched(&objects(), 60_000));
+
 fn model(settings: &Settings) -> Vec<u8> {
-    let dataset = touched(&objects(), 60_000);
-    let surfaces = learn(&dataset, settings).unwrap();
-    let names: Vec<String> = dataset.names();
-    write(&surfaces, &names, &probe(), settings).unwrap()
+    write(&learn(&TOUCHED, settings).unwrap(), &TOUCHED.names(), &probe(), settings).unwrap()
 }
+
+/// Maps with the usual settings.
+static MODEL: LazyLock<Vec<u8>> = LazyLock::new(|| model(&Settings::default()));
+/// Coarser ones.
+static COARSE: LazyLock<Vec<u8>> = LazyLock::new(|| model(&with!(Settings::default(), fine = false)));
+/// The objects as they stand.
+static STANDING: LazyLock<Vec<Standing>> = LazyLock::new(|| standing(&objects().each_ref(), &probe(), &()).unwrap());
 
 fn terms(sequences: usize) -> Terms {
     Terms {
-        promise: calibrate::Terms { rate: 0.1, confidence: 0.9, per: Per::Average },
+        promise: promises::Terms { rate: 0.1, confidence: 0.9, per: Per::Average },
         sequences,
         max_touches: 20,
         aimed: Aimed::Chosen,
@@ -74,28 +81,22 @@ fn terms(sequences: usize) -> Terms {
 
 #[test]
 fn an_object_is_named_and_found_in_a_few_approaches_chosen_or_at_random() {
-    let bytes = model(&Settings::default());
-    let maps = Maps::new(&bytes).unwrap();
+    let maps = Maps::new(&MODEL).unwrap();
     assert_eq!([0, 1].map(|object| maps.object_name(object)), ["bar", "puck"]);
-    let objects = objects();
-    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
     for aimed in [Aimed::Chosen, Aimed::Random] {
-        let found = evaluate(maps, &standing, &probe(), &Terms { aimed, ..terms(40) }, &()).unwrap();
+        let found = evaluate(maps, &STANDING, &probe(), &Terms { aimed, ..terms(40) }, &()).unwrap();
         assert!(found.wrong <= 1 && found.given >= 35, "{found:?}");
         assert!(found.mean_approaches < 12.0, "{found:?}");
     }
     let until = Some(Until { millimeters: 6.0, degrees: 10.0 });
-    let sure = evaluate(maps, &standing, &probe(), &Terms { until, ..terms(40) }, &()).unwrap();
+    let sure = evaluate(maps, &STANDING, &probe(), &Terms { until, ..terms(40) }, &()).unwrap();
     assert!(sure.poses_within * 10 >= sure.poses * 9 && sure.poses >= 30, "{sure:?}");
 }
 
 #[test]
 fn an_object_that_lies_hidden_is_found_among_its_ghosts() {
-    let bytes = model(&Settings { fine: false, ..Settings::default() });
-    let maps = Maps::new(&bytes).unwrap();
-    let objects = objects();
-    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
-    let world = World { standing: &standing, probe: &probe(), real: Real::default(), range: 28.0, seed: 3 };
+    let maps = Maps::new(&COARSE).unwrap();
+    let world = World { standing: &STANDING, probe: &probe(), real: Real::default(), range: 28.0, seed: 3 };
     let mut hidden = Hidden::new(&world, maps, 0).unwrap();
     assert!(hidden.ghosts().is_empty());
     let first = hidden.choose();
@@ -118,12 +119,9 @@ fn an_object_that_lies_hidden_is_found_among_its_ghosts() {
 
 #[test]
 fn the_same_seed_gives_the_same_sequences_on_any_number_of_threads() {
-    let bytes = model(&Settings { fine: false, ..Settings::default() });
-    let objects = objects();
-    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
     let found = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let evaluate = || evaluate(Maps::new(&bytes).unwrap(), &standing, &probe(), &terms(12), &()).unwrap();
+        let evaluate = || evaluate(Maps::new(&COARSE).unwrap(), &STANDING, &probe(), &terms(12), &()).unwrap();
         format!("{:?}", pool.install(evaluate))
     };
     assert_eq!(found(1), found(4));
@@ -131,20 +129,17 @@ fn the_same_seed_gives_the_same_sequences_on_any_number_of_threads() {
 
 #[test]
 fn a_calibrated_model_states_its_promise_and_how_approaches_were_aimed() {
-    let bytes = model(&Settings::default());
-    let objects = objects();
-    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
     for (aimed, unknown) in [(Aimed::Chosen, false), (Aimed::Random, true)] {
         let terms = Terms { aimed, unknown, ..terms(80) };
-        let calibrated = calibrate(Maps::new(&bytes).unwrap(), &standing, &probe(), &terms, &()).unwrap();
+        let calibrated = calibrate(Maps::new(&MODEL).unwrap(), &STANDING, &probe(), &terms, &()).unwrap();
         let maps = Maps::new(&calibrated.model).unwrap();
         let promise = maps.promise().unwrap();
         assert_eq!((promise.rate, promise.active), (0.1, aimed == Aimed::Chosen));
         assert_eq!((promise.given as usize, promise.wrong as usize), (calibrated.given, calibrated.wrong));
         let other = Terms { seed: 8, ..terms };
-        let found = evaluate(maps, &standing, &probe(), &other, &()).unwrap();
+        let found = evaluate(maps, &STANDING, &probe(), &other, &()).unwrap();
         assert!(found.wrong * 4 <= found.given, "{found:?}");
-        assert_eq!(Maps::new(&bytes).unwrap().promise(), None);
+        assert_eq!(Maps::new(&MODEL).unwrap().promise(), None);
     }
 }
 
@@ -153,9 +148,7 @@ fn an_object_that_moves_in_each_approach_takes_a_few_more() {
     let real = Real { drift: 1.0, drift_yaw: 1.0, ..Real::default() };
     let [still, moving] = [Real::default(), real].map(|real| {
         let bytes = model(&Settings::default().expecting(&real));
-        let objects = objects();
-        let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
-        evaluate(Maps::new(&bytes).unwrap(), &standing, &probe(), &Terms { real, ..terms(60) }, &()).unwrap()
+        evaluate(Maps::new(&bytes).unwrap(), &STANDING, &probe(), &Terms { real, ..terms(60) }, &()).unwrap()
     });
     assert!(moving.mean_approaches < 2.0 * still.mean_approaches && moving.given >= 55, "{moving:?}, still {still:?}");
     assert!(moving.wrong <= 2, "{moving:?}");
@@ -163,13 +156,10 @@ fn an_object_that_moves_in_each_approach_takes_a_few_more() {
 
 #[test]
 fn a_hand_that_may_not_leave_the_middle_aims_otherwise_chosen_or_at_random() {
-    let bytes = model(&Settings::default());
-    let objects = objects();
-    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
     for aimed in [Aimed::Chosen, Aimed::Random] {
         let mean = |within| {
             let terms = Terms { aimed, within, ..terms(30) };
-            evaluate(Maps::new(&bytes).unwrap(), &standing, &probe(), &terms, &()).unwrap().mean_approaches
+            evaluate(Maps::new(&MODEL).unwrap(), &STANDING, &probe(), &terms, &()).unwrap().mean_approaches
         };
         let [kept, free] = [0, 60_000].map(mean);
         // A bar as long as the table is met from the middle more often than at random.
@@ -181,10 +171,6 @@ fn a_hand_that_may_not_leave_the_middle_aims_otherwise_chosen_or_at_random() {
 
 #[test]
 fn intervals_of_poses_change_only_where_a_promise_is_for_poses() {
-    use palpate_onboard::locate::{Contact, Seen};
-    let bytes = model(&Settings::default());
-    let objects = objects();
-    let standing = standing(&objects.each_ref(), &probe(), &()).unwrap();
     let within = |bytes: &[u8]| {
         let maps = Maps::new(bytes).unwrap();
         let mut locating = locating(maps, maps.stopping(), None);
@@ -193,20 +179,19 @@ fn intervals_of_poses_change_only_where_a_promise_is_for_poses() {
     };
     let calibrated = |until| {
         let terms = Terms { until, ..terms(40) };
-        calibrate(Maps::new(&bytes).unwrap(), &standing, &probe(), &terms, &()).unwrap().model
+        calibrate(Maps::new(&MODEL).unwrap(), &STANDING, &probe(), &terms, &()).unwrap().model
     };
     // A name is sure long before its pose: intervals that held 95 % of such poses would be as wide as the table.
-    assert_eq!(within(&calibrated(None)), within(&bytes));
-    assert_ne!(within(&calibrated(Some(Until { millimeters: 4.0, degrees: 8.0 }))), within(&bytes));
+    assert_eq!(within(&calibrated(None)), within(&MODEL));
+    assert_ne!(within(&calibrated(Some(Until { millimeters: 4.0, degrees: 8.0 }))), within(&MODEL));
 }
 
 #[test]
 fn an_object_that_the_model_does_not_know_is_called_unknown() {
-    let bytes = model(&Settings::default());
     let mut objects = objects().to_vec();
     let known = standing(&objects.iter().collect::<Vec<_>>(), &probe(), &()).unwrap();
     let terms = Terms { unknown: true, ..terms(80) };
-    let calibrated = calibrate(Maps::new(&bytes).unwrap(), &known, &probe(), &terms, &()).unwrap();
+    let calibrated = calibrate(Maps::new(&MODEL).unwrap(), &known, &probe(), &terms, &()).unwrap();
     // As high as three pucks.
     let mut tower = objects[1].mesh().clone();
     tower.vertices.iter_mut().for_each(|vertex| *vertex = [vertex[0] * 0.7, vertex[1] * 0.7, vertex[2] * 5.0]);
@@ -222,8 +207,8 @@ fn an_object_that_the_model_does_not_know_is_called_unknown() {
 fn touches_without_a_position_and_other_units_are_refused() {
     let mut dataset = touched(&objects(), 50);
     let touch = dataset.objects[0].touches()[0];
-    let bare = palpate_shared::Touch::new(touch.times()).with_pose(touch.pose().unwrap());
-    let object = crate::touches::ObjectTouches::new("bar", vec![touch, bare], crate::touches::Source::Object);
+    let bare = Touch::new(touch.times()).with_pose(touch.pose().unwrap());
+    let object = ObjectTouches::new("bar", vec![touch, bare], Source::Object);
     dataset.objects = vec![object];
     let error = learn(&dataset, &Settings::default()).unwrap_err().to_string();
     assert!(error.contains("bar: touch 2 has no position"), "{error}");
@@ -247,10 +232,10 @@ fn maps_of_no_object_and_of_one_without_a_surface_are_refused_by_name() {
 fn settings_out_of_range_are_refused_by_name() {
     let settings = Settings::default();
     for (wrong, name) in [
-        (Settings { range: 200.0, ..settings.clone() }, "range"),
-        (Settings { noise: f64::NAN, ..settings.clone() }, "noise"),
-        (Settings { lost: 0.0, ..settings.clone() }, "lost"),
-        (Settings { max_touches: 33, ..settings.clone() }, "max_touches"),
+        (with!(settings.clone(), range = 200.0), "range"),
+        (with!(settings.clone(), noise = f64::NAN), "noise"),
+        (with!(settings.clone(), lost = 0.0), "lost"),
+        (with!(settings.clone(), max_touches = 33), "max_touches"),
     ] {
         let error = wrong.check().unwrap_err().to_string();
         assert!(error.starts_with(name), "{error}");

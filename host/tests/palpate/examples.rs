@@ -12,7 +12,7 @@ fn run(name: &str) -> String {
     path.push(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     let output = Command::new(&path).stdin(Stdio::null()).output().unwrap_or_else(|error| {
         panic!(
-            "{}: {error}; `cargo test --release -p palpate` builds it, `cargo test --release --test examples` does not",
+            "{}: {error}; `cargo test --release -p palpate` builds it, `cargo test --release --test palpate` does not",
             path.display()
         )
     });

@@ -1,10 +1,11 @@
-use super::*;
-use crate::capture;
-use crate::compile::{self, compile};
-use crate::ensemble::{self, Ensemble, Node, Output, Tree, inputs};
-use crate::with;
-
-use palpate_shared::Descriptor;
+use crate::fixtures::*;
+use glam::DVec3;
+use palpate::capture;
+use palpate::compile::{self, compile};
+use palpate::ensemble::{self, inputs};
+use palpate::play::{Game, Series};
+use palpate::probe::approach::{Approach, CLEARANCE};
+use palpate::probe::hand::Unreached;
 
 /// A nat or less for the disc where the surface is flat, for the globe where it is bent; of full touches.
 fn model() -> Vec<u8> {
@@ -89,7 +90,7 @@ fn an_aimed_approach_moves_along_its_line_and_is_none_beside_the_object() {
     assert_eq!((start.y, start.z, direction), (1.0, 0.5, DVec3::NEG_X));
     assert!(alignment.dot(direction).abs() < 1e-12 && (alignment.length() - 1.0).abs() < 1e-12);
     let [low, high] = game.scene(1).unwrap().bounds();
-    assert!((start.length() - (high - low).length() / 2.0 - crate::probe::approach::CLEARANCE).abs() < 1e-9);
+    assert!((start.length() - (high - low).length() / 2.0 - CLEARANCE).abs() < 1e-9);
     assert!(approached.distances[1].is_some());
     // Beside it, beyond where approaches start, and nowhere.
     for (point, direction) in [
@@ -144,7 +145,7 @@ fn what_cannot_be_played_with_is_refused() {
 
 #[test]
 fn a_finger_that_the_hand_does_not_reach_is_missing_with_the_reason() {
-    let probe = with!(crate::probe::Probe::default(), stroke = Some(1.0), travel = Some(9.0));
+    let probe = with!(Probe::default(), stroke = Some(1.0), travel = Some(9.0));
     let mut game = Game::new(&Origin { probe, ..Origin::default() });
     game.add_object("disc", &Mesh::globe(12).stretched([1.0, 1.0, 0.1]), 10.0).unwrap();
     let origin = Origin { approaches: true, pose: true, seed: 7, probe, ..Origin::default() };

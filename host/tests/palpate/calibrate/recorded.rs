@@ -1,0 +1,122 @@
+use crate::fixtures::*;
+use crate::synthetic::{self, MODEL};
+use palpate::calibrate::{Calibrated, Settings, calibrate, calibrate_recorded};
+
+const OBJECTS: usize = 3;
+
+fn simulated(count: usize, seed: u64) -> Dataset {
+    synthetic::dataset(&[count; OBJECTS], seed)
+}
+
+static SIMULATED: LazyLock<Dataset> = LazyLock::new(|| simulated(30_000, 2));
+
+/// Recordings of a robot, which are not what the simulation says. Its hand is faster, and its contacts are noisy.
+fn recorded(count: usize, seed: u64) -> Dataset {
+    let mut dataset = simulated(count, seed);
+    dataset.add_noise(&with!(Noise::gaussian(8_000.0), speed = 1.12), seed, 1);
+    dataset
+}
+
+fn settings(rate: f64) -> Settings {
+    with!(Settings::default(), rate, sequences = 6_000, max_touches = Some(200))
+}
+
+fn not_supported(result: palpate::Result<Calibrated>) -> (CalibrateProblem, String) {
+    let error = result.unwrap_err();
+    let problem = error.problem::<CalibrateProblem>().cloned().unwrap();
+    assert!(matches!(problem, CalibrateProblem::NotSupported { .. }), "{problem:?}");
+    (problem, error.to_string())
+}
+
+/// The share of wrong names among those that a model gives to touches of a robot.
+fn error(bytes: &[u8], touches: &Dataset) -> f64 {
+    let model = Model::new(bytes).unwrap();
+    let margins = Margins::new(Candidate::Compiled(&model), touches).unwrap();
+    let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 3_000, seed: 1 };
+    margins.sequential(&settings).unwrap().error
+}
+
+/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --test palpate found_on_simulated -- --nocapture` repeats it as often.
+#[test]
+fn thresholds_found_on_simulated_touches_and_tested_on_recorded_ones_keep_the_promise_for_recorded_ones() {
+    let repetitions = repetitions(20);
+    let unseen = recorded(10_000, 1_000);
+    let rate = 0.05;
+    // The second has so few that a sequence is a large share of them.
+    for (rate, approaches) in [(rate, 1_200), (0.2, 150)] {
+        let (mut broken, mut made, mut used) = (0, 0, 0.0);
+        for run in 0..repetitions {
+            let of_robot = recorded(approaches, 2_000 + run);
+            let result = calibrate_recorded(&MODEL.model(), SIMULATED.clone(), &of_robot, &settings(rate), &());
+            let Ok(calibrated) = result else { continue };
+            let error = error(&calibrated.model, &unseen);
+            made += 1;
+            used += error / rate;
+            // Within the standard error of 9,000 sequences.
+            broken += u64::from(error > rate + (rate * (1.0 - rate) / 9_000.0).sqrt());
+        }
+        let used = 100.0 * used / f64::from(made as u32);
+        println!("{made} of {repetitions} promises made and {broken} broken, {used:.0} % of the rate used");
+        assert!(2 * made > repetitions, "{made} of {repetitions} promises made");
+        assert_rare("promise on recordings", broken, repetitions, 0.05);
+    }
+    // What the simulation alone promises does not hold for them.
+    let alone = calibrate(&MODEL.model(), SIMULATED.clone(), &settings(rate), &()).unwrap();
+    let alone = error(&alone.model, &unseen);
+    assert!(alone > 1.3 * rate, "{alone}");
+}
+
+#[test]
+fn a_promise_takes_fewer_recordings_than_a_calibration_from_nothing() {
+    let settings_of_rate = settings(0.03);
+    let alone = |count: usize| calibrate(&MODEL.model(), simulated(count, 3), &settings_of_rate, &());
+    let with = |count: usize| {
+        calibrate_recorded(&MODEL.model(), SIMULATED.clone(), &simulated(count, 3), &settings_of_rate, &())
+    };
+    let few = (2..14).map(|hundreds| 100 * hundreds).find(|&count| with(count).is_ok()).unwrap();
+    let error = alone(few).unwrap_err().to_string();
+    assert!(error.contains("too few to promise 3 %") && error.contains("which support"), "{few}: {error}");
+    let (calibrated, recorded) = (with(few).unwrap(), simulated(700, 3));
+    let facts = calibrated.recorded.unwrap();
+    assert_eq!((facts.approaches, facts.recordings), (few, None));
+    assert_eq!((calibrated.promise.rate, calibrated.promise.noise), (0.03, Noise::default().promised()));
+    assert!(calibrated.promise.given >= 99, "{:?}", calibrated.promise);
+    for per in [Per::Object, Per::Name] {
+        let each = with!(settings(0.1), per);
+        let calibrated = calibrate_recorded(&MODEL.model(), SIMULATED.clone(), &recorded, &each, &()).unwrap();
+        assert_eq!(calibrated.errors.len(), OBJECTS, "{calibrated:?}");
+        assert!(calibrated.objects.values().all(|of| of.given >= 29), "{calibrated:?}");
+    }
+}
+
+#[test]
+fn recordings_that_are_too_few_say_which_rate_they_support_and_that_rate_can_be_promised() {
+    let of = |count: usize, rate: f64| {
+        calibrate_recorded(&MODEL.model(), SIMULATED.clone(), &recorded_as_simulated(count), &settings(rate), &())
+    };
+    let (problem, text) = not_supported(of(300, 0.01));
+    let CalibrateProblem::NotSupported { tally, needed, forecast, object, .. } = problem else { unreachable!() };
+    assert!(tally.all < 299 && tally.wrong == 0 && needed == 299 && object.is_none(), "{text}");
+    assert!(text.contains("are too few to promise 1 %: at least 299 are needed"), "{text}");
+    let (supported, enough) = (forecast.supported.unwrap(), forecast.enough.unwrap());
+    assert!(
+        text.contains(&format!("300 recorded approaches to each object support about {} %", 100.0 * supported)),
+        "{text}"
+    );
+    assert!(text.contains(&format!("1 % takes about {} in all, from {} to", enough.all, enough.least.0)), "{text}");
+    let most = enough.most.0;
+    assert!((0.015..0.4).contains(&supported) && (400..6_000).contains(&most), "{text}");
+    assert!(enough.least.0 < most && enough.all < OBJECTS as u64 * most, "{text}");
+    of(300, supported).unwrap();
+    // As many of each object as it takes.
+    let counts = [&enough.least, &enough.most].map(|(count, name)| (name.clone(), *count as usize));
+    let rest = enough.all as usize - counts.iter().map(|(_, count)| count).sum::<usize>();
+    let as_much = |object: &ObjectTouches| counts.iter().find(|of| of.0 == object.name).map_or(rest, |of| of.1);
+    let recorded = recorded_as_simulated(most as usize).each(|object| object.select(0..as_much(object)));
+    calibrate_recorded(&MODEL.model(), SIMULATED.clone(), &recorded, &settings(0.01), &()).unwrap();
+}
+
+/// Recordings of which the simulation is right.
+fn recorded_as_simulated(count: usize) -> Dataset {
+    simulated(count, 77)
+}

@@ -1,0 +1,31 @@
+//! What most tests use, and what they do with touches.
+
+pub(crate) use crate::repetitions::{assert_rare, repetitions};
+pub(crate) use palpate::compile::CompiledModel;
+pub(crate) use palpate::ensemble::{
+    Ensemble, Inputs, Node, Output, OverTouches, Provenance, StatedProbe, TouchOrigin, Tree,
+};
+pub(crate) use palpate::error::{CalibrateProblem, EvaluateProblem, ProbeProblem, Setting};
+pub(crate) use palpate::evaluate::{Candidate, Margins, SequentialSettings};
+pub(crate) use palpate::mesh::{Mesh, Object};
+pub(crate) use palpate::onboard::{Model, Recognizer, Stopping, Verdict};
+pub(crate) use palpate::probe::approach::Probe;
+pub(crate) use palpate::probe::noise::Noise;
+pub(crate) use palpate::random::{Purpose, generator};
+pub(crate) use palpate::shared::format::{Counted, Held, Length, Per};
+pub(crate) use palpate::shared::{ContactTime, Descriptor, Pose, Q15_ONE, Touch};
+pub(crate) use palpate::touches::{Dataset, ObjectTouches, Origin, Recorded, Source, Surroundings};
+pub(crate) use palpate::with;
+pub(crate) use std::collections::{BTreeMap, BTreeSet};
+pub(crate) use std::path::Path;
+pub(crate) use std::sync::LazyLock;
+
+/// The touches that `keep` says.
+pub(crate) fn filtered(object: &ObjectTouches, keep: impl Fn(&Touch) -> bool) -> ObjectTouches {
+    object.select((0..object.len()).filter(|&touch| keep(&object.touches()[touch])))
+}
+
+/// Touches of an object of one source, each changed.
+pub(crate) fn changed(object: &ObjectTouches, change: impl FnMut(&Touch) -> Touch) -> ObjectTouches {
+    ObjectTouches::new(&object.name, object.touches().iter().map(change).collect(), Source::Object)
+}
