@@ -6,72 +6,36 @@ use palpate_trees::ensemble::{Ensemble, Probability};
 use palpate_trees::shared::format::Link::{self, Exponential, Identity, Logistic, Softplus, Square};
 use std::path::Path;
 
-/// XGBoost's objectives of one output, the number of objects, the link, and the margin that trees start from at 0.3.
-const XGBOOST: [(&str, usize, Link, f32); 19] = [
-    ("binary:logistic", 2, Identity, LOGIT),
-    ("binary:logitraw", 2, Identity, 0.3),
-    ("binary:hinge", 2, Identity, 0.3),
-    ("reg:logistic", 1, Logistic, LOGIT),
-    ("count:poisson", 1, Exponential, LOG),
-    ("reg:gamma", 1, Exponential, LOG),
-    ("reg:tweedie", 1, Exponential, LOG),
-    ("survival:cox", 1, Exponential, LOG),
-    ("survival:aft", 1, Exponential, LOG),
-    ("reg:squarederror", 1, Identity, 0.3),
-    ("reg:linear", 1, Identity, 0.3),
-    ("reg:squaredlogerror", 1, Identity, 0.3),
-    ("reg:pseudohubererror", 1, Identity, 0.3),
-    ("reg:absoluteerror", 1, Identity, 0.3),
-    ("reg:quantileerror", 1, Identity, 0.3),
-    ("reg:expectileerror", 1, Identity, 0.3),
-    ("rank:pairwise", 1, Identity, 0.3),
-    ("rank:ndcg", 1, Identity, 0.3),
-    ("rank:map", 1, Identity, 0.3),
-];
 const LOGIT: f32 = -0.847_297_85;
 const LOG: f32 = -1.203_972_8;
 
-/// LightGBM's objectives of one output, with the words that it writes after them.
-const LIGHTGBM: [(&str, usize, Link, Probability); 22] = [
-    ("binary sigmoid:1", 2, Identity, Probability::Softmax),
-    ("custom", 1, Identity, Probability::Unknown),
-    ("regression", 1, Identity, Probability::Softmax),
-    ("regression_l1", 1, Identity, Probability::Softmax),
-    ("huber", 1, Identity, Probability::Softmax),
-    ("fair", 1, Identity, Probability::Softmax),
-    ("quantile", 1, Identity, Probability::Softmax),
-    ("mape", 1, Identity, Probability::Softmax),
-    ("regression sqrt", 1, Square, Probability::Softmax),
-    ("regression_l1 sqrt", 1, Square, Probability::Softmax),
-    ("huber sqrt", 1, Square, Probability::Softmax),
-    ("fair sqrt", 1, Square, Probability::Softmax),
-    ("quantile sqrt", 1, Square, Probability::Softmax),
-    ("mape sqrt", 1, Square, Probability::Softmax),
-    ("poisson", 1, Exponential, Probability::Softmax),
-    ("gamma", 1, Exponential, Probability::Softmax),
-    ("tweedie", 1, Exponential, Probability::Softmax),
-    ("poisson sqrt", 1, Exponential, Probability::Softmax),
-    ("cross_entropy", 1, Logistic, Probability::Softmax),
-    ("cross_entropy_lambda", 1, Softplus, Probability::Softmax),
-    ("lambdarank", 1, Identity, Probability::Softmax),
-    ("rank_xendcg", 1, Identity, Probability::Softmax),
+/// XGBoost's objectives of one output, the number of objects, the link, and the margin that trees start from at 0.3.
+const XGBOOST: [(&str, usize, Link, f32); 6] = [
+    ("binary:logistic", 2, Identity, LOGIT),
+    ("binary:logitraw binary:hinge", 2, Identity, 0.3),
+    ("reg:logistic", 1, Logistic, LOGIT),
+    ("count:poisson reg:gamma reg:tweedie survival:cox survival:aft", 1, Exponential, LOG),
+    ("reg:squarederror reg:linear reg:squaredlogerror reg:pseudohubererror reg:absoluteerror", 1, Identity, 0.3),
+    ("reg:quantileerror reg:expectileerror rank:pairwise rank:ndcg rank:map", 1, Identity, 0.3),
+];
+
+/// LightGBM's objectives of one output that may learn the roots of their targets, which it then writes after them.
+const WITH_ROOTS: &str = "regression regression_l1 huber fair quantile mape";
+
+/// The others.
+const LIGHTGBM: [(&str, usize, Link); 5] = [
+    ("binary", 2, Identity),
+    ("poisson gamma tweedie", 1, Exponential),
+    ("cross_entropy", 1, Logistic),
+    ("cross_entropy_lambda", 1, Softplus),
+    ("lambdarank rank_xendcg", 1, Identity),
 ];
 
 /// CatBoost's losses of one output for models without names of classes, as its `predict` gives them by default.
-const CATBOOST: [(&str, usize, Link); 13] = [
-    ("RMSE", 1, Identity),
-    ("MAE", 1, Identity),
-    ("MAPE", 1, Identity),
-    ("Quantile", 1, Identity),
-    ("LogLinQuantile", 1, Identity),
-    ("Huber", 1, Identity),
-    ("Expectile", 1, Identity),
-    ("Lq", 1, Identity),
-    ("Cox", 1, Identity),
-    ("Poisson", 1, Exponential),
-    ("Tweedie", 1, Exponential),
-    ("Logloss", 2, Identity),
-    ("CrossEntropy", 2, Identity),
+const CATBOOST: [(&str, usize, Link); 3] = [
+    ("RMSE MAE MAPE Quantile LogLinQuantile Huber Expectile Lq Cox", 1, Identity),
+    ("Poisson Tweedie", 1, Exponential),
+    ("Logloss CrossEntropy", 2, Identity),
 ];
 
 /// A fixture with other words in its file, each of which it has once.
@@ -90,7 +54,10 @@ fn meaning(ensemble: &Ensemble) -> (usize, Link, Probability) {
 
 #[test]
 fn each_objective_of_xgboost_has_its_link_and_the_margin_that_its_trees_start_from() {
-    for (objective, objects, link, start) in XGBOOST {
+    let all = XGBOOST.into_iter().flat_map(|(names, objects, link, start)| {
+        names.split(' ').map(move |objective| (objective, objects, link, start))
+    });
+    for (objective, objects, link, start) in all {
         let ensemble = changed("xgboost-3.2-binary", ["binary:logistic", objective]).unwrap();
         // Its margins only say which class.
         let probability = if objective == "binary:hinge" { Probability::Unknown } else { Probability::Softmax };
@@ -108,10 +75,21 @@ fn each_objective_of_xgboost_has_its_link_and_the_margin_that_its_trees_start_fr
 
 #[test]
 fn each_objective_of_lightgbm_has_its_link_and_probabilities() {
-    for (objective, objects, link, probability) in LIGHTGBM {
-        let of = changed("lightgbm-4.7-regression", ["objective=regression", &format!("objective={objective}")]);
-        assert_eq!(meaning(&of.unwrap()), (objects, link, probability), "{objective}");
+    let of = |objective: &str| {
+        let objective = format!("objective={objective}");
+        meaning(&changed("lightgbm-4.7-regression", ["objective=regression", &objective]).unwrap())
+    };
+    for (names, objects, link) in LIGHTGBM {
+        for objective in names.split(' ') {
+            assert_eq!(of(objective), (objects, link, Probability::Softmax), "{objective}");
+        }
     }
+    for objective in WITH_ROOTS.split(' ') {
+        assert_eq!(of(objective), (1, Identity, Probability::Softmax), "{objective}");
+        assert_eq!(of(&format!("{objective} sqrt")), (1, Square, Probability::Softmax), "{objective}");
+    }
+    assert_eq!(of("poisson sqrt"), (1, Exponential, Probability::Softmax));
+    assert_eq!(of("custom"), (1, Identity, Probability::Unknown));
     let own = "objective=multiclass num_class:3";
     for (objective, probability) in [
         ("multiclass num_class:3", Probability::Softmax),
@@ -130,9 +108,11 @@ fn each_loss_of_catboost_has_its_link_and_probabilities() {
     let of = |name: &str, words: [&str; 2]| {
         changed(name, words.map(|loss| format!("\"type\":\"{loss}\"")).each_ref().map(String::as_str))
     };
-    for (loss, objects, link) in CATBOOST {
-        let ensemble = of("catboost-1.2-regression", ["RMSE", loss]).unwrap();
-        assert_eq!(meaning(&ensemble), (objects, link, Probability::Softmax), "{loss}");
+    for (names, objects, link) in CATBOOST {
+        for loss in names.split(' ') {
+            let ensemble = of("catboost-1.2-regression", ["RMSE", loss]).unwrap();
+            assert_eq!(meaning(&ensemble), (objects, link, Probability::Softmax), "{loss}");
+        }
     }
     for (loss, probability) in [("MultiClass", Probability::Softmax), ("MultiClassOneVsAll", Probability::Logistic)] {
         let ensemble = of("catboost-1.2-multiclass", ["MultiClass", loss]).unwrap();
