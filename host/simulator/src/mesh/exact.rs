@@ -66,19 +66,3 @@ impl Mesh {
 pub(super) fn rounded(vertex: [f64; 3], offset: [f64; 3]) -> [f32; 3] {
     std::array::from_fn(|axis| (vertex[axis] - offset[axis]) as f32)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_what_is_far_from_the_origin_is_moved() {
-        let cube = |at: f64| [[at, 0.0, 0.0], [at + 1.0, 1.0, 1.0]];
-        assert_eq!(Bounds::of(cube(15.5)).offset(), [0.0; 3]);
-        assert_eq!(Bounds::of(cube(-17.5)).offset(), [-17.0, 0.5, 0.5]);
-        assert_eq!(Bounds::of(cube(f64::NAN)).offset(), [0.0; 3]);
-        assert_eq!(Bounds::of([[5.0; 3]]).offset(), [0.0; 3], "a point has no side");
-        assert_eq!(Bounds::default().offset(), [0.0; 3]);
-        assert_eq!(rounded([0.1, -0.0, 1e-50], [0.0; 3]).map(f32::to_bits), [0.1, -0.0, 0.0].map(f32::to_bits));
-    }
-}

@@ -53,8 +53,6 @@ mod polygon;
 mod scan;
 pub mod source;
 mod stl;
-#[cfg(test)]
-mod tests;
 mod text;
 mod triangles;
 mod unread;

@@ -96,32 +96,3 @@ impl Places {
         None
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use rand::{RngExt, SeedableRng};
-
-    #[test]
-    fn places_are_the_same_up_to_a_billionth_of_the_size_whichever_cells_they_are_in() {
-        let mut random = rand::rngs::Xoshiro256PlusPlus::seed_from_u64(1);
-        let mut places = Places::new([glam::Vec3::ZERO, glam::Vec3::ONE]);
-        for _ in 0..5_000 {
-            // Where f32 is fine enough to hold such distances.
-            let place: [f64; 3] = std::array::from_fn(|_| random.random_range(0.0..1e-3));
-            let own = places.of(place.map(|x| x as f32));
-            for _ in 0..3 {
-                let moved = place.map(|x| x + random.random_range(-0.9e-9..0.9e-9));
-                assert_eq!(places.of(moved.map(|x| x as f32)), own, "{place:?} {moved:?}");
-                let far = [moved[0] + 3e-9, moved[1], moved[2]];
-                assert_ne!(places.of(far.map(|x| x as f32)), own, "{place:?} {far:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn of_a_point_only_equal_vertices_are_at_the_same_place() {
-        let mut places = Places::new([glam::Vec3::ZERO; 2]);
-        assert_eq!([0.0, -0.0, 1e-30, 0.0].map(|x| places.of([x, 0.0, 0.0])), [0, 0, 1, 0]);
-    }
-}

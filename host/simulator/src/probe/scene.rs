@@ -170,39 +170,3 @@ fn bounds(triangles: &[Triangle]) -> [DVec3; 2] {
     let grow = |[low, high]: [DVec3; 2], &corner: &DVec3| [low.min(corner), high.max(corner)];
     triangles.iter().flatten().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], grow)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_longest_side_gets_the_length_and_the_box_is_centered() {
-        let vertices = vec![[1.0, 10.0, 0.0], [3.0, 10.0, 0.5], [2.0, 6.0, 0.25], [900.0; 3]];
-        let scene = Scene::new(&Mesh { vertices, triangles: vec![[0, 1, 2]] }, 10.0).unwrap();
-        assert_eq!(scene.bounds(), [DVec3::new(-2.5, -5.0, -0.625), DVec3::new(2.5, 5.0, 0.625)]);
-        assert_eq!(scene.triangles().next().unwrap()[0], DVec3::new(-2.5, 5.0, -0.625));
-    }
-
-    #[test]
-    fn the_center_of_mass_weighs_triangles_by_their_area() {
-        // A large triangle and one of a quarter of its area.
-        let vertices =
-            vec![[0.0; 3], [6.0, 0.0, 0.0], [0.0, 6.0, 0.0], [0.0, 0.0, 4.0], [3.0, 0.0, 4.0], [0.0, 3.0, 4.0]];
-        let scene = Scene::as_is(&Mesh { vertices, triangles: vec![[0, 1, 2], [3, 4, 5]] }).unwrap();
-        let expected = (DVec3::new(2.0, 2.0, 0.0) * 4.0 + DVec3::new(1.0, 1.0, 4.0)) / 5.0;
-        assert!(scene.center_of_mass().distance(expected) < 1e-12);
-        let flat =
-            Scene::as_is(&Mesh { vertices: vec![[0.0; 3], [2.0, 0.0, 0.0]], triangles: vec![[0, 1, 1]] }).unwrap();
-        assert_eq!(flat.center_of_mass(), DVec3::new(1.0, 0.0, 0.0));
-    }
-
-    #[test]
-    fn meshes_that_cannot_be_touched_are_refused() {
-        let vertices = vec![[1.0; 3], [f32::NAN; 3], [2.0; 3]];
-        for (triangle, what) in [([0, 0, 0], "no extent"), ([0, 1, 2], "not finite"), ([0, 2, 3], "vertex 3")] {
-            let error = Scene::new(&Mesh { vertices: vertices.clone(), triangles: vec![triangle] }, 10.0).unwrap_err();
-            assert!(error.to_string().contains(what), "{error}");
-        }
-        assert!(Scene::as_is(&Mesh::default()).unwrap_err().to_string().contains("no faces"));
-    }
-}

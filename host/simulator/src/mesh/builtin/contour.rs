@@ -127,23 +127,3 @@ fn unfold(points: &mut [Vec3], triangles: &[[u32; 3]], shape: &slices::Shape, ce
         suspects.dedup();
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::mesh::builtin::shape::ellipsoid;
-
-    /// In a box of 2 units, so finely meshed that the mesher's cube is hardly larger.
-    fn form(shape: Shape) -> Form {
-        Form { shape, bounds: [Vec3::splat(-1.0), Vec3::splat(1.0)], cells: f32::from(1_u16 << DEPTH) }
-    }
-
-    #[test]
-    fn a_shape_that_has_no_closed_mesh_gives_no_empty_mesh() {
-        let ball = ellipsoid(Vec3::splat(0.12));
-        assert!(mesh(&form(ball.clone())).is_some());
-        // Cut by the cube's side, whichever of the resolutions is tried, and outside of the cube.
-        assert_eq!(mesh(&form(ball.moved(Vec3::X * 1.06))), None);
-        assert_eq!(mesh(&form(ball.moved(Vec3::X * 9.0))), None);
-    }
-}

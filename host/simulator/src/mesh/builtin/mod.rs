@@ -198,6 +198,3 @@ fn kind(name: &str) -> Result<Kind> {
         Error::setting("name", format!("{name:?}"), format!("the name of a built-in object: {}", names().join(", ")))
     })
 }
-
-#[cfg(test)]
-mod tests;

@@ -255,6 +255,3 @@ impl<'a, 'input> Scene<'a, 'input> {
         placed.map_err(|problem| wrong(instance, problem))
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -273,6 +273,3 @@ pub(super) fn short(value: f64) -> String {
         _ => format!("{value:.2e}"),
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -221,6 +221,3 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
         }
     })
 }
-
-#[cfg(test)]
-mod tests;

@@ -296,6 +296,3 @@ fn transform(node: &Node, index: u32) -> Result<DAffine3, MeshProblem> {
     };
     Ok(DAffine3::from_scale_rotation_translation(scale, rotation, translation))
 }
-
-#[cfg(test)]
-mod tests;

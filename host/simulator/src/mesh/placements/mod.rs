@@ -23,8 +23,6 @@
 mod alike;
 mod center;
 mod hull;
-#[cfg(test)]
-mod tests;
 
 use crate::error::{MeshProblem, Result};
 use crate::mesh::{Mesh, Object};

@@ -284,6 +284,3 @@ impl Collect for Skipped {
         Ok(())
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -17,8 +17,6 @@ pub(super) mod pcd;
 mod side;
 mod smooth;
 mod table;
-#[cfg(test)]
-mod tests;
 mod views;
 pub(super) mod xyz;
 

@@ -383,6 +383,3 @@ fn directories(directory: &Path, finder: &mut Finder) -> Result<Vec<Source>> {
     }
     Ok(objects)
 }
-
-#[cfg(test)]
-mod tests;

@@ -275,6 +275,3 @@ impl<R: BufRead> Text<'_, R> {
         self.here(MeshProblem::Damaged { format: "STL", what })
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -19,8 +19,6 @@
 mod grazing;
 mod partial;
 pub mod quantity;
-#[cfg(test)]
-mod tests;
 
 pub use grazing::Grazing;
 pub use partial::{BadNoise, PartialNoise};

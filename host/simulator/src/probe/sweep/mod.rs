@@ -12,9 +12,6 @@ mod pack;
 pub mod precision;
 mod tree;
 
-#[cfg(test)]
-mod tests;
-
 use glam::DVec3;
 use narrow::{Motion, Triangle};
 use tree::{Search, Tree};

@@ -1,6 +1,8 @@
-use super::*;
-use crate::mesh::tests::full_touches;
-use crate::mesh::tests::samples::{self, corners};
+use crate::full_touches;
+use crate::samples::{self, corners};
+use palpate_simulator::mesh::Mesh;
+use palpate_simulator::mesh::file::{Contents, Format, parse, read};
+use std::path::Path;
 
 #[test]
 fn one_object_in_every_format_has_the_same_triangles_and_the_same_touches() {

@@ -1,9 +1,9 @@
 //! Meshes far from the origin of their coordinates, in files of every kind.
 
-use super::full_touches;
-use crate::mesh::facts::Facts;
-use crate::mesh::{Mesh, builtin, file};
+use crate::full_touches;
 use glam::DVec3;
+use palpate_simulator::mesh::facts::Facts;
+use palpate_simulator::mesh::{Mesh, builtin, file};
 use std::fmt::Write as _;
 use std::path::Path;
 

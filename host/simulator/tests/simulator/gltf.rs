@@ -1,14 +1,16 @@
-use super::*;
-use crate::mesh::Mesh;
-use crate::mesh::tests::samples::{corners, document, glb_of};
+use crate::samples::{corners, document, glb_of};
+use palpate_simulator::error::Result;
+use palpate_simulator::mesh::Mesh;
+use palpate_simulator::mesh::file::parse;
 use serde_json::{Value, json};
+use std::path::Path;
 
 /// A square of two triangles, as a GLB file whose document was changed.
 fn changed(change: impl FnOnce(&mut Value)) -> Result<Mesh> {
     let square = square();
     let mut document = document(&square, None);
     change(&mut document);
-    parse(&glb_of(&document, &buffer(&square)), Path::new("cup.glb"), None).map(|(mesh, _)| mesh)
+    parse(&glb_of(&document, &buffer(&square)), Path::new("cup.glb")).map(|contents| contents.mesh)
 }
 
 fn square() -> Mesh {
@@ -165,7 +167,7 @@ fn a_sparse_accessor_replaces_some_elements() {
     bytes.push(2);
     [5.0_f32, 6.0, 7.0].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
     let read = |document: &Value, bytes: &[u8]| {
-        parse(&glb_of(document, bytes), Path::new("cup.glb"), None).map(|(mesh, _)| mesh)
+        parse(&glb_of(document, bytes), Path::new("cup.glb")).map(|contents| contents.mesh)
     };
     assert_eq!(corners(&read(&document, &bytes).unwrap())[0][2], [5.0, 6.0, 7.0]);
     bytes[start] = 4;
@@ -186,7 +188,7 @@ fn buffers_beside_the_file_are_read_also_with_escaped_names_and_never_more_than_
     let path = directory.path().join("cup.gltf");
     let read = |document: &Value| {
         std::fs::write(&path, serde_json::to_vec(document).unwrap()).unwrap();
-        crate::mesh::file::read(&path).map(|contents| contents.mesh)
+        palpate_simulator::mesh::file::read(&path).map(|contents| contents.mesh)
     };
     assert_eq!(corners(&read(&document).unwrap()), corners(&square));
     for (uri, expected) in [
@@ -208,14 +210,14 @@ fn a_document_of_version_1_is_called_that_and_not_damaged() {
         "accessors": {"accessor_1": {"bufferView": "view_1", "componentType": 5123, "count": 3, "type": "SCALAR"}},
         "meshes": {"mesh_1": {"primitives": [{"attributes": {"POSITION": "accessor_2"}, "mode": 4}]}},
     });
-    let error = parse(document.to_string().as_bytes(), Path::new("cup.gltf"), None).unwrap_err().to_string();
+    let error = parse(document.to_string().as_bytes(), Path::new("cup.gltf")).unwrap_err().to_string();
     assert_eq!(error, "cup.gltf: glTF of version 1.0 is not read. Export it as glTF 2.0.");
 }
 
 #[test]
 fn chunks_that_do_not_fit_are_refused_with_their_byte() {
-    let whole = crate::mesh::tests::samples::glb(&square());
-    let complaint = |bytes: &[u8]| parse(bytes, Path::new("cup.glb"), None).unwrap_err().to_string();
+    let whole = crate::samples::glb(&square());
+    let complaint = |bytes: &[u8]| parse(bytes, Path::new("cup.glb")).unwrap_err().to_string();
     assert!(
         complaint(&whole[..whole.len() - 4]).contains("cup.glb: byte 8: the GLB file is damaged: it states a length")
     );
@@ -229,8 +231,8 @@ fn chunks_that_do_not_fit_are_refused_with_their_byte() {
     let mut bytes = whole.clone();
     bytes[20] = b'!';
     assert!(complaint(&bytes).contains("cup.glb: byte 20: the glTF file"), "{}", complaint(&bytes));
-    let text = parse(b"{\n\"asset\": 1}", Path::new("cup.gltf"), None).unwrap_err().to_string();
+    let text = parse(b"{\n\"asset\": 1}", Path::new("cup.gltf")).unwrap_err().to_string();
     assert!(text.starts_with("cup.gltf:2: the glTF file is damaged: invalid type"), "{text}");
-    let deep = parse("[".repeat(100_000).as_bytes(), Path::new("cup.gltf"), None);
+    let deep = parse("[".repeat(100_000).as_bytes(), Path::new("cup.gltf"));
     assert!(deep.is_err());
 }

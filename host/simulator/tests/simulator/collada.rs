@@ -1,9 +1,11 @@
-use super::*;
-use crate::mesh::Mesh;
-use crate::mesh::tests::samples::{self, corners};
+use crate::samples::{self, corners};
+use palpate_simulator::error::Result;
+use palpate_simulator::mesh::Mesh;
+use palpate_simulator::mesh::file::parse;
+use std::path::Path;
 
 fn parse_text(text: &str) -> Result<(Mesh, Option<f64>)> {
-    parse(text.as_bytes(), Path::new("cup.dae")).map(|((mesh, _), unit)| (mesh, unit))
+    parse(text.as_bytes(), Path::new("cup.dae")).map(|contents| (contents.mesh, contents.millimeters))
 }
 
 fn complaint(text: &str) -> String {
@@ -162,7 +164,8 @@ fn polygons_are_cut_as_those_of_an_obj_file() {
     let places = [[2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0], [0, 0, 0], [2, 0, 0]];
     let numbers = places.iter().flatten().map(|x: &i32| format!("{x} ")).collect::<String>();
     let lines: String = places.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
-    let expected = crate::mesh::obj::parse((lines + "f 1 2 3 4 5 6\n").as_bytes(), Path::new("l.obj")).unwrap();
+    let expected =
+        palpate_simulator::mesh::obj::parse((lines + "f 1 2 3 4 5 6\n").as_bytes(), Path::new("l.obj")).unwrap();
     let good = triangle("", "", &format!("<node>{INSTANCE}</node>"))
         .replace("0 0 0 1 0 0 0 <!-- here --> 2 0", &numbers)
         .replace("count=\"9\"", "count=\"18\"")

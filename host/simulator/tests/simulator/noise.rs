@@ -1,8 +1,14 @@
-use super::*;
-use crate::error::Setting;
-use crate::mesh::Mesh;
-use crate::probe::approach::{Approach, Probe};
-use crate::probe::scene::Scene;
+use glam::DVec3;
+use palpate_shared::format::TrainedNoise;
+use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
+use palpate_simulator::error::Setting;
+use palpate_simulator::mesh::Mesh;
+use palpate_simulator::probe::approach::FINGERS;
+use palpate_simulator::probe::approach::{Approach, Probe};
+use palpate_simulator::probe::noise::{Deviation, Grazing, Noise};
+use palpate_simulator::probe::scene::Scene;
+use palpate_simulator::random::{self, Purpose};
+use rand_distr::{Distribution, StandardNormal};
 
 /// Touches with Gaussian noise of one deviation.
 fn noisy(name: &str, touches: &[Touch], deviation: f64, seed: u64) -> Vec<Touch> {
@@ -70,7 +76,7 @@ fn one_level_is_the_noise_of_version_0_1_0() {
         assert_eq!(*noisy, Touch::from_micros(times.map(|time| (time - earliest).round() as u32)));
     }
     // Nothing else that is asked for changes the Gaussian part.
-    let also = Noise { bent: [1.0, 1.0, 1.0], ..Noise::gaussian(5_000.0) };
+    let also = with!(Noise::gaussian(5_000.0); bent: [1.0, 1.0, 1.0]);
     assert_eq!(also.add("fork", &clean, 1), noisy);
 }
 
@@ -85,7 +91,7 @@ fn a_range_draws_a_level_for_every_touch() {
         let squares = noisy.iter().zip(&clean).map(|(a, b)| (slope(a) - slope(b)).powi(2));
         (squares.sum::<f64>() / (2.0 * clean.len() as f64)).sqrt()
     };
-    let mixture = deviation(Noise { deviation: Deviation { least: 0.0, largest: 9_000.0 }, ..Noise::default() });
+    let mixture = deviation(with!(Noise::default(); deviation: Deviation { least: 0.0, largest: 9_000.0 }));
     // The mean of the third power of a uniform number from 0 to 1 is a quarter.
     assert!((mixture / 9_000.0 - 0.5).abs() < 0.02, "{mixture}");
 }
@@ -93,7 +99,7 @@ fn a_range_draws_a_level_for_every_touch() {
 #[test]
 fn a_timer_rounds_down_from_a_phase_of_every_touch() {
     let clean = vec![Touch::from_micros([0, 400, 2_000]); 10_000];
-    let noisy = Noise { timer: 1_000.0, ..Noise::default() }.add("fork", &clean, 1);
+    let noisy = with!(Noise::default(); timer: 1_000.0).add("fork", &clean, 1);
     let micros = |touch: &Touch, finger: usize| touch.times()[finger].micros().unwrap();
     assert!(noisy.iter().all(|touch| micros(touch, 0) == 0 && micros(touch, 2) == 2_000));
     // 400 µs later is a tick later in four touches of ten.
@@ -103,11 +109,11 @@ fn a_timer_rounds_down_from_a_phase_of_every_touch() {
 
 #[test]
 fn missed_contacts_are_as_many_as_asked_for_and_the_others_start_at_zero() {
-    let noisy = Noise { missed: [0.25; 3], ..Noise::default() }.add("fork", &touches(10_000), 1);
+    let noisy = with!(Noise::default(); missed: [0.25; 3]).add("fork", &touches(10_000), 1);
     let missing = noisy.iter().flat_map(|touch| touch.times()).filter(|time| time.is_missing()).count();
     assert!((7_200..7_800).contains(&missing), "{missing}");
     assert!(noisy.iter().all(|touch| touch.is_empty() || touch.times().contains(&ContactTime::FIRST)));
-    let none = Noise { missed: [1.0; 3], ..Noise::default() }.add("fork", &touches(10), 1);
+    let none = with!(Noise::default(); missed: [1.0; 3]).add("fork", &touches(10), 1);
     assert_eq!(none, vec![Touch::new([ContactTime::MISSING; 3]); 10]);
 }
 
@@ -115,19 +121,19 @@ fn missed_contacts_are_as_many_as_asked_for_and_the_others_start_at_zero() {
 fn a_bent_finger_is_early_and_a_fast_robot_has_short_times() {
     let touch = [Touch::from_micros([0, 10_000, 20_000])];
     let micros = |noise: Noise| noise.add("fork", &touch, 1)[0].times().map(|time| time.micros().unwrap());
-    assert_eq!(micros(Noise { bent: [0.0, 3_000.0, 0.0], ..Noise::default() }), [0, 7_000, 20_000]);
-    assert_eq!(micros(Noise { bent: [0.0, 13_000.0, 0.0], ..Noise::default() }), [3_000, 0, 23_000]);
-    assert_eq!(micros(Noise { speed: 2.0, ..Noise::default() }), [0, 5_000, 10_000]);
-    let [_, middle, last] = micros(Noise { speed_error: 0.1, ..Noise::default() });
+    assert_eq!(micros(with!(Noise::default(); bent: [0.0, 3_000.0, 0.0])), [0, 7_000, 20_000]);
+    assert_eq!(micros(with!(Noise::default(); bent: [0.0, 13_000.0, 0.0])), [3_000, 0, 23_000]);
+    assert_eq!(micros(with!(Noise::default(); speed: 2.0)), [0, 5_000, 10_000]);
+    let [_, middle, last] = micros(with!(Noise::default(); speed_error: 0.1));
     assert!(last != 20_000 && last.abs_diff(2 * middle) <= 1 && last.abs_diff(20_000) < 2_300, "{last}");
-    let debounced = micros(Noise { debounce: 500.0, ..Noise::default() });
+    let debounced = micros(with!(Noise::default(); debounce: 500.0));
     assert!(debounced != [0, 10_000, 20_000] && debounced[2].abs_diff(20_000) <= 500, "{debounced:?}");
 }
 
 #[test]
 fn a_robots_bias_is_the_same_for_all_its_touches_and_objects() {
     let clean = vec![Touch::from_micros([0, 500_000, 1_000_000]); 30];
-    let noise = Noise { speed_bias: 0.1, ..Noise::default() };
+    let noise = with!(Noise::default(); speed_bias: 0.1);
     let fork = by_robots(noise, "fork", &clean, 1, 3);
     assert_eq!(fork, by_robots(noise, "spoon", &clean, 1, 3));
     assert!(fork.iter().zip(&fork[3..]).all(|(one, later)| one == later));
@@ -145,9 +151,7 @@ fn a_turned_pose_keeps_its_lengths_and_its_angle() {
     let dot = |a: [i16; 3], b: [i16; 3]| -> f64 {
         a.iter().zip(b).map(|(&a, b)| f64::from(a) * f64::from(b)).sum::<f64>() / f64::from(Q15_ONE).powi(2)
     };
-    for (noise, robots) in
-        [(Noise { pose: 5.0, ..Noise::default() }, 1), (Noise { pose_bias: 5.0, ..Noise::default() }, 2_000)]
-    {
+    for (noise, robots) in [(with!(Noise::default(); pose: 5.0), 1), (with!(Noise::default(); pose_bias: 5.0), 2_000)] {
         let poses = by_robots(noise, "fork", &clean, 1, robots);
         let poses: Vec<Pose> = poses.iter().map(|touch| touch.pose().unwrap()).collect();
         for Pose { direction, alignment } in &poses {
@@ -163,19 +167,12 @@ fn a_turned_pose_keeps_its_lengths_and_its_angle() {
         assert!((deviation - 5.0).abs() < 0.4, "{deviation}");
     }
     // Without a pose there is nothing to turn.
-    assert_eq!(Noise { pose: 5.0, ..Noise::default() }.add("fork", &touches(5), 1), touches(5));
+    assert_eq!(with!(Noise::default(); pose: 5.0).add("fork", &touches(5), 1), touches(5));
 }
 
 #[test]
 fn noise_of_a_touch_depends_on_its_position_and_on_no_other_touch() {
-    let noise = Noise {
-        deviation: Deviation { least: 0.0, largest: 10_000.0 },
-        timer: 1_000.0,
-        debounce: 2_000.0,
-        missed: [0.1; 3],
-        speed_error: 0.05,
-        ..Noise::default()
-    };
+    let noise = with!(Noise::default(); deviation: Deviation { least: 0.0, largest: 10_000.0 }, timer: 1_000.0, debounce: 2_000.0, missed: [0.1; 3], speed_error: 0.05);
     let (long, short) = (noise.add("fork", &touches(500), 1), noise.add("fork", &touches(200), 1));
     assert_eq!(long[..200], short);
     let others = vec![Touch::new([ContactTime::MISSING; 3]); 100]
@@ -191,18 +188,18 @@ fn noise_that_cannot_be_is_refused_by_the_name_of_its_setting() {
     for (noise, name) in [
         (Noise::gaussian(-1.0), "noise"),
         (Noise::gaussian(f64::INFINITY), "noise"),
-        (Noise { deviation: Deviation { least: 2.0, largest: 1.0 }, ..base }, "noise"),
-        (Noise { timer: f64::NAN, ..base }, "timer"),
-        (Noise { debounce: -1.0, ..base }, "debounce"),
-        (Noise { missed: [0.0, 1.5, 0.0], ..base }, "missed"),
-        (Noise { bent: [f64::NAN, 0.0, 0.0], ..base }, "bent"),
-        (Noise { speed: 0.0, ..base }, "speed"),
-        (Noise { speed_error: 1.0, ..base }, "speed_error"),
-        (Noise { speed_bias: -0.1, ..base }, "speed_bias"),
-        (Noise { pose: 181.0, ..base }, "pose_noise"),
-        (Noise { pose_bias: f64::NAN, ..base }, "pose_bias"),
-        (Noise { grazing: Grazing { angle: 20.0, bend: f64::NAN }, ..base }, "grazing"),
-        (Noise { grazing: Grazing { angle: 90.0, bend: 1.0 }, ..base }, "grazing"),
+        (with!(base; deviation: Deviation { least: 2.0, largest: 1.0 }), "noise"),
+        (with!(base; timer: f64::NAN), "timer"),
+        (with!(base; debounce: -1.0), "debounce"),
+        (with!(base; missed: [0.0, 1.5, 0.0]), "missed"),
+        (with!(base; bent: [f64::NAN, 0.0, 0.0]), "bent"),
+        (with!(base; speed: 0.0), "speed"),
+        (with!(base; speed_error: 1.0), "speed_error"),
+        (with!(base; speed_bias: -0.1), "speed_bias"),
+        (with!(base; pose: 181.0), "pose_noise"),
+        (with!(base; pose_bias: f64::NAN), "pose_bias"),
+        (with!(base; grazing: Grazing { angle: 20.0, bend: f64::NAN }), "grazing"),
+        (with!(base; grazing: Grazing { angle: 90.0, bend: 1.0 }), "grazing"),
     ] {
         let error = noise.check().unwrap_err();
         assert!(matches!(error.problem::<Setting>(), Some(Setting { name: found, .. }) if *found == name), "{error}");
@@ -213,7 +210,7 @@ fn noise_that_cannot_be_is_refused_by_the_name_of_its_setting() {
 #[test]
 fn a_model_states_the_noise_that_it_was_trained_with() {
     let noise =
-        Noise { deviation: "0..10ms".parse().unwrap(), timer: 1_000.0, pose: 3.0, pose_bias: 4.0, ..Noise::default() };
+        with!(Noise::default(); deviation: "0..10ms".parse().unwrap(), timer: 1_000.0, pose: 3.0, pose_bias: 4.0);
     assert_eq!(noise.trained(), TrainedNoise { least: 0, largest: 10_000, timer: 1_000, pose: 5_000 });
     assert_eq!(Noise::default().trained(), TrainedNoise::default());
 }
@@ -222,9 +219,9 @@ fn a_model_states_the_noise_that_it_was_trained_with() {
 fn noise_is_said_in_words() {
     assert_eq!(Noise::default().to_string(), "no noise");
     assert_eq!(Noise::gaussian(5_000.0).to_string(), "noise of 5 ms");
-    let noise = Noise { deviation: "0..10ms".parse().unwrap(), timer: 500.0, missed: [0.02; 3], ..Noise::default() };
+    let noise = with!(Noise::default(); deviation: "0..10ms".parse().unwrap(), timer: 500.0, missed: [0.02; 3]);
     assert_eq!(noise.to_string(), "noise of 0 to 10 ms, a timer of 0.5 ms, 2 % of contacts missed");
-    let noise = Noise { bent: [0.0, 3_000.0, 0.0], speed_bias: 0.05, pose: 5.0, ..Noise::default() };
+    let noise = with!(Noise::default(); bent: [0.0, 3_000.0, 0.0], speed_bias: 0.05, pose: 5.0);
     assert_eq!(
         noise.to_string(),
         "finger 2 is 3 ms early, speed off by up to 5 % per robot, a pose turned by 5° per touch"
@@ -233,7 +230,7 @@ fn noise_is_said_in_words() {
 
 #[test]
 fn a_late_finger_is_not_said_to_be_early_by_a_negative_time() {
-    let noise = Noise { bent: [0.0, -4_311.0, 2_000.0], ..Noise::default() };
+    let noise = with!(Noise::default(); bent: [0.0, -4_311.0, 2_000.0]);
     assert_eq!(noise.to_string(), "finger 2 is 4.3 ms late, finger 3 is 2 ms early");
 }
 

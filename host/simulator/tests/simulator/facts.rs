@@ -1,4 +1,6 @@
-use super::*;
+use glam::Vec3;
+use palpate_simulator::mesh::Mesh;
+use palpate_simulator::mesh::facts::{Facts, sides};
 
 fn cube() -> Mesh {
     let vertices = (0..8_u8).map(|i| [i & 1, i >> 1 & 1, i >> 2].map(f32::from)).collect();
@@ -66,7 +68,7 @@ fn vertices_that_differ_by_rounding_alone_leave_no_gap() {
 #[test]
 fn an_edge_of_four_triangles_is_not_that_of_a_manifold() {
     // Two tetrahedra that share an edge.
-    let mut mesh = crate::mesh::obj::parse(
+    let mut mesh = palpate_simulator::mesh::obj::parse(
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n".as_bytes(),
         "two.obj".as_ref(),
     )

@@ -1,4 +1,6 @@
-use super::*;
+use palpate_simulator::mesh::MeshProblem;
+use palpate_simulator::mesh::source::{Search, Source, files, load, object, objects, objects_of_instances};
+use std::path::Path;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -87,7 +89,7 @@ fn a_misspelled_built_in_object_is_refused_with_the_names_of_all() {
     {
         let error = error.unwrap_err().to_string();
         assert!(error.starts_with("mug: ") && !error.contains("os error"), "{error}");
-        assert!(builtin::names().iter().all(|name| error.contains(name)), "{error}");
+        assert!(palpate_simulator::mesh::builtin::names().iter().all(|name| error.contains(name)), "{error}");
     }
 }
 
@@ -136,24 +138,24 @@ fn data_sets_of_meshes_give_the_names_of_their_objects() {
     ];
     let source = place(directory.path(), &files);
     let expected = ["025_mug", "02958343", "072-a_toy_airplane", "Threshold_Bowl", "chair", "textured"];
-    let found = super::files(std::slice::from_ref(&source)).unwrap();
+    let found = self::files(std::slice::from_ref(&source)).unwrap();
     assert_eq!(found.iter().map(Source::name).collect::<Vec<_>>(), expected);
     let Source::File { path, notes, .. } = &found[0] else { panic!("{found:?}") };
     assert!(path.ends_with("google_16k/textured.obj") && notes[0].contains("merged_cloud.ply"), "{path:?} {notes:?}");
     // One file, named outright.
     for (file, name) in [(files[0], "025_mug"), (files[6], "Threshold_Bowl"), (files[8], "02958343")] {
-        assert_eq!(super::files(&[format!("{source}/{file}")]).unwrap()[0].name(), name);
+        assert_eq!(self::files(&[format!("{source}/{file}")]).unwrap()[0].name(), name);
     }
-    let instances = super::found(&[source], Search { instances: true, ..Search::default() }).unwrap().0;
-    let Source::Instances { name, files, .. } = &instances[0] else { panic!("{instances:?}") };
-    assert_eq!((name.as_str(), files.len(), files[0].0.as_str()), ("025_mug", 1, "google_16k/textured"));
+    let mug = &objects_of_instances(&[source]).unwrap()[0];
+    let instances: Vec<&str> = mug.instances().map(|one| one.name.as_str()).collect();
+    assert_eq!((mug.name.as_str(), instances), ("025_mug", vec!["google_16k/textured"]));
 }
 
 #[test]
 fn instances_whose_files_state_their_units_are_brought_to_one() {
     let directory = tempfile::tempdir().unwrap();
-    let globe = crate::mesh::Mesh::globe(3);
-    let dae = crate::mesh::tests::samples::collada(&globe);
+    let globe = palpate_simulator::mesh::Mesh::globe(3);
+    let dae = crate::samples::collada(&globe);
     std::fs::create_dir(directory.path().join("cup")).unwrap();
     std::fs::write(directory.path().join("cup/a.dae"), &dae).unwrap();
     std::fs::write(directory.path().join("cup/b.dae"), dae.replace("0.0254", "0.0508")).unwrap();
@@ -262,17 +264,10 @@ fn objects_with_the_same_mesh_are_named() {
 fn files_that_may_state_their_unit_come_first_where_that_is_wanted() {
     let directory = tempfile::tempdir().unwrap();
     let source = place(directory.path(), &["cup.obj", "cup.glb", "cup.stl", "fork.stl"]);
-    let first = |prefers_units| match &super::found(
-        std::slice::from_ref(&source),
-        Search { prefers_units, ..Search::default() },
-    ) {
-        Ok((found, _)) => match &found[0] {
-            Source::File { path, .. } => path.file_name().unwrap().to_owned(),
-            other => panic!("{other:?}"),
-        },
-        Err(error) => panic!("{error}"),
-    };
-    assert_eq!((first(false), first(true)), ("cup.obj".into(), "cup.glb".into()));
+    for (prefers_units, expected) in [(false, "cup.obj is used;"), (true, "cup.glb is used;")] {
+        let found = load(std::slice::from_ref(&source), Search { prefers_units, ..Search::default() }).unwrap();
+        assert!(found.objects[0].notes[0].contains(expected), "{:?}", found.objects[0].notes);
+    }
 }
 
 #[cfg(unix)]

@@ -1,13 +1,13 @@
 //! One mesh in every format, and damage to files.
 
-use crate::mesh::{Mesh, obj};
 use base64::Engine;
+use palpate_simulator::mesh::{Mesh, obj};
 use rand::{Rng, RngExt, SeedableRng};
 use serde_ply::PlyFormat;
 use std::fmt::Write as _;
 
 /// The mesh in every kind of file, each under a name.
-pub(in crate::mesh) fn all(mesh: &Mesh) -> Vec<(&'static str, Vec<u8>)> {
+pub(crate) fn all(mesh: &Mesh) -> Vec<(&'static str, Vec<u8>)> {
     let mut text = Vec::new();
     obj::write(mesh, &mut text).unwrap();
     vec![
@@ -24,11 +24,11 @@ pub(in crate::mesh) fn all(mesh: &Mesh) -> Vec<(&'static str, Vec<u8>)> {
 }
 
 /// The triangles' corners, in the order of the file.
-pub(in crate::mesh) fn corners(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
+pub(crate) fn corners(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
     mesh.triangles.iter().map(|triangle| triangle.map(|i| mesh.vertices[i as usize])).collect()
 }
 
-pub(in crate::mesh) fn stl_binary(mesh: &Mesh) -> Vec<u8> {
+pub(crate) fn stl_binary(mesh: &Mesh) -> Vec<u8> {
     let mut bytes = [b"solid a header that lies".to_vec(), vec![0; 56]].concat();
     bytes.extend((mesh.triangles.len() as u32).to_le_bytes());
     for triangle in corners(mesh) {
@@ -40,7 +40,7 @@ pub(in crate::mesh) fn stl_binary(mesh: &Mesh) -> Vec<u8> {
 }
 
 /// Two solids, of half the triangles each.
-pub(in crate::mesh) fn stl_text(mesh: &Mesh) -> String {
+pub(crate) fn stl_text(mesh: &Mesh) -> String {
     let mut text = String::new();
     let corners = corners(mesh);
     for (name, half) in [("solid", &corners[..corners.len() / 2]), ("SOLID the rest", &corners[corners.len() / 2..])] {
@@ -55,7 +55,7 @@ pub(in crate::mesh) fn stl_text(mesh: &Mesh) -> String {
     text
 }
 
-pub(in crate::mesh) fn ply(mesh: &Mesh, format: PlyFormat) -> Vec<u8> {
+pub(crate) fn ply(mesh: &Mesh, format: PlyFormat) -> Vec<u8> {
     let (vertices, faces) = (mesh.vertices.len(), mesh.triangles.len());
     let mut bytes = format!(
         "ply\nformat {format} 1.0\ncomment by hand\nelement material 1\nproperty list uchar uchar name\n\
@@ -92,7 +92,7 @@ fn buffer(mesh: &Mesh) -> Vec<u8> {
 }
 
 /// A document over that buffer, with this URI or none: half the triangles in one primitive of one mesh, half in another.
-pub(in crate::mesh) fn document(mesh: &Mesh, uri: Option<String>) -> serde_json::Value {
+pub(crate) fn document(mesh: &Mesh, uri: Option<String>) -> serde_json::Value {
     let (vertices, corners) = (mesh.vertices.len(), 3 * mesh.triangles.len());
     let half = corners / 6 * 3;
     let mut buffer = serde_json::json!({"byteLength": 12 * vertices + 4 * corners});
@@ -124,17 +124,17 @@ pub(in crate::mesh) fn document(mesh: &Mesh, uri: Option<String>) -> serde_json:
     })
 }
 
-pub(in crate::mesh) fn gltf(mesh: &Mesh) -> Vec<u8> {
+pub(crate) fn gltf(mesh: &Mesh) -> Vec<u8> {
     let data = base64::engine::general_purpose::STANDARD.encode(buffer(mesh));
     serde_json::to_vec_pretty(&document(mesh, Some(format!("data:application/octet-stream;base64,{data}")))).unwrap()
 }
 
-pub(in crate::mesh) fn glb(mesh: &Mesh) -> Vec<u8> {
+pub(crate) fn glb(mesh: &Mesh) -> Vec<u8> {
     glb_of(&document(mesh, None), &buffer(mesh))
 }
 
 /// A GLB file of a document and a buffer.
-pub(in crate::mesh) fn glb_of(document: &serde_json::Value, buffer: &[u8]) -> Vec<u8> {
+pub(crate) fn glb_of(document: &serde_json::Value, buffer: &[u8]) -> Vec<u8> {
     let mut json = serde_json::to_vec(document).unwrap();
     json.resize(json.len().next_multiple_of(4), b' ');
     let mut binary = buffer.to_vec();
@@ -146,7 +146,7 @@ pub(in crate::mesh) fn glb_of(document: &serde_json::Value, buffer: &[u8]) -> Ve
 }
 
 /// A quarter of the triangles each as triangles, polylist and polygons, and the rest in a nested node.
-pub(in crate::mesh) fn collada(mesh: &Mesh) -> String {
+pub(crate) fn collada(mesh: &Mesh) -> String {
     let numbers = |mut text: String, number: &dyn std::fmt::Display| {
         write!(text, "{number} ").unwrap();
         text
@@ -197,7 +197,7 @@ pub(in crate::mesh) fn collada(mesh: &Mesh) -> String {
 }
 
 /// A file with damage that the seed chooses: bytes changed, removed or repeated, the end cut, a number replaced.
-pub(in crate::mesh) fn damaged(bytes: &[u8], seed: u64) -> Vec<u8> {
+pub(crate) fn damaged(bytes: &[u8], seed: u64) -> Vec<u8> {
     let mut rng = rand::rngs::ChaCha8Rng::seed_from_u64(seed);
     let mut bytes = bytes.to_vec();
     for _ in 0..rng.random_range(1..4) {

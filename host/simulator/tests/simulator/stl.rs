@@ -1,14 +1,15 @@
-use super::*;
-use crate::mesh::tests::samples;
+use crate::samples;
+use palpate_simulator::error::Result;
+use palpate_simulator::mesh::Mesh;
+use palpate_simulator::mesh::file::parse;
+use std::path::Path;
 
 fn parse_bytes(bytes: impl AsRef<[u8]>) -> Result<Mesh> {
-    let bytes = bytes.as_ref();
-    parse(bytes, bytes.len() as u64, Path::new("cup.stl")).map(|((mesh, _), _)| mesh)
+    parse(bytes.as_ref(), Path::new("cup.stl")).map(|contents| contents.mesh)
 }
 
 fn notes(bytes: impl AsRef<[u8]>) -> Vec<String> {
-    let bytes = bytes.as_ref();
-    parse(bytes, bytes.len() as u64, Path::new("cup.stl")).unwrap().1
+    parse(bytes.as_ref(), Path::new("cup.stl")).unwrap().notes
 }
 
 fn complaint(bytes: impl AsRef<[u8]>) -> String {
@@ -23,7 +24,7 @@ fn corners_at_one_place_become_one_vertex() {
     for mesh in [parse_bytes(samples::stl_binary(&globe)), parse_bytes(samples::stl_text(&globe))] {
         let mesh = mesh.unwrap();
         assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (globe.vertices.len(), globe.triangles.len()));
-        assert!(crate::mesh::facts::Facts::of(&mesh).is_right_side_out());
+        assert!(palpate_simulator::mesh::facts::Facts::of(&mesh).is_right_side_out());
     }
     let zeros = format!("solid\n{FACET}{}endsolid", FACET.replace("vertex 0 0 0", "vertex -0 0 -0.0"));
     assert_eq!(parse_bytes(zeros).unwrap().vertices.len(), 3);

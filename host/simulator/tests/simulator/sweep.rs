@@ -1,8 +1,10 @@
 //! Casts in four classes (listed cases, edges, random, spaced), compared with analytic answers and with brute force.
 
-use super::*;
-use crate::mesh::Mesh;
-use crate::probe::scene::Scene;
+use glam::DVec3;
+use palpate_simulator::mesh::Mesh;
+use palpate_simulator::probe::sweep::narrow::{self, Motion, Triangle};
+use palpate_simulator::probe::sweep::{Contact, Surface};
+use palpate_simulator::probe::{Approach, Probe, Scene};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 const fn at(x: f64, y: f64, z: f64) -> DVec3 {
@@ -327,7 +329,10 @@ fn all_contacts_at_once_are_each_ones_first_contact_bit_for_bit_or_none_if_one_m
     let (mut all, mut some) = (0, 0);
     // Coarse, about as large as the sphere, and fine: each kind of search; and a single triangle.
     for (triangles, radius) in [(globe(4), 0.05), (globe(12), 0.15), (globe(60), 0.3), (vec![FLOOR], 0.5)] {
-        let surface = Surface::new(triangles);
+        let vertices = triangles.iter().flatten().map(|corner| corner.as_vec3().to_array()).collect();
+        let triangles = (0..triangles.len() as u32).map(|index| [0, 1, 2].map(|corner| 3 * index + corner)).collect();
+        let scene = Scene::as_is(&Mesh { vertices, triangles }).unwrap();
+        let probe = with!(Probe::default(); radius: radius, spacing: 1.0);
         for case in 0..2_000 {
             let (origin, direction) = random_cast(&mut rng);
             // At rest, side by side on a line through the aim, in one place, and not of unit length.
@@ -335,12 +340,12 @@ fn all_contacts_at_once_are_each_ones_first_contact_bit_for_bit_or_none_if_one_m
                 [direction, direction * 3.0, DVec3::ZERO][usize::from(case % 50 == 0) + usize::from(case % 100 == 0)];
             let side = random_point(&mut rng, 0.4) * f64::from(u8::from(case % 7 != 0));
             let origins = [origin - side, origin, origin + side];
-            let each = origins.map(|origin| surface.first_contact(origin, direction, radius));
+            let each = origins.map(|origin| scene.first_contact(origin, direction, radius));
             let expected = match each {
                 [Some(a), Some(b), Some(c)] => Some([a, b, c].map(f64::to_bits)),
                 _ => None,
             };
-            let found = surface.all_contacts(origins, direction, radius);
+            let found = Approach { start: origin, direction, alignment: side }.full_distances(&scene, &probe);
             assert_eq!(found.map(|found| found.map(f64::to_bits)), expected, "{origins:?} along {direction}");
             all += usize::from(expected.is_some());
             some += usize::from(expected.is_none() && each.iter().any(Option::is_some));
@@ -459,12 +464,13 @@ fn the_normal_of_a_contact_leads_from_the_nearest_point_of_the_mesh_to_the_cente
         let (origin, direction) = random_cast(&mut rng);
         let contact = surface.contact(origin, direction, 0.15);
         assert_eq!(contact.map(|contact| contact.distance), surface.first_contact(origin, direction, 0.15));
-        let Some(Contact { distance, normal }) = contact.filter(|contact| contact.distance > 0.0) else { continue };
+        let Some(Contact { distance: way, normal }) = contact.filter(|contact| contact.distance > 0.0) else {
+            continue;
+        };
         found += 1;
-        let touched = origin + direction * distance - normal * 0.15;
+        let touched = origin + direction * way - normal * 0.15;
         assert!((normal.length() - 1.0).abs() < 1e-9 && normal.dot(direction) < 1e-6, "{normal}");
-        let away = |triangle: &narrow::Triangle| nearest::nearest_point(triangle, touched).distance(touched);
-        let nearest = triangles.iter().map(away).fold(f64::INFINITY, f64::min);
+        let nearest = triangles.iter().map(|triangle| distance(touched, triangle)).fold(f64::INFINITY, f64::min);
         assert!(nearest < 1e-7, "{nearest}");
     }
     assert!(found > 50, "{found}");
