@@ -1,8 +1,13 @@
-//! The smallest model, for tests of pages.
+//! The smallest model and a small object, for tests of pages.
 
 use palpate::compile::{self, CompiledModel, compile};
 use palpate::ensemble::{self, Ensemble, Node, Output, Tree, inputs};
+use palpate::mesh::{Object, builtin};
 use palpate_shared::Descriptor;
+use std::sync::LazyLock;
+
+/// A built-in object, made once.
+pub(crate) static BOWL: LazyLock<Object> = LazyLock::new(|| builtin::one("bowl").unwrap());
 
 /// One split between two objects of these names.
 pub(crate) fn model(names: [&str; 2]) -> CompiledModel {

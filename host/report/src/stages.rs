@@ -317,18 +317,17 @@ mod tests {
             approaches: 900,
             limit_touches: 1_000,
             limit_rounds: 3,
+            limit_groups: 100,
+            sequences: 60,
+            reliability_groups: 100,
+            promise_sequences: 1_000,
+            cost_groups: 100,
             ..Settings::quick(sources, 1)
         }
     }
 
-    #[test]
-    fn a_report_has_every_figure_and_its_files_and_resumes_without_measuring_again() {
-        let place = tempfile::tempdir().unwrap();
-        let sources = meshes(&place.path().join("meshes"));
-        let directory = place.path().join("report");
-        let settings = tiny(sources);
-        let written = report(&settings, &directory, Existing::default(), &()).unwrap();
-        let html = std::fs::read_to_string(directory.join("index.html")).unwrap();
+    /// Asserts that a page of all parts has every figure, and that its files are there.
+    fn assert_has_every_figure_and_its_files(html: &str, written: &Report) {
         let files: BTreeSet<String> =
             written.files.iter().map(|file| file.file_name().unwrap().to_string_lossy().into_owned()).collect();
         for figure in [
@@ -374,22 +373,36 @@ mod tests {
         let is_number = |at: usize| !html[..at].ends_with(|c: char| c.is_ascii_alphanumeric() || c == '+' || c == '/');
         assert!(!html.match_indices("NaN").any(|(at, _)| is_number(at)), "a number is none");
         assert_eq!(html.matches("<img ").count(), 3);
+    }
 
-        // Stages are taken as they are, their times too; a cut-off stage is measured again, and nothing else.
-        let again = report(&settings, &directory, RESUME, &()).unwrap();
-        assert_eq!((&again.stages, &again.summary), (&written.stages, &written.summary));
-        let kept = |name: &str| {
-            let stages = std::fs::read_dir(directory.join(".stages")).unwrap().map(|entry| entry.unwrap().path());
-            stages.into_iter().find(|path| path.file_name().unwrap().to_string_lossy().starts_with(name)).unwrap()
-        };
-        std::fs::remove_file(kept("calibration-")).unwrap();
-        let cut = report(&settings, &directory, RESUME, &()).unwrap();
-        let differ = written.stages.iter().zip(&cut.stages).filter(|(a, b)| a != b).map(|(a, _)| a.0.as_str());
-        assert_eq!(differ.collect::<Vec<_>>(), ["calibration"]);
+    /// Asserts that captions state the probe and the settings of the report, and not the published or the usual ones.
+    fn assert_states_its_probe_and_its_settings(html: &str) {
+        for said in [
+            "fingers of radius 0.1 units are 1.25 units apart and move at 20 units per second, tilted by up to 5°",
+            "Here it is 9 trees (300 as published: 100 boosting rounds instead of 3)",
+            "by a linear Savitzky–Golay filter over 3 levels",
+            "Of 10 folds, 2 were trained",
+            "1,000 full touches of each object were captured",
+            "20 groups per object and fold",
+        ] {
+            assert!(html.contains(said), "{said}");
+        }
+        for other in [
+            "0.15 units",
+            "1.5 apart",
+            "10 units per second",
+            "1000 trees",
+            "eleven",
+            "kilobytes",
+            "a fork",
+            "80 rounds",
+        ] {
+            assert!(!html.contains(other), "{other}");
+        }
     }
 
     #[test]
-    fn a_cancelled_report_resumes_where_it_was() {
+    fn a_cancelled_report_resumes_where_it_was_and_a_whole_one_without_measuring_again() {
         /// Cancels as soon as the stage begins.
         struct CancelAt(&'static str, AtomicBool, Mutex<Vec<String>>);
         impl Progress for CancelAt {
@@ -421,33 +434,23 @@ mod tests {
         let kept = std::fs::read_dir(directory.join(".stages")).unwrap().map(|entry| entry.unwrap().path());
         let kept = kept.into_iter().find(|path| path.to_string_lossy().contains("accuracy-")).unwrap();
         let kept: serde_json::Value = serde_json::from_slice(&std::fs::read(kept).unwrap()).unwrap();
-        let resumed = report(&settings, &directory, RESUME, &()).unwrap();
-        assert_eq!(resumed.stages[0], ("accuracy".into(), kept["seconds"].as_f64().unwrap()));
+        let written = report(&settings, &directory, RESUME, &()).unwrap();
+        assert_eq!(written.stages[0], ("accuracy".into(), kept["seconds"].as_f64().unwrap()));
         let html = std::fs::read_to_string(directory.join("index.html")).unwrap();
+        assert_has_every_figure_and_its_files(&html, &written);
+        assert_states_its_probe_and_its_settings(&html);
 
-        // Captions state this probe and these settings, and not the published or the usual ones.
-        for said in [
-            "fingers of radius 0.1 units are 1.25 units apart and move at 20 units per second, tilted by up to 5°",
-            "Here it is 9 trees (300 as published: 100 boosting rounds instead of 3)",
-            "by a linear Savitzky–Golay filter over 3 levels",
-            "Of 10 folds, 2 were trained",
-            "1,000 full touches of each object were captured",
-            "20 groups per object and fold",
-        ] {
-            assert!(html.contains(said), "{said}");
-        }
-        for other in [
-            "0.15 units",
-            "1.5 apart",
-            "10 units per second",
-            "1000 trees",
-            "eleven",
-            "kilobytes",
-            "a fork",
-            "80 rounds",
-        ] {
-            assert!(!html.contains(other), "{other}");
-        }
+        // Stages are taken as they are, their times too; a cut-off stage is measured again, and nothing else.
+        let again = report(&settings, &directory, RESUME, &()).unwrap();
+        assert_eq!((&again.stages, &again.summary), (&written.stages, &written.summary));
+        let kept = |name: &str| {
+            let stages = std::fs::read_dir(directory.join(".stages")).unwrap().map(|entry| entry.unwrap().path());
+            stages.into_iter().find(|path| path.file_name().unwrap().to_string_lossy().starts_with(name)).unwrap()
+        };
+        std::fs::remove_file(kept("calibration-")).unwrap();
+        let cut = report(&settings, &directory, RESUME, &()).unwrap();
+        let differ = written.stages.iter().zip(&cut.stages).filter(|(a, b)| a != b).map(|(a, _)| a.0.as_str());
+        assert_eq!(differ.collect::<Vec<_>>(), ["calibration"]);
     }
 
     #[test]

@@ -1,5 +1,5 @@
 use super::*;
-use palpate::mesh::builtin;
+use crate::small::BOWL;
 
 fn decoded(png: &[u8]) -> (png::OutputInfo, Vec<u8>) {
     let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
@@ -10,8 +10,7 @@ fn decoded(png: &[u8]) -> (png::OutputInfo, Vec<u8>) {
 
 #[test]
 fn a_thumbnail_is_transparent_around_the_object_and_opaque_on_it() {
-    let bowl = builtin::one("bowl").unwrap();
-    let (info, data) = decoded(&thumbnail(bowl.mesh(), 64));
+    let (info, data) = decoded(&thumbnail(BOWL.mesh(), 64));
     assert_eq!((info.width, info.height, info.color_type), (64, 64, png::ColorType::Rgba));
     let alpha = |x: usize, y: usize| data[(y * 64 + x) * 4 + 3];
     assert_eq!(alpha(0, 0), 0);
@@ -32,7 +31,7 @@ fn a_mesh_that_is_thin_in_any_axis_is_seen_from_its_broad_side() {
 
 #[test]
 fn a_sheet_has_a_picture_and_a_caption_for_each_object() {
-    let objects = [builtin::one("paperclip").unwrap(), builtin::one("bowl").unwrap()];
+    let objects = [Object::new("globe", Mesh::globe(20)), BOWL.clone()];
     let (info, data) = decoded(&sheet(&objects, 200));
     assert_eq!((info.width, info.height), (200, 132));
     let dark = |x: std::ops::Range<usize>, y: std::ops::Range<usize>| {
@@ -56,7 +55,7 @@ fn meshes_without_extent_give_an_empty_picture_and_no_objects_an_empty_sheet() {
 
 #[test]
 fn thumbnails_are_small_enough_to_embed_ten_of_them_in_a_page() {
-    let camera = builtin::one("camera").unwrap();
+    let camera = palpate::mesh::builtin::one("camera").unwrap();
     let bytes = thumbnail(camera.mesh(), 160).len();
     assert!(bytes < 16_000, "{bytes} bytes");
 }
