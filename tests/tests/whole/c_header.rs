@@ -102,18 +102,18 @@ fn count(script: &Script<'_>, word: &str) -> usize {
 fn touches_and_rows_give_the_bits_of_the_crate() {
     let mut rng = SmallRng::seed_from_u64(1);
     let models = all_models(&mut rng);
-    let script = script(&models, 150_000, 150_000, &mut rng);
+    let script = script(&models, 30_000, 30_000, &mut rng);
     compare(&run(&mut Command::new(&*PROGRAM), &script.commands), &script);
     let counted = [count(&script, "touch"), count(&script, "features"), count(&script, "verdict")];
     println!("{counted:?} touches, features, verdicts; {} sums in f32", count(&script, "sums"));
     let verdicts = |verdict: &str| script.expected.lines().filter(|line| line.starts_with(verdict)).count();
     let verdicts =
         ["verdict 0", "verdict 1", "verdict 2", "verdict 3", "refused 1", "refused 2", "refused 3"].map(verdicts);
-    assert!(counted[0] >= 100_000 && counted[1] >= counted[0] + 100_000, "{counted:?}");
-    assert!(verdicts.iter().all(|&count| count > 100), "{verdicts:?}");
+    assert!(counted[0] >= 20_000 && counted[1] >= counted[0] + 20_000, "{counted:?}");
+    assert!(verdicts.iter().all(|&count| count > 10), "{verdicts:?}");
     let (guarded, next) = (count(&script, "guarded"), script.next_rows);
     println!("{guarded} of {next} rows of sequences are not taken");
-    assert!(guarded > 1_000 && next > 2 * guarded, "{guarded} of {next}");
+    assert!(guarded > 200 && next > 2 * guarded, "{guarded} of {next}");
 }
 
 /// Verdict after verdict on a stream of rows.
@@ -130,7 +130,7 @@ fn play_stream<'m>(script: &mut Script<'m>, stream: &'m Stream) {
 
 #[test]
 fn calibrated_models_of_five_kinds_give_the_same_verdicts_at_the_same_rows() {
-    let streams = streams(10_000);
+    let streams = streams(3_000);
     for stream in &streams {
         let mut script = Script::default();
         play_stream(&mut script, stream);
@@ -143,7 +143,7 @@ fn calibrated_models_of_five_kinds_give_the_same_verdicts_at_the_same_rows() {
             stream.rows.len(),
             model.row_evidence().is_some()
         );
-        assert!(given > 300 && count(&script, "verdict") >= 10_000, "{}: {given}", stream.kind);
+        assert!(given > 90 && count(&script, "verdict") >= 3_000, "{}: {given}", stream.kind);
         // Shares of votes are no log-probabilities.
         assert!(model.row_evidence().is_some() || stream.kind != "votes of a forest");
     }
@@ -233,7 +233,8 @@ impl<'m> Batch<'m> {
 
 #[test]
 fn damaged_models_are_taken_or_refused_alike_at_the_same_place_and_give_the_same_answers() {
-    damaged(100_000, None);
+    // With the sweep, which is the first batch, they are 100,000.
+    damaged(52_000, None);
 }
 
 /// An hour of it is `PALPATE_FUZZ_SECONDS=3600 cargo test --release -p palpate-tests --test whole damaged_models -- --ignored --nocapture`.

@@ -1,5 +1,5 @@
-//! The compiled model against the full one: 200,000 touches, or 50,000 where margins are exact or others repeat it, and ten
-//! thousand sequences. `PALPATE_REPETITIONS=5 cargo test --release -p palpate-tests --test whole parity::` compares a million touches.
+//! The compiled model against the full one: 20,000 touches and 10,000 sequences.
+//! `PALPATE_REPETITIONS=50 cargo test --release -p palpate-tests --test whole parity::` compares a million touches.
 
 use palpate::capture::capture;
 use palpate::compile::{Layout, Leaf, Settings, compile};
@@ -13,8 +13,7 @@ use palpate_shared::Descriptor;
 use palpate_tests::random;
 use std::sync::LazyLock;
 
-const MANY: usize = 200_000;
-const FEWER: usize = 50_000;
+const TOUCHES: usize = 20_000;
 const SEQUENCES: usize = 10_000;
 
 /// Bytes of a compiled model.
@@ -50,8 +49,8 @@ fn spread(dataset: &Dataset, count: usize) -> Dataset {
     Dataset::new(objects.collect())
 }
 
-fn hold(ensemble: &Ensemble, dataset: &Dataset, count: usize) -> (Parity, Parity) {
-    let count = count * palpate_tests::repetitions(1);
+fn hold(ensemble: &Ensemble, dataset: &Dataset) -> (Parity, Parity) {
+    let count = TOUCHES * palpate_tests::repetitions(1);
     let compiled = compile(ensemble, &with!(Settings::default(), leaf = Leaf::I16)).unwrap();
     let model = Model::new(&compiled.bytes).unwrap();
     let touches = parity(ensemble, &model, &spread(dataset, count), 0, 1, &()).unwrap();
@@ -64,7 +63,7 @@ fn hold(ensemble: &Ensemble, dataset: &Dataset, count: usize) -> (Parity, Parity
 #[test]
 fn the_published_methods_margins_stay_within_a_bound_that_is_near_and_its_verdicts_are_equal() {
     let dataset = captured(false);
-    let (touches, sequences) = hold(&PUBLISHED, dataset, MANY);
+    let (touches, sequences) = hold(&PUBLISHED, dataset);
     assert!(touches.max_margin_error > 0.0 && touches.max_margin_error <= touches.stated_bound);
     assert!(touches.stated_bound <= 4.0 * touches.max_margin_error);
     assert!(sequences.max_margin_error <= sequences.stated_bound);
@@ -76,7 +75,7 @@ fn the_compact_methods_margins_and_verdicts_are_the_full_models_own() {
     for descriptor in [Descriptor::Curvature, Descriptor::Oriented] {
         let dataset = captured(true);
         let ensemble = train(dataset, &with!(train::Settings::compact(), descriptor), &()).unwrap();
-        let (touches, sequences) = hold(&ensemble, dataset, FEWER);
+        let (touches, sequences) = hold(&ensemble, dataset);
         assert_eq!((touches.stated_bound, touches.max_margin_error, touches.best_differs), (0.0, 0.0, 0));
         assert_eq!((sequences.verdict_differs, sequences.touches_differ), (0, 0));
     }
@@ -86,7 +85,7 @@ fn the_compact_methods_margins_and_verdicts_are_the_full_models_own() {
 fn leaves_that_were_not_rounded_in_training_stay_within_a_bound_that_is_near() {
     let dataset = captured(true);
     let settings = with!(train::Settings::compact(), descriptor = Descriptor::Oriented, leaf_bits = None);
-    let (touches, sequences) = hold(&train(dataset, &settings, &()).unwrap(), dataset, FEWER);
+    let (touches, sequences) = hold(&train(dataset, &settings, &()).unwrap(), dataset);
     assert!(touches.max_margin_error > 0.0 && touches.max_margin_error <= touches.stated_bound);
     assert!(touches.stated_bound <= 4.0 * touches.max_margin_error);
     assert_eq!(sequences.verdict_differs, 0);
