@@ -103,22 +103,21 @@ fn agree(what: &str, stated: [Share; 3], fresh: [Share; 3]) {
 
 /// The share of wrong names among those that a calibrated model gives, of all and of the object that is mistaken most often.
 fn wrong_names(model: &[u8]) -> [f64; 2] {
-    static TOUCHED: LazyLock<Dataset> = LazyLock::new(|| touches(60_000, 78));
+    static TOUCHED: LazyLock<Dataset> = LazyLock::new(|| touches(120_000, 78));
     let model = compile::open(model).unwrap();
     let mut recognizer = Recognizer::<{ KINDS.len() }>::new(&model, Stopping::from_model(&model)).unwrap();
     let mut tallies = [[0.0; 2]; KINDS.len()];
     for (object, touched) in TOUCHED.objects.iter().enumerate() {
-        // One mesh after the other.
-        let kinds = KINDS[object].len();
-        for touch in (0..kinds).flat_map(|kind| touched.touches().iter().skip(kind).step_by(kinds)) {
-            match recognizer.push(touch) {
-                Ok(Verdict::Recognized { object: name, .. }) => {
+        // As many sequences of each mesh, however long they take.
+        for turn in 0..KINDS[object].len() {
+            let of_mesh: Vec<&Touch> = touched.touches().iter().skip(turn).step_by(KINDS[object].len()).collect();
+            for sequence in of_mesh.chunks_exact(MOST as usize) {
+                recognizer.reset();
+                sequence.iter().for_each(|touch| _ = recognizer.push(touch));
+                if let Verdict::Recognized { object: name, .. } = recognizer.verdict() {
                     tallies[object][0] += f64::from(u8::from(usize::from(name) != object));
                     tallies[object][1] += 1.0;
-                    recognizer.reset();
                 }
-                Ok(Verdict::GaveUp) => recognizer.reset(),
-                _ => {}
             }
         }
     }

@@ -244,28 +244,6 @@ fn of_robot(count: usize, seed: u64) -> Dataset {
 }
 
 #[test]
-fn a_test_that_is_calibrated_on_recordings_keeps_its_false_alarms_on_them_and_warns_where_simulated_ones_do_not() {
-    let model = compile::open(&MODELS[0]).unwrap();
-    let (simulated, robot) = (of(0..KNOWN, 30_000, 2), of_robot(2_000, 5));
-    let settings = with!(Settings::default(), held = Held::Certain);
-    let alarms = |calibrated: &Tested, seed| on_fresh_touches(&calibrated.bytes, &of_robot(20_000, seed))[1];
-    let alone = calibrate(&model, &simulated, &shapes(), &settings).unwrap();
-    assert!(alarms(&alone, 6) > 0.04, "{}", alarms(&alone, 6));
-    let both = calibrate_recorded(&model, &simulated, &robot, &shapes(), &settings).unwrap();
-    let found = both.recorded.clone().unwrap();
-    assert!(found.before.differs && found.before.objects.len() == KNOWN, "{found:?}");
-    assert!(found.alarms as f64 <= found.supported * found.sequences as f64, "{found:?}");
-    assert!(alarms(&both, 6) < found.supported + 0.005, "{} {found:?}", alarms(&both, 6));
-    assert_eq!(
-        (both.terms.sequences as usize, f64::from(both.terms.alarms) * 1e-6),
-        (found.sequences, found.supported)
-    );
-    // Recordings that are like the simulation raise no warning.
-    let same = calibrate_recorded(&model, &simulated, &of(0..KNOWN, 2_000, 5), &shapes(), &settings).unwrap();
-    assert!(!same.recorded.unwrap().before.differs);
-}
-
-#[test]
 fn few_recordings_state_the_share_of_false_alarms_that_they_support() {
     let model = compile::open(&MODELS[0]).unwrap();
     let settings = Settings::default();

@@ -396,7 +396,7 @@ fn false_alarms_stay_below_the_stated_rate_on_sequences() {
 
 #[test]
 fn rows_of_no_class_are_detected_with_a_background_and_without() {
-    let made = sequences(Kind::Independent, 3_000, 60, 3);
+    let made = sequences(Kind::Independent, 6_000, 60, 3);
     for place in [None, Some(5.0)] {
         let settings = with!(Settings::default(), rate = 0.05, strangers = Some(strangers(place)));
         let calibrated = calibrate(&MODEL, &made, &settings, &()).unwrap();
