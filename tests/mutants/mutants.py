@@ -168,7 +168,7 @@ def apply(commit, tree):
     git("worktree", "add", "--detach", str(Path(tree).resolve()), commit)
     missed = []
     for patch in PATCHES:
-        # As git first, then with lines around it that have changed.
+        # By git first, then by patch, which takes a patch whose surroundings have changed.
         ways = [["git", "apply", str(patch)], ["patch", "-p1", "--fuzz=2", "--no-backup-if-mismatch", "-i", str(patch)]]
         if not any(subprocess.run(way, cwd=tree, capture_output=True).returncode == 0 for way in ways):
             missed.append(patch.name)

@@ -1,4 +1,4 @@
-//! What holds between the floors: parity, hard cases, the pipeline, the firmware, the C header.
+//! Properties between the crates: parity, hard cases, the pipeline, the firmware, the C header.
 
 mod approach;
 mod arduino;

@@ -43,7 +43,7 @@ impl Place {
 
 const HOUSEHOLD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
 
-/// What a model says to lines of touches.
+/// Verdicts of a model on lines of touches.
 fn recognized(at: &Path, touches: &str, more: &str) -> Vec<Value> {
     fs::write(at.join("touches.txt"), touches).unwrap();
     lines(&succeeds(at, &format!("recognize model.palpate touches.txt --json {more}")))

@@ -3,7 +3,7 @@
 use crate::{command, globe, json, listing, run, shapes, stderr, stdout};
 use std::path::Path;
 
-/// As little work as there is.
+/// The least work that a search can do.
 const QUICK: [&str; 10] =
     ["probe", "design", "meshes", "--approaches", "200", "--sequences", "30", "--error-rate", "5%", "-o"];
 

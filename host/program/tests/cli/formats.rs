@@ -29,7 +29,7 @@ fn ply(mesh: &Mesh) -> String {
     text
 }
 
-/// What a capture of these meshes says.
+/// Messages of a capture of these meshes.
 fn capture(at: &Path, source: &str) -> String {
     stderr(palpate(at, &format!("capture {source} -o touches-{source} --touches 50")), 0)
 }

@@ -12,7 +12,7 @@ pub(crate) fn recognized(at: &Path, words: &str, text: &str) -> Vec<Value> {
     lines(&succeeds(at, &format!("recognize {words} lines.txt")))
 }
 
-/// So many touches of the brick in its first placement, in its own frame: at the origin, turned by nothing.
+/// Touches of the brick in its first placement and in its own frame: at the origin, not turned.
 pub(crate) fn of_one_placement(at: &Path, count: usize) -> Vec<String> {
     let placements = read(&at.join("data/dataset.json"))["objects"][0]["placements"].as_array().unwrap().len();
     let text = fs::read_to_string(at.join("data/brick.txt")).unwrap();

@@ -28,7 +28,7 @@ fn of_library(name: &str, kind: &str) -> Vec<String> {
     cells(&table, kind).into_iter().map(|row| row.join(",")).collect()
 }
 
-/// The same as a file at this path.
+/// Path of a file with these rows.
 fn written(name: &str, kind: &str, path: String) -> String {
     std::fs::write(&path, of_library(name, kind).join("\n") + "\n").unwrap();
     path
