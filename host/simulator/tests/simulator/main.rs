@@ -1,5 +1,5 @@
-//! Meshes, scenes, touches and noise through the crate's public interface. Four private modules that need nothing from the
-//! crate are compiled here from their sources: nothing else reaches their every case.
+//! Meshes, scenes, touches and noise through the crate's public interface. Private modules whose every case no public function
+//! reaches are compiled here from their sources.
 
 /// A value with some of its fields changed.
 macro_rules! with {
