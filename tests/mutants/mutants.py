@@ -181,8 +181,16 @@ def apply(commit, tree):
 
 def binaries(tree, target):
     """Builds all tests, and asks cargo where they are."""
+    target = Path(target or tree / "target").resolve()
+    # Cargo takes what another checkout built there after these sources were written as built from them.
+    built_for = target / "mutants-of"
+    if not built_for.exists() or built_for.read_text() != str(tree):
+        for crate in CRATES:
+            (tree / crate / "src/lib.rs").touch()
+        target.mkdir(parents=True, exist_ok=True)
+        built_for.write_text(str(tree))
     command = ["cargo", "test", "--release", "--workspace", "--locked", "--no-run", "--message-format", "json"]
-    command += ["--target-dir", str(Path(target).resolve())] if target else []
+    command += ["--target-dir", str(target)]
     settings = os.environ | {"CARGO_INCREMENTAL": "0"}
     built = subprocess.run(command, cwd=tree, stdout=subprocess.PIPE, check=True, env=settings).stdout
     found = []
@@ -358,7 +366,7 @@ def main():
     runs = commands.add_parser("run")
     runs.add_argument("tree")
     runs.add_argument("log")
-    runs.add_argument("--target-dir", help="where cargo builds, so that dependencies are not built again")
+    runs.add_argument("--target-dir", help="a folder of its own, or a copy of another target: its dependencies are not built again")
     runs.add_argument("--only", metavar="N,N", help="these mutants")
     runs.add_argument("--caught", metavar="LOG", help="those that this log says were caught")
     compares = commands.add_parser("compare")
