@@ -214,7 +214,7 @@ fn promises_are_kept_for_independent_rows_dependent_rows_and_new_groups() {
     ] {
         let population = Population::new(kind, many_or(3_000, repetitions, 9_000), length);
         let rates = [(0.01, 0.6), (0.05, 0.8), (0.1, 0.8)].into_iter();
-        for (rate, least) in rates.filter(|&(rate, _)| rate != 0.05 || repetitions > 20) {
+        for (rate, least) in rates.filter(|&(rate, _)| rate == 0.01 || repetitions > 20) {
             let figures = repeated(&population, count, rate, repetitions);
             let [used, rows] = [&figures.used, &figures.rows].map(|numbers| Figures::median(numbers));
             println!(
