@@ -356,6 +356,11 @@ mod tests {
         (40, 5, None, LeafType::I8, 2, [4_010, 6_152]),
     ];
 
+    /// A model of ten objects without shared leaves.
+    fn shape(layout: Layout, leaf: LeafType, axes: usize, groups: &[Group]) -> Shape<'_> {
+        Shape { layout, leaf, objects: 10, axes, groups, steps: &[], is_shared: false }
+    }
+
     #[test]
     fn estimates_are_within_a_tenth_of_what_emulation_counts_on_both_processors() {
         for (trees, depth, object, leaf, axes, counted) in COUNTED {
@@ -372,16 +377,7 @@ mod tests {
                 Group { depth, shift: 0, object, trees }
             };
             let groups: Vec<Group> = (0..parts).map(group).collect();
-            let shape = Shape {
-                layout: Layout::Complete,
-                leaf,
-                objects: 10,
-                axes,
-                groups: &groups,
-                steps: &[],
-                is_shared: false,
-            };
-            let estimate = Instructions::new(&shape);
+            let estimate = Instructions::new(&shape(Layout::Complete, leaf, axes, &groups));
             for (estimate, counted) in [estimate.m4f, estimate.m0_plus.unwrap()].into_iter().zip(counted) {
                 assert!(
                     estimate.abs_diff(counted) * 10 <= counted,
@@ -389,27 +385,16 @@ mod tests {
                 );
             }
         }
-        let table = |layout, axes| {
-            let (leaf, objects) = (LeafType::I8, 10);
-            Instructions::new(&Shape { layout, leaf, objects, axes, groups: &[], steps: &[], is_shared: false })
-        };
+        let table = |layout, axes| Instructions::new(&shape(layout, LeafType::I8, axes, &[]));
         assert_eq!(table(Layout::Grid, 2), Instructions { m4f: 330, m0_plus: Some(375) });
         assert_eq!(table(Layout::Patterns, 3), Instructions { m4f: 598, m0_plus: Some(685) });
     }
 
     #[test]
     fn with_f32_leaves_nothing_is_said_about_a_processor_without_float_unit() {
-        let shape = Shape {
-            layout: Layout::Grid,
-            leaf: LeafType::F32,
-            objects: 10,
-            axes: 2,
-            groups: &[],
-            steps: &[],
-            is_shared: false,
-        };
-        assert_eq!(Instructions::new(&shape).on(Core::M0Plus), None);
-        assert!(Instructions::new(&shape).on(Core::M4F).is_some());
+        let instructions = Instructions::new(&shape(Layout::Grid, LeafType::F32, 2, &[]));
+        assert_eq!(instructions.on(Core::M0Plus), None);
+        assert!(instructions.on(Core::M4F).is_some());
     }
 
     #[test]

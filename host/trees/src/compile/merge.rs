@@ -195,25 +195,13 @@ fn balanced<'a>(cuts: &[i32], values: &[f32], feature: u8, missing_left: bool, o
 mod tests {
     use super::super::groups::groups_and_splits;
     use super::super::{Leaf, Settings, compile, open};
+    use crate::compile::code::tests::Numbers;
     use crate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
     use palpate_shared::MISSING_FEATURE;
     use palpate_shared::format::f32_key;
 
     fn leaf(value: f32) -> Node {
         Node::Leaf(vec![value])
-    }
-
-    /// Numbers that look random (SplitMix64).
-    struct Numbers(u64);
-
-    impl Numbers {
-        fn below(&mut self, most: u64) -> u64 {
-            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = self.0;
-            z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-            (z ^ z >> 31) % most
-        }
     }
 
     /// Random trees of no split, one split and two, of three objects over four features; every fourth of thresholds that

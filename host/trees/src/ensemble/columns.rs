@@ -144,6 +144,8 @@ mod tests {
         let mut many: Vec<Tree> = (0..257).map(tree).collect();
         let refused = features(vec![String::new(); 300], &mut many, &mut notes).unwrap_err();
         assert_eq!(refused, EnsembleProblem::FeatureCount { count: 300, used: 257, most: 256 });
+        let said = refused.to_string();
+        assert!(said.contains("its trees use 257 of its 300 features, and not 1 to 256"), "{said}");
         assert!(features(vec![String::new(); MAX_COLUMNS + 1], &mut [tree(0)], &mut notes).is_err());
         assert!(features(vec![String::new(); 300], &mut [tree(300)], &mut notes).is_err(), "there is no such column");
     }

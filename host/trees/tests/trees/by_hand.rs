@@ -1,61 +1,75 @@
 //! Ensembles that a program makes, from nodes and from another library's columns, and those that contradict themselves.
 
-use crate::fixtures::computed;
+use crate::compiling::refusal;
+use crate::fixtures::{computed, leaf, split, stump};
+use palpate_trees::compile::Settings;
 use palpate_trees::ensemble::import::{Options, PartTree, Parts};
-use palpate_trees::ensemble::{Ensemble, Node, Output, Provenance, Tree, check_names};
+use palpate_trees::ensemble::{Ensemble, Node, Output, check_names};
 use palpate_trees::error::{EnsembleProblem, NameProblem, TreeProblem};
 use palpate_trees::shared::Descriptor;
 
+type Change = fn(&mut Ensemble);
+
 fn ensemble() -> Ensemble {
-    let split = Node::Split { feature: 0, threshold: 5.0, missing_left: true, left: 1, right: 2 };
-    let nodes = vec![split, Node::Leaf(vec![1.0, 2.0]), Node::Leaf(vec![3.0, 4.0])];
-    Ensemble {
-        inputs: computed(Descriptor::Curvature).into(),
-        objects: vec!["bowl".into(), "fork".into()],
-        base_margins: vec![0.0; 2],
-        trees: vec![Tree { nodes, output: Output::Each }],
-        origin: Provenance::default(),
+    stump(5.0, [[1.0, 2.0], [3.0, 4.0]])
+}
+
+fn changed(change: Change) -> Ensemble {
+    let mut changed = ensemble();
+    change(&mut changed);
+    changed
+}
+
+/// What is wrong with a changed ensemble, which leaves no file.
+fn unsaved(change: Change) -> EnsembleProblem {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("ensemble.json");
+    let error = changed(change).save(&path).unwrap_err();
+    assert!(error.to_string().contains("ensemble.json: ") && !path.exists(), "{error}");
+    error.problem::<EnsembleProblem>().unwrap_or_else(|| panic!("{error}")).clone()
+}
+
+fn root(ensemble: &mut Ensemble) -> &mut Node {
+    &mut ensemble.trees[0].nodes[0]
+}
+
+#[test]
+fn a_tree_that_contradicts_itself_is_neither_saved_nor_compiled() {
+    let infinite = TreeProblem::LeafValue { node: 2, value: f32::INFINITY };
+    let cases: [(Change, TreeProblem); 10] = [
+        (|e| e.trees[0].nodes.clear(), TreeProblem::NoNodes),
+        (|e| e.trees[0].output = Output::One(2), TreeProblem::Object { object: 2, objects: 2 }),
+        (|e| e.trees[0].output = Output::One(1), TreeProblem::LeafValues { node: 1, found: 2, wanted: 1 }),
+        (|e| *root(e) = leaf(&[]), TreeProblem::LeafValues { node: 0, found: 0, wanted: 2 }),
+        (|e| e.trees[0].nodes[2] = leaf(&[0.0, f32::INFINITY]), infinite),
+        (|e| *root(e) = split(0, 5.0, 9, 2), TreeProblem::Child { node: 0, side: "left", child: 9, nodes: 3 }),
+        (|e| *root(e) = split(0, 5.0, 1, 7), TreeProblem::Child { node: 0, side: "right", child: 7, nodes: 3 }),
+        (|e| *root(e) = split(0, 5.0, 0, 2), TreeProblem::ReachedTwice { node: 0 }),
+        (|e| *root(e) = split(2, 5.0, 1, 2), TreeProblem::Feature { node: 0, feature: 2, features: 2 }),
+        (|e| *root(e) = split(0, f32::NAN, 1, 2), TreeProblem::Threshold { node: 0, threshold: f32::NAN }),
+    ];
+    for (change, problem) in cases {
+        // As text, since a threshold that is no number is not equal to itself.
+        let expected = format!("Tree {{ tree: 0, problem: {problem:?} }}");
+        assert_eq!(format!("{:?}", unsaved(change)), expected);
+        assert_eq!(format!("{:?}", refusal(&changed(change), &Settings::default())), expected);
     }
 }
 
 #[test]
 fn saving_an_ensemble_made_by_hand_that_contradicts_itself_is_an_error_and_no_panic() {
+    let twice = EnsembleProblem::Tree { tree: 0, problem: TreeProblem::ReachedTwice { node: 1 } };
+    assert_eq!(unsaved(|e| *root(e) = split(0, 5.0, 1, 1)), twice);
+    assert_eq!(unsaved(|e| e.trees.clear()), EnsembleProblem::NoTrees);
+    let margins = EnsembleProblem::BaseMargins { found: 1, objects: 2 };
+    assert_eq!(unsaved(|e| e.base_margins = vec![0.0, f32::NAN]), margins);
+    assert_eq!(unsaved(|e| e.objects.truncate(1)), EnsembleProblem::ObjectCount { count: 1 });
+}
+
+#[test]
+fn a_saved_ensemble_is_read_as_it_was_where_its_schema_is_known() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("ensemble.json");
-    let refused = |change: &dyn Fn(&mut Ensemble)| {
-        let mut changed = ensemble();
-        change(&mut changed);
-        let error = changed.save(&path).unwrap_err();
-        assert!(error.to_string().contains("ensemble.json: ") && !path.exists(), "{error}");
-        error.problem::<EnsembleProblem>().unwrap_or_else(|| panic!("{error}")).clone()
-    };
-    let split = |left, right, feature, threshold| Node::Split { feature, threshold, missing_left: true, left, right };
-    let tree = |problem| EnsembleProblem::Tree { tree: 0, problem };
-    let root = |node: Node| move |e: &mut Ensemble| e.trees[0].nodes[0] = node.clone();
-    assert_eq!(
-        refused(&root(split(1, 7, 0, 5.0))),
-        tree(TreeProblem::Child { node: 0, side: "right", child: 7, nodes: 3 })
-    );
-    assert_eq!(refused(&root(split(1, 1, 0, 5.0))), tree(TreeProblem::ReachedTwice { node: 1 }));
-    assert_eq!(refused(&root(split(0, 2, 0, 5.0))), tree(TreeProblem::ReachedTwice { node: 0 }));
-    assert_eq!(refused(&root(split(1, 2, 2, 5.0))), tree(TreeProblem::Feature { node: 0, feature: 2, features: 2 }));
-    assert!(matches!(
-        refused(&root(split(1, 2, 0, f32::NAN))),
-        EnsembleProblem::Tree { problem: TreeProblem::Threshold { .. }, .. }
-    ));
-    assert_eq!(refused(&root(Node::Leaf(vec![]))), tree(TreeProblem::LeafValues { node: 0, found: 0, wanted: 2 }));
-    assert_eq!(
-        refused(&|e| e.trees[0].nodes[2] = Node::Leaf(vec![0.0, f32::INFINITY])),
-        tree(TreeProblem::LeafValue { node: 2, value: f32::INFINITY })
-    );
-    assert_eq!(refused(&|e| e.trees[0].nodes.clear()), tree(TreeProblem::NoNodes));
-    assert_eq!(refused(&|e| e.trees[0].output = Output::One(2)), tree(TreeProblem::Object { object: 2, objects: 2 }));
-    assert_eq!(refused(&|e| e.trees.clear()), EnsembleProblem::NoTrees);
-    assert_eq!(
-        refused(&|e| e.base_margins = vec![0.0, f32::NAN]),
-        EnsembleProblem::BaseMargins { found: 1, objects: 2 }
-    );
-    assert_eq!(refused(&|e| e.objects.truncate(1)), EnsembleProblem::ObjectCount { count: 1 });
     ensemble().save(&path).unwrap();
     let schemas = [computed(Descriptor::Curvature)];
     let options = Options { schemas: &schemas, ..Options::default() };

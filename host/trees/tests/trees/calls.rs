@@ -14,16 +14,21 @@ use palpate_trees::verify::predict::{Predicted, predict};
 use std::path::Path;
 use std::process::Command;
 
-/// A row as a C initializer.
-fn initializer(row: &[f64], is_whole: bool) -> String {
-    let cell = |value: &f64| match *value {
-        value if value.is_nan() && is_whole => "INT32_MIN".to_owned(),
+/// Rows as C initializers: with an encoder as the whole numbers that it makes of them.
+fn initializers(rows: &[Vec<f64>], whole: Option<&Encoder>) -> String {
+    let cell = |value: f64| match value {
         value if value.is_nan() => "NAN".to_owned(),
-        value if is_whole => value.to_string(),
         value if value.is_infinite() => format!("{}INFINITY", if value < 0.0 { "-" } else { "" }),
         value => format!("{:e}f", value as f32),
     };
-    format!("{{{}}}", row.iter().map(cell).collect::<Vec<_>>().join(","))
+    let key = |key: i32| if key == i32::MIN { "INT32_MIN".to_owned() } else { key.to_string() };
+    let cells = |row: &Vec<f64>| -> Vec<String> {
+        match whole {
+            Some(encoder) => encoder.row(row).into_iter().map(key).collect(),
+            None => row.iter().copied().map(cell).collect(),
+        }
+    };
+    rows.iter().map(|row| format!("{{{}}}", cells(row).join(","))).collect::<Vec<_>>().join(",")
 }
 
 /// Output of a C program with these functions and calls, built beside the headers in `directory` with warnings denied.
@@ -96,11 +101,7 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
             let model = Model::new(&plain.bytes).unwrap();
             let is_whole = form == "whole";
             let encoder = Encoder::of(&model);
-            let whole = |row: &Vec<f64>| {
-                let keys = encoder.row(row).into_iter();
-                keys.map(|key| if key == i32::MIN { f64::NAN } else { f64::from(key) }).collect::<Vec<_>>()
-            };
-            let given = rows.iter().map(|row| initializer(&if is_whole { whole(row) } else { row.clone() }, is_whole));
+            let given = initializers(&rows, is_whole.then_some(&encoder));
             let has_posteriors = is_class && probability != Probability::Unknown;
             assert_eq!(header.contains(&format!("{name}_posteriors(")), has_posteriors, "{name}");
             let bound = header.split("probabilities, within ").nth(1).map(|text| text.split(' ').next().unwrap());
@@ -121,7 +122,7 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
                  puts(\"\");\n    }}\n}}\n",
                 if is_whole { "int32_t" } else { "float" },
                 rows[0].len(),
-                given.collect::<Vec<_>>().join(","),
+                given,
                 rows.len(),
             );
             calls += &format!("    run_{name}();\n");
@@ -247,11 +248,7 @@ fn rows_of_a_sequence_are_numbered_and_refused_by_the_same_bits_as_in_rust() {
             let numbers: Vec<String> = evidence.map(|number| number.to_string()).collect();
             expected += &format!("{answer} {feature} {}\n", numbers.join(" "));
         }
-        let keys = |row: &Vec<f64>| {
-            let keys = encoder.row(row).into_iter();
-            keys.map(|key| if key == i32::MIN { f64::NAN } else { f64::from(key) }).collect::<Vec<_>>()
-        };
-        let given = measured.iter().map(|row| initializer(&if is_whole { keys(row) } else { row.clone() }, is_whole));
+        let given = initializers(&measured, is_whole.then_some(&encoder));
         let (seen, argument, refused) = match is_guarded {
             true => (format!("{name}_seen seen;"), ", &seen", "seen.refused"),
             false => (String::new(), "", "0"),
@@ -267,7 +264,7 @@ fn rows_of_a_sequence_are_numbered_and_refused_by_the_same_bits_as_in_rust() {
              puts(\"\");\n    }}\n}}\n",
             if is_whole { "int32_t" } else { "float" },
             measured[0].len(),
-            given.collect::<Vec<_>>().join(","),
+            given,
             measured.len(),
         );
         calls += &format!("    run_{name}();\n");

@@ -1,38 +1,14 @@
 //! Compiling by hand-made ensembles: layouts, exactness, what the header says, and what is refused.
 
-use crate::fixtures::computed;
+use crate::fixtures::{leaf, of_two_objects, split, stump};
 use palpate_base::with;
 use palpate_onboard::{ModelError, Stopping};
 use palpate_trees::compile::{
     Compiled, CompiledModel, Goal, Layout, Leaf, Restated, Settings, compile, compile_within, names, open, restate,
 };
-use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
+use palpate_trees::ensemble::{Ensemble, Inputs, Node};
 use palpate_trees::error::{CompileProblem, Setting, TreeProblem};
 use palpate_trees::shared::{Descriptor, MISSING_FEATURE};
-
-fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
-    Node::Split { feature, threshold, missing_left: true, left, right }
-}
-
-fn leaf(values: &[f32]) -> Node {
-    Node::Leaf(values.into())
-}
-
-/// An ensemble of two objects over these trees, whose leaves have a value for each.
-fn ensemble(descriptor: Descriptor, trees: Vec<Vec<Node>>) -> Ensemble {
-    Ensemble {
-        inputs: computed(descriptor).into(),
-        objects: vec!["bowl".into(), "fork".into()],
-        base_margins: vec![0.0; 2],
-        trees: trees.into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect(),
-        origin: Provenance::default(),
-    }
-}
-
-/// One split.
-fn stump(threshold: f32, leaves: [[f32; 2]; 2]) -> Ensemble {
-    ensemble(Descriptor::Curvature, vec![vec![split(0, threshold, 1, 2), leaf(&leaves[0]), leaf(&leaves[1])]])
-}
 
 /// A tree that is a chain of splits, one below the other to the right, at whole thresholds.
 fn chain(splits: usize, feature: impl Fn(usize) -> usize) -> Vec<Node> {
@@ -49,7 +25,8 @@ fn settings_of(layout: Option<Layout>, leaf: Leaf) -> Settings {
     with!(Settings::default(), layout, leaf)
 }
 
-fn refusal(ensemble: &Ensemble, settings: &Settings) -> CompileProblem {
+/// The problem of an ensemble that is not compiled.
+pub(crate) fn refusal(ensemble: &Ensemble, settings: &Settings) -> CompileProblem {
     let error = compile(ensemble, settings).unwrap_err();
     error.problem::<CompileProblem>().unwrap_or_else(|| panic!("{error}")).clone()
 }
@@ -75,9 +52,9 @@ fn half_the_bytes_are_worth_a_fifth_more_instructions_and_three_times_the_smalle
         vec![nodes; 30]
     };
     for (ensemble, expected) in [
-        (ensemble(Descriptor::Curvature, shallow), Layout::Grid),
-        (ensemble(Descriptor::Oriented, deep), Layout::Compact),
-        (ensemble(Descriptor::Oriented, full), Layout::Complete),
+        (of_two_objects(Descriptor::Curvature, shallow), Layout::Grid),
+        (of_two_objects(Descriptor::Oriented, deep), Layout::Compact),
+        (of_two_objects(Descriptor::Oriented, full), Layout::Complete),
     ] {
         let chosen = compile(&ensemble, &Settings::default()).unwrap();
         assert_eq!(chosen.layout, expected);
@@ -101,7 +78,7 @@ fn half_the_bytes_are_worth_a_fifth_more_instructions_and_three_times_the_smalle
 
 #[test]
 fn an_ensemble_that_does_not_fit_a_layout_says_so_in_a_variant() {
-    let deep = ensemble(Descriptor::Oriented, vec![chain(9, |number| number % 8)]);
+    let deep = of_two_objects(Descriptor::Oriented, vec![chain(9, |number| number % 8)]);
     for layout in [Layout::Complete, Layout::Grid] {
         assert_eq!(refusal(&deep, &settings_of(Some(layout), Leaf::I16)), CompileProblem::DoesNotFit { layout });
     }
@@ -120,7 +97,7 @@ fn trees_with_more_left_splits_than_a_byte_counts_take_the_wide_layout() {
     }
     // 255 splits below the root's left side, then 511.
     for (depth, expected) in [(9, Layout::Compact), (10, Layout::Wide)] {
-        let deep = ensemble(Descriptor::Oriented, vec![full(depth)]);
+        let deep = of_two_objects(Descriptor::Oriented, vec![full(depth)]);
         assert_eq!(compile(&deep, &settings_of(Some(Layout::Compact), Leaf::I16)).unwrap().layout, expected);
     }
 }
@@ -159,7 +136,7 @@ fn sums_that_f32_rounds_are_not_stated_to_be_exact_where_no_leaf_is_rounded() {
     let value = 127.0 * 131_071.0 * 0.5_f32.powi(24);
     let tree = |feature| vec![split(feature, 500.0, 1, 2), leaf(&[value, -value]), leaf(&[-value, value])];
     for features in [[0, 0, 0], [0, 1, 2]] {
-        let ensemble = ensemble(Descriptor::Oriented, features.map(tree).into());
+        let ensemble = of_two_objects(Descriptor::Oriented, features.map(tree).into());
         let compiled = compile(&ensemble, &settings_of(Some(Layout::Compact), Leaf::I8)).unwrap();
         let model = open(&compiled.bytes).unwrap();
         let mut margins = [0; 2];
@@ -205,55 +182,26 @@ fn the_header_says_what_was_compiled() {
 }
 
 #[test]
-fn every_ensemble_that_contradicts_itself_is_refused_by_what_is_wrong() {
-    let sound = || stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]);
-    let refused = |change: &dyn Fn(&mut Ensemble)| {
-        let mut changed = sound();
+fn objects_margins_depths_and_names_that_no_model_can_have_are_refused_by_what_is_wrong() {
+    let refused = |change: fn(&mut Ensemble)| {
+        let mut changed = stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]);
         change(&mut changed);
         refusal(&changed, &Settings::default())
     };
-    let tree = |problem| CompileProblem::Tree { tree: 0, problem };
-    assert_eq!(refused(&|e| e.objects.push("cup".into())), CompileProblem::Objects { objects: 3, base_margins: 2 });
-    assert_eq!(
-        refused(&|e| {
-            e.objects.clear();
-            e.base_margins.clear();
-        }),
-        CompileProblem::Objects { objects: 0, base_margins: 0 }
-    );
-    assert_eq!(refused(&|e| e.trees[0].nodes.clear()), tree(TreeProblem::NoNodes));
-    assert_eq!(refused(&|e| e.trees[0].output = Output::One(2)), tree(TreeProblem::Object { object: 2, objects: 2 }));
-    assert_eq!(
-        refused(&|e| e.trees[0].output = Output::One(1)),
-        tree(TreeProblem::LeafValues { node: 1, found: 2, wanted: 1 })
-    );
-    assert_eq!(
-        refused(&|e| e.trees[0].nodes[0] = split(2, 500.0, 1, 2)),
-        tree(TreeProblem::Feature { node: 0, feature: 2, features: 2 })
-    );
-    assert_eq!(
-        refused(&|e| e.trees[0].nodes[0] = split(0, 500.0, 9, 2)),
-        tree(TreeProblem::Child { node: 0, side: "left", child: 9, nodes: 3 })
-    );
-    assert_eq!(refused(&|e| e.trees[0].nodes = chain(257, |_| 0)), tree(TreeProblem::TooDeep { most: 256 }));
-    assert!(matches!(
-        refused(&|e| e.trees[0].nodes[0] = split(0, f32::NAN, 1, 2)),
-        CompileProblem::Tree { problem: TreeProblem::Threshold { node: 0, .. }, .. }
-    ));
-    assert!(matches!(
-        refused(&|e| e.trees[0].nodes[0] = split(0, 500.0, 0, 2)),
-        CompileProblem::Tree { problem: TreeProblem::ReachedTwice { .. } | TreeProblem::TooDeep { .. }, .. }
-    ));
-    assert_eq!(
-        refused(&|e| e.trees[0].nodes[2] = leaf(&[0.0, f32::INFINITY])),
-        tree(TreeProblem::LeafValue { node: 2, value: f32::INFINITY })
-    );
-    match refused(&|e| e.trees[0].nodes[2] = leaf(&[0.0, 1e5])) {
+    let none: fn(&mut Ensemble) = |e| {
+        e.objects.clear();
+        e.base_margins.clear();
+    };
+    let too_deep = CompileProblem::Tree { tree: 0, problem: TreeProblem::TooDeep { most: 256 } };
+    assert_eq!(refused(|e| e.objects.push("cup".into())), CompileProblem::Objects { objects: 3, base_margins: 2 });
+    assert_eq!(refused(none), CompileProblem::Objects { objects: 0, base_margins: 0 });
+    assert_eq!(refused(|e| e.trees[0].nodes = chain(257, |_| 0)), too_deep);
+    match refused(|e| e.trees[0].nodes[2] = leaf(&[0.0, 1e5])) {
         CompileProblem::MarginRange { of, largest, .. }
             if of.starts_with("the object ") && (1e5..1.1e5).contains(&f64::from(largest)) => {}
         other => panic!("{other:?}"),
     }
-    assert_eq!(refused(&|e| e.objects[0] = "x".repeat(256)), CompileProblem::NameTooLong { name: "x".repeat(256) });
+    assert_eq!(refused(|e| e.objects[0] = "x".repeat(256)), CompileProblem::NameTooLong { name: "x".repeat(256) });
 }
 
 #[test]
@@ -273,12 +221,12 @@ fn thresholds_that_fall_together_when_rounded_are_refused_by_their_feature() {
     let seconds: Vec<Vec<Node>> = (0..9)
         .map(|number| vec![split(0, number as f32 * 0.05 - 0.2, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])])
         .collect();
-    let problem = refusal(&ensemble(Descriptor::Curvature, seconds.clone()), &Settings::default());
+    let problem = refusal(&of_two_objects(Descriptor::Curvature, seconds.clone()), &Settings::default());
     let (of, whole, units) = ("things", "whole units", "units");
     let (feature, thresholds, rounded, example) = ("curvature", 9, 2, -0.2);
     assert_eq!(problem, CompileProblem::Thresholds { feature, thresholds, rounded, example, of, whole, units });
     // Rows of features are compared as they are, fractions and all.
-    let rows = Ensemble { inputs: Inputs::unnamed(2), ..ensemble(Descriptor::Curvature, seconds) };
+    let rows = Ensemble { inputs: Inputs::unnamed(2), ..of_two_objects(Descriptor::Curvature, seconds) };
     compile(&rows, &with!(Settings::default(), leaf = Leaf::F32)).unwrap();
     for scales in [vec![1.0], vec![1.0, 0.0], vec![f32::NAN, 1.0]] {
         let error = compile(&rows, &with!(Settings::default(), scales = Some(scales))).unwrap_err();
@@ -287,7 +235,7 @@ fn thresholds_that_fall_together_when_rounded_are_refused_by_their_feature() {
     // Whole thresholds, and halves between neighbors, are what trainers put between whole numbers.
     for step in [1.0, 0.5] {
         let whole = (0..9).map(|n| vec![split(0, n as f32 * step, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])]);
-        compile(&ensemble(Descriptor::Curvature, whole.collect()), &Settings::default()).unwrap();
+        compile(&of_two_objects(Descriptor::Curvature, whole.collect()), &Settings::default()).unwrap();
     }
 }
 
@@ -315,7 +263,7 @@ fn a_compiled_model_opens_in_one_place_and_says_what_is_wrong_at_which_byte() {
 fn what_fits_a_budget_is_as_exact_as_there_is_room_for() {
     let leaf_of = |compiled: &Compiled| open(&compiled.bytes).unwrap().leaf_type();
     let trees = (0..40).map(|i| vec![split(0, 10.0 * i as f32, 1, 2), leaf(&[0.7, -0.3]), leaf(&[-0.123, 0.456])]);
-    let ensemble = ensemble(Descriptor::Oriented, trees.collect());
+    let ensemble = of_two_objects(Descriptor::Oriented, trees.collect());
     let settings = settings_of(Some(Layout::Compact), Leaf::F32);
     let [f32, i16, i8] = [Leaf::F32, Leaf::I16, Leaf::I8]
         .map(|leaf| compile(&ensemble, &settings_of(Some(Layout::Compact), leaf)).unwrap().bytes.len());
@@ -340,7 +288,7 @@ fn few_leaves(trees: usize, different: usize) -> Ensemble {
             [split(tree % 8, at(0), 1, 2), split((tree + 1) % 8, at(1), 3, 4), split((tree + 3) % 8, at(2), 5, 6)];
         splits.into_iter().chain((0..4).map(|number| values(4 * tree + number))).collect()
     };
-    ensemble(Descriptor::Oriented, (0..trees).map(tree).collect())
+    of_two_objects(Descriptor::Oriented, (0..trees).map(tree).collect())
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::table::cells;
 use palpate_trees::ensemble::import::Options;
-use palpate_trees::ensemble::{Ensemble, Schema};
+use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Schema, Tree};
 use palpate_trees::rows::Rows;
 use palpate_trees::shared::Descriptor;
 use std::path::{Path, PathBuf};
@@ -100,6 +100,41 @@ impl Fixture {
     pub(crate) fn is_categorical(&self) -> bool {
         self.name.contains("-categorical") || self.name.contains("-one-hot")
     }
+}
+
+/// A split that sends missing values to the left.
+pub(crate) fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
+    Node::Split { feature, threshold, missing_left: true, left, right }
+}
+
+pub(crate) fn leaf(values: &[f32]) -> Node {
+    Node::Leaf(values.into())
+}
+
+/// An ensemble of these trees, which start from margins of 0.
+fn of_trees(inputs: Inputs, objects: &[&str], output: Output, trees: Vec<Vec<Node>>) -> Ensemble {
+    Ensemble {
+        inputs,
+        objects: objects.iter().map(ToString::to_string).collect(),
+        base_margins: vec![0.0; objects.len()],
+        trees: trees.into_iter().map(|nodes| Tree { nodes, output }).collect(),
+        origin: Provenance::default(),
+    }
+}
+
+/// An ensemble of two objects over these trees, whose leaves have a value for each.
+pub(crate) fn of_two_objects(descriptor: Descriptor, trees: Vec<Vec<Node>>) -> Ensemble {
+    of_trees(computed(descriptor).into(), &["bowl", "fork"], Output::Each, trees)
+}
+
+/// An ensemble of one value over rows of this many features.
+pub(crate) fn of_one_value(features: usize, trees: Vec<Vec<Node>>) -> Ensemble {
+    of_trees(Inputs::unnamed(features), &["value"], Output::One(0), trees)
+}
+
+/// One split of curvature between two objects.
+pub(crate) fn stump(threshold: f32, leaves: [[f32; 2]; 2]) -> Ensemble {
+    of_two_objects(Descriptor::Curvature, vec![vec![split(0, threshold, 1, 2), leaf(&leaves[0]), leaf(&leaves[1])]])
 }
 
 /// Schema of a descriptor's features, without planes.

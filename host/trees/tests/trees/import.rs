@@ -1,11 +1,11 @@
 //! Files that other libraries wrote, with their own margins: `tests/data/import`.
 
-use crate::fixtures::{FIXTURES, Fixture, computed, directory, files, fixture};
+use crate::fixtures::{FIXTURES, Fixture, computed, directory, files, fixture, leaf, of_one_value, split};
 use palpate_base::with;
 use palpate_trees::compile::code::Form;
 use palpate_trees::compile::{self, Core, Goal, Instructions, Layout, Leaf, Settings};
 use palpate_trees::ensemble::import::{Options, read};
-use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Threshold, Tree};
+use palpate_trees::ensemble::{Ensemble, Node, Provenance, Threshold};
 use palpate_trees::prove::{check, prove};
 use palpate_trees::rows::{self, Encoder, Features, Rows, columns_of, scales};
 use palpate_trees::shared::Descriptor;
@@ -559,12 +559,6 @@ const EVERY_WAY: [&str; 12] = [
     "xgboost-3.4-dart",
 ];
 
-impl Fixture {
-    fn is_for_every_way(&self) -> bool {
-        EVERY_WAY.contains(&self.name.as_str())
-    }
-}
-
 #[test]
 fn every_model_is_proved_and_some_with_every_leaf_in_every_layout_each_also_in_whole_units() {
     let every_way = Leaf::ALL.iter().flat_map(|&leaf| Layout::OF_DATA.iter().map(move |&layout| (leaf, Some(layout))));
@@ -572,7 +566,7 @@ fn every_model_is_proved_and_some_with_every_leaf_in_every_layout_each_also_in_w
     let mut counts = BTreeMap::new();
     for fixture in FIXTURES.iter() {
         let (name, ensemble, file) = (&fixture.name, &fixture.ensemble, fixture.bytes());
-        let is_every = fixture.is_for_every_way() || fixture.is_categorical();
+        let is_every = EVERY_WAY.contains(&name.as_str()) || fixture.is_categorical();
         let mut ways = 0;
         for &(leaf, layout) in if is_every { &every_way[..] } else { &[(Leaf::I16, None)] } {
             for scales in [None, Some(scales::fit(ensemble, &fixture.rows))] {
@@ -646,20 +640,9 @@ fn models_stay_in_every_layout() {
 #[test]
 fn trees_of_one_split_whose_thresholds_fall_together_in_whole_units_are_proved() {
     // More thresholds than a merged tree may have, and ten in tenths.
-    let stumps = (0..300).map(|number| {
-        let leaf = |value| Node::Leaf(vec![value]);
-        let threshold = number as f32 / 300.0;
-        let split = Node::Split { feature: 0, threshold, missing_left: true, left: 1, right: 2 };
-        let nodes = vec![split, leaf(0.01), leaf(-0.01 * number as f32)];
-        Tree { nodes, output: Output::One(0) }
-    });
-    let ensemble = Ensemble {
-        inputs: Inputs::unnamed(1),
-        objects: vec!["value".into()],
-        base_margins: vec![0.0],
-        trees: stumps.collect(),
-        origin: Provenance::default(),
-    };
+    let stumps = (0..300)
+        .map(|number| vec![split(0, number as f32 / 300.0, 1, 2), leaf(&[0.01]), leaf(&[-0.01 * number as f32])]);
+    let ensemble = of_one_value(1, stumps.collect());
     for scales in [None, Some(vec![10.0])] {
         let settings = with!(Settings::default(), layout = Some(Layout::Complete), scales);
         let bytes = compile::compile(&ensemble, &settings).unwrap().bytes;
@@ -836,23 +819,6 @@ fn of_more_columns_than_a_model_can_have_those_that_are_used_are_stored_by_numbe
         assert_eq!((&again.inputs, Features::from(&again)), (&ensemble.inputs, features));
         assert_eq!(again.margins_of_features(&[2.5, 0.25]), ensemble.margins_of_features(&[2.5, 0.25]));
     }
-    let all = format!("{}\n", (0..300).map(|feature| feature.to_string()).collect::<Vec<_>>().join(" "));
-    let too_many = many_columns(300, |column| format!("c{column}"))
-        .replace("num_leaves=3", "num_leaves=301")
-        .replace("split_feature=299 7\n", &format!("split_feature={all}"))
-        .replace("threshold=0.5 2\n", &format!("threshold={all}"))
-        .replace("decision_type=2 2\n", &format!("decision_type={}\n", ["2"; 300].join(" ")))
-        .replace(
-            "left_child=1 -1\n",
-            &format!("left_child={}\n", (0..300).map(|n| format!("-{}", n + 1)).collect::<Vec<_>>().join(" ")),
-        )
-        .replace(
-            "right_child=-2 -3\n",
-            &format!("right_child={} -301\n", (1..300).map(|n| n.to_string()).collect::<Vec<_>>().join(" ")),
-        )
-        .replace("leaf_value=1 2 3", &format!("leaf_value={}", ["1"; 301].join(" ")));
-    let error = read(Path::new("wide.txt"), too_many.as_bytes(), &Options::default()).unwrap_err().to_string();
-    assert!(error.contains("its trees use 300 of its 300 features, and not 1 to 256"), "{error}");
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Tables of rows and of sequences: their columns, what is wrong with them by line, and rows that are made at thresholds.
 
+use crate::fixtures::{leaf, of_one_value, split};
 use palpate_trees::Result as Read;
-use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Threshold, Tree};
+use palpate_trees::ensemble::Threshold;
 use palpate_trees::error::RowsProblem;
 use palpate_trees::rows::{Features, Matched, RowSequence, Rows, SequenceColumns, Sequences, generate, whole};
 use palpate_trees::shared::MISSING_FEATURE;
@@ -62,26 +63,18 @@ fn whole_numbers_saturate_and_a_missing_value_stays_missing() {
 
 #[test]
 fn every_split_is_reached_and_decided_both_ways() {
-    let split = |feature, threshold, left, right| Node::Split { feature, threshold, missing_left: true, left, right };
-    let leaf = |value: f32| Node::Leaf(vec![value]);
     let nodes = vec![
         split(0, 5.0, 1, 2),
         split(1, -1.0, 3, 4),
         split(0, 9.0, 5, 6),
-        leaf(1.0),
+        leaf(&[1.0]),
         split(0, 1.0, 7, 8),
-        leaf(2.0),
-        leaf(3.0),
-        leaf(4.0),
-        leaf(5.0),
+        leaf(&[2.0]),
+        leaf(&[3.0]),
+        leaf(&[4.0]),
+        leaf(&[5.0]),
     ];
-    let ensemble = Ensemble {
-        inputs: Inputs::unnamed(2),
-        objects: vec!["value".into()],
-        base_margins: vec![0.0],
-        trees: vec![Tree { nodes, output: Output::One(0) }],
-        origin: Provenance::default(),
-    };
+    let ensemble = of_one_value(2, vec![nodes]);
     let mut reached = BTreeSet::new();
     let mut count = 0;
     let around = |_, threshold: Threshold| {

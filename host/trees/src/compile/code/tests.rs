@@ -103,17 +103,7 @@ impl Random {
 
 /// Thresholds of every kind of column, leaves of every kind of sum; and models that other libraries trained.
 pub(crate) static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
-    let anywhere: fn(&mut Numbers) -> f32 = |numbers| numbers.value(100.0);
-    let usual = || Random {
-        inputs: Inputs::unnamed(6),
-        objects: 3,
-        trees: 40,
-        depth: 5,
-        each: false,
-        votes: 0,
-        largest: 0.5,
-        threshold: anywhere,
-    };
+    let usual = || random_of(3);
     let positive: fn(&mut Numbers) -> f32 = |numbers| numbers.value(50.0).abs() + 0.25;
     let halves: fn(&mut Numbers) -> f32 = |numbers| (numbers.below(31) as f32 + 1.0) / 2.0;
     let wide: fn(&mut Numbers) -> f32 = |numbers| (numbers.below(60) as f32 + 1.0) * 64.0;
