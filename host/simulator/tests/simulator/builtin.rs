@@ -1,29 +1,14 @@
+use crate::samples::{assert_closed, volume};
 use glam::Vec3;
 use palpate_simulator::mesh::Mesh;
 use palpate_simulator::mesh::Object;
 use palpate_simulator::mesh::builtin::{all, background, make, many, names, one, varied};
 use std::collections::HashMap;
+use std::ops::RangeInclusive;
 use std::sync::LazyLock;
 
 /// The canonical objects, made only once.
 static CANONICAL: LazyLock<Vec<Object>> = LazyLock::new(|| all().unwrap());
-
-/// The signed volume, in cubic centimeters: positive if the triangles are anticlockwise seen from outside.
-fn volume(mesh: &Mesh) -> f64 {
-    let at = |i: u32| Vec3::from(mesh.vertices[i as usize]).as_dvec3();
-    mesh.triangles.iter().map(|&[a, b, c]| at(a).dot(at(b).cross(at(c))) / 6.0).sum()
-}
-
-/// Number of times that every directed edge occurs.
-fn edges(mesh: &Mesh) -> HashMap<(u32, u32), usize> {
-    let mut count = HashMap::new();
-    for &[a, b, c] in &mesh.triangles {
-        for edge in [(a, b), (b, c), (c, a)] {
-            *count.entry(edge).or_insert(0) += 1;
-        }
-    }
-    count
-}
 
 /// Number of separate pieces of the surface.
 fn pieces(mesh: &Mesh) -> usize {
@@ -44,14 +29,11 @@ fn pieces(mesh: &Mesh) -> usize {
     mesh.triangles.iter().map(|&[a, ..]| root(&mut parents, a)).collect::<std::collections::HashSet<_>>().len()
 }
 
-fn assert_closed(name: &str, mesh: &Mesh) {
-    let edges = edges(mesh);
-    for (&(a, b), &count) in &edges {
-        assert_ne!(a, b, "{name}: a triangle uses a vertex twice");
-        assert_eq!(count, 1, "{name}: an edge is used {count} times in one direction");
-        assert_eq!(edges.get(&(b, a)), Some(&1), "{name}: an edge has no opposite");
-    }
-    assert!(mesh.vertices.iter().flatten().all(|x| x.is_finite()), "{name}: a vertex is not finite");
+/// Checks that a mesh is closed, right side out and of so many triangles.
+fn assert_sound(name: &str, mesh: &Mesh, counts: RangeInclusive<usize>) {
+    assert_closed(name, mesh);
+    assert!(volume(mesh) > 0.0, "{name} is inside out");
+    assert!(counts.contains(&mesh.triangles.len()), "{name}: {} triangles", mesh.triangles.len());
 }
 
 #[test]
@@ -63,24 +45,11 @@ fn there_are_ten_in_the_agreed_order() {
 }
 
 #[test]
-fn every_edge_is_shared_by_two_triangles_that_agree_which_side_is_out() {
+fn every_object_is_one_closed_piece_right_side_out_of_5000_to_60000_triangles() {
     for object in &*CANONICAL {
-        assert_closed(&object.name, object.mesh());
-        assert!(volume(object.mesh()) > 0.0, "{} is inside out", object.name);
-    }
-}
-
-#[test]
-fn every_object_is_one_piece() {
-    for object in &*CANONICAL {
+        assert_sound(&object.name, object.mesh(), 5_000..=60_000);
         assert_eq!(pieces(object.mesh()), 1, "{}", object.name);
     }
-}
-
-#[test]
-fn every_mesh_has_5000_to_60000_triangles() {
-    let counts: Vec<_> = CANONICAL.iter().map(|object| (&object.name, object.mesh().triangles.len())).collect();
-    assert!(counts.iter().all(|(_, count)| (5_000..=60_000).contains(count)), "{counts:?}");
 }
 
 #[test]
@@ -96,10 +65,8 @@ fn varied_objects_are_closed_and_right_side_out_and_another_than_the_canonical_o
     for object in &*CANONICAL {
         let varied = varied(&object.name, 3).unwrap();
         let name = &object.name;
-        assert_closed(name, varied.mesh());
+        assert_sound(name, varied.mesh(), 5_000..=70_000);
         assert_eq!(pieces(varied.mesh()), 1, "{name}");
-        let count = varied.mesh().triangles.len();
-        assert!((5_000..=70_000).contains(&count), "{name}: {count}");
         let (size, canonical) = (volume(varied.mesh()), volume(object.mesh()));
         assert!(size > 0.3 * canonical && size < 3.0 * canonical, "{name}: {size}, canonical {canonical}");
         assert!((size / canonical - 1.0).abs() > 1e-4, "{name} is the canonical one");
@@ -152,11 +119,8 @@ fn shapes_of_a_background_are_closed_right_side_out_and_of_their_own() {
     assert_eq!(object.instances().len(), 10);
     let mut volumes: Vec<f64> = Vec::new();
     for instance in object.instances() {
-        assert_closed(&instance.name, &instance.mesh);
+        assert_sound(&instance.name, &instance.mesh, 200..=200_000);
         let size = volume(&instance.mesh);
-        assert!(size > 0.0, "{} is inside out", instance.name);
-        let count = instance.mesh.triangles.len();
-        assert!((200..=200_000).contains(&count), "{}: {count} triangles", instance.name);
         assert!(volumes.iter().all(|other| (size / other - 1.0).abs() > 1e-4), "{} is another", instance.name);
         volumes.push(size);
     }

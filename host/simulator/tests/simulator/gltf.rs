@@ -1,4 +1,4 @@
-use crate::samples::{corners, document, glb_of};
+use crate::samples::{buffer, corners, document, glb_of};
 use palpate_simulator::error::Result;
 use palpate_simulator::mesh::Mesh;
 use palpate_simulator::mesh::file::parse;
@@ -10,7 +10,11 @@ fn changed(change: impl FnOnce(&mut Value)) -> Result<Mesh> {
     let square = square();
     let mut document = document(&square, None);
     change(&mut document);
-    parse(&glb_of(&document, &buffer(&square)), Path::new("cup.glb")).map(|contents| contents.mesh)
+    read(&document, &buffer(&square))
+}
+
+fn read(document: &Value, bytes: &[u8]) -> Result<Mesh> {
+    parse(&glb_of(document, bytes), Path::new("cup.glb")).map(|contents| contents.mesh)
 }
 
 fn square() -> Mesh {
@@ -18,11 +22,6 @@ fn square() -> Mesh {
         vertices: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
     }
-}
-
-fn buffer(mesh: &Mesh) -> Vec<u8> {
-    let vertices = mesh.vertices.iter().flatten().flat_map(|x| x.to_le_bytes());
-    vertices.chain(mesh.triangles.iter().flatten().flat_map(|index| index.to_le_bytes())).collect()
 }
 
 #[track_caller]
@@ -166,9 +165,6 @@ fn a_sparse_accessor_replaces_some_elements() {
     let mut bytes = buffer(&square);
     bytes.push(2);
     [5.0_f32, 6.0, 7.0].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
-    let read = |document: &Value, bytes: &[u8]| {
-        parse(&glb_of(document, bytes), Path::new("cup.glb")).map(|contents| contents.mesh)
-    };
     assert_eq!(corners(&read(&document, &bytes).unwrap())[0][2], [5.0, 6.0, 7.0]);
     bytes[start] = 4;
     assert!(read(&document, &bytes).unwrap_err().to_string().contains("replaces its element 4"));

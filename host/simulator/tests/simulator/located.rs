@@ -1,8 +1,8 @@
+use crate::samples::cuboid;
 use glam::DMat3;
 use glam::DVec3;
 use palpate_shared::ContactTime;
 use palpate_shared::Touch;
-use palpate_simulator::mesh::Mesh;
 use palpate_simulator::probe::noise::Grazing;
 use palpate_simulator::probe::noise::Noise;
 use palpate_simulator::probe::scene::Table;
@@ -11,14 +11,8 @@ use palpate_simulator::random::{Purpose, generator};
 
 /// A brick of 60 by 40 by 30 mm on a table.
 fn brick() -> Scene {
-    let [x, y, z] = [30.0, 20.0, 15.0];
-    let vertices = (0..8).map(|corner: u8| {
-        let side = |axis: u8, half: f32| if corner >> axis & 1 == 0 { -half } else { half };
-        [side(0, x), side(1, y), side(2, z)]
-    });
-    let faces = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
-    let triangles = faces.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
-    let mesh = Mesh { vertices: vertices.collect(), triangles: triangles.collect() };
+    let mut mesh = cuboid([60.0, 40.0, 30.0]);
+    mesh.vertices.iter_mut().for_each(|[x, y, z]| (*x, *y, *z) = (*x - 30.0, *y - 20.0, *z - 15.0));
     let table = Table { instance: 0, placement: "+z".into(), weight: 1.0, cone: 0.0 };
     Scene::on_table(&mesh, 60.0, DMat3::IDENTITY, table).unwrap()
 }

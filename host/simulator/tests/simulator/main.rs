@@ -34,7 +34,6 @@ mod ply;
 mod polygon;
 mod precision;
 mod probe_file;
-mod quantity;
 mod random;
 mod samples;
 #[cfg(feature = "scans")]

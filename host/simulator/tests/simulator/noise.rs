@@ -25,15 +25,17 @@ fn touches(count: u32) -> Vec<Touch> {
     (0..count).map(|i| Touch::from_micros([i % 977, 500_000, 900_000 + i])).collect()
 }
 
+/// Time from the first finger's contact to the last one's.
+fn lag(touch: &Touch) -> f64 {
+    let [first, _, last] = touch.times().map(|t| f64::from(t.micros().unwrap()));
+    last - first
+}
+
 #[test]
 fn noise_has_the_deviation_asked_for_and_no_drift() {
     let clean = touches(40_000);
-    let slope = |touch: &Touch| {
-        let [first, _, last] = touch.times().map(|t| f64::from(t.micros().unwrap()));
-        last - first
-    };
     let noisy = noisy("fork", &clean, 5_000.0, 1);
-    let differences: Vec<f64> = noisy.iter().zip(&clean).map(|(a, b)| slope(a) - slope(b)).collect();
+    let differences: Vec<f64> = noisy.iter().zip(&clean).map(|(a, b)| lag(a) - lag(b)).collect();
     let count = differences.len() as f64;
     let mean = differences.iter().sum::<f64>() / count;
     let deviation = (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / count).sqrt();
@@ -83,12 +85,9 @@ fn one_level_is_the_noise_of_version_0_1_0() {
 #[test]
 fn a_range_draws_a_level_for_every_touch() {
     let clean = touches(40_000);
-    let slope = |touch: &Touch| {
-        touch.times()[2].micros().map(f64::from).unwrap() - touch.times()[0].micros().map(f64::from).unwrap()
-    };
     let deviation = |noise: Noise| {
         let noisy = noise.add("fork", &clean, 1);
-        let squares = noisy.iter().zip(&clean).map(|(a, b)| (slope(a) - slope(b)).powi(2));
+        let squares = noisy.iter().zip(&clean).map(|(a, b)| (lag(a) - lag(b)).powi(2));
         (squares.sum::<f64>() / (2.0 * clean.len() as f64)).sqrt()
     };
     let mixture = deviation(with!(Noise::default(); deviation: Deviation { least: 0.0, largest: 9_000.0 }));
@@ -216,7 +215,7 @@ fn a_model_states_the_noise_that_it_was_trained_with() {
 }
 
 #[test]
-fn noise_is_said_in_words() {
+fn noise_is_said_in_words_and_a_late_finger_is_not_early_by_a_negative_time() {
     assert_eq!(Noise::default().to_string(), "no noise");
     assert_eq!(Noise::gaussian(5_000.0).to_string(), "noise of 5 ms");
     let noise = with!(Noise::default(); deviation: "0..10ms".parse().unwrap(), timer: 500.0, missed: [0.02; 3]);
@@ -226,10 +225,6 @@ fn noise_is_said_in_words() {
         noise.to_string(),
         "finger 2 is 3 ms early, speed off by up to 5 % per robot, a pose turned by 5° per touch"
     );
-}
-
-#[test]
-fn a_late_finger_is_not_said_to_be_early_by_a_negative_time() {
     let noise = with!(Noise::default(); bent: [0.0, -4_311.0, 2_000.0]);
     assert_eq!(noise.to_string(), "finger 2 is 4.3 ms late, finger 3 is 2 ms early");
 }

@@ -11,8 +11,10 @@ fn every_key_sets_its_own_setting_and_leaves_the_others_open() {
         ("noise=0..5ms", PartialNoise { deviation: Some(deviation), ..PartialNoise::default() }),
         ("noise=5ms", PartialNoise { deviation: Some(5_000.0.into()), ..PartialNoise::default() }),
         ("timer=1ms", PartialNoise { timer: Some(1_000.0), ..PartialNoise::default() }),
+        ("timer=0.005 s", PartialNoise { timer: Some(5_000.0), ..PartialNoise::default() }),
         ("debounce=300us", PartialNoise { debounce: Some(300.0), ..PartialNoise::default() }),
         ("missed=2%", PartialNoise { missed: Some([0.02; 3]), ..PartialNoise::default() }),
+        ("missed=2 %", PartialNoise { missed: Some([0.02; 3]), ..PartialNoise::default() }),
         ("missed=1%/0.02/0%", PartialNoise { missed: Some([0.01, 0.02, 0.0]), ..PartialNoise::default() }),
         ("bent=3ms/0ms/-500us", PartialNoise { bent: Some([3_000.0, 0.0, -500.0]), ..PartialNoise::default() }),
         ("speed_factor=0.98", PartialNoise { speed: Some(0.98), ..PartialNoise::default() }),
@@ -21,6 +23,7 @@ fn every_key_sets_its_own_setting_and_leaves_the_others_open() {
         ("pose-noise=5deg", PartialNoise { pose: Some(5.0), ..PartialNoise::default() }),
         ("drift=1mm/0.5deg", PartialNoise { drift: Some([1_000.0, 0.5]), ..PartialNoise::default() }),
         ("position=0.5mm", PartialNoise { position: Some(500.0), ..PartialNoise::default() }),
+        ("position=300um", PartialNoise { position: Some(300.0), ..PartialNoise::default() }),
         (" pose_bias = 1.5° ", PartialNoise { pose_bias: Some(1.5), ..PartialNoise::default() }),
     ] {
         assert_eq!(read(text), expected, "{text}");
@@ -83,6 +86,17 @@ fn what_is_no_noise_is_refused_by_key_and_value_with_what_to_use() {
     ] {
         let error = text.parse::<PartialNoise>().unwrap_err().to_string();
         assert!(error.starts_with(expected), "{text}: {error}");
+    }
+    for (key, values, wanted) in [
+        ("timer", &["5", "ms", "5 m"][..], "a duration such as 5ms"),
+        ("position", &["5", "mm", "1m", "nanmm"], "a length such as 1mm"),
+        ("pose_noise", &["deg", "-1deg", "5rad"], "an angle such as 5deg"),
+        ("missed", &["%", "-2%", "2%%", "nan"], "a share such as 2%"),
+    ] {
+        for value in values {
+            let error = format!("{key}={value}").parse::<PartialNoise>().unwrap_err().to_string();
+            assert!(error.starts_with(&format!("{key} is {value:?}; use {wanted}")), "{error}");
+        }
     }
     // Hostile lengths end at once.
     assert!("noise=5ms,".repeat(1_000).parse::<PartialNoise>().is_err());

@@ -51,7 +51,7 @@ fn a_polygon_has_two_triangles_fewer_than_corners_however_it_is_warped() {
 }
 
 #[test]
-fn corners_in_line_with_their_neighbors_are_not_left_out() {
+fn a_concave_polygon_keeps_its_winding_its_area_and_corners_in_line_with_their_neighbors() {
     // An L with further corners on its sides, one of them twice, in a plane and in a tilted one.
     let outline = [
         [2.0, 1.0],

@@ -1,10 +1,48 @@
-//! One mesh in every format, and damage to files.
+//! Meshes, what holds of them, one mesh in every format, and damage to files.
 
 use base64::Engine;
+use glam::Vec3;
 use palpate_simulator::mesh::{Mesh, obj};
 use rand::{Rng, RngExt, SeedableRng};
 use serde_ply::PlyFormat;
+use std::collections::HashMap;
 use std::fmt::Write as _;
+
+/// A box, closed and right side out.
+pub(crate) fn cuboid(sides: [f32; 3]) -> Mesh {
+    let vertices =
+        (0..8_u32).map(|i| std::array::from_fn(|axis| if i >> axis & 1 == 1 { sides[axis] } else { 0.0 })).collect();
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    Mesh { vertices, triangles: quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect() }
+}
+
+/// The signed volume, in cubic centimeters: positive if the triangles are anticlockwise seen from outside.
+pub(crate) fn volume(mesh: &Mesh) -> f64 {
+    let at = |i: u32| Vec3::from(mesh.vertices[i as usize]).as_dvec3();
+    mesh.triangles.iter().map(|&[a, b, c]| at(a).dot(at(b).cross(at(c))) / 6.0).sum()
+}
+
+/// Number of times that every directed edge occurs.
+fn edges(mesh: &Mesh) -> HashMap<(u32, u32), usize> {
+    let mut count = HashMap::new();
+    for &[a, b, c] in &mesh.triangles {
+        for edge in [(a, b), (b, c), (c, a)] {
+            *count.entry(edge).or_insert(0) += 1;
+        }
+    }
+    count
+}
+
+/// Checks that every edge is shared by two triangles that agree which side is out.
+pub(crate) fn assert_closed(name: &str, mesh: &Mesh) {
+    let edges = edges(mesh);
+    for (&(a, b), &count) in &edges {
+        assert_ne!(a, b, "{name}: a triangle uses a vertex twice");
+        assert_eq!(count, 1, "{name}: an edge is used {count} times in one direction");
+        assert_eq!(edges.get(&(b, a)), Some(&1), "{name}: an edge has no opposite");
+    }
+    assert!(mesh.vertices.iter().flatten().all(|x| x.is_finite()), "{name}: a vertex is not finite");
+}
 
 /// The mesh in every kind of file, each under a name.
 pub(crate) fn all(mesh: &Mesh) -> Vec<(&'static str, Vec<u8>)> {
@@ -86,7 +124,7 @@ pub(crate) fn ply(mesh: &Mesh, format: PlyFormat) -> Vec<u8> {
 }
 
 /// The vertices, then the indices, as they stand in a buffer of glTF.
-fn buffer(mesh: &Mesh) -> Vec<u8> {
+pub(crate) fn buffer(mesh: &Mesh) -> Vec<u8> {
     let vertices = mesh.vertices.iter().flatten().flat_map(|x| x.to_le_bytes());
     vertices.chain(mesh.triangles.iter().flatten().flat_map(|index| index.to_le_bytes())).collect()
 }

@@ -1,5 +1,6 @@
 use glam::DVec3;
 use palpate_simulator::mesh::Mesh;
+use palpate_simulator::mesh::placements::placements;
 use palpate_simulator::probe::{Aim, Scene};
 
 #[test]
@@ -26,11 +27,19 @@ fn approaches_aim_about_the_center_of_mass_that_weighs_triangles_by_their_area()
 }
 
 #[test]
-fn meshes_that_cannot_be_touched_are_refused() {
+fn meshes_that_can_be_neither_touched_nor_placed_are_refused() {
     let vertices = vec![[1.0; 3], [f32::NAN; 3], [2.0; 3]];
-    for (triangle, what) in [([0, 0, 0], "no extent"), ([0, 1, 2], "not finite"), ([0, 2, 3], "vertex 3")] {
-        let error = Scene::new(&Mesh { vertices: vertices.clone(), triangles: vec![triangle] }, 10.0).unwrap_err();
-        assert!(error.to_string().contains(what), "{error}");
+    for (triangles, what) in [
+        (vec![], "no faces"),
+        (vec![[0, 0, 0]], "no extent"),
+        (vec![[0, 1, 2]], "not finite"),
+        (vec![[0, 2, 3]], "vertex 3"),
+    ] {
+        let mesh = Mesh { vertices: vertices.clone(), triangles };
+        for error in [Scene::new(&mesh, 10.0).map(drop), placements(&mesh).map(drop)] {
+            let error = error.unwrap_err().to_string();
+            assert!(error.contains(what), "{error}");
+        }
     }
     assert!(Scene::as_is(&Mesh::default()).unwrap_err().to_string().contains("no faces"));
 }

@@ -1,6 +1,7 @@
 use palpate_simulator::mesh::MeshProblem;
 use palpate_simulator::mesh::source::{Search, Source, files, load, object, objects, objects_of_instances};
 use std::path::Path;
+use tempfile::TempDir;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -11,6 +12,13 @@ fn place(directory: &Path, files: &[&str]) -> String {
         std::fs::write(path, TRIANGLE).unwrap();
     }
     directory.to_str().unwrap().to_owned()
+}
+
+/// A directory of these files, and its path.
+fn placed(files: &[&str]) -> (TempDir, String) {
+    let directory = tempfile::tempdir().unwrap();
+    let source = place(directory.path(), files);
+    (directory, source)
 }
 
 fn names(sources: &[String]) -> Vec<String> {
@@ -35,9 +43,8 @@ fn a_built_in_object_is_found_by_its_name_unless_a_file_has_it() {
 
 #[test]
 fn shapenet_objects_are_named_after_category_and_id() {
-    let directory = tempfile::tempdir().unwrap();
     let files = ["mug/1a/models/model_normalized.obj", "bowl/2b/models/model_normalized.obj"];
-    let source = place(directory.path(), &files);
+    let (directory, source) = placed(&files);
     assert_eq!(names(&[format!("{source}/mug/1a/models/model_normalized.obj")]), ["mug"]);
     assert_eq!(names(&[source]), ["bowl", "mug"]);
     let source = place(directory.path(), &["mug/3c/models/model_normalized.obj"]);
@@ -46,9 +53,8 @@ fn shapenet_objects_are_named_after_category_and_id() {
 
 #[test]
 fn a_directory_inside_a_directory_is_one_object_with_instances() {
-    let directory = tempfile::tempdir().unwrap();
     let files = ["cup/red.obj", "cup/blue.obj", "cup/far/green.obj", "fork/one.obj", "spoon.obj", "empty/notes.txt"];
-    let source = place(directory.path(), &files);
+    let (directory, source) = placed(&files);
     let objects = objects_of_instances(std::slice::from_ref(&source)).unwrap();
     let found: Vec<(&str, Vec<&str>)> = objects
         .iter()
@@ -65,8 +71,7 @@ fn a_directory_inside_a_directory_is_one_object_with_instances() {
 
 #[test]
 fn two_objects_of_one_name_are_refused() {
-    let directory = tempfile::tempdir().unwrap();
-    let source = place(directory.path(), &["a/cup.obj", "b/cup.obj"]);
+    let (_directory, source) = placed(&["a/cup.obj", "b/cup.obj"]);
     let error = objects(&[source]).unwrap_err().to_string();
     assert!(error.contains("two objects are called cup") && error.contains("b/cup.obj"), "{error}");
 }
@@ -98,8 +103,7 @@ fn a_misspelled_built_in_object_is_refused_with_the_names_of_all() {
 fn several_objects_where_one_is_needed_are_refused_with_their_number() {
     let error = object("builtin").unwrap_err().to_string();
     assert!(error.starts_with("builtin: 10 objects"), "{error}");
-    let directory = tempfile::tempdir().unwrap();
-    let source = place(directory.path(), &["cup.obj"]);
+    let (directory, source) = placed(&["cup.obj"]);
     assert_eq!(object(&source).unwrap().name, "cup");
     place(directory.path(), &["bowl.obj"]);
     assert!(object(&source).unwrap_err().to_string().contains("2 objects, where one is needed"));
@@ -107,8 +111,7 @@ fn several_objects_where_one_is_needed_are_refused_with_their_number() {
 
 #[test]
 fn a_name_in_several_formats_is_one_object_of_the_first_of_them_and_a_note_says_so() {
-    let directory = tempfile::tempdir().unwrap();
-    let source = place(directory.path(), &["cup.dae", "cup.STL", "cup.ply", "fork.glb", "deep/cup2.gltf", "cup.mtl"]);
+    let (_directory, source) = placed(&["cup.dae", "cup.STL", "cup.ply", "fork.glb", "deep/cup2.gltf", "cup.mtl"]);
     let found = files(&[source]).unwrap();
     let expected = ["cup.STL", "deep/cup2.gltf", "fork.glb"];
     for (one, expected) in found.iter().zip(expected) {
@@ -122,7 +125,6 @@ fn a_name_in_several_formats_is_one_object_of_the_first_of_them_and_a_note_says_
 
 #[test]
 fn data_sets_of_meshes_give_the_names_of_their_objects() {
-    let directory = tempfile::tempdir().unwrap();
     let files = [
         "025_mug/google_16k/nontextured.ply",
         "025_mug/google_16k/nontextured.stl",
@@ -136,7 +138,7 @@ fn data_sets_of_meshes_give_the_names_of_their_objects() {
         "chair/1a/models/model_normalized.obj",
         "plain/textured.obj",
     ];
-    let source = place(directory.path(), &files);
+    let (_directory, source) = placed(&files);
     let expected = ["025_mug", "02958343", "072-a_toy_airplane", "Threshold_Bowl", "chair", "textured"];
     let found = self::files(std::slice::from_ref(&source)).unwrap();
     assert_eq!(found.iter().map(Source::name).collect::<Vec<_>>(), expected);
@@ -188,11 +190,8 @@ fn hidden_files_and_what_macs_put_beside_files_are_no_meshes() {
 
 #[test]
 fn files_of_formats_that_are_not_read_are_named_with_what_converts_them() {
-    let directory = tempfile::tempdir().unwrap();
-    let source = place(
-        directory.path(),
-        &["box.obj", "cup.off", "deep/mug.step", "jug.OFF", "box.fbx", "box.blend", "notes.txt"],
-    );
+    let (directory, source) =
+        placed(&["box.obj", "cup.off", "deep/mug.step", "jug.OFF", "box.fbx", "box.blend", "notes.txt"]);
     let loaded = load(std::slice::from_ref(&source), Search::default()).unwrap();
     assert_eq!(loaded.objects.len(), 1);
     let expected = format!(
@@ -213,8 +212,7 @@ fn files_of_formats_that_are_not_read_are_named_with_what_converts_them() {
 
 #[test]
 fn all_meshes_that_cannot_be_read_are_named_at_once_and_left_out_if_that_is_wanted() {
-    let directory = tempfile::tempdir().unwrap();
-    let source = place(directory.path(), &["a/one.obj", "a/two.obj", "b/three.obj", "c/four.obj"]);
+    let (directory, source) = placed(&["a/one.obj", "a/two.obj", "b/three.obj", "c/four.obj"]);
     let path = |name: &str| directory.path().join(name);
     std::fs::write(path("a/two.obj"), "v 0 0\n").unwrap();
     std::fs::write(path("c/four.obj"), "").unwrap();
@@ -253,8 +251,7 @@ fn all_meshes_that_cannot_be_read_are_named_at_once_and_left_out_if_that_is_want
 
 #[test]
 fn objects_with_the_same_mesh_are_named() {
-    let directory = tempfile::tempdir().unwrap();
-    let source = place(directory.path(), &["cup.obj", "mug.obj", "jug.obj"]);
+    let (directory, source) = placed(&["cup.obj", "mug.obj", "jug.obj"]);
     std::fs::write(directory.path().join("jug.obj"), TRIANGLE.replace("v 1 0 0", "v 2 0 0")).unwrap();
     let notes = load(&[source], Search::default()).unwrap().notes;
     assert_eq!(notes, ["cup and mug have the same mesh: no touch distinguishes them"]);
@@ -262,8 +259,7 @@ fn objects_with_the_same_mesh_are_named() {
 
 #[test]
 fn files_that_may_state_their_unit_come_first_where_that_is_wanted() {
-    let directory = tempfile::tempdir().unwrap();
-    let source = place(directory.path(), &["cup.obj", "cup.glb", "cup.stl", "fork.stl"]);
+    let (_directory, source) = placed(&["cup.obj", "cup.glb", "cup.stl", "fork.stl"]);
     for (prefers_units, expected) in [(false, "cup.obj is used;"), (true, "cup.glb is used;")] {
         let found = load(std::slice::from_ref(&source), Search { prefers_units, ..Search::default() }).unwrap();
         assert!(found.objects[0].notes[0].contains(expected), "{:?}", found.objects[0].notes);
@@ -273,8 +269,7 @@ fn files_that_may_state_their_unit_come_first_where_that_is_wanted() {
 #[cfg(unix)]
 #[test]
 fn a_link_to_the_directory_that_it_is_in_is_not_followed() {
-    let directory = tempfile::tempdir().unwrap();
-    let source = place(directory.path(), &["deep/cup.obj"]);
+    let (directory, source) = placed(&["deep/cup.obj"]);
     std::os::unix::fs::symlink(".", directory.path().join("self")).unwrap();
     std::os::unix::fs::symlink("..", directory.path().join("deep/up")).unwrap();
     assert_eq!(names(&[source]), ["cup"]);
