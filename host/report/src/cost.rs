@@ -321,7 +321,8 @@ fn table(context: &Context, members: &[Member]) -> Table {
 mod tests {
     use super::*;
     use crate::instructions::Count;
-    use palpate::ensemble::{Node, Output, Tree};
+    use crate::small::ensemble;
+    use palpate::ensemble::Node;
 
     /// A chain of splits of curvature, `depth` of them one below the other.
     fn chain(depth: usize, leaf: f32) -> Ensemble {
@@ -337,13 +338,7 @@ mod tests {
             nodes.push(Node::Leaf(vec![leaf, 0.0]));
         }
         nodes.push(Node::Leaf(vec![0.0, leaf]));
-        Ensemble {
-            inputs: palpate::ensemble::inputs(palpate_shared::Descriptor::Curvature),
-            objects: vec!["a".into(), "b".into()],
-            base_margins: vec![0.0; 2],
-            trees: vec![Tree { nodes, output: Output::Each }],
-            origin: palpate::ensemble::Provenance::default(),
-        }
+        ensemble(palpate_shared::Descriptor::Curvature, &["a", "b"], vec![nodes])
     }
 
     #[test]

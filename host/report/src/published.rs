@@ -334,18 +334,14 @@ pub(super) fn sentence(summary: &Summary) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate::ensemble::{self, Node, Output, Tree};
+    use crate::small::ensemble;
+    use palpate::ensemble::Node;
     use palpate_shared::Descriptor;
 
     #[test]
     fn a_method_of_500_trees_is_not_called_one_of_1000() {
-        let of = |trees: usize| Ensemble {
-            inputs: palpate::ensemble::inputs(Descriptor::Times),
-            objects: (0..10).map(|k| k.to_string()).collect(),
-            base_margins: vec![0.0; 10],
-            trees: vec![Tree { nodes: vec![Node::Leaf(vec![0.5; 10])], output: Output::Each }; trees],
-            origin: ensemble::Provenance::default(),
-        };
+        let names = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j"];
+        let of = |trees| ensemble(Descriptor::Times, &names, vec![vec![Node::Leaf(vec![0.5; 10])]; trees]);
         let quick = method(&of(500), 50);
         assert!(
             quick.contains("Here it is 500 trees (1,000 as published: 100 boosting rounds instead of 50)"),

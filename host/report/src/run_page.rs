@@ -197,8 +197,8 @@ mod tests {
     }
 
     #[test]
-    fn the_short_page_shows_objects_table_and_curves_of_both_methods() {
-        let page = run_page(&results()).unwrap();
+    fn the_short_page_shows_objects_table_and_curves_of_both_methods_and_writes_csv_and_svg_beside_it() {
+        let mut page = run_page(&results()).unwrap();
         let html = page.html();
         assert_eq!(page.figures().count(), 2);
         // One of them is drawn for a phone as well.
@@ -214,12 +214,7 @@ mod tests {
         ] {
             assert!(html.contains(part), "{part}");
         }
-    }
-
-    #[test]
-    fn writing_with_files_puts_csv_and_svg_beside_the_page() {
         let directory = tempfile::tempdir().unwrap();
-        let mut page = run_page(&results()).unwrap();
         page.files = true;
         let written = page.write(&directory.path().join("index.html")).unwrap();
         let mut names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();

@@ -52,21 +52,14 @@ pub(crate) fn series(index: usize) -> RGBColor {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The contrast of a color with white, by WCAG 2.
-    fn contrast(RGBColor(r, g, b): RGBColor) -> f64 {
-        let linear = |channel: u8| match f64::from(channel) / 255.0 {
-            dark @ ..=0.04045 => dark / 12.92,
-            bright => libm::pow((bright + 0.055) / 1.055, 2.4),
-        };
-        1.05 / (0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b) + 0.05)
-    }
+    use crate::small::contrast;
 
     #[test]
     fn text_in_charts_has_a_contrast_of_at_least_four_and_a_half_and_a_counterpart_in_the_dark() {
         for color in [INK, GRAY, BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY].map(text) {
-            assert!(contrast(color) >= 4.5, "{color:?}: {}", contrast(color));
             let RGBColor(r, g, b) = color;
+            let contrast = contrast([r, g, b].map(f64::from), [255.0; 3]);
+            assert!(contrast >= 4.5, "{color:?}: {contrast}");
             let rule = format!("svg [fill=\"#{r:02X}{g:02X}{b:02X}\"]");
             assert!(include_str!("page.css").contains(&rule), "{rule}");
         }

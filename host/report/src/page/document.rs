@@ -318,26 +318,20 @@ fn rows(data: &Records, title: &str) -> Markup {
 mod tests {
     use super::*;
 
+    /// A page of one table.
+    fn page(title: &str, caption: &str, data: Records) -> Page {
+        let mut section = Section::new("one", "One & only");
+        let command = "palpate report a b".into();
+        section.table(Table { id: "t".into(), title: "T".into(), caption: caption.into(), command, data });
+        let facts = vec![("seed".into(), "1".into())];
+        Page { title: title.into(), summary: String::new(), sections: vec![section], facts, files: true }
+    }
+
     #[test]
     fn a_page_escapes_what_it_is_given_and_holds_everything_itself() {
-        let mut section = Section::new("one", "One & only");
         let mut data = Records::new(["name", "value"]);
         data.push(["<b>".into(), Cell::Number(2.0, 0)]);
-        section.table(Table {
-            id: "t".into(),
-            title: "T".into(),
-            caption: "See `palpate calibrate <model>`.".into(),
-            command: "palpate report a b".into(),
-            data,
-        });
-        let page = Page {
-            title: "A <page>".into(),
-            summary: String::new(),
-            sections: vec![section],
-            facts: vec![("seed".into(), "1".into())],
-            files: true,
-        };
-        let html = page.html();
+        let html = page("A <page>", "See `palpate calibrate <model>`.", data).html();
         for part in [
             "A &lt;page&gt;",
             "&lt;b&gt;",
@@ -358,12 +352,7 @@ mod tests {
     fn tables_that_the_page_links_are_replaced_with_it_and_foreign_ones_keep_it_from_being_written() {
         let directory = tempfile::tempdir().unwrap();
         let (path, csv) = (directory.path().join("index.html"), directory.path().join("t.csv"));
-        let page = |columns: [&str; 2]| {
-            let mut section = Section::new("one", "One");
-            let data = Records::new(columns);
-            section.table(Table { id: "t".into(), title: "T".into(), caption: "".into(), command: "".into(), data });
-            Page { title: "A".into(), summary: String::new(), sections: vec![section], facts: Vec::new(), files: true }
-        };
+        let page = |columns: [&str; 2]| page("A", "", Records::new(columns));
         std::fs::write(&csv, "mine,yours\n").unwrap();
         let error = page(["name", "value"]).write(&path).unwrap_err();
         assert!(error.to_string().contains("t.csv: a file is there already that Palpate did not write"), "{error}");

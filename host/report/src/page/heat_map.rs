@@ -43,21 +43,17 @@ mod tests {
     use crate::page::color;
 
     #[test]
-    fn a_heat_map_writes_percentages_and_leaves_only_small_shares_blank() {
+    fn a_heat_map_writes_percentages_and_leaves_only_shares_below_half_a_percent_blank() {
         let names = ["fork".to_string(), "spoon".to_string()];
-        let shares = [vec![0.9, 0.1], vec![0.001, 0.999]];
-        let svg = heat_map("ours", ["recognized as", "touched"], &names, &shares, color::OURS).unwrap();
-        for text in [">90<", ">10<", ">100<", "fork", "spoon", "touched"] {
-            assert!(svg.text.contains(text), "{text} {}", svg.text);
+        for (shares, written) in [
+            ([vec![0.9, 0.1], vec![0.001, 0.999]], &[">90<", ">10<", ">100<", "fork", "spoon", "touched"][..]),
+            ([vec![0.995, 0.005], vec![0.004, 0.996]], &[">1<"]),
+        ] {
+            let svg = heat_map("ours", ["recognized as", "touched"], &names, &shares, color::OURS).unwrap();
+            for text in written {
+                assert!(svg.text.contains(text), "{text} {}", svg.text);
+            }
+            assert!(!svg.text.contains(">0<"), "{}", svg.text);
         }
-        assert!(!svg.text.contains(">0<"));
-    }
-
-    #[test]
-    fn half_a_percent_is_not_written_as_none() {
-        let names = ["fork".to_string(), "spoon".to_string()];
-        let shares = [vec![0.995, 0.005], vec![0.004, 0.996]];
-        let svg = heat_map("ours", ["recognized as", "touched"], &names, &shares, color::OURS).unwrap();
-        assert!(svg.text.contains(">1<") && !svg.text.contains(">0<"), "{}", svg.text);
     }
 }

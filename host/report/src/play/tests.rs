@@ -1,12 +1,9 @@
 use super::*;
 use crate::small::model;
-use palpate::compile::{self, compile};
-use palpate::ensemble::{self, Ensemble, Node, Output, Tree, inputs};
 use palpate::mesh::Mesh;
 use palpate::play::Game;
 use palpate::probe::scene::Scene;
 use palpate_onboard::Verdict;
-use palpate_shared::Descriptor;
 
 /// The sections of a WebAssembly module: each one's number and content.
 fn sections(module: &[u8]) -> Vec<(u8, &[u8])> {
@@ -162,17 +159,8 @@ fn a_trace_is_what_the_game_computes() {
 
 #[test]
 fn models_of_one_name_are_told_apart_by_their_files() {
-    let ensemble = Ensemble {
-        inputs: inputs(Descriptor::Curvature),
-        objects: vec!["a".into(), "b".into()],
-        base_margins: vec![0.0; 2],
-        trees: vec![Tree { nodes: vec![Node::Leaf(vec![0.5, 0.0])], output: Output::Each }],
-        origin: ensemble::Provenance::default(),
-    };
-    let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
-    let contender = || Contender::new(CompiledModel::from_bytes(bytes.clone()).unwrap(), None).unwrap();
     let names = |files: &[&str]| -> Vec<String> {
-        let mut contenders: Vec<Contender> = files.iter().map(|_| contender()).collect();
+        let mut contenders: Vec<Contender> = files.iter().map(|_| contender(["a", "b"])).collect();
         distinguish(&mut contenders, &files.iter().map(PathBuf::from).collect::<Vec<_>>());
         contenders.into_iter().map(|contender| contender.name.replace("curvature, full touches", "~")).collect()
     };

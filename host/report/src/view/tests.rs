@@ -1,13 +1,9 @@
 use super::*;
-use crate::small::BOWL;
+use crate::small::{BOWL, contrast};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use palpate::mesh::Mesh;
 use std::collections::HashMap;
-
-fn object(name: &str, mesh: Mesh) -> Object {
-    Object::new(name, mesh)
-}
 
 fn cube() -> Mesh {
     let vertices = (0..8_u8).map(|i| [i & 1, i >> 1 & 1, i >> 2].map(f32::from)).collect();
@@ -41,13 +37,16 @@ fn data(page: &str) -> serde_json::Value {
 }
 
 #[test]
-fn a_page_refers_to_nothing_outside_itself() {
+fn a_page_refers_to_nothing_outside_itself_and_its_buttons_and_headings_have_names() {
     let page = page(&BOWL, &Settings::default()).unwrap();
+    let own = page.replace(scene::LIBRARY, "");
     for part in [" src=", "@import", "url(", "<link rel=\"stylesheet\"", "fetch(\"http", "importScripts"] {
-        let own = page.replace(scene::LIBRARY, "");
         assert!(!own.contains(part), "the page holds {part}");
     }
-    assert!(page.contains("default-src 'none'"));
+    assert!(page.contains("default-src 'none'") && page.contains("aria-label=\"Show approach 1\""));
+    for empty in ["<button type=\"button\"></button>", "<th scope=\"col\"></th>", "<th></th>", "<th>"] {
+        assert!(!page.contains(empty), "{empty}");
+    }
 }
 
 #[test]
@@ -87,14 +86,10 @@ fn a_page_of_an_object_on_a_table_shows_its_placements_and_approaches_from_above
 }
 
 #[test]
-fn an_objects_name_cannot_break_out_of_the_page() {
-    let page = page(&object("</script><script>alert(1)</script>", cube()), &Settings::default()).unwrap();
+fn the_shown_mesh_is_as_large_as_the_scene_and_its_name_cannot_break_out_of_the_page() {
+    let object = Object::new("</script><script>alert(1)</script>", cube());
+    let page = page(&object, &Settings { length: 4.0, ..Settings::default() }).unwrap();
     assert!(!page.contains("<script>alert"));
-}
-
-#[test]
-fn the_shown_mesh_is_as_large_as_the_scene() {
-    let page = page(&object("cube", cube()), &Settings { length: 4.0, ..Settings::default() }).unwrap();
     let data = data(&page);
     assert_eq!(data["low"], serde_json::json!([-2.0, -2.0, -2.0]));
     assert_eq!(data["origin"], serde_json::json!([-2.0, -2.0, -2.0]));
@@ -121,7 +116,7 @@ fn a_large_mesh_and_a_soup_of_its_triangles_make_pages_below_six_megabytes() {
     let soup =
         Mesh { triangles: (0..vertices.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(), vertices };
     for (name, mesh) in [("smooth", smooth), ("soup", soup)] {
-        let page = page(&object(name, mesh), &Settings::default()).unwrap();
+        let page = page(&Object::new(name, mesh), &Settings::default()).unwrap();
         assert!(page.len() < 6_000_000, "{name}: {} bytes", page.len());
         let count = STANDARD.decode(data(&page)["indices"].as_str().unwrap()).unwrap().len();
         assert!(count > 3 * 2 * scene::MOST_TRIANGLES / 3, "{name}: only {count} bytes of indices are left");
@@ -154,50 +149,26 @@ fn colors(style: &str) -> [HashMap<String, [f64; 3]>; 2] {
     [of(&light[light.find(":root").unwrap()..]), of(&dark[dark.find(":root").unwrap()..])]
 }
 
-/// The contrast ratio of WCAG 2.
-fn contrast(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let luminance = |color: [f64; 3]| {
-        let linear = |channel: f64| match channel / 255.0 {
-            dark @ ..=0.04045 => dark / 12.92,
-            bright => libm::pow((bright + 0.055) / 1.055, 2.4),
-        };
-        0.2126 * linear(color[0]) + 0.7152 * linear(color[1]) + 0.0722 * linear(color[2])
-    };
-    let (a, b) = (luminance(a) + 0.05, luminance(b) + 0.05);
-    a.max(b) / a.min(b)
-}
-
 #[test]
 fn text_on_the_pages_has_a_contrast_of_at_least_four_and_a_half() {
     let view = include_str!("page.css");
     // The fingers' colors are for dots and underlines, not for text.
     assert!(!view.contains(" color: var(--first)") && !view.contains(" color: var(--middle)"));
+    let texts = [("ink", "ground"), ("ink", "shade"), ("soft", "ground")];
+    for (style, more) in [
+        (view, [("warning", "ground"), ("on-first", "first")]),
+        (crate::page::document::STYLE, [("soft", "shade"), ("link", "ground")]),
+    ] {
+        for colors in colors(style) {
+            for (text, ground) in texts.into_iter().chain(more) {
+                let contrast = contrast(colors[text], colors[ground]);
+                assert!(contrast >= 4.5, "{text} on {ground}: {contrast}");
+            }
+        }
+    }
     for colors in colors(view) {
-        for (text, ground) in
-            [("ink", "ground"), ("ink", "shade"), ("soft", "ground"), ("warning", "ground"), ("on-first", "first")]
-        {
-            let contrast = contrast(colors[text], colors[ground]);
-            assert!(contrast >= 4.5, "{text} on {ground}: {contrast}");
+        for dot in ["first", "middle", "last", "missed", "back"] {
+            assert!(contrast(colors[dot], colors["ground"]) >= 3.0, "{dot} on the ground");
         }
-        for (dot, ground) in ["first", "middle", "last", "missed", "back"].map(|dot| (dot, "ground")) {
-            assert!(contrast(colors[dot], colors[ground]) >= 3.0, "{dot} on {ground}");
-        }
-    }
-    for colors in colors(crate::page::document::STYLE) {
-        for (text, ground) in
-            [("ink", "ground"), ("ink", "shade"), ("soft", "ground"), ("soft", "shade"), ("link", "ground")]
-        {
-            let contrast = contrast(colors[text], colors[ground]);
-            assert!(contrast >= 4.5, "{text} on {ground}: {contrast}");
-        }
-    }
-}
-
-#[test]
-fn buttons_and_headings_of_the_page_have_names() {
-    let page = page(&BOWL, &Settings::default()).unwrap();
-    assert!(page.contains("aria-label=\"Show approach 1\""));
-    for empty in ["<button type=\"button\"></button>", "<th scope=\"col\"></th>", "<th></th>", "<th>"] {
-        assert!(!page.contains(empty), "{empty}");
     }
 }
