@@ -1,7 +1,8 @@
 //! Models that other libraries wrote, each read once: `tests/data/import`.
 
 use crate::table::cells;
-use palpate_trees::ensemble::import::Options;
+use palpate_trees::Result;
+use palpate_trees::ensemble::import::{Options, read};
 use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Schema, Tree};
 use palpate_trees::rows::Rows;
 use palpate_trees::shared::Descriptor;
@@ -100,6 +101,18 @@ impl Fixture {
     pub(crate) fn is_categorical(&self) -> bool {
         self.name.contains("-categorical") || self.name.contains("-one-hot")
     }
+}
+
+/// The model in a file of this name and content.
+pub(crate) fn parsed(name: &str, bytes: &[u8]) -> Result<Ensemble> {
+    read(Path::new(name), bytes, &Options::default())
+}
+
+/// Checks that an error says all of this.
+#[track_caller]
+pub(crate) fn assert_says(said: impl std::fmt::Display, parts: &[&str]) {
+    let said = said.to_string();
+    assert!(parts.iter().all(|part| said.contains(part)), "{said}");
 }
 
 /// A split that sends missing values to the left.
