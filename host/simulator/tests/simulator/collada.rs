@@ -1,3 +1,4 @@
+use crate::assert_says;
 use crate::samples::{self, corners};
 use palpate_simulator::error::Result;
 use palpate_simulator::mesh::Mesh;
@@ -109,8 +110,7 @@ fn names_in_latin_1_are_read_where_the_file_says_so() {
     let latin: Vec<u8> = text.chars().map(|letter| letter as u8).collect();
     let with = |declaration: &str| [declaration.as_bytes(), &latin].concat();
     assert!(parse(&with("<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>"), Path::new("cup.dae")).is_ok());
-    let error = parse(&latin, Path::new("cup.dae")).unwrap_err().to_string();
-    assert!(error.contains("cup.dae: byte ") && error.contains("not text in UTF-8"), "{error}");
+    assert_says(parse(&latin, Path::new("cup.dae")).unwrap_err(), &["cup.dae: byte ", "not text in UTF-8"]);
 }
 
 #[test]

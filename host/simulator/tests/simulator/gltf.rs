@@ -1,3 +1,4 @@
+use crate::assert_says;
 use crate::samples::{buffer, corners, document, glb_of};
 use palpate_simulator::error::Result;
 use palpate_simulator::mesh::Mesh;
@@ -90,8 +91,7 @@ fn what_would_change_the_surface_is_refused_by_name() {
             document["extensionsUsed"] = json!([used]);
             document["accessors"][0].as_object_mut().unwrap().remove("bufferView");
         });
-        let error = error.unwrap_err().to_string();
-        assert!(error.contains(used) && error.contains(name), "{error}");
+        assert_says(error.unwrap_err(), &[used, name]);
     }
     // Draco with plain numbers beside it is read.
     assert_eq!(
@@ -146,8 +146,7 @@ fn a_mesh_placed_a_million_times_is_refused_before_it_fills_the_memory() {
         // Each of the twenty thousand has two hundred primitives.
         document["meshes"][0]["primitives"] = vec![document["meshes"][0]["primitives"][0].clone(); 200].into();
     });
-    let error = error.unwrap_err().to_string();
-    assert!(error.contains("the mesh would take more than"), "{error}");
+    assert_says(error.unwrap_err(), &["the mesh would take more than"]);
 }
 
 #[test]
@@ -194,8 +193,7 @@ fn buffers_beside_the_file_are_read_also_with_escaped_names_and_never_more_than_
         ("pointer.bin", "pointer.bin: this is a pointer of Git LFS"),
     ] {
         document["buffers"][0]["uri"] = uri.into();
-        let error = read(&document).unwrap_err().to_string();
-        assert!(error.contains(expected), "{error}");
+        assert_says(read(&document).unwrap_err(), &[expected]);
     }
 }
 
@@ -214,9 +212,8 @@ fn a_document_of_version_1_is_called_that_and_not_damaged() {
 fn chunks_that_do_not_fit_are_refused_with_their_byte() {
     let whole = crate::samples::glb(&square());
     let complaint = |bytes: &[u8]| parse(bytes, Path::new("cup.glb")).unwrap_err().to_string();
-    assert!(
-        complaint(&whole[..whole.len() - 4]).contains("cup.glb: byte 8: the GLB file is damaged: it states a length")
-    );
+    let cut = complaint(&whole[..whole.len() - 4]);
+    assert_says(cut, &["cup.glb: byte 8: the GLB file is damaged: it states a length"]);
     for (place, value, expected) in
         [(4, 1, "glTF of version 1"), (12, 1 << 30, "goes beyond its end"), (16, 0, "first chunk is not JSON")]
     {

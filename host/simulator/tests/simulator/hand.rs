@@ -1,3 +1,4 @@
+use crate::assert_says;
 use palpate_shared::Touch;
 use palpate_simulator::probe::Probe;
 use palpate_simulator::probe::approach::FINGERS;
@@ -41,7 +42,6 @@ fn strokes_that_cannot_be_are_refused() {
     assert!(good.check(10.0).is_ok() && with!(good; stroke_tolerance: Some(0.1)).check(10.0).is_ok());
     for (stroke, tolerance) in [(Some(3.0), 0.0), (Some(3.0), f64::NAN), (Some(3.0), -1.0), (None, 0.1)] {
         let probe = with!(Probe::default(); stroke: stroke, stroke_tolerance: Some(tolerance));
-        let refused = probe.check(10.0).unwrap_err().to_string();
-        assert!(refused.contains("stroke_tolerance"), "{refused}");
+        assert_says(probe.check(10.0).unwrap_err(), &["stroke_tolerance"]);
     }
 }

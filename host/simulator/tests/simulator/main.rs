@@ -55,6 +55,13 @@ use palpate_simulator::mesh::Mesh;
 use palpate_simulator::probe::{Approach, Probe, Scene};
 use rand::SeedableRng;
 
+/// Checks that an error says all of this.
+#[track_caller]
+fn assert_says(said: impl std::fmt::Display, parts: &[&str]) {
+    let said = said.to_string();
+    assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+}
+
 /// The first `count` touches of all three fingers.
 fn full_touches(mesh: &Mesh, count: usize) -> Vec<Touch> {
     let (scene, probe) = (Scene::new(mesh, 10.0).unwrap(), Probe::default());

@@ -1,3 +1,4 @@
+use crate::assert_says;
 use palpate_simulator::error::{MeshProblem, Result};
 use palpate_simulator::mesh::Mesh;
 use palpate_simulator::mesh::obj::{parse, read, write};
@@ -104,6 +105,5 @@ fn meshes_without_faces_or_extent_are_refused() {
     }
     let point = "v 1 2 3\nv 1 2 3\nv 5 5 5\nf 1 2 1\n";
     assert!(parse_text(point).unwrap_err().to_string().contains("no extent"));
-    let missing = read(Path::new("nowhere/cup.obj")).unwrap_err().to_string();
-    assert!(missing.contains("nowhere/cup.obj: cannot read the mesh"), "{missing}");
+    assert_says(read(Path::new("nowhere/cup.obj")).unwrap_err(), &["nowhere/cup.obj: cannot read the mesh"]);
 }

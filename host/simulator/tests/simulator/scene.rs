@@ -1,3 +1,4 @@
+use crate::assert_says;
 use glam::DVec3;
 use palpate_simulator::mesh::Mesh;
 use palpate_simulator::mesh::placements::placements;
@@ -37,8 +38,7 @@ fn meshes_that_can_be_neither_touched_nor_placed_are_refused() {
     ] {
         let mesh = Mesh { vertices: vertices.clone(), triangles };
         for error in [Scene::new(&mesh, 10.0).map(drop), placements(&mesh).map(drop)] {
-            let error = error.unwrap_err().to_string();
-            assert!(error.contains(what), "{error}");
+            assert_says(error.unwrap_err(), &[what]);
         }
     }
     assert!(Scene::as_is(&Mesh::default()).unwrap_err().to_string().contains("no faces"));

@@ -1,3 +1,4 @@
+use crate::assert_says;
 use palpate_simulator::mesh::file::{EXTENSIONS, parse};
 use std::path::Path;
 
@@ -28,8 +29,7 @@ fn a_format_that_is_not_read_is_named_with_what_converts_it() {
         (b"\n<!DOCTYPE html>\n<html>", "mug.obj", "a web page is not read. Download the file itself"),
         (b"", "mug.fbx", "FBX is not read"),
     ] {
-        let said = said(bytes, name);
-        assert!(said.contains(expected), "{said}");
+        assert_says(said(bytes, name), &[expected]);
     }
 }
 
