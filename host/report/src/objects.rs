@@ -179,15 +179,12 @@ fn beyond<'a>(values: impl Iterator<Item = (&'a str, &'a Vec<f64>)>, reach: f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::small::assert_says;
     use palpate::with;
 
     #[test]
     fn the_caption_of_a_capture_states_the_probe_and_the_sizes_of_the_settings() {
-        let published = touched_by(&Origin::default());
-        assert!(
-            published.contains("longest side is 10 units") && published.contains("radius 0.15 units"),
-            "{published}"
-        );
+        assert_says(touched_by(&Origin::default()), &["longest side is 10 units", "radius 0.15 units"]);
         let probe =
             with!(Probe::default(), radius = 2.0, spacing = 20.0, speed = 130.0, tilt = 5.0, stroke = Some(7.0));
         let own = touched_by(&Origin { unit: Length::Millimeter, probe, ..Origin::default() });

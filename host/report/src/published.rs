@@ -334,7 +334,7 @@ pub(super) fn sentence(summary: &Summary) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::small::ensemble;
+    use crate::small::{assert_says, ensemble};
     use palpate::ensemble::Node;
     use palpate_shared::Descriptor;
 
@@ -342,19 +342,16 @@ mod tests {
     fn a_method_of_500_trees_is_not_called_one_of_1000() {
         let names = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j"];
         let of = |trees| ensemble(Descriptor::Times, &names, vec![vec![Node::Leaf(vec![0.5; 10])]; trees]);
-        let quick = method(&of(500), 50);
-        assert!(
-            quick.contains("Here it is 500 trees (1,000 as published: 100 boosting rounds instead of 50)"),
-            "{quick}"
+        assert_says(
+            method(&of(500), 50),
+            &["Here it is 500 trees (1,000 as published: 100 boosting rounds instead of 50)"],
         );
-        let full = method(&of(1_000), 100);
-        assert!(full.contains("Here it is 1,000 trees on the three"), "{full}");
+        assert_says(method(&of(1_000), 100), &["Here it is 1,000 trees on the three"]);
     }
 
     #[test]
     fn a_difference_below_zero_is_below() {
-        let said = difference((-0.012, Some(-0.02), Some(0.004)));
-        assert!(said.contains("1.2 points below") && said.contains("\u{2212}2.0 to 0.4"), "{said}");
+        assert_says(difference((-0.012, Some(-0.02), Some(0.004))), &["1.2 points below", "\u{2212}2.0 to 0.4"]);
         assert_eq!(
             difference((0.122, None, None)),
             "After ten touches our accuracy is 12.2 points above that of the paper's method."

@@ -67,6 +67,7 @@ pub fn json(what: &'static str, value: &impl Serialize) -> Result<Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::small::assert_says;
     use serde_json::json;
 
     #[test]
@@ -88,11 +89,7 @@ mod tests {
         std::fs::write(place.join(SUMMARY), json!({"made_from": own, "seconds": 3}).to_string()).unwrap();
         check(&own).unwrap();
         let other = json!({"job": "run", "sources": ["builtin"], "settings": {"seed": 1, "touches": 200}});
-        let error = check(&other).unwrap_err().to_string();
-        assert!(
-            error.contains("summary.json") && error.contains("settings: touches was 100, and is 200 now"),
-            "{error}"
-        );
+        assert_says(check(&other).unwrap_err(), &["summary.json", "settings: touches was 100, and is 200 now"]);
         assert!(check(&json!({"job": "report"})).is_err());
         for summary in ["{}", "no JSON"] {
             std::fs::write(place.join(SUMMARY), summary).unwrap();

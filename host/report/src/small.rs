@@ -32,6 +32,13 @@ pub(crate) fn model(names: [&str; 2]) -> CompiledModel {
     CompiledModel::from_bytes(bytes).unwrap()
 }
 
+/// Checks that a sentence or an error says all of this.
+#[track_caller]
+pub(crate) fn assert_says(said: impl std::fmt::Display, parts: &[&str]) {
+    let said = said.to_string();
+    assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+}
+
 /// The contrast ratio of WCAG 2, of colors whose channels go up to 255.
 pub(crate) fn contrast(a: [f64; 3], b: [f64; 3]) -> f64 {
     let luminance = |color: [f64; 3]| {
