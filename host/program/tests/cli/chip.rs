@@ -1,13 +1,12 @@
 //! The commands that talk to a chip: link and watch, with a chip's whole program behind a TCP connection.
 
-use crate::compiled::Place;
-use crate::fixtures::LOCATED;
+use crate::fixtures::{LOCATED, ONE_SPLIT};
 use crate::locate::{of_one_placement, recognized};
-use crate::{command, fails, json, lines, run, stderr, stdout, succeeds};
+use crate::{command, complains, fails, figures, json, lines, listen, piped, run, says, stderr, stdout, succeeds};
 use palpate_onboard::station::{Memory, NoStorage, Table, record_length, serve, serve_with};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
-use std::process::{Output, Stdio};
+use std::path::Path;
 
 const OBJECTS: usize = 2;
 
@@ -36,40 +35,36 @@ impl embedded_io::Write for Wire {
 
 /// A port at which `chip` gets the first connection.
 fn port(chip: impl FnOnce(TcpStream) + Send + 'static) -> String {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let port = format!("tcp://{}", listener.local_addr().unwrap());
-    std::thread::spawn(move || chip(listener.accept().unwrap().0));
-    port
+    listen(|listener| chip(listener.accept().unwrap().0)).0
 }
 
-/// A chip without a model, until its first connection ends.
-fn chip() -> String {
-    port(|stream| {
+/// A chip with this room for a model and these maps, until its first connection ends.
+fn chip_of(room: usize, serve: impl FnOnce(&mut Memory<'_>, &mut Wire) + Send + 'static) -> String {
+    port(move |stream| {
         stream.set_nodelay(true).unwrap();
-        let [mut a, mut b] = [(); 2].map(|()| vec![0; 10_000]);
+        let [mut a, mut b] = [(); 2].map(|()| vec![0; room]);
         let [mut c, mut d] = [(); 2].map(|()| vec![0; record_length(OBJECTS)]);
-        let mut memory = Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] };
         // It ends with an error where the host hangs up in the middle of something.
-        let _ = serve::<OBJECTS, _, _>(&[], &mut memory, 0, &mut Wire(stream));
+        serve(&mut Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] }, &mut Wire(stream));
     })
+}
+
+/// A chip without a model.
+fn chip() -> String {
+    chip_of(10_000, |memory, wire| _ = serve::<OBJECTS, _, _>(&[], memory, 0, wire))
 }
 
 /// A chip with room for maps, as a Cortex-M4F with 128 KB has.
 fn chip_with_table() -> String {
-    port(|stream| {
-        stream.set_nodelay(true).unwrap();
-        let [mut a, mut b] = [(); 2].map(|()| vec![0; 60_000]);
-        let [mut c, mut d] = [(); 2].map(|()| vec![0; record_length(OBJECTS)]);
-        let mut memory = Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] };
+    chip_of(60_000, |memory, wire| {
         let mut table = Box::new(Table::<14_336, 32, 16>::new());
-        let _ = serve_with::<OBJECTS, _, _, _>(&[], &mut memory, &mut *table, 0, &mut Wire(stream));
+        let _ = serve_with::<OBJECTS, _, _, _>(&[], memory, &mut *table, 0, wire);
     })
 }
 
 #[test]
 fn a_chip_with_maps_says_verdicts_places_and_approaches_as_the_host_does() {
-    let directory = LOCATED.folder();
-    let at = directory.path();
+    let at = &LOCATED.folder();
     // An empty line begins another object.
     let mut touches = of_one_placement(at, 12);
     touches.insert(2, "\n".into());
@@ -86,9 +81,8 @@ fn a_chip_with_maps_says_verdicts_places_and_approaches_as_the_host_does() {
 
 #[test]
 fn touches_with_a_position_and_a_chip_without_maps_do_not_go_together() {
-    let directory = LOCATED.folder();
-    let at = directory.path();
-    std::fs::copy(Place::new().path("model.palpate"), at.join("trees.palpate")).unwrap();
+    let at = &LOCATED.folder();
+    std::fs::copy(ONE_SPLIT.folder().join("model.palpate"), at.join("trees.palpate")).unwrap();
     std::fs::write(at.join("located.txt"), "0 0 0 0 0 -1 1 0 0 0 0 20\n").unwrap();
     std::fs::write(at.join("free.txt"), "0 0 0.08\n0 0 0 0 0.6 -0.8 1 0 0 0 0 20\n").unwrap();
     std::fs::write(at.join("nan.txt"), "0 0 0 0 0 -1 1 0 0 nan 0 20\n").unwrap();
@@ -114,31 +108,22 @@ fn touches_with_a_position_and_a_chip_without_maps_do_not_go_together() {
     assert!(text.starts_with(refused), "{text}");
 }
 
-/// A run of the program that reads `input`.
-fn run_with_input(arguments: &[&str], input: &str) -> Output {
-    let mut command = command(arguments);
-    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
-    child.wait_with_output().unwrap()
-}
-
 #[test]
 fn link_loads_a_model_and_says_what_is_on_the_chip() {
-    let place = Place::new();
-    let model = place.text("model.palpate");
-    let length = std::fs::metadata(&model).unwrap().len();
-    let text = stdout(run(["link", &chip(), "--load", &model]));
+    let at = &ONE_SPLIT.folder();
+    let length = std::fs::metadata(at.join("model.palpate")).unwrap().len();
+    let link = || format!("link {} --load model.palpate", chip());
+    let text = says(at, &link(), &[&format!(": a model of {length} bytes, checksum ")]);
     assert!(text.starts_with("tcp://127.0.0.1:"), "{text}");
-    assert!(text.contains(&format!(": a model of {length} bytes, checksum ")), "{text}");
     assert!(text.ends_with(", curvature, 2 objects: bowl, fork\n"), "{text}");
-    let described = json(run(["link", &chip(), "--load", &model, "--json"]));
+    let described = figures(at, &link());
     assert_eq!(described["objects"], serde_json::json!(["bowl", "fork"]));
     assert_eq!(described["length"], length);
 }
 
 #[test]
 fn link_recognizes_as_the_host_does_and_watch_shows_its_journal() {
-    let place = Place::new();
+    let place = ONE_SPLIT.folder();
     let (model, data, journal) = (place.text("model.palpate"), place.text("data"), place.text("journal.jsonl"));
     let arguments = ["--load", &model, "--parity", &data, "--stop-after", "40", "--per-object", "5"];
     let mut command = command(["link", &chip()]);
@@ -171,7 +156,7 @@ fn link_recognizes_as_the_host_does_and_watch_shows_its_journal() {
 
 #[test]
 fn link_counts_every_touch_once_over_a_bad_line() {
-    let place = Place::new();
+    let place = ONE_SPLIT.folder();
     let (model, data) = (place.text("model.palpate"), place.text("data"));
     let arguments = ["--load", &model, "--parity", &data, "--stop-after", "500", "--bad-line", "0.001,0.001,0.02,0"];
     let summary = json(command(["link", &chip(), "--json"]).args(arguments).output().unwrap());
@@ -180,40 +165,35 @@ fn link_counts_every_touch_once_over_a_bad_line() {
 }
 
 #[test]
-fn an_empty_line_begins_another_object_on_the_chip() {
-    let place = Place::new();
-    let arguments = ["link", &chip(), "-", "--load", &place.text("model.palpate")];
-    let text = stdout(run_with_input(&arguments, "0 0 0.08\n0 0 0.08\n\n0 0 0.01\n"));
+fn each_line_is_a_touch_an_empty_one_begins_another_object_and_a_wrong_one_is_named() {
+    let place = ONE_SPLIT.folder();
+    let link = |input: &[u8]| piped(command(["link", &chip(), "-", "--load", &place.text("model.palpate")]), input);
+    let text = stdout(link(b"0 0 0.08\n0 0 0.08\n\n0 0 0.01\n"));
     let lines: Vec<&str> = text.lines().collect();
     assert!(lines[0].starts_with("most likely fork after 1 touch, posterior 0.8"), "{text}");
     assert!(lines[1].starts_with("most likely fork after 2 touches, posterior 0.9"), "{text}");
     assert!(lines[2].starts_with("most likely bowl after 1 touch, posterior 0.8"), "{text}");
     assert!(lines[3].starts_with("3 touches in "), "{text}");
-}
-
-#[test]
-fn a_line_that_is_no_touch_is_named() {
-    let place = Place::new();
-    let arguments = ["link", &chip(), "-", "--load", &place.text("model.palpate")];
-    let error = stderr(run_with_input(&arguments, "0 0 0.08\nnonsense\n"), 1);
-    assert!(error.contains("standard input:2: 1 fields") && error.contains("three times in seconds"), "{error}");
+    let expected = "standard input:2: 1 fields … three times in seconds";
+    complains(link(b"0 0 0.08\nnonsense\n"), "link", 1, expected);
 }
 
 #[test]
 fn a_chip_without_a_model_and_a_chip_that_is_gone_say_what_to_do() {
-    let error = stderr(run(["link", &chip()]), 1);
-    assert!(error.contains("the chip has no model. Load a model into it."), "{error}");
-    let error = stderr(run(["link", &port(drop)]), 1);
-    assert!(error.contains("the connection to the chip was lost") && error.contains("Check the cable"), "{error}");
     // Nobody listens there: the listener is gone again.
-    let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    let error = stderr(run(["link", &format!("tcp://{address}")]), 1);
-    assert!(error.contains("cannot connect to the chip") && error.contains("Check the address"), "{error}");
+    let nobody = format!("tcp://{}", TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap());
+    for (port, expected) in [
+        (chip(), "the chip has no model. Load a model into it."),
+        (port(drop), "the connection to the chip was lost … Check the cable"),
+        (nobody, "cannot connect to the chip … Check the address"),
+    ] {
+        fails(Path::new("."), &format!("link {port}"), 1, expected);
+    }
 }
 
 #[test]
 fn bad_arguments_of_link_and_watch_exit_with_2() {
-    let place = Place::new();
+    let place = ONE_SPLIT.folder();
     let error = stderr(run(["link", "emulator", "--parity", &place.text("data")]), 2);
     assert!(error.contains("--load") && error.contains("--against"), "{error}");
     for arguments in [&["link", "http://host:1"][..], &["link", "http://host:1", "--watch"]] {
@@ -226,7 +206,7 @@ fn bad_arguments_of_link_and_watch_exit_with_2() {
 
 #[test]
 fn watch_shows_a_chip_that_gets_a_data_set() {
-    let place = Place::new();
+    let place = ONE_SPLIT.folder();
     let arguments = ["link", &chip(), &place.text("data"), "--watch", "--load", &place.text("model.palpate")];
     let text = stdout(run(arguments));
     let lines: Vec<&str> = text.lines().collect();
@@ -237,7 +217,7 @@ fn watch_shows_a_chip_that_gets_a_data_set() {
 
 #[test]
 fn watch_names_the_line_of_a_journal_that_is_wrong() {
-    let place = Place::new();
+    let place = ONE_SPLIT.folder();
     let journal = place.text("journal.jsonl");
     std::fs::write(&journal, "{\"is\":\"object\",\"name\":\"cup\"}\nnonsense\n").unwrap();
     let output = run(["link", &journal, "--watch"]);
@@ -284,7 +264,7 @@ fn chip_that_is_reset(before: Vec<u8>, after: Vec<u8>) -> String {
 #[test]
 fn a_chip_that_is_reset_and_has_another_model_then_is_not_watched_with_the_names_of_the_one_before() {
     let household = include_bytes!("../../../../models/household.palpate").to_vec();
-    let own = std::fs::read(Place::new().path("model.palpate")).unwrap();
+    let own = std::fs::read(ONE_SPLIT.folder().join("model.palpate")).unwrap();
     for after in [own, Vec::new()] {
         let output = run(["link", &chip_that_is_reset(household.clone(), after), "--watch"]);
         assert!(String::from_utf8_lossy(&output.stdout).starts_with("model of 44336 bytes"));

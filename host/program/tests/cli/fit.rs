@@ -1,14 +1,13 @@
 //! `palpate probe fit`, `palpate capture --probe` and `palpate data check`, as a user calls them.
 
 use crate::fixtures::CROOKED;
-use crate::{fails, figures, globe, palpate, read, shapes, stderr, succeeds};
+use crate::{Folder, complains, fails, figures, globe, palpate, read, says, shapes, succeeds};
 use serde_json::Value;
 use std::fs;
 
 #[test]
 fn a_crooked_probe_is_fitted_and_touches_are_captured_as_it_gives_them() {
-    let directory = CROOKED.folder();
-    let at = directory.path();
+    let at = &CROOKED.folder();
     let fit = "probe fit recorded meshes -o fitted.toml --approaches 4000";
     let found = figures(at, fit);
     let number = |path: &str| found.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {found}"));
@@ -18,11 +17,7 @@ fn a_crooked_probe_is_fitted_and_touches_are_captured_as_it_gives_them() {
     assert!((number("/missed/1/value") - 0.04).abs() < 0.03, "{found}");
     let text = fs::read_to_string(at.join("fitted.toml")).unwrap();
     assert!(text.contains("speed_factor = 0.") && text.contains("timer = \"1ms\"") && text.contains(" to "), "{text}");
-    let table = succeeds(at, fit);
-    assert!(
-        table.contains("\nsecond finger ") && table.contains("95 % interval") && table.contains("Wrote "),
-        "{table}"
-    );
+    says(at, fit, &["\nsecond finger ", "95 % interval", "Wrote "]);
     assert_eq!(fs::read_to_string(at.join("fitted.toml")).unwrap(), text, "the same recordings give the same bytes");
 
     succeeds(at, "capture meshes -o touches --approaches 500 --probe fitted.toml");
@@ -49,18 +44,13 @@ fn a_crooked_probe_is_fitted_and_touches_are_captured_as_it_gives_them() {
 
 #[test]
 fn recordings_that_look_wrong_are_named_and_nothing_is_written() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     shapes(at);
     succeeds(at, "capture meshes -o recorded --seed 5 --approaches 150");
     fs::copy(at.join("recorded/cigar.txt"), at.join("recorded/disc.txt")).unwrap();
     fs::remove_file(at.join("recorded/dataset.json")).unwrap();
     let fit = "probe fit recorded meshes -o fitted.toml --approaches 12000";
-    let error = stderr(palpate(at, fit), 1);
-    assert!(
-        error.contains("disc: these look like touches of the cigar") && error.contains("Nothing was written"),
-        "{error}"
-    );
+    complains(palpate(at, fit), fit, 1, "disc: these look like touches of the cigar … Nothing was written");
     assert!(!at.join("fitted.toml").exists());
     succeeds(at, &format!("{fit} --force"));
     assert!(fs::read_to_string(at.join("fitted.toml")).unwrap().contains("# LOOKS WRONG: disc: "));
@@ -70,8 +60,7 @@ fn recordings_that_look_wrong_are_named_and_nothing_is_written() {
 
 #[test]
 fn recorded_touches_are_compared_with_simulated_ones() {
-    let directory = CROOKED.folder();
-    let at = directory.path();
+    let at = &CROOKED.folder();
     succeeds(at, "capture meshes --approaches 3000 -o clean");
     succeeds(at, "capture meshes --approaches 3000 -o right --probe true.toml");
     let [wrong, right] =
@@ -79,9 +68,8 @@ fn recorded_touches_are_compared_with_simulated_ones() {
     let told = |of: &Value| of["told_apart"]["value"].as_f64().unwrap();
     assert!(told(&right) < 0.56 && told(&wrong) > told(&right) + 0.02, "{wrong} {right}");
     assert!(right["told_apart"]["low"].as_f64().unwrap() < 0.53, "{right}");
-    let text = succeeds(at, "data check recorded right --sequences 100");
-    assert!(text.contains("50 % is guessing") && text.contains("on recorded"), "{text}");
+    says(at, "data check recorded right --sequences 100", &["50 % is guessing", "on recorded"]);
     succeeds(at, "capture meshes --touches 300 -o full");
-    let error = stderr(palpate(at, "data check recorded full"), 1);
-    assert!(error.contains("full touches only") && error.contains("--approaches"), "{error}");
+    let check = "data check recorded full";
+    complains(palpate(at, check), check, 1, "full touches only … --approaches");
 }

@@ -1,6 +1,6 @@
 //! Meshes in other formats than OBJ, wherever a mesh is read.
 
-use crate::{fails, globe, palpate, stderr, succeeds};
+use crate::{Folder, fails, globe, holds, palpate, stderr, succeeds};
 use palpate::mesh::Mesh;
 use std::path::Path;
 
@@ -36,38 +36,37 @@ fn capture(at: &Path, source: &str) -> String {
 
 #[test]
 fn one_object_in_three_formats_gives_the_same_touches_to_the_byte() {
-    let directory = tempfile::tempdir().unwrap();
-    let obj = globe(directory.path(), "cup", 8);
+    let at = &Folder::new();
+    let obj = globe(at, "cup", 8);
     let mesh = palpate::mesh::obj::read(&obj).unwrap();
-    std::fs::write(directory.path().join("cup.stl"), stl(&mesh)).unwrap();
-    std::fs::write(directory.path().join("cup.ply"), ply(&mesh)).unwrap();
+    std::fs::write(at.join("cup.stl"), stl(&mesh)).unwrap();
+    std::fs::write(at.join("cup.ply"), ply(&mesh)).unwrap();
     let touches = |name: &str| {
-        capture(directory.path(), name);
-        std::fs::read(directory.path().join(format!("touches-{name}/cup.txt"))).unwrap()
+        capture(at, name);
+        std::fs::read(at.join(format!("touches-{name}/cup.txt"))).unwrap()
     };
     let expected = touches("cup.obj");
     assert!(expected == touches("cup.stl") && expected == touches("cup.ply"));
     // The content counts, not the name.
-    std::fs::rename(directory.path().join("cup.stl"), directory.path().join("cup.dae")).unwrap();
+    std::fs::rename(at.join("cup.stl"), at.join("cup.dae")).unwrap();
     assert!(expected == touches("cup.dae"));
 }
 
 #[test]
 fn one_name_in_several_formats_is_touched_once_with_a_note() {
-    let directory = tempfile::tempdir().unwrap();
-    let meshes = directory.path().join("meshes");
+    let at = &Folder::new();
+    let meshes = at.join("meshes");
     std::fs::create_dir(&meshes).unwrap();
     std::fs::write(meshes.join("cup.ply"), ply(&Mesh::globe(6))).unwrap();
     std::fs::write(meshes.join("cup.stl"), stl(&Mesh::globe(5))).unwrap();
-    let error = capture(directory.path(), "meshes");
+    let error = capture(at, "meshes");
     let note = error.lines().find(|line| line.contains("passed over")).unwrap_or_default();
     assert!(note.starts_with("cup: ") && note.contains("cup.stl is used; cup.ply is passed over"), "{error}");
 }
 
 #[test]
 fn view_says_in_words_what_is_wrong_with_a_mesh_on_the_page_and_in_the_terminal() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     let view = |mesh: &Mesh| {
         std::fs::write(at.join("cup.stl"), stl(mesh)).unwrap();
         (succeeds(at, "view cup.stl -o page.html"), std::fs::read_to_string(at.join("page.html")).unwrap())
@@ -94,16 +93,13 @@ fn view_says_in_words_what_is_wrong_with_a_mesh_on_the_page_and_in_the_terminal(
     }
     let error = capture(at, "cup.stl");
     let line = error.lines().find(|line| line.starts_with("cup: The mesh is open")).unwrap_or_default();
-    assert!(
-        line.contains("partly inside out") && line.contains("stray parts") && line.contains("an implausible size"),
-        "{error}"
-    );
+    holds(line, &["partly inside out", "stray parts", "an implausible size"]);
 }
 
 #[test]
 fn a_damaged_mesh_of_any_format_is_refused_with_its_place_and_a_cure() {
-    let directory = tempfile::tempdir().unwrap();
-    let (at, cut) = (directory.path(), stl(&Mesh::globe(4)));
+    let at = &Folder::new();
+    let cut = stl(&Mesh::globe(4));
     std::fs::write(at.join("casts.csv"), "a,0,0,9,0,0,-1\n").unwrap();
     for (name, bytes, expected) in [
         ("cup.stl", &cut[..cut.len() - 50], "cup.stl: byte 80: the STL file is damaged: it states 48 triangles"),

@@ -1,9 +1,10 @@
 //! Results that stay: what the program prints, and the files it writes, for settings that cover each kind of evidence, promise
 //! and layout. `PALPATE_GOLDENS=write` records them again, for a change that is meant to change them.
 
-use crate::stdout;
+use crate::{normal, stdout};
 use palpate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
 use std::fmt::Write as _;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// Commands whose output holds times, which is left out.
@@ -107,21 +108,27 @@ fn calibration_and_evaluation_on_touches_stay() {
     script.compare("touches.txt");
 }
 
-/// Trees that are exact for rows that are normal about the classes' centers: steps of the log density.
-fn ensemble() -> Ensemble {
-    let cuts: Vec<f64> = (-20..=28).map(|step| f64::from(step) * 0.25).collect();
-    let leaf = |x: f64| Node::Leaf(CENTERS.iter().map(|center| (-0.5 * (x - center).powi(2)) as f32).collect());
+/// Trees that are exact for rows that are normal about the classes' centers: steps of the log density, at quarters.
+pub(crate) fn densities(
+    inputs: Inputs,
+    objects: [&str; 3],
+    centers: [f64; 3],
+    quarters: RangeInclusive<i32>,
+) -> Ensemble {
+    let leaf = |x: f64| Node::Leaf(centers.map(|center| (-0.5 * (x - center).powi(2)) as f32).to_vec());
     let mut nodes = Vec::new();
-    for cut in &cuts {
-        let (threshold, here) = (*cut as f32, nodes.len());
+    let mut last = 0.0;
+    for cut in quarters.map(|quarter| f64::from(quarter) * 0.25) {
+        let (threshold, here) = (cut as f32, nodes.len());
         nodes.push(Node::Split { feature: 0, threshold, missing_left: true, left: here + 1, right: here + 2 });
         nodes.push(leaf(cut - 0.125));
+        last = cut;
     }
-    nodes.push(leaf(cuts[cuts.len() - 1] + 0.125));
+    nodes.push(leaf(last + 0.125));
     Ensemble {
-        inputs: Inputs::unnamed(1),
-        objects: ["a", "b", "c"].map(String::from).to_vec(),
-        base_margins: vec![0.0; CENTERS.len()],
+        inputs,
+        objects: objects.map(String::from).to_vec(),
+        base_margins: vec![0.0; 3],
         trees: vec![Tree { nodes, output: Output::Each }],
         origin: Provenance::default(),
     }
@@ -129,16 +136,11 @@ fn ensemble() -> Ensemble {
 
 /// Sequences of twelve rows as CSV, three of each group, with an offset for each sequence.
 fn sequences(count: usize, mut state: u64) -> String {
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
     let mut text = String::from("f0,kind,id,person\n");
     for id in 0..count {
-        let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-        let (class, offset) = (id % CENTERS.len(), 0.4 * normal());
+        let (class, offset) = (id % CENTERS.len(), 0.4 * normal(&mut state));
         for _ in 0..12 {
-            let x = CENTERS[class] + offset + normal();
+            let x = CENTERS[class] + offset + normal(&mut state);
             writeln!(text, "{x:.4},{},{id},{}", ["a", "b", "c"][class], id / 3).unwrap();
         }
     }
@@ -148,7 +150,8 @@ fn sequences(count: usize, mut state: u64) -> String {
 #[test]
 fn calibration_and_evaluation_on_rows_stay() {
     let mut script = Script::new();
-    ensemble().save(script.path("rows.json")).unwrap();
+    let ensemble = densities(Inputs::unnamed(1), ["a", "b", "c"], CENTERS, -20..=28);
+    ensemble.save(script.path("rows.json")).unwrap();
     std::fs::write(script.path("calibration.csv"), sequences(900, 1)).unwrap();
     std::fs::write(script.path("unseen.csv"), sequences(300, 2)).unwrap();
     let columns = "--label kind --sequence-column id";

@@ -1,6 +1,6 @@
 //! The program's own texts: help and completions.
 
-use crate::{command, run, stderr, stdout};
+use crate::{Folder, command, fails, holds, palpate, run, says, stderr, stdout, succeeds};
 use std::process::Stdio;
 
 /// The program's commands, as its help lists them in groups: what stands before two blanks.
@@ -31,11 +31,12 @@ fn every_command_prints_its_usage_and_options_within_the_columns_of_the_terminal
 }
 
 #[test]
-fn the_program_without_a_command_prints_its_help() {
-    let directory = tempfile::tempdir().unwrap();
-    let error = stderr(command([""; 0]).current_dir(&directory).output().unwrap(), 2);
-    assert!(error.contains("Usage: palpate [OPTIONS] <COMMAND>") && error.contains("palpate run"), "{error}");
-    assert!(crate::listing(directory.path()).is_empty());
+fn the_program_without_a_command_prints_its_help_and_a_misspelled_one_is_answered_with_the_right_one() {
+    let at = &Folder::new();
+    fails(at, "", 2, "Usage: palpate [OPTIONS] <COMMAND> … palpate run");
+    assert!(crate::listing(at).is_empty());
+    fails(at, "help captre", 2, "captre … 'capture'");
+    says(at, "help capture", &["--approaches"]);
 }
 
 #[test]
@@ -48,15 +49,14 @@ fn completions_know_every_command_in_every_shell() {
         }
         assert!(script.contains("bad-line"), "{shell}");
     }
-    let error = stderr(run(["completions", "tcsh"]), 2);
-    assert!(error.contains("bash"), "{error}");
+    fails(&Folder::new(), "completions tcsh", 2, "bash");
 }
 
 #[test]
 fn keys_of_options_are_completed_after_a_comma_too_where_the_shell_is_there() {
-    let directory = tempfile::tempdir().unwrap();
+    let at = &Folder::new();
     let script = |shell: &str| {
-        let path = directory.path().join(shell);
+        let path = at.join(shell);
         std::fs::write(&path, stdout(run(["completions", shell]))).unwrap();
         path
     };
@@ -86,21 +86,16 @@ fn keys_of_options_are_completed_after_a_comma_too_where_the_shell_is_there() {
         Err(_) => println!("SKIPPED: no fish"),
     }
     let zsh = std::fs::read_to_string(script("zsh")).unwrap();
-    assert!(
-        zsh.contains(":_palpate_trees'")
-            && zsh.contains("_values -s , key 'i8' 'i16' 'f32'")
-            && zsh.contains("_values -s , key 'rounds:value: '"),
-        "{zsh}"
-    );
+    holds(&zsh, &[":_palpate_trees'", "_values -s , key 'i8' 'i16' 'f32'", "_values -s , key 'rounds:value: '"]);
 }
 
 #[test]
 #[cfg(unix)]
 fn ctrl_c_says_how_far_a_capture_came_and_how_it_goes_on() {
-    let directory = tempfile::tempdir().unwrap();
+    let at = &Folder::new();
     let mut capture = command(["capture", "bowl", "-o", "data", "--touches", "10000000"]);
-    let capture = capture.current_dir(&directory).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    while !directory.path().join("data").exists() {
+    let capture = capture.current_dir(at).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    while !at.join("data").exists() {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     let process = capture.id().to_string();
@@ -121,13 +116,6 @@ fn fish_does_not_complete_what_help_does_not_list() {
 }
 
 #[test]
-fn help_of_a_misspelled_command_suggests_the_right_one() {
-    let error = stderr(run(["help", "captre"]), 2);
-    assert!(error.contains("captre") && error.contains("'capture'"), "{error}");
-    assert!(stdout(run(["help", "capture"])).contains("--approaches"));
-}
-
-#[test]
 fn help_lists_commands_in_groups_of_what_one_wants_to_do() {
     for arguments in [&["help"][..], &["--help"]] {
         let text = help(arguments, 80);
@@ -139,31 +127,28 @@ fn help_lists_commands_in_groups_of_what_one_wants_to_do() {
 
 #[test]
 fn quiet_prints_no_remark_and_still_results_and_errors() {
-    let directory = tempfile::tempdir().unwrap();
+    let at = &Folder::new();
     let lines = (0..40).map(|i| format!("0 0.00{} 0.0{}\n", i % 7, 10 + i % 50)).collect::<String>();
-    std::fs::create_dir(directory.path().join("data")).unwrap();
+    std::fs::create_dir(at.join("data")).unwrap();
     for name in ["bowl.txt", "cup.txt"] {
-        std::fs::write(directory.path().join("data").join(name), &lines).unwrap();
+        std::fs::write(at.join("data").join(name), &lines).unwrap();
     }
-    let here = |arguments: &[&str]| command(arguments).current_dir(&directory).output().unwrap();
-    let trained = stdout(here(&["--quiet", "train", "data", "-o", "e.json", "--trees", "rounds=2"]));
+    let trained = succeeds(at, "--quiet train data -o e.json --trees rounds=2");
     assert_eq!(trained.lines().count(), 1, "{trained}");
-    stdout(here(&["export", "e.json", "-o", "m.palpate"]));
-    let error = stderr(here(&["--quiet", "evaluate", "m.palpate", "nowhere"]), 1);
-    assert!(error.contains("nowhere"), "{error}");
-    let quiet = here(&["evaluate", "m.palpate", "data", "--quiet"]);
+    succeeds(at, "export e.json -o m.palpate");
+    fails(at, "--quiet evaluate m.palpate nowhere", 1, "nowhere");
+    let quiet = palpate(at, "evaluate m.palpate data --quiet");
     assert!(quiet.stderr.is_empty() && !stdout(quiet).is_empty());
 }
 
 #[test]
 fn an_error_is_json_on_standard_output_where_results_would_be() {
-    let output = run(["inspect", "no-such-file", "--json"]);
-    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let error = stderr(output, 1);
-    let text = found["error"].as_str().unwrap();
-    assert!(text.contains("no-such-file") && error.contains(text), "{found}, {error}");
-    let output = run(["inspect", "--chp", "m4f", "--json"]);
-    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let error = stderr(output, 2);
-    assert!(error.contains(found["error"].as_str().unwrap()) && error.contains("--chip"), "{found}, {error}");
+    for (words, code, expected) in
+        [("inspect no-such-file --json", 1, "no-such-file"), ("inspect --chp m4f --json", 2, "--chip")]
+    {
+        let output = run(words.split(' '));
+        let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let error = stderr(output, code);
+        assert!(error.contains(found["error"].as_str().unwrap()) && error.contains(expected), "{found}, {error}");
+    }
 }

@@ -1,7 +1,7 @@
 //! Maps from touches with a position, through every command that takes them.
 
 use crate::fixtures::{HAND, LOCATED, brick};
-use crate::{fails, figures, lines, read, succeeds};
+use crate::{Folder, fails, figures, lines, read, says, succeeds};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -21,8 +21,7 @@ pub(crate) fn of_one_placement(at: &Path, count: usize) -> Vec<String> {
 
 #[test]
 fn objects_are_located_with_maps_from_a_capture_to_a_verdict() {
-    let directory = LOCATED.folder();
-    let at = directory.path();
+    let at = &LOCATED.folder();
     let trained = figures(at, "train data -o again.palpate --maps cell=2mm,range=20mm");
     let bytes = fs::read(at.join("maps.palpate")).unwrap();
     assert_eq!(fs::read(at.join("again.palpate")).unwrap(), bytes);
@@ -35,8 +34,7 @@ fn objects_are_located_with_maps_from_a_capture_to_a_verdict() {
     assert_eq!(inspected["placements"].as_array().unwrap().len(), placements.len());
     assert_eq!((inspected["cell"].as_u64(), inspected["range"].as_f64()), (Some(2), Some(20.0)));
     assert!(inspected["promise"].is_null() && inspected["approach"]["ram"].as_u64().unwrap() > 100_000);
-    let text = succeeds(at, "inspect maps.palpate");
-    assert!(text.contains("brick/") && text.contains("noise of 5 ms, 2 % of contacts missed"), "{text}");
+    says(at, "inspect maps.palpate", &["brick/", "noise of 5 ms, 2 % of contacts missed"]);
 
     let words = "calibrate maps.palpate --objects meshes --true-size mm --error-rate 40% --sequences 20";
     let said = succeeds(at, &format!("{words} -o sure.palpate"));
@@ -54,14 +52,12 @@ fn objects_are_located_with_maps_from_a_capture_to_a_verdict() {
     assert!(evaluated["given"].as_u64().unwrap() > 13, "{evaluated}");
     assert_eq!((evaluated["aimed"].as_str(), evaluated["promise"]["aimed"].as_str()), (Some("chosen"), Some("chosen")));
     assert!(evaluated["off"][0].as_f64().unwrap() < 10.0, "{evaluated}");
-    let random = succeeds(at, &format!("{evaluate} --aimed random"));
-    assert!(random.contains("Void here: it was made for chosen approaches."), "{random}");
+    says(at, &format!("{evaluate} --aimed random"), &["Void here: it was made for chosen approaches."]);
 }
 
 #[test]
 fn each_touch_gives_a_verdict_a_place_and_the_next_approach_until_an_object_is_named() {
-    let directory = LOCATED.folder();
-    let at = directory.path();
+    let at = &LOCATED.folder();
     let touches = of_one_placement(at, 30);
     let said = recognized(at, "maps.palpate --next", &touches.concat());
     let end = said.iter().position(|line| line["verdict"] != "undecided").unwrap();
@@ -86,8 +82,7 @@ fn each_touch_gives_a_verdict_a_place_and_the_next_approach_until_an_object_is_n
 
 #[test]
 fn on_an_empty_table_it_is_said_that_nothing_but_the_table_was_met() {
-    let directory = LOCATED.folder();
-    let at = directory.path();
+    let at = &LOCATED.folder();
     let calibrate = "calibrate maps.palpate --objects meshes --true-size mm --error-rate 40% --sequences 20";
     succeeds(at, &format!("{calibrate} --detect-unknown -o sure.palpate"));
     // All over the table, with the row along x.
@@ -100,8 +95,7 @@ fn on_an_empty_table_it_is_said_that_nothing_but_the_table_was_met() {
     let end = said.iter().find(|line| line["verdict"] != "undecided").unwrap();
     assert!(["unknown", "gave-up"].map(Value::from).contains(&end["verdict"]) && end["table_alone"] == true, "{end}");
     assert!(said[0].get("table_alone").is_none());
-    let text = succeeds(at, "recognize sure.palpate lines.txt");
-    assert!(text.contains("  nothing but the table was met\n"), "{text}");
+    says(at, "recognize sure.palpate lines.txt", &["  nothing but the table was met\n"]);
     // A finger that met something else once.
     let met = format!("0 0.1 0.1 0 0 -1 1 0 0 29 29 10\n{presses}");
     let said = recognized(at, "sure.palpate --next", &met);
@@ -111,8 +105,7 @@ fn on_an_empty_table_it_is_said_that_nothing_but_the_table_was_met() {
 
 #[test]
 fn maps_and_trees_are_refused_where_the_other_is_needed_with_what_to_do() {
-    let directory = LOCATED.folder();
-    let at = directory.path();
+    let at = &LOCATED.folder();
     succeeds(at, "capture meshes -o free --touches 300");
     succeeds(at, "train free -o e.json --trees rounds=2,depth=2");
     succeeds(at, "export e.json -o trees.palpate");
@@ -153,8 +146,7 @@ fn maps_and_trees_are_refused_where_the_other_is_needed_with_what_to_do() {
 
 #[test]
 fn presses_on_the_bare_table_measure_it_and_the_fingertips() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     fs::write(at.join("nominal.toml"), HAND.replace("stroke = 20\n", "")).unwrap();
     // The table at .8 mm; the first fingertip stands out by .6 mm, and the third one stands back by .9 mm.
     let press = |number: i32| {
@@ -216,8 +208,7 @@ fn pressed(scale: f64, place: [f64; 2], yaw: f64, count: usize) -> String {
 
 #[test]
 fn an_object_without_a_mesh_is_taught_by_touches_with_a_position() {
-    let directory = LOCATED.folder();
-    let at = directory.path();
+    let at = &LOCATED.folder();
     fs::write(at.join("pot.txt"), pressed(1.0, [0.0; 2], 0.0, 300)).unwrap();
     let trained = figures(at, "train data --teach pot.txt -o mixed.palpate --maps cell=2mm,range=30mm");
     assert_eq!(trained["objects"], 3);
@@ -228,13 +219,11 @@ fn an_object_without_a_mesh_is_taught_by_touches_with_a_position() {
     // The promise is for the taught object, too.
     let calibrate = "calibrate mixed.palpate --objects meshes pot.txt --true-size mm -o sure.palpate";
     succeeds(at, &format!("{calibrate} --sequences 20 --error-rate 40%"));
-    let said = succeeds(at, "train --teach pot.txt -o own.palpate --probe hand.toml");
-    assert!(said.contains("maps of 1 placements of 1 objects"), "{said}");
+    says(at, "train --teach pot.txt -o own.palpate --probe hand.toml", &["maps of 1 placements of 1 objects"]);
     // Another recording, turned, is of the same surface.
     fs::create_dir(at.join("later")).unwrap();
     fs::write(at.join("later/pot.txt"), pressed(1.0, [10.0, 5.0], 1.0, 200)).unwrap();
-    let said = succeeds(at, "train --teach pot.txt --teach later/pot.txt -o own.palpate --probe hand.toml");
-    assert!(said.contains("maps of 1 placements"), "{said}");
+    says(at, "train --teach pot.txt --teach later/pot.txt -o own.palpate --probe hand.toml", &["maps of 1 placements"]);
     fails(at, "train --teach pot.txt -o own.palpate", 1, "not of objects at their true size");
     fs::rename(at.join("pot.txt"), at.join("brick.txt")).unwrap();
     fails(at, "train data --teach brick.txt -o own.palpate", 2, "objects that the data set does not have");
@@ -242,8 +231,7 @@ fn an_object_without_a_mesh_is_taught_by_touches_with_a_position() {
 
 #[test]
 fn recordings_of_objects_that_stood_still_test_a_promise() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     fs::write(at.join("hand.toml"), HAND).unwrap();
     fs::write(at.join("other.toml"), HAND.replace("spacing = 15", "spacing = 12")).unwrap();
     for (name, scale) in [("pot", 1.0), ("lid", 0.5)] {
@@ -277,8 +265,7 @@ fn recordings_of_objects_that_stood_still_test_a_promise() {
 
 #[test]
 fn touches_with_a_position_have_a_surface_and_a_page() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     for (name, text) in [
         ("hand.toml", HAND.to_owned()),
         ("pot.txt", pressed(1.0, [0.0; 2], 0.0, 300)),
@@ -290,8 +277,7 @@ fn touches_with_a_position_have_a_surface_and_a_page() {
         fs::write(at.join(name), text).unwrap();
     }
     succeeds(at, "data objects pot.txt -o meshes --probe hand.toml");
-    let checked = succeeds(at, "view meshes/pot.obj -o mesh.html --true-size mm --probe hand.toml");
-    assert!(checked.contains("nothing is wrong with the mesh"), "{checked}");
+    says(at, "view meshes/pot.obj -o mesh.html --true-size mm --probe hand.toml", &["nothing is wrong with the mesh"]);
     succeeds(at, "view pot.txt -o pot.html --probe hand.toml");
     let page = fs::read_to_string(at.join("pot.html")).unwrap();
     assert!(page.contains("300 approaches") && page.contains("url(#guessed)") && page.contains("class=\"contact\""));
@@ -310,8 +296,7 @@ fn touches_with_a_position_have_a_surface_and_a_page() {
 
 #[test]
 fn exploring_says_where_to_touch_next_until_the_map_is_known() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     fs::write(at.join("hand.toml"), HAND).unwrap();
     let touches = pressed(1.0, [-25.0, -20.0], 0.0, 40);
     let said = recognized(at, "hand.toml --explore=2mm/30% --workspace 30", &touches);

@@ -35,6 +35,6 @@ mod teach;
 mod view;
 
 use support::{
-    command, cut, fails, figures, globe, json, lines, listing, palpate, read, run, shapes, stderr, stdout, succeeds,
-    touches,
+    Folder, command, complains, cut, fails, figures, globe, holds, json, lines, listen, listing, normal, palpate,
+    parts_are_all_bytes, piped, read, run, says, shapes, stderr, stdout, succeeds, touches,
 };

@@ -1,12 +1,12 @@
 //! Robots' logs, as a user meets them: recognized, evaluated, recorded, checked, trained on, and written.
 
-use crate::compiled::Place;
-use crate::{command, json, run, stderr, stdout};
+use crate::fixtures::ONE_SPLIT;
+use crate::{Folder, command, complains, fails, figures, holds, palpate, piped, run, says, stderr, stdout, succeeds};
 use palpate::touches::mcap::{Writer, read};
 use palpate::touches::{Content, Dataset, Log, is_log, parse_touch};
-use std::io::{Cursor, Write};
+use std::io::Cursor;
 use std::path::Path;
-use std::process::{Output, Stdio};
+use std::process::Output;
 
 /// A log that MCAP's library for Python wrote: twenty touches of a bowl and twenty of a mug, and another channel.
 const PYTHON: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/mcap/json-zstd.mcap");
@@ -26,51 +26,45 @@ fn error_of(output: &Output) -> String {
 
 #[test]
 fn a_log_is_recognized_like_lines_and_another_object_begins_where_the_name_changes() {
-    let place = Place::new();
+    let at = &ONE_SPLIT.folder();
     let touches = [("0 0 0.08", "fork"), ("0 0 0.08", "fork"), ("0 0 0.01", "bowl"), ("0 0 0.02", "bowl")];
-    log(&place.path("monday.mcap"), touches.map(|(line, object)| (line, Some(object))));
-    std::fs::write(place.path("lines.txt"), "0 0 0.08\n0 0 0.08\n\n0 0 0.01\n0 0 0.02\n").unwrap();
-    let recognize = |file: &str| stdout(run(["recognize", &place.text("model.palpate"), &place.text(file), "--json"]));
-    let expected = recognize("lines.txt");
-    assert_eq!(recognize("monday.mcap"), expected);
+    log(&at.join("monday.mcap"), touches.map(|(line, object)| (line, Some(object))));
+    std::fs::write(at.join("lines.txt"), "0 0 0.08\n0 0 0.08\n\n0 0 0.01\n0 0 0.02\n").unwrap();
+    let expected = succeeds(at, "recognize model.palpate lines.txt --json");
+    assert_eq!(succeeds(at, "recognize model.palpate monday.mcap --json"), expected);
     assert_eq!(expected.matches("\"touch\":2").count(), 2, "{expected}");
     // The content says what it is, not the name; standard input has none.
-    std::fs::rename(place.path("monday.mcap"), place.path("monday.txt")).unwrap();
-    assert_eq!(recognize("monday.txt"), expected);
-    let mut child = command(["recognize", &place.text("model.palpate"), "--json"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    child.stdin.take().unwrap().write_all(&std::fs::read(place.path("monday.txt")).unwrap()).unwrap();
-    assert_eq!(stdout(child.wait_with_output().unwrap()), expected);
+    std::fs::rename(at.join("monday.mcap"), at.join("monday.txt")).unwrap();
+    assert_eq!(succeeds(at, "recognize model.palpate monday.txt --json"), expected);
+    let piped = piped(
+        command(["recognize", &at.text("model.palpate"), "--json"]),
+        &std::fs::read(at.join("monday.txt")).unwrap(),
+    );
+    assert_eq!(stdout(piped), expected);
 }
 
 #[test]
 fn channels_that_are_skipped_are_named_and_a_damaged_log_is_refused_with_its_byte() {
-    let place = Place::new();
-    let model = place.text("model.palpate");
-    let output = run(["recognize", &model, PYTHON]);
+    let at = &ONE_SPLIT.folder();
+    let output = palpate(at, &format!("recognize model.palpate {PYTHON}"));
     let said = error_of(&output);
     assert_eq!(stdout(output).lines().count(), 40);
     assert_eq!(said, format!("palpate: {PYTHON}: skipped 1 other channel: /joints (robot.Joints)\n"));
-    let whole = std::fs::read(PYTHON).unwrap();
-    let path = place.path("cut.mcap");
-    std::fs::write(&path, &whole[..3000]).unwrap();
-    let said = stderr(run(["recognize", &model, path.to_str().unwrap()]), 1);
-    assert!(said.starts_with(&format!("palpate: {}: byte ", path.display())), "{said}");
+    std::fs::write(at.join("cut.mcap"), &std::fs::read(PYTHON).unwrap()[..3000]).unwrap();
+    let said = stderr(palpate(at, "recognize model.palpate cut.mcap"), 1);
+    assert!(said.starts_with("palpate: cut.mcap: byte "), "{said}");
     assert!(said.ends_with("it ends early. Repair it with `mcap recover`, or copy the log again.\n"), "{said}");
     // Times in milliseconds.
-    log(&path, [("0 0 0.08", None), ("0 0 80", None)]);
-    let said = stderr(run(["recognize", &model, path.to_str().unwrap()]), 1);
-    assert!(said.contains("cut.mcap: byte ") && said.contains("80"), "{said}");
+    log(&at.join("cut.mcap"), [("0 0 0.08", None), ("0 0 80", None)]);
+    let recognize = "recognize model.palpate cut.mcap";
+    complains(palpate(at, recognize), recognize, 1, "cut.mcap: byte … 80");
 }
 
 #[test]
 fn touches_and_verdicts_become_a_log_that_is_recognized_again() {
-    let place = Place::new();
+    let place = ONE_SPLIT.folder();
     let (model, out) = (place.text("model.palpate"), place.text("verdicts.mcap"));
-    std::fs::write(place.path("lines.txt"), "0 0 0.08\n".repeat(4) + "0 0 -\n0 0 0.01\n").unwrap();
+    std::fs::write(place.join("lines.txt"), "0 0 0.08\n".repeat(4) + "0 0 -\n0 0 0.01\n").unwrap();
     let recognize = |file: &str, out: &str| run(["recognize", &model, &place.text(file), "--json", "--mcap", out]);
     let lines = stdout(recognize("lines.txt", &out));
     let bytes = std::fs::read(&out).unwrap();
@@ -106,97 +100,87 @@ fn touches_and_verdicts_become_a_log_that_is_recognized_again() {
     assert!(verdicts[4].refused.is_some());
     // What was written is a log like any other, and the bytes are always the same.
     assert_eq!(stdout(recognize("verdicts.mcap", &place.text("again.mcap"))), lines);
-    assert!(std::fs::read(place.path("again.mcap")).unwrap() == bytes);
+    assert!(std::fs::read(place.join("again.mcap")).unwrap() == bytes);
     let said = stderr(recognize("lines.txt", "-"), 2);
     assert!(said.contains("--mcap is standard output. Use a file"), "{said}");
     let said = stderr(recognize("verdicts.mcap", &out), 2);
     assert!(said.contains("Use another file than what is read."), "{said}");
     // Nothing is left of a run that fails.
-    std::fs::write(place.path("lines.txt"), "0 0 0.08\nnonsense\n").unwrap();
+    std::fs::write(place.join("lines.txt"), "0 0 0.08\nnonsense\n").unwrap();
     stderr(recognize("lines.txt", &place.text("none.mcap")), 1);
-    assert!(!place.path("none.mcap").exists());
+    assert!(!place.join("none.mcap").exists());
 }
 
 #[test]
 fn a_log_is_a_data_set_to_evaluate_and_to_train_on_and_so_is_a_directory_with_logs() {
-    let place = Place::new();
+    let at = &ONE_SPLIT.folder();
     let lines =
         |late: usize| -> Vec<String> { (0..60).map(|i| format!("0 0.00{} 0.{:03}", i % 7, late + i % 10)).collect() };
     let (bowl, fork) = (lines(10), lines(80));
-    std::fs::write(place.path("data/bowl.txt"), bowl.join("\n")).unwrap();
-    std::fs::write(place.path("data/fork.txt"), fork.join("\n")).unwrap();
+    std::fs::write(at.join("data/bowl.txt"), bowl.join("\n")).unwrap();
+    std::fs::write(at.join("data/fork.txt"), fork.join("\n")).unwrap();
     // By turns, with names; and in a directory, without.
     let both: Vec<(String, &str)> =
         bowl.iter().zip(&fork).flat_map(|(bowl, fork)| [(bowl.clone(), "bowl"), (fork.clone(), "fork")]).collect();
-    log(&place.path("monday.mcap"), both.iter().map(|(line, object)| (line.as_str(), Some(*object))));
-    std::fs::create_dir(place.path("mixed")).unwrap();
-    std::fs::copy(place.path("data/bowl.txt"), place.path("mixed/bowl.txt")).unwrap();
-    log(&place.path("mixed/fork.mcap"), fork.iter().map(|line| (line.as_str(), None)));
-    let [model, data, monday, mixed] = ["model.palpate", "data", "monday.mcap", "mixed"].map(|name| place.text(name));
-    let expected = stdout(run(["evaluate", &model, &data, "--json"]));
-    for logs in [&monday, &mixed] {
-        assert_eq!(stdout(run(["evaluate", &model, logs, "--json"])), expected);
+    log(&at.join("monday.mcap"), both.iter().map(|(line, object)| (line.as_str(), Some(*object))));
+    std::fs::create_dir(at.join("mixed")).unwrap();
+    std::fs::copy(at.join("data/bowl.txt"), at.join("mixed/bowl.txt")).unwrap();
+    log(&at.join("mixed/fork.mcap"), fork.iter().map(|line| (line.as_str(), None)));
+    let expected = succeeds(at, "evaluate model.palpate data --json");
+    for logs in ["monday.mcap", "mixed"] {
+        assert_eq!(succeeds(at, &format!("evaluate model.palpate {logs} --json")), expected);
     }
     let trained = |data: &str, name: &str| {
-        stdout(run(["train", data, "-o", &place.text(name), "--trees", "rounds=3,depth=2"]));
-        Dataset::read(Path::new(data)).unwrap()
+        succeeds(at, &format!("train {data} -o {name} --trees rounds=3,depth=2"));
+        Dataset::read(&at.join(data)).unwrap()
     };
     let touches = |dataset: Dataset| -> Vec<_> {
         dataset.objects.iter().map(|object| (object.name.clone(), object.touches().to_vec())).collect()
     };
-    assert_eq!(touches(trained(&data, "a.json")), touches(trained(&monday, "b.json")));
-    assert!(std::fs::read(place.path("a.json")).unwrap() == std::fs::read(place.path("b.json")).unwrap());
+    assert_eq!(touches(trained("data", "a.json")), touches(trained("monday.mcap", "b.json")));
+    assert!(std::fs::read(at.join("a.json")).unwrap() == std::fs::read(at.join("b.json")).unwrap());
     // And taught, as recorded touches are.
-    stdout(run(["train", "--teach", &monday, "-o", &place.text("taught.json"), "--trees", "rounds=3,depth=2"]));
-    // What is read is not written.
-    assert!(stderr(run(["train", &monday, "-o", &monday]), 2).contains("another file than what is read"));
-    assert!(is_log(&place.path("monday.mcap")));
+    succeeds(at, "train --teach monday.mcap -o taught.json --trees rounds=3,depth=2");
+    fails(at, "train monday.mcap -o monday.mcap", 2, "another file than what is read");
+    assert!(is_log(&at.join("monday.mcap")));
 }
 
 #[test]
 fn a_log_is_recorded_into_a_data_set_object_by_object() {
-    let place = tempfile::tempdir().unwrap();
-    let data = place.path().join("recorded");
-    let record = |object: &str| run(["data", "record", PYTHON, "--object", object, "-o", data.to_str().unwrap()]);
-    let output = record("bowl");
+    let at = &Folder::new();
+    let record = |object: &str| format!("data record {PYTHON} -o recorded --object {object}");
+    let output = palpate(at, &record("bowl"));
     let said = error_of(&output);
-    assert!(
-        said.contains("json-zstd.mcap: skipped 1 other channel")
-            && said.contains("skipped 20 touches of other objects")
-    );
+    holds(&said, &["json-zstd.mcap: skipped 1 other channel", "skipped 20 touches of other objects"]);
     assert!(stdout(output).starts_with("recorded 20 touches of bowl into "));
-    stdout(record("mug"));
-    let dataset = Dataset::read(&data).unwrap();
+    succeeds(at, &record("mug"));
+    let dataset = Dataset::read(&at.join("recorded")).unwrap();
     let log = Log::read(Path::new(PYTHON)).unwrap().by_object("-").unwrap();
     let touches = |objects: &[palpate::touches::ObjectTouches]| -> Vec<_> {
         objects.iter().map(|object| object.touches().iter().map(|touch| touch.times()).collect::<Vec<_>>()).collect()
     };
     assert_eq!(touches(&dataset.objects), touches(&log));
     assert_eq!(dataset.recorded()[0].source, PYTHON);
-    let said = stderr(record("bowl"), 1);
-    assert!(said.contains("the same 20 touches of bowl were recorded before"), "{said}");
-    let said = stderr(record("spoon"), 1);
-    assert!(said.contains("json-zstd.mcap: no touch of spoon in this log, only of bowl, mug."), "{said}");
+    fails(at, &record("bowl"), 1, "the same 20 touches of bowl were recorded before");
+    fails(at, &record("spoon"), 1, "json-zstd.mcap: no touch of spoon in this log, only of bowl, mug.");
 }
 
 #[test]
 fn a_log_is_checked_like_a_directory() {
-    let said = stdout(run(["data", "check", PYTHON]));
-    for expected in [
+    let at = &Folder::new();
+    let check = format!("data check {PYTHON}");
+    let expected = [
         "note: ",
         "json-zstd.mcap/bowl: only 20 touches",
         "json-zstd.mcap: skipped 1 other channel: /joints (robot.Joints)",
         "probe: unknown, since there is no dataset.json",
         "2 objects, 40 touches",
-    ] {
-        assert!(said.contains(expected), "{said}");
-    }
-    let checked = json(run(["data", "check", PYTHON, "--json"]));
+    ];
+    says(at, &check, &expected);
+    let checked = figures(at, &check);
     assert_eq!(checked["summary"]["objects"][1]["patterns"], serde_json::json!([0, 0, 0, 0, 4, 16]));
-    let place = tempfile::tempdir().unwrap();
-    let path = place.path().join("fork.mcap");
-    std::fs::write(&path, &std::fs::read(PYTHON).unwrap()[..2000]).unwrap();
-    let output = run(["data", "check", path.to_str().unwrap()]);
+    std::fs::write(at.join("fork.mcap"), &std::fs::read(PYTHON).unwrap()[..2000]).unwrap();
+    let output = palpate(at, "data check fork.mcap");
     assert!(String::from_utf8_lossy(&output.stdout).contains("fork.mcap: byte "), "{output:?}");
-    assert!(stderr(output, 1).contains("training on these touches would be wrong, for 1 reason."));
+    complains(output, "data check", 1, "training on these touches would be wrong, for 1 reason.");
 }

@@ -1,6 +1,6 @@
 //! Meshes that something is wrong with, given to `capture` and `view` alike.
 
-use crate::{command, fails, globe, palpate, stderr, stdout, succeeds};
+use crate::{Folder, command, fails, globe, holds, palpate, says, stderr, stdout, succeeds};
 use palpate::mesh::builtin;
 use std::path::Path;
 
@@ -13,57 +13,56 @@ fn changed(mesh: &Path, name: &str, change: impl Fn(usize, &str) -> Option<Strin
 
 #[test]
 fn a_capture_of_an_open_or_inside_out_mesh_says_so_in_one_line_for_each() {
-    let directory = tempfile::tempdir().unwrap();
-    let good = globe(directory.path(), "good", 6);
+    let at = &Folder::new();
+    let good = globe(at, "good", 6);
     let first_face = std::fs::read_to_string(&good).unwrap().lines().position(|line| line.starts_with("f ")).unwrap();
     changed(&good, "open.obj", |index, line| (index != first_face).then(|| line.to_owned()));
     changed(&good, "turned.obj", |_, line| match line.split(' ').collect::<Vec<_>>()[..] {
         ["f", a, b, c] => Some(format!("f {a} {c} {b}")),
         _ => Some(line.to_owned()),
     });
-    let said = captured(directory.path(), "good.obj open.obj turned.obj -o touches --touches 10", 0);
+    let said = captured(at, "good.obj open.obj turned.obj -o touches --touches 10", 0);
     let lines: Vec<&str> = said.lines().filter(|line| line.contains("The mesh is")).collect();
     assert_eq!(lines.len(), 2, "{said}");
     assert!(lines[0].starts_with("open: The mesh is open: 3 edges belong to one triangle only"), "{said}");
     assert!(lines[1].starts_with("turned: The mesh is inside out: "), "{said}");
-    assert!(!captured(directory.path(), "good.obj -o more --touches 10", 0).contains("The mesh is"));
+    assert!(!captured(at, "good.obj -o more --touches 10", 0).contains("The mesh is"));
 }
 
 #[test]
 fn a_capture_of_a_misspelled_object_lists_the_names_as_view_does() {
-    let directory = tempfile::tempdir().unwrap();
+    let at = &Folder::new();
     for words in ["capture builtin mug -o out", "view mug -o out"] {
-        let error = stderr(palpate(directory.path(), words), 1);
+        let error = stderr(palpate(at, words), 1);
         assert!(error.contains("mug: cannot read the mesh: this is neither a file"), "{error}");
         assert!(builtin::names().iter().all(|name| error.contains(name)), "{error}");
         assert!(!error.contains("os error"), "{error}");
     }
-    assert!(crate::listing(directory.path()).is_empty());
+    assert!(crate::listing(at).is_empty());
 }
 
 #[test]
 fn a_file_named_like_a_built_in_object_comes_first_in_capture_and_view_alike() {
-    let directory = tempfile::tempdir().unwrap();
-    let mesh = globe(directory.path(), "globe", 6);
-    std::fs::rename(mesh, directory.path().join("fork")).unwrap();
-    let here = |words: &str| succeeds(directory.path(), words);
+    let at = &Folder::new();
+    let mesh = globe(at, "globe", 6);
+    std::fs::rename(mesh, at.join("fork")).unwrap();
+    let here = |words: &str| succeeds(at, words);
     here("view fork -o file.html");
-    let page = |name: &str| std::fs::read_to_string(directory.path().join(name)).unwrap();
+    let page = |name: &str| std::fs::read_to_string(at.join(name)).unwrap();
     // 4 · 6 · 5 triangles, where the built-in fork has thousands.
     assert!(page("file.html").contains("<dt>Triangles</dt><dd>120"));
     here("capture fork -o file --touches 5");
-    std::fs::remove_file(directory.path().join("fork")).unwrap();
+    std::fs::remove_file(at.join("fork")).unwrap();
     here("view fork -o built-in.html");
     assert!(!page("built-in.html").contains("<dt>Triangles</dt><dd>120"));
     here("capture fork -o built-in --touches 5");
-    let touches = |name: &str| std::fs::read(directory.path().join(name).join("fork.txt")).unwrap();
+    let touches = |name: &str| std::fs::read(at.join(name).join("fork.txt")).unwrap();
     assert_ne!(touches("file"), touches("built-in"));
 }
 
 #[test]
 fn a_broken_mesh_is_refused_with_its_file_its_line_and_a_cure() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     let cure = "Correct the line, or export the mesh again.";
     let range = "cup.obj:4: vertex 4 of a face is out of range: the file has 3 vertices.";
     for (text, expected, cure) in [
@@ -76,8 +75,7 @@ fn a_broken_mesh_is_refused_with_its_file_its_line_and_a_cure() {
     ] {
         std::fs::write(at.join("cup.obj"), text).unwrap();
         for command in ["capture", "view"] {
-            let error = stderr(palpate(at, &format!("{command} cup.obj -o out")), 1);
-            assert!(error.contains(expected) && error.contains(cure), "{error}");
+            fails(at, &format!("{command} cup.obj -o out"), 1, &format!("{expected} … {cure}"));
         }
     }
     assert!(!at.join("out").exists());
@@ -90,8 +88,7 @@ fn captured(at: &Path, words: &str, code: i32) -> String {
 
 #[test]
 fn bad_meshes_are_named_at_once_and_with_skip_bad_the_rest_is_captured() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     std::fs::create_dir(at.join("set")).unwrap();
     let set = at.join("set");
     for (name, rings) in [("one", 5), ("two", 6)] {
@@ -110,14 +107,13 @@ fn bad_meshes_are_named_at_once_and_with_skip_bad_the_rest_is_captured() {
     );
     assert!(!at.join("data").exists());
     let said = captured(at, "set -o data --touches 5 --skip-bad", 0);
-    for expected in [
+    let expected = [
         "palpate: left out: set/cut.stl:2: the STL file is damaged",
         "palpate: left out: set/empty.ply:1: ",
         "palpate: set/mug.step is not read. STEP: Export a mesh of it as STL",
         "palpate: twin and two have the same mesh: no touch distinguishes them",
-    ] {
-        assert!(said.contains(expected), "{said}");
-    }
+    ];
+    holds(&said, &expected);
     let listed = std::fs::read_to_string(at.join("data/dataset.json")).unwrap();
     assert_eq!(listed.matches("\"name\"").count(), 3, "{listed}");
     // Every command with such a set has the option.
@@ -127,8 +123,7 @@ fn bad_meshes_are_named_at_once_and_with_skip_bad_the_rest_is_captured() {
 
 #[test]
 fn objects_that_cannot_be_touched_are_named_with_their_sizes_before_anything_is_captured() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     globe(at, "one", 4);
     // Two flat sheets, which a table hides.
     for name in ["flat", "sheet"] {
@@ -155,24 +150,19 @@ fn objects_that_cannot_be_touched_are_named_with_their_sizes_before_anything_is_
 
 #[test]
 fn two_directories_with_a_file_of_one_name_lead_to_the_option_for_that() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     for name in ["cup", "ball"] {
         std::fs::create_dir_all(at.join("set").join(name)).unwrap();
         globe(&at.join("set").join(name), "mesh", 4);
     }
-    let said = captured(at, "set -o data --touches 5", 1);
-    assert!(
-        said.contains("two objects are called mesh")
-            && said.contains("\n--instances takes each directory as one object")
-    );
+    let expected = "two objects are called mesh … \n--instances takes each directory as one object";
+    fails(at, "capture set -o data --touches 5", 1, expected);
     captured(at, "set -o data --touches 5 --instances", 0);
 }
 
 #[test]
 fn objects_without_a_known_unit_are_named_together_and_files_that_state_one_are_preferred() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     std::fs::write(at.join("probe.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\n").unwrap();
     std::fs::create_dir(at.join("set")).unwrap();
     globe(&at.join("set"), "cup", 4);
@@ -210,8 +200,7 @@ fn objects_without_a_known_unit_are_named_together_and_files_that_state_one_are_
 #[cfg(target_os = "linux")]
 #[test]
 fn a_probe_file_may_be_a_pipe() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     globe(at, "ball", 4);
     std::fs::write(at.join("probe.toml"), "radius = 0.2\nspacing = 1.5\nspeed = 10\n").unwrap();
     let capture = |out: &str, probe: &str| {
@@ -228,21 +217,16 @@ fn a_probe_file_may_be_a_pipe() {
 
 #[test]
 fn touches_of_one_object_of_a_model_are_evaluated() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     globe(at, "bowl", 6);
     succeeds(at, "capture bowl.obj --approaches 150 -o one");
     let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
     let evaluate = format!("evaluate {model} one --sequences 20");
     let text = succeeds(at, &format!("{evaluate} --confusion 5"));
-    assert!(
-        text.contains("\nbowl ") && text.contains("promised for all 10 objects of the model, tested on 1"),
-        "{text}"
-    );
+    holds(&text, &["\nbowl ", "promised for all 10 objects of the model, tested on 1"]);
     assert!(text.contains("Taken for, after 5 touches"), "{text}");
     // What needs a second object says so, and neither a model nor a promise comes of one.
     fails(at, &format!("{evaluate} --switch"), 1, "nothing to exchange it for");
     fails(at, "train one -o e.json", 1, "only one object here, bowl");
-    let check = succeeds(at, "data check one");
-    assert!(check.contains("only bowl is here") && check.contains("1 object, 150 touches"), "{check}");
+    says(at, "data check one", &["only bowl is here", "1 object, 150 touches"]);
 }

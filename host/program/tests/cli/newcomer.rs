@@ -1,33 +1,22 @@
 //! Guidance for someone who uses the program for the first time.
 
-use crate::{fails, figures, globe, palpate, stderr, succeeds};
+use crate::fixtures::spread;
+use crate::{Folder, figures, globe, palpate, says, stderr, succeeds};
 use serde_json::Value;
-use std::path::Path;
-
-/// Data sets of three objects with `count` approaches each: a third of them misses the last finger, unless only `full`
-/// touches are wanted. The curvature of the rest often distinguishes the objects.
-fn approaches(directory: &Path, count: u64, first: u64, full: bool) {
-    std::fs::create_dir_all(directory).unwrap();
-    for (name, bend) in [("bowl", 100_000), ("cup", 160_000), ("jug", 260_000)] {
-        let spread = |index: u64, prime: u64, range: u64| (index.wrapping_mul(prime) >> 7) % range;
-        let lines = (first..first + count).map(|index| {
-            let slope = spread(index, 0x9e37_79b9_7f4a_7c15, 300_007);
-            let bend = spread(index, 0xd134_2543_de82_ef95, bend);
-            let [a, b, c] = [0, slope / 2 + bend, slope].map(|micros| format!("{:.6}", micros as f64 * 1e-6));
-            if !full && index % 3 == 0 { format!("{a} {b} -\n") } else { format!("{a} {b} {c}\n") }
-        });
-        std::fs::write(directory.join(format!("{name}.txt")), lines.collect::<String>()).unwrap();
-    }
-}
 
 #[test]
 fn a_promise_that_is_tested_on_other_data_than_it_was_made_for_says_so_and_whether_it_is_kept() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
-    approaches(&at.join("train"), 2_000, 0, false);
-    approaches(&at.join("fresh"), 20_000, 1_000_000, false);
-    approaches(&at.join("unseen"), 4_000, 2_000_000, false);
-    approaches(&at.join("full"), 4_000, 3_000_000, true);
+    let at = &Folder::new();
+    // Their curvature often distinguishes them.
+    let objects = [("bowl", 100_000), ("cup", 160_000), ("jug", 260_000)];
+    for (name, numbers) in [
+        ("train", 0..2_000),
+        ("fresh", 1_000_000..1_020_000),
+        ("unseen", 2_000_000..2_004_000),
+        ("full", 3_000_000..3_004_000),
+    ] {
+        spread(&at.join(name), &objects, numbers, name == "full");
+    }
     succeeds(at, "train train -o e.json --trees rounds=10");
     succeeds(at, "export e.json -o m.palpate");
     succeeds(at, "calibrate m.palpate fresh -o c.palpate --error-rate 5%");
@@ -35,7 +24,7 @@ fn a_promise_that_is_tested_on_other_data_than_it_was_made_for_says_so_and_wheth
     let own = json("unseen");
     assert_eq!(own["promise"]["void"], serde_json::json!([]));
     assert_eq!(own["promise"]["finding"], "kept", "{}", own["promise"]);
-    assert!(succeeds(at, "evaluate c.palpate unseen").contains("the promise is kept."));
+    says(at, "evaluate c.palpate unseen", &["the promise is kept."]);
     // All touches are full, which the model takes for evidence.
     let other = json("full");
     let void = other["promise"]["void"].as_array().unwrap();
@@ -71,31 +60,13 @@ fn a_promise_that_is_tested_on_other_data_than_it_was_made_for_says_so_and_wheth
 }
 
 #[test]
-fn messages_name_the_option_that_is_wrong_and_what_to_write() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
-    globe(at, "cup", 6);
-    for (words, expected) in [
-        ("calibrate m.palpate fresh -o c.palpate --error-rate 2", "for 2 percent write 2%"),
-        ("evaluate m.palpate fresh --error-rate 2", "for 2 percent write 2%"),
-        ("tune data --error-rate 2", "for 2 percent write 2%"),
-        ("capture cup.obj -o data --true-size mm", "unit = \"mm\", radius = 1.5, spacing = 15, speed = 100"),
-    ] {
-        fails(at, words, 2, expected);
-    }
-    let error = stderr(palpate(at, "report --touches 5"), 2);
-    assert!(error.contains("unexpected argument '--touches'") && !error.contains("-- --touches"), "{error}");
-}
-
-#[test]
 fn every_approach_is_not_summed_up_as_a_touch_and_a_mesh_gets_a_verdict() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     globe(at, "cup", 6);
     globe(at, "jug", 8);
     let said = succeeds(at, "capture cup.obj jug.obj -o data --approaches 300");
     assert!(!said.contains("share") && said.contains("Every approach was kept"), "{said}");
-    assert!(succeeds(at, "view cup.obj -o cup.html").contains("cup: usable"));
+    says(at, "view cup.obj -o cup.html", &["cup: usable"]);
     succeeds(at, "train data -o e.json --trees rounds=3");
     succeeds(at, "export e.json -o m.palpate");
     std::fs::write(at.join("rows.csv"), "a,b,c\n1,2,3\n").unwrap();

@@ -1,9 +1,7 @@
 //! Output of commands: a file of Palpate's is replaced, and no other one, unless `--force` is given.
 
-use crate::compiled::Place;
-use crate::{command, globe, listing, stderr, stdout};
-use std::path::Path;
-use std::process::Output;
+use crate::fixtures::ONE_SPLIT;
+use crate::{Folder, fails, globe, listing, palpate, stderr, succeeds};
 
 /// A file that a user might have where a command writes.
 const FOREIGN: &str = "// Recognizes with palpate_onboard.\nfn main() {}\n";
@@ -75,35 +73,25 @@ const WRITERS: &[Writer] = &[
     slow("data record touches.txt -o out --object ball", &["ball.txt"]),
 ];
 
-fn set_up() -> Place {
-    let place = Place::new();
-    let at = place.path("");
+fn set_up() -> Folder {
+    let at = ONE_SPLIT.folder();
     globe(&at, "ball", 8);
     std::fs::write(at.join("touches.txt"), "0 0 0.08\n0 0 0.01\n").unwrap();
     std::fs::write(at.join("casts.csv"), "a,-9,0,0,1,0,0\n").unwrap();
-    let rows = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/import/xgboost-3.4-softprob.ubj");
-    stdout(
-        command(["export".as_ref(), rows.as_os_str(), "-o".as_ref(), at.join("rows.palpate").as_os_str()])
-            .output()
-            .unwrap(),
-    );
-    place
-}
-
-fn run(at: &Path, words: &str, more: &[&str]) -> Output {
-    command(words.split(' ').chain(more.iter().copied())).current_dir(at).output().unwrap()
+    let rows = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/import/xgboost-3.4-softprob.ubj");
+    succeeds(&at, &format!("export {rows} -o rows.palpate"));
+    at
 }
 
 #[test]
 fn no_command_replaces_a_file_that_palpate_did_not_write() {
-    let place = set_up();
-    let at = place.path("");
+    let at = &set_up();
     let out = at.join("out");
     for Writer { words, files, .. } in WRITERS {
         for file in *files {
             std::fs::create_dir(&out).unwrap();
             std::fs::write(out.join(file), FOREIGN).unwrap();
-            let error = stderr(run(&at, words, &[]), 1);
+            let error = stderr(palpate(at, words), 1);
             assert!(error.contains(file), "{words}, {file}: {error}");
             assert_eq!(std::fs::read_to_string(out.join(file)).unwrap(), FOREIGN, "{words}, {file}");
             let others: Vec<String> =
@@ -116,8 +104,7 @@ fn no_command_replaces_a_file_that_palpate_did_not_write() {
 
 #[test]
 fn with_force_such_a_file_is_replaced_and_then_as_one_of_palpates_without() {
-    let place = set_up();
-    let at = place.path("");
+    let at = &set_up();
     let out = at.join("out");
     for Writer { words, files, is_quick } in WRITERS {
         if !is_quick {
@@ -125,8 +112,8 @@ fn with_force_such_a_file_is_replaced_and_then_as_one_of_palpates_without() {
         }
         std::fs::create_dir(&out).unwrap();
         files.iter().for_each(|file| std::fs::write(out.join(file), FOREIGN).unwrap());
-        for more in [&["--force"][..], &[]] {
-            stdout(run(&at, words, more));
+        for more in [" --force", ""] {
+            succeeds(at, &format!("{words}{more}"));
             for file in *files {
                 assert!(std::fs::read(out.join(file)).unwrap() != FOREIGN.as_bytes(), "{words}, {file}");
             }
@@ -137,12 +124,11 @@ fn with_force_such_a_file_is_replaced_and_then_as_one_of_palpates_without() {
 
 #[test]
 fn export_leaves_the_program_that_it_is_called_beside() {
-    let place = set_up();
-    let at = place.path("");
+    let at = &set_up();
     std::fs::create_dir(at.join("src")).unwrap();
     std::fs::write(at.join("src/main.rs"), FOREIGN).unwrap();
     let export = "export ensemble.json -o src/main.palpate --emit rust";
-    let error = stderr(run(&at, export, &[]), 1);
+    let error = stderr(palpate(at, export), 1);
     assert_eq!(
         error,
         "palpate: src/main.rs: a file is there already that Palpate did not write, and it is not replaced. Give another path, \
@@ -151,14 +137,13 @@ fn export_leaves_the_program_that_it_is_called_beside() {
     assert_eq!(listing(&at.join("src")), ["main.rs"]);
     // An empty file is nobody's.
     std::fs::write(at.join("src/main.rs"), "").unwrap();
-    stdout(run(&at, export, &[]));
+    succeeds(at, export);
 }
 
 #[test]
 fn force_does_not_go_with_what_keeps_what_is_there() {
-    let place = set_up();
+    let at = &set_up();
     for words in ["capture ball.obj -o out --resume --force", "--force capture ball.obj -o out --add"] {
-        let error = stderr(run(&place.path(""), words, &[]), 2);
-        assert!(error.contains("--force is given. Use it without --resume and --add"), "{error}");
+        fails(at, words, 2, "--force is given. Use it without --resume and --add");
     }
 }

@@ -1,14 +1,13 @@
 //! Plans of approaches, as a user makes, evaluates and follows them.
 
 use crate::fixtures::PLANNED;
-use crate::{command, fails, figures, lines, stdout, succeeds};
+use crate::{command, fails, figures, lines, says, stdout, succeeds};
 use serde_json::Value;
 use std::fs;
 
 #[test]
 fn a_plan_is_made_evaluated_shown_and_followed() {
-    let place = PLANNED.folder();
-    let at = place.path();
+    let at = &PLANNED.folder();
     let length = |name: &str| fs::metadata(at.join(name)).unwrap().len();
     // 26 directions, three pairs, four bytes before them, eight before the section, and zeros.
     assert_eq!(length("planned.palpate"), length("model.palpate") + 4 + 26 * 3 + 8 + 2);
@@ -40,8 +39,7 @@ fn a_plan_is_made_evaluated_shown_and_followed() {
     assert!(text.contains("Each approach is in the pose that the plan proposed, of 26"), "{text}");
 
     let follow = "recognize planned.palpate unseen/cigar.txt --active";
-    let followed = succeeds(at, follow);
-    assert!(followed.contains("next: pose "), "{followed}");
+    says(at, follow, &["next: pose "]);
     let said = lines(&succeeds(at, &format!("{follow} --json")));
     let line = said.iter().find(|line| line["verdict"] == "undecided").unwrap();
     assert!(line["next"]["pose"].as_u64().unwrap() < 26 && line["next"]["direction"].is_array(), "{line}");
@@ -49,19 +47,18 @@ fn a_plan_is_made_evaluated_shown_and_followed() {
 
 #[test]
 fn an_evaluation_under_a_plan_is_the_same_on_any_number_of_threads() {
-    let place = PLANNED.folder();
+    let at = &PLANNED.folder();
     let evaluate = "evaluate planned.palpate unseen --sequences 50 --active --switch --json";
     let on = |threads: &str| {
         let mut command = command(evaluate.split(' '));
-        stdout(command.current_dir(place.path()).env("RAYON_NUM_THREADS", threads).output().unwrap())
+        stdout(command.current_dir(at).env("RAYON_NUM_THREADS", threads).output().unwrap())
     };
     assert_eq!(on("1"), on("3"));
 }
 
 #[test]
 fn what_cannot_be_planned_or_followed_is_refused_with_what_to_do() {
-    let place = PLANNED.folder();
-    let at = place.path();
+    let at = &PLANNED.folder();
     succeeds(at, "capture meshes -o full --pose --touches 100");
     succeeds(at, "capture meshes -o blind --approaches 500");
     let make = "palpate calibrate MODEL DIR -o OUT --plan 4";
@@ -89,8 +86,7 @@ fn what_cannot_be_planned_or_followed_is_refused_with_what_to_do() {
 
 #[test]
 fn a_promise_is_calibrated_under_the_plan_kept_under_it_and_another_one_at_random() {
-    let place = PLANNED.folder();
-    let at = place.path();
+    let at = &PLANNED.folder();
     succeeds(at, "capture meshes -o more --approaches 12000 --pose --seed 4");
     let calibrate = "calibrate planned.palpate more -o calibrated.palpate --error-rate 10%";
     let random = figures(at, calibrate);
@@ -111,8 +107,7 @@ fn a_promise_is_calibrated_under_the_plan_kept_under_it_and_another_one_at_rando
 
 #[test]
 fn forgetting_finds_an_exchanged_object_sooner() {
-    let place = PLANNED.folder();
-    let at = place.path();
+    let at = &PLANNED.folder();
     let figures = figures(at, "evaluate model.palpate unseen --sequences 500 --switch 3");
     let of = |rule: &str, case: &str, figure: &str| figures["switch"][rule][case][figure].as_f64().unwrap();
     assert_eq!(figures["switch"]["nats"], 3.0);
@@ -124,6 +119,5 @@ fn forgetting_finds_an_exchanged_object_sooner() {
     assert!(beyond("still") < 0.01, "{figures:#}");
     let old = figures["switch"]["on"]["old"].as_f64().unwrap();
     assert!(of("on", "switched", "error") - old < 0.02, "{figures:#}");
-    let text = succeeds(at, "evaluate model.palpate unseen --switch");
-    assert!(text.contains("at 5 nats"), "{text}");
+    says(at, "evaluate model.palpate unseen --switch", &["at 5 nats"]);
 }

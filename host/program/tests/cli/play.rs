@@ -1,4 +1,4 @@
-use crate::{fails, globe, listing, succeeds};
+use crate::{Folder, fails, globe, listing, says, succeeds};
 use std::fs;
 
 /// The model that the repository ships.
@@ -6,14 +6,12 @@ const HOUSEHOLD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/house
 
 #[test]
 fn a_page_is_made_of_a_model_and_objects_with_a_trace_of_a_thousand_approaches_to_each() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     globe(at, "my_globe", 8);
     let words =
         format!("view --play mouse my_globe.obj --model {HOUSEHOLD} -o pages/play.html --trace pages/trace.txt");
     let play = || {
-        let said = succeeds(at, &words);
-        assert!(said.contains("play.html"), "{said}");
+        says(at, &words, &["play.html"]);
         fs::read_to_string(at.join("pages/play.html")).unwrap()
     };
     let text = play();
@@ -28,8 +26,7 @@ fn a_page_is_made_of_a_model_and_objects_with_a_trace_of_a_thousand_approaches_t
 
 #[test]
 fn a_page_without_a_model_trains_four_and_says_what_each_is_expected_to_cost() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     for (name, rings) in [("round", 8), ("rough", 5)] {
         globe(at, name, rings);
     }
@@ -45,37 +42,30 @@ fn a_page_without_a_model_trains_four_and_says_what_each_is_expected_to_cost() {
 
 #[test]
 fn a_page_of_a_table_holds_maps_of_its_objects_and_says_what_they_were_learned_from() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
-    let table = "view --play --scene table --touches 4000 -o table.html";
-    succeeds(at, &format!("{table} bowl mouse --placements bowl/+z=1 --real missed=5%"));
+    let at = &Folder::new();
+    let objects = "bowl mouse --placements bowl/+z=1 --real missed=5%";
+    succeeds(at, &format!("view --play --scene table --touches 4000 -o table.html {objects}"));
     let text = fs::read_to_string(at.join("table.html")).unwrap();
     assert!(text.contains("from 4,000 simulated approaches") && text.contains("5 % of contacts to be lost"));
     assert!(text.contains("\"maps\":") && text.contains("\"name\":\"mouse\""));
-    fs::remove_file(at.join("table.html")).unwrap();
-    for (wrong, code, expected) in [
-        ("bowl", 2, "2 to 16 objects"),
-        (&format!("bowl mouse --model {HOUSEHOLD}"), 2, "model"),
-        ("bowl mouse --trace trace.txt", 2, "trace"),
-        ("bowl mouse --cone 30", 2, "cone"),
-        ("bowl mouse --real debounce=1ms", 1, "noise"),
-    ] {
-        fails(at, &format!("{table} {wrong}"), code, expected);
-    }
-    assert!(listing(at).is_empty());
 }
 
 #[test]
 fn what_cannot_be_played_with_writes_no_page() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     fs::write(at.join("bad.palpate"), b"no model").unwrap();
+    let table = "bowl mouse --scene table --touches 4000";
     for (wrong, code, expected) in [
-        ("--model bad.palpate", 1, "bad.palpate"),
-        (&format!("--true-size stated --model {HOUSEHOLD}"), 2, "probe"),
-        ("--real noise=much", 2, "5ms"),
+        ("bowl --model bad.palpate", 1, "bad.palpate"),
+        (&format!("bowl --true-size stated --model {HOUSEHOLD}"), 2, "probe"),
+        ("bowl --real noise=much", 2, "5ms"),
+        ("bowl --scene table --touches 4000", 2, "2 to 16 objects"),
+        (&format!("{table} --model {HOUSEHOLD}"), 2, "model"),
+        (&format!("{table} --trace trace.txt"), 2, "trace"),
+        (&format!("{table} --cone 30"), 2, "cone"),
+        (&format!("{table} --real debounce=1ms"), 1, "noise"),
     ] {
-        fails(at, &format!("view --play bowl -o play.html {wrong}"), code, expected);
+        fails(at, &format!("view --play -o play.html {wrong}"), code, expected);
     }
     assert_eq!(listing(at), ["bad.palpate"]);
 }

@@ -1,18 +1,16 @@
 //! Probe files, true sizes and objects with several instances, as a user gives them.
 
-use crate::{fails, figures, globe, read, succeeds};
+use crate::{Folder, fails, figures, globe, read, succeeds};
 use serde_json::{Value, json};
 use std::fs;
-use tempfile::TempDir;
 
 const MILLIMETERS: &str = "unit = \"mm\"\nradius = 0.1\nspacing = 0.3\nspeed = 2.0\n";
 const PUBLISHED: &str = "radius = 0.15\nspacing = 1.5\nspeed = 10\n";
 const THICK: &str = "radius = 0.3\nspacing = 1.5\nspeed = 10\n[real]\nnoise = \"0..5ms\"\n";
 
 /// A folder with two meshes about 2 long, and probe files.
-fn set_up() -> TempDir {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+fn set_up() -> Folder {
+    let at = Folder::new();
     fs::create_dir(at.join("meshes")).unwrap();
     globe(&at.join("meshes"), "globe", 12);
     globe(&at.join("meshes"), "lump", 3);
@@ -25,16 +23,14 @@ fn set_up() -> TempDir {
     ] {
         fs::write(at.join(format!("{name}.toml")), text).unwrap();
     }
-    directory
+    at
 }
 
 #[test]
 fn objects_keep_their_true_sizes_and_the_manifest_says_so() {
-    let directory = set_up();
-    let at = directory.path();
+    let at = &set_up();
     let capture = "capture meshes -o data --touches 200 --probe probe.toml --true-size";
-    fails(at, &format!("{capture} stated"), 1, "globe, lump: the true size is unknown");
-    fails(at, &format!("{capture} stated"), 1, "See --true-size");
+    fails(at, &format!("{capture} stated"), 1, "globe, lump: the true size is unknown … See --true-size");
     succeeds(at, &format!("{capture} mm,lump=cm"));
     let stated = read(&at.join("data/dataset.json"));
     assert_eq!(stated["settings"]["unit"], "mm");
@@ -51,17 +47,13 @@ fn objects_keep_their_true_sizes_and_the_manifest_says_so() {
 
 #[test]
 fn a_probe_in_another_unit_than_the_objects_is_refused() {
-    let directory = set_up();
-    let at = directory.path();
+    let at = &set_up();
     for (more, code, expected) in [
-        ("--probe probe.toml", 1, "probe.toml: "),
-        ("--probe probe.toml", 1, "--true-size"),
-        ("--probe tenths.toml --true-size mm", 1, "tenths.toml: "),
-        ("--probe tenths.toml --true-size mm", 1, "unit = \"mm\""),
-        ("--true-size mm", 2, "--probe is not given"),
+        ("--probe probe.toml", 1, "probe.toml: … --true-size"),
+        ("--probe tenths.toml --true-size mm", 1, "tenths.toml: … unit = \"mm\""),
+        ("--true-size mm", 2, "--probe is not given … unit = \"mm\", radius = 1.5, spacing = 15, speed = 100"),
         ("--true-size mm --length 12 --probe probe.toml", 2, "--length"),
-        ("--probe broken.toml", 1, "broken.toml:5: not a usable probe file: "),
-        ("--probe broken.toml", 1, "weight"),
+        ("--probe broken.toml", 1, "broken.toml:5: not a usable probe file: … weight"),
     ] {
         fails(at, &format!("capture meshes -o data --touches 200 {more}"), code, expected);
     }
@@ -73,8 +65,7 @@ fn a_probe_in_another_unit_than_the_objects_is_refused() {
 
 #[test]
 fn two_probes_that_meet_have_to_be_the_same() {
-    let directory = set_up();
-    let at = directory.path();
+    let at = &set_up();
     for (data, probe) in [("other", "thick"), ("data", "published")] {
         succeeds(at, &format!("capture meshes -o {data} --touches 300 --probe {probe}.toml"));
     }
@@ -105,8 +96,7 @@ fn two_probes_that_meet_have_to_be_the_same() {
 
 #[test]
 fn run_tune_and_view_take_the_probe_file() {
-    let directory = set_up();
-    let at = directory.path();
+    let at = &set_up();
     succeeds(at, "run meshes -o out --touches 300 --true-size mm --probe probe.toml");
     assert_eq!(read(&at.join("out/data/dataset.json"))["settings"]["unit"], "mm");
     let saved = fs::read_to_string(at.join("out/ensemble.json")).unwrap();
@@ -120,8 +110,7 @@ fn run_tune_and_view_take_the_probe_file() {
 
 #[test]
 fn a_directory_of_meshes_is_one_object_with_instances() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     for (object, rings) in [("globe", [12, 9, 14]), ("lump", [3, 4, 5])] {
         let meshes = at.join("meshes").join(object);
         fs::create_dir_all(&meshes).unwrap();
@@ -140,8 +129,7 @@ fn a_directory_of_meshes_is_one_object_with_instances() {
 
 #[test]
 fn built_in_objects_vary_in_as_many_instances_as_asked_for() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &Folder::new();
     let [one, other] = ["1", "2"].map(|seed| {
         succeeds(at, &format!("capture bowl --touches 60 --instances 2 -o {seed} --seed {seed}"));
         read(&at.join(seed).join("dataset.json"))["objects"][0]["instances"].as_array().unwrap().clone()

@@ -1,6 +1,6 @@
 //! The commands that do everything and write pages: run and report.
 
-use crate::{globe, listing, read, succeeds};
+use crate::{Folder, globe, listing, read, says, succeeds};
 use std::fs;
 use std::path::Path;
 
@@ -13,12 +13,11 @@ fn meshes(directory: &Path) {
 
 #[test]
 fn run_goes_from_meshes_to_models_and_a_page_with_noise_which_its_command_states() {
-    let directory = tempfile::tempdir().unwrap();
-    meshes(directory.path());
+    let at = &Folder::new();
+    meshes(at);
     let words = "run meshes -o out --touches 300 --seed 3 --real noise=0..20ms,timer=1ms";
-    let text = succeeds(directory.path(), words);
-    assert!(text.contains("report.html"), "{text}");
-    let out = directory.path().join("out");
+    says(at, words, &["report.html"]);
+    let out = at.join("out");
     for name in
         ["ensemble.json", "model.palpate", "paper.json", "paper.palpate", "play.html", "report.html", "summary.json"]
     {
@@ -41,11 +40,11 @@ fn run_goes_from_meshes_to_models_and_a_page_with_noise_which_its_command_states
 
 #[test]
 fn report_writes_a_page_with_every_figure_it_names() {
-    let directory = tempfile::tempdir().unwrap();
-    meshes(directory.path());
-    let text = succeeds(directory.path(), "report meshes -o report --quick --real noise=0..10ms");
+    let at = &Folder::new();
+    meshes(at);
+    let text = succeeds(at, "report meshes -o report --quick --real noise=0..10ms");
     assert!(text.trim_end().ends_with("index.html"), "{text}");
-    let page = fs::read_to_string(directory.path().join("report/index.html")).unwrap();
+    let page = fs::read_to_string(at.join("report/index.html")).unwrap();
     assert!(page.contains("globe") && page.contains("lump"));
     assert!(page.contains("<svg") && page.contains("</html>"));
     assert!(page.contains("touches with noise of 0 to 10 ms") && page.contains("2 % of contacts missed"));

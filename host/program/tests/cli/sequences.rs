@@ -1,15 +1,14 @@
 //! Sequences of rows whose number is a feature, or whose sensors are guarded: export, calibrate, evaluate, recognize, inspect.
 
-use crate::{fails, figures, lines, palpate, stderr, succeeds};
+use crate::{Folder, fails, figures, lines, normal, says, succeeds};
 use palpate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
-use tempfile::TempDir;
 
 /// A folder with an ensemble that distinguishes rising from falling heights by the row number.
-fn place() -> TempDir {
+fn place() -> Folder {
     let split = |feature, threshold, left, right| Node::Split { feature, threshold, missing_left: true, left, right };
     let leaf = |up: f32| Node::Leaf(vec![up, -up]);
     let splits = [split(0, 5.5, 1, 2), split(1, 0.55, 3, 4), split(1, 0.55, 5, 6)];
@@ -21,8 +20,8 @@ fn place() -> TempDir {
         trees: vec![Tree { nodes, output: Output::Each }],
         origin: Provenance::default(),
     };
-    let place = tempfile::tempdir().unwrap();
-    ensemble.save(place.path().join("ramps.json")).unwrap();
+    let place = Folder::new();
+    ensemble.save(place.join("ramps.json")).unwrap();
     place
 }
 
@@ -49,13 +48,9 @@ struct Row {
 
 /// Heights that rise from 0.1 to 1 in ten rows, or fall, with noise.
 fn ramps(count: usize, mut state: u64) -> Vec<Row> {
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
     let mut rows = Vec::new();
     for (id, step) in (0..count).flat_map(|id| (1..=10).map(move |step| (id, f64::from(step) / 10.0))) {
-        let noise = 0.4 * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0);
+        let noise = 0.4 * normal(&mut state);
         let (kind, height) = if id % 2 == 0 { ("up", step) } else { ("down", 1.1 - step) };
         rows.push(Row { id, kind, height: format!("{:.6}", height + noise) });
     }
@@ -66,8 +61,7 @@ const COLUMNS: &str = "--label kind --sequence-column id";
 
 #[test]
 fn a_model_that_counts_rows_gives_the_verdicts_of_the_ensemble_with_the_numbers_added_by_hand() {
-    let place = place();
-    let at = place.path();
+    let at = &place();
     write(at, "fresh.csv", &ramps(400, 1));
     write(at, "unseen.csv", &ramps(200, 2));
     // By keys of f32 values, and in units.
@@ -94,20 +88,17 @@ fn a_model_that_counts_rows_gives_the_verdicts_of_the_ensemble_with_the_numbers_
         let [own, other] = ["counted", "by-hand"]
             .map(|model| succeeds(at, &format!("recognize {model} numbered-unseen.csv --features --json")));
         assert_eq!(own, other);
-        let message = stderr(palpate(at, "recognize counted unseen.csv --features"), 1);
-        assert!(message.contains("no column is named number"), "{message}");
+        fails(at, "recognize counted unseen.csv --features", 1, "no column is named number");
         let inspected = figures(at, "inspect counted");
         assert_eq!((&inspected["position"], inspected.get("guard")), (&json!("number"), None));
-        let text = succeeds(at, "inspect counted");
-        assert!(text.contains("row number     number, which recognizers count\n"), "{text}");
+        says(at, "inspect counted", &["row number     number, which recognizers count\n"]);
         assert!(!succeeds(at, "inspect by-hand").contains("row number"));
     }
 }
 
 #[test]
 fn a_guard_names_the_sensor_that_is_stuck_missing_or_out_of_its_range() {
-    let place = place();
-    let at = place.path();
+    let at = &place();
     succeeds(at, "export ramps.json -o counts --row-number number");
     write(at, "fresh.csv", &ramps(400, 1));
     let text = succeeds(at, &format!("calibrate counts fresh.csv -o sure --error-rate 10% --guard {COLUMNS}"));
@@ -156,8 +147,7 @@ fn a_guard_names_the_sensor_that_is_stuck_missing_or_out_of_its_range() {
     assert_eq!(refused("4"), [33, 34, 35, 36].map(|row| (row, outside)));
     let last = said.iter().rfind(|line| line["sequence"] == "4").unwrap();
     assert_eq!((&last["rows"], &last["margins"]), (&json!(5), &json!([])), "rows that are refused count nothing");
-    let text = succeeds(at, recognize);
-    assert!(text.contains(&format!("  2  refused: {missing}\n")), "{text}");
+    says(at, recognize, &[&format!("  2  refused: {missing}\n")]);
     let evaluate = format!("evaluate sure broken.csv {COLUMNS}");
     let text = succeeds(at, &evaluate);
     assert!(text.starts_with("4 sequences, 21 rows, 15 others refused\n"), "{text}");
@@ -169,8 +159,7 @@ fn a_guard_names_the_sensor_that_is_stuck_missing_or_out_of_its_range() {
 
 #[test]
 fn numbers_of_rows_and_guards_are_refused_where_there_is_no_such_feature_or_no_sequence() {
-    let place = place();
-    let at = place.path();
+    let at = &place();
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/import/catboost-1.2-regression.json");
     fs::copy(data, at.join("regression.json")).unwrap();
     crate::compiled::ensemble().save(at.join("touches.json")).unwrap();
@@ -199,49 +188,29 @@ fn numbers_of_rows_and_guards_are_refused_where_there_is_no_such_feature_or_no_s
 
 /// Recordings of 100 rows: `low` between events of `middle` and `high`.
 fn recordings(count: usize, mut state: u64) -> String {
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
     let mut text = "id,kind,x\n".to_owned();
     for id in 0..count {
         for (class, name) in [(0.0, "low"), (3.0, "high"), (0.0, "low"), (1.5, "middle"), (0.0, "low")] {
             for _ in 0..20 {
-                let noise = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-                writeln!(text, "{id},{name},{:.5}", class + noise).unwrap();
+                writeln!(text, "{id},{name},{:.5}", class + normal(&mut state)).unwrap();
             }
         }
     }
     text
 }
 
-/// Trees whose margins are the log-densities of the classes, in steps.
+/// A model of such recordings.
 fn classes_of_recordings(at: &Path) {
-    let cuts: Vec<f64> = (-12..=18).map(|step| f64::from(step) * 0.25).collect();
-    let leaf = |x: f64| Node::Leaf([0.0, 1.5, 3.0].map(|at: f64| (-0.5 * (x - at).powi(2)) as f32).to_vec());
-    let mut nodes = Vec::new();
-    for cut in &cuts {
-        let here = nodes.len();
-        let threshold = *cut as f32;
-        nodes.push(Node::Split { feature: 0, threshold, missing_left: true, left: here + 1, right: here + 2 });
-        nodes.push(leaf(cut - 0.125));
-    }
-    nodes.push(leaf(cuts[cuts.len() - 1] + 0.125));
-    let ensemble = Ensemble {
-        inputs: Inputs::Rows(vec!["x".into()]),
-        objects: ["low", "middle", "high"].map(String::from).to_vec(),
-        base_margins: vec![0.0; 3],
-        trees: vec![Tree { nodes, output: Output::Each }],
-        origin: Provenance::default(),
-    };
-    ensemble.save(at.join("steps.json")).unwrap();
+    let inputs = Inputs::Rows(vec!["x".into()]);
+    crate::goldens::densities(inputs, ["low", "middle", "high"], [0.0, 1.5, 3.0], -12..=18)
+        .save(at.join("steps.json"))
+        .unwrap();
     succeeds(at, "export steps.json -o steps");
 }
 
 #[test]
 fn verdicts_go_on_through_recordings_of_events_at_a_promised_rate_and_as_evaluate_counts_them() {
-    let place = place();
-    let at = place.path();
+    let at = &place();
     classes_of_recordings(at);
     for (name, count, seed) in [("known.csv", 240, 1), ("unseen.csv", 100, 2)] {
         fs::write(at.join(name), recordings(count, seed)).unwrap();
@@ -259,11 +228,7 @@ fn verdicts_go_on_through_recordings_of_events_at_a_promised_rate_and_as_evaluat
     let number = |key: &str| found[key].as_f64().unwrap();
     assert_eq!([number("recordings"), number("events"), number("too_long")], [100.0, 200.0, 0.0]);
     assert!(number("named") > 150.0 && number("mean_delay") < 1.5 && found["finding"] == "kept", "{found}");
-    let text = succeeds(at, &evaluate);
-    assert!(
-        text.contains("promised: at most 120 per hour") && text.contains("as few false by a majority of "),
-        "{text}"
-    );
+    let text = says(at, &evaluate, &["promised: at most 120 per hour", "as few false by a majority of "]);
     assert!(text.contains("as few false by debouncing of "), "{text}");
     let said = succeeds(at, "recognize sure unseen.csv --features --add-up --sequence-column id --json");
     let verdicts: Vec<Value> = lines(&said).into_iter().filter(|line| line["verdict"] == "recognized").collect();
@@ -272,8 +237,7 @@ fn verdicts_go_on_through_recordings_of_events_at_a_promised_rate_and_as_evaluat
     let inspected = figures(at, "inspect sure");
     assert_eq!(inspected["events"]["background"], "low");
     assert_eq!([&inspected["events"]["hold_off"], &inspected["events"]["grace"]], [1.5, 1.0]);
-    let text = succeeds(at, "inspect sure");
-    assert!(text.contains("between low, at 10.0 rows per second; 1.5 s from one verdict to the next"), "{text}");
+    says(at, "inspect sure", &["between low, at 10.0 rows per second; 1.5 s from one verdict to the next"]);
     // The same seed gives the same bytes.
     let first = fs::read(at.join("sure")).unwrap();
     succeeds(at, &calibrate);
@@ -282,8 +246,7 @@ fn verdicts_go_on_through_recordings_of_events_at_a_promised_rate_and_as_evaluat
 
 #[test]
 fn what_is_wrong_with_recordings_of_events_is_said_and_nothing_is_written() {
-    let place = place();
-    let at = place.path();
+    let at = &place();
     classes_of_recordings(at);
     fs::write(at.join("recordings.csv"), recordings(20, 1)).unwrap();
     for (options, code, expected) in [

@@ -1,4 +1,4 @@
-use crate::{command, shapes, succeeds};
+use crate::{Folder, command, shapes, succeeds};
 use std::process::Command;
 
 /// The lines for a capture without Dask, as the documentation has them.
@@ -10,8 +10,8 @@ fn documented(start: &str) -> &'static str {
 #[cfg(unix)]
 #[test]
 fn the_documented_lines_capture_in_parts_that_are_the_whole_together() {
-    let directory = tempfile::tempdir().unwrap();
-    let path = directory.path();
+    let at = &Folder::new();
+    let path = at;
     shapes(path);
     succeeds(path, "capture meshes/ -o one --touches 500");
     let program = command([""; 0]).get_program().to_owned();

@@ -1,13 +1,12 @@
 //! Objects that a model does not know: from shapes to figures, as a user does it.
 
 use crate::fixtures::STRANGERS;
-use crate::{cut, fails, figures, lines, palpate, stdout, succeeds};
+use crate::{cut, fails, figures, lines, palpate, says, stdout, succeeds};
 use serde_json::Value;
 
 #[test]
 fn a_stranger_is_unknown_to_a_model_that_was_calibrated_for_strangers() {
-    let place = STRANGERS.folder();
-    let at = place.path();
+    let at = &STRANGERS.folder();
     let trained = figures(at, "train data -o e.json --trees rounds=10 --background shapes");
     assert_eq!(trained["objects"], 2, "a background is no object");
     succeeds(at, "export e.json -o m.palpate");
@@ -31,13 +30,12 @@ fn a_stranger_is_unknown_to_a_model_that_was_calibrated_for_strangers() {
     let inspected = figures(at, "inspect c.palpate");
     assert_eq!((&inspected["background"], &inspected["strangers"]["held"]), (&true.into(), &"certain".into()));
     assert_eq!(inspected["objects"].as_array().unwrap().len(), 2);
-    assert!(succeeds(at, "inspect c.palpate").contains("strangers"));
+    says(at, "inspect c.palpate", &["strangers"]);
 }
 
 #[test]
 fn a_test_is_calibrated_on_recordings_and_those_without_a_sequence_are_named() {
-    let place = STRANGERS.folder();
-    let at = place.path();
+    let at = &STRANGERS.folder();
     // Both objects bend more than they are simulated.
     let robot = at.join("robot");
     std::fs::create_dir(&robot).unwrap();
@@ -54,16 +52,14 @@ fn a_test_is_calibrated_on_recordings_and_those_without_a_sequence_are_named() {
     let [alarms, sequences, supported] =
         ["alarms", "sequences", "supported"].map(|key| recorded[key].as_f64().unwrap());
     assert!(alarms <= supported * sequences, "{made}");
-    let text = succeeds(at, &with);
-    assert!(text.contains("The test rests on recorded touches"), "{text}");
+    says(at, &with, &["The test rests on recorded touches"]);
     let expected = "few: the 4 recorded approaches to fork make no sequence that ends with a name";
     fails(at, &format!("{alone} --recorded few"), 1, expected);
 }
 
 #[test]
 fn strangers_and_backgrounds_that_cannot_be_are_refused_and_nothing_is_written() {
-    let place = STRANGERS.folder();
-    let at = place.path();
+    let at = &STRANGERS.folder();
     for (from, to) in [("fork", "named/fork"), ("bowl", "named/background"), ("bowl", "partial/shape")] {
         cut(&at.join(format!("data/{from}.txt")), &at.join(format!("{to}.txt")), 100);
     }
@@ -81,12 +77,10 @@ fn strangers_and_backgrounds_that_cannot_be_are_refused_and_nothing_is_written()
 
 #[test]
 fn shares_of_strangers_are_dashes_where_touches_run_out_before_a_verdict() {
-    let place = STRANGERS.folder();
-    let at = place.path();
+    let at = &STRANGERS.folder();
     cut(&at.join("others/kettle.txt"), &at.join("few/kettle.txt"), 4);
     let evaluate = "evaluate model.palpate unseen --sequences 200 --error-rate 0.01% --unknown";
-    let text = succeeds(at, &format!("{evaluate} few"));
-    assert!(text.contains("kettle –") && text.contains("A dash (–): not known"), "{text}");
+    let text = says(at, &format!("{evaluate} few"), &["kettle –", "A dash (–): not known"]);
     assert!(text.contains("drawn from 2 at least"), "{text}");
     let strangers = &figures(at, &format!("{evaluate} few"))["strangers"];
     assert!(strangers["wrong_name"].is_null() && strangers["detected"]["30"].is_null(), "{strangers}");
@@ -101,8 +95,7 @@ fn shares_of_strangers_are_dashes_where_touches_run_out_before_a_verdict() {
 
 #[test]
 fn a_promise_for_other_noise_than_that_of_the_training_is_noted() {
-    let place = STRANGERS.folder();
-    let at = place.path();
+    let at = &STRANGERS.folder();
     succeeds(at, "train data -o e.json --trees rounds=5 --real noise=0..5ms,timer=1ms");
     succeeds(at, "export e.json -o m.palpate");
     let calibrated = |more: &str| {

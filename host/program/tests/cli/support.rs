@@ -1,8 +1,41 @@
 //! Running the program, and files for it.
 
 use palpate::mesh::{Mesh, obj};
+use std::io::Write;
+use std::net::TcpListener;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::thread::JoinHandle;
+use tempfile::TempDir;
+
+/// A folder of one test.
+pub(crate) struct Folder(TempDir);
+
+impl Folder {
+    pub(crate) fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    /// The absolute path of a file in it.
+    pub(crate) fn text(&self, name: &str) -> String {
+        self.join(name).to_str().unwrap().to_owned()
+    }
+}
+
+impl Deref for Folder {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        self.0.path()
+    }
+}
+
+impl AsRef<Path> for Folder {
+    fn as_ref(&self) -> &Path {
+        self
+    }
+}
 
 /// The program with these arguments.
 pub(crate) fn command<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command {
@@ -13,6 +46,20 @@ pub(crate) fn command<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<It
 
 pub(crate) fn run<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> Output {
     command(arguments).output().unwrap()
+}
+
+/// Runs a command that reads this input, or ends before it has read it.
+pub(crate) fn piped(mut command: Command, input: &[u8]) -> Output {
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let _ = child.stdin.take().unwrap().write_all(input);
+    child.wait_with_output().unwrap()
+}
+
+/// A port at which `chip` takes connections, in a thread of its own.
+pub(crate) fn listen(chip: impl FnOnce(TcpListener) + Send + 'static) -> (String, JoinHandle<()>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = format!("tcp://{}", listener.local_addr().unwrap());
+    (port, std::thread::spawn(move || chip(listener)))
 }
 
 /// The output of a run that must succeed.
@@ -54,13 +101,44 @@ pub(crate) fn figures(directory: &Path, words: &str) -> serde_json::Value {
     json(palpate(directory, &format!("{words} --json")))
 }
 
-/// Runs and fails with this exit code; the message must contain `expected`.
+/// The output of a run in a directory that must succeed and say all of `expected`.
+#[track_caller]
+pub(crate) fn says(directory: &Path, words: &str, expected: &[&str]) -> String {
+    let text = succeeds(directory, words);
+    holds(&text, expected);
+    text
+}
+
+/// A text contains all of `expected`.
+#[track_caller]
+pub(crate) fn holds(text: &str, expected: &[&str]) {
+    for part in expected {
+        assert!(text.contains(part), "{part:?} is not in {text}");
+    }
+}
+
+/// Runs and fails with this exit code and nothing on standard output; the message must contain `expected`.
 #[track_caller]
 pub(crate) fn fails(directory: &Path, words: &str, code: i32, expected: &str) {
     let output = palpate(directory, words);
     assert!(output.stdout.is_empty(), "{words}");
+    complains(output, words, code, expected);
+}
+
+/// A run `of` these words failed with this exit code, and its message contains every part of `expected`; ` … ` separates parts.
+#[track_caller]
+pub(crate) fn complains(output: Output, of: &str, code: i32, expected: &str) {
     let message = stderr(output, code);
-    assert!(message.contains(expected), "{words}: {message}");
+    for part in expected.split(" … ") {
+        assert!(message.contains(part), "{of}: {part:?} is not in {message}");
+    }
+}
+
+/// The bytes that `inspect` states for a model's parts add up to all of its bytes.
+#[track_caller]
+pub(crate) fn parts_are_all_bytes(inspected: &serde_json::Value) {
+    let parts = inspected["bytes_by_part"].as_object().unwrap().values();
+    assert_eq!(inspected["bytes"], parts.map(|bytes| bytes.as_u64().unwrap()).sum::<u64>());
 }
 
 /// The JSON of a file.
@@ -78,6 +156,15 @@ pub(crate) fn cut(from: &Path, to: &Path, count: usize) {
     let text = std::fs::read_to_string(from).unwrap();
     std::fs::create_dir_all(to.parent().unwrap()).unwrap();
     std::fs::write(to, text.split_inclusive('\n').take(count).collect::<String>()).unwrap();
+}
+
+/// A normal number of deviation 1, nearly, from a state that it changes.
+pub(crate) fn normal(state: &mut u64) -> f64 {
+    let mut uniform = || {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
 /// Writes touches of an object that bends by up to `most` microseconds, in any order; other seeds are other touches. A touch

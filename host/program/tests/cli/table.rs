@@ -2,12 +2,11 @@
 //! command that takes recordings.
 
 use crate::fixtures::TABLE;
-use crate::{cut, fails, figures, listing, palpate, read, stderr, succeeds};
+use crate::{Folder, cut, fails, figures, listing, read, says, succeeds};
 
 #[test]
 fn recordings_on_a_table_are_taken_by_every_command_with_their_placements_or_without() {
-    let place = TABLE.folder();
-    let at = place.path();
+    let at = &TABLE.folder();
     let sessions = read(&at.join("stated/dataset.json"))["recorded"].take();
     let sessions = sessions.as_array().unwrap();
     assert!(sessions.iter().all(|session| session["placement"].is_string()), "{sessions:?}");
@@ -41,8 +40,7 @@ fn recordings_on_a_table_are_taken_by_every_command_with_their_placements_or_wit
 
 #[test]
 fn a_probe_over_a_table_is_fitted_from_objects_that_stand_on_it() {
-    let place = TABLE.folder();
-    let at = place.path();
+    let at = &TABLE.folder();
     for object in ["brick", "slab"] {
         cut(&at.join(format!("{object}+z.txt")), &at.join("short.txt"), 60);
         succeeds(at, &format!("data record short.txt -o recorded --object {object}/+z --pose"));
@@ -51,8 +49,7 @@ fn a_probe_over_a_table_is_fitted_from_objects_that_stand_on_it() {
     let expected = "scene is floating. Use table: the recordings state placements on one, such as brick/";
     fails(at, fit, 2, expected);
     fails(at, &format!("{fit} --cone 45"), 2, "--scene table");
-    let said = succeeds(at, &format!("{fit} --scene table --approaches 1000"));
-    assert!(said.contains(" on a table: ") && said.contains("Wrote probe.toml"), "{said}");
+    let said = says(at, &format!("{fit} --scene table --approaches 1000"), &[" on a table: ", "Wrote probe.toml"]);
     let speed = said.lines().find_map(|line| line.strip_prefix("speed over nominal")).unwrap();
     let speed: f64 = speed.split_whitespace().next().unwrap().parse().unwrap();
     assert!((speed - 1.0).abs() < 0.05, "{said}");
@@ -62,15 +59,11 @@ fn a_probe_over_a_table_is_fitted_from_objects_that_stand_on_it() {
 
 #[test]
 fn names_of_placements_that_cannot_be_are_refused_by_name() {
-    let place = tempfile::tempdir().unwrap();
-    let at = place.path();
+    let at = &Folder::new();
     std::fs::write(at.join("lines.txt"), "0 0.1 -\n0 0.2 0.3\n").unwrap();
     for object in ["bowl/", "/+z", "bowl/+z/2", "bowl/..", "a\\b/+z"] {
-        let error = stderr(palpate(at, &format!("data record lines.txt -o out --object {object}")), 1);
-        assert!(
-            error.contains("no file can be named after") && error.contains("OBJECT/PLACEMENT"),
-            "{object}: {error}"
-        );
+        let record = format!("data record lines.txt -o out --object {object}");
+        fails(at, &record, 1, "no file can be named after … OBJECT/PLACEMENT");
     }
     assert!(!at.join("out/dataset.json").exists());
 }

@@ -1,7 +1,7 @@
 //! Objects that are learned from recorded touches: `palpate train --teach`.
 
 use crate::fixtures::TAUGHT;
-use crate::{fails, figures, palpate, shapes, stderr, succeeds};
+use crate::{Folder, complains, fails, figures, holds, palpate, says, shapes, succeeds};
 use std::fs;
 use std::path::Path;
 
@@ -13,18 +13,16 @@ fn touches(path: &Path, most: u64, count: u64, seed: u64) {
 
 #[test]
 fn a_recorded_object_is_taught_exported_and_recognized() {
-    let place = TAUGHT.folder();
-    let at = place.path();
+    let at = &TAUGHT.folder();
     let text = succeeds(at, "train data --teach pot.txt -o t.json --trees rounds=6,depth=4");
-    for part in [
+    let expected = [
         "pot: 300 recorded approaches, 300 of them evidence",
         "recorded touches that were held out",
         "approaches  recognized",
         "Of the other objects",
         "No promise can be made yet. To promise 1 % wrong names takes 299 sequences that end with a name, none of them a wrong one, 100 of each object",
-    ] {
-        assert!(text.contains(part), "{part}: {text}");
-    }
+    ];
+    holds(&text, &expected);
     assert!(
         text.contains("to pot would hardly help") || text.contains("approaches to pot the error would be"),
         "{text}"
@@ -32,14 +30,11 @@ fn a_recorded_object_is_taught_exported_and_recognized() {
     succeeds(at, "export t.json -o t.palpate");
     let extend = "train data --extend t.json --teach cup.txt -o u.json --page cup.html";
     touches(&at.join("cup.txt"), 20_000, 100, 9);
-    let error = stderr(palpate(at, extend), 1);
-    assert!(error.contains("there are no touches of pot, which the ensemble knows"), "{error}");
+    complains(palpate(at, extend), extend, 1, "there are no touches of pot, which the ensemble knows");
     fs::copy(at.join("unseen/pot.txt"), at.join("data/pot.txt")).unwrap();
     succeeds(at, extend);
     let page = fs::read_to_string(at.join("cup.html")).unwrap();
-    for part in ["Errors against approaches", "palpate train data --extend t.json", "<svg", "cup"] {
-        assert!(page.contains(part), "{part}");
-    }
+    holds(&page, &["Errors against approaches", "palpate train data --extend t.json", "<svg", "cup"]);
     let found = figures(at, "evaluate t.palpate unseen --at 20 --sequences 300");
     for object in ["bowl", "fork", "pot"] {
         assert!(found["per_object"][object]["20"].as_f64() > Some(0.8), "{object}: {}", found["per_object"]);
@@ -55,8 +50,7 @@ fn a_recorded_object_is_taught_exported_and_recognized() {
 
 #[test]
 fn teaching_an_ensemble_that_is_there_gives_what_training_it_again_gives() {
-    let place = TAUGHT.folder();
-    let at = place.path();
+    let at = &TAUGHT.folder();
     succeeds(at, "train data --extend ensemble.json --teach pot.txt -o extended.json");
     succeeds(at, "train data --teach pot.txt -o again.json --trees rounds=6,depth=4 --threads 1");
     assert!(fs::read(at.join("again.json")).unwrap() == fs::read(at.join("extended.json")).unwrap());
@@ -64,8 +58,7 @@ fn teaching_an_ensemble_that_is_there_gives_what_training_it_again_gives() {
 
 #[test]
 fn several_recordings_are_taught_at_once_and_alone() {
-    let place = TAUGHT.folder();
-    let at = place.path();
+    let at = &TAUGHT.folder();
     touches(&at.join("more/cup.txt"), 20_000, 120, 7);
     let trained = figures(at, "train data --teach pot.txt --teach more -o both.json --trees rounds=6,depth=4");
     assert_eq!(trained["objects"], 4);
@@ -79,8 +72,7 @@ fn several_recordings_are_taught_at_once_and_alone() {
 
 #[test]
 fn recorded_touches_of_known_objects_adjust_the_model_and_new_ones_are_taught() {
-    let place = TAUGHT.folder();
-    let at = place.path();
+    let at = &TAUGHT.folder();
     // This bowl and fork bend more than the simulated ones.
     touches(&at.join("robot/bowl.txt"), 170_000, 300, 5);
     touches(&at.join("robot/fork.txt"), 330_000, 300, 6);
@@ -89,8 +81,7 @@ fn recorded_touches_of_known_objects_adjust_the_model_and_new_ones_are_taught() 
     assert_eq!((&made["objects"], &made["adjusted"]["is_better"]), (&2.into(), &true.into()), "{made}");
     assert!(made["adjusted"]["adjusted"]["loss"].as_f64() < made["adjusted"]["given"]["loss"].as_f64(), "{made}");
     assert!(made["taught"].is_null(), "{made}");
-    let text = succeeds(at, train);
-    assert!(text.contains("bowl (300), fork (300)") && text.contains("The adjusted model is better"), "{text}");
+    says(at, train, &["bowl (300), fork (300)", "The adjusted model is better"]);
     let made = figures(at, &format!("{train} --teach pot.txt"));
     assert_eq!((&made["objects"], &made["taught"]["objects"][0]["name"]), (&3.into(), &"pot".into()), "{made}");
     // Recordings like the simulation do not improve it.
@@ -104,8 +95,7 @@ fn recorded_touches_of_known_objects_adjust_the_model_and_new_ones_are_taught() 
 
 #[test]
 fn what_does_not_go_together_is_named_and_nothing_is_written() {
-    let place = TAUGHT.folder();
-    let at = place.path();
+    let at = &TAUGHT.folder();
     touches(&at.join("few/pot.txt"), 500_000, 12, 5);
     touches(&at.join("shy/bowl.txt"), 100_000, 12, 5);
     fs::write(at.join("cup.txt"), "0 0.1 0.2\n0 0.1 -\n0 zero 0.2\n").unwrap();
@@ -139,8 +129,7 @@ fn what_does_not_go_together_is_named_and_nothing_is_written() {
 
 #[test]
 fn a_recording_with_another_probe_or_without_poses_is_refused() {
-    let place = tempfile::tempdir().unwrap();
-    let at = place.path();
+    let at = &Folder::new();
     fs::create_dir(at.join("data")).unwrap();
     for (name, most) in [("data/bowl", 100_000), ("data/fork", 200_000), ("pot", 500_000)] {
         crate::touches(&at.join(format!("{name}.txt")), [most, 300, 1], true, " 0 0 1 1 0 0");
