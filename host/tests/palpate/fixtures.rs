@@ -1,4 +1,4 @@
-//! What most tests use, and what they do with touches.
+//! Imports that most tests need, and helpers for touches.
 
 pub(crate) use crate::repetitions::{assert_rare, repetitions};
 pub(crate) use palpate::compile::CompiledModel;

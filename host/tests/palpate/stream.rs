@@ -198,7 +198,7 @@ fn repeated(population: &Population, count: usize, rate: f64, repetitions: u64) 
     figures
 }
 
-/// So many where a simulation is often repeated, else a few.
+/// The larger number where a simulation is often repeated, else the smaller one.
 fn many_or(few: usize, repetitions: u64, many: usize) -> usize {
     if repetitions > 20 { many } else { few }
 }

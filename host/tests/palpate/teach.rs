@@ -7,7 +7,7 @@ use palpate::error::TeachProblem;
 use palpate::mesh::BACKGROUND;
 use palpate::teach::{Settings, alone, teach};
 
-/// Of the objects to train on that [`to_teach`] gives.
+/// Ensemble of the objects that [`to_teach`] gives to train on.
 static TRAINED: LazyLock<Ensemble> = LazyLock::new(|| train(&to_teach(60)[0], &few_trees(), &()).unwrap());
 
 fn few_groups() -> Settings {

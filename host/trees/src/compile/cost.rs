@@ -114,7 +114,7 @@ impl Memory {
 }
 
 /// Features of palpate-onboard that models need, and the bytes of flash of each on a Cortex-M4F and a Cortex-M0+, beyond
-/// what all of them have: `verdict` images of the firmware, which `cargo test --release -p palpate-tests --test whole images:: -- --ignored` compares.
+/// what all of them have: `verdict` images of the firmware, which the ignored tests of `tests/tests/whole/images.rs` compare.
 pub const FEATURES: [(&str, [usize; 2]); 15] = [
     ("compact", [780, 1_012]),
     ("complete", [2_048, 1_932]),

@@ -20,7 +20,7 @@ fn changed(change: Change) -> Ensemble {
     changed
 }
 
-/// What is wrong with a changed ensemble, which leaves no file.
+/// Error of saving a changed ensemble, which leaves no file.
 fn unsaved(change: Change) -> EnsembleProblem {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("ensemble.json");
