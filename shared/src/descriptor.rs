@@ -317,7 +317,8 @@ fn oriented(alignment: [i16; 3], ends: [i32; 2], contacts: bool) -> [i16; 3] {
 mod tests {
     use super::*;
     use crate::ContactPattern;
-    use std::vec::Vec;
+
+    const NONE: i32 = MISSING_FEATURE;
 
     fn touch() -> Touch {
         Touch::from_micros([30_000, 0, 50_000]).with_pose(Pose { direction: [1, 2, 3], alignment: [-4, 5, 6] })
@@ -328,11 +329,6 @@ mod tests {
         let mut times = [ContactTime::MISSING; 3];
         times[finger] = ContactTime::FIRST;
         Touch::new(times)
-    }
-
-    #[test]
-    fn curvature_is_the_second_difference_and_slope_the_absolute_first() {
-        assert_eq!(Descriptor::Curvature.features(&touch()).as_slice(), [80_000, 20_000]);
     }
 
     #[test]
@@ -355,12 +351,6 @@ mod tests {
     }
 
     #[test]
-    fn gravity_and_oriented_append_the_pose() {
-        assert_eq!(Descriptor::Gravity.features(&touch()).as_slice(), [80_000, 20_000, 3, 6]);
-        assert_eq!(Descriptor::Oriented.features(&touch()).as_slice(), [80_000, 20_000, 1, 2, 3, -4, 5, 6]);
-    }
-
-    #[test]
     fn every_descriptor_but_times_is_blind_to_mirroring() {
         let level = Touch::from_micros([7, 0, 7]).with_pose(Pose { direction: [1, 2, 3], alignment: [0, -5, 6] });
         let partial = Touch::new([ContactTime::MISSING, ContactTime::FIRST, ContactTime::from_micros(9)]);
@@ -375,17 +365,31 @@ mod tests {
     }
 
     #[test]
-    fn missing_contacts_leave_features_missing() {
+    fn each_descriptor_has_the_features_of_its_contacts_and_pose() {
         let partial = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(9)]);
-        assert_eq!(Descriptor::Times.features(&partial).as_slice(), [0, MISSING_FEATURE, 9]);
-        assert_eq!(Descriptor::Curvature.features(&partial).as_slice(), [MISSING_FEATURE, 9]);
-        let no_pose: Vec<i32> = Descriptor::Gravity.features(&partial).as_slice().to_vec();
-        assert_eq!(no_pose, [MISSING_FEATURE, 9, MISSING_FEATURE, MISSING_FEATURE]);
+        let slow = Touch::from_micros([0, u32::MAX - 1, 0]);
+        let late = Touch::new([ContactTime::MISSING, ContactTime::FIRST, ContactTime::from_micros(u32::MAX - 1)]);
+        let outer = i32::from(ContactPattern::OuterAndMiddle.code());
+        let cases: [(Descriptor, Touch, &[i32]); 10] = [
+            (Descriptor::Curvature, touch(), &[80_000, 20_000]),
+            (Descriptor::Gravity, touch(), &[80_000, 20_000, 3, 6]),
+            (Descriptor::Oriented, touch(), &[80_000, 20_000, 1, 2, 3, -4, 5, 6]),
+            (Descriptor::ContactsOriented, touch(), &[5, 80_000, 20_000, NONE, 1, 2, 3, -4, 5, 6]),
+            (Descriptor::ContactsGravity, touch(), &[5, 80_000, 20_000, NONE, 3, 6]),
+            (Descriptor::Times, partial, &[0, NONE, 9]),
+            (Descriptor::Curvature, partial, &[NONE, 9]),
+            (Descriptor::Gravity, partial, &[NONE, 9, NONE, NONE]),
+            (Descriptor::Curvature, slow, &[-FEATURE_LIMIT, 0]),
+            (Descriptor::ContactsCurvature, late, &[outer, NONE, NONE, -FEATURE_LIMIT]),
+        ];
+        for (descriptor, touch, features) in cases {
+            assert_eq!(descriptor.features(&touch).as_slice(), features, "{descriptor:?}");
+        }
+        assert_eq!(FEATURE_LIMIT as f32 as i32, FEATURE_LIMIT);
     }
 
     #[test]
     fn contacts_begin_with_the_pattern_and_have_the_differences_that_exist() {
-        const NONE: i32 = MISSING_FEATURE;
         let some = ContactTime::from_micros;
         let missing = ContactTime::MISSING;
         let cases = [
@@ -404,11 +408,6 @@ mod tests {
                 assert_eq!(descriptor.features(&touch).as_slice()[..4], expected, "{pattern}");
             }
         }
-        assert_eq!(
-            Descriptor::ContactsOriented.features(&touch()).as_slice(),
-            [5, 80_000, 20_000, NONE, 1, 2, 3, -4, 5, 6]
-        );
-        assert_eq!(Descriptor::ContactsGravity.features(&touch()).as_slice(), [5, 80_000, 20_000, NONE, 3, 6]);
     }
 
     #[test]
@@ -447,15 +446,6 @@ mod tests {
             assert_eq!(contacts.needs_pose(), descriptor.needs_pose());
             assert_eq!(contacts.feature_count(), descriptor.for_full_touches().feature_count() + 2);
         }
-    }
-
-    #[test]
-    fn features_are_clamped_to_what_f32_holds_exactly() {
-        let slow = Touch::from_micros([0, u32::MAX - 1, 0]);
-        assert_eq!(Descriptor::Curvature.features(&slow).as_slice(), [-FEATURE_LIMIT, 0]);
-        let late = Touch::new([ContactTime::MISSING, ContactTime::FIRST, ContactTime::from_micros(u32::MAX - 1)]);
-        assert_eq!(Descriptor::ContactsCurvature.features(&late).as_slice()[3], -FEATURE_LIMIT);
-        assert_eq!(FEATURE_LIMIT as f32 as i32, FEATURE_LIMIT);
     }
 
     #[test]

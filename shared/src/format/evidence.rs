@@ -166,13 +166,11 @@ impl<'a> Weights<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::tests::{assert_refused, written};
     use std::vec::Vec;
 
     fn table(start: i32, [dropped, between, scale]: [u8; 3], values: &[u8]) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let shifts = Shifts { dropped, between, scale };
-        RowEvidence::write(start, shifts, values, &mut |part| bytes.extend_from_slice(part));
-        bytes
+        written(|put| RowEvidence::write(start, Shifts { dropped, between, scale }, values, put))
     }
 
     #[test]
@@ -221,15 +219,12 @@ mod tests {
 
     #[test]
     fn tables_that_make_no_sense_are_refused() {
-        let valid = || table(0, [4, 3, 0], &[1, 2, 3]);
-        assert!(RowEvidence::from_bytes(&valid()).is_some());
-        for (at, byte) in [(4, 24), (4, 255), (5, 16), (6, 20), (6, 255), (7, 0), (7, 3), (8, 3), (3, 0x41), (3, 0x80)]
-        {
-            let mut bytes = valid();
-            bytes[at] = byte;
-            assert_eq!(RowEvidence::from_bytes(&bytes), None, "{at}: {byte}");
+        let valid = table(0, [4, 3, 0], &[1, 2, 3]);
+        let wrong = [(4, 24), (4, 255), (5, 16), (6, 20), (6, 255), (7, 0), (7, 3), (8, 3), (3, 0x41), (3, 0x80)];
+        for (at, byte) in wrong {
+            assert_refused(&valid, &[(at, &[byte])], |bytes| RowEvidence::from_bytes(bytes).is_some());
         }
-        assert_eq!(RowEvidence::from_bytes(&valid()[..10]), None);
+        assert_eq!(RowEvidence::from_bytes(&valid[..10]), None);
         assert_eq!(RowEvidence::from_bytes(&table(0, [4, 0, 0], &[0; 130])), None);
         assert!(RowEvidence::from_bytes(&table(0, [4, 0, 0], &[0; 129])).is_some());
     }
@@ -239,8 +234,7 @@ mod tests {
         let positions: Vec<usize> = (0..=16).map(Weights::position).collect();
         assert_eq!(positions, [0, 0, 2, 3, 4, 4, 5, 5, 6, 6, 6, 6, 7, 7, 7, 7, 8]);
         assert_eq!(Weights::position(u32::MAX), 63);
-        let mut bytes = Vec::new();
-        Weights::write(&[65_536, 65_536, 40_000, 1], &mut |part| bytes.extend_from_slice(part));
+        let bytes = written(|put| Weights::write(&[65_536, 65_536, 40_000, 1], put));
         let read = Weights::from_bytes(&bytes).unwrap();
         assert_eq!([0, 1, 2, 3, 4, u32::MAX].map(|touches| read.of(touches)), [65_536, 65_536, 40_000, 1, 1, 1]);
         assert_eq!(Weights::from_bytes(&bytes[..9]), None);

@@ -49,3 +49,26 @@ pub const MARGIN_LIMIT: i32 = 1 << 30;
 
 /// The largest depth of trees in [`Layout::Complete`].
 pub const MAX_COMPLETE_DEPTH: u8 = 8;
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    /// The bytes that something writes in parts.
+    pub(super) fn written(write: impl FnOnce(&mut &mut dyn FnMut(&[u8]))) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut put: &mut dyn FnMut(&[u8]) = &mut |part| bytes.extend_from_slice(part);
+        write(&mut put);
+        bytes
+    }
+
+    /// Nothing is read from bytes with any of these in them, each at its place, though it is from the bytes as they are.
+    pub(super) fn assert_refused(bytes: &[u8], wrong: &[(usize, &[u8])], is_read: impl Fn(&[u8]) -> bool) {
+        assert!(is_read(bytes));
+        for (place, wrong) in wrong {
+            let mut bytes = bytes.to_vec();
+            bytes[*place..place + wrong.len()].copy_from_slice(wrong);
+            assert!(!is_read(&bytes), "byte {place}: {wrong:?}");
+        }
+    }
+}

@@ -79,11 +79,10 @@ impl<'a> Outputs<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::tests::written;
 
     fn content(outputs: &[(u8, f64)]) -> std::vec::Vec<u8> {
-        let mut content = std::vec::Vec::new();
-        Outputs::write(outputs.iter().copied(), &mut |bytes| content.extend_from_slice(bytes));
-        content
+        written(|put| Outputs::write(outputs.iter().copied(), put))
     }
 
     #[test]

@@ -113,11 +113,10 @@ impl Sentinel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::tests::{assert_refused, written};
 
     fn content(prediction: Prediction) -> std::vec::Vec<u8> {
-        let mut content = std::vec::Vec::new();
-        prediction.write(&mut |part| content.extend_from_slice(part));
-        content
+        written(|put| prediction.write(put))
     }
 
     #[test]
@@ -133,14 +132,10 @@ mod tests {
         let averaged = content(Prediction { average: 500, ..Prediction::default() });
         assert_eq!(Link::from_code(averaged[0]), None);
         assert_eq!(Prediction::from_bytes(&averaged[..11]), None, "too short");
-        assert_eq!(Prediction::from_bytes(&[&averaged[..8], &[0; 4]].concat()), None, "divided by 0");
+        assert_refused(&averaged, &[(8, &[0; 4])], |bytes| Prediction::from_bytes(bytes).is_some());
         let bytes = content(Prediction::default());
         assert_eq!(Prediction::from_bytes(&bytes[..7]), None);
-        for (at, wrong) in [(0, 5), (1, 2)] {
-            let mut bytes = bytes.clone();
-            bytes[at] = wrong;
-            assert_eq!(Prediction::from_bytes(&bytes), None, "byte {at}");
-        }
+        assert_refused(&bytes, &[(0, &[5]), (1, &[2])], |bytes| Prediction::from_bytes(bytes).is_some());
         for scale in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             assert_eq!(Prediction::from_bytes(&content(Prediction { scale, ..Prediction::default() })), None);
         }

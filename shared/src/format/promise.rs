@@ -252,6 +252,7 @@ impl Temperature {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::tests::assert_refused;
     use std::vec::Vec;
 
     const PROMISE: Promise = Promise {
@@ -322,11 +323,7 @@ mod tests {
             (16, &[0xff; 4]),
             (20, &[0xff; 4]),
         ];
-        for (place, value) in wrong {
-            let mut bytes = bytes(&PROMISE);
-            bytes[place..place + value.len()].copy_from_slice(value);
-            assert_eq!(Promise::from_bytes(&bytes), None, "{place}");
-        }
+        assert_refused(&bytes(&PROMISE), &wrong, |bytes| Promise::from_bytes(bytes).is_some());
     }
 
     #[test]

@@ -250,6 +250,7 @@ impl ObjectMisfit<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::tests::{assert_refused, written};
     use std::vec::Vec;
 
     const TERMS: MisfitTerms = MisfitTerms {
@@ -323,21 +324,16 @@ mod tests {
             (record, &[41]),
             (record + 8, &[4]),
         ];
-        for (position, wrong) in wrong {
-            let mut bytes = bytes.clone();
-            bytes[position..position + wrong.len()].copy_from_slice(wrong);
-            assert_eq!(Strangers::from_bytes(&bytes, 4), None, "byte {position}: {wrong:?}");
-        }
+        assert_refused(&bytes, &wrong, |bytes| Strangers::from_bytes(bytes, 4).is_some());
     }
 
     #[test]
     fn records_are_as_long_as_stated() {
         for rivals in 1..=MisfitTest::MOST_RIVALS {
-            let mut length = 0;
             let numbers = (0..2 * rivals + rivals * (rivals + 1) / 2).map(|_| 0);
             let all: Vec<u8> = (0..rivals as u8).collect();
-            ObjectMisfit::write([0; 3], 0, &all, numbers, &mut |part| length += part.len());
-            assert_eq!(length, MisfitTest::record_length(rivals));
+            let record = written(|put| ObjectMisfit::write([0; 3], 0, &all, numbers, put));
+            assert_eq!(record.len(), MisfitTest::record_length(rivals));
         }
         assert_eq!(MisfitTest::record_length(9), 144);
     }

@@ -458,6 +458,7 @@ pub fn take_section<'a>(bytes: &mut &'a [u8]) -> Option<Section<'a>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::tests::{assert_refused, written};
     use std::vec::Vec;
 
     const TOUCHES: TrainedTouches = TrainedTouches {
@@ -481,11 +482,12 @@ mod tests {
     #[test]
     fn sections_are_read_back_as_written() {
         let trained = Trained { probe: Some(PROBE), touches: Some(TOUCHES), noise: Some(NOISE), shares: None };
-        let mut bytes = Vec::new();
-        trained.write(|part| bytes.extend_from_slice(part));
-        write_section(Tag::FeatureNames, false, b"seven b", &mut |part| bytes.extend_from_slice(part));
         let shares = PatternShares([9, 8, 7, 6, 5, 65_530]);
-        Trained { shares: Some(shares), ..Trained::default() }.write(|part| bytes.extend_from_slice(part));
+        let bytes = written(|put| {
+            trained.write(&mut *put);
+            write_section(Tag::FeatureNames, false, b"seven b", put);
+            Trained { shares: Some(shares), ..Trained::default() }.write(put);
+        });
         let mut rest = bytes.as_slice();
         let sections: Vec<Section> = core::iter::from_fn(|| take_section(&mut rest)).collect();
         assert!(rest.is_empty());
@@ -503,36 +505,28 @@ mod tests {
     }
 
     #[test]
-    fn a_probe_states_its_stroke_and_travel_and_one_without_is_as_it_was() {
-        assert_eq!(PROBE.length(), 16);
-        assert_eq!(TrainedProbe::from_bytes(&PROBE.to_bytes()[..16]), Some(PROBE));
-        for (stroke, travel) in [(Some(3.0), None), (None, Some(20.0)), (Some(0.5), Some(20.0))] {
-            let probe = TrainedProbe { stroke, travel, ..PROBE };
-            assert_eq!(probe.length(), 24);
+    fn a_probe_is_read_back_and_readers_of_fewer_bytes_know_what_stands_in_them() {
+        let stroke = TrainedProbe { stroke: Some(5.25), ..PROBE };
+        let tolerance = TrainedProbe { stroke_tolerance: Some(0.25), ..stroke };
+        let travel = TrainedProbe { travel: Some(20.0), ..PROBE };
+        let both = TrainedProbe { stroke: Some(0.5), ..travel };
+        let scene = |cone| TrainedProbe { cone, ..PROBE };
+        for (probe, length, shorter, known) in [
+            (PROBE, 16, 16, PROBE),
+            (stroke, 24, 23, PROBE),
+            (travel, 24, 23, PROBE),
+            (both, 24, 23, PROBE),
+            (tolerance, 28, 24, stroke),
+            (scene(1), 16, 16, scene(1)),
+            (scene(6_000), 16, 16, scene(6_000)),
+            (scene(9_000), 16, 16, scene(9_000)),
+        ] {
+            assert_eq!(probe.length(), length);
             assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), Some(probe));
-            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()[..23]), Some(PROBE), "whole fields only");
+            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()[..shorter]), Some(known));
         }
-    }
-
-    #[test]
-    fn a_probe_states_how_well_its_stroke_is_known_behind_what_older_readers_know() {
-        let stated = TrainedProbe { stroke: Some(5.25), ..PROBE };
-        let probe = TrainedProbe { stroke_tolerance: Some(0.25), ..stated };
-        assert_eq!((stated.length(), probe.length()), (24, 28));
-        assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), Some(probe));
-        assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()[..24]), Some(stated), "as version 0.3 reads it");
-        assert_eq!(probe.to_bytes()[..24], stated.to_bytes()[..24]);
-    }
-
-    #[test]
-    fn a_probe_states_its_scene_in_bytes_that_were_zeros() {
-        for cone in [1, 6_000, 9_000] {
-            let probe = TrainedProbe { cone, ..PROBE };
-            assert_eq!(probe.length(), PROBE.length());
-            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), Some(probe));
-        }
+        assert_eq!(tolerance.to_bytes()[..24], stroke.to_bytes()[..24]);
         assert_eq!(PROBE.to_bytes()[12..16], [0; 4]);
-        assert_eq!(TrainedProbe::from_bytes(&TrainedProbe { cone: 9_001, ..PROBE }.to_bytes()), None);
     }
 
     #[test]
@@ -558,11 +552,8 @@ mod tests {
 
     #[test]
     fn contents_that_make_no_sense_are_refused() {
-        for (position, wrong) in [(0, 0), (0, 1), (0, 64), (1, 3), (2, 2)] {
-            let mut bytes = TOUCHES.to_bytes();
-            bytes[position] = wrong;
-            assert_eq!(TrainedTouches::from_bytes(&bytes), None, "byte {position}: {wrong}");
-        }
+        let wrong: [(usize, &[u8]); 5] = [(0, &[0]), (0, &[1]), (0, &[64]), (1, &[3]), (2, &[2])];
+        assert_refused(&TOUCHES.to_bytes(), &wrong, |bytes| TrainedTouches::from_bytes(bytes).is_some());
         for (radius, length) in [(0.0, 0), (-1.0, 0), (f32::NAN, 0), (f32::INFINITY, 0), (0.15, 2)] {
             let mut bytes = TrainedProbe { radius, ..PROBE }.to_bytes();
             bytes[12] = length;
@@ -571,9 +562,9 @@ mod tests {
         assert_eq!(TrainedNoise::from_bytes(&TrainedNoise { least: 20_000, ..NOISE }.to_bytes()), None);
         assert_eq!(TrainedTouches::from_bytes(&TOUCHES.to_bytes()[..7]), None);
         assert_eq!(TrainedProbe::from_bytes(&PROBE.to_bytes()[..15]), None);
-        for wrong in [-1.0, f32::NAN, f32::INFINITY] {
-            let probe = TrainedProbe { stroke: Some(wrong), ..PROBE };
-            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), None, "{wrong}");
+        let strokes = [-1.0, f32::NAN, f32::INFINITY].map(|stroke| TrainedProbe { stroke: Some(stroke), ..PROBE });
+        for probe in strokes.into_iter().chain([TrainedProbe { cone: 9_001, ..PROBE }]) {
+            assert_eq!(TrainedProbe::from_bytes(&probe.to_bytes()), None, "{probe:?}");
         }
         assert_eq!(TrainedNoise::from_bytes(&NOISE.to_bytes()[..15]), None);
     }

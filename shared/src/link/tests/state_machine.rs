@@ -5,6 +5,7 @@
 //! Frames are delivered in any order, twice, late (also after resets), or not at all. Both hosts hear what a chip says that
 //! they are connected to. `PALPATE_LINK_STEPS=1000000` sets the number of steps; without it there are 60,000.
 
+use super::{NAMES, Notebook, number_of};
 use crate::link::*;
 use crate::{Approach, Pose, TablePose, Touch};
 use proptest::prelude::*;
@@ -73,72 +74,8 @@ struct Chip {
     touched: u32,
 }
 
-/// Counts touches, by the number that stands in their first contact time.
-#[derive(Default)]
-struct Notebook {
-    counted: Vec<u32>,
-}
-
-impl Device for Notebook {
-    fn touch(&mut self, touch: &Touch, _: bool) -> Outcome {
-        let number = touch.times()[1].micros().expect("a number");
-        self.counted.push(number);
-        // The outcome identifies its touch.
-        Outcome::Verdict(VerdictMessage { decision: Decision::Undecided, best: 0, touches: number, detail: None })
-    }
-
-    fn press(&mut self, touch: &Touch, position: [i32; 3], detail: bool) -> Outcome {
-        assert_eq!(position, [touch.times()[1].micros().expect("a number").cast_signed(), i32::MIN, -1]);
-        self.touch(touch, detail)
-    }
-
-    fn reset(&mut self) -> Outcome {
-        Outcome::Done
-    }
-
-    fn begin(&mut self, _: Payload, _: u32, _: u32) -> Outcome {
-        Outcome::Done
-    }
-
-    fn chunk(&mut self, _: u32, _: &[u8]) -> Outcome {
-        Outcome::Done
-    }
-
-    fn commit(&mut self) -> Outcome {
-        Outcome::Done
-    }
-
-    fn model(&self) -> Option<ModelInfo> {
-        None
-    }
-
-    fn name(&self, object: u8) -> Option<&str> {
-        NAMES.get(usize::from(object)).copied()
-    }
-
-    fn posterior(&self, _: u8) -> Option<u64> {
-        None
-    }
-
-    fn snapshot(&mut self, _: u32, _: &mut [u8]) -> Result<(u32, usize), Refusal> {
-        Err(Refusal::Unsupported)
-    }
-
-    fn next_approach(&self, without: &[u8; POSE_BYTES]) -> Result<ApproachMessage, Refusal> {
-        Ok(approach(without[0]))
-    }
-
-    fn place(&mut self, rank: u8) -> Result<(bool, Option<TablePose>), Refusal> {
-        Ok((rank >= 4, Some(place(rank))))
-    }
-
-    fn next_press(&mut self, within: Option<u32>) -> Result<Approach, Refusal> {
-        Ok(Approach { x: within.map_or(-1, u32::cast_signed), y: i32::MIN, roll: 255 })
-    }
-}
-
 /// The place of this rank.
-fn place(rank: u8) -> TablePose {
+pub(super) fn place(rank: u8) -> TablePose {
     let position = [i32::from(rank), -1];
     TablePose { placement: rank, position, yaw: 65_535, within: [0, u32::MAX], yaw_within: None, share: 65_536 }
 }
@@ -151,12 +88,10 @@ fn next_approach(number: u8) -> Query {
 }
 
 /// The answer to the question with this number.
-fn approach(number: u8) -> ApproachMessage {
+pub(super) fn approach(number: u8) -> ApproachMessage {
     let middle = Pose { direction: [number.into(), -1, i16::MAX], alignment: [i16::MIN, 0, 7] };
     ApproachMessage::new(number.into(), -i32::from(number), &middle)
 }
-
-const NAMES: [&str; 8] = ["a", "b", "c", "d", "e", "f", "g", "h"];
 
 /// A host, and what its program knows.
 struct Host {
@@ -181,6 +116,7 @@ enum To {
     Host(usize),
 }
 
+#[derive(Clone)]
 struct Frame {
     to: To,
     bytes: Vec<u8>,
@@ -287,32 +223,23 @@ impl World {
                 }
                 self.down(host, frames);
             }
-            Action::Connect(host) => {
-                self.connect(host);
-            }
+            Action::Connect(host) => self.connect(host),
             Action::Plug(host, chip) => self.hosts[host].chip = chip,
+            Action::Deliver(..) | Action::DeliverOldest | Action::Lose(_) if self.under_way.is_empty() => {}
             Action::Deliver(place, again) => {
-                if !self.under_way.is_empty() {
-                    let place = usize::from(place) % self.under_way.len();
-                    let frame = if again {
-                        let Frame { to, ref bytes, resets } = self.under_way[place];
-                        Frame { to, bytes: bytes.clone(), resets }
-                    } else {
-                        self.under_way.swap_remove(place)
-                    };
-                    self.deliver(frame);
-                }
+                let place = usize::from(place) % self.under_way.len();
+                let frame = match again {
+                    true => self.under_way[place].clone(),
+                    false => self.under_way.swap_remove(place),
+                };
+                self.deliver(frame);
             }
             Action::DeliverOldest => {
-                if !self.under_way.is_empty() {
-                    let frame = self.under_way.remove(0);
-                    self.deliver(frame);
-                }
+                let frame = self.under_way.remove(0);
+                self.deliver(frame);
             }
             Action::Lose(place) => {
-                if !self.under_way.is_empty() {
-                    self.under_way.swap_remove(usize::from(place) % self.under_way.len());
-                }
+                self.under_way.swap_remove(usize::from(place) % self.under_way.len());
             }
             Action::Reset(chip) => self.start(chip, Progress::NONE, Notebook::default()),
             Action::Cut(chip, touches) => {
@@ -397,9 +324,9 @@ impl World {
         match frame.to {
             To::Chip(chip) => {
                 let Chip { end, notebook, .. } = &mut self.chips[chip];
-                let before = notebook.counted.len();
+                let before = notebook.touches.len();
                 end.receive(&frame.bytes, notebook, |frame| frames.push(frame.to_vec()));
-                for &touch in &notebook.counted[before..] {
+                for touch in notebook.touches[before..].iter().map(number_of) {
                     let times = self.counted.entry(touch).or_default();
                     *times += 1;
                     assert_eq!(*times, 1, "touch {touch} was counted twice");
@@ -497,7 +424,7 @@ impl World {
                 continue;
             }
             assert!(host.end.is_idle() && host.answered == host.given.len(), "host {number} neither ends nor is told");
-            let counted = &self.chips[host.chip].notebook.counted;
+            let counted: Vec<u32> = self.chips[host.chip].notebook.touches.iter().map(number_of).collect();
             assert!(
                 host.given.iter().all(|touch| counted.contains(touch)),
                 "host {number} believes {:?} to be counted in boot {}, which has {counted:?}",
