@@ -166,30 +166,18 @@ pub(super) fn ratio(part: u64, whole: u64) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// A unit of a thousandth of a nat.
-    fn unit() -> Unit {
+    pub(in crate::decide) fn unit() -> Unit {
         let bits = core::f64::consts::LOG2_E / 1000.0 * 4_294_967_296.0;
         Unit { bits: (bits * 256.0).round() as u32, shift: 8, sharpness: SHARPNESS }
     }
 
     #[test]
-    fn posteriors_are_those_of_a_softmax() {
-        let evidence = [1000, 400, -2500, 999];
-        let weights = evidence.map(|e| (e as f64 / 1000.0).exp());
-        let sum: f64 = weights.iter().sum();
-        for (object, weight) in weights.iter().enumerate() {
-            let posterior = posterior(&evidence, object, unit()).to_f64();
-            assert!((posterior - weight / sum).abs() < 2e-8, "{posterior} for {}", weight / sum);
-        }
-        assert_eq!(posterior(&evidence, 4, unit()), Posterior(0));
-    }
-
-    #[test]
-    fn posteriors_at_a_temperature_are_those_of_a_softmax_of_the_evidence_divided_by_it() {
-        for sharpness in [1 << 12, 40_960, 59_578, 100_000, 1 << 20] {
+    fn posteriors_are_those_of_a_softmax_of_the_evidence_divided_by_the_temperature() {
+        for sharpness in [1 << 12, 40_960, 59_578, SHARPNESS, 100_000, 1 << 20] {
             let evidence = [1000, 400, -2500, 999, i64::MIN];
             let weights = evidence.map(|e| (e as f64 / 1000.0 * f64::from(sharpness) / 65_536.0).exp());
             let sum: f64 = weights.iter().sum();
@@ -197,6 +185,7 @@ mod tests {
                 let posterior = posterior(&evidence, object, Unit { sharpness, ..unit() }).to_f64();
                 assert!((posterior - weight / sum).abs() < 2e-8, "{posterior} for {} at {sharpness}", weight / sum);
             }
+            assert_eq!(posterior(&evidence, 5, Unit { sharpness, ..unit() }), Posterior(0));
         }
     }
 

@@ -136,14 +136,8 @@ pub(super) fn posterior(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decide::evidence::SHARPNESS;
+    use crate::decide::evidence::tests::unit;
     use std::vec::Vec;
-
-    /// A unit of a thousandth of a nat.
-    fn unit() -> Unit {
-        let bits = core::f64::consts::LOG2_E / 1000.0 * 4_294_967_296.0;
-        Unit { bits: (bits * 256.0).round() as u32, shift: 8, sharpness: SHARPNESS }
-    }
 
     fn section(objects: &[u8]) -> Vec<u8> {
         let mut content = Vec::new();

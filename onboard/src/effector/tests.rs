@@ -20,46 +20,80 @@ const SETTINGS: Settings = Settings {
 /// Outcomes of a run: touches and faults, in order.
 type Outcomes = Vec<Result<Touch, Fault>>;
 
-fn poll(effector: &mut Effector, now: u32, outcomes: &mut Outcomes) {
-    while let Some(outcome) = effector.poll(now).transpose() {
-        outcomes.push(outcome);
+/// Edges: finger, closed, time.
+type Edges = [(Finger, bool, u32)];
+
+/// An effector, and what it has told.
+struct Bench {
+    effector: Effector,
+    outcomes: Outcomes,
+}
+
+impl Bench {
+    fn new(settings: Settings) -> Self {
+        Self { effector: Effector::new(settings), outcomes: Outcomes::new() }
     }
-}
 
-/// Plays edges (finger, closed, time) from `start` on, when the fingers have been open for long enough since power-up,
-/// polling at the given times after it as well.
-fn play(start: u32, edges: &[(Finger, bool, u32)], polls: &[u32], end: u32) -> (Outcomes, Effector) {
-    play_after(SETTINGS.release, start, edges, polls, end)
-}
+    /// One whose fingers have been open for long enough since power-up, at this time.
+    fn rested(settings: Settings, at: u32) -> Self {
+        let mut bench = Self::new(settings);
+        bench.poll(at.wrapping_sub(SETTINGS.release));
+        bench.poll(at);
+        bench
+    }
 
-/// Like [`play`], with power-up `rested` before `start`.
-fn play_after(rested: u32, start: u32, edges: &[(Finger, bool, u32)], polls: &[u32], end: u32) -> (Outcomes, Effector) {
-    let mut effector = Effector::new(SETTINGS);
-    let mut outcomes = Outcomes::new();
-    poll(&mut effector, start.wrapping_sub(rested), &mut outcomes);
-    poll(&mut effector, start, &mut outcomes);
-    let mut moments: Vec<(u32, Option<(Finger, bool)>)> =
-        edges.iter().map(|&(finger, closed, at)| (at, Some((finger, closed)))).collect();
-    moments.extend(polls.iter().filter(|&&at| at < end).map(|&at| (at, None)));
-    moments.push((end, None));
-    moments.sort_by_key(|&(at, _)| at);
-    for (at, edge) in moments {
-        let now = start.wrapping_add(at);
-        if let Some((finger, closed)) = edge {
-            let outcome = effector.edge(Edge::new(finger, closed, now)).transpose();
-            outcomes.extend(outcome);
+    fn poll(&mut self, now: u32) {
+        while let Some(outcome) = self.effector.poll(now).transpose() {
+            self.outcomes.push(outcome);
         }
-        poll(&mut effector, now, &mut outcomes);
     }
-    (outcomes, effector)
+
+    fn edges(&mut self, edges: &Edges) {
+        for &(finger, closed, at) in edges {
+            self.outcomes.extend(self.effector.edge(Edge::new(finger, closed, at)).transpose());
+        }
+    }
+
+    /// Plays edges from `start` on, polling at the given times after it as well.
+    fn play(&mut self, start: u32, edges: &Edges, polls: &[u32], end: u32) {
+        let mut moments: Vec<(u32, Option<(Finger, bool)>)> =
+            edges.iter().map(|&(finger, closed, at)| (at, Some((finger, closed)))).collect();
+        moments.extend(polls.iter().filter(|&&at| at < end).map(|&at| (at, None)));
+        moments.push((end, None));
+        moments.sort_by_key(|&(at, _)| at);
+        for (at, edge) in moments {
+            let now = start.wrapping_add(at);
+            if let Some((finger, closed)) = edge {
+                self.edges(&[(finger, closed, now)]);
+            }
+            self.poll(now);
+        }
+    }
 }
 
-/// An effector whose fingers have been open for long enough since power-up, at 50 ms.
-fn rested(settings: Settings) -> (Effector, Outcomes) {
-    let (mut effector, mut outcomes) = (Effector::new(settings), Outcomes::new());
-    poll(&mut effector, 50_000_u32.wrapping_sub(SETTINGS.release), &mut outcomes);
-    poll(&mut effector, 50_000, &mut outcomes);
-    (effector, outcomes)
+/// Plays edges from `start` on, when the fingers have been open for long enough since power-up.
+fn play(start: u32, edges: &Edges, polls: &[u32], end: u32) -> (Outcomes, State) {
+    let mut bench = Bench::rested(SETTINGS, start);
+    bench.play(start, edges, polls, end);
+    (bench.outcomes, bench.effector.state())
+}
+
+/// Plays edges from power-up on.
+fn play_from_power_up(edges: &Edges, end: u32) -> Bench {
+    let mut bench = Bench::new(SETTINGS);
+    bench.poll(0);
+    bench.play(0, edges, &[], end);
+    bench
+}
+
+/// All fingers at once.
+fn all(closed: bool, at: u32) -> [(Finger, bool, u32); 3] {
+    Finger::ALL.map(|finger| (finger, closed, at))
+}
+
+/// A touch of all fingers at once.
+fn at_once() -> Result<Touch, Fault> {
+    Ok(Touch::from_micros([0; 3]))
 }
 
 use Finger::{First, Last, Middle};
@@ -71,24 +105,70 @@ fn alone(finger: usize) -> Touch {
     Touch::new(times)
 }
 
+/// A touch of the outer fingers, the last one so much later.
+fn without_middle(last: u32) -> Touch {
+    Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(last)])
+}
+
 #[test]
-fn three_contacts_make_a_touch_of_the_first_closing_edges() {
-    let edges = [(Middle, true, 100_000), (Last, true, 150_000), (First, true, 130_000)];
-    let (outcomes, effector) = play(0, &edges, &[], 160_000);
-    assert_eq!(outcomes, [Ok(Touch::from_micros([30_000, 0, 50_000]))]);
-    assert_eq!(effector.state(), State::Complete);
+fn contacts_are_first_closing_edges_that_last_and_begin_before_the_timeout() {
+    let two = [(First, true, 100_000), (Last, true, 180_000)];
+    let three = |last| [(First, true, 100_000), (Middle, true, 200_000), (Last, true, last)];
+    let partial = Touch::new([ContactTime::FIRST, ContactTime::from_micros(100_000), ContactTime::MISSING]);
+    let lets_go = [(First, true, 50_000), (First, false, 90_000), (First, true, 120_000)];
+    let given_up = [(First, true, 50_000), (First, false, 110_000), (Middle, true, 400_000), (Middle, false, 450_000)];
+    let cases: [(&str, &Edges, u32, &[Touch], State); 10] = [
+        (
+            "three contacts in any order",
+            &[(Middle, true, 100_000), (Last, true, 150_000), (First, true, 130_000)],
+            160_000,
+            &[Touch::from_micros([30_000, 0, 50_000])],
+            State::Complete,
+        ),
+        ("a finger that may still come", &two, 499_999, &[], State::Touching),
+        ("a finger that is missing", &two, 500_000, &[without_middle(80_000)], State::TimedOut),
+        (
+            "a contact in the last moment",
+            &three(499_999),
+            510_000,
+            &[Touch::from_micros([0, 100_000, 399_999])],
+            State::Complete,
+        ),
+        ("a contact that is too late", &three(500_000), 510_000, &[partial], State::TimedOut),
+        (
+            "a finger that lets go before the others touch",
+            &[&lets_go[..], &[(Middle, true, 130_000), (Last, true, 140_000)]].concat(),
+            200_000,
+            &[Touch::from_micros([0, 80_000, 90_000])],
+            State::Complete,
+        ),
+        (
+            "glitches shorter than the debounce",
+            &[(First, true, 50_000), (First, false, 54_000), (Last, true, 70_000), (Last, false, 74_999)],
+            2_000_000,
+            &[],
+            State::Waiting,
+        ),
+        // The next approach's middle finger comes before the first one's time is up.
+        ("an approach given up, and the next", &given_up, 600_000, &[alone(0), alone(1)], State::Waiting),
+        // Over 100 ms after the finger has settled open.
+        ("an approach that may go on", &given_up[..2], 214_999, &[], State::Touching),
+        ("an approach that was given up", &given_up[..2], 215_000, &[alone(0)], State::Waiting),
+    ];
+    for (what, edges, end, touches, state) in cases {
+        let (outcomes, ended) = play(0, edges, &[], end);
+        assert_eq!(outcomes, touches.iter().copied().map(Ok).collect::<Vec<_>>(), "{what}");
+        assert_eq!(ended, state, "{what}");
+    }
 }
 
 #[test]
 fn states_follow_a_touch_from_waiting_to_waiting() {
-    let mut effector = Effector::new(SETTINGS);
+    let mut bench = Bench::new(SETTINGS);
     let mut state_at = |at: u32, edges: &[(Finger, bool)]| {
-        let mut outcomes = Outcomes::new();
-        for &(finger, closed) in edges {
-            outcomes.extend(effector.edge(Edge::new(finger, closed, at)).transpose());
-        }
-        poll(&mut effector, at, &mut outcomes);
-        effector.state()
+        edges.iter().for_each(|&(finger, closed)| bench.edges(&[(finger, closed, at)]));
+        bench.poll(at);
+        bench.effector.state()
     };
     let power_up = 10_000_u32.wrapping_sub(SETTINGS.release);
     assert_eq!(state_at(power_up, &[]), State::Released, "at power-up an approach may be going on");
@@ -107,126 +187,61 @@ fn states_follow_a_touch_from_waiting_to_waiting() {
 }
 
 #[test]
-fn a_missing_finger_is_a_missing_contact_after_the_timeout_and_not_before() {
-    let edges = [(First, true, 100_000), (Last, true, 180_000)];
-    assert_eq!(play(0, &edges, &[], 499_999).0, []);
-    let touch = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(80_000)]);
-    let (outcomes, effector) = play(0, &edges, &[], 500_000);
-    assert_eq!(outcomes, [Ok(touch)]);
-    assert_eq!(effector.state(), State::TimedOut);
-}
-
-#[test]
-fn a_contact_that_began_before_the_timeout_counts_and_a_later_one_does_not() {
-    let last_moment = [(First, true, 100_000), (Middle, true, 200_000), (Last, true, 499_999)];
-    assert_eq!(play(0, &last_moment, &[], 510_000).0, [Ok(Touch::from_micros([0, 100_000, 399_999]))]);
-    let too_late = [(First, true, 100_000), (Middle, true, 200_000), (Last, true, 500_000)];
-    let (outcomes, effector) = play(0, &too_late, &[], 510_000);
-    assert_eq!(
-        outcomes,
-        [Ok(Touch::new([ContactTime::FIRST, ContactTime::from_micros(100_000), ContactTime::MISSING]))]
-    );
-    assert_eq!(effector.state(), State::TimedOut);
-}
-
-#[test]
-fn a_finger_that_lets_go_before_the_others_touch_keeps_its_first_contact() {
-    let edges = [
-        (First, true, 50_000),
-        (First, false, 90_000),
-        (First, true, 120_000),
-        (Middle, true, 130_000),
-        (Last, true, 140_000),
-    ];
-    assert_eq!(play(0, &edges, &[], 200_000).0, [Ok(Touch::from_micros([0, 80_000, 90_000]))]);
-}
-
-#[test]
-fn a_glitch_shorter_than_the_debounce_is_no_contact() {
-    let edges = [(First, true, 50_000), (First, false, 54_000), (Last, true, 70_000), (Last, false, 74_999)];
-    let (outcomes, effector) = play(0, &edges, &[], 2_000_000);
-    assert_eq!((outcomes, effector.state()), (Vec::new(), State::Waiting));
-}
-
-#[test]
 fn a_probe_that_rests_too_shortly_after_a_touch_has_to_open_again() {
-    let mut edges: Vec<_> = Finger::ALL.map(|f| (f, true, 50_000)).to_vec();
-    edges.extend(Finger::ALL.map(|f| (f, false, 100_000)));
     // The fingers have settled at 105 ms and rested at 115 ms.
-    edges.extend(Finger::ALL.map(|f| (f, true, 114_999)));
-    edges.extend(Finger::ALL.map(|f| (f, false, 150_000)));
-    edges.extend(Finger::ALL.map(|f| (f, true, 165_000)));
-    assert_eq!(play(0, &edges, &[], 200_000).0, [Ok(Touch::from_micros([0; 3])); 2]);
+    let changes = [(true, 50_000), (false, 100_000), (true, 114_999), (false, 150_000), (true, 165_000)];
+    let edges = changes.map(|(closed, at)| all(closed, at)).concat();
+    assert_eq!(play(0, &edges, &[], 200_000).0, [at_once(); 2]);
 }
 
 #[test]
 fn fault_stuck_names_the_finger_once_and_the_others_go_on_when_it_opens() {
-    let mut edges = vec![(First, true, 50_000), (Middle, true, 50_000), (Last, true, 50_000)];
+    let mut edges = all(true, 50_000).to_vec();
     edges.extend([(First, false, 100_000), (Last, false, 100_000)]);
-    let (outcomes, effector) = play(0, &edges, &[], 60_000_000);
-    assert_eq!(outcomes, [Ok(Touch::from_micros([0; 3])), Err(Fault::Stuck(Middle))]);
-    assert_eq!(effector.state(), State::Complete);
+    let stuck = [at_once(), Err(Fault::Stuck(Middle))];
+    assert_eq!(play(0, &edges, &[], 60_000_000), (stuck.to_vec(), State::Complete));
     edges.push((Middle, false, 60_000_000));
-    edges.extend(Finger::ALL.map(|f| (f, true, 61_000_000)));
-    let (outcomes, _) = play(0, &edges, &[], 61_010_000);
-    assert_eq!(outcomes.last(), Some(&Ok(Touch::from_micros([0; 3]))));
-    assert_eq!(outcomes.len(), 3);
+    edges.extend(all(true, 61_000_000));
+    assert_eq!(play(0, &edges, &[], 61_010_000).0, [&stuck[..], &[at_once()]].concat());
 }
 
 #[test]
-fn fault_stuck_is_seen_at_power_up() {
-    let (outcomes, effector) = play_after(0, 0, &[(Last, true, 0)], &[], 5_000_000);
-    assert_eq!(outcomes, [Err(Fault::Stuck(Last))]);
-    assert_eq!(effector.state(), State::Released);
-}
-
-#[test]
-fn a_finger_stuck_for_longer_than_the_clock_goes_round_still_opens() {
-    let (mut outcomes, mut effector) = play_after(0, 0, &[(Last, true, 0)], &[], 5_000_000);
+fn a_finger_stuck_since_power_up_for_longer_than_the_clock_goes_round_still_opens() {
+    let mut bench = play_from_power_up(&[(Last, true, 0)], 5_000_000);
+    assert_eq!(bench.outcomes, [Err(Fault::Stuck(Last))]);
+    assert_eq!(bench.effector.state(), State::Released);
     for (closed, at) in [(false, 3_000_000_000), (true, 3_001_000_000)] {
-        for finger in Finger::ALL {
-            outcomes.extend(effector.edge(Edge::new(finger, closed, at)).transpose());
-        }
-        poll(&mut effector, at + 900_000, &mut outcomes);
+        bench.edges(&all(closed, at));
+        bench.poll(at + 900_000);
     }
-    assert_eq!(outcomes, [Err(Fault::Stuck(Last)), Ok(Touch::from_micros([0; 3]))]);
+    assert_eq!(bench.outcomes, [Err(Fault::Stuck(Last)), at_once()]);
 }
 
 #[test]
 fn fault_bouncing_names_the_finger_and_drops_the_touch() {
     let mut edges = vec![(First, true, 50_000), (Last, true, 60_000)];
     edges.extend((0..20).map(|i| (Middle, i % 2 == 0, 70_000 + i * 2_000)));
-    let (outcomes, effector) = play(0, &edges, &[], 2_000_000);
-    assert_eq!(outcomes, [Err(Fault::Bouncing(Middle))]);
-    assert_eq!(effector.state(), State::Released);
+    assert_eq!(play(0, &edges, &[], 2_000_000), (vec![Err(Fault::Bouncing(Middle))], State::Released));
 }
 
 #[test]
 fn bouncing_for_an_hour_is_told_once_and_ends() {
-    let mut effector = Effector::new(SETTINGS);
-    let mut outcomes = Outcomes::new();
-    let step = 4_000;
+    let mut bench = Bench::new(SETTINGS);
     let mut now = 0_u32;
-    let mut closed = false;
     // Ends closed, more than half a turn of the clock after the bouncing began.
-    for _ in 0..750_001 {
-        now = now.wrapping_add(step);
-        closed = !closed;
-        outcomes.extend(effector.edge(Edge::new(First, closed, now)).transpose());
+    for change in 0..750_001 {
+        now = now.wrapping_add(4_000);
+        bench.edges(&[(First, change % 2 == 0, now)]);
     }
-    assert_eq!(outcomes, [Err(Fault::Bouncing(First))]);
+    assert_eq!(bench.outcomes, [Err(Fault::Bouncing(First))]);
     now = now.wrapping_add(6_000_000);
-    poll(&mut effector, now, &mut outcomes);
-    assert_eq!(outcomes, [Err(Fault::Bouncing(First)), Err(Fault::Stuck(First))]);
+    bench.poll(now);
     for settled in [false, true] {
-        for finger in Finger::ALL {
-            outcomes.extend(effector.edge(Edge::new(finger, settled, now)).transpose());
-        }
+        bench.edges(&all(settled, now));
         now = now.wrapping_add(1_000_000);
-        poll(&mut effector, now, &mut outcomes);
+        bench.poll(now);
     }
-    assert_eq!(outcomes.last(), Some(&Ok(Touch::from_micros([0; 3]))));
-    assert_eq!(outcomes.len(), 3);
+    assert_eq!(bench.outcomes, [Err(Fault::Bouncing(First)), Err(Fault::Stuck(First)), at_once()]);
 }
 
 #[test]
@@ -247,71 +262,76 @@ fn fault_silent_names_the_finger_after_so_many_touches_without_it() {
     assert_eq!((outcomes.len(), silent), (11, vec![4, 9]), "after the fourth and the eighth touch");
 }
 
-/// Three pins, their watcher with a queue of `N` edges, and what the main loop makes of them.
+/// Three pins and a clock.
+#[derive(Default)]
+struct Pins {
+    levels: [Cell<bool>; 3],
+    clock: TestClock,
+}
+
+impl Pins {
+    fn fingers(&self) -> Fingers<TestPin<'_>, TestPin<'_>, TestPin<'_>> {
+        let [a, b, c] = self.levels.each_ref().map(TestPin);
+        Fingers::new(a, b, c, Active::High)
+    }
+}
+
+/// Pins, their watcher with a queue of `N` edges, and what the main loop makes of them.
 struct Board<'a, const N: usize> {
-    levels: &'a [Cell<bool>; 3],
-    clock: &'a TestClock,
+    pins: &'a Pins,
     watcher: Watcher<TestPin<'a>, TestPin<'a>, TestPin<'a>, N>,
     effector: Effector,
     outcomes: Outcomes,
 }
 
-fn open_pins() -> ([Cell<bool>; 3], TestClock) {
-    Default::default()
-}
-
 impl<'a, const N: usize> Board<'a, N> {
-    fn start(levels: &'a [Cell<bool>; 3], clock: &'a TestClock) -> Self {
-        let [a, b, c] = levels.each_ref().map(TestPin);
-        let watcher = Watcher::start(Fingers::new(a, b, c, Active::High), clock);
-        let (effector, outcomes) = (Effector::new(SETTINGS), Outcomes::new());
-        Self { levels, clock, watcher, effector, outcomes }
+    /// A board whose main loop has run at these times.
+    fn start(pins: &'a Pins, steps: &[u32]) -> Self {
+        let watcher = Watcher::start(pins.fingers(), &pins.clock);
+        let Bench { effector, outcomes } = Bench::new(SETTINGS);
+        let mut board = Self { pins, watcher, effector, outcomes };
+        steps.iter().for_each(|&at| board.step(at));
+        board
     }
 
     /// Pins change.
     fn change(&mut self, at: u32, changes: &[(Finger, bool)]) {
-        self.clock.0.set(at);
+        self.pins.clock.0.set(at);
         for &(finger, closed) in changes {
-            finger.of(&mut self.levels.each_ref()).set(closed);
+            finger.of(&mut self.pins.levels.each_ref()).set(closed);
         }
     }
 
     /// Pins change, and interrupt.
     fn set(&mut self, at: u32, changes: &[(Finger, bool)]) {
         self.change(at, changes);
-        self.watcher.interrupt(self.clock);
+        self.watcher.interrupt(&self.pins.clock);
+    }
+
+    /// All pins change at once, and interrupt.
+    fn set_all(&mut self, at: u32, closed: bool) {
+        self.set(at, &Finger::ALL.map(|finger| (finger, closed)));
+    }
+
+    /// An interrupt that was held off.
+    fn interrupt_late(&mut self) {
+        self.watcher.interrupt_late(&self.pins.clock);
     }
 
     /// The main loop, once.
     fn step(&mut self, at: u32) {
-        self.clock.0.set(at);
-        let Self { watcher, effector, outcomes, clock, .. } = self;
-        while let Some(outcome) = drain(effector, || watcher.sense(*clock)).transpose() {
+        self.pins.clock.0.set(at);
+        let Self { pins, watcher, effector, outcomes } = self;
+        while let Some(outcome) = drain(effector, || watcher.sense(&pins.clock)).transpose() {
             outcomes.push(outcome);
         }
     }
 }
 
 #[test]
-fn fault_overrun_drops_the_touch_whose_edges_were_lost() {
-    let (levels, clock) = open_pins();
-    let mut board = Board::<3>::start(&levels, &clock);
-    board.step(0);
-    for (at, closed) in [(50_000, true), (51_000, false)] {
-        board.set(at, &Finger::ALL.map(|finger| (finger, closed)));
-    }
-    board.step(51_000);
-    board.set(52_000, &Finger::ALL.map(|finger| (finger, true)));
-    board.step(1_000_000);
-    assert_eq!(board.outcomes, [Err(Fault::Overrun)]);
-}
-
-#[test]
 fn a_lost_pulse_drops_its_own_touch_at_once_and_no_later_one_and_the_chip_sleeps_again() {
-    let (levels, clock) = open_pins();
-    let mut board = Board::<3>::start(&levels, &clock);
-    board.step(0);
-    board.step(150_000);
+    let pins = Pins::default();
+    let mut board = Board::<3>::start(&pins, &[0, 150_000]);
     // The first finger bounces until the queue is full; then the middle one touches and lets go.
     board.set(200_000, &[(First, true)]);
     board.set(200_500, &[(First, false)]);
@@ -340,14 +360,12 @@ fn a_lost_pulse_drops_its_own_touch_at_once_and_no_later_one_and_the_chip_sleeps
 
 #[test]
 fn a_first_contact_that_is_lost_while_the_probe_rests_drops_its_touch() {
-    let (levels, clock) = open_pins();
-    let mut board = Board::<3>::start(&levels, &clock);
-    board.step(0);
-    board.step(150_000);
-    board.set(200_000, &Finger::ALL.map(|finger| (finger, true)));
+    let pins = Pins::default();
+    let mut board = Board::<3>::start(&pins, &[0, 150_000]);
+    board.set_all(200_000, true);
     board.step(210_000);
     // The openings fill the queue, and the first contact of the next approach is lost, while the main loop is busy.
-    board.set(300_000, &Finger::ALL.map(|finger| (finger, false)));
+    board.set_all(300_000, false);
     board.set(330_000, &[(First, true)]);
     board.set(340_000, &[(First, false)]);
     board.step(350_000);
@@ -355,39 +373,35 @@ fn a_first_contact_that_is_lost_while_the_probe_rests_drops_its_touch() {
     board.step(390_000);
     board.set(400_000, &[(Middle, false), (Last, false)]);
     board.step(900_000);
-    assert_eq!(board.outcomes, [Ok(Touch::from_micros([0; 3])), Err(Fault::Overrun)]);
+    assert_eq!(board.outcomes, [at_once(), Err(Fault::Overrun)]);
 }
 
 #[test]
 fn an_edge_found_after_the_interrupt_was_held_off_is_no_contact_time() {
-    let (levels, clock) = open_pins();
-    let mut board = Board::<8>::start(&levels, &clock);
-    board.step(0);
-    board.step(50_000);
+    let pins = Pins::default();
+    let mut board = Board::<8>::start(&pins, &[0, 50_000]);
     // Flash is erased: nothing changes, then a finger closes meanwhile.
-    board.watcher.interrupt_late(&clock);
+    board.interrupt_late();
     board.set(100_000, &[(First, true)]);
     board.change(120_000, &[(Middle, true)]);
-    clock.0.set(145_000);
-    board.watcher.interrupt_late(&clock);
+    board.change(145_000, &[]);
+    board.interrupt_late();
     board.set(150_000, &[(Last, true)]);
     board.step(300_000);
-    board.set(400_000, &Finger::ALL.map(|finger| (finger, false)));
+    board.set_all(400_000, false);
     board.step(900_000);
     assert_eq!(board.outcomes, [Err(Fault::Overrun)]);
     // The next touch counts, also after a pause in which nothing changed.
-    board.watcher.interrupt_late(&clock);
-    board.set(1_000_000, &Finger::ALL.map(|finger| (finger, true)));
+    board.interrupt_late();
+    board.set_all(1_000_000, true);
     board.step(1_200_000);
-    assert_eq!(board.outcomes[1..], [Ok(Touch::from_micros([0; 3]))]);
+    assert_eq!(board.outcomes[1..], [at_once()]);
 }
 
 #[test]
 fn the_time_until_something_is_due_is_the_time_until_something_happens() {
-    let (levels, clock) = open_pins();
-    let mut board = Board::<8>::start(&levels, &clock);
-    board.step(50_000_u32.wrapping_sub(SETTINGS.release));
-    board.step(50_000);
+    let pins = Pins::default();
+    let mut board = Board::<8>::start(&pins, &[50_000_u32.wrapping_sub(SETTINGS.release), 50_000]);
     assert_eq!(board.effector.due(50_000), None);
     board.set(100_000, &[(First, true)]);
     board.step(100_000);
@@ -406,10 +420,8 @@ fn the_time_until_something_is_due_is_the_time_until_something_happens() {
 
 #[test]
 fn a_switch_that_is_closed_at_power_up_is_seen_before_any_interrupt_and_is_no_contact_of_a_later_touch() {
-    let (levels, clock) = ([Cell::new(false), Cell::new(true), Cell::new(false)], TestClock::default());
-    let mut board = Board::<64>::start(&levels, &clock);
-    board.step(0);
-    board.step(1_000_000);
+    let pins = Pins { levels: [false, true, false].map(Cell::new), ..Pins::default() };
+    let mut board = Board::<64>::start(&pins, &[0, 1_000_000]);
     // The first finger's interrupt must not read the middle one as touching at the same time.
     board.set(1_000_000, &[(First, true)]);
     board.step(1_500_000);
@@ -420,23 +432,25 @@ fn a_switch_that_is_closed_at_power_up_is_seen_before_any_interrupt_and_is_no_co
 
 #[test]
 fn an_opening_that_did_not_fit_into_the_queue_is_read_again_without_another_interrupt() {
-    let (levels, clock) = open_pins();
+    let pins = Pins::default();
     // Room for four edges.
-    let mut board = Board::<4>::start(&levels, &clock);
-    board.step(0);
-    board.step(50_000);
-    board.set(100_000, &Finger::ALL.map(|finger| (finger, true)));
+    let mut board = Board::<4>::start(&pins, &[0, 50_000]);
+    board.set_all(100_000, true);
     // The main loop is busy: of three openings one fits.
-    board.set(200_000, &Finger::ALL.map(|finger| (finger, false)));
+    board.set_all(200_000, false);
     board.step(201_000);
     board.step(300_000);
     for finger in Finger::ALL {
         board.set(400_000, &[(finger, true)]);
     }
     board.step(500_000);
-    let touch = Ok(Touch::from_micros([0; 3]));
-    assert_eq!(board.outcomes.last(), Some(&touch), "no finger's next closing looks unchanged: {:?}", board.outcomes);
-    board.set(600_000, &Finger::ALL.map(|finger| (finger, false)));
+    assert_eq!(
+        board.outcomes.last(),
+        Some(&at_once()),
+        "no finger's next closing looks unchanged: {:?}",
+        board.outcomes
+    );
+    board.set_all(600_000, false);
     board.step(20_000_000);
     assert!(board.outcomes.contains(&Err(Fault::Overrun)), "{:?}", board.outcomes);
     assert!(!board.outcomes.iter().any(|outcome| matches!(outcome, Err(Fault::Stuck(_)))), "{:?}", board.outcomes);
@@ -465,11 +479,8 @@ fn unreadable_pins_are_all_reported_although_a_touch_comes_at_the_same_time() {
     let level = Cell::new(false);
     let fingers = Fingers::new(TestPin(&level), BrokenPin, BrokenPin, Active::High);
     let mut watcher = Watcher::<_, _, _, 8>::start(fingers, &clock);
-    let mut effector = Effector::new(SETTINGS);
-    let mut outcomes = Outcomes::new();
-    outcomes.extend(effector.poll(0).transpose());
+    let Bench { mut effector, mut outcomes } = Bench::rested(SETTINGS, 100_000);
     clock.0.set(100_000);
-    outcomes.extend(effector.poll(100_000).transpose());
     level.set(true);
     watcher.interrupt(&clock);
     clock.0.set(600_000);
@@ -481,37 +492,32 @@ fn unreadable_pins_are_all_reported_although_a_touch_comes_at_the_same_time() {
 }
 
 #[test]
-fn an_approach_that_was_given_up_does_not_merge_with_the_next_one() {
-    // One finger, retracted; then the next approach's middle finger, before the first one's time is up.
-    let edges = [(First, true, 50_000), (First, false, 110_000), (Middle, true, 400_000), (Middle, false, 450_000)];
-    let (outcomes, effector) = play(0, &edges, &[], 600_000);
-    assert_eq!((outcomes, effector.state()), (vec![Ok(alone(0)), Ok(alone(1))], State::Waiting));
-    // The first touch is over 100 ms after the finger has settled open.
-    assert_eq!(play(0, &edges[..2], &[], 214_999).0, []);
-    assert_eq!(play(0, &edges[..2], &[], 215_000).0, [Ok(alone(0))]);
-}
-
-#[test]
 fn an_approach_that_goes_on_through_a_power_cut_is_no_touch_though_no_finger_was_closed_at_power_up() {
     // A finger has touched and let go; the others touch within the same approach, 90 ms after power-up.
     let rest = [(Middle, true, 90_000), (Last, true, 95_000), (Middle, false, 200_000), (Last, false, 200_000)];
     let next = [(First, true, 400_000), (First, false, 500_000)];
-    let (outcomes, effector) = play_after(0, 0, &[&rest[..], &next].concat(), &[], 700_000);
+    let Bench { effector, outcomes } = play_from_power_up(&[&rest[..], &next].concat(), 700_000);
     assert_eq!((outcomes, effector.state()), (vec![Ok(alone(0))], State::Waiting));
 }
 
 #[test]
 fn an_approach_that_goes_on_after_its_touch_was_dropped_is_no_other_touch() {
     // Edges are lost while the first finger lets go for a while; then the last one touches.
-    let mut effector = play(0, &[(First, true, 50_000)], &[], 90_000).1;
-    let mut outcomes = Outcomes::new();
+    let mut bench = Bench::rested(SETTINGS, 0);
+    bench.play(0, &[(First, true, 50_000)], &[], 90_000);
     let opened = Edge { after_loss: true, ..Edge::new(First, false, 100_000) };
-    outcomes.extend(effector.edge(opened).transpose());
-    for (finger, closed, at) in [(Last, true, 160_000), (Last, false, 300_000), (Last, true, 600_000)] {
-        outcomes.extend(effector.edge(Edge::new(finger, closed, at)).transpose());
-    }
-    poll(&mut effector, 2_000_000, &mut outcomes);
-    assert_eq!(outcomes, [Err(Fault::Overrun), Ok(alone(2))]);
+    bench.outcomes.extend(bench.effector.edge(opened).transpose());
+    bench.edges(&[(Last, true, 160_000), (Last, false, 300_000), (Last, true, 600_000)]);
+    bench.poll(2_000_000);
+    assert_eq!(bench.outcomes, [Err(Fault::Overrun), Ok(alone(2))]);
+}
+
+/// What an effector makes of fingers at these times after the first contact.
+fn touched(settings: Settings, times: [u32; 3]) -> Outcomes {
+    let mut bench = Bench::rested(settings, 50_000);
+    Finger::ALL.into_iter().zip(times).for_each(|(finger, at)| bench.edges(&[(finger, true, 50_000 + at)]));
+    bench.poll(100_000 + times[2]);
+    bench.outcomes
 }
 
 #[test]
@@ -522,13 +528,9 @@ fn the_timeout_is_that_of_the_model_and_so_no_full_touch_becomes_a_partial_one()
     let model = crate::Model::new(&bytes).unwrap();
     let half_speed = Scale::new(Geometry { spacing: 10, speed: 10 }, Geometry { spacing: 10, speed: 5 }).unwrap();
     for (scale, spread) in [(Scale::IDENTITY, spread), (half_speed, 2 * spread)] {
-        let (mut effector, mut outcomes) = rested(SETTINGS.for_model(&model, &scale));
-        for (finger, at) in [(First, 0), (Middle, spread / 2), (Last, spread)] {
-            outcomes.extend(effector.edge(Edge::new(finger, true, 50_000 + at)).transpose());
-        }
-        poll(&mut effector, 100_000 + spread, &mut outcomes);
-        assert_eq!(outcomes, [Ok(Touch::from_micros([0, spread / 2, spread]))]);
-        assert!(model.accepts(&scale.apply(&Touch::from_micros([0, spread / 2, spread]))).is_ok());
+        let times = [0, spread / 2, spread];
+        assert_eq!(touched(SETTINGS.for_model(&model, &scale), times), [Ok(Touch::from_micros(times))]);
+        assert!(model.accepts(&scale.apply(&Touch::from_micros(times))).is_ok());
     }
     let unstated = model_of(&Trained::default());
     let unstated = crate::Model::new(&unstated).unwrap();
@@ -553,11 +555,7 @@ fn the_timeout_of_a_model_with_a_stroke_is_the_strokes_time_and_what_comes_later
     let bytes = model_of(&Trained { touches: Some(touches), probe: Some(probe), ..Trained::default() });
     let model = crate::Model::new(&bytes).unwrap();
     for (last, expected) in [(stroke, Some(stroke)), (stroke + 1, None), (stroke + 9_000, None)] {
-        let (mut effector, mut outcomes) = rested(SETTINGS.for_model(&model, &Scale::IDENTITY));
-        for (finger, at) in [(First, 0), (Middle, 70_000), (Last, last)] {
-            outcomes.extend(effector.edge(Edge::new(finger, true, 50_000 + at)).transpose());
-        }
-        poll(&mut effector, 100_000 + last, &mut outcomes);
+        let outcomes = touched(SETTINGS.for_model(&model, &Scale::IDENTITY), [0, 70_000, last]);
         let last = expected.map_or(ContactTime::MISSING, ContactTime::from_micros);
         assert_eq!(outcomes, [Ok(Touch::new([ContactTime::FIRST, ContactTime::from_micros(70_000), last]))]);
     }
@@ -593,19 +591,23 @@ fn model_of(trained: &Trained) -> Vec<u8> {
     bytes
 }
 
+/// Every level of the pins was read.
+fn read_to_the_end<T: Clock>(probe: Probe<Mock, Mock, Mock, T>) {
+    let (a, b, c) = probe.into_parts().0.into_pins();
+    [a, b, c].iter_mut().for_each(Mock::done);
+}
+
 #[test]
 fn fault_unreadable_names_the_pin_once_until_it_can_be_read_again() {
     let low = Transaction::get(Level::Low);
     let broken = || Transaction::get(Level::Low).with_error(MockError::Io(std::io::ErrorKind::NotConnected));
-    let first = Mock::new(&[low.clone(), low.clone(), low.clone(), low.clone(), low.clone()]);
     let middle = Mock::new(&[low.clone(), broken(), broken(), low.clone(), broken()]);
-    let last = Mock::new(&[low.clone(), low.clone(), low.clone(), low.clone(), low]);
+    let [first, last] = [(); 2].map(|()| Mock::new(&vec![low.clone(); 5]));
     let mut probe = Probe::new(Fingers::new(first, middle, last, Active::High), TestClock::default(), SETTINGS);
     let outcomes: Vec<_> = (0..5).map(|_| probe.poll()).collect();
     let fault = Err(Fault::Unreadable(Middle));
     assert_eq!(outcomes, [Ok(None), fault, Ok(None), Ok(None), fault]);
-    let (a, b, c) = probe.into_parts().0.into_pins();
-    [a, b, c].iter_mut().for_each(Mock::done);
+    read_to_the_end(probe);
 }
 
 #[test]
@@ -627,8 +629,7 @@ fn each_poll_reads_each_pin_once_and_active_low_switches_close_to_low() {
     }
     assert_eq!(touches, [Touch::from_micros([0, 1_000, 3_000])]);
     assert_eq!(probe.state(), State::Complete);
-    let (a, b, c) = probe.into_parts().0.into_pins();
-    [a, b, c].iter_mut().for_each(Mock::done);
+    read_to_the_end(probe);
 }
 
 #[test]
@@ -648,20 +649,20 @@ fn every_fault_says_what_to_do() {
 
 /// Touches half a second apart, polled each millisecond, by a counter of this many bits that starts at `start`.
 fn by_counter(bits: u32, start: u64, touches: u64) -> Outcomes {
-    let (mut effector, mut outcomes) = (Effector::new(SETTINGS), Outcomes::new());
+    let mut bench = Bench::new(SETTINGS);
     for at in (0..touches * 500_000).step_by(1_000) {
         let now = u32::try_from((start + at) % (1 << bits)).unwrap();
         for (finger, time) in [(First, 0), (Middle, 20_000), (Last, 35_000)] {
             // The first touch after the rest at power-up.
             for (closed, time) in [(true, 150_000 + time), (false, 210_000)] {
                 if at % 500_000 == time {
-                    outcomes.extend(effector.edge(Edge::new(finger, closed, now)).transpose());
+                    bench.edges(&[(finger, closed, now)]);
                 }
             }
         }
-        poll(&mut effector, now, &mut outcomes);
+        bench.poll(now);
     }
-    outcomes
+    bench.outcomes
 }
 
 #[test]
@@ -680,37 +681,28 @@ fn a_counter_of_fewer_than_32_bits_that_wraps_in_a_touch_is_a_fault_and_costs_no
 
 #[test]
 fn a_reading_of_the_clock_that_is_ahead_drops_its_touch_and_no_later_one() {
-    let (mut effector, mut outcomes) = (Effector::new(SETTINGS), Outcomes::new());
-    let mut touch = |from: u32, ahead: u32| {
-        poll(&mut effector, from, &mut outcomes);
-        poll(&mut effector, from + 200_000, &mut outcomes);
+    let mut bench = Bench::new(SETTINGS);
+    for (from, ahead) in [(0, 1 << 16), (1_000_000, 0)] {
+        bench.poll(from);
+        bench.poll(from + 200_000);
         for (finger, time) in [(First, 200_000), (Middle, 220_000), (Last, 235_000)] {
-            outcomes.extend(effector.edge(Edge::new(finger, true, from + time)).transpose());
-            poll(&mut effector, from + time + 6_000 + if finger == First { ahead } else { 0 }, &mut outcomes);
+            bench.edges(&[(finger, true, from + time)]);
+            bench.poll(from + time + 6_000 + if finger == First { ahead } else { 0 });
         }
-        for finger in Finger::ALL {
-            outcomes.extend(effector.edge(Edge::new(finger, false, from + 300_000)).transpose());
-        }
-        poll(&mut effector, from + 900_000, &mut outcomes);
-    };
-    touch(0, 1 << 16);
-    touch(1_000_000, 0);
-    assert_eq!(outcomes, [Err(Fault::Clock), Ok(Touch::from_micros([0, 20_000, 35_000]))]);
+        bench.edges(&all(false, from + 300_000));
+        bench.poll(from + 900_000);
+    }
+    assert_eq!(bench.outcomes, [Err(Fault::Clock), Ok(Touch::from_micros([0, 20_000, 35_000]))]);
 }
 
 #[test]
 fn an_edge_that_is_a_little_older_than_the_last_poll_counts_as_now() {
-    let (mut effector, mut outcomes) = (Effector::new(SETTINGS), Outcomes::new());
-    for at in [0, 200_000] {
-        poll(&mut effector, at, &mut outcomes);
-    }
-    outcomes.extend(effector.edge(Edge::new(First, true, 200_000)).transpose());
-    poll(&mut effector, 240_000, &mut outcomes);
-    for finger in [Middle, Last] {
-        outcomes.extend(effector.edge(Edge::new(finger, true, 210_000)).transpose());
-    }
-    poll(&mut effector, 250_000, &mut outcomes);
-    assert_eq!(outcomes, [Ok(Touch::from_micros([0, 40_000, 40_000]))]);
+    let mut bench = Bench::rested(SETTINGS, 200_000);
+    bench.edges(&[(First, true, 200_000)]);
+    bench.poll(240_000);
+    bench.edges(&[(Middle, true, 210_000), (Last, true, 210_000)]);
+    bench.poll(250_000);
+    assert_eq!(bench.outcomes, [Ok(Touch::from_micros([0, 40_000, 40_000]))]);
 }
 
 #[test]
@@ -776,6 +768,10 @@ impl embedded_hal::digital::InputPin for TestPin<'_> {
     }
 }
 
+fn touches(outcomes: &Outcomes) -> Vec<Touch> {
+    outcomes.iter().flatten().copied().collect()
+}
+
 fn finger() -> impl Strategy<Value = Finger> {
     prop::sample::select(Finger::ALL.to_vec())
 }
@@ -804,7 +800,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2_000))]
 
     #[test]
-    fn outcomes_depend_on_the_edges_and_not_on_how_often_one_polls(
+    fn outcomes_depend_on_the_edges_and_neither_on_the_clock_nor_on_how_often_one_polls(
         edges in edges(),
         polls in prop::collection::vec(0..40_000_000_u32, 0..200),
         dense in prop::collection::vec(0..2_000_000_u32, 0..200),
@@ -812,9 +808,9 @@ proptest! {
     ) {
         let end = edges.last().map_or(0, |e| e.2) + 10_000_000;
         let seldom = play(start, &edges, &[], end);
+        prop_assert_eq!(&play(0, &edges, &[], end), &seldom);
         let often = play(start, &edges, &[polls, dense].concat(), end);
         // Faults due at the same time as a touch may be reported before or after it.
-        let touches = |outcomes: &Outcomes| outcomes.iter().flatten().copied().collect::<Vec<_>>();
         prop_assert_eq!(touches(&seldom.0), touches(&often.0));
         let faults = |outcomes: &Outcomes| {
             let mut faults: Vec<_> = outcomes.iter().filter_map(|o| o.err()).map(|f| std::format!("{f:?}")).collect();
@@ -823,13 +819,7 @@ proptest! {
             faults
         };
         prop_assert_eq!(faults(&seldom.0), faults(&often.0));
-        prop_assert_eq!(seldom.1.state(), often.1.state());
-    }
-
-    #[test]
-    fn outcomes_do_not_depend_on_where_the_clock_stands(edges in edges(), start: u32) {
-        let end = edges.last().map_or(0, |e| e.2) + 10_000_000;
-        prop_assert_eq!(play(0, &edges, &[], end).0, play(start, &edges, &[], end).0);
+        prop_assert_eq!(seldom.1, often.1);
     }
 
     #[test]
@@ -875,31 +865,27 @@ proptest! {
     #[test]
     fn interrupts_and_polling_at_every_edge_agree(edges in edges(), start: u32) {
         let end = edges.last().map_or(0, |e| e.2) + 10_000_000;
-        let (levels, clock) = open_pins();
-        clock.0.set(start);
-        let mut probe = { let [a, b, c] = levels.each_ref().map(TestPin); Probe::new(Fingers::new(a, b, c, Active::High), &clock, SETTINGS) };
-        let mut watcher = { let [a, b, c] = levels.each_ref().map(TestPin); Watcher::<_, _, _, 127>::start(Fingers::new(a, b, c, Active::High), &clock) };
-        let mut effector = Effector::new(SETTINGS);
-        let (mut polled, mut interrupted) = (Outcomes::new(), Outcomes::new());
+        let pins = Pins::default();
+        pins.clock.0.set(start);
+        let mut probe = Probe::new(pins.fingers(), &pins.clock, SETTINGS);
+        let mut polled = Outcomes::new();
         polled.extend(probe.poll().transpose());
-        interrupted.extend(drain(&mut effector, || watcher.sense(&clock)).transpose());
+        let mut board = Board::<127>::start(&pins, &[start]);
         for (i, &(finger, closed, at)) in edges.iter().enumerate() {
-            clock.0.set(start.wrapping_add(at));
+            let now = start.wrapping_add(at);
             // What was due before the edge is handed over before the pin changes, as it is on a chip.
-            for _ in 0..8 { polled.extend(probe.poll().transpose()); }
-            let mut levels = levels.each_ref();
-            finger.of(&mut levels).set(closed);
-            for _ in 0..8 { polled.extend(probe.poll().transpose()); }
-            watcher.interrupt(&clock);
+            board.change(now, &[]);
+            (0..8).for_each(|_| polled.extend(probe.poll().transpose()));
+            board.change(now, &[(finger, closed)]);
+            (0..8).for_each(|_| polled.extend(probe.poll().transpose()));
+            board.set(now, &[]);
             if i % 3 == 0 {
-                while let Some(outcome) = drain(&mut effector, || watcher.sense(&clock)).transpose() { interrupted.push(outcome); }
+                board.step(now);
             }
         }
-        clock.0.set(start.wrapping_add(end));
-        for _ in 0..8 { polled.extend(probe.poll().transpose()); }
-        while let Some(outcome) = drain(&mut effector, || watcher.sense(&clock)).transpose() { interrupted.push(outcome); }
-        let touches = |outcomes: &Outcomes| outcomes.iter().flatten().copied().collect::<Vec<_>>();
-        prop_assert_eq!(touches(&polled), touches(&interrupted));
+        board.step(start.wrapping_add(end));
+        (0..8).for_each(|_| polled.extend(probe.poll().transpose()));
+        prop_assert_eq!(touches(&polled), touches(&board.outcomes));
     }
 
     #[test]
@@ -933,9 +919,7 @@ fn scale_follows_planes_and_parabolas_exactly_and_speed_everywhere() {
     let probe = Geometry { spacing: 200, speed: 500 };
     let scale = Scale::new(model, probe).unwrap();
     assert_eq!(scale.apply(&touch(200, 2)), touch(100, 1));
-    let missing = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(4_000)]);
-    let scaled = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(1_000)]);
-    assert_eq!(scale.apply(&missing), scaled);
+    assert_eq!(scale.apply(&without_middle(4_000)), without_middle(1_000));
     assert_eq!(scale.apply(&alone(1)), alone(1));
 }
 
@@ -950,19 +934,16 @@ fn scale_of_the_models_own_probe_changes_nothing() {
 #[test]
 fn scale_takes_extremes_without_overflow_and_refuses_worse() {
     let small = Geometry { spacing: 1, speed: 1 };
-    for probe in [Geometry { spacing: 16, speed: 16 }, Geometry { spacing: 16, speed: 1 }] {
-        for scale in [Scale::new(small, probe).unwrap(), Scale::new(probe, small).unwrap()] {
-            for times in [[0, u32::MAX - 1, 0], [u32::MAX - 1, 0, u32::MAX - 1], [0, 0, u32::MAX - 1]] {
-                assert!(scale.apply(&Touch::from_micros(times)).is_full());
-            }
+    let of = |spacing, speed| {
+        let probe = Geometry { spacing, speed };
+        [Scale::new(small, probe), Scale::new(probe, small)]
+    };
+    for scale in [of(16, 16), of(16, 1)].as_flattened() {
+        for times in [[0, u32::MAX - 1, 0], [u32::MAX - 1, 0, u32::MAX - 1], [0, 0, u32::MAX - 1]] {
+            assert!(scale.unwrap().apply(&Touch::from_micros(times)).is_full());
         }
     }
-    for bad in
-        [Geometry { spacing: 17, speed: 1 }, Geometry { spacing: 1, speed: 0 }, Geometry { spacing: 0, speed: 1 }]
-    {
-        assert_eq!(Scale::new(small, bad), None);
-        assert_eq!(Scale::new(bad, small), None);
-    }
+    assert_eq!([of(17, 1), of(1, 0), of(0, 1)], [[None; 2]; 3]);
 }
 
 #[test]
@@ -995,8 +976,7 @@ fn calibration_says_what_is_wrong() {
     assert_eq!(run(Touch::from_micros([0; 3]), 8, 1), Err(CalibrationError::NotTilted));
     assert_eq!(run(Touch::from_micros([0, 50_000, 50_000]), 8, 1), Err(CalibrationError::NotFlat));
     assert_eq!(run(Touch::from_micros([0, 0, 1]), 8, u16::MAX), Err(CalibrationError::NotFlat));
-    let missing = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(5)]);
-    assert_eq!(run(missing, 100, 1), Err(CalibrationError::TooFew));
+    assert_eq!(run(without_middle(5), 100, 1), Err(CalibrationError::TooFew));
 }
 
 #[test]

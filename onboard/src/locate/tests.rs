@@ -7,6 +7,7 @@ use palpate_shared::format::{
 };
 use palpate_shared::{ContactTime, Pose as HandPose, Position, Touch};
 use proptest::prelude::*;
+use std::sync::LazyLock;
 use std::vec::Vec;
 use std::{format, vec};
 
@@ -154,25 +155,51 @@ fn place_of_maps(bytes: &[u8]) -> usize {
     bytes.len() - 4 - content.next_multiple_of(4)
 }
 
+/// The model of a wedge and a cylinder.
+pub(crate) static BOTH: LazyLock<Vec<u8>> = LazyLock::new(|| model(&[WEDGE, CYLINDER], 0));
+
+/// A model of two pins, and its maps' place in it.
+fn pins(misfit: i16) -> (Vec<u8>, usize) {
+    let bytes = model(&PINS, misfit);
+    let place = place_of_maps(&bytes);
+    (bytes, place)
+}
+
+/// The model with these bytes at a place, under a right checksum.
+fn changed(bytes: &[u8], at: usize, new: &[u8]) -> Vec<u8> {
+    let mut changed = bytes.to_vec();
+    changed[at..at + new.len()].copy_from_slice(new);
+    make_right(&mut changed);
+    changed
+}
+
 pub(crate) type Small<'m> = Locator<'m, 4096, 32, 2>;
 
-pub(crate) fn locator(maps: Maps<'_>) -> Small<'_> {
+pub(crate) fn locator(bytes: &[u8]) -> Small<'_> {
+    let maps = Maps::new(bytes).unwrap();
     Locator::new(maps.try_into().unwrap(), maps.stopping(), Effort::default(), 1)
 }
 
-/// The heights that an object at a place in millimeters, turned by this many radians, gives an approach.
-fn met(height: Heights, at: Approach, [x, y]: [f64; 2], yaw: f64) -> Seen {
+/// The row of an approach's fingers, and the heights that an object at a place in millimeters, turned by this many radians,
+/// gives them.
+pub(crate) fn heights(height: Heights, at: Approach, [x, y]: [f64; 2], yaw: f64) -> ([f64; 2], [f64; 3]) {
     let roll = f64::from(at.roll) / 256.0 * std::f64::consts::TAU;
-    let row = [roll.cos(), roll.sin()].map(|axis| axis * 15.0);
-    let heights = [-1.0, 0.0, 1.0].map(|finger| {
+    let row = [roll.cos(), roll.sin()];
+    let heights = [-15.0, 0.0, 15.0].map(|finger| {
         let (u, v) = (f64::from(at.x) / 1e3 + finger * row[0] - x, f64::from(at.y) / 1e3 + finger * row[1] - y);
         height(yaw.cos() * u + yaw.sin() * v, yaw.cos() * v - yaw.sin() * u)
     });
+    (row, heights)
+}
+
+/// What an approach to an object meets.
+fn met(height: Heights, at: Approach, place: [f64; 2], yaw: f64) -> Seen {
+    let (row, heights) = heights(height, at, place, yaw);
     let limit = heights.into_iter().fold(0.0, f64::max) - f64::from(STROKE) / 1e3;
     let micrometers = |millimeters: f64| (millimeters * 1e3) as i32;
     let contacts =
         heights.map(|height| if height >= limit { Contact::At(micrometers(height)) } else { Contact::Nothing });
-    Seen::new([at.x, at.y], row.map(micrometers), contacts, micrometers(limit))
+    Seen::new([at.x, at.y], row.map(|axis| micrometers(axis * 15.0)), contacts, micrometers(limit))
 }
 
 /// Touches where the locator proposes, until it is done, or as often as said; returns the verdict.
@@ -207,22 +234,20 @@ fn far(pose: &Pose, [x, y]: [f64; 2]) -> f64 {
 
 #[test]
 fn a_wedge_and_a_cylinder_are_told_apart_with_place_and_yaw() {
-    let bytes = model(&[WEDGE, CYLINDER], 0);
-    let mut locator = locator(Maps::new(&bytes).unwrap());
+    let mut locator = locator(&BOTH);
     for (place, yaw) in [([12.0, -9.0], 0.6), ([-20.0, 17.0], 2.4), ([3.0, 5.0], 4.9)] {
-        locator.reset();
-        let verdict = touch(&mut locator, wedge, place, yaw, 8);
-        assert!(matches!(verdict, Verdict::Recognized { object: 0, .. }), "{verdict:?}");
-        let [pose, ..] = poses(&locator, 0)[..] else { panic!("no pose") };
+        let mut find = |object: u8, height: Heights| {
+            locator.reset();
+            let verdict = touch(&mut locator, height, place, yaw, 8);
+            assert!(matches!(verdict, Verdict::Recognized { object: found, .. } if found == object), "{verdict:?}");
+            poses(&locator, usize::from(object))[0]
+        };
+        let pose = find(0, wedge);
         assert!(far(&pose, place) < 2.0 && turned(&pose, yaw).abs() < 6.0, "{pose:?} at {place:?}, {yaw}");
         let turn = pose.yaw_within.expect("a wedge has a yaw");
         assert!(pose.within.iter().all(|&within| (400..4_000).contains(&within)) && turn < 3_000, "{pose:?}");
         assert!(pose.placement == 0 && pose.share > 50_000, "{pose:?}");
-
-        locator.reset();
-        let verdict = touch(&mut locator, cylinder, place, yaw, 8);
-        assert!(matches!(verdict, Verdict::Recognized { object: 1, .. }), "{verdict:?}");
-        let [pose, ..] = poses(&locator, 1)[..] else { panic!("no pose") };
+        let pose = find(1, cylinder);
         assert!(far(&pose, place) < 2.0, "{pose:?} at {place:?}");
         assert_eq!((pose.placement, pose.yaw, pose.yaw_within), (1, 0, None));
         assert!(locator.posterior(1) > 64_000 && locator.posterior(0) < 1_000 && locator.posterior(usize::MAX) == 0);
@@ -232,7 +257,7 @@ fn a_wedge_and_a_cylinder_are_told_apart_with_place_and_yaw() {
 #[test]
 fn an_object_that_looks_the_same_from_behind_has_two_poses() {
     let bytes = model(&[BAR, CYLINDER], 0);
-    let mut locator = locator(Maps::new(&bytes).unwrap());
+    let mut locator = locator(&bytes);
     let (place, yaw) = ([8.0, 4.0], 0.4);
     touch(&mut locator, bar, place, yaw, 8);
     let [one, other, ..] = poses(&locator, 0)[..] else { panic!("fewer than two poses") };
@@ -245,8 +270,7 @@ fn an_object_that_looks_the_same_from_behind_has_two_poses() {
 
 #[test]
 fn a_search_that_was_not_finished_names_nothing() {
-    let bytes = model(&[WEDGE, CYLINDER], 0);
-    let maps = Maps::new(&bytes).unwrap();
+    let maps = Maps::new(&BOTH).unwrap();
     // Any lead would do, and yet there is no name.
     let stopping = Stopping::from_odds(1 << 55, 3);
     for lookups in [0, 1_000] {
@@ -272,8 +296,7 @@ fn a_search_that_was_not_finished_names_nothing() {
 
 #[test]
 fn approaches_are_chosen_within_the_workspace_and_alike_after_a_reset() {
-    let bytes = model(&[WEDGE, CYLINDER], 0);
-    let mut locator = locator(Maps::new(&bytes).unwrap());
+    let mut locator = locator(&BOTH);
     let run = |locator: &mut Small<'_>| {
         let mut all = Vec::new();
         let mut at = Approach::default();
@@ -288,15 +311,13 @@ fn approaches_are_chosen_within_the_workspace_and_alike_after_a_reset() {
     let first = run(&mut locator);
     locator.reset();
     assert_eq!(run(&mut locator), first);
-    let maps = locator.maps();
-    assert_eq!(run(&mut self::locator(maps)), first);
+    assert_eq!(run(&mut self::locator(&BOTH)), first);
     assert_eq!(locator.choose(SPACING, STROKE, 0, 20).x, 0);
 }
 
 #[test]
 fn weights_say_which_objects_there_may_be() {
-    let bytes = model(&[WEDGE, CYLINDER], 0);
-    let mut locator = locator(Maps::new(&bytes).unwrap());
+    let mut locator = locator(&BOTH);
     assert!(!locator.reset_to(&[0, 0]) && !locator.reset_to(&[1]) && !locator.reset_to(&[1; 3]));
     assert!(locator.reset_to(&[3, 1]));
     let share = f64::from(locator.posterior(0)) / 65_536.0;
@@ -314,7 +335,7 @@ fn weights_say_which_objects_there_may_be() {
 fn what_fits_no_object_is_unknown() {
     // After eight touches 1,000 / 2.81 below this.
     let bytes = model(&[WEDGE, CYLINDER], -500);
-    let mut locator = locator(Maps::new(&bytes).unwrap());
+    let mut locator = locator(&bytes);
     let verdict = touch(&mut locator, wedge, [5.0, 5.0], 1.0, 1);
     assert!(matches!(verdict, Verdict::Recognized { object: 0, touches: 8, .. }), "{verdict:?}");
     assert_eq!(locator.familiarity(), Familiarity::Known);
@@ -331,8 +352,7 @@ fn what_fits_no_object_is_unknown() {
 
 #[test]
 fn on_an_empty_table_nothing_but_the_table_is_met() {
-    let bytes = model(&[WEDGE, CYLINDER], 0);
-    let mut locator = locator(Maps::new(&bytes).unwrap());
+    let mut locator = locator(&BOTH);
     let empty: Heights = |_, _| 0.0;
     assert!(!locator.met_table_alone());
     assert_eq!(touch(&mut locator, empty, [0.0; 2], 0.0, 1), Verdict::GaveUp);
@@ -349,8 +369,7 @@ fn on_an_empty_table_nothing_but_the_table_is_met() {
 #[test]
 fn a_locator_that_has_searched_nothing_chooses_as_after_a_reset() {
     let bytes = model(&PINS, 0);
-    let maps = Maps::new(&bytes).unwrap();
-    let mut fresh = locator(maps);
+    let mut fresh = locator(&bytes);
     let mut reset = fresh.clone();
     reset.reset();
     assert_eq!(fresh.verdict(), reset.verdict());
@@ -382,7 +401,7 @@ fn a_touch_counts_with_a_position_from_straight_above() {
     let bytes = model(&PINS, 0);
     let maps = Maps::new(&bytes).unwrap();
     assert_eq!(Hand::of(&maps), Some(HAND));
-    let mut locator = locator(maps);
+    let mut locator = locator(&bytes);
     let down = HandPose { direction: [0, 0, -32_767], alignment: [0, 32_767, 0] };
     let position = Position { micrometers: [1_000, 2_000, 12_000] };
     let touch = Touch::new([ContactTime::MISSING, ContactTime::FIRST, ContactTime::from_micros(50_000)]);
@@ -431,8 +450,7 @@ fn every_truncation_and_every_changed_byte_is_refused() {
 
 #[test]
 fn meaningless_maps_are_refused_at_their_place() {
-    let bytes = model(&PINS, 0);
-    let maps = place_of_maps(&bytes);
+    let (bytes, maps) = pins(0);
     let section = ModelError::Section { offset: maps - 8 };
     let field = |offset| ModelError::Field { offset };
     let record = maps + MAPS_LENGTH;
@@ -455,10 +473,7 @@ fn meaningless_maps_are_refused_at_their_place() {
         ("heights beyond the end", record + 8, &[0, 0, 1, 0], section),
     ];
     for (what, at, new, error) in cases {
-        let mut changed = bytes.clone();
-        changed[at..at + new.len()].copy_from_slice(new);
-        make_right(&mut changed);
-        assert_eq!(Maps::new(&changed).err(), Some(error), "{what}");
+        assert_eq!(Maps::new(&changed(&bytes, at, new)).err(), Some(error), "{what}");
     }
 }
 
@@ -488,9 +503,7 @@ fn follow(bytes: &[u8], touches: &[Seen]) -> bool {
         let at = locator.choose(end, u32::MAX - end, end, 64);
         assert!(at.x.unsigned_abs() <= end && at.y.unsigned_abs() <= end);
         let leader = locator.leader();
-        let mut poses =
-            [Pose { placement: 0, position: [0; 2], yaw: 0, within: [0; 2], yaw_within: None, share: 0 }; 3];
-        locator.poses(leader, &mut poses);
+        locator.poses(leader, &mut [Pose::default(); 3]);
     }
     let names = maps.object_name(locator.leader()).len() + maps.placement_name(0).len() + maps.bytes_of(0);
     let _ = (names, Hand::of(&maps), locator.posterior(0), locator.rivals(), locator.fit(), maps.promise());
@@ -501,17 +514,14 @@ fn follow(bytes: &[u8], touches: &[Seen]) -> bool {
 
 #[test]
 fn every_changed_byte_under_a_right_checksum_is_refused_or_read() {
-    let bytes = model(&PINS, -700);
-    let maps = place_of_maps(&bytes);
+    let (bytes, maps) = pins(-700);
     let touches = &extreme()[..3];
     let mut read = 0;
     let likelihoods = maps + MAPS_LENGTH + 2 * PLACEMENT_LENGTH;
     for at in (0..likelihoods).chain((likelihoods..bytes.len() - 4).step_by(97)) {
         for change in [0, 1, 127, 128, 255] {
-            let mut changed = bytes.clone();
-            changed[at] = if changed[at] == change { change ^ 85 } else { change };
-            make_right(&mut changed);
-            read += u32::from(follow(&changed, touches));
+            let new = if bytes[at] == change { change ^ 85 } else { change };
+            read += u32::from(follow(&changed(&bytes, at, &[new]), touches));
         }
     }
     assert!(read > 300, "{read}");
@@ -529,8 +539,7 @@ proptest! {
         spacing in prop_oneof![Just(SPACING), any::<u32>()],
         seed in any::<u32>(),
     ) {
-        let bytes = model(&[WEDGE, CYLINDER], 0);
-        let maps = Maps::new(&bytes).unwrap();
+        let maps = Maps::new(&BOTH).unwrap();
         let effort = Effort { lookups: 40_000, candidates: 16, ..Effort::default() };
         let mut locator = Locator::<1024, 32, 2>::new(maps.try_into().unwrap(), maps.stopping(), effort, seed);
         for number in 0..=touches {
@@ -550,8 +559,7 @@ proptest! {
         likelihood in prop::sample::select(vec![None, Some(i16::MIN), Some(i16::MAX), Some(-1), Some(500)]),
         first in 0_usize..20,
     ) {
-        let mut bytes = model(&PINS, 0);
-        let maps = place_of_maps(&bytes);
+        let (mut bytes, maps) = pins(0);
         for ((to, &record), kept) in bytes[maps + MAPS_LENGTH..].iter_mut().zip(&records).zip(kept) {
             *to = if kept { *to } else { record };
         }
@@ -580,8 +588,7 @@ proptest! {
         touches in prop::collection::vec(
             (any::<[i32; 2]>(), any::<[i32; 2]>(), any::<[i32; 3]>(), any::<u8>(), any::<i32>(), 0_u32..16), 1..4),
     ) {
-        let mut bytes = model(&PINS, 0);
-        let maps = place_of_maps(&bytes);
+        let (mut bytes, maps) = pins(0);
         for placement in 0..2 {
             let record = &mut bytes[maps + MAPS_LENGTH + placement * PLACEMENT_LENGTH..];
             record[2..4].copy_from_slice(&priors[placement].to_le_bytes());

@@ -1,7 +1,7 @@
 //! Models of maps in a station: loaded, touched and asked over the link.
 
 use super::*;
-use crate::locate::tests::{CYLINDER, Heights, WEDGE, locator, model, wedge};
+use crate::locate::tests::{BOTH, Heights, heights, locator, wedge};
 use crate::locate::{Approach, Hand, Maps, POSE, Pose};
 use crate::{Model, Verdict};
 use palpate_shared::link::*;
@@ -127,31 +127,26 @@ impl<'m> Line<'m> {
 }
 
 /// The touch of an approach to an object at a place in millimeters, turned by this many radians.
-fn touch(height: Heights, at: Approach, [x, y]: [f64; 2], yaw: f64) -> Touch {
-    let roll = f64::from(at.roll) / 256.0 * std::f64::consts::TAU;
-    let heights = [-15.0, 0.0, 15.0].map(|finger| {
-        let (u, v) = (f64::from(at.x) / 1e3 + finger * roll.cos() - x, f64::from(at.y) / 1e3 + finger * roll.sin() - y);
-        height(yaw.cos() * u + yaw.sin() * v, yaw.cos() * v - yaw.sin() * u)
-    });
+fn touch(height: Heights, at: Approach, place: [f64; 2], yaw: f64) -> Touch {
+    let ([cosine, sine], heights) = heights(height, at, place, yaw);
     let highest = heights.into_iter().fold(0.0, f64::max);
     let times = heights.map(|height| match highest - height {
         // A hand of 100 mm per second, with a stroke of 20 mm.
         way if way <= 20.0 => ContactTime::from_micros((way * 1e4) as u32),
         _ => ContactTime::MISSING,
     });
-    let alignment = [roll.cos(), roll.sin(), 0.0].map(|share| (share * f64::from(Q15_ONE)) as i16);
+    let alignment = [cosine, sine, 0.0].map(|share| (share * f64::from(Q15_ONE)) as i16);
     let position = Position { micrometers: [at.x, at.y, (highest * 1e3) as i32] };
     Touch::new(times).with_pose(HandPose { direction: [0, 0, -Q15_ONE], alignment }).with_position(position)
 }
 
 #[test]
 fn verdicts_places_and_approaches_over_a_line_that_loses_bytes_are_those_of_a_locator() {
-    let bytes = model(&[WEDGE, CYLINDER], 0);
-    let maps = Maps::new(&bytes).unwrap();
+    let maps = Maps::new(&BOTH).unwrap();
     let hand = Hand::of(&maps).unwrap();
     for loses in [0, 157] {
-        let (mut kept, mut room, mut locator) = (Kept::new(), Room::new(), locator(maps));
-        let mut line = Line::new(&bytes, &mut kept, &mut room, loses);
+        let (mut kept, mut room, mut locator) = (Kept::new(), Room::new(), locator(&BOTH));
+        let mut line = Line::new(&BOTH, &mut kept, &mut room, loses);
         for (place, yaw) in [([12.0, -9.0], 0.6), ([-20.0, 17.0], 2.4)] {
             assert_eq!(line.ask(Query::Place { rank: 0 }), "Place { table_alone: false, place: None }");
             let mut at = Approach { x: 0, y: 0, roll: 40 };
@@ -196,7 +191,7 @@ fn verdicts_places_and_approaches_over_a_line_that_loses_bytes_are_those_of_a_lo
         assert_eq!(line.ask(Query::Placement { placement: 2 }), "Refused(NoObject)");
         assert_eq!(line.ask(Query::Name { object: 1 }), "Name(\"object 1\")");
         assert_eq!(line.ask(Query::Name { object: 2 }), "Refused(NoObject)");
-        let info = format!("length: {}, last_object: 1, descriptor: 254 }})", bytes.len());
+        let info = format!("length: {}, last_object: 1, descriptor: 254 }})", BOTH.len());
         assert!(line.ask(Query::Model).ends_with(&info), "{info}");
         assert_eq!(line.end.statistics().garbled > 0, loses > 0);
     }
@@ -204,7 +199,7 @@ fn verdicts_places_and_approaches_over_a_line_that_loses_bytes_are_those_of_a_lo
 
 #[test]
 fn maps_are_loaded_in_place_of_trees_and_each_refuses_the_touches_of_the_other() {
-    let (maps, refused) = (model(&[WEDGE, CYLINDER], 0), Outcome::Refused);
+    let (maps, refused) = (&*BOTH, Outcome::Refused);
     let at = Approach { x: 0, y: 0, roll: 40 };
     let located = touch(wedge, at, [0.0; 2], 0.0);
     let free = Command::Touch { touch: (&Touch::from_micros([0, 30_000, 50_000])).into(), detail: false };
@@ -215,7 +210,7 @@ fn maps_are_loaded_in_place_of_trees_and_each_refuses_the_touches_of_the_other()
     assert_eq!(line.load(TREES), Outcome::Done);
     assert_eq!(line.press(&located), refused(Refusal::Position));
     assert!(matches!(line.say(free.clone()), Outcome::Verdict(_)));
-    assert_eq!(line.load(&maps), Outcome::Done);
+    assert_eq!(line.load(maps), Outcome::Done);
     assert_eq!(line.say(free.clone()), refused(Refusal::NoPosition));
     let first = line.press(&located);
     assert!(matches!(first, Outcome::Verdict(VerdictMessage { touches: 1, .. })), "{first:?}");
@@ -226,11 +221,11 @@ fn maps_are_loaded_in_place_of_trees_and_each_refuses_the_touches_of_the_other()
     assert_eq!(line.load(TREES), Outcome::Done);
     assert_eq!(line.press(&located), refused(Refusal::Position));
     assert!(line.ask(Query::Statistics).contains("refused: 4,"));
-    assert_eq!(line.load(&maps), Outcome::Done);
+    assert_eq!(line.load(maps), Outcome::Done);
     // After a reset the maps are there, and their touches are not: the host's session is not known any more.
     drop(line);
     let line = Line::new(&[], &mut kept, &mut room, 0);
-    assert_eq!(Device::model(&line.station).map(|info| info.checksum), Some(checksum_of(&maps)));
+    assert_eq!(Device::model(&line.station).map(|info| info.checksum), Some(checksum_of(maps)));
     assert_eq!(line.end.progress().executed(), 0);
 }
 
@@ -241,12 +236,12 @@ fn checksum_of(model: &[u8]) -> u32 {
 
 #[test]
 fn a_station_without_room_for_maps_refuses_them_and_so_does_one_with_too_little() {
-    let maps = model(&[WEDGE, CYLINDER], 0);
-    assert_eq!(().open(&maps), Err(Refusal::Invalid));
-    assert_eq!((&mut Table::<4096, 32, 1>::new()).open(&maps), Err(Refusal::TooLong));
+    let maps = &*BOTH;
+    assert_eq!(().open(maps), Err(Refusal::Invalid));
+    assert_eq!((&mut Table::<4096, 32, 1>::new()).open(maps), Err(Refusal::TooLong));
     assert_eq!((&mut Room::new()).open(TREES), Err(Refusal::Invalid));
     let mut room = Table::<64, 1, 2>::new();
-    let mut station = Station::<16, _, _>::open_with(&maps, NoStorage, &mut room).unwrap().0;
+    let mut station = Station::<16, _, _>::open_with(maps, NoStorage, &mut room).unwrap().0;
     assert!(station.model().is_none() && Device::model(&station).unwrap().has_maps());
     assert_eq!(station.begin(Payload::Model, 1, 0), Outcome::Refused(Refusal::Unsupported));
     // Trees have no places.
@@ -261,9 +256,8 @@ proptest! {
         rank: u8,
         within: Option<u32>,
     ) {
-        let maps = model(&[WEDGE, CYLINDER], 0);
         let mut room = Table::<256, 8, 2>::new();
-        let mut station = Station::<16, _, _>::open_with(&maps, NoStorage, &mut room).unwrap().0;
+        let mut station = Station::<16, _, _>::open_with(&BOTH, NoStorage, &mut room).unwrap().0;
         let mut counted = 0;
         for (times, pose, position, is_down) in touches {
             let touch = Touch::new(times.map(ContactTime::from_micros));
