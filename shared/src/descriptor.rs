@@ -369,8 +369,9 @@ mod tests {
         let partial = Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::from_micros(9)]);
         let slow = Touch::from_micros([0, u32::MAX - 1, 0]);
         let late = Touch::new([ContactTime::MISSING, ContactTime::FIRST, ContactTime::from_micros(u32::MAX - 1)]);
-        let outer = i32::from(ContactPattern::OuterAndMiddle.code());
-        let cases: [(Descriptor, Touch, &[i32]); 10] = [
+        let [lone, outer] = [ContactPattern::Outer, ContactPattern::OuterAndMiddle].map(|of| i32::from(of.code()));
+        let pose = Pose { direction: [1, 2, 3], alignment: [4, 5, 6] };
+        let cases: [(Descriptor, Touch, &[i32]); 12] = [
             (Descriptor::Curvature, touch(), &[80_000, 20_000]),
             (Descriptor::Gravity, touch(), &[80_000, 20_000, 3, 6]),
             (Descriptor::Oriented, touch(), &[80_000, 20_000, 1, 2, 3, -4, 5, 6]),
@@ -379,6 +380,9 @@ mod tests {
             (Descriptor::Times, partial, &[0, NONE, 9]),
             (Descriptor::Curvature, partial, &[NONE, 9]),
             (Descriptor::Gravity, partial, &[NONE, 9, NONE, NONE]),
+            // The alignment points away from the only outer finger that touched.
+            (Descriptor::ContactsOriented, alone(0).with_pose(pose), &[lone, NONE, NONE, NONE, 1, 2, 3, 4, 5, 6]),
+            (Descriptor::ContactsOriented, alone(2).with_pose(pose), &[lone, NONE, NONE, NONE, 1, 2, 3, -4, -5, -6]),
             (Descriptor::Curvature, slow, &[-FEATURE_LIMIT, 0]),
             (Descriptor::ContactsCurvature, late, &[outer, NONE, NONE, -FEATURE_LIMIT]),
         ];
@@ -423,15 +427,6 @@ mod tests {
                 assert_eq!(as_is, turned, "{alignment:?}");
             }
         }
-    }
-
-    #[test]
-    fn the_alignment_points_away_from_the_only_outer_finger_that_touched() {
-        let pose = Pose { direction: [1, 2, 3], alignment: [4, 5, 6] };
-        let alignment =
-            |touch: Touch| Descriptor::ContactsOriented.features(&touch.with_pose(pose)).as_slice()[7..].to_vec();
-        assert_eq!(alignment(alone(0)), [4, 5, 6]);
-        assert_eq!(alignment(alone(2)), [-4, -5, -6]);
     }
 
     #[test]

@@ -345,7 +345,7 @@ fn a_clean_line_repeats_nothing() {
 
 #[test]
 fn ten_thousand_touches_arrive_exactly_once_over_a_bad_line_with_the_default_number_of_attempts() {
-    let faults = Faults { byte_lost: 0.001, byte_changed: 0.001, frame_lost: 0.15, frame_doubled: 0.1, delay: 10_000 };
+    let faults = Faults { byte_lost: 0.001, byte_changed: 0.001, frame_lost: 0.15, frame_doubled: 0.1, delay: 40_000 };
     let mut rig = Rig::with_attempts(HostSettings::default().attempts, faults, 7);
     rig.send_touches(0..10_000);
     rig.assert_exactly_once(10_000);
@@ -483,16 +483,6 @@ fn a_second_host_opens_a_session_of_its_own_and_late_copies_open_none() {
     assert_eq!((before.session(), before.executed()), (2, 2));
     rig.chip.receive(&old_opening, &mut rig.notebook, |_| ());
     assert_eq!(rig.chip.progress(), &before);
-}
-
-#[test]
-fn events_say_how_many_before_them_were_lost() {
-    let mut rig = Rig::new(CLEAN, 1);
-    for (event, copies) in [(Event::Started, 1), (FAULT, 1), (FAULT, 0), (FAULT, 2), (FAULT, 1)] {
-        rig.tell(event, copies);
-    }
-    assert_eq!(rig.events, [(Event::Started, 0), (FAULT, 0), (FAULT, 1), (FAULT, 0)]);
-    assert_eq!(rig.missed_and_repeated(), (1, 1));
 }
 
 #[test]
@@ -797,13 +787,6 @@ fn the_longest_messages_fit_into_a_frame() {
     assert!(framed(0, too_long).is_empty());
 }
 
-/// A host that wants a session, and a chip.
-fn ends() -> (HostEnd, DeviceEnd) {
-    let mut host = HostEnd::new(HostSettings::default());
-    host.connect(1, 0, |_| ());
-    (host, DeviceEnd::new(Progress::NONE, 1))
-}
-
 proptest! {
     #[test]
     fn touches_survive_the_journey(times: [u32; 3], pose: Option<([i16; 3], [i16; 3])>) {
@@ -822,15 +805,13 @@ proptest! {
     }
 
     #[test]
-    fn no_bytes_make_an_end_panic(bytes in prop::collection::vec(prop_oneof![Just(0_u8), any::<u8>(), 0..8_u8], 0..600)) {
-        let (mut host, mut chip) = ends();
-        host.receive(&bytes, 1, |_| (), |_| ());
-        chip.receive(&bytes, &mut Notebook::default(), |_| ());
-    }
-
-    #[test]
-    fn whole_frames_of_any_content_make_no_end_panic(messages in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..60), 1..20)) {
-        let (mut host, mut chip) = ends();
+    fn no_bytes_make_an_end_panic(
+        messages in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..60), 1..20),
+        noise in prop::collection::vec(prop_oneof![Just(0_u8), any::<u8>(), 0..8_u8], 0..600),
+    ) {
+        let mut host = HostEnd::new(HostSettings::default());
+        host.connect(1, 0, |_| ());
+        let mut chip = DeviceEnd::new(Progress::NONE, 1);
         let mut notebook = Notebook::default();
         let count = messages.len();
         for message in messages {
@@ -841,20 +822,8 @@ proptest! {
         // Each was counted once by either end, as a message or as none.
         prop_assert_eq!((chip.statistics().garbled + chip.statistics().frames) as usize, count);
         prop_assert_eq!((host.statistics().garbled + host.statistics().received) as usize, count);
-    }
-
-    #[test]
-    fn every_touch_is_counted_exactly_once_over_any_line(
-        byte_lost in 0.0..0.005,
-        byte_changed in 0.0..0.005,
-        frame_lost in 0.0..0.3,
-        frame_doubled in 0.0..0.3,
-        delay in 0..40_000_u64,
-        seed: u64,
-    ) {
-        let mut rig = Rig::new(Faults { byte_lost, byte_changed, frame_lost, frame_doubled, delay }, seed);
-        rig.send_touches(0..60);
-        rig.assert_exactly_once(60);
+        chip.receive(&noise, &mut notebook, |_| ());
+        host.receive(&noise, 1, |_| (), |_| ());
     }
 }
 
@@ -879,6 +848,7 @@ fn late_events_of_an_earlier_start_are_not_counted_twice_and_do_not_confuse_the_
         missed,
         [(1, 0, 0), (1, 1, 0), (2, 0, 0), (3, 0, 0), (3, 1, 0), (1, 3, 1), (3, 2, 0), (2, 2, 1), (3, 4, 1)]
     );
+    assert_eq!(rig.missed_and_repeated(), (3, 2));
 }
 
 #[test]

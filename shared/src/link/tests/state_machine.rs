@@ -68,7 +68,6 @@ struct Chip {
     end: DeviceEnd,
     notebook: Notebook,
     life: u32,
-    boot: u32,
     touches: u32,
     /// Resets of all chips when its own fingers touched last.
     touched: u32,
@@ -78,13 +77,6 @@ struct Chip {
 pub(super) fn place(rank: u8) -> TablePose {
     let position = [i32::from(rank), -1];
     TablePose { placement: rank, position, yaw: 65_535, within: [0, u32::MAX], yaw_within: None, share: 65_536 }
-}
-
-/// A question for an approach, with a number in it.
-fn next_approach(number: u8) -> Query {
-    let mut without = [0; POSE_BYTES];
-    without[0] = number;
-    Query::NextApproach { without }
 }
 
 /// The answer to the question with this number.
@@ -145,9 +137,8 @@ fn scatter(number: u32) -> u32 {
 impl World {
     fn new() -> Self {
         let chip = |number: u32| {
-            let boot = scatter(number);
-            let end = DeviceEnd::new(Progress::NONE, boot);
-            Chip { end, notebook: Notebook::default(), life: number, boot, touches: 0, touched: 0 }
+            let end = DeviceEnd::new(Progress::NONE, scatter(number));
+            Chip { end, notebook: Notebook::default(), life: number, touches: 0, touched: 0 }
         };
         let host = |chip| Host {
             end: HostEnd::new(HostSettings { retry: 20_000, attempts: 12 }),
@@ -214,7 +205,7 @@ impl World {
                 // In turn: the answer has the question's number.
                 let query = match name % 4 {
                     0 => Query::Name { object: name },
-                    1 => next_approach(name),
+                    1 => Query::NextApproach { without: std::array::from_fn(|byte| if byte == 0 { name } else { 0 }) },
                     2 => Query::Place { rank: name },
                     _ => Query::NextPress { within: Some(name.into()) },
                 };
@@ -271,12 +262,11 @@ impl World {
         let resets = self.resets;
         self.under_way.retain(|frame| resets - frame.resets < LATEST);
         let life = u32::try_from(CHIPS).unwrap() + resets;
-        let boot = scatter(life);
-        let mut end = DeviceEnd::new(progress, boot);
+        let mut end = DeviceEnd::new(progress, scatter(life));
         let mut frames = Vec::new();
         end.start(|frame| frames.push(frame.to_vec()));
         let touched = self.chips[chip].touched;
-        self.chips[chip] = Chip { end, notebook, life, boot, touches: 0, touched };
+        self.chips[chip] = Chip { end, notebook, life, touches: 0, touched };
         self.up(chip, frames);
     }
 
@@ -427,9 +417,9 @@ impl World {
             let counted: Vec<u32> = self.chips[host.chip].notebook.touches.iter().map(number_of).collect();
             assert!(
                 host.given.iter().all(|touch| counted.contains(touch)),
-                "host {number} believes {:?} to be counted in boot {}, which has {counted:?}",
+                "host {number} believes {:?} to be counted in life {}, which has {counted:?}",
                 host.given,
-                self.chips[host.chip].boot
+                self.chips[host.chip].life
             );
         }
     }
@@ -445,7 +435,7 @@ fn each_touch_counts_at_most_once_and_what_a_host_believes_is_so_or_it_is_told()
         proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha),
     );
     let histories = prop::collection::vec(action(), LENGTH);
-    let result = runner.run(&histories, |actions| {
+    let held = runner.run(&histories, |actions| {
         let mut world = World::new();
         world.connect(0);
         for action in actions {
@@ -454,7 +444,5 @@ fn each_touch_counts_at_most_once_and_what_a_host_believes_is_so_or_it_is_told()
         world.settle();
         Ok(())
     });
-    if let Err(error) = result {
-        panic!("{error}");
-    }
+    held.unwrap_or_else(|error| panic!("{error}"));
 }
