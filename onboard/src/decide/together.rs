@@ -167,12 +167,20 @@ mod tests {
     }
 
     #[test]
-    fn objects_lead_by_the_sum_of_their_outputs_and_rivals_are_the_others_sums() {
+    fn an_object_counts_as_the_sum_of_its_outputs_as_leader_as_rival_and_in_posteriors() {
         for (evidence, objects, known) in cases() {
             let content = section(&objects);
             let outputs = Outputs::from_bytes(&content, 4).unwrap();
-            let leading = Leading::of(&evidence, known, outputs, unit());
             let weights = weights(&evidence, &objects, known);
+            let (all, best): (f64, _) = (weights.iter().sum(), evidence.iter().max().unwrap());
+            for output in 0..known {
+                let own = weights[usize::from(objects[output])];
+                let (posterior, share) = posterior(&evidence, known, output, outputs, unit());
+                assert!((posterior.to_f64() - own / all).abs() < 1e-7, "{evidence:?} {objects:?}");
+                let part = ((evidence[output] - best) as f64 / 1000.0).exp();
+                assert!(own < 1e-9 || (share.to_f64() - part / own).abs() < 1e-6, "{evidence:?} {objects:?}");
+            }
+            let leading = Leading::of(&evidence, known, outputs, unit());
             let named = weights.len() - (4 - known);
             let own = weights[usize::from(objects[leading.output])];
             let most = weights[..named].iter().copied().fold(0.0, f64::max);
@@ -183,7 +191,7 @@ mod tests {
             assert!(own >= most * (1.0 - 1e-7), "{evidence:?} {objects:?} {known}");
             let strongest = (0..known).filter(|&output| objects[output] == objects[leading.output]);
             assert_eq!(Some(evidence[leading.output]), strongest.map(|output| evidence[output]).max());
-            let exact = (weights.iter().sum::<f64>() - own) / own;
+            let exact = (all - own) / own;
             match leading.rivals() {
                 Some(rivals) => {
                     let found = rivals.q56() as f64 / ONE as f64;
@@ -209,24 +217,6 @@ mod tests {
             }
         }
         assert!(found > 1_000, "{found}");
-    }
-
-    #[test]
-    fn posteriors_of_objects_are_sums_and_shares_are_parts_of_them() {
-        for (evidence, objects, known) in cases() {
-            let content = section(&objects);
-            let outputs = Outputs::from_bytes(&content, 4).unwrap();
-            let weights = weights(&evidence, &objects, known);
-            let all: f64 = weights.iter().sum();
-            let most = evidence.iter().max().unwrap();
-            for output in 0..known {
-                let own = weights[usize::from(objects[output])];
-                let (posterior, share) = posterior(&evidence, known, output, outputs, unit());
-                assert!((posterior.to_f64() - own / all).abs() < 1e-7, "{evidence:?} {objects:?}");
-                let part = ((evidence[output] - most) as f64 / 1000.0).exp();
-                assert!(own < 1e-9 || (share.to_f64() - part / own).abs() < 1e-6, "{evidence:?} {objects:?}");
-            }
-        }
     }
 
     #[test]

@@ -1,11 +1,11 @@
 use super::*;
 use core::cell::Cell;
-use embedded_hal_mock::eh1::MockError;
+use embedded_hal::digital::ErrorKind;
 use embedded_hal_mock::eh1::digital::{Mock, State as Level, Transaction};
 use palpate_shared::format::{HeaderBuilder, Trained, TrainedProbe, TrainedTouches, checksum};
 use palpate_shared::{ContactTime, Touch};
 use proptest::prelude::*;
-use std::{vec, vec::Vec};
+use std::{rc::Rc, vec, vec::Vec};
 
 const SETTINGS: Settings = Settings {
     debounce: 5_000,
@@ -246,47 +246,54 @@ fn bouncing_for_an_hour_is_told_once_and_ends() {
 
 #[test]
 fn fault_silent_names_the_finger_after_so_many_touches_without_it() {
-    let mut edges = Vec::new();
-    for touch in 0..9 {
+    let edges = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|touch| {
         let at = 50_000 + touch * 1_000_000;
-        edges.extend([
-            (First, true, at),
-            (Last, true, at + 7),
-            (First, false, at + 500_000),
-            (Last, false, at + 500_000),
-        ]);
-    }
-    let (outcomes, _) = play(0, &edges, &[], 10_000_000);
+        [(First, true, at), (Last, true, at + 7), (First, false, at + 500_000), (Last, false, at + 500_000)]
+    });
+    let (outcomes, _) = play(0, edges.as_flattened(), &[], 10_000_000);
     let silent: Vec<usize> =
         outcomes.iter().enumerate().filter(|(_, o)| **o == Err(Fault::Silent(Middle))).map(|(i, _)| i).collect();
     assert_eq!((outcomes.len(), silent), (11, vec![4, 9]), "after the fourth and the eighth touch");
 }
 
 /// Three pins and a clock.
-#[derive(Default)]
+#[derive(Clone)]
 struct Pins {
-    levels: [Cell<bool>; 3],
+    levels: [Rc<Cell<Option<bool>>>; 3],
     clock: TestClock,
 }
 
 impl Pins {
-    fn fingers(&self) -> Fingers<TestPin<'_>, TestPin<'_>, TestPin<'_>> {
-        let [a, b, c] = self.levels.each_ref().map(TestPin);
+    fn open() -> Self {
+        Self::new([Some(false); 3])
+    }
+
+    /// Pins with these levels; without one, a pin cannot be read.
+    fn new(levels: [Option<bool>; 3]) -> Self {
+        Self { levels: levels.map(|level| Rc::new(Cell::new(level))), clock: TestClock::default() }
+    }
+
+    fn fingers(&self) -> Fingers<TestPin, TestPin, TestPin> {
+        let [a, b, c] = self.levels.clone().map(TestPin);
         Fingers::new(a, b, c, Active::High)
     }
 }
 
 /// Pins, their watcher with a queue of `N` edges, and what the main loop makes of them.
-struct Board<'a, const N: usize> {
-    pins: &'a Pins,
-    watcher: Watcher<TestPin<'a>, TestPin<'a>, TestPin<'a>, N>,
+struct Board<const N: usize> {
+    pins: Pins,
+    watcher: Watcher<TestPin, TestPin, TestPin, N>,
     effector: Effector,
     outcomes: Outcomes,
 }
 
-impl<'a, const N: usize> Board<'a, N> {
+impl<const N: usize> Board<N> {
+    fn open(steps: &[u32]) -> Self {
+        Self::start(Pins::open(), steps)
+    }
+
     /// A board whose main loop has run at these times.
-    fn start(pins: &'a Pins, steps: &[u32]) -> Self {
+    fn start(pins: Pins, steps: &[u32]) -> Self {
         let watcher = Watcher::start(pins.fingers(), &pins.clock);
         let Bench { effector, outcomes } = Bench::new(SETTINGS);
         let mut board = Self { pins, watcher, effector, outcomes };
@@ -298,7 +305,7 @@ impl<'a, const N: usize> Board<'a, N> {
     fn change(&mut self, at: u32, changes: &[(Finger, bool)]) {
         self.pins.clock.0.set(at);
         for &(finger, closed) in changes {
-            finger.of(&mut self.pins.levels.each_ref()).set(closed);
+            finger.of(&mut self.pins.levels).set(Some(closed));
         }
     }
 
@@ -330,8 +337,7 @@ impl<'a, const N: usize> Board<'a, N> {
 
 #[test]
 fn a_lost_pulse_drops_its_own_touch_at_once_and_no_later_one_and_the_chip_sleeps_again() {
-    let pins = Pins::default();
-    let mut board = Board::<3>::start(&pins, &[0, 150_000]);
+    let mut board = Board::<3>::open(&[0, 150_000]);
     // The first finger bounces until the queue is full; then the middle one touches and lets go.
     board.set(200_000, &[(First, true)]);
     board.set(200_500, &[(First, false)]);
@@ -360,8 +366,7 @@ fn a_lost_pulse_drops_its_own_touch_at_once_and_no_later_one_and_the_chip_sleeps
 
 #[test]
 fn a_first_contact_that_is_lost_while_the_probe_rests_drops_its_touch() {
-    let pins = Pins::default();
-    let mut board = Board::<3>::start(&pins, &[0, 150_000]);
+    let mut board = Board::<3>::open(&[0, 150_000]);
     board.set_all(200_000, true);
     board.step(210_000);
     // The openings fill the queue, and the first contact of the next approach is lost, while the main loop is busy.
@@ -378,8 +383,7 @@ fn a_first_contact_that_is_lost_while_the_probe_rests_drops_its_touch() {
 
 #[test]
 fn an_edge_found_after_the_interrupt_was_held_off_is_no_contact_time() {
-    let pins = Pins::default();
-    let mut board = Board::<8>::start(&pins, &[0, 50_000]);
+    let mut board = Board::<8>::open(&[0, 50_000]);
     // Flash is erased: nothing changes, then a finger closes meanwhile.
     board.interrupt_late();
     board.set(100_000, &[(First, true)]);
@@ -400,8 +404,7 @@ fn an_edge_found_after_the_interrupt_was_held_off_is_no_contact_time() {
 
 #[test]
 fn the_time_until_something_is_due_is_the_time_until_something_happens() {
-    let pins = Pins::default();
-    let mut board = Board::<8>::start(&pins, &[50_000_u32.wrapping_sub(SETTINGS.release), 50_000]);
+    let mut board = Board::<8>::open(&[50_000_u32.wrapping_sub(SETTINGS.release), 50_000]);
     assert_eq!(board.effector.due(50_000), None);
     board.set(100_000, &[(First, true)]);
     board.step(100_000);
@@ -420,8 +423,7 @@ fn the_time_until_something_is_due_is_the_time_until_something_happens() {
 
 #[test]
 fn a_switch_that_is_closed_at_power_up_is_seen_before_any_interrupt_and_is_no_contact_of_a_later_touch() {
-    let pins = Pins { levels: [false, true, false].map(Cell::new), ..Pins::default() };
-    let mut board = Board::<64>::start(&pins, &[0, 1_000_000]);
+    let mut board = Board::<64>::start(Pins::new([false, true, false].map(Some)), &[0, 1_000_000]);
     // The first finger's interrupt must not read the middle one as touching at the same time.
     board.set(1_000_000, &[(First, true)]);
     board.step(1_500_000);
@@ -432,9 +434,8 @@ fn a_switch_that_is_closed_at_power_up_is_seen_before_any_interrupt_and_is_no_co
 
 #[test]
 fn an_opening_that_did_not_fit_into_the_queue_is_read_again_without_another_interrupt() {
-    let pins = Pins::default();
     // Room for four edges.
-    let mut board = Board::<4>::start(&pins, &[0, 50_000]);
+    let mut board = Board::<4>::open(&[0, 50_000]);
     board.set_all(100_000, true);
     // The main loop is busy: of three openings one fits.
     board.set_all(200_000, false);
@@ -456,39 +457,14 @@ fn an_opening_that_did_not_fit_into_the_queue_is_read_again_without_another_inte
     assert!(!board.outcomes.iter().any(|outcome| matches!(outcome, Err(Fault::Stuck(_)))), "{:?}", board.outcomes);
 }
 
-/// A pin that cannot be read.
-struct BrokenPin;
-
-impl embedded_hal::digital::ErrorType for BrokenPin {
-    type Error = embedded_hal::digital::ErrorKind;
-}
-
-impl embedded_hal::digital::InputPin for BrokenPin {
-    fn is_high(&mut self) -> Result<bool, Self::Error> {
-        Err(embedded_hal::digital::ErrorKind::Other)
-    }
-
-    fn is_low(&mut self) -> Result<bool, Self::Error> {
-        self.is_high()
-    }
-}
-
 #[test]
 fn unreadable_pins_are_all_reported_although_a_touch_comes_at_the_same_time() {
-    let clock = TestClock::default();
-    let level = Cell::new(false);
-    let fingers = Fingers::new(TestPin(&level), BrokenPin, BrokenPin, Active::High);
-    let mut watcher = Watcher::<_, _, _, 8>::start(fingers, &clock);
-    let Bench { mut effector, mut outcomes } = Bench::rested(SETTINGS, 100_000);
-    clock.0.set(100_000);
-    level.set(true);
-    watcher.interrupt(&clock);
-    clock.0.set(600_000);
+    let mut board = Board::<8>::start(Pins::new([Some(false), None, None]), &[]);
+    Bench { effector: board.effector, outcomes: board.outcomes } = Bench::rested(SETTINGS, 100_000);
+    board.set(100_000, &[(First, true)]);
     // Touch and faults are there at the same time.
-    while let Some(outcome) = drain(&mut effector, || watcher.sense(&clock)).transpose() {
-        outcomes.push(outcome);
-    }
-    assert_eq!(outcomes, [Err(Fault::Unreadable(Middle)), Ok(alone(0)), Err(Fault::Unreadable(Last))]);
+    board.step(600_000);
+    assert_eq!(board.outcomes, [Err(Fault::Unreadable(Middle)), Ok(alone(0)), Err(Fault::Unreadable(Last))]);
 }
 
 #[test]
@@ -591,23 +567,16 @@ fn model_of(trained: &Trained) -> Vec<u8> {
     bytes
 }
 
-/// Every level of the pins was read.
-fn read_to_the_end<T: Clock>(probe: Probe<Mock, Mock, Mock, T>) {
-    let (a, b, c) = probe.into_parts().0.into_pins();
-    [a, b, c].iter_mut().for_each(Mock::done);
-}
-
 #[test]
 fn fault_unreadable_names_the_pin_once_until_it_can_be_read_again() {
-    let low = Transaction::get(Level::Low);
-    let broken = || Transaction::get(Level::Low).with_error(MockError::Io(std::io::ErrorKind::NotConnected));
-    let middle = Mock::new(&[low.clone(), broken(), broken(), low.clone(), broken()]);
-    let [first, last] = [(); 2].map(|()| Mock::new(&vec![low.clone(); 5]));
-    let mut probe = Probe::new(Fingers::new(first, middle, last, Active::High), TestClock::default(), SETTINGS);
-    let outcomes: Vec<_> = (0..5).map(|_| probe.poll()).collect();
+    let pins = Pins::open();
+    let mut probe = Probe::new(pins.fingers(), pins.clock.clone(), SETTINGS);
+    let outcomes = [Some(false), None, None, Some(false), None].map(|level| {
+        pins.levels[1].set(level);
+        probe.poll()
+    });
     let fault = Err(Fault::Unreadable(Middle));
     assert_eq!(outcomes, [Ok(None), fault, Ok(None), Ok(None), fault]);
-    read_to_the_end(probe);
 }
 
 #[test]
@@ -617,11 +586,10 @@ fn each_poll_reads_each_pin_once_and_active_low_switches_close_to_low() {
         let level = move |i| if i >= contact { Level::Low } else { Level::High };
         (0..30).map(|i| Transaction::get(level(i))).collect::<Vec<_>>()
     };
-    let pins = [20, 21, 23].map(|contact| Mock::new(&levels(contact)));
-    let [first, middle, last] = pins;
+    let [first, middle, last] = [20, 21, 23].map(|contact| Mock::new(&levels(contact)));
     let clock = TestClock::default();
     let settings = Settings { release: 10_000, ..SETTINGS };
-    let mut probe = Probe::new(Fingers::new(first, middle, last, Active::Low), &clock, settings);
+    let mut probe = Probe::new(Fingers::new(first, middle, last, Active::Low), clock.clone(), settings);
     let mut touches = Vec::new();
     for i in 0..30 {
         clock.0.set(i * 1_000);
@@ -629,7 +597,8 @@ fn each_poll_reads_each_pin_once_and_active_low_switches_close_to_low() {
     }
     assert_eq!(touches, [Touch::from_micros([0, 1_000, 3_000])]);
     assert_eq!(probe.state(), State::Complete);
-    read_to_the_end(probe);
+    let (a, b, c) = probe.into_parts().0.into_pins();
+    [a, b, c].iter_mut().for_each(Mock::done);
 }
 
 #[test]
@@ -736,8 +705,8 @@ fn settings_out_of_range_are_brought_into_it() {
 }
 
 /// A clock that stands where the test puts it.
-#[derive(Default)]
-struct TestClock(Cell<u32>);
+#[derive(Clone, Default)]
+struct TestClock(Rc<Cell<u32>>);
 
 impl Clock for TestClock {
     fn micros(&self) -> u32 {
@@ -745,26 +714,20 @@ impl Clock for TestClock {
     }
 }
 
-impl Clock for &TestClock {
-    fn micros(&self) -> u32 {
-        self.0.get()
-    }
+/// A pin that has the level the test gives it, or cannot be read.
+struct TestPin(Rc<Cell<Option<bool>>>);
+
+impl embedded_hal::digital::ErrorType for TestPin {
+    type Error = ErrorKind;
 }
 
-/// A pin that has the level the test gives it.
-struct TestPin<'a>(&'a Cell<bool>);
-
-impl embedded_hal::digital::ErrorType for TestPin<'_> {
-    type Error = core::convert::Infallible;
-}
-
-impl embedded_hal::digital::InputPin for TestPin<'_> {
+impl embedded_hal::digital::InputPin for TestPin {
     fn is_high(&mut self) -> Result<bool, Self::Error> {
-        Ok(self.0.get())
+        self.0.get().ok_or(ErrorKind::Other)
     }
 
     fn is_low(&mut self) -> Result<bool, Self::Error> {
-        Ok(!self.0.get())
+        self.is_high().map(|is_high| !is_high)
     }
 }
 
@@ -865,12 +828,12 @@ proptest! {
     #[test]
     fn interrupts_and_polling_at_every_edge_agree(edges in edges(), start: u32) {
         let end = edges.last().map_or(0, |e| e.2) + 10_000_000;
-        let pins = Pins::default();
+        let pins = Pins::open();
         pins.clock.0.set(start);
-        let mut probe = Probe::new(pins.fingers(), &pins.clock, SETTINGS);
+        let mut probe = Probe::new(pins.fingers(), pins.clock.clone(), SETTINGS);
         let mut polled = Outcomes::new();
         polled.extend(probe.poll().transpose());
-        let mut board = Board::<127>::start(&pins, &[start]);
+        let mut board = Board::<127>::start(pins.clone(), &[start]);
         for (i, &(finger, closed, at)) in edges.iter().enumerate() {
             let now = start.wrapping_add(at);
             // What was due before the edge is handed over before the pin changes, as it is on a chip.
@@ -952,9 +915,7 @@ fn calibration_finds_the_speed_under_noise_and_from_both_ends() {
     let mut calibration = Calibration::new(12_000, 1, 6);
     for i in 0..200_u32 {
         let noise = [(i * 7_919) % 10_001, (i * 104_729) % 10_001, (i * 1_299_709) % 10_001];
-        let [a, b, c] = [0, 25_000, 50_000];
-        let times = if i % 2 == 0 { [a, b, c] } else { [c, b, a] };
-        let [a, b, c] = times;
+        let [a, b, c] = if i % 2 == 0 { [0, 25_000, 50_000] } else { [50_000, 25_000, 0] };
         assert!(calibration.push(&Touch::from_micros([a + noise[0], b + noise[1], c + noise[2]])));
     }
     let speed = calibration.speed().unwrap();

@@ -149,19 +149,14 @@ fn make_right(bytes: &mut [u8]) {
     bytes[body..].copy_from_slice(&right);
 }
 
-/// Place of the maps' content in a model.
-fn place_of_maps(bytes: &[u8]) -> usize {
-    let content = Maps::new(bytes).unwrap().section(Tag::Maps).unwrap().len();
-    bytes.len() - 4 - content.next_multiple_of(4)
-}
-
 /// The model of a wedge and a cylinder.
 pub(crate) static BOTH: LazyLock<Vec<u8>> = LazyLock::new(|| model(&[WEDGE, CYLINDER], 0));
 
 /// A model of two pins, and its maps' place in it.
 fn pins(misfit: i16) -> (Vec<u8>, usize) {
     let bytes = model(&PINS, misfit);
-    let place = place_of_maps(&bytes);
+    let content = Maps::new(&bytes).unwrap().section(Tag::Maps).unwrap().len();
+    let place = bytes.len() - 4 - content.next_multiple_of(4);
     (bytes, place)
 }
 

@@ -225,13 +225,8 @@ fn maps_are_loaded_in_place_of_trees_and_each_refuses_the_touches_of_the_other()
     // After a reset the maps are there, and their touches are not: the host's session is not known any more.
     drop(line);
     let line = Line::new(&[], &mut kept, &mut room, 0);
-    assert_eq!(Device::model(&line.station).map(|info| info.checksum), Some(checksum_of(maps)));
+    assert_eq!(Device::model(&line.station).map(|info| info.checksum), Some(checksum(&maps[..maps.len() - 4])));
     assert_eq!(line.end.progress().executed(), 0);
-}
-
-/// The checksum that a model states.
-fn checksum_of(model: &[u8]) -> u32 {
-    u32::from_le_bytes(*model.last_chunk().unwrap())
 }
 
 #[test]
