@@ -488,7 +488,7 @@ fn an_approach_that_goes_on_after_its_touch_was_dropped_is_no_other_touch() {
     assert_eq!(bench.outcomes, [Err(Fault::Overrun), Ok(alone(2))]);
 }
 
-/// What an effector makes of fingers at these times after the first contact.
+/// Touch that an effector makes of fingers at these times after the first contact.
 fn touched(settings: Settings, times: [u32; 3]) -> Outcomes {
     let mut bench = Bench::rested(settings, 50_000);
     Finger::ALL.into_iter().zip(times).for_each(|(finger, at)| bench.edges(&[(finger, true, 50_000 + at)]));

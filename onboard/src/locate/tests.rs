@@ -187,7 +187,7 @@ pub(crate) fn heights(height: Heights, at: Approach, [x, y]: [f64; 2], yaw: f64)
     (row, heights)
 }
 
-/// What an approach to an object meets.
+/// Contacts of an approach to an object.
 fn met(height: Heights, at: Approach, place: [f64; 2], yaw: f64) -> Seen {
     let (row, heights) = heights(height, at, place, yaw);
     let limit = heights.into_iter().fold(0.0, f64::max) - f64::from(STROKE) / 1e3;
