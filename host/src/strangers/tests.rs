@@ -46,7 +46,7 @@ fn the_chip_computes_the_misfit_that_was_learned() {
     }
 }
 
-/// Touches of the known objects as a robot makes them of which the simulation knows nothing.
+/// Touches of the known objects by a robot that the simulation does not model.
 fn of_robot(count: usize, seed: u64) -> Dataset {
     let mut dataset = of(0..KNOWN, count, seed);
     dataset.add_noise(&with!(Noise::gaussian(10_000.0), speed = 1.25), seed, 1);

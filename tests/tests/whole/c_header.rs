@@ -51,7 +51,7 @@ fn here(name: &str, flags: &[&str]) -> Result<PathBuf, String> {
 /// The test program of this machine.
 static PROGRAM: LazyLock<PathBuf> = LazyLock::new(|| here("replay", &[]).unwrap());
 
-/// The same under sanitizers, with every layout, code among them, which is not one of the header's defaults.
+/// Same program under sanitizers, with every layout, including code, which is not one of the header's defaults.
 static SANITIZED: LazyLock<PathBuf> = LazyLock::new(|| {
     let layouts = "-DPALPATE_LAYOUTS=95";
     let sanitizers = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", layouts];

@@ -56,7 +56,7 @@ fn collect(root: &Path, below: &Path, files: &mut Vec<(PathBuf, Vec<u8>)>) {
     }
 }
 
-/// A model of two objects of which one is flat and one curved: `ensemble.json`, `model.palpate`, and a few touches in `data`.
+/// A model of two objects, one flat and one curved: `ensemble.json`, `model.palpate`, and a few touches in `data`.
 pub(crate) static ONE_SPLIT: Fixture = Fixture::new(|at| {
     ensemble().save(at.join("ensemble.json")).unwrap();
     fs::create_dir(at.join("data")).unwrap();
@@ -65,7 +65,7 @@ pub(crate) static ONE_SPLIT: Fixture = Fixture::new(|at| {
     succeeds(at, "export ensemble.json -o model.palpate");
 });
 
-/// Approaches to objects, each of which bends by up to so many microseconds, of these numbers; other numbers are other ones. A
+/// Approaches to objects that bend by at most this number of microseconds, with these numbers; other numbers are other ones. A
 /// third of them misses the last finger, unless only `full` touches are wanted.
 pub(crate) fn spread(directory: &Path, objects: &[(&str, u64)], numbers: Range<u64>, full: bool) {
     fs::create_dir_all(directory).unwrap();

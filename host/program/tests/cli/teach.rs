@@ -5,7 +5,7 @@ use crate::{Folder, complains, fails, figures, holds, palpate, says, shapes, suc
 use std::fs;
 use std::path::Path;
 
-/// Touches of an object that bends by up to so many microseconds; some miss a finger.
+/// Touches of an object that bends by at most this number of microseconds; some miss a finger.
 fn touches(path: &Path, most: u64, count: u64, seed: u64) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     crate::touches(path, [most, count, seed], true, "");

@@ -29,7 +29,7 @@ fn pieces(mesh: &Mesh) -> usize {
     mesh.triangles.iter().map(|&[a, ..]| root(&mut parents, a)).collect::<std::collections::HashSet<_>>().len()
 }
 
-/// Checks that a mesh is closed, right side out and of so many triangles.
+/// Checks that a mesh is closed, right side out, and has a number of triangles in the range.
 fn assert_sound(name: &str, mesh: &Mesh, counts: RangeInclusive<usize>) {
     assert_closed(name, mesh);
     assert!(volume(mesh) > 0.0, "{name} is inside out");

@@ -116,7 +116,7 @@ fn recordings_that_are_too_few_say_which_rate_they_support_and_that_rate_can_be_
     calibrate_recorded(&MODEL.model(), SIMULATED.clone(), &recorded, &settings(0.01), &()).unwrap();
 }
 
-/// Recordings of which the simulation is right.
+/// Recordings that agree with the simulation.
 fn recorded_as_simulated(count: usize) -> Dataset {
     simulated(count, 77)
 }

@@ -36,7 +36,7 @@ const CATBOOST: [(&str, usize, Link); 3] = [
     ("Logloss CrossEntropy", 2, Identity),
 ];
 
-/// A fixture with other words in its file, each of which it has once.
+/// Fixture with some words of its file replaced; each stands there once.
 fn changed(name: &str, words: [&str; 2]) -> Result<Ensemble, String> {
     let text = String::from_utf8(fixture(name).bytes()).unwrap();
     assert_eq!(text.matches(words[0]).count(), 1, "{name}: {}", words[0]);
