@@ -65,7 +65,7 @@ pub(crate) static ONE_SPLIT: Fixture = Fixture::new(|at| {
     succeeds(at, "export ensemble.json -o model.palpate");
 });
 
-/// Approaches to objects that bend by at most this number of microseconds, with these numbers; other numbers are other ones. A
+/// Approaches with these numbers to objects that bend by at most the stated microseconds. Other numbers give other approaches. A
 /// third of them misses the last finger, unless only `full` touches are wanted.
 pub(crate) fn spread(directory: &Path, objects: &[(&str, u64)], numbers: Range<u64>, full: bool) {
     fs::create_dir_all(directory).unwrap();
