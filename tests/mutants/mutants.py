@@ -117,8 +117,8 @@ pub(crate) const fn mutant(_: u32) -> bool {
 }
 """
 
-# A run has caught a mutant as well once it has taken so many times as much processor time as without it, and so many
-# seconds more, or this much memory. Time on the clock only ends one that waits for itself: other programs may be running.
+# A run that takes more processor time than TIMES that of the run without a mutant plus MORE seconds, or more than this
+# memory, has caught the mutant as well. Time on the clock only ends one that waits for itself: other programs may be running.
 TIMES, MORE = 5, 20
 WAITED, MORE_WAITED = 30, 300
 MOST_BYTES = 6 << 30

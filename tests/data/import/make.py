@@ -96,7 +96,7 @@ def text(value):
 
 
 def columns(kind, values):
-    """Lines of cells, the first of which are the columns' names."""
+    """Lines of cells; the first line names the columns."""
     values = np.asarray(values)
     values = values.reshape(len(values), -1)
     plain = lambda value: str(value) if isinstance(value, (str, np.integer)) else text(value)

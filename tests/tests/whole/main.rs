@@ -26,7 +26,7 @@ use palpate_shared::Descriptor;
 use palpate_tests::random::Shape;
 use proptest::prelude::*;
 
-/// Shapes with fewer than so many objects and thresholds, and at most so many trees and levels.
+/// Shapes with fewer objects and thresholds than stated, and at most the stated numbers of trees and levels.
 fn shapes(objects: usize, trees: usize, depth: usize, thresholds: usize) -> impl Strategy<Value = Shape> {
     let descriptors = prop::sample::select(Descriptor::ALL.to_vec());
     (descriptors, 1..objects, 1..=trees, 0..=depth, any::<bool>(), 0..thresholds, 0.01..30.0_f32).prop_map(

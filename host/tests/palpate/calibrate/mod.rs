@@ -18,7 +18,7 @@ fn problem<T>(result: palpate::Result<T>) -> CalibrateProblem {
     }
 }
 
-/// Places of made-up objects; the first two are hard to tell apart.
+/// Places of made-up objects; the first two are hard to distinguish.
 const PLACES: [[f64; 2]; 4] = [[0.0, 0.0], [0.45, 0.0], [2.0, 0.5], [0.0, 2.0]];
 
 /// Sequences of made-up touches: an object's place with Gaussian noise, and the exact evidence of it.

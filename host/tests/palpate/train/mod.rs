@@ -87,7 +87,7 @@ fn no_feature_has_more_thresholds_than_its_bins_leave() {
         }
     }
     let [curvature, slope] = thresholds.map(|set| set.len());
-    // One threshold fewer than bins, and one that tells missing values from all others.
+    // One threshold fewer than bins, and one that separates missing values from all others.
     assert!((6..=12).contains(&curvature) && (2..=5).contains(&slope), "{curvature} {slope}");
 }
 

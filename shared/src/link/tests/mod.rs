@@ -272,7 +272,7 @@ impl Rig {
         (0..10_000).find_map(|_| self.step().err()).unwrap()
     }
 
-    /// The chip tells of an event, and so many copies of the frame arrive; the frame.
+    /// Lets the chip report an event whose frame arrives as often as `copies` says; returns that frame.
     fn tell(&mut self, event: Event, copies: usize) -> Vec<u8> {
         let (up, now, mut told) = (&mut self.up, self.now, Vec::new());
         self.chip.tell(event, |frame| {
