@@ -3,6 +3,7 @@
 //! | module | what it does | start with |
 //! |---|---|---|
 //! | [`error`] | one error, with any crate's problem, its place and its fix | [`error::Error`] |
+//! | [`gone`] | what earlier versions had, and what to use instead | [`gone::instead`] |
 //! | [`output`] | files that appear whole or not at all | [`output::write_whole`] |
 //! | [`progress`] | progress of long calls, and a way to cancel them | [`progress::Progress`] |
 //! | [`wording`] | numbers as people read them | [`wording::decimal`] |
@@ -10,6 +11,7 @@
 //! The crates `palpate-trees`, `palpate-simulator` and `palpate` build on this one and re-export it.
 
 pub mod error;
+pub mod gone;
 pub mod output;
 pub mod progress;
 pub mod wording;

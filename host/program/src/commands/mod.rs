@@ -309,7 +309,7 @@ fn unwrapped(text: &str) -> String {
 pub fn main() -> ExitCode {
     let matches = cli().try_get_matches().unwrap_or_else(|error| {
         let words: Vec<String> = std::env::args().skip(1).collect();
-        let error = without_trailing(without_help(&words).unwrap_or(error));
+        let error = with_instead(without_trailing(without_help(&words).unwrap_or(error)), &words);
         if error.use_stderr() && words.iter().any(|word| word == "--json") {
             _ = output::print_json(&serde_json::json!({ "error": error.to_string().trim_end() }));
         }
@@ -353,6 +353,35 @@ fn without_trailing(mut error: clap::Error) -> clap::Error {
         let others: Vec<_> = advice.into_iter().filter(|advice| !advice.to_string().starts_with("to pass ")).collect();
         if !others.is_empty() {
             error.insert(ContextKind::Suggested, ContextValue::StyledStrs(others));
+        }
+    }
+    error
+}
+
+/// The error with what to use instead, if it is about a command, an option or a value that an earlier version had.
+fn with_instead(mut error: clap::Error, words: &[String]) -> clap::Error {
+    let text = |kind| match error.get(kind) {
+        // An option is followed by the name of its value.
+        Some(ContextValue::String(text)) => Some(text.split([' ', '=']).next().unwrap_or_default()),
+        _ => None,
+    };
+    let argument = text(ContextKind::InvalidArg);
+    let gone = match (argument, text(ContextKind::InvalidValue), text(ContextKind::InvalidSubcommand)) {
+        (Some(option), Some(value), _) => format!("{option} {value}"),
+        (Some(option), ..) if option.starts_with('-') => option.into(),
+        (Some(_), ..) if words.starts_with(&["data".into(), "check".into()]) => "data check A B".into(),
+        (.., Some(command)) => {
+            let above = words.iter().take_while(|word| *word != command).filter(|word| !word.starts_with('-'));
+            above.map(String::as_str).chain([command]).collect::<Vec<_>>().join(" ")
+        }
+        _ => return error,
+    };
+    if let Some(instead) = palpate::gone::instead(&gone) {
+        let advice = format!("`{gone}` was removed: {instead}").into();
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice]));
+        // These suggest a similar name, which is another thing.
+        for kind in [ContextKind::SuggestedArg, ContextKind::SuggestedSubcommand, ContextKind::SuggestedValue] {
+            error.remove(kind);
         }
     }
     error

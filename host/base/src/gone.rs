@@ -1,0 +1,69 @@
+//! Commands, options, values and kinds of files that earlier versions had, with what to use instead.
+
+/// One line for each word that went, as a user writes it: a command, an option, an option with a value, or the ending of a
+/// file name.
+const GONE: &[(&str, &str)] = &[
+    ("tune", "train with --preset small or --preset tiny, or loop over settings in Python (docs/guide/small.md)"),
+    ("probe design", "compare probes with a loop in Python (docs/guide/real-probe.md)"),
+    ("data cast", "run the simulator's example: cargo run --release -p palpate-simulator --example cast"),
+    ("data check A B", "evaluate a model of one data set on the other: palpate evaluate MODEL DATA"),
+    ("--layout", "there is one layout of data; --emit writes code where speed counts"),
+    ("--early-exit", "code of all trees is fast: --emit c-code"),
+    ("--emit thumb", "use --emit c-code, which compilers turn into code that is about as fast"),
+    ("--emit thumb-m4f", "use --emit c-code, which compilers turn into code that is about as fast"),
+    ("--certificate", "run verify --prove again: the proof takes seconds"),
+    ("--shared-leaves", "leaves are shared by themselves where that makes the model smaller"),
+    ("--resume", "repeat the command: a folder appears whole or not at all"),
+    ("--add", "capture all touches at once, or parts of them with --samples A..B"),
+    ("--shard", "capture parts on several machines with --samples A..B"),
+    ("--format", "data sets are text; DataSet.to_pandas() in Python leads to every other format"),
+    ("--switch", "call reset() where another object begins"),
+    ("--events", "begin again after each verdict (docs/guide/streams.md)"),
+    ("--rows-per-second", "rates per hour went with --events; begin again after each verdict (docs/guide/streams.md)"),
+    ("--false-per-hour", "rates per hour went with --events; begin again after each verdict (docs/guide/streams.md)"),
+    ("--hold-off", "begin again after each verdict (docs/guide/streams.md)"),
+    ("--grace", "begin again after each verdict (docs/guide/streams.md)"),
+    ("--strangers certain", "give an error rate, such as --strangers 5%"),
+    ("--varied", "capture objects of your own with --instances"),
+    ("--picture", "draw objects with palpate view"),
+    ("--trace", "compare a page with the program by the binary `page` of palpate-tests"),
+    (
+        "--watch",
+        "palpate link PORT prints a line for each touch of the chip's own fingers; palpate view --port shows a page",
+    ),
+    ("--journal", "write the output of palpate link PORT to a file"),
+    ("--against", "check a chip with --parity and --load"),
+    ("--per-object", "check a chip with --parity and --load"),
+    ("--bad-line", "faults of lines are simulated by Palpate's own tests"),
+    ("--firmware", "connect to the chip or the emulator by its port"),
+    ("--misses", "state the probability of a miss with --real missed=P"),
+    ("--mhz", "divide the number of instructions by the clock rate"),
+    ("--config", "state the settings as options"),
+    ("--confusion", "palpate report draws the confusion of objects"),
+    ("--recorded", "evaluate a model on the recording: palpate evaluate MODEL RECORDED"),
+    (".parquet", "write text or CSV, for instance with pandas"),
+    (".pcd", "make a mesh of the points first (docs/guide/scenes.md)"),
+    (".xyz", "make a mesh of the points first (docs/guide/scenes.md)"),
+    ("points", "make a mesh of the points first (docs/guide/scenes.md)"),
+    ("depth image", "make a mesh of the depth images first (docs/guide/scenes.md)"),
+];
+
+/// What to use instead of `word`, if it went: the line of a command (`probe design`), an option (`--layout`), an option with
+/// a value (`--emit thumb`), or the ending of a file name (`.pcd`).
+pub fn instead(word: &str) -> Option<&'static str> {
+    GONE.iter().find(|(gone, _)| *gone == word).map(|(_, instead)| *instead)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_word_that_went_has_one_line() {
+        for (index, (word, line)) in GONE.iter().enumerate() {
+            assert!(GONE[..index].iter().all(|(earlier, _)| earlier != word), "{word} twice");
+            assert!(!line.contains('\n') && !line.ends_with('.') && instead(word) == Some(*line), "{word}");
+        }
+        assert_eq!(instead("--error-rate"), None);
+    }
+}
