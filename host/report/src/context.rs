@@ -1,11 +1,10 @@
 //! Data that the stages of a report share: objects, touches, folds, and the models of the first fold.
 
-use super::cache::Cache;
 use super::settings::Settings;
 use palpate::capture::{self, Sampler};
 use palpate::compile;
+use palpate::ensemble::Ensemble;
 use palpate::ensemble::train;
-use palpate::ensemble::{self, Ensemble};
 use palpate::error::Result;
 use palpate::in_order::in_order;
 use palpate::mesh::Object;
@@ -23,7 +22,6 @@ use std::time::Instant;
 pub(super) struct Context<'a> {
     pub(super) settings: &'a Settings,
     pub(super) objects: &'a [Object],
-    pub(super) cache: &'a Cache,
     pub(super) progress: &'a dyn Progress,
     /// Scenes of each object's instances.
     scenes: Vec<Vec<Scene>>,
@@ -51,15 +49,10 @@ pub(super) struct Models {
 pub(super) const NOISE: f64 = 5_000.0;
 
 impl<'a> Context<'a> {
-    pub(super) fn new(
-        settings: &'a Settings,
-        objects: &'a [Object],
-        cache: &'a Cache,
-        progress: &'a dyn Progress,
-    ) -> Result<Self> {
+    pub(super) fn new(settings: &'a Settings, objects: &'a [Object], progress: &'a dyn Progress) -> Result<Self> {
         let scenes = capture::scenes(&objects.iter().collect::<Vec<_>>(), &settings.capture, progress)?;
         let (captured, first, models) = Default::default();
-        Ok(Self { settings, objects, cache, progress, scenes, captured, first, models })
+        Ok(Self { settings, objects, progress, scenes, captured, first, models })
     }
 
     /// The touches that folds are made of.
@@ -96,22 +89,14 @@ impl<'a> Context<'a> {
         get_or_try(&self.first, || self.fold(0))
     }
 
-    /// The first fold's ensembles, kept on disk.
+    /// The first fold's ensembles.
     pub(super) fn models(&self) -> Result<&Models> {
         get_or_try(&self.models, || {
-            let trained = |name: &str, settings: &train::Settings| -> Result<Ensemble> {
-                let path = self.cache.path(&format!("fold0-{name}"), "ensemble");
-                if let Ok(kept) = ensemble::load(&path) {
-                    return Ok(kept);
-                }
-                let ensemble = self.train(&self.first()?.train, settings)?;
-                ensemble.save(&path)?;
-                Ok(ensemble)
-            };
+            let trained = |settings: &train::Settings| self.train(&self.first()?.train, settings);
             Ok(Models {
-                paper: trained("paper", &self.paper())?,
-                ours: trained("ours", &self.ours())?,
-                noise: trained("noise", &self.ours_for_noise())?,
+                paper: trained(&self.paper())?,
+                ours: trained(&self.ours())?,
+                noise: trained(&self.ours_for_noise())?,
             })
         })
     }
@@ -223,10 +208,9 @@ mod tests {
 
     #[test]
     fn what_a_fold_states_of_objects_with_several_meshes_is_what_fresh_touches_give() {
-        let (place, objects) = (tempfile::tempdir().unwrap(), meshes());
+        let objects = meshes();
         let settings = Settings { touches: 2_000, ..Settings::quick(vec!["meshes".into()], 1) };
-        let cache = Cache::open(place.path(), &settings, &objects, false).unwrap();
-        let context = Context::new(&settings, &objects, &cache, &()).unwrap();
+        let context = Context::new(&settings, &objects, &()).unwrap();
         let Split { train, test } = context.fold(0).unwrap();
         assert_eq!(test.several().into_values().collect::<Vec<_>>(), [2; 3]);
         let ensemble = context.train(&train, &context.ours()).unwrap();

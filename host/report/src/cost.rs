@@ -3,7 +3,6 @@
 use super::context::Context;
 use super::instructions::Instructions;
 use super::limit::Large;
-use super::settings::LAYOUTS;
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
@@ -11,17 +10,16 @@ use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::compile::{self, Leaf};
 use palpate::ensemble::{Ensemble, OverTouches};
-use palpate::error::{CompileProblem, Error, Result};
+use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins, parity};
 use palpate::with;
 use palpate::wording::count;
 use palpate_onboard::Model;
 use palpate_shared::Touch;
-use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// One compiled model.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Member {
     /// Name of the trained model.
     pub(super) name: String,
@@ -29,8 +27,6 @@ pub(super) struct Member {
     pub(super) paper: bool,
     /// Type that leaves are stored as.
     pub(super) leaf: String,
-    /// Layout of the trees.
-    pub(super) layout: String,
     /// Size.
     pub(super) bytes: usize,
     /// Nanoseconds per touch on this machine.
@@ -55,30 +51,22 @@ const FAMILY: [(usize, usize, usize); 8] =
 
 /// Trains, compiles and measures the family.
 pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
-    let settings = context.settings;
     let first = context.first()?;
     let touches: Vec<Touch> =
         first.test.objects.iter().flat_map(|object| object.touches().iter().take(1_000)).copied().collect();
     let mut members = Vec::new();
-    let mut add =
-        |name: &str, ensemble: &Ensemble, leaves: &[Leaf], layouts: &[Option<compile::Layout>]| -> Result<()> {
-            for &layout in layouts {
-                for &leaf in leaves {
-                    context.check()?;
-                    if let Some(compiled) = fitting(ensemble, leaf, layout)? {
-                        members.push(member(context, large, &touches, name, ensemble, leaf, &compiled)?);
-                    }
-                }
-            }
-            Ok(())
-        };
+    let mut add = |name: &str, ensemble: &Ensemble, leaves: &[Leaf]| -> Result<()> {
+        for &leaf in leaves {
+            context.check()?;
+            let how = with!(compile::Settings::default(), leaf, shared_leaves = Some(false));
+            let compiled = compile::compile(ensemble, &how)?;
+            members.push(member(context, large, &touches, name, ensemble, leaf, &compiled)?);
+        }
+        Ok(())
+    };
     let models = context.models()?;
-    add(
-        &format!("paper's method, {} trees", models.paper.trees.len()),
-        &models.paper,
-        &[Leaf::I16, Leaf::F32],
-        &[None],
-    )?;
+    let name = format!("paper's method, {} trees", models.paper.trees.len());
+    add(&name, &models.paper, &[Leaf::I16, Leaf::F32])?;
     for (rounds, depth, bins) in FAMILY {
         let mut family = with!(context.ours(), rounds, depth, bins);
         if rounds < 30 {
@@ -87,26 +75,9 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
         }
         let ensemble = context.train(&first.train, &family)?;
         let name = format!("{rounds} trees, depth {depth}, {bins} bins");
-        let layouts: &[_] = if settings.all_layouts { &LAYOUTS.map(Some) } else { &[None] };
-        add(&name, &ensemble, &[Leaf::I8, Leaf::I16], layouts)?;
+        add(&name, &ensemble, &[Leaf::I8, Leaf::I16, Leaf::F32])?;
     }
     Ok(members)
-}
-
-/// The ensemble compiled into this layout, or into the best; none if it does not fit.
-///
-/// # Errors
-/// Whatever else is wrong with the ensemble.
-fn fitting(ensemble: &Ensemble, leaf: Leaf, layout: Option<compile::Layout>) -> Result<Option<compile::Compiled>> {
-    match compile::compile(ensemble, &with!(compile::Settings::default(), leaf, layout, shared_leaves = Some(false))) {
-        Ok(compiled) => Ok(Some(compiled)),
-        Err(error) if is_unfit(&error) => Ok(None),
-        Err(error) => Err(error),
-    }
-}
-
-fn is_unfit(error: &Error) -> bool {
-    matches!(error.problem::<CompileProblem>(), Some(CompileProblem::DoesNotFit { .. }))
 }
 
 fn member(
@@ -128,7 +99,6 @@ fn member(
         name: name.into(),
         paper: ensemble.descriptor() == Some(palpate_shared::Descriptor::Times),
         leaf: leaf.name().into(),
-        layout: compiled.layout.name().into(),
         bytes: compiled.bytes.len(),
         nanoseconds: nanoseconds(&model, touches),
         instructions: Instructions::new(compiled, touches)?,
@@ -201,7 +171,7 @@ fn figure(
     let x = Axis::logarithmic(all().fold(f64::INFINITY, f64::min) * 0.7, all().fold(0.0, f64::max) * 1.6);
     let y = Axis::percent((low * 20.0).floor() / 20.0, (((high + 0.02) * 20.0).ceil() / 20.0).min(1.0));
     let mut chart = Chart::new(unit, x, "accuracy after 10 touches", y).sized(660, 400);
-    let mut data = Records::new(["model", "leaf", "layout", unit, "accuracy after 10 touches"]);
+    let mut data = Records::new(["model", "leaf", unit, "accuracy after 10 touches"]);
     let mut by_cost: Vec<&Member> = members.iter().collect();
     by_cost.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
     let mut best = f64::NEG_INFINITY;
@@ -230,9 +200,8 @@ fn figure(
         let text = if member.paper {
             member.leaf.clone()
         } else {
-            let trees = member.name.split(',').next().unwrap_or_default();
-            // Leaves of one byte and of two hardly differ, so both share the note.
-            format!("{trees}, {}", member.layout)
+            // Types of leaves hardly differ, so they share the note.
+            member.name.split(',').next().unwrap_or_default().to_owned()
         };
         if !named.contains(&text) {
             chart.marks.push(Mark::Note { at, text: text.clone(), color });
@@ -241,7 +210,6 @@ fn figure(
         data.push([
             member.name.as_str().into(),
             member.leaf.as_str().into(),
-            member.layout.as_str().into(),
             Cell::Number(at.0, 1),
             Cell::Percent(at.1, 2),
         ]);
@@ -273,7 +241,6 @@ fn table(context: &Context, members: &[Member]) -> Table {
         "model",
         "frontier",
         "leaf",
-        "layout",
         "bytes",
         "ns per touch",
         &chips[0],
@@ -291,7 +258,6 @@ fn table(context: &Context, members: &[Member]) -> Table {
             member.name.as_str().into(),
             Cell::from(if on { "yes" } else { "" }),
             member.leaf.as_str().into(),
-            member.layout.as_str().into(),
             Cell::count(member.bytes),
             Cell::Number(member.nanoseconds, 0),
             Cell::count(member.instructions.m4f.number),
@@ -321,33 +287,6 @@ fn table(context: &Context, members: &[Member]) -> Table {
 mod tests {
     use super::*;
     use crate::instructions::Count;
-    use crate::small::ensemble;
-    use palpate::ensemble::Node;
-
-    /// A chain of splits of curvature, `depth` of them one below the other.
-    fn chain(depth: usize, leaf: f32) -> Ensemble {
-        let mut nodes = Vec::new();
-        for k in 0..depth {
-            nodes.push(Node::Split {
-                feature: 0,
-                threshold: k as f32,
-                missing_left: true,
-                left: 2 * k + 1,
-                right: 2 * k + 2,
-            });
-            nodes.push(Node::Leaf(vec![leaf, 0.0]));
-        }
-        nodes.push(Node::Leaf(vec![0.0, leaf]));
-        ensemble(palpate_shared::Descriptor::Curvature, &["a", "b"], vec![nodes])
-    }
-
-    #[test]
-    fn a_compile_error_that_is_not_about_size_is_not_taken_for_one() {
-        assert!(fitting(&chain(3, 0.5), Leaf::I16, None).unwrap().is_some());
-        assert!(fitting(&chain(9, 0.5), Leaf::I16, Some(compile::Layout::Complete)).unwrap().is_none());
-        let error = fitting(&chain(3, f32::NAN), Leaf::I16, Some(compile::Layout::Complete)).unwrap_err();
-        assert!(!is_unfit(&error), "{error}");
-    }
 
     #[test]
     fn the_frontier_holds_what_nothing_smaller_beats() {
@@ -355,7 +294,6 @@ mod tests {
             name: String::new(),
             paper: false,
             leaf: String::new(),
-            layout: String::new(),
             bytes,
             nanoseconds: 1.0,
             instructions: Instructions {

@@ -14,7 +14,6 @@ use palpate::ensemble::train;
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins};
 use palpate::wording::{count, counted};
-use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// The methods compared, in the order of [`Fold::methods`].
@@ -30,7 +29,7 @@ pub(super) const PAPERS_GROUPS: usize = 10;
 const CONFUSED_AT: usize = 10;
 
 /// Results of one fold.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Fold {
     /// One of each of [`METHODS`].
     pub(super) methods: Vec<MethodFold>,
@@ -38,7 +37,7 @@ pub(super) struct Fold {
 
 /// Results of one fold for one method. Accuracies are after 1, 2, … touches, up to [`MOST`] or to as many as still make
 /// [enough distinct groups](super::statistics::LEAST_GROUPS).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct MethodFold {
     /// Accuracy over the paper's few groups per object.
     pub(super) few: Vec<f64>,
@@ -55,9 +54,7 @@ pub(super) struct MethodFold {
 
 /// Trains and tests both methods on every fold that is used.
 pub(super) fn measure(context: &Context) -> Result<Vec<Fold>> {
-    (0..context.settings.folds_used)
-        .map(|fold| Ok(context.cache.stage(&format!("fold-{fold}"), || one_fold(context, fold))?.result))
-        .collect()
+    (0..context.settings.folds_used).map(|fold| one_fold(context, fold)).collect()
 }
 
 fn one_fold(context: &Context, fold: usize) -> Result<Fold> {

@@ -4,10 +4,9 @@ use palpate::chip::instructions::Chip;
 use palpate::compile::{self, Compiled};
 use palpate::error::Result;
 use palpate_shared::Touch;
-use serde::{Deserialize, Serialize};
 
 /// Instructions per touch, from contact times to margins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Instructions {
     /// On a Cortex-M4F.
     pub(super) m4f: Count,
@@ -16,7 +15,7 @@ pub(super) struct Instructions {
 }
 
 /// A number of instructions, and where it comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Count {
     /// Instructions per touch.
     pub(super) number: u64,

@@ -1,18 +1,14 @@
 //! The evaluation: what is measured and shown, one section per module, written as one page with the files behind it.
 //!
-//! [`report`] measures the chosen parts, or takes them from an interrupted report, and writes the page. [`view`] makes the page
+//! [`report`] measures the chosen parts and writes the page. [`view`] makes the page
 //! that shows an object and its touches, [`play`] the one on which objects can be touched, [`watch`] the one that watches a
 //! chip, [`shape`] the one of an object's map. The page of the program's main job is also drawn here, and [`page`] draws what all of them consist of.
 
-mod approaches;
-mod cache;
-mod calibration;
 mod confusion;
 mod context;
 mod cost;
 mod cross_validation;
 mod density;
-pub mod design;
 pub mod error;
 mod instructions;
 mod limit;
@@ -23,10 +19,8 @@ pub mod page;
 pub mod play;
 mod promises;
 mod published;
-mod recorded;
 pub mod results;
 pub mod run_page;
-mod sequential;
 mod settings;
 pub mod shape;
 #[cfg(test)]
@@ -34,9 +28,8 @@ mod small;
 mod stages;
 pub mod statistics;
 pub mod stream;
-pub mod teach;
 pub mod view;
 pub mod watch;
 
 pub use settings::{Part, Settings};
-pub use stages::{Existing, Report, report};
+pub use stages::{Report, report};

@@ -17,7 +17,6 @@ use palpate::touches::Dataset;
 use palpate::with;
 use palpate::wording::{count, decimal};
 use palpate_shared::Descriptor;
-use serde::{Deserialize, Serialize};
 
 /// The longest groups.
 const MOST: usize = 60;
@@ -29,7 +28,7 @@ const PARTS: [usize; 2] = [85, 5];
 const DEPTH: usize = 7;
 
 /// Results of the large capture.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Limit {
     /// Full touches captured of each object.
     pub(super) captured: usize,
@@ -44,7 +43,7 @@ pub(super) struct Limit {
 }
 
 /// One candidate's accuracies on the groups of the large capture.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Measured {
     /// Its name.
     pub(super) name: String,

@@ -1,17 +1,12 @@
 //! Measurements that a report is written from.
 
-use super::{approaches, calibration, cost, cross_validation, limit, noise, promises, sequential};
-use palpate::compare::Comparison;
+use super::{cost, cross_validation, limit, noise, promises};
 
 /// Results that the sections show; none of a part that was not chosen.
 pub(super) struct Measured {
     pub(super) folds: Option<Vec<cross_validation::Fold>>,
     pub(super) noisy: Option<Vec<noise::Fold>>,
     pub(super) limit: Option<limit::Limit>,
-    pub(super) sequences: Option<sequential::Sequences>,
-    pub(super) calibration: Option<calibration::Calibration>,
     pub(super) promises: Option<promises::Promises>,
     pub(super) members: Option<Vec<cost::Member>>,
-    pub(super) approaches: Option<approaches::ByApproach>,
-    pub(super) recorded: Option<Comparison>,
 }

@@ -18,7 +18,6 @@ use palpate::touches::{Dataset, ObjectTouches};
 use palpate::with;
 use palpate::wording::{count, counted};
 use plotters::style::RGBColor;
-use serde::{Deserialize, Serialize};
 
 /// The methods, in the order of [`Fold::methods`].
 pub(super) const METHODS: [&str; 3] = ["paper", "ours", "ours, trained for noise"];
@@ -26,7 +25,7 @@ const COLORS: [RGBColor; 3] = [color::PAPER, color::OURS, color::GREEN];
 const SHAPES: [Shape; 3] = [Shape::Ring, Shape::Disc, Shape::Triangle];
 
 /// Results of one fold, one entry per method and noise level.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Fold {
     /// For each of [`METHODS`], for each level: accuracy after ten touches of each object.
     pub(super) accuracy: Vec<Vec<Vec<f64>>>,
@@ -55,9 +54,7 @@ fn kinds() -> [Noise; 9] {
 
 /// Tests on noisy touches.
 pub(super) fn measure(context: &Context) -> Result<Vec<Fold>> {
-    (0..context.settings.noise_folds.min(context.settings.folds))
-        .map(|fold| Ok(context.cache.stage(&format!("noise-{fold}"), || one_fold(context, fold))?.result))
-        .collect()
+    (0..context.settings.noise_folds.min(context.settings.folds)).map(|fold| one_fold(context, fold)).collect()
 }
 
 fn one_fold(context: &Context, fold: usize) -> Result<Fold> {

@@ -18,12 +18,11 @@ use palpate::with;
 use palpate::wording;
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
-use serde::{Deserialize, Serialize};
 
 /// The promised rates.
 const RATES: [f64; 6] = [0.1, 0.05, 0.02, 0.01, 0.005, 0.001];
 /// The one whose objects are shown.
-const SHOWN: f64 = 0.01;
+pub(super) const SHOWN: f64 = 0.01;
 /// Margin, in nats, by which sequences are followed beyond the posterior of the strictest rate.
 const BEYOND: f64 = 2.5;
 /// Touches after which a sequence ends undecided.
@@ -32,10 +31,12 @@ const MAX_TOUCHES: u32 = 200;
 const CONFIDENCE: f64 = 0.95;
 
 /// Results of promises.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Promises {
     /// Sequences that thresholds were found on, and others that they were tested on.
-    sequences: [usize; 2],
+    pub(super) sequences: [usize; 2],
+    /// The paper's method and ours, stopping when the posterior exceeds 1 − [`SHOWN`].
+    pub(super) until_sure: [Stopped; 2],
     /// For each of [`RATES`].
     rates: Vec<Promised>,
     /// For each object at [`SHOWN`].
@@ -43,7 +44,7 @@ pub(super) struct Promises {
 }
 
 /// The results for one rate; none where there were too few sequences to promise it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 struct Promised {
     rate: f64,
     /// Stopping when the posterior exceeds 1 − rate.
@@ -58,20 +59,20 @@ struct Promised {
 }
 
 /// Results of thresholds on sequences that they were not found on.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Stopped {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stopped {
     /// The threshold in nats; the mean of several.
     margin: f64,
-    touches: f64,
+    pub(super) touches: f64,
     /// Share of the names given that were wrong, and its 95 % interval.
-    error: f64,
+    pub(super) error: f64,
     low: f64,
     high: f64,
     undecided: f64,
 }
 
 /// Meaning of a promise for an object.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 struct OfObject {
     name: String,
     /// Meanings of a promise on average, and of one per name; none where there were too few sequences for it.
@@ -79,7 +80,7 @@ struct OfObject {
 }
 
 /// Results of thresholds for an object.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Meaning {
     /// Touches until a verdict.
     touches: f64,
@@ -94,17 +95,20 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Promises> {
     let ours = compiled(&context.models()?.ours)?.bytes;
     let (density, _) = density_model(Descriptor::Curvature, &large.train, &large.held)?;
     let limit = compiled_f32(&density)?.bytes;
-    let [ours, limit] = [compile::open(&ours)?, compile::open(&limit)?];
+    let paper = compiled_f32(&context.models()?.paper)?.bytes;
+    let [paper, ours, limit] = [compile::open(&paper)?, compile::open(&ours)?, compile::open(&limit)?];
     let names = context.names();
     // Other seeds than those of the folds and of the large capture.
     let seeds = [0x11_1118, 0x11_1119].map(|other| context.settings.seed.wrapping_add(other));
-    // Both models on the same touches, captured once.
-    let draw = |seed: u64| -> Result<[Vec<Sequence>; 2]> {
-        let kept = &mut calibrate::Fresh::default();
-        Ok([sequences(context, &ours, seed, kept)?, sequences(context, &limit, seed, kept)?])
-    };
-    let [[ours_chosen, limit_chosen], [ours_tested, limit_tested]] = [draw(seeds[0])?, draw(seeds[1])?];
-    let (ours, limit) = ([ours_chosen, ours_tested], [limit_chosen, limit_tested]);
+    // All models on the same touches, captured once.
+    let kept = &mut calibrate::Fresh::default();
+    let [ours_chosen, limit_chosen] =
+        [sequences(context, &ours, seeds[0], kept)?, sequences(context, &limit, seeds[0], kept)?];
+    let kept = &mut calibrate::Fresh::default();
+    let tested = |model| sequences(context, model, seeds[1], kept);
+    let [ours_tested, limit_tested, paper] = [&ours, &limit, &paper].map(tested);
+    let (ours, limit) = ([ours_chosen, ours_tested?], [limit_chosen, limit_tested?]);
+    let until_sure = [&paper?, &ours[1]].map(|sequences| stopped(sequences, &at_posterior(SHOWN)));
     let mut found = Vec::new();
     let chosen = |sequences: &[Sequence], rate: f64, per: Per| -> Result<Option<Odds>> {
         let terms = Terms { rate, confidence: CONFIDENCE, per };
@@ -126,14 +130,19 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Promises> {
         let by = |of: &dyn Fn(&Sequence, usize) -> usize, odds: &Odds| worst(&ours[1], names.len(), odds, of);
         found.push(Promised {
             rate,
-            uncalibrated: stopped(&ours[1], &Odds::All(odds_of(((1.0 - rate) / rate).ln()))),
+            uncalibrated: stopped(&ours[1], &at_posterior(rate)),
             average: average.map(|odds| stopped(&ours[1], &odds)),
             limit: of_limit.map(|odds| stopped(&limit[1], &odds)),
             name: name.map(|odds| by(&|_, name| name, &odds)),
             object: object.map(|odds| by(&|sequence, _| sequence.object, &odds)),
         });
     }
-    Ok(Promises { sequences: [ours[0].len(), ours[1].len()], rates: found, objects })
+    Ok(Promises { sequences: [ours[0].len(), ours[1].len()], until_sure, rates: found, objects })
+}
+
+/// The threshold that a posterior of 1 − `rate` exceeds.
+fn at_posterior(rate: f64) -> Odds {
+    Odds::All(odds_of(((1.0 - rate) / rate).ln()))
 }
 
 /// The margin that sequences are followed to.

@@ -6,16 +6,13 @@ use super::cross_validation::{Fold, PAPERS_GROUPS, accuracies, shares};
 use super::limit;
 use super::measured::Measured;
 use super::noise;
-use super::sequential::Sequences;
+use super::promises::{Promises, SHOWN, Stopped};
 use super::statistics::{mean_deviation, paired_difference};
 use crate::page::table::{Cell, Records, Table};
 use palpate::ensemble::{Ensemble, train};
 use palpate::error::Result;
 use palpate::wording::{count, counted, decimal};
 use serde::Serialize;
-
-/// The threshold of touches until sure.
-const SURE: f64 = 0.01;
 
 /// The numbers that `summary.json` holds: accuracies as shares of one. It has those of the parts that were measured.
 #[derive(Clone, Debug, Serialize)]
@@ -78,13 +75,11 @@ struct Accuracy {
     precision: f64,
 }
 
-/// Touches until sure, for a threshold of [`SURE`].
+/// Touches until sure, for a threshold of [`SHOWN`].
 #[derive(Clone, Debug, Serialize)]
 struct UntilSure {
-    /// Mean touches, and the errors made.
+    /// Mean touches, and the share of wrong names.
     touches_until_sure: (f64, f64),
-    /// The fixed number of touches that errs no more often.
-    fixed: Option<usize>,
 }
 
 impl Accuracy {
@@ -103,20 +98,20 @@ impl Accuracy {
 }
 
 impl UntilSure {
-    fn of(sequences: &Sequences, method: usize) -> Option<Self> {
-        let stopped = sequences.methods[method].iter().find(|stopped| stopped.rate == SURE)?;
-        Some(Self { touches_until_sure: (stopped.touches, stopped.error), fixed: stopped.fixed })
+    fn of(promises: &Promises, method: usize) -> Self {
+        let Stopped { touches, error, .. } = promises.until_sure[method];
+        Self { touches_until_sure: (touches, error) }
     }
 }
 
 /// Gathers the numbers.
 pub(super) fn summary(context: &Context, measured: &Measured) -> Summary {
-    let Measured { folds, noisy, limit, sequences, .. } = measured;
+    let Measured { folds, noisy, limit, promises, .. } = measured;
     let with_noise = |method| Some(noise::accuracy_at(context, noisy.as_ref()?, method, NOISE / 1e3));
     let method = |index: usize| Method {
         accuracy: folds.as_ref().map(|folds| Accuracy::of(folds, index)),
         at_10_with_5_ms: with_noise(index),
-        until_sure: sequences.as_ref().and_then(|sequences| UntilSure::of(sequences, index)),
+        until_sure: promises.as_ref().map(|promises| UntilSure::of(promises, index)),
     };
     let finite = |value: f64| value.is_finite().then_some(value);
     let difference = |folds: &Vec<Fold>| {
@@ -257,16 +252,15 @@ pub(super) fn large(context: &Context, summary: &Summary, measured: &Measured) -
             rows.push(vec![name, cell(limit::PAPER), cell(limit::OURS), cell(limit.best)]);
         }
     }
-    if let (Some(sequences), Some(paper), Some(ours)) =
-        (&measured.sequences, &summary.paper.until_sure, &summary.ours.until_sure)
+    if let (Some(promises), Some(paper), Some(ours)) =
+        (&measured.promises, &summary.paper.until_sure, &summary.ours.until_sure)
     {
-        groups.push(format!("touches until sure over {} sequences per object", count(sequences.count)));
+        groups
+            .push(format!("touches until sure over the {} sequences that test promises", count(promises.sequences[1])));
         let mut push =
             |name: String, cell: fn(&UntilSure) -> Cell| rows.push(vec![name.into(), cell(paper), cell(ours)]);
-        push(format!("touches until sure (threshold {SURE})"), |of| Cell::Number(of.touches_until_sure.0, 1));
-        push("errors then".into(), |of| Cell::Percent(of.touches_until_sure.1, 2));
-        let fixed = "fixed number of touches with no more errors";
-        push(fixed.into(), |of| of.fixed.map_or(Cell::Missing, Cell::count));
+        push(format!("touches until sure (threshold {SHOWN})"), |of| Cell::Number(of.touches_until_sure.0, 1));
+        push("wrong names then".into(), |of| Cell::Percent(of.touches_until_sure.1, 2));
     }
     if groups.is_empty() {
         return None;
@@ -318,9 +312,9 @@ pub(super) fn sentence(summary: &Summary) -> String {
             percent(limit.limit_at_10)
         ));
     }
-    if let Some(UntilSure { touches_until_sure: (touches, errors), .. }) = ours.until_sure {
+    if let Some(UntilSure { touches_until_sure: (touches, errors) }) = ours.until_sure {
         sentences.push(format!(
-            "Stopping when sure, ours takes {} touches on average for {}\u{a0}% errors.",
+            "Stopping when sure, ours takes {} touches on average for {}\u{a0}% wrong names.",
             decimal(touches, 1),
             decimal(errors * 100.0, 2)
         ));

@@ -17,7 +17,7 @@ const MADE_FROM: &str = "made_from";
 ///
 /// # Errors
 /// [`ReportProblem::OtherResults`] naming the file, or [`Error::Io`].
-pub fn refuse_others(directory: &Path, made_from: &Value, files: &[&str], trace: &str) -> Result<()> {
+pub fn refuse_others(directory: &Path, made_from: &Value, files: &[&str], trace: Option<&str>) -> Result<()> {
     let summary = directory.join(SUMMARY);
     let refused = |path: &Path, found: String| Err(Error::at(Place::file(path), ReportProblem::OtherResults { found }));
     match std::fs::read(&summary) {
@@ -32,7 +32,7 @@ pub fn refuse_others(directory: &Path, made_from: &Value, files: &[&str], trace:
         }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
             match files.iter().map(|file| directory.join(file)).find(|path| path.exists()) {
-                Some(path) if !directory.join(trace).exists() => {
+                Some(path) if !trace.is_some_and(|trace| directory.join(trace).exists()) => {
                     refused(&path, format!("there is no {SUMMARY} that states what it was made from"))
                 }
                 _ => Ok(()),
@@ -74,7 +74,7 @@ mod tests {
     fn results_of_another_run_are_refused_and_those_of_the_same_run_or_an_interrupted_one_are_not() {
         let directory = tempfile::tempdir().unwrap();
         let place = directory.path();
-        let check = |made_from: &Value| refuse_others(place, made_from, &["model.palpate"], "data");
+        let check = |made_from: &Value| refuse_others(place, made_from, &["model.palpate"], Some("data"));
         let own = json!({"job": "run", "sources": ["builtin"], "settings": {"seed": 1, "touches": 100}});
         check(&own).unwrap();
 

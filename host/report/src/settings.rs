@@ -1,32 +1,21 @@
 //! Extent of a report's measurements.
 
-use palpate::compile::Layout;
 use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
-use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
-
-/// Layouts that each model of the section on cost is compiled into.
-pub(super) const LAYOUTS: [Layout; 3] = [Layout::Compact, Layout::Complete, Layout::Grid];
+use serde::Serialize;
 
 /// A section of the report that can be chosen, with what it measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Part {
     /// Objects, what was captured, and densities of curvature: the paper's figures 5 and 6.
     Objects,
     /// Accuracy and confusion by cross-validation: figures 8 and 9.
     Accuracy,
-    /// Approaches to a verdict.
-    Approaches,
     /// Noise on contact times: figures 10 to 13.
     Noise,
     /// The best accuracy that any classifier could reach.
     Limit,
-    /// Touches until a posterior is high enough.
-    Stopping,
-    /// Reliability of posteriors.
-    Calibration,
     /// Promised error rates, kept or broken.
     Promises,
     /// Speed and bytes against error.
@@ -35,28 +24,15 @@ pub enum Part {
 
 impl Part {
     /// All of them, in the order of the page.
-    pub const ALL: [Self; 9] = [
-        Self::Objects,
-        Self::Accuracy,
-        Self::Approaches,
-        Self::Noise,
-        Self::Limit,
-        Self::Stopping,
-        Self::Calibration,
-        Self::Promises,
-        Self::Cost,
-    ];
+    pub const ALL: [Self; 6] = [Self::Objects, Self::Accuracy, Self::Noise, Self::Limit, Self::Promises, Self::Cost];
 
     /// Its name, which is also that of its stage.
     pub fn name(self) -> &'static str {
         match self {
             Self::Objects => "objects",
             Self::Accuracy => "accuracy",
-            Self::Approaches => "approaches",
             Self::Noise => "noise",
             Self::Limit => "limit",
-            Self::Stopping => "stopping",
-            Self::Calibration => "calibration",
             Self::Promises => "promises",
             Self::Cost => "cost",
         }
@@ -66,8 +42,8 @@ impl Part {
 /// Numbers that a quick report may shorten: the name of each, the parts that depend on it, and its value.
 type Extent = (&'static str, &'static [Part], fn(&Settings) -> usize);
 
-const LARGE: &[Part] = &[Part::Limit, Part::Stopping, Part::Calibration, Part::Promises, Part::Cost];
-const EXTENTS: [Extent; 15] = [
+const LARGE: &[Part] = &[Part::Limit, Part::Promises, Part::Cost];
+const EXTENTS: [Extent; 12] = [
     ("full touches of each object", &Part::ALL, |of| of.touches),
     ("folds", &[Part::Accuracy], |of| of.folds_used),
     ("rounds of the paper's method", &Part::ALL, |of| of.paper_rounds),
@@ -75,18 +51,15 @@ const EXTENTS: [Extent; 15] = [
     ("groups of each object and fold", &[Part::Accuracy, Part::Noise], |of| of.many_groups),
     ("noise levels", &[Part::Noise], |of| of.noise_levels),
     ("folds with noise", &[Part::Noise], |of| of.noise_folds),
-    ("approaches to each object", &[Part::Approaches], |of| of.approaches as usize),
     ("touches of each object in the large capture", LARGE, |of| of.limit_touches),
     ("rounds of the large ensemble", &[Part::Limit], |of| of.limit_rounds),
     ("groups of each object for the limit", &[Part::Limit], |of| of.limit_groups),
-    ("sequences of each object", &[Part::Approaches, Part::Stopping], |of| of.sequences),
-    ("groups of each object for reliability", &[Part::Calibration], |of| of.reliability_groups),
     ("sequences for promises", &[Part::Promises], |of| of.promise_sequences),
     ("groups of each object for each model of the family", &[Part::Cost], |of| of.cost_groups),
 ];
 
-/// Settings of a report. A change of any of these but the command and the parts starts it from the beginning.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Settings of a report.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Settings {
     /// Sources of the objects: see [`palpate::mesh::source::objects`].
     pub sources: Vec<String>,
@@ -101,12 +74,6 @@ pub struct Settings {
     /// Origin of the touches: the probe, and the unit of its lengths. The settings beside it state the number of
     /// touches and the seed.
     pub capture: Origin,
-    /// Noise that a real probe adds to simulated touches where they are compared with recorded ones.
-    #[serde(default)]
-    pub real: Noise,
-    /// A data set of recorded touches of these objects, to compare simulated ones with.
-    #[serde(default)]
-    pub recorded: Option<PathBuf>,
     /// Full touches captured of each object.
     pub touches: usize,
     /// Folds that the touches are divided into.
@@ -127,24 +94,16 @@ pub struct Settings {
     pub noise: Noise,
     /// Folds of the noise figures.
     pub noise_folds: usize,
-    /// Approaches to each object that models are trained on which use every contact; a third as many test them.
-    pub approaches: u64,
     /// Full touches captured of each object, to estimate the limit.
     pub limit_touches: usize,
     /// Boosting rounds of the ensemble that estimates the limit.
     pub limit_rounds: usize,
     /// Groups of each object's touches of the large capture that estimate the limit.
     pub limit_groups: usize,
-    /// Sequences of each object that stop when sure.
-    pub sequences: usize,
-    /// Groups of each object for the reliability of posteriors.
-    pub reliability_groups: usize,
     /// Sequences of all objects together that promises rest on.
     pub promise_sequences: usize,
     /// Groups of each object that each model of the family is tested on.
     pub cost_groups: usize,
-    /// True to compile each model of the family into every layout, not only into the best.
-    pub all_layouts: bool,
 }
 
 impl Settings {
@@ -157,8 +116,6 @@ impl Settings {
             quick: false,
             parts: Part::ALL.into(),
             capture: Origin::default(),
-            real: Noise::default(),
-            recorded: None,
             touches: 21_000,
             folds: 10,
             folds_used: 10,
@@ -169,15 +126,11 @@ impl Settings {
             noise_levels: 41,
             noise: Noise::gaussian(5_000.0),
             noise_folds: 10,
-            approaches: 60_000,
             limit_touches: 300_000,
             limit_rounds: 80,
             limit_groups: 3_000,
-            sequences: 1_000,
-            reliability_groups: 2_000,
             promise_sequences: 100_000,
             cost_groups: 1_500,
-            all_layouts: true,
         }
     }
 
@@ -192,15 +145,11 @@ impl Settings {
             many_groups: 200,
             noise_levels: 6,
             noise_folds: 1,
-            approaches: 8_000,
             limit_touches: 30_000,
             limit_rounds: 60,
             limit_groups: 1_000,
-            sequences: 300,
-            reliability_groups: 500,
             promise_sequences: 4_000,
             cost_groups: 500,
-            all_layouts: false,
             ..Self::full(sources, seed)
         }
     }
@@ -208,11 +157,9 @@ impl Settings {
     /// Numbers in which the chosen parts differ from those of a full report: the name of each, here and there.
     pub(super) fn shortened(&self) -> Vec<(&'static str, usize, usize)> {
         let full = Self::full(Vec::new(), self.seed);
-        let layouts: Extent =
-            ("layouts of each model of the family", &[Part::Cost], |of| if of.all_layouts { LAYOUTS.len() } else { 1 });
         let chosen = |extent: &Extent| extent.1.iter().any(|part| self.parts.contains(part));
         let numbers = |(name, _, of): Extent| (name, of(self), of(&full));
-        EXTENTS.into_iter().chain([layouts]).filter(chosen).map(numbers).filter(|own| own.1 != own.2).collect()
+        EXTENTS.into_iter().filter(chosen).map(numbers).filter(|own| own.1 != own.2).collect()
     }
 
     /// The numbers of touches at which cross-validation looks: log-spaced from 10 to 120, rounded, without repeats.
@@ -251,7 +198,7 @@ mod tests {
             let settings = Settings { parts: parts.into(), ..Settings::quick(vec!["meshes".into()], 1) };
             settings.shortened().into_iter().map(|own| own.0).collect()
         };
-        assert_eq!(names(&Part::ALL).len(), EXTENTS.len() + 1, "a number is not shortened, or not listed");
+        assert_eq!(names(&Part::ALL).len(), EXTENTS.len(), "a number is not shortened, or not listed");
         assert!(names(&[Part::Noise]).contains(&"noise levels") && !names(&[Part::Limit]).contains(&"noise levels"));
         assert!(Settings::full(vec!["builtin".into()], 1).shortened().is_empty());
         assert!(Settings::quick(vec!["a".into()], 1).shortened().contains(&("folds", 2, 10)));

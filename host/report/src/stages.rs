@@ -1,26 +1,18 @@
-//! The whole report: measures every stage or takes it from an interrupted report, then writes one page.
+//! The whole report: measures every stage, then writes one page.
 
-use super::cache::{self, Cache};
 use super::context::{Context, get_or_try};
 use super::measured::Measured;
 use super::settings::{Part, Settings};
-use super::{
-    approaches, calibration, cost, cross_validation, limit, noise, objects, promises, published, recorded, results,
-    sequential,
-};
+use super::{cost, cross_validation, limit, noise, objects, promises, published, results};
 use crate::error::ReportProblem;
 use crate::page::document::{Page, Section};
 use crate::page::table::{Cell, Records, Table};
-use palpate::capture;
-use palpate::compile;
-use palpate::ensemble::train;
 use palpate::error::Result;
 use palpate::mesh::Object;
 use palpate::output::{refuse_foreign, write_json};
 use palpate::progress::{self, Progress};
 use palpate::wording::count;
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 use serde_json::json;
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
@@ -32,21 +24,12 @@ use std::time::Instant;
 pub struct Report {
     /// All files, the page last.
     pub files: Vec<PathBuf>,
-    /// Seconds of the stages, as they were measured.
+    /// Seconds of the stages.
     pub stages: Vec<(String, f64)>,
     /// A sentence or two about the result.
     pub sentence: String,
     /// The contents of `summary.json`.
     pub summary: serde_json::Value,
-}
-
-/// Rules for the present contents of a report's directory.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Existing {
-    /// True to take stages that an interrupted report measured with the same settings, objects and program.
-    pub resume: bool,
-    /// True to replace another report's or run's results.
-    pub replace: bool,
 }
 
 /// The progress of a report: whatever begins within a stage is named after it.
@@ -78,57 +61,47 @@ impl Progress for Named<'_> {
     }
 }
 
-/// Stages that are measured, or were before.
+/// Stages that are measured.
 struct Stages<'a> {
     parts: &'a [Part],
-    cache: &'a Cache,
     progress: &'a Named<'a>,
-    /// Names and seconds of those that are there.
+    /// Names and seconds of those that were.
     seconds: Vec<(String, f64)>,
 }
 
 impl Stages<'_> {
-    /// The result of the part, if it is to be measured.
-    fn part<T: Serialize + DeserializeOwned>(
-        &mut self,
-        part: Part,
-        measure: impl FnOnce() -> Result<T>,
-    ) -> Result<Option<T>> {
+    /// The result of the part, if it is to be measured; progress is told its name before it begins.
+    fn part<T>(&mut self, part: Part, measure: impl FnOnce() -> Result<T>) -> Result<Option<T>> {
         if !self.parts.contains(&part) {
             return Ok(None);
         }
-        self.stage(part.name(), measure).map(Some)
-    }
-
-    /// The result of the stage; progress is told its name before it begins.
-    fn stage<T: Serialize + DeserializeOwned>(&mut self, name: &str, measure: impl FnOnce() -> Result<T>) -> Result<T> {
         progress::check(self.progress)?;
-        self.progress.enter(name);
-        let stage = self.cache.stage(name, measure)?;
-        self.seconds.push((name.to_string(), stage.seconds));
-        Ok(stage.result)
+        self.progress.enter(part.name());
+        let began = Instant::now();
+        let result = measure()?;
+        self.seconds.push((part.name().to_owned(), began.elapsed().as_secs_f64()));
+        Ok(Some(result))
     }
 }
 
 /// Measures the chosen parts on the objects that `objects` gives, sorted by name, and writes `directory/index.html`, the
-/// figures' and tables' files and `summary.json`. A report that was interrupted, or cancelled through `progress`, can be
-/// resumed with [`Existing::resume`].
+/// figures' and tables' files and `summary.json`. Another report's or run's results are replaced only if `replace` is true.
 ///
 /// # Errors
 /// Errors of `objects`, of measuring and of writing; [`ReportProblem::OneObject`] for fewer than two objects;
-/// [`ReportProblem::OtherResults`] for a directory that holds other results, unless [`Existing::replace`];
+/// [`ReportProblem::OtherResults`] for a directory that holds other results, unless `replace`;
 /// [`Error::Cancelled`](palpate::Error::Cancelled).
 pub fn report(
     objects: &dyn Fn() -> Result<Vec<Object>>,
     settings: &Settings,
     directory: &Path,
-    existing: Existing,
+    replace: bool,
     progress: &dyn Progress,
 ) -> Result<Report> {
     // The command makes no difference to the results.
     let made_from = json!({ "job": "report", "settings": Settings { command: String::new(), ..settings.clone() } });
-    if !existing.replace {
-        results::refuse_others(directory, &made_from, &["index.html"], cache::DIRECTORY)?;
+    if !replace {
+        results::refuse_others(directory, &made_from, &["index.html"], None)?;
         refuse_foreign(&directory.join("index.html"))?;
     }
     let objects = objects()?;
@@ -136,20 +109,9 @@ pub fn report(
         return Err(ReportProblem::OneObject.into());
     }
     let began = Instant::now();
-    let presets = format!(
-        "{:?} {:?} {:?} {:?}",
-        train::Settings::paper(),
-        train::Settings::compact(),
-        capture::Settings::default(),
-        compile::Settings::default()
-    );
-    let recorded = settings.recorded.as_deref().map(recorded::fingerprint).transpose()?;
-    // Nor do the parts make a difference to each other's results.
-    let measured_with = Settings { command: String::new(), parts: Vec::new(), ..settings.clone() };
-    let cache = Cache::open(directory, &(measured_with, presets, recorded), &objects, existing.resume)?;
     let progress = &Named { progress, stage: Mutex::new("objects".into()) };
-    let context = Context::new(settings, &objects, &cache, progress)?;
-    let mut stages = Stages { parts: &settings.parts, cache: &cache, progress, seconds: Vec::new() };
+    let context = Context::new(settings, &objects, progress)?;
+    let mut stages = Stages { parts: &settings.parts, progress, seconds: Vec::new() };
     let measured = measured(&context, &mut stages)?;
     let stages = stages.seconds;
     progress.enter("drawing");
@@ -184,20 +146,13 @@ pub fn report(
 fn measured(context: &Context, stages: &mut Stages<'_>) -> Result<Measured> {
     let folds = stages.part(Part::Accuracy, || cross_validation::measure(context))?;
     let noisy = stages.part(Part::Noise, || noise::measure(context))?;
-    // The large capture is needed by five stages, and by none if all were measured before.
+    // The large capture is needed by three stages.
     let large = OnceCell::new();
     let get_large = || get_or_try(&large, || limit::large(context));
     let limit = stages.part(Part::Limit, || limit::measure(context, get_large()?))?;
-    let sequences = stages.part(Part::Stopping, || sequential::measure(context, get_large()?))?;
-    let calibration = stages.part(Part::Calibration, || calibration::measure(context, get_large()?))?;
     let promises = stages.part(Part::Promises, || promises::measure(context, get_large()?))?;
     let members = stages.part(Part::Cost, || cost::measure(context, get_large()?))?;
-    drop(large);
-    let approaches = stages.part(Part::Approaches, || approaches::measure(context))?;
-    let recorded = context.settings.recorded.as_deref();
-    let recorded = recorded.map(|directory| stages.stage("recorded", || recorded::measure(context, directory)));
-    let recorded = recorded.transpose()?;
-    Ok(Measured { folds, noisy, limit, sequences, calibration, promises, members, approaches, recorded })
+    Ok(Measured { folds, noisy, limit, promises, members })
 }
 
 /// The page's sections, in order.
@@ -223,14 +178,10 @@ fn sections(context: &Context, measured: &Measured, summary: &published::Summary
     }
     let all = [
         shown(&measured.folds, |of| cross_validation::section(context, of))?,
-        shown(&measured.approaches, |of| approaches::section(context, of))?,
         shown(&measured.noisy, |of| noise::section(context, of))?,
         shown(&measured.limit, |of| limit::section(context, of))?,
-        shown(&measured.sequences, |of| sequential::section(context, of))?,
-        shown(&measured.calibration, |of| calibration::section(context, of))?,
         shown(&measured.promises, |of| promises::section(context, of))?,
         shown(&measured.members, |of| cost::section(context, of))?,
-        shown(&measured.recorded, |of| recorded::section(context, of))?,
     ];
     sections.extend(all.into_iter().flatten());
     Ok(sections)
@@ -300,11 +251,9 @@ mod tests {
         vec![directory.to_str().unwrap().to_string()]
     }
 
-    fn report(settings: &Settings, directory: &Path, existing: Existing, progress: &dyn Progress) -> Result<Report> {
-        super::report(&|| source::objects(&settings.sources), settings, directory, existing, progress)
+    fn report(settings: &Settings, directory: &Path, replace: bool, progress: &dyn Progress) -> Result<Report> {
+        super::report(&|| source::objects(&settings.sources), settings, directory, replace, progress)
     }
-
-    const RESUME: Existing = Existing { resume: true, replace: false };
 
     fn tiny(sources: Vec<String>) -> Settings {
         Settings {
@@ -314,12 +263,9 @@ mod tests {
             levels: 4,
             many_groups: 20,
             noise_levels: 3,
-            approaches: 900,
             limit_touches: 1_000,
             limit_rounds: 3,
             limit_groups: 100,
-            sequences: 60,
-            reliability_groups: 100,
             promise_sequences: 1_000,
             cost_groups: 100,
             ..Settings::quick(sources, 1)
@@ -334,16 +280,12 @@ mod tests {
             "curvature",
             "accuracy",
             "accuracy-objects",
-            "approaches-accuracy",
             "confusion",
             "signal-to-noise",
             "noise",
             "noise-objects",
             "noise-confusion",
             "limit-curves",
-            "sequential-trade",
-            "sequential-objects",
-            "reliability",
             "promises-kept",
             "cost-bytes",
             "cost-time",
@@ -355,7 +297,7 @@ mod tests {
             }
         }
         let figures = html.matches("<figure id=").count();
-        assert_eq!(figures, 17, "a figure is not in the list above");
+        assert_eq!(figures, 13, "a figure is not in the list above");
         let mut ids: Vec<&str> = html.split(" id=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
         let count = ids.len();
         ids.sort_unstable();
@@ -402,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cancelled_report_resumes_where_it_was_and_a_whole_one_without_measuring_again() {
+    fn a_cancelled_report_writes_nothing_and_a_whole_one_has_every_figure() {
         /// Cancels as soon as the stage begins.
         struct CancelAt(&'static str, AtomicBool, Mutex<Vec<String>>);
         impl Progress for CancelAt {
@@ -422,45 +364,29 @@ mod tests {
         let settings = Settings { capture, ..tiny(meshes(&place.path().join("meshes"))) };
         let directory = place.path().join("report");
         let cancel = CancelAt("noise", AtomicBool::new(false), Mutex::default());
-        let error = report(&settings, &directory, Existing::default(), &cancel).unwrap_err();
+        let error = report(&settings, &directory, false, &cancel).unwrap_err();
         assert!(matches!(error, palpate::Error::Cancelled), "{error}");
-        assert!(!directory.join("index.html").exists());
+        assert!(!directory.exists());
         // What is long is named with its stage.
         let named = cancel.2.into_inner().unwrap();
         let is_of = |name: &&String, stage: &str| name.split(": ").next() == Some(stage);
         let stages = ["objects", "accuracy", "noise"];
         assert!(named.iter().all(|name| stages.iter().any(|stage| is_of(&name, stage))), "{named:?}");
         assert!(named.iter().any(|name| name.starts_with("accuracy: train")), "{named:?}");
-        let kept = std::fs::read_dir(directory.join(".stages")).unwrap().map(|entry| entry.unwrap().path());
-        let kept = kept.into_iter().find(|path| path.to_string_lossy().contains("accuracy-")).unwrap();
-        let kept: serde_json::Value = serde_json::from_slice(&std::fs::read(kept).unwrap()).unwrap();
-        let written = report(&settings, &directory, RESUME, &()).unwrap();
-        assert_eq!(written.stages[0], ("accuracy".into(), kept["seconds"].as_f64().unwrap()));
+        let written = report(&settings, &directory, false, &()).unwrap();
         let html = std::fs::read_to_string(directory.join("index.html")).unwrap();
         assert_has_every_figure_and_its_files(&html, &written);
         assert_states_its_probe_and_its_settings(&html);
-
-        // Stages are taken as they are, their times too; a cut-off stage is measured again, and nothing else.
-        let again = report(&settings, &directory, RESUME, &()).unwrap();
-        assert_eq!((&again.stages, &again.summary), (&written.stages, &written.summary));
-        let kept = |name: &str| {
-            let stages = std::fs::read_dir(directory.join(".stages")).unwrap().map(|entry| entry.unwrap().path());
-            stages.into_iter().find(|path| path.file_name().unwrap().to_string_lossy().starts_with(name)).unwrap()
-        };
-        std::fs::remove_file(kept("calibration-")).unwrap();
-        let cut = report(&settings, &directory, RESUME, &()).unwrap();
-        let differ = written.stages.iter().zip(&cut.stages).filter(|(a, b)| a != b).map(|(a, _)| a.0.as_str());
-        assert_eq!(differ.collect::<Vec<_>>(), ["calibration"]);
     }
 
     #[test]
-    fn a_report_measures_the_chosen_parts_alone_and_takes_them_from_one_with_others() {
+    fn a_report_measures_the_chosen_parts_alone() {
         let place = tempfile::tempdir().unwrap();
         let directory = place.path().join("report");
         let with = |parts: &[Part]| Settings { parts: parts.into(), ..tiny(meshes(&place.path().join("meshes"))) };
         let read = || std::fs::read_to_string(directory.join("index.html")).unwrap();
         let names = |report: &Report| report.stages.iter().map(|stage| stage.0.clone()).collect::<Vec<_>>();
-        let noise = report(&with(&[Part::Noise]), &directory, Existing::default(), &()).unwrap();
+        let noise = report(&with(&[Part::Noise]), &directory, false, &()).unwrap();
         assert_eq!(names(&noise), ["noise"]);
         let html = read();
         assert!(html.contains("<figure id=\"noise\">") && html.contains("noise levels"));
@@ -472,17 +398,15 @@ mod tests {
         assert!(paper["at_10_with_5_ms"].is_array() && paper.get("at_10").is_none(), "{paper}");
         assert!(noise.summary["summary"].get("limit_at_10").is_none());
 
-        // Its sections would be lost, so it is asked for; then what was measured is taken.
-        let both = with(&[Part::Objects, Part::Noise, Part::Limit]);
-        let error = report(&both, &directory, RESUME, &()).unwrap_err();
+        // Its sections would be lost, so it is asked for.
+        let both = with(&[Part::Objects, Part::Limit]);
+        let error = report(&both, &directory, false, &()).unwrap_err();
         assert!(error.to_string().contains("settings: parts was"), "{error}");
-        let both = report(&both, &directory, Existing { resume: true, replace: true }, &()).unwrap();
-        assert_eq!((names(&both), &both.stages[0]), (vec!["noise".into(), "limit".into()], &noise.stages[0]));
-        assert!(read().contains("<figure id=\"limit-curves\">") && both.summary["summary"]["limit_at_10"].is_number());
-
-        let objects = with(&[Part::Objects]);
-        let only = report(&objects, &directory, Existing { resume: true, replace: true }, &()).unwrap();
-        assert_eq!((only.stages, read().contains("<figure id=\"curvature\">")), (vec![], true));
+        let both = report(&both, &directory, true, &()).unwrap();
+        assert_eq!(names(&both), ["limit"]);
+        let html = read();
+        assert!(html.contains("<figure id=\"limit-curves\">") && html.contains("<figure id=\"curvature\">"));
+        assert!(both.summary["summary"]["limit_at_10"].is_number());
     }
 
     #[test]
@@ -491,7 +415,7 @@ mod tests {
         let settings = tiny(meshes(&place.path().join("meshes")));
         let summary = place.path().join("summary.json");
         std::fs::write(&summary, json!({"made_from": {"job": "run"}}).to_string()).unwrap();
-        let error = report(&settings, place.path(), Existing::default(), &()).unwrap_err();
+        let error = report(&settings, place.path(), false, &()).unwrap_err();
         let problem = error.problem::<ReportProblem>();
         assert!(matches!(problem, Some(ReportProblem::OtherResults { .. })), "{error}");
         assert!(error.to_string().contains("summary.json: "), "{error}");
@@ -504,7 +428,7 @@ mod tests {
         let sources = meshes(place.path());
         let one = vec![format!("{}/ball.obj", sources[0])];
         let directory = place.path().join("report");
-        let error = report(&tiny(one), &directory, Existing::default(), &()).unwrap_err();
+        let error = report(&tiny(one), &directory, false, &()).unwrap_err();
         assert!(error.to_string().contains("only one object"), "{error}");
         assert!(!directory.exists());
     }

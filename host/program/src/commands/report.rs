@@ -1,14 +1,14 @@
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::real::RealArguments;
-use super::{Global, remark, shell};
+use super::{Global, shell};
 use clap::builder::TypedValueParser as _;
 use palpate::Result;
 use palpate::output::{print, print_json, refuse_stdout};
 use palpate::probe::noise::{Grazing, Noise};
 use palpate::touches::Origin;
 use palpate::with;
-use palpate_report::{self, Existing, Part, Settings};
+use palpate_report::{self, Part, Settings};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -21,10 +21,7 @@ Examples:
                                        objects as large as they are, your probe
   palpate report meshes/ --only accuracy,noise
                                        two sections
-  palpate report --real noise=0..10ms  our robust model trained for this noise
-  palpate report meshes/ --recorded recorded --probe probe.toml
-                                       is the simulation of your probe right?
-  palpate report --resume              continue an interrupted report")]
+  palpate report --real noise=0..10ms  our robust model trained for this noise")]
 pub(crate) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(default_value = "builtin", value_name = "SOURCE")]
@@ -38,12 +35,6 @@ pub(crate) struct Arguments {
     /// Only these; other sections are left out
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = part())]
     only: Vec<Part>,
-    /// Recorded touches of the objects; simulated ones are compared with them by the probe of --probe, as it really is
-    #[arg(long, value_name = "DIR")]
-    recorded: Option<PathBuf>,
-    /// Continue what was interrupted; with the same program, settings and objects
-    #[arg(long)]
-    resume: bool,
     #[command(flatten)]
     size: SizeArguments,
     #[command(flatten)]
@@ -51,35 +42,25 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
-    let Arguments { sources, output, quick, only, recorded, resume, size, real: given } = arguments;
+    let Arguments { sources, output, quick, only, size, real: given } = arguments;
     let seed = global.seed();
     refuse_stdout(&output)?;
-    let compared = recorded.iter().flat_map(|path| ["--recorded".to_owned(), path.to_string_lossy().into_owned()]);
-    let compared: Vec<String> = compared.collect();
     let parts: Vec<Part> = Part::ALL.into_iter().filter(|part| only.is_empty() || only.contains(part)).collect();
-    let command = command(&sources, seed, quick, &only, &[compared, size.words(), given.words()].concat());
+    let command = command(&sources, seed, quick, &only, &[size.words(), given.words()].concat());
     let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
     refuse_unstated(&size)?;
     let capture = size.origin(Origin::default())?;
     let real = size.probe.read()?.map(|file| file.real).filter(|real| !real.is_none());
     let noise = match real {
-        Some(real) => {
-            if !real.grazing.is_none() {
-                remark(
-                    "Where noise is added to touches, fingers do not bend aside; in the comparison with recordings they do.",
-                );
-            }
-            given.over(with!(real, grazing = Grazing::default()))?
-        }
+        // Where noise is added to touches, fingers do not bend aside.
+        Some(real) => given.over(with!(real, grazing = Grazing::default()))?,
         None if given.is_given() => given.over(Noise::default())?,
         None => settings.noise,
     };
     noise.check()?;
-    let real = real.unwrap_or_default();
-    let settings = Settings { command, parts, noise, real, recorded, capture, ..settings };
+    let settings = Settings { command, parts, noise, capture, ..settings };
     let objects = || size.touchable(size.objects(&settings.sources, seed)?, &settings.capture);
-    let existing = Existing { resume, replace: global.force };
-    let written = palpate_report::report(&objects, &settings, &output, existing, &Bar::new())?;
+    let written = palpate_report::report(&objects, &settings, &output, global.force, &Bar::new())?;
     if global.json {
         return print_json(&written.summary);
     }
