@@ -20,7 +20,7 @@ use palpate::touches::{Dataset, Listing, ObjectTouches, Origin};
 use palpate::with;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_report::error::ReportProblem;
-use palpate_report::play::{self, Contender, Expected};
+use palpate_report::play::{self, Contender};
 use palpate_report::results;
 use palpate_report::run_page::{RunResults, run_page};
 use palpate_report::statistics::{LEAST_GROUPS, distinct_groups, largest_group};
@@ -226,7 +226,7 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let began = Instant::now();
     let made_from = made_from(objects, settings)?;
     if !settings.replace {
-        results::refuse_others(out, &made_from, &FILES, "data/dataset.json")?;
+        results::refuse_others(out, &made_from, &FILES, Some("data/dataset.json"))?;
         FILES.iter().try_for_each(|file| output::refuse_foreign(&out.join(file)))?;
     }
     let mut stages = Stages::new();
@@ -465,11 +465,7 @@ fn recognize(model: &Model<'_>, touched: &ObjectTouches) -> Result<Recognition> 
 
 /// The page on which the objects can be touched, with all models.
 fn play_page(objects: &[Object], trials: [&Trial; 3], settings: &Settings) -> Result<String> {
-    let contender = |trial: &Trial| {
-        let measured = trial.method.evaluation.approaches.as_ref();
-        let expected = measured.map(|approaches| Expected::from(&approaches.sequential));
-        Contender::new(CompiledModel::from_bytes(trial.compiled.bytes.clone())?, expected)
-    };
+    let contender = |trial: &Trial| Contender::new(CompiledModel::from_bytes(trial.compiled.bytes.clone())?);
     let contenders = trials.into_iter().map(contender).collect::<Result<Vec<_>>>()?;
     let origin = settings.capture.origin.clone();
     play::page(

@@ -27,11 +27,9 @@
 //! ```
 
 mod pack;
-mod series;
 mod table;
 
 pub use pack::{compress, decompress, pack, unpack};
-pub use series::{Score, Series};
 pub use table::{Ghost, Hidden, Pressed};
 
 use crate::capture::Sampler;

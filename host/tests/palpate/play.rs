@@ -3,7 +3,7 @@ use glam::DVec3;
 use palpate::capture;
 use palpate::compile::{self, compile};
 use palpate::ensemble::{self, inputs};
-use palpate::play::{Game, Series};
+use palpate::play::Game;
 use palpate::probe::approach::{Approach, CLEARANCE};
 use palpate::probe::hand::Unreached;
 
@@ -102,22 +102,6 @@ fn an_aimed_approach_moves_along_its_line_and_is_none_beside_the_object() {
         assert_eq!(game.touch_along(&mut round, point, direction, 0.0), None);
     }
     assert_eq!(round.players[0].approaches, 1);
-}
-
-#[test]
-fn a_series_gives_the_same_scores_in_one_go_and_in_small_steps() {
-    let bytes = model();
-    let game = game(&bytes);
-    let mut whole = Series::new(&game, 1);
-    whole.go_on(&game, 30, u64::MAX);
-    let mut steps = Series::new(&game, 1);
-    while steps.rounds < 30 {
-        steps.go_on(&game, 30, 7);
-    }
-    assert_eq!(whole.scores, steps.scores);
-    let score = whole.scores[0];
-    let (mean, error) = score.mean().unwrap();
-    assert!(score.rounds == 30 && mean > 5.0 && mean < 200.0 && error > 0.0 && error < mean, "{score:?}");
 }
 
 #[test]

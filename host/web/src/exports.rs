@@ -140,15 +140,4 @@ export! {
     fn truth() -> i32 {
         with(|table| number(table.truth()))
     }
-
-    /// Begins a series of rounds.
-    fn begin_series(seed: u32) -> i32 {
-        with(|table| number(table.begin_series(seed)))
-    }
-
-    /// Goes on with the series until `rounds` are finished, for about `approaches` approaches. Puts out for each model:
-    /// mean approaches, their standard error, wrong names, rounds without a name. Returns how many rounds are finished.
-    fn go_on(rounds: u32, approaches: u32) -> i32 {
-        with(|table| number(table.go_on(rounds, approaches)))
-    }
 }

@@ -1,11 +1,11 @@
-//! State of the table: one game, one round, one series, and the memory that the script shares.
+//! State of the table: one game, one round, and the memory that the script shares.
 
 use palpate::compile::open;
 use palpate::glam::DVec3;
 use palpate::locate::{Maps, Standing, World};
 use palpate::mesh::Mesh;
 use palpate::onboard::{Refused, Verdict};
-use palpate::play::{Approached, Game, Hidden, Round, Series, decompress, unpack};
+use palpate::play::{Approached, Game, Hidden, Round, decompress, unpack};
 use palpate::probe::hand::Unreached;
 use palpate::probe::noise::{Deviation, Noise};
 use palpate::probe::{Aim, Probe};
@@ -39,7 +39,6 @@ pub(crate) struct Table {
     pub(crate) press: Press,
     game: Option<Game<'static>>,
     round: Option<Round<'static>>,
-    series: Option<Series<'static>>,
 }
 
 thread_local! {
@@ -203,24 +202,5 @@ impl Table {
         self.output = vec![proposal.pose.into(), f64::from(proposal.score) / 32_768.0];
         self.output.extend([direction, alignment].into_iter().flatten().map(|cosine| f64::from(cosine) / one));
         Some(0)
-    }
-
-    pub(crate) fn begin_series(&mut self, seed: u32) -> Option<usize> {
-        self.series = Some(Series::new(self.game.as_ref()?, seed.into()));
-        Some(0)
-    }
-
-    pub(crate) fn go_on(&mut self, rounds: u32, approaches: u32) -> Option<usize> {
-        let series = self.series.as_mut()?;
-        series.go_on(self.game.as_ref()?, rounds.into(), approaches.into());
-        self.output = series
-            .scores
-            .iter()
-            .flat_map(|score| {
-                let (mean, error) = score.mean().unwrap_or((f64::NAN, f64::NAN));
-                [mean, error, score.wrong as f64, score.unnamed as f64]
-            })
-            .collect();
-        usize::try_from(series.rounds).ok()
     }
 }

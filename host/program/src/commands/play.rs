@@ -6,18 +6,17 @@ use super::real::RealArguments;
 use super::scene::SceneArguments;
 use super::{Global, shell};
 use palpate::compile::CompiledModel;
+use palpate::ensemble::StatedProbe;
 use palpate::locate::Real;
+use palpate::mesh::builtin;
 use palpate::output;
 use palpate::probe::Probe;
 use palpate::probe::noise::Noise;
 use palpate::touches::{Origin, Surroundings};
 use palpate::with;
 use palpate::{Error, Result};
-use palpate_report::play::{self, Settings, Training};
+use palpate_report::play::{self, Contender, Settings};
 use std::path::PathBuf;
-
-/// Full touches of each object that models are trained on, and three times as many approaches.
-const TOUCHES: u64 = 10_000;
 
 /// Approaches to each object on a table that maps are learned from.
 const PRESSED: u64 = 50_000;
@@ -28,10 +27,10 @@ const ROUNDS: u64 = 10;
 /// A page to be made on which objects are touched.
 pub(super) struct Wanted {
     pub(super) sources: Vec<String>,
-    /// Compiled models; some are trained if there are none.
+    /// Compiled models; that of the built-in objects if there are none.
     pub(super) model: Vec<PathBuf>,
     pub(super) output: PathBuf,
-    /// Full touches of each object to train on.
+    /// Approaches to each object on a table that maps are learned from.
     pub(super) touches: Option<u64>,
     pub(super) trace: Option<PathBuf>,
     pub(super) size: SizeArguments,
@@ -40,32 +39,30 @@ pub(super) struct Wanted {
 
 pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
     let Wanted { mut sources, model, output, touches, trace, size, real } = wanted;
-    let (touches, seed) = (touches.unwrap_or(TOUCHES), global.seed());
-    if touches < 100 {
-        return Err(Error::setting("touches", touches, "100 or more"));
+    let seed = global.seed();
+    if let Some(touches) = touches {
+        return Err(Error::setting("touches", touches, "it with --scene table: the page's models are given"));
     }
     if sources.is_empty() {
         sources.push("builtin".into());
     }
     output::admit(&output, model.iter().chain(sources.iter().map(PathBuf::from).collect::<Vec<_>>().iter()))?;
     let file = size.probe.read()?;
-    let origin = size.origin(Origin { touches, seed, ..Origin::default() })?;
+    let origin = size.origin(Origin { seed, ..Origin::default() })?;
     refuse_unstated(&size)?;
     let objects = size.touchable(size.objects(&sources, seed)?, &origin)?;
     let stated = file.map(|file| file.real).filter(|real| !real.is_none());
     let noise = real.over(stated.unwrap_or_else(Noise::switch)).map_err(|error| size.probe.named(error))?;
-    let progress = Bar::new();
-    let surfaces = play::surfaces(&objects, &origin)?;
-    let contenders = if model.is_empty() {
-        play::train(&objects, &Training { origin: origin.clone(), noise }, &progress)?
-    } else {
-        let models = model.iter().map(CompiledModel::read).collect::<Result<_>>()?;
-        let origin = Origin { seed: seed.wrapping_add(5), ..origin.clone() };
-        let mut contenders = play::expect(models, &surfaces, &origin, &noise, &progress)?;
-        play::distinguish(&mut contenders, &model);
-        contenders
-    };
-    drop(progress);
+    let mut contenders = model.iter().map(|path| contender(path, &origin)).collect::<Result<Vec<_>>>()?;
+    play::distinguish(&mut contenders, &model);
+    if contenders.is_empty() {
+        let is_builtin = |source: &String| source == "builtin" || builtin::names().contains(&source.as_str());
+        if !sources.iter().all(is_builtin) || origin.probe != Probe::default() {
+            let allowed = "a model of these objects and this probe: palpate run SOURCE -o out makes out/model.palpate";
+            return Err(Error::setting("model", "not given", allowed));
+        }
+        contenders.push(Contender::household()?);
+    }
     let models = model.iter().flat_map(|path| ["--model".into(), path.to_string_lossy().into_owned()]);
     let own: Vec<String> = models.chain(size.words()).chain(real.words()).collect();
     let command = shell::command(
@@ -79,10 +76,21 @@ pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
     let page = play::page(&objects, &contenders, &settings)?;
     output::write_bytes(&output, page.as_bytes())?;
     if let Some(trace) = trace {
+        let surfaces = play::surfaces(&objects, &settings.origin)?;
         output::write_unmarked(&trace, play::trace(&surfaces, &contenders, &settings, ROUNDS)?.as_bytes())?;
     }
     let text = || format!("{}: open it in a browser\n", output.display());
     global.print_about(&output, &serde_json::json!({ "page": output }), text)
+}
+
+/// A model for approaches of this origin.
+fn contender(path: &PathBuf, origin: &Origin) -> Result<Contender> {
+    let model = CompiledModel::read(path)?;
+    if let Some(stated) = model.model().probe() {
+        let own = StatedProbe::from(origin).trained();
+        StatedProbe::compare([&path.display().to_string(), "the page"], [stated, own])?;
+    }
+    Contender::new(model).map_err(|error| error.in_file(path))
 }
 
 /// Makes the page of a table.

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 #[command(group(ArgGroup::new("recognizes").args(["play", "port"])), after_help = "\
 Pages work in any browser, without a network. The inside of a surface is orange; a mesh that shows orange from outside is inside out, or has holes.
 
-With --play the page lets you touch several objects, and models recognize them. Without --model, it trains four, which takes about a minute. With --scene table, too, one of the objects lies hidden on a table, and a hand that knows where it is finds out what it is and where it lies. With --port it shows what a chip at the reader's computer touches and recognizes, where the browser has Web Serial.
+With --play the page lets you touch several objects, and models recognize them; without --model one of the built-in objects, which the program has. With --scene table, too, one of the objects lies hidden on a table, and a hand that knows where it is finds out what it is and where it lies. With --port it shows what a chip at the reader's computer touches and recognizes, where the browser has Web Serial.
 
 Examples:
   palpate view bowl -o bowl.html                a built-in object
@@ -34,8 +34,9 @@ Examples:
                                                 touches on a table
   palpate view mon.txt tue.txt -o pot.html --probe hand.toml
                                                 two, compared
-  palpate view --play -o play.html              ten objects, four models
-  palpate view --play --model models/household.palpate -o play.html
+  palpate view --play -o play.html              ten objects
+  palpate view --play meshes/ --model out/model.palpate -o play.html
+                                                your meshes and model
   palpate view --play --scene table -o table.html
                                                 ten objects on a table
   palpate view --port -o chip.html              a chip, without a program")]
@@ -46,7 +47,7 @@ pub(crate) struct Arguments {
     /// Output; the page
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// Touches of each object; to show [default: 24], or with --play to train on [default: 10000; on a table 50000]
+    /// Touches of each object; to show [default: 24], or with --play --scene table to learn maps from [default: 50000]
     #[arg(long, value_name = "N", value_parser = super::numbers::count)]
     touches: Option<u64>,
     /// Approaches to show in which a finger missed

@@ -16,8 +16,6 @@ fn a_page_is_made_of_a_model_and_objects_with_a_trace_of_a_thousand_approaches_t
     };
     let text = play();
     assert!(text.contains("my_globe") && text.contains("curvature, every contact"));
-    // The model does not know one of the objects, so nobody knows what to expect.
-    assert!(text.contains("\"expected\":null"));
     assert_eq!(listing(&at.join("pages")), ["play.html", "trace.txt"]);
     assert_eq!(fs::read_to_string(at.join("pages/trace.txt")).unwrap().lines().count(), 2_000);
     // The same seed gives the same page.
@@ -25,19 +23,11 @@ fn a_page_is_made_of_a_model_and_objects_with_a_trace_of_a_thousand_approaches_t
 }
 
 #[test]
-fn a_page_without_a_model_trains_four_and_says_what_each_is_expected_to_cost() {
+fn a_page_without_a_model_has_that_of_the_built_in_objects() {
     let at = &Folder::new();
-    for (name, rings) in [("round", 8), ("rough", 5)] {
-        globe(at, name, rings);
-    }
-    succeeds(at, "view --play --touches 300 -o play.html round.obj rough.obj");
+    succeeds(at, "view --play -o play.html bowl mouse");
     let text = fs::read_to_string(at.join("play.html")).unwrap();
-    for name in
-        ["times, full touches", "curvature, full touches", "curvature, every contact", "oriented, every approach"]
-    {
-        assert!(text.contains(name), "{name}");
-    }
-    assert!(text.contains("\"plan\":true") && !text.contains("\"expected\":null"));
+    assert!(text.contains("curvature, every contact") && text.contains("\"name\":\"mouse\""));
 }
 
 #[test]
@@ -54,9 +44,14 @@ fn a_page_of_a_table_holds_maps_of_its_objects_and_says_what_they_were_learned_f
 fn what_cannot_be_played_with_writes_no_page() {
     let at = &Folder::new();
     fs::write(at.join("bad.palpate"), b"no model").unwrap();
+    fs::write(at.join("wide.toml"), "radius = 0.15\nspacing = 2\nspeed = 10\n").unwrap();
+    globe(at, "round", 8);
     let table = "bowl mouse --scene table --touches 4000";
     for (wrong, code, expected) in [
         ("bowl --model bad.palpate", 1, "bad.palpate"),
+        ("bowl --touches 300", 2, "touches is 300. Use it with --scene table"),
+        ("round.obj", 2, "--model is not given. Use a model of these objects and this probe"),
+        (&format!("bowl --probe wide.toml --model {HOUSEHOLD}"), 1, "spacing 1.5 and 2"),
         (&format!("bowl --true-size stated --model {HOUSEHOLD}"), 2, "probe"),
         ("bowl --real noise=much", 2, "5ms"),
         ("bowl --scene table --touches 4000", 2, "2 to 16 objects"),
@@ -67,5 +62,5 @@ fn what_cannot_be_played_with_writes_no_page() {
     ] {
         fails(at, &format!("view --play -o play.html {wrong}"), code, expected);
     }
-    assert_eq!(listing(at), ["bad.palpate"]);
+    assert_eq!(listing(at), ["bad.palpate", "round.obj", "wide.toml"]);
 }

@@ -127,21 +127,5 @@ function openGame(data) {
       const [pose, score, ...vectors] = taken(8);
       return { pose, score, direction: vectors.slice(0, 3), alignment: vectors.slice(3) };
     },
-    // Puts another object on the table, which a series needs all of; false once they are.
-    prepare: () => {
-      const missing = numbers.indexOf(null);
-      if (missing >= 0) number(missing);
-      return missing >= 0;
-    },
-    beginSeries: (seed) => sure(exports.begin_series(seed), "the series"),
-    goOn: (rounds, approaches) => {
-      const finished = sure(exports.go_on(rounds, approaches), "the series");
-      const all = [...taken(4 * data.models.length)];
-      const score = (_, model) => {
-        const [mean, error, wrong, unnamed] = all.slice(4 * model);
-        return { mean, error, wrong, unnamed };
-      };
-      return { finished, scores: data.models.map(score) };
-    },
   };
 }

@@ -4,12 +4,10 @@
 //! lines of Rust that touch the one and read the other ([`palpate::play`], compiled to WebAssembly by `host/web`). What a
 //! page says is what the program says; [`trace()`] writes that down, to compare.
 
-mod models;
 mod surfaces;
 mod table;
 mod trace;
 
-pub use models::{Training, expect, train};
 pub use surfaces::{Surface, surfaces};
 pub use table::{MOST_OBJECTS, table};
 pub use trace::trace;
@@ -23,19 +21,21 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 use palpate::compile::CompiledModel;
 use palpate::error::{CaptureProblem, EvaluateProblem, Result};
-use palpate::evaluate::Sequential;
 use palpate::mesh::Object;
 use palpate::play::compress;
 use palpate::probe::approach::Aim;
 use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
-use palpate::wording::{count, decimal, list};
+use palpate::wording::{count, list};
 use palpate_onboard::Model;
 use palpate_shared::format::{Counted, Length};
 use std::path::PathBuf;
 
 /// The game, compiled to WebAssembly.
 const WASM: &[u8] = include_bytes!("../../assets/play/palpate.wasm");
+
+/// A copy of `models/household.palpate`, which knows the ten built-in objects.
+const HOUSEHOLD: &[u8] = include_bytes!("../../assets/play/household.palpate");
 
 /// Settings of a page.
 #[derive(Clone, Debug)]
@@ -55,29 +55,6 @@ pub struct Contender {
     pub name: String,
     /// The model.
     pub model: CompiledModel,
-    /// Its average cost, measured on many more approaches than anybody plays; none if that is not known.
-    pub expected: Option<Expected>,
-}
-
-/// Average cost of a model.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Expected {
-    /// Approaches to its verdict, also where it gave up.
-    pub approaches: f64,
-    /// Its standard error.
-    pub standard_error: f64,
-    /// The share of rounds in which it named another object.
-    pub wrong: f64,
-}
-
-impl From<&Sequential> for Expected {
-    fn from(measured: &Sequential) -> Self {
-        Self {
-            approaches: measured.mean().value,
-            standard_error: measured.mean().standard_error,
-            wrong: measured.error,
-        }
-    }
 }
 
 impl Contender {
@@ -85,9 +62,17 @@ impl Contender {
     ///
     /// # Errors
     /// [`EvaluateProblem::RawFeatures`] for a model over rows of features.
-    pub fn new(model: CompiledModel, expected: Option<Expected>) -> Result<Self> {
+    pub fn new(model: CompiledModel) -> Result<Self> {
         let name = about(&model.model())?;
-        Ok(Self { name, model, expected })
+        Ok(Self { name, model })
+    }
+
+    /// The model of the ten built-in objects, touched by the published probe.
+    ///
+    /// # Errors
+    /// None: the model is part of this crate.
+    pub fn household() -> Result<Self> {
+        Self::new(CompiledModel::from_bytes(HOUSEHOLD.to_vec())?)
     }
 }
 
@@ -163,7 +148,6 @@ fn data(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
             "objects": contender.model.names(),
             "known": contender.model.model().known_count(),
             "plan": contender.model.model().plan().is_some(),
-            "expected": contender.expected,
         })).collect::<Vec<_>>(),
     });
     safe(&data)
@@ -301,34 +285,18 @@ fn compare(contenders: &[Contender], settings: &Settings) -> Markup {
                         th.number scope="col" { "posterior" }
                         th.number scope="col" { "approaches" }
                         th.number scope="col" { "of them evidence" }
-                        th.number scope="col" { "approaches, on average" }
-                        th.number scope="col" { "expected" }
-                        th.number scope="col" { "wrong" }
                         th.number scope="col" { "bytes" }
                     } }
                     tbody {
                         @for contender in contenders {
                             tr {
                                 th scope="row" { (contender.name) }
-                                td {} td.number {} td.number {} td.number {} td.number { "–" }
-                                td.number {
-                                    @match contender.expected {
-                                        Some(expected) => {
-                                            (format!("{} ± {}", decimal(expected.approaches, 1), decimal(expected.standard_error, 1)))
-                                        }
-                                        None => "–",
-                                    }
-                                }
-                                td.number { "–" }
+                                td {} td.number {} td.number {} td.number {}
                                 td.number { (count(contender.model.bytes().len())) }
                             }
                         }
                     }
                 }
-            }
-            div.row {
-                button type="button" id="series" { "Play rounds" }
-                p id="rounds" role="status" {}
             }
             fieldset {
                 legend { "Noise of the sensor" }
@@ -344,7 +312,6 @@ fn compare(contenders: &[Contender], settings: &Settings) -> Markup {
                         output for=(id) {}
                     }
                 }
-                p.note id="condition" {}
             }
         }
     }
@@ -396,12 +363,6 @@ fn notes(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) ->
             }
             @if let Some(travel) = settings.origin.probe.travel {
                 p { "An approach without a contact ends after " (travel) ", the hand's travel." }
-            }
-            @if contenders.iter().any(|contender| contender.expected.is_some()) {
-                p {
-                    "The expected number is the mean that the program measured on captured approaches, with "
-                    (settings.noise.to_string()) ". Rounds are played with the sliders as they are."
-                }
             }
             p { "Made by " code { (settings.command) } }
         }

@@ -177,66 +177,21 @@
     }, 60);
   });
 
-  // Many rounds, a few thousand approaches at a time.
-  const ROUNDS = 100, AT_ONCE = 1500;
-  let playing = false, wanted = 0, begun = false;
-  const showScores = ({ finished, scores }) => {
-    element("rounds").textContent = finished === 0 ? "" : `${finished} rounds played.`;
-    tables.forEach((row, index) => {
-      const { mean, error, wrong, unnamed } = scores[index];
-      row.cells[5].textContent = Number.isNaN(mean) ? "–" : `${mean.toFixed(1)} ± ${error.toFixed(1)}`;
-      row.cells[7].textContent = finished === 0 ? "–" : `${wrong}` + (unnamed ? `, ${unnamed} undecided` : "");
-    });
-  };
-  const beginSeries = () => {
-    game.beginSeries(random(2 ** 31));
-    [wanted, begun] = [0, true];
-  };
-  const pause = () => {
-    playing = false;
-    element("series").textContent = `Play ${ROUNDS} rounds`;
-  };
-  const goOn = () => {
-    if (!playing) return;
-    if (game.prepare()) return void setTimeout(goOn, 0);
-    const done = game.goOn(wanted, AT_ONCE);
-    showScores(done);
-    if (done.finished >= wanted) return pause();
-    setTimeout(goOn, 0);
-  };
-  element("series").addEventListener("click", () => {
-    if (playing) return pause();
-    if (!begun) beginSeries();
-    wanted = game.goOn(0, 0).finished + ROUNDS;
-    playing = true;
-    element("series").textContent = "Stop";
-    goOn();
-  });
-
-  // What the sensor adds. Rounds under other conditions are another series.
+  // What the sensor adds.
   const showNoise = () => {
     const text = (micros) => `${(Math.abs(micros) / 1000).toFixed(1)} ms`;
     const offset = (early) => (early === 0 ? text(early) : `${text(early)} ${early > 0 ? "early" : "late"}`);
     const outputs = [...document.querySelectorAll(".slider output")];
     outputs[0].textContent = text(noise.deviation.largest);
     noise.bent.forEach((early, finger) => { outputs[finger + 1].textContent = offset(early); });
-    const same = noise.deviation.largest === data.noise.deviation.largest && noise.bent.every((early, finger) => early === data.noise.bent[finger]);
-    element("condition").textContent = same ? "These are the settings under which the \u201cexpected\u201d column was measured."
-      : "The \u201cexpected\u201d column was measured under other settings.";
   };
   ["noise", "bent1", "bent2", "bent3"].forEach((id, index) => element(id).addEventListener("input", ({ target }) => {
     if (index === 0) noise.deviation.largest = 1000 * target.value;
     else noise.bent[index - 1] = 1000 * target.value;
     game.setNoise(noise);
     showNoise();
-    if (begun) {
-      pause();
-      beginSeries();
-      showScores(game.goOn(0, 0));
-    }
   }));
 
-  pause();
   // The model that uses most touches and no pose first: the one to use.
   model = Number(element("model")?.value ?? 0);
   showModel();

@@ -41,7 +41,7 @@ fn object(name: &str, rings: u32, height: f32) -> Object {
 
 /// One nat for the first of two objects below a curvature of 9 ms, one for the second above.
 fn contender(names: [&str; 2]) -> Contender {
-    Contender::new(model(names), None).unwrap()
+    Contender::new(model(names)).unwrap()
 }
 
 fn settings() -> Settings {
@@ -99,6 +99,13 @@ fn a_page_of_ten_large_objects_stays_below_three_megabytes_and_says_what_it_simp
     let (before, _) = page.split_once(&format!(" of {last} triangles)")).unwrap();
     let left: usize = before.rsplit('(').next().unwrap().replace(',', "").parse().unwrap();
     assert!((5_000..objects[9].mesh().triangles.len()).contains(&left), "{left} of {last}");
+}
+
+#[test]
+fn the_household_model_is_the_one_that_the_repository_ships() {
+    assert_eq!(Contender::household().unwrap().name, "curvature, every contact");
+    let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
+    assert!(std::fs::read(shipped).unwrap() == HOUSEHOLD, "copy {shipped} into assets/play");
 }
 
 #[test]
