@@ -10,7 +10,6 @@ use palpate::calibrate::Per;
 use palpate::compile;
 use palpate::error::{Error, RowsProblem};
 use palpate::rows::{Features, RowOf, Sequences, SequencesBuilder};
-use palpate::shared::format::Held;
 use palpate::strangers;
 use palpate::stream::{self, EventSettings, Learned, Settings, StrangerTest, Wanted};
 use palpate::with;
@@ -124,19 +123,17 @@ pub(crate) fn calibrate(
     let rows = sequences(opened, &rows, Some(&labels), &sequence, groups.as_deref())?;
     let known = Per::ALL.iter().copied().find(|own| own.name() == per);
     let per = known.ok_or_else(|| Error::setting("per", per, "average, name or object"))?;
-    let held = strangers.map(|name| {
-        let held = Held::ALL.iter().copied().find(|held| held.name() == name);
-        held.ok_or_else(|| Error::setting("strangers", name, "likely, certain or None"))
-    });
+    if let Some(name) = strangers.filter(|name| *name != "likely") {
+        return Err(Error::setting("strangers", name, "likely or None").into());
+    }
     let others = background
         .map(|rows| sequences(opened, &rows, None, background_sequence.as_deref().unwrap_or_default(), None))
         .transpose()?;
-    let held = held.transpose()?;
     let learned = learned.map(self::learned).transpose()?;
     let calibrated = long(py, progress.as_ref(), |progress| {
-        let strangers = held
-            .map(|held| {
-                let test = with!(strangers::Settings::default(), held, confidence, seed);
+        let strangers = strangers
+            .map(|_| {
+                let test = with!(strangers::Settings::default(), confidence, seed);
                 StrangerTest::new(test, opened, others.as_ref())
             })
             .transpose()?;

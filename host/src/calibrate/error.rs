@@ -55,7 +55,7 @@ pub enum CalibrateProblem {
     #[error("the folds have other features or classes than the model, or are fewer than two")]
     FoldDiffers,
     /// There are too few sequences of rows, or groups of them, for a promise, even without any error.
-    #[error("{} are too few to promise {} %: at least {needed} are needed, none of them wrong; {}", how_many(*found, object, *groups, *names_in), percent(*rate), could(*possible, *held))]
+    #[error("{} are too few to promise {} %: at least {needed} are needed, none of them wrong; {}", how_many(*found, object, *groups, *names_in), percent(*rate), could(*possible))]
     TooFewSequences {
         /// The class whose names are too few, if the promise is for each.
         object: Option<String>,
@@ -71,8 +71,6 @@ pub enum CalibrateProblem {
         possible: Option<f64>,
         /// True if it is groups that are too few.
         groups: bool,
-        /// The row from which a test of strangers lets names be given, and the rows of the longest sequence, where it has none.
-        held: Option<[u64; 2]>,
     },
     /// There are too few sequences of rows for a test of strangers.
     #[error("{found} {} are too few for a test of strangers with at most {} % false alarms: at least {needed} are needed, as a part of them tests it", what(*groups), percent(*alarms))]
@@ -302,7 +300,6 @@ impl Problem for CalibrateProblem {
             Self::TooFewSequences { groups: true, .. } => {
                 "Record more groups, or promise a higher error rate; more sequences of the same groups do not help."
             }
-            Self::TooFewSequences { held: Some(_), .. } => "Give sequences of more rows, or use `--strangers likely`.",
             Self::TooFewSequences { .. } => "Record more sequences, or promise a higher error rate.",
             Self::TooFewForTest { .. } => "Record more, or calibrate without the test.",
             Self::TooManyAlarms { .. } => {
@@ -367,15 +364,10 @@ fn how_many(found: u64, object: &Option<String>, groups: bool, names_in: Option<
     }
 }
 
-fn could(possible: Option<f64>, held: Option<[u64; 2]>) -> String {
-    match (held, possible) {
-        (Some([first, longest]), _) => {
-            format!(
-                "the test of strangers lets names be given from row {first} on, and the longest sequence has {longest}"
-            )
-        }
-        (None, None) => "as many could promise nothing".into(),
-        (None, Some(rate)) => format!("as many could promise {} %", percent(rate)),
+fn could(possible: Option<f64>) -> String {
+    match possible {
+        None => "as many could promise nothing".into(),
+        Some(rate) => format!("as many could promise {} %", percent(rate)),
     }
 }
 

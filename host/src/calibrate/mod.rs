@@ -63,14 +63,13 @@ pub(crate) use choose::{Way, choose_independent};
 #[cfg(all(test, feature = "train"))]
 use draw::MarginSupply;
 pub use draw::{TouchSupply, follow};
-pub use found::{Alarms, Found, OnRecordings};
+pub use found::Found;
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
 pub(crate) use groups::choose_groups;
 #[cfg(feature = "train")]
-pub(crate) use model::added_bytes;
 pub use model::{OfRecorded, Settings, calibrate};
 #[cfg(feature = "train")]
-pub(crate) use model::{STRICTEST, Start, add_noise, begin, calibrate_from};
+pub(crate) use model::{Start, add_noise, begin, calibrate_from};
 pub use palpate_shared::format::Per;
 pub use recorded::calibrate_recorded;
 pub use terms::Terms;

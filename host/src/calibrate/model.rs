@@ -27,7 +27,7 @@ use std::collections::BTreeSet;
 /// One touch in this many serves the pilot alone, which says how strict to begin; its sequences are at most one in this many.
 const PILOT: usize = 30;
 /// The strictest threshold beyond that of the posterior, in nats: usually, and where a tenth of that is not enough.
-pub(crate) const STRICTEST: [f64; 2] = [2.5, 10.0];
+pub(super) const STRICTEST: [f64; 2] = [2.5, 10.0];
 
 /// Settings of a promise, and of the touches that it rests on.
 #[derive(Clone, Debug, PartialEq)]
@@ -398,14 +398,6 @@ pub(crate) fn add_noise(model: &Model<'_>, dataset: &mut Dataset, noise: &Noise,
 fn is_kept_well(pilot: &[Sequence], margin: f64, rate: f64) -> bool {
     let totals = totals(pilot, &Odds::All(odds_of(margin)));
     totals.wrong as f64 <= 0.5 * rate * totals.given as f64
-}
-
-/// Bytes that a calibration to an average error rate adds to a model that states neither promise nor temperature.
-#[cfg(feature = "train")]
-pub(crate) fn added_bytes(noise: &Noise) -> usize {
-    use palpate_shared::format::{Promise, SECTION_HEADER_LENGTH};
-    let promise = Promise::length(&noise.promised());
-    2 * SECTION_HEADER_LENGTH + promise + Temperature::LENGTH
 }
 
 /// The calibrated model; the promise holds for touches with the noise of these settings.

@@ -2,7 +2,6 @@
 
 use crate::ensemble::object_of;
 use crate::error::Problem;
-use palpate_base::wording::two_digits;
 use palpate_shared::Descriptor;
 
 /// Problems with evaluating.
@@ -54,39 +53,6 @@ pub enum EvaluateProblem {
         object_sequences: usize,
         /// Number of sequences of each object that it takes.
         needed: u64,
-    },
-    /// Recordings of an object make no sequence.
-    #[error(
-        "the {approaches} recorded approaches to {object} make no sequence that ends with a name: half of them are tested, {tested} \
-         touches that are evidence{}",
-        enough.map_or_else(String::new, |enough| format!(", and a simulated sequence takes {:.0}", enough.touches))
-    )]
-    TooFewRecorded {
-        /// The object.
-        object: String,
-        /// Approaches that were recorded.
-        approaches: usize,
-        /// Touches of them that sequences are made of.
-        tested: usize,
-        /// Recordings that would do, where simulated sequences say.
-        enough: Option<EnoughRecorded>,
-    },
-    /// Too many recorded sequences end as unknown at every threshold.
-    #[error(
-        "of {of_each} recorded sequences of each object {} end as unknown at the strictest threshold, where a false alarm rate of \
-         {} % allows {allowed}",
-        unknown.iter().map(|(object, count)| format!("{count} of {object}")).collect::<Vec<_>>().join(", "),
-        percent(*share)
-    )]
-    RecordedUnknown {
-        /// Sequences of each object.
-        of_each: usize,
-        /// Objects of which some end as unknown, and how many.
-        unknown: Vec<(String, usize)>,
-        /// The share of false alarms that so many sequences support.
-        share: f64,
-        /// Sequences of all objects together that may end as unknown.
-        allowed: u64,
     },
     /// The model works on other rows than touches.
     #[error("the model works on rows of features, not on touches")]
@@ -190,26 +156,6 @@ pub enum EvaluateProblem {
     },
 }
 
-/// Recordings that are likely to be enough for a false alarm rate, by simulated sequences.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct EnoughRecorded {
-    /// Touches that are evidence of a simulated sequence, on average.
-    pub touches: f64,
-    /// Approaches to the object that make one sequence.
-    pub one: f64,
-    /// The share of false alarms that one sequence of each object supports.
-    pub share_of_one: f64,
-    /// Approaches to the object that the promised share takes.
-    pub promised: f64,
-    /// The promised share.
-    pub share: f64,
-}
-
-/// A share in percent, without digits that say nothing.
-fn percent(share: f64) -> f64 {
-    (share * 1e4).round() / 1e2
-}
-
 fn too_few_for_alarms(object: &str, object_sequences: usize, needed: u64) -> String {
     if (object_sequences as u64) < needed {
         format!(
@@ -242,20 +188,6 @@ impl Problem for EvaluateProblem {
             Self::NoProbabilities { is_loaded: true } => "Compile its estimator again.",
             Self::NoProbabilities { is_loaded: false } => "Use `predict` or `margins`.",
             Self::TooFewForMisfit { .. } | Self::TooFewForAlarms { .. } => "Capture more touches of every object.",
-            Self::TooFewRecorded { object, enough: Some(enough), .. } => {
-                return format!(
-                    "Record about {} approaches to {object}: one sequence of each object supports a false alarm rate of {} %, and {} % \
-                     takes about {} approaches to it. Or calibrate on simulated touches alone.",
-                    two_digits(enough.one),
-                    percent(enough.share_of_one),
-                    percent(enough.share),
-                    two_digits(enough.promised)
-                );
-            }
-            Self::TooFewRecorded { .. } => "Record more approaches to it, or calibrate on simulated touches alone.",
-            Self::RecordedUnknown { .. } => {
-                "Fit the probe to the recordings (`palpate probe fit`) and check the meshes, or calibrate on simulated touches alone."
-            }
             Self::OverTouches => "Use `palpate verify` and `palpate evaluate` for models of touches.",
             Self::RawFeatures => {
                 "Give it rows of features: `palpate help recognize` and `palpate help evaluate` say how."

@@ -4,7 +4,6 @@ use super::{EARLY, FIRST, HALVED_AFTER, NAT, Pools};
 use crate::evaluate::leading;
 use crate::random::{self, Purpose};
 use palpate_onboard::{Model, Stopping};
-use palpate_shared::format::MisfitTerms;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
@@ -15,32 +14,6 @@ pub(super) enum Ending {
     Touches(u32),
     /// At a name that a threshold of misfit at this level, in nats, would let be given; at the limit of touches at the latest.
     Named { level: f64 },
-}
-
-/// Rules for following sequences.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Policy {
-    pub(super) ending: Ending,
-    /// Touches from which on names are given.
-    pub(super) least: u32,
-}
-
-impl Policy {
-    /// The rules of a calibrated test, and the end of a sequence under it.
-    pub(super) fn of(terms: &MisfitTerms) -> (Self, impl Fn(&Sequence) -> End + use<>) {
-        let [threshold, doubt] = [terms.threshold, terms.doubt].map(|limit| f64::from(limit) / NAT);
-        let least = terms.least;
-        let policy = Self { ending: Ending::Named { level: doubt }, least };
-        (policy, move |sequence| sequence.end(threshold, doubt, least))
-    }
-
-    /// The number of touches that all sequences have; without meaning where they end at a name.
-    pub(super) fn last(&self) -> u32 {
-        match self.ending {
-            Ending::Touches(touches) => touches,
-            Ending::Named { .. } => u32::MAX,
-        }
-    }
 }
 
 /// State after a touch.
@@ -64,22 +37,17 @@ pub(super) struct End {
 }
 
 impl Sequence {
-    /// Its end with these limits of misfit and names from `least` touches on.
-    pub(super) fn end(&self, threshold: f64, doubt: f64, least: u32) -> End {
+    /// Its end with this limit of misfit.
+    pub(super) fn end(&self, threshold: f64) -> End {
         for (state, touches) in self.0.iter().zip(1_u64..) {
             if state.level > threshold {
                 return End { is_alarm: true, touches };
             }
-            if touches >= u64::from(least) && state.is_decided && state.level <= doubt {
+            if touches >= u64::from(FIRST) && state.is_decided {
                 return End { is_alarm: false, touches };
             }
         }
         End { is_alarm: false, touches: self.0.len() as u64 }
-    }
-
-    /// Number of its touches.
-    pub(super) fn touches(&self) -> usize {
-        self.0.len()
     }
 
     /// The touches after which it ends without a test.
@@ -106,13 +74,13 @@ pub(super) fn early(touches: u32) -> f64 {
 /// Follows as many sequences of each object as its touches allow, each touch in one only, at most `most` of all
 /// together: of each pool as many, in turn. A sequence that the touches end in is left out; one that a robot's touches end
 /// in ends there.
-pub(super) fn sequences(model: &Model<'_>, supplies: &[Pools], policy: &Policy, most: usize) -> Vec<Vec<Sequence>> {
+pub(super) fn sequences(model: &Model<'_>, supplies: &[Pools], ending: Ending, most: usize) -> Vec<Vec<Sequence>> {
     let objects = model.object_count();
     let of_each = most.div_ceil(supplies.len().max(1));
     // Where several outputs belong to one object, it is the object that is named.
     let numbers: Option<Vec<u8>> = model.outputs().map(|outputs| outputs.objects().collect());
     let numbers = numbers.as_deref();
-    let limit = match policy.ending {
+    let limit = match ending {
         Ending::Touches(touches) => touches,
         Ending::Named { .. } => Stopping::from_model(model).max_touches(),
     };
@@ -121,7 +89,7 @@ pub(super) fn sequences(model: &Model<'_>, supplies: &[Pools], policy: &Policy, 
         if supply.is_once {
             let once = supply.pools.iter().take(of_each).map(|rows| {
                 let mut states = Vec::new();
-                one(model, numbers, &mut rows.chunks_exact(objects), (policy, limit), &mut states);
+                one(model, numbers, &mut rows.chunks_exact(objects), (ending, limit), &mut states);
                 Sequence(states)
             });
             return once.filter(|sequence| !sequence.0.is_empty()).collect();
@@ -130,7 +98,7 @@ pub(super) fn sequences(model: &Model<'_>, supplies: &[Pools], policy: &Policy, 
         while all.len() < of_each && !pools.is_empty() {
             let next = all.len() % pools.len();
             let mut states = Vec::new();
-            if !one(model, numbers, &mut pools[next], (policy, limit), &mut states) {
+            if !one(model, numbers, &mut pools[next], (ending, limit), &mut states) {
                 break;
             }
             all.push(Sequence(states));
@@ -145,7 +113,7 @@ fn one<'r>(
     model: &Model<'_>,
     numbers: Option<&[u8]>,
     rows: &mut impl Iterator<Item = &'r [i32]>,
-    (policy, limit): (&Policy, u32),
+    (ending, limit): (Ending, u32),
     states: &mut Vec<State>,
 ) -> bool {
     let mut evidence: Vec<i64> = (0..model.object_count()).map(|object| model.prior(object).into()).collect();
@@ -156,8 +124,8 @@ fn one<'r>(
         let level = misfit.map_or(f64::NEG_INFINITY, |misfit| misfit as f64 / NAT - early(touches));
         let state = State { level, is_decided: is_decided(model, numbers, &evidence, touches) };
         states.push(state);
-        match policy.ending {
-            Ending::Named { level } if touches >= policy.least && state.is_decided && state.level <= level => break,
+        match ending {
+            Ending::Named { level } if touches >= FIRST && state.is_decided && state.level <= level => break,
             _ => {}
         }
     }

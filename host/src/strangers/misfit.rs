@@ -1,7 +1,6 @@
 //! Expected evidence of touches of each object, and the distance of evidence from it.
 
-use super::follow::early;
-use super::{FIRST, Pools};
+use super::Pools;
 use nalgebra::{DMatrix, DVector};
 use palpate_shared::format::MisfitTest;
 use rayon::prelude::*;
@@ -41,16 +40,8 @@ pub(super) struct Misfit {
 }
 
 impl Moments {
-    /// A misfit from rows of margins in units, for each known object, and of recorded ones where there are some: recorded touches
-    /// take the place of another instance. `shapes` are mean rows.
-    pub(super) fn new(
-        supplies: &[Pools],
-        recorded: Option<&[Pools]>,
-        shapes: &[Vec<f64>],
-        known: usize,
-        objects: usize,
-        unit: f64,
-    ) -> Self {
+    /// A misfit from rows of margins in units, for each known object. `shapes` are mean rows.
+    pub(super) fn new(supplies: &[Pools], shapes: &[Vec<f64>], known: usize, objects: usize, unit: f64) -> Self {
         let of_rows = |rows: &Vec<i32>| {
             let count = (rows.len() / objects).max(1) as f64;
             let mut mean = DVector::zeros(objects);
@@ -64,13 +55,12 @@ impl Moments {
             }
             (mean, covariance)
         };
-        let of = supplies.par_iter().enumerate().map(|(object, supply)| {
+        let of = supplies.par_iter().map(|supply| {
             if supply.is_short {
                 return of_short(&supply.pools, objects, unit);
             }
-            let recorded = recorded.and_then(|recorded| recorded.get(object)).map(|supply| supply.pools.concat());
             let pools: Vec<(DVector<f64>, DMatrix<f64>)> =
-                supply.pools.iter().chain(&recorded).filter(|rows| !rows.is_empty()).map(of_rows).collect();
+                supply.pools.iter().filter(|rows| !rows.is_empty()).map(of_rows).collect();
             let share = 1.0 / pools.len().max(1) as f64;
             let (mut mean, mut covariance) = (DVector::zeros(objects), DMatrix::zeros(objects, objects));
             for (own_mean, own_covariance) in &pools {
@@ -87,11 +77,10 @@ impl Moments {
         Self { of: of.collect(), shapes: shapes.collect(), known, objects }
     }
 
-    /// The misfit of an object as if the model did not have the column `without`; none if its touches are too few or too
-    /// much alike to have a covariance.
-    fn misfit(&self, leader: usize, without: Option<usize>) -> Option<Misfit> {
+    /// The misfit of an object; none if its touches are too few or too much alike to have a covariance.
+    fn misfit(&self, leader: usize) -> Option<Misfit> {
         let (mean, covariance) = self.of.get(leader)?;
-        let rivals = self.rivals(leader, without);
+        let rivals = self.rivals(leader);
         let count = rivals.len();
         let against = |row: &DVector<f64>| DVector::from_iterator(count, rivals.iter().map(|&r| row[r] - row[leader]));
         let own = covariance[(leader, leader)];
@@ -104,10 +93,7 @@ impl Moments {
         (0..count).for_each(|index| spread[(index, index)] += floor);
         let expected = against(mean);
 
-        let named = |row: &DVector<f64>| {
-            let others = (0..self.known).filter(|object| Some(*object) != without);
-            others.map(|object| row[object]).fold(f64::NEG_INFINITY, f64::max)
-        };
+        let named = |row: &DVector<f64>| (0..self.known).map(|object| row[object]).fold(f64::NEG_INFINITY, f64::max);
         let weigh = |row: &DVector<f64>| ((row[leader] - named(row)) / NEAR).exp();
         let total: f64 = self.shapes.iter().map(weigh).sum();
         let (mut shift, mut between) = (DVector::zeros(count), &spread * WITHOUT_SHAPES);
@@ -138,9 +124,8 @@ impl Moments {
     }
 
     /// The rivals of an object: all others, or those whose evidence is nearest to its own; the background always.
-    fn rivals(&self, leader: usize, without: Option<usize>) -> Vec<usize> {
-        let mut rivals: Vec<usize> =
-            (0..self.objects).filter(|&other| other != leader && Some(other) != without).collect();
+    fn rivals(&self, leader: usize) -> Vec<usize> {
+        let mut rivals: Vec<usize> = (0..self.objects).filter(|&other| other != leader).collect();
         if rivals.len() > MisfitTest::MOST_RIVALS {
             let mean = &self.of[leader].0;
             let ahead = |&rival: &usize| if rival >= self.known { f64::INFINITY } else { mean[rival] };
@@ -185,51 +170,7 @@ fn of_short(pools: &[Vec<i32>], objects: usize, unit: f64) -> (DVector<f64>, DMa
 }
 
 /// The misfit of every known object; none if one has none.
-pub(super) fn misfits(moments: &Moments, without: Option<usize>) -> Option<Vec<Misfit>> {
-    let misfits: Option<Vec<Misfit>> =
-        (0..moments.known).map(|object| moments.misfit(object, without.filter(|other| *other != object))).collect();
+pub(super) fn misfits(moments: &Moments) -> Option<Vec<Misfit>> {
+    let misfits: Option<Vec<Misfit>> = (0..moments.known).map(|object| moments.misfit(object)).collect();
     misfits.filter(|misfits| misfits.iter().all(|misfit| !misfit.rivals.is_empty()))
-}
-
-impl Misfit {
-    /// The misfit of the evidence of `touches` touches, in nats.
-    pub(super) fn of(&self, evidence: &[f64], leader: usize, touches: u32) -> f64 {
-        let count = f64::from(touches);
-        let against =
-            self.rivals.iter().zip(self.mean.iter()).map(|(&r, mean)| evidence[r] - evidence[leader] - count * mean);
-        let against = DVector::from_iterator(self.rivals.len(), against);
-        (&self.weights * &against).norm_squared() / count + self.slope.dot(&against) - count * self.constant
-    }
-}
-
-/// For each known object, and each number of touches up to `last`, the share of its sequences that are detected when
-/// the model does not use its column: at a level of misfit of `threshold`.
-pub(super) fn left_out(moments: &Moments, supplies: &[Pools], threshold: f64, unit: f64, last: u32) -> Vec<Vec<f64>> {
-    let of = |stranger: usize| {
-        let objects = moments.objects;
-        // With two objects, none is left that could be told from the other.
-        let Some(misfits) = misfits(moments, Some(stranger)) else { return vec![0.0; last as usize] };
-        let mut found = vec![0_usize; last as usize];
-        let pools = supplies[stranger].pools.iter();
-        let sequences: Vec<&[i32]> = pools.flat_map(|rows| rows.chunks_exact(objects * last as usize)).collect();
-        let count = sequences.len();
-        for sequence in sequences {
-            let mut evidence = vec![0.0; objects];
-            for (touches, row) in (1..=last).zip(sequence.chunks_exact(objects)) {
-                evidence.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += f64::from(margin) * unit);
-                let known = (0..moments.known).filter(|&object| object != stranger);
-                let Some(leader) =
-                    known.reduce(|best, other| if evidence[other] > evidence[best] { other } else { best })
-                else {
-                    break;
-                };
-                if touches >= FIRST && misfits[leader].of(&evidence, leader, touches) - early(touches) > threshold {
-                    found.iter_mut().skip(touches as usize - 1).for_each(|found| *found += 1);
-                    break;
-                }
-            }
-        }
-        found.into_iter().map(|found| found as f64 / count.max(1) as f64).collect()
-    };
-    (0..moments.known).into_par_iter().map(of).collect()
 }

@@ -7,21 +7,17 @@
 //!                       └─ the rest ───► sequences (follow) ──► its threshold, by Learn-then-Test
 //! ```
 //!
-//! If there are recordings, one half of them is like another instance of the simulated objects, and the other half tests the
-//! threshold too ([`calibrate_recorded`]).
-//!
 //! The misfit of n touches is half of the log-likelihood ratio of two normal distributions of the mean evidence: that of
 //! other shapes, N(μ + s, B + C/n), and that of the leading object's touches, N(μ, C/n). The first is learned on shapes of
 //! no kind, each weighted by how nearly the object leads it. B + C/n is taken at n = 40 for all n, so that one matrix for
 //! each object does; measured, that detects as many strangers as the exact ratio.
 //!
-//! `calibrate --strangers` says how many strangers a test detects, and how many known objects it calls unknown.
+//! `calibrate --strangers` says how many known objects a test calls unknown, and `evaluate --unknown` how many strangers it detects.
 
 mod fixed;
 mod follow;
 mod misfit;
 mod promised;
-mod recorded;
 #[cfg(feature = "objects")]
 mod shapes;
 #[cfg(test)]
@@ -31,20 +27,18 @@ pub use promised::calibrate_with_promise;
 #[cfg(feature = "objects")]
 pub use shapes::captured;
 
-use crate::calibrate::{Found, OnRecordings, allowed, needed};
+use crate::calibrate::{Found, allowed, needed};
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, EvaluateProblem, Result};
 use crate::evaluate::together::margins_of_touches;
 use crate::evaluate::{Candidate, OfTouches};
 use crate::touches::{Dataset, ObjectTouches, Pool};
-use follow::{Policy, Sequence};
+use follow::{Ending, Sequence};
 use misfit::Moments;
 use palpate_onboard::{Model, Refused};
 use palpate_shared::Touch;
 use palpate_shared::format::{Held, MisfitTerms, Strangers, Tag};
 use rayon::prelude::*;
-pub(crate) use recorded::OfRecorded;
-use std::collections::BTreeMap;
 
 /// Touches from which on a test is made.
 const FIRST: u32 = 5;
@@ -52,11 +46,10 @@ const FIRST: u32 = 5;
 /// Measured to detect most strangers after 60 and 120 touches.
 const EARLY: f64 = 12.0;
 const HALVED_AFTER: f64 = 21.0;
-/// With [`Held::Certain`] no name is given whose misfit is not this far below the threshold, in nats.
-const DOUBT: f64 = 8.0;
-/// The share of strangers that must have been detected before a name is given, and the most touches to wait for it.
-const FOUND_OUT: f64 = 0.8;
-const MOST_HELD: u32 = 120;
+/// Touches of sequences that give a first guess of the threshold.
+const ROUGH: u32 = 120;
+/// Distance below that guess, which was found without any name being given, from which on thresholds are tried, in nats.
+const BELOW: f64 = 6.0;
 /// Between two thresholds that are tried, in nats, and how many are.
 const STEP: f64 = 0.05;
 const STEPS: usize = 400;
@@ -69,8 +62,6 @@ const NAT: f64 = 65_536.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Settings {
-    /// Rule for holding names back.
-    pub held: Held,
     /// The share of known objects' sequences that may end as unknown.
     pub alarms: f64,
     /// The confidence that the share is kept.
@@ -83,7 +74,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { held: Held::Likely, alarms: 0.02, confidence: 0.95, sequences: 100_000, seed: 1 }
+        Self { alarms: 0.02, confidence: 0.95, sequences: 100_000, seed: 1 }
     }
 }
 
@@ -100,11 +91,6 @@ pub struct Tested {
     pub mean_touches: f64,
     /// Touches used on average without a test.
     pub mean_touches_without: f64,
-    /// For each known object the share of its sequences that are detected after 30, 60 and 120 touches when the model
-    /// does not use its column: an estimate of what happens to strangers.
-    pub left_out: BTreeMap<String, BTreeMap<u32, f64>>,
-    /// Results of recorded sequences, where there are recordings.
-    pub recorded: Option<OnRecordings>,
 }
 
 impl Tested {
@@ -112,15 +98,11 @@ impl Tested {
     pub fn found(&self, settings: &Settings) -> Found {
         let terms = &self.terms;
         Found {
-            held: settings.held.name(),
-            promised: self.recorded.as_ref().map_or(settings.alarms, |recorded| recorded.supported),
+            promised: settings.alarms,
             false_alarms: self.alarms as f64 / f64::from(terms.sequences.max(1)),
             sequences: terms.sequences,
-            least_touches: terms.least,
             mean_touches: self.mean_touches,
             mean_touches_without: self.mean_touches_without,
-            left_out: self.left_out.clone(),
-            recorded: self.recorded.clone(),
         }
     }
 }
@@ -171,48 +153,14 @@ pub fn calibrate(
     shapes: &[ObjectTouches],
     settings: &Settings,
 ) -> Result<Tested> {
-    calibrate_on(model, dataset, None, shapes, settings)
-}
-
-/// Like [`calibrate`], with `recorded` touches of every object: half of them say, beside the simulated ones of `dataset`, what touches
-/// of each object give, and the other half tests the threshold too. The stricter threshold of both is taken. Where the
-/// recordings are too few for the share of `settings`, the share that the model states is the one that they support.
-///
-/// # Errors
-/// Errors of [`calibrate`].
-pub fn calibrate_recorded(
-    model: &Model<'_>,
-    dataset: &Dataset,
-    recorded: &Dataset,
-    shapes: &[ObjectTouches],
-    settings: &Settings,
-) -> Result<Tested> {
-    let simulated = calibrate(model, dataset, shapes, settings)?;
-    let before = recorded::alarms(&compile::open(&simulated.bytes)?, recorded, settings)?;
-    let mut calibrated = calibrate_on(model, dataset, Some(recorded), shapes, settings)?;
-    calibrated.recorded.iter_mut().for_each(|found| found.before = before.clone());
-    Ok(calibrated)
-}
-
-fn calibrate_on(
-    model: &Model<'_>,
-    dataset: &Dataset,
-    recorded: Option<&Dataset>,
-    shapes: &[ObjectTouches],
-    settings: &Settings,
-) -> Result<Tested> {
     check(settings)?;
-    let given = supplies(model, dataset, settings.seed)?;
-    let recorded = recorded.map(|recorded| recorded::supplies(model, recorded, settings.seed)).transpose()?;
-    calibrate_supplies(model, given, recorded, &of_shapes(model, shapes), settings)
+    calibrate_supplies(model, supplies(model, dataset, settings.seed)?, &of_shapes(model, shapes), settings)
 }
 
-/// Like [`calibrate`], from margins: of each known object, recorded ones too if there are some, and the mean ones of other
-/// shapes.
+/// Like [`calibrate`], from margins: of each known object, and the mean ones of other shapes.
 pub(crate) fn calibrate_supplies(
     model: &Model<'_>,
     given: Vec<Pools>,
-    recorded: Option<Vec<OfRecorded>>,
     shapes: &[Vec<f64>],
     settings: &Settings,
 ) -> Result<Tested> {
@@ -221,36 +169,27 @@ pub(crate) fn calibrate_supplies(
     let unit = f64::from(model.unit());
     let (learn, test) = learned_and_tested(given, objects);
     let known = model.known_count();
-    let (recorded_learn, recorded_test) = recorded.map(|all| recorded::halves(all, objects)).unzip();
-    let recorded_learn = recorded_learn.map(|learn| recorded::by_output(learn, known, objects));
-    let moments = Moments::new(&learn, recorded_learn.as_deref(), shapes, known, objects, unit);
-    let misfits = misfit::misfits(&moments, None)
-        .ok_or(EvaluateProblem::TooFewForMisfit { found: learn_count(&learn, objects) })?;
-    let terms = |threshold: f64, least: u32| terms(settings, &misfits, threshold, least);
+    let moments = Moments::new(&learn, shapes, known, objects, unit);
+    let misfits =
+        misfit::misfits(&moments).ok_or(EvaluateProblem::TooFewForMisfit { found: learn_count(&learn, objects) })?;
+    let terms = |threshold: f64| terms(settings, &misfits, threshold);
     // Levels of misfit do not depend on any threshold.
-    let untested = stated(model, &terms(0.0, FIRST), &misfits)?;
+    let untested = stated(model, &terms(0.0), &misfits)?;
     let untested = compile::open(&untested)?;
-    let follow = |of: &[Pools], policy: &Policy| follow::sequences(&untested, of, policy, settings.sequences);
+    let follow = |of: &[Pools], ending: Ending| follow::sequences(&untested, of, ending, settings.sequences);
 
-    let free = Policy { ending: follow::Ending::Touches(MOST_HELD.min(model.header().max_touches())), least: FIRST };
     let is_short = learn.iter().any(|supply| supply.is_short);
-    let rough = follow::quantile(&counted(&follow(&learn, &free), is_short), 1.0 - settings.alarms);
-    let left_out = misfit::left_out(&moments, &learn, rough, unit, free.last());
-    let least = match settings.held {
-        Held::Likely => FIRST,
-        Held::Certain => found_out(&left_out).min(free.last()).max(FIRST),
-    };
-    let loosest = rough - below(settings.held);
-    let to_the_end = Policy { ending: follow::Ending::Touches(model.header().max_touches()), least: FIRST };
-    let strictest = strictest(is_short.then(|| follow(&learn, &to_the_end)), settings, loosest);
-    let policy = Policy { ending: follow::Ending::Named { level: loosest - doubt(settings.held) }, least };
-    let sequences = follow(&test, &policy);
+    let free = follow(&learn, Ending::Touches(ROUGH.min(model.header().max_touches())));
+    let loosest = follow::quantile(&counted(&free, is_short), 1.0 - settings.alarms) - BELOW;
+    let to_the_end = Ending::Touches(model.header().max_touches());
+    let strictest = strictest(is_short.then(|| follow(&learn, to_the_end)), settings, loosest);
+    let sequences = follow(&test, Ending::Named { level: loosest });
     let all = counted(&sequences, is_short);
-    let tried = Tried { loosest, strictest, least, gap: doubt(settings.held) };
-    let names = compile::names(model);
-    let simulated = tried.threshold(&all, settings.alarms, settings.confidence).ok_or_else(|| {
+    let tried = Tried { loosest, strictest };
+    let threshold = tried.threshold(&all, settings.alarms, settings.confidence).ok_or_else(|| {
         let objects = if is_short { 1 } else { known.max(1) };
         let needed = needed(settings.alarms, settings.confidence).div_ceil(objects as u64);
+        let names = compile::names(model);
         let fewest = (0..sequences.len()).min_by_key(|&object| sequences[object].len());
         EvaluateProblem::TooFewForAlarms {
             object: fewest.and_then(|object| names.get(object).cloned()).unwrap_or_default(),
@@ -258,38 +197,16 @@ pub(crate) fn calibrate_supplies(
             needed,
         }
     })?;
-    let on_recordings = match &recorded_test {
-        Some(test) => {
-            let followed = |own: &OfRecorded| follow(std::slice::from_ref(&own.supply), &policy).pop();
-            let followed: Vec<Vec<Sequence>> = test.par_iter().map(followed).map(Option::unwrap_or_default).collect();
-            Some(recorded::tested((test, &followed), &sequences, (&tried, simulated), settings)?)
-        }
-        None => None,
-    };
-    let threshold = on_recordings.as_ref().map_or(simulated, |(threshold, _)| *threshold);
-    let found = on_recordings.map(|(_, found)| found);
     let [alarms, touches] = tried.ends(&all, threshold);
-    let count = found.as_ref().map_or(all.len(), |found| found.sequences);
-    let terms = MisfitTerms {
-        sequences: u32::try_from(count).unwrap_or(u32::MAX),
-        alarms: millionths(found.as_ref().map_or(settings.alarms, |found| found.supported)),
-        ..terms(threshold, least)
-    };
+    let terms = MisfitTerms { sequences: u32::try_from(all.len()).unwrap_or(u32::MAX), ..terms(threshold) };
     let bytes = stated(model, &terms, &misfits)?;
-    let at = |path: &[f64], touches: u32| path.get(touches as usize - 1).or(path.last()).copied().unwrap_or(0.0);
     let mean = |touches: u64| touches as f64 / all.len().max(1) as f64;
     Ok(Tested {
         bytes,
         terms,
-        alarms: found.as_ref().map_or(alarms as usize, |found| found.alarms),
+        alarms: alarms as usize,
         mean_touches: mean(touches),
         mean_touches_without: mean(all.iter().map(|sequence| u64::from(sequence.decided_after())).sum()),
-        left_out: names
-            .into_iter()
-            .zip(&left_out)
-            .map(|(name, path)| (name, [30, 60, 120].map(|touches| (touches, at(path, touches))).into()))
-            .collect(),
-        recorded: found,
     })
 }
 
@@ -335,13 +252,13 @@ fn learned_and_tested(supplies: Vec<Pools>, objects: usize) -> (Vec<Pools>, Vec<
 fn tested_means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<[f64; 2]> {
     let (_, test) = learned_and_tested(supplies(model, dataset, settings.seed)?, model.object_count());
     let Some(misfit_test) = model.strangers().and_then(|strangers| strangers.test) else { return Ok([0.0; 2]) };
-    let (policy, end) = Policy::of(&misfit_test.terms);
-    let sequences = follow::sequences(model, &test, &policy, settings.sequences);
+    let threshold = f64::from(misfit_test.terms.threshold) / NAT;
+    let sequences = follow::sequences(model, &test, Ending::Named { level: threshold }, settings.sequences);
     let all = equally_many(&sequences);
     let mean = |touches: &dyn Fn(&Sequence) -> u64| {
         all.iter().map(|sequence| touches(sequence)).sum::<u64>() as f64 / all.len().max(1) as f64
     };
-    let with = mean(&|sequence| end(sequence).touches);
+    let with = mean(&|sequence| sequence.end(threshold).touches);
     Ok([with, mean(&|sequence| sequence.decided_after().into())])
 }
 
@@ -416,31 +333,16 @@ fn of_shapes(model: &Model<'_>, shapes: &[ObjectTouches]) -> Vec<Vec<f64>> {
     of.filter(|touches| touches.len() >= 20).map(mean).collect()
 }
 
-/// Amount by which a misfit must be below the threshold for a name, in nats.
-fn doubt(held: Held) -> f64 {
-    match held {
-        Held::Likely => 0.0,
-        Held::Certain => DOUBT,
-    }
-}
-
-/// Distance below a first guess, which was found without any name being given, to which thresholds are tried, in nats.
-fn below(held: Held) -> f64 {
-    match held {
-        Held::Likely => 6.0,
-        Held::Certain => 2.0,
-    }
-}
-
-fn terms(settings: &Settings, misfits: &[misfit::Misfit], threshold: f64, least: u32) -> MisfitTerms {
+fn terms(settings: &Settings, misfits: &[misfit::Misfit], threshold: f64) -> MisfitTerms {
+    let limit = (threshold * NAT).round() as i32;
     MisfitTerms {
-        held: settings.held,
+        held: Held::Likely,
         rivals: misfits.first().map_or(0, |misfit| misfit.rivals.len() as u8),
         first: FIRST,
-        least,
-        threshold: (threshold * NAT).round() as i32,
+        least: FIRST,
+        threshold: limit,
         early: (EARLY * NAT).round() as u32,
-        doubt: ((threshold - doubt(settings.held)) * NAT).round() as i32,
+        doubt: limit,
         halving: (4_294_967_296.0 / HALVED_AFTER).round() as u32,
         alarms: millionths(settings.alarms),
         sequences: 0,
@@ -457,16 +359,6 @@ fn stated(model: &Model<'_>, terms: &MisfitTerms, misfits: &[misfit::Misfit]) ->
     restate(model, &Restated { sections, ..Restated::default() })
 }
 
-/// The touches after which four of five sequences of left-out objects are detected.
-fn found_out(left_out: &[Vec<f64>]) -> u32 {
-    let longest = left_out.iter().map(Vec::len).max().unwrap_or(0);
-    let mean = |touches: usize| {
-        let shares = left_out.iter().map(|path| path.get(touches).or(path.last()).copied().unwrap_or(0.0));
-        shares.sum::<f64>() / left_out.len().max(1) as f64
-    };
-    (0..longest).position(|touches| mean(touches) >= FOUND_OUT).map_or(MOST_HELD, |touches| touches as u32 + 1)
-}
-
 /// The threshold from which looser ones are tested. Rows of a sequence that depend on each other make a misfit that goes on
 /// growing: then where those that were learned from have half as many false alarms as are allowed, if that is beyond.
 fn strictest(learned: Option<Vec<Vec<Sequence>>>, settings: &Settings, loosest: f64) -> f64 {
@@ -479,15 +371,12 @@ fn strictest(learned: Option<Vec<Vec<Sequence>>>, settings: &Settings, loosest: 
 struct Tried {
     loosest: f64,
     strictest: f64,
-    least: u32,
-    /// By how much a misfit must be below the threshold for a name, in nats.
-    gap: f64,
 }
 
 impl Tried {
     /// False alarms of sequences at a threshold, and their touches.
     fn ends(&self, sequences: &[&Sequence], threshold: f64) -> [u64; 2] {
-        let ends = sequences.par_iter().map(|sequence| sequence.end(threshold, threshold - self.gap, self.least));
+        let ends = sequences.par_iter().map(|sequence| sequence.end(threshold));
         ends.map(|end| [u64::from(end.is_alarm), end.touches]).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
     }
 

@@ -17,7 +17,7 @@
 //! It ends where the same calibration without the test ends, on all touches; then every sequence that gets a name has one
 //! without the test too.
 
-use super::{Settings, Tested, calibrate, calibrate_recorded, tested_means, without};
+use super::{Settings, Tested, calibrate, tested_means, without};
 use crate::calibrate::{self, Start, add_noise, begin, calibrate_from, odds_of};
 use crate::compile::{self, Restated, restate};
 use crate::error::{CalibrateProblem, Result};
@@ -35,15 +35,13 @@ const BEGUN: f64 = 0.25;
 
 /// Gives a model a misfit test, or replaces the one that it has, and thresholds that keep a promised error rate with that
 /// test: a sequence that ends as unknown is one without a name, and a name is given when the test lets it be. `promise.noise`
-/// is added to touches and shapes. Each of the two shares is kept with its own confidence. `recorded` touches calibrate the test,
-/// as [`calibrate_recorded`] says; the error rate is promised for the simulated ones all the same.
+/// is added to touches and shapes. Each of the two shares is kept with its own confidence.
 ///
 /// # Errors
 /// Errors of [`strangers::calibrate`](fn@super::calibrate) and [`calibrate::calibrate`](fn@crate::calibrate::calibrate).
 pub fn calibrate_with_promise(
     model: &Model<'_>,
     dataset: &Dataset,
-    recorded: Option<&Dataset>,
     shapes: &[ObjectTouches],
     settings: &Settings,
     promise: &calibrate::Settings,
@@ -75,10 +73,7 @@ pub fn calibrate_with_promise(
     let shapes: Vec<ObjectTouches> =
         if promise.noise.is_none() { shapes.to_vec() } else { shapes.iter().map(noisy).collect() };
     let begun = compile::open(&begun)?;
-    let tested = match recorded {
-        Some(recorded) => calibrate_recorded(&begun, &learned, recorded, &shapes, settings)?,
-        None => calibrate(&begun, &learned, &shapes, settings)?,
-    };
+    let tested = calibrate(&begun, &learned, &shapes, settings)?;
     let start = Start { margin: strictest, loosest: without.map(|without| without.odds) };
     let promised = calibrate_from(&compile::open(&tested.bytes)?, halves.test, promise, Some(start), progress);
     let promised = promised.map_err(|error| {

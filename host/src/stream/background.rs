@@ -53,7 +53,7 @@ pub(super) fn test<'s>(
             .collect()
     };
     let shapes: Vec<Vec<f64>> = wanted.background.iter().filter(|margins| !margins.is_empty()).map(mean).collect();
-    let tested = strangers::calibrate_supplies(&begun, supplies, None, &shapes, &wanted.settings);
+    let tested = strangers::calibrate_supplies(&begun, supplies, &shapes, &wanted.settings);
     let tested = tested.map_err(|error| problem(error, &parts, &wanted.settings))?;
     let found = tested.found(&wanted.settings);
     Ok((tested.bytes, parts, found))

@@ -156,13 +156,13 @@ fn calibrate_parts(model: &Model<'_>, rows: &Rows<'_>, parts: Parts<'_>, setting
         let model = compile::open(&shaped)?;
         let loosest = without.as_ref().map(|without| &without.odds);
         let chosen = followed.choose(&model, &parts, &[begin.loosest], loosest);
-        let chosen = chosen.map_err(|stop| parts.problem(stop, &names, settings, found.least_touches))?;
+        let chosen = chosen.map_err(|stop| parts.problem(stop, &names, settings))?;
         let calibrated = finished(&model, &chosen, &parts, settings, max_rows, &fitted)?;
         return Ok(Calibrated { strangers: Some(found), ..calibrated });
     }
     let model = compile::open(&shaped)?;
     let chosen = followed.choose(&model, &parts, &begin.starts, None);
-    let chosen = chosen.map_err(|stop| parts.problem(stop, &names, settings, 0))?;
+    let chosen = chosen.map_err(|stop| parts.problem(stop, &names, settings))?;
     finished(&model, &chosen, &parts, settings, max_rows, &fitted)
 }
 

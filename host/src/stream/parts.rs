@@ -133,11 +133,11 @@ impl<'s> Parts<'s> {
         let digit = 10.0_f64.powf(possible.log10().floor() - 1.0);
         let possible = Some((possible / digit).ceil() * digit).filter(|rate| *rate < 0.5);
         let found = found as u64;
-        CalibrateProblem::TooFewSequences { found, needed, rate, possible, groups, object, names_in: None, held: None }
+        CalibrateProblem::TooFewSequences { found, needed, rate, possible, groups, object, names_in: None }
     }
 
-    /// The problem that a walk ended with; `least` is the row before which no name is given.
-    pub(super) fn problem(&self, stop: Stop, names: &[String], settings: &Settings, least: u32) -> CalibrateProblem {
+    /// The problem that a walk ended with.
+    pub(super) fn problem(&self, stop: Stop, names: &[String], settings: &Settings) -> CalibrateProblem {
         let of = |position: usize| (settings.per != Per::Average).then(|| names.get(position).cloned()).flatten();
         // Thresholds by name are learned on some of them.
         let share = if self.has_groups { 1.0 } else { share_tested(settings.per) };
@@ -146,10 +146,8 @@ impl<'s> Parts<'s> {
             Stop::TooFew { position, found, needed } => {
                 let count = usize::try_from(found).unwrap_or(usize::MAX);
                 let mut problem = Self::too_few(count, needed, self.has_groups, of(position), settings);
-                let longest = self.tested.iter().map(|sequence| sequence.rows.len()).max().unwrap_or(0) as u64;
-                if let CalibrateProblem::TooFewSequences { names_in, held, .. } = &mut problem {
+                if let CalibrateProblem::TooFewSequences { names_in, .. } = &mut problem {
                     *names_in = Some(units);
-                    *held = (longest < u64::from(least)).then(|| [u64::from(least), longest]);
                 }
                 problem
             }

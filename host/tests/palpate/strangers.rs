@@ -7,7 +7,7 @@ use palpate::ensemble::{self};
 use palpate::error::Result;
 use palpate::evaluate::parity::parity;
 use palpate::evaluate::{Evaluated, Wanted, measure};
-use palpate::strangers::{Settings, Tested, calibrate, calibrate_recorded, calibrate_with_promise, without};
+use palpate::strangers::{Settings, Tested, calibrate, calibrate_with_promise, without};
 
 /// Object k bends up to 80 ms · (k + 1). Three are known; objects 5 and 9 are not.
 const KNOWN: usize = 3;
@@ -33,10 +33,10 @@ fn shapes() -> Vec<ObjectTouches> {
     of(4..9, 400, 7).objects
 }
 
-fn calibrated(bytes: &[u8], held: Held) -> Tested {
+fn calibrated(bytes: &[u8]) -> Tested {
     let model = compile::open(bytes).unwrap();
     let fresh = of(0..KNOWN, 30_000, 2);
-    calibrate(&model, &fresh, &shapes(), &with!(Settings::default(), held)).unwrap()
+    calibrate(&model, &fresh, &shapes(), &Settings::default()).unwrap()
 }
 
 /// Figures of a model on touches of its objects, and on those of others.
@@ -59,22 +59,18 @@ fn measured(model: &Model<'_>, known: &Dataset, unknown: &Dataset) -> Result<Eva
 #[test]
 fn strangers_are_found_out_and_known_objects_are_not_taken_for_them() {
     for bytes in &*MODELS {
-        for held in [Held::Likely, Held::Certain] {
-            let calibrated = calibrated(bytes, held);
-            let model = compile::open(&calibrated.bytes).unwrap();
-            let (known, unknown) = (of(0..KNOWN, 5_000, 3), of(9..10, 5_000, 3));
-            let measured = measured(&model, &known, &unknown).unwrap();
-            let (of_known, found) = (measured.evaluation.sequential, measured.strangers.unwrap());
-            // 2 % promised; the standard error of 3,000 sequences is a quarter of a percent.
-            assert!(found.false_alarms < 0.028, "{found:?}");
-            assert!((found.false_alarms - of_known.unknown).abs() < 1e-12);
-            assert!(found.detected[&120] + found.wrong_name + found.undecided <= 1.0 + 1e-9);
-            assert!(found.detected[&30] <= found.detected[&60] && found.detected[&60] <= found.detected[&120]);
-            if held == Held::Certain {
-                assert!(found.detected[&120] > 0.9 && found.wrong_name < 0.05, "{found:?}");
-            }
-            assert!(of_known.error < 0.02, "{of_known:?}");
-        }
+        let calibrated = calibrated(bytes);
+        let model = compile::open(&calibrated.bytes).unwrap();
+        let (known, unknown) = (of(0..KNOWN, 5_000, 3), of(9..10, 5_000, 3));
+        let measured = measured(&model, &known, &unknown).unwrap();
+        let (of_known, found) = (measured.evaluation.sequential, measured.strangers.unwrap());
+        // 2 % promised; the standard error of 3,000 sequences is a quarter of a percent.
+        assert!(found.false_alarms < 0.028, "{found:?}");
+        assert!((found.false_alarms - of_known.unknown).abs() < 1e-12);
+        assert!(found.detected[&120] + found.wrong_name + found.undecided <= 1.0 + 1e-9);
+        assert!(found.detected[&30] <= found.detected[&60] && found.detected[&60] <= found.detected[&120]);
+        assert!(found.detected[&120] > 0.3, "{found:?}");
+        assert!(of_known.error < 0.02, "{of_known:?}");
     }
 }
 
@@ -117,25 +113,24 @@ fn full_and_compiled_model_agree_on_a_background() {
 fn what_was_learned_does_not_depend_on_threads() {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let three = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
-    let make = || calibrated(&MODELS[1], Held::Likely);
+    let make = || calibrated(&MODELS[1]);
     assert_eq!(one.install(make), three.install(make));
 }
 
 #[test]
 fn a_test_is_replaced_and_taken_out_again() {
     let bytes = &MODELS[1];
-    let once = calibrated(bytes, Held::Likely).bytes;
-    assert_eq!(calibrated(&once, Held::Likely).bytes, once);
+    let once = calibrated(bytes).bytes;
+    assert_eq!(calibrated(&once).bytes, once);
     assert_eq!(&without(&compile::open(&once).unwrap()).unwrap(), bytes);
-    let plain = calibrated(&MODELS[0], Held::Certain).bytes;
+    let plain = calibrated(&MODELS[0]).bytes;
     assert_eq!(&without(&compile::open(&plain).unwrap()).unwrap(), &MODELS[0]);
 }
 
 #[test]
 fn without_other_shapes_a_test_is_made_too() {
     let model = compile::open(&MODELS[0]).unwrap();
-    let settings = with!(Settings::default(), held = Held::Certain);
-    let calibrated = calibrate(&model, &of(0..KNOWN, 30_000, 2), &[], &settings).unwrap();
+    let calibrated = calibrate(&model, &of(0..KNOWN, 30_000, 2), &[], &Settings::default()).unwrap();
     assert!(calibrated.terms.least >= 5 && calibrated.terms.sequences > 300);
     assert!(calibrated.alarms as f64 <= 0.02 * f64::from(calibrated.terms.sequences));
 }
@@ -158,12 +153,11 @@ fn what_cannot_be_calibrated_says_so() {
 }
 
 /// Touches of the known objects for a promise, and what is promised.
-fn promised(seed: u64, held: Held, rate: f64) -> (Calibrated, Tested) {
+fn promised(seed: u64, rate: f64) -> (Calibrated, Tested) {
     let model = compile::open(&MODELS[0]).unwrap();
     let promise = with!(promises::Settings::default(), rate, max_touches = Some(60), seed);
-    let settings = with!(Settings::default(), held, alarms = 0.05, seed);
-    calibrate_with_promise(&model, &of(0..KNOWN, 15_000, 100 + seed), None, &shapes(), &settings, &promise, &())
-        .unwrap()
+    let settings = with!(Settings::default(), alarms = 0.05, seed);
+    calibrate_with_promise(&model, &of(0..KNOWN, 15_000, 100 + seed), &shapes(), &settings, &promise, &()).unwrap()
 }
 
 /// Results of a model on sequences of touches that nothing was made from, each touch in one of them: shares of the
@@ -194,18 +188,16 @@ fn on_fresh_touches(bytes: &[u8], fresh: &Dataset) -> [f64; 3] {
 #[test]
 fn a_promise_beside_a_test_for_strangers_is_one_of_the_model_with_its_test() {
     let fresh = of(0..KNOWN, 60_000, 5);
-    for held in [Held::Likely, Held::Certain] {
-        let (promised, tested) = promised(1, held, 0.05);
-        let model = compile::open(&tested.bytes).unwrap();
-        assert_eq!((&promised.model, model.promise()), (&tested.bytes, Some(promised.promise)));
-        let [wrong, unknown, touches] = on_fresh_touches(&tested.bytes, &fresh);
-        assert!(wrong < 0.06 && unknown < 0.06, "{held:?}: {wrong} {unknown}");
-        // As many touches as the promise says: those of a model that waits for its test.
-        assert!((touches / promised.used.mean() - 1.0).abs() < 0.1, "{held:?}: {touches} {}", promised.used.mean());
-        assert!((touches / tested.mean_touches - 1.0).abs() < 0.1, "{held:?}: {touches} {}", tested.mean_touches);
-        // And without a name as often: unknown, or undecided.
-        assert!(promised.undecided > 0.3 * unknown, "{held:?}: {} {unknown}", promised.undecided);
-    }
+    let (promised, tested) = promised(1, 0.05);
+    let model = compile::open(&tested.bytes).unwrap();
+    assert_eq!((&promised.model, model.promise()), (&tested.bytes, Some(promised.promise)));
+    let [wrong, unknown, touches] = on_fresh_touches(&tested.bytes, &fresh);
+    assert!(wrong < 0.06 && unknown < 0.06, "{wrong} {unknown}");
+    // As many touches as the promise says: those of a model that waits for its test.
+    assert!((touches / promised.used.mean() - 1.0).abs() < 0.1, "{touches} {}", promised.used.mean());
+    assert!((touches / tested.mean_touches - 1.0).abs() < 0.1, "{touches} {}", tested.mean_touches);
+    // And without a name as often: unknown, or undecided.
+    assert!(promised.undecided > 0.3 * unknown, "{} {unknown}", promised.undecided);
 }
 
 #[test]
@@ -213,9 +205,9 @@ fn a_promise_made_without_a_test_is_not_stated_with_one() {
     let model = compile::open(&MODELS[0]).unwrap();
     let settings = with!(promises::Settings::default(), rate = 0.05);
     let promised = promises::calibrate(&model, of(0..KNOWN, 30_000, 3), &settings, &()).unwrap().model;
-    let with = calibrated(&promised, Held::Likely).bytes;
+    let with = calibrated(&promised).bytes;
     assert_eq!(compile::open(&with).unwrap().promise(), None);
-    let (_, with) = self::promised(1, Held::Likely, 0.05);
+    let (_, with) = self::promised(1, 0.05);
     let without = without(&compile::open(&with.bytes).unwrap()).unwrap();
     assert_eq!(compile::open(&without).unwrap().promise(), None);
 }
@@ -227,51 +219,11 @@ fn both_shares_promised_are_kept_in_all_but_one_of_twenty_calibrations() {
     let repetitions = repetitions(3);
     let (mut wrong, mut alarms) = (0, 0);
     for seed in 0..repetitions {
-        let (_, tested) = promised(seed, Held::Likely, 0.05);
+        let (_, tested) = promised(seed, 0.05);
         let [names, unknown, _] = on_fresh_touches(&tested.bytes, &fresh);
         wrong += u64::from(names > 0.05);
         alarms += u64::from(unknown > 0.05);
     }
     assert_rare("wrong names", wrong, repetitions, 0.05);
     assert_rare("false alarms", alarms, repetitions, 0.05);
-}
-
-/// Touches of the known objects by a robot that the simulation does not model.
-fn of_robot(count: usize, seed: u64) -> Dataset {
-    let mut dataset = of(0..KNOWN, count, seed);
-    dataset.add_noise(&with!(Noise::gaussian(10_000.0), speed = 1.25), seed, 1);
-    dataset
-}
-
-#[test]
-fn few_recordings_state_the_share_of_false_alarms_that_they_support() {
-    let model = compile::open(&MODELS[0]).unwrap();
-    let settings = Settings::default();
-    let few = calibrate_recorded(&model, &of(0..KNOWN, 30_000, 2), &of_robot(300, 5), &shapes(), &settings).unwrap();
-    let found = few.recorded.unwrap();
-    assert!((10..149).contains(&found.sequences) && found.alarms == 0, "{found:?}");
-    assert!((found.supported - (1.0 - 0.05_f64.powf(1.0 / found.sequences as f64))).abs() < 2e-6, "{found:?}");
-    let none = calibrate_recorded(&model, &of(0..KNOWN, 30_000, 2), &of_robot(4, 5), &shapes(), &settings);
-    let none = none.unwrap_err();
-    let Some(EvaluateProblem::TooFewRecorded { object, approaches: 4, tested: 2, enough: Some(enough) }) =
-        none.problem()
-    else {
-        panic!("{none}")
-    };
-    let said = none.to_string();
-    assert!(
-        said.starts_with(&format!("the 4 recorded approaches to {object} make no sequence that ends with a name")),
-        "{said}"
-    );
-    // Three objects with a sequence each: 1 - .05^(1/3).
-    assert!(said.contains("supports a false alarm rate of 63.16 %, and 2 % takes about"), "{said}");
-    // As many approaches as it says make one.
-    let one = calibrate_recorded(
-        &model,
-        &of(0..KNOWN, 30_000, 2),
-        &of_robot(2 * enough.one.ceil() as usize, 5),
-        &shapes(),
-        &settings,
-    );
-    assert!(one.is_ok_and(|one| one.recorded.is_some_and(|found| found.supported <= 0.6317)));
 }

@@ -442,24 +442,6 @@ fn a_test_for_strangers_names_no_more_rows_between_the_classes_than_no_test() {
 }
 
 #[test]
-fn names_that_a_test_never_lets_be_given_are_no_lack_of_sequences() {
-    let short = sequences(Kind::Independent, 3_000, 12, 3);
-    let certain = with!(strangers::Settings::default(), held = Held::Certain);
-    let strangers = Some(StrangerTest::new(certain, &MODEL, None).unwrap());
-    let settings = with!(Settings::default(), rate = 0.05, strangers);
-    let refused = calibrate(&MODEL, &short, &settings, &()).unwrap_err().to_string();
-    assert!(
-        refused.starts_with("0 names given in ") && refused.contains(" sequences are too few to promise 5 %"),
-        "{refused}"
-    );
-    assert!(
-        refused.contains("from row ")
-            && refused.contains("and the longest sequence has 12. Give sequences of more rows"),
-        "{refused}"
-    );
-}
-
-#[test]
 fn sequences_that_are_too_few_for_a_test_of_strangers_are_counted_as_sequences() {
     let settings = with!(Settings::default(), rate = 0.1, strangers = Some(strangers(None)));
     let refused = calibrate(&MODEL, &sequences(Kind::Independent, 400, 40, 3), &settings, &()).unwrap_err().to_string();

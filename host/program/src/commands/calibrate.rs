@@ -12,7 +12,7 @@ use palpate::Result;
 use palpate::calibrate::{self, Calibrated, Gain, Guarded, OfRecorded, OfRows, Per, Settings, Terms, Used};
 use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
-use palpate::error::{CalibrateProblem, Error, EvaluateProblem, Place};
+use palpate::error::{CalibrateProblem, Error, Place};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::rows::SequenceColumns;
@@ -21,7 +21,6 @@ use palpate::stream::{self, EventsCalibrated, StrangerTest};
 use palpate::touches::Dataset;
 use palpate::with;
 use palpate::wording::{self, count, decimal};
-use palpate_shared::format::Held;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -48,8 +47,8 @@ pub(crate) struct Arguments {
     objects: Vec<String>,
     #[command(flatten)]
     table: TableArguments,
-    /// Recorded touches of the objects; thresholds, or --strangers, are tested on them. Of a model of maps, without DIR: each recording is of an object that stood still
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["plan", "label"])]
+    /// Recorded touches of the objects; thresholds are tested on them. Of a model of maps, without DIR: each recording is of an object that stood still
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["plan", "label", "strangers"])]
     recorded: Option<PathBuf>,
     /// Output; the calibrated model
     #[arg(short, long, value_name = "PATH")]
@@ -151,9 +150,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             seed: global.seed(),
         };
         let Arguments { per, active, strangers, real, recorded, table, output, .. } = &arguments;
-        let is_of_trees = *per != Per::Average || *active || strangers.held().is_some() || real.is_given();
+        let is_of_trees = *per != Per::Average || *active || real.is_given();
         if recorded.is_some() && (is_of_trees || strangers.background().is_some()) {
-            let allowed = "it without --per, --active, --strangers, --background and --real, or with DIR";
+            let allowed = "it without --per, --active, --background and --real, or with DIR";
             return Err(Error::setting("recorded", "given", allowed));
         }
         return table.calibrate(&wanted, recorded.as_deref(), output, global);
@@ -216,12 +215,10 @@ fn on_touches(arguments: &Arguments, directory: &PathBuf, global: &Global) -> Re
     }
     let wrong = |error: palpate::Error| {
         use CalibrateProblem::{MissingRecordings, NotSupported};
-        use EvaluateProblem::{RecordedUnknown, TooFewRecorded};
-        let is_of_recorded = matches!(error.problem(), Some(NotSupported { .. } | MissingRecordings { .. }))
-            || matches!(error.problem(), Some(TooFewRecorded { .. } | RecordedUnknown { .. }));
+        let is_of_recorded = matches!(error.problem(), Some(NotSupported { .. } | MissingRecordings { .. }));
         error.in_file(arguments.recorded.as_ref().filter(|_| is_of_recorded).unwrap_or(directory))
     };
-    let Some(held) = arguments.strangers.held() else {
+    if !arguments.strangers.is_wanted() {
         let untested = strangers::without(&compiled.model())?;
         let model = compile::open(&untested)?;
         let calibrated = match &recorded {
@@ -229,19 +226,18 @@ fn on_touches(arguments: &Arguments, directory: &PathBuf, global: &Global) -> Re
             None => calibrate::calibrate(&model, dataset, &settings, &Bar::new()),
         };
         return calibrated.map_err(wrong);
-    };
+    }
     let sequences = settings.sequences;
-    let test = with!(test(held, arguments, global), sequences);
+    let test = with!(test(arguments, global), sequences);
     let shapes = arguments.strangers.shapes(&dataset)?;
-    let (model, recorded) = (compiled.model(), recorded.as_ref());
-    let both = strangers::calibrate_with_promise(&model, &dataset, recorded, &shapes, &test, &settings, &Bar::new());
+    let both = strangers::calibrate_with_promise(&compiled.model(), &dataset, &shapes, &test, &settings, &Bar::new());
     let (calibrated, tested) = both.map_err(wrong)?;
     Ok(Calibrated { strangers: Some(tested.found(&test)), ..calibrated })
 }
 
 /// The test for what the model does not know, with the confidence and the seed of the promise.
-fn test(held: Held, arguments: &Arguments, global: &Global) -> strangers::Settings {
-    with!(strangers::Settings::default(), held, confidence = arguments.confidence, seed = global.seed())
+fn test(arguments: &Arguments, global: &Global) -> strangers::Settings {
+    with!(strangers::Settings::default(), confidence = arguments.confidence, seed = global.seed())
 }
 
 /// Calibrates on sequences of rows.
@@ -257,9 +253,9 @@ fn on_rows(arguments: &Arguments, rows: &PathBuf, global: &Global) -> Result<Cal
     let model = compiled.model();
     stream::check(&model).map_err(|error| error.in_file(path))?;
     let found = sequences::read(rows, &model, &columns)?;
-    let strangers = |held: Held| {
+    let strangers = || {
         let others = background.map(|path| sequences::others(path, &model, &columns)).transpose()?;
-        StrangerTest::new(test(held, arguments, global), &model, others.as_ref())
+        StrangerTest::new(test(arguments, global), &model, others.as_ref())
     };
     let settings = with!(
         stream::Settings::default(),
@@ -269,7 +265,7 @@ fn on_rows(arguments: &Arguments, rows: &PathBuf, global: &Global) -> Result<Cal
         sequences = arguments.drawn(),
         max_rows = arguments.max_touches,
         guard = arguments.guard,
-        strangers = arguments.strangers.held().map(strangers).transpose()?,
+        strangers = arguments.strangers.is_wanted().then(strangers).transpose()?,
         seed = global.seed()
     );
     stream::calibrate(&model, &found, &settings, &Bar::new()).map_err(|error| error.in_file(rows))

@@ -183,7 +183,7 @@ def calibrate(
     `model` is a compiled model over rows, or what `palpate.compile` takes. Rows with the same value of `sequence` follow each
     other, and are of one class. Without `groups` sequences must be independent of each other; with them, such as a person for
     each row, the promise is for new groups. The rows must be others than those of the training. `per` is what the rate is
-    promised of: "average", "name" or "object". With `strangers` ("likely" or "certain") the model also tests whether rows fit
+    promised of: "average", "name" or "object". With `strangers` ("likely") the model also tests whether rows fit
     any class; rows of others can be given as a `background`, with their own sequences. With `guard` the model refuses rows of a
     sensor that is dead, stuck or out of its range, which then add nothing. `seed` says which sequences are learned
     from: calibrate once. Of several seeds, rates or models tried on the same sequences, the one that looks best keeps its promise
