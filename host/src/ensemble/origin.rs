@@ -21,8 +21,6 @@ pub struct TouchOrigin {
     pub noise: Option<Noise>,
     /// For each object, a fingerprint of the first of its touches.
     pub touches: BTreeMap<String, u64>,
-    /// Fingerprints of recorded touches that the ensemble was adjusted to.
-    pub adjusted: BTreeMap<String, u64>,
     /// Kind of touches, and so which ones are evidence.
     pub trained: Option<Trained>,
     /// The capture that made them, where that is known.
@@ -35,7 +33,6 @@ impl TouchOrigin {
     const PROBE: &str = "palpate_probe";
     const NOISE: &str = "palpate_noise";
     const TOUCHES: &str = "palpate_touches";
-    const ADJUSTED: &str = "palpate_adjusted";
     const TRAINED: &str = "palpate_trained";
     const CAPTURED: &str = "palpate_captured";
     const PLACEMENTS: &str = "palpate_placements";
@@ -64,7 +61,6 @@ impl TouchOrigin {
             probe: parsed(attributes, Self::PROBE, "a JSON object of radius, spacing, speed, tilt and length")?,
             noise: parsed(attributes, Self::NOISE, "a JSON object of what was added to the touches in training")?,
             touches: numbers(Self::TOUCHES)?,
-            adjusted: numbers(Self::ADJUSTED)?,
             trained: trained(origin)?,
             captured: parsed(attributes, Self::CAPTURED, "a JSON object of settings, samples and objects")?,
             placements: parsed(attributes, Self::PLACEMENTS, "a JSON object of weights")?.unwrap_or_default(),
@@ -84,7 +80,6 @@ impl TouchOrigin {
             (Self::PROBE, self.probe.and_then(|probe| serde_json::to_string(&probe).ok())),
             (Self::NOISE, self.noise.and_then(|noise| serde_json::to_string(&noise).ok())),
             (Self::TOUCHES, hexadecimal(&self.touches)),
-            (Self::ADJUSTED, hexadecimal(&self.adjusted)),
             (Self::TRAINED, self.trained.and_then(|trained| serde_json::to_string(&trained).ok())),
             (Self::CAPTURED, self.captured.as_ref().and_then(|captured| serde_json::to_string(captured).ok())),
             (Self::PLACEMENTS, placements.and_then(|placements| serde_json::to_string(placements).ok())),
@@ -161,11 +156,9 @@ impl TouchOrigin {
         let stated: Vec<u16> = objects.iter().map(stated).collect();
         let (settings, samples) = captured.map_or((0, 0..u32::MAX), Captured::stated);
         let is_known = stated.iter().any(|&object| object != 0);
-        let of = |name: &String| self.adjusted.get(name).map_or(0, |&fingerprint| short(fingerprint));
-        let adjusted = objects.iter().map(of).filter(|_| !self.adjusted.is_empty());
         is_known.then(|| {
             let head = palpate_shared::format::TrainedCapture::head(settings, samples).into_iter();
-            head.chain(stated.into_iter().chain(adjusted).flat_map(u16::to_le_bytes)).collect()
+            head.chain(stated.into_iter().flat_map(u16::to_le_bytes)).collect()
         })
     }
 
@@ -177,10 +170,7 @@ impl TouchOrigin {
         let captured = self.captured.as_ref().zip(Captured::of(dataset));
         let shared: Vec<String> = captured
             .map_or_else(Vec::new, |(trained, tested)| trained.shared(&tested).into_iter().map(String::from).collect());
-        let begins = |name: &&str| {
-            let of = |touches: &BTreeMap<String, u64>| touches.get(*name) == own.get(*name);
-            own.contains_key(*name) && (of(&self.touches) || of(&self.adjusted))
-        };
+        let begins = |name: &&str| own.contains_key(*name) && self.touches.get(*name) == own.get(*name);
         let same = |name: &&str| begins(name) || shared.iter().any(|shared| shared == name);
         dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
     }
@@ -412,8 +402,7 @@ pub fn compiled_trained_on<'d>(compiled: &CompiledModel, dataset: &'d Dataset) -
         let object = names.iter().position(|own| own == name).and_then(|object| stated.object(object));
         let is_captured = is_near && captured.as_ref().and_then(|captured| captured.stated_of(name)) == object;
         let begins = fingerprints.get(*name).map(|&fingerprint| short(fingerprint));
-        let adjusted = names.iter().position(|own| own == name).and_then(|object| stated.adjusted(object));
-        object.is_some() && (is_captured || begins == object || (begins.is_some() && begins == adjusted))
+        object.is_some() && (is_captured || begins == object)
     };
     dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
 }

@@ -2,7 +2,7 @@
 
 use super::balance::Held;
 use super::held_out::{Division, loss, places, repeated};
-use super::{Curve, JITTERS, Needed, Settings, Smoothing, Taught, TaughtObject, check, on_threads};
+use super::{JITTERS, Settings, Smoothing, Taught, TaughtObject, check, on_threads};
 use crate::ensemble::train::{self, train};
 use crate::ensemble::{Ensemble, OverTouches, TouchOrigin};
 use crate::error::Result;
@@ -15,8 +15,6 @@ use palpate_shared::format::TrainedTouches;
 
 /// Division by which jitters are compared and errors counted. Trees are grown for each part.
 const COMPARED: Division = Division { parts: 5, used: 4 };
-/// The shares of the learning curve, besides that.
-const SHARES: [Division; 2] = [Division { parts: 4, used: 1 }, Division { parts: 2, used: 1 }];
 
 /// Trains an ensemble on the objects of `recorded` alone. Its touches are repeated under jitter, and how much is chosen by
 /// cross-validation, one jitter for all objects: the figures come from the touches that chose it among three. There are
@@ -49,14 +47,14 @@ pub fn alone(
             let objects = recorded.objects.iter().zip(&places).map(object).collect();
             train(&Dataset { origin: recorded.origin.clone(), ..Dataset::new(objects) }, &training, &())
         };
-        let held_out = |jitter: f64, division: Division| -> Result<Vec<Held>> {
+        let held_out = |jitter: f64| -> Result<Vec<Held>> {
             let mut held: Vec<Held> = recorded.objects.iter().map(|object| vec![None; object.len()]).collect();
-            for part in 0..division.parts {
-                let ensemble = fitted(jitter, &|place| division.uses(division.part(place), part))?;
+            for part in 0..COMPARED.parts {
+                let ensemble = fitted(jitter, &|place| COMPARED.uses(COMPARED.part(place), part))?;
                 let trained = ensemble.trained_touches();
                 for (object, (held, places)) in recorded.objects.iter().zip(held.iter_mut().zip(&places)) {
                     let touches = object.touches().iter().zip(places).zip(held);
-                    for ((touch, _), held) in touches.filter(|((_, place), _)| division.part(**place) == part) {
+                    for ((touch, _), held) in touches.filter(|((_, place), _)| COMPARED.part(**place) == part) {
                         *held = margins(&ensemble, &trained, touch);
                     }
                 }
@@ -64,38 +62,21 @@ pub fn alone(
             }
             Ok(held)
         };
-        let trainings = JITTERS.len() * COMPARED.parts + SHARES.iter().map(|division| division.parts).sum::<usize>();
+        let trainings = JITTERS.len() * COMPARED.parts;
         // Too few touches are found before any training.
         let evidence = evidence(recorded, &training)?;
         progress.begin("cross-validating", Some(trainings as u64));
-        let compared = JITTERS.map(|jitter| held_out(jitter, COMPARED).map(|held| (jitter, held)));
+        let compared = JITTERS.map(|jitter| held_out(jitter).map(|held| (jitter, held)));
         let compared = compared.into_iter().collect::<Result<Vec<_>>>()?;
         let best = compared.into_iter().min_by(|a, b| loss(&a.1).total_cmp(&loss(&b.1)));
         let (jitter, held) = best.unwrap_or((1.0, Vec::new()));
         let approaches = settings.approaches.min(recorded.fewest_in_sequence() / 2).max(1);
         let sources: Vec<Vec<Vec<usize>>> = recorded.objects.iter().map(super::by_source).collect();
-        let groups = |held: &[Held]| {
-            super::Groups::draw(
-                (held, &sources),
-                (0..all).collect(),
-                None,
-                [settings.groups, approaches],
-                settings.seed,
-            )
-        };
+        let sizes = [settings.groups, approaches];
+        let drawn = super::Groups::draw((&held, &sources), (0..all).collect(), None, sizes, settings.seed);
         let none = vec![0.0; all];
-        let mut curves = vec![Curve::default(); all];
-        for division in SHARES {
-            let drawn = groups(&held_out(jitter, division)?);
-            for (index, curve) in curves.iter_mut().enumerate() {
-                let used = recorded.objects[index].len() as f64 * division.share();
-                curve.add(used.round() as usize, drawn.named(index, &none));
-            }
-        }
-        let drawn = groups(&held);
-        let objects = recorded.objects.iter().zip(curves).enumerate().map(|(index, (object, mut curve))| {
+        let objects = recorded.objects.iter().enumerate().map(|(index, object)| {
             let named = drawn.named(index, &none);
-            curve.finish(object.len(), COMPARED.share(), named);
             TaughtObject {
                 name: object.name.clone(),
                 approaches: object.len(),
@@ -104,12 +85,9 @@ pub fn alone(
                 constant: 0.0,
                 recognized: named.right,
                 taken_for_it: named.wrong,
-                curve,
             }
         });
-        let taught: Vec<usize> = (0..all).collect();
-        let promise = Needed::new((&held, &sources), &taught, None, &none, settings.seed);
-        let taught = Taught { approaches, objects: objects.collect(), others: None, promise };
+        let taught = Taught { approaches, objects: objects.collect(), others: None };
         progress.begin("training", None);
         let mut ensemble = fitted(jitter, &|_| true)?;
         // What is stated is what was recorded, not its copies.

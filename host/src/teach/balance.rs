@@ -110,13 +110,6 @@ impl Groups {
         others.iter().map(right).sum::<f64>() / others.len().max(1) as f64
     }
 
-    /// The share of groups that are recognized, of all objects.
-    pub(super) fn right(&self, constants: &[f64]) -> f64 {
-        let objects: Vec<usize> = (0..self.of.len()).filter(|object| Some(*object) != self.background).collect();
-        let right = |&object: &usize| self.share(object, constants, |name| name == object);
-        objects.iter().map(right).sum::<f64>() / objects.len().max(1) as f64
-    }
-
     /// The constants with which errors balance; where a range of them does, the nearest to 0.
     pub(super) fn balanced(&self) -> Vec<f64> {
         let mut constants = vec![0.0; self.taught.len()];
@@ -151,8 +144,6 @@ struct Third {
     groups: Groups,
     /// The constants that balance the errors of groups of the other parts.
     constants: Vec<f64>,
-    /// For each object its approaches.
-    approaches: Vec<Vec<usize>>,
 }
 
 impl Judged {
@@ -181,16 +172,14 @@ impl Judged {
                 let own: Vec<Vec<Vec<usize>>> = sources.iter().map(own).collect();
                 Groups::draw((held, &own), taught.to_vec(), background, sizes, seed)
             };
-            let own = |sources: &Vec<Vec<usize>>| sources.iter().flat_map(|approaches| of(approaches, true)).collect();
-            let approaches = sources.iter().map(own).collect();
-            Third { groups: groups(true), constants: groups(false).balanced(), approaches }
+            Third { groups: groups(true), constants: groups(false).balanced() }
         };
         Self((0..PARTS).map(part).collect())
     }
 
     /// Frequency with which taught object number `index` is named, in the mean of the parts.
     pub(super) fn named(&self, index: usize) -> Named {
-        let of = |Third { groups, constants, .. }: &Third| groups.named(index, constants);
+        let of = |Third { groups, constants }: &Third| groups.named(index, constants);
         let sum = self.0.iter().map(of).fold([0.0; 2], |[right, wrong], of| [right + of.right, wrong + of.wrong]);
         let [right, wrong] = sum.map(|sum| sum / self.0.len() as f64);
         Named { right, wrong }
@@ -199,32 +188,6 @@ impl Judged {
     /// The share of groups that are recognized, of all objects that were not taught.
     pub(super) fn others(&self) -> f64 {
         self.0.iter().map(|third| third.groups.others(&third.constants)).sum::<f64>() / self.0.len() as f64
-    }
-
-    /// The share of groups that are recognized, of all objects, with this share of the constants.
-    pub(super) fn right(&self, share: f64) -> f64 {
-        let right = |Third { groups, constants, .. }: &Third| {
-            groups.right(&constants.iter().map(|constant| share * constant).collect::<Vec<_>>())
-        };
-        self.0.iter().map(right).sum::<f64>() / self.0.len() as f64
-    }
-
-    /// The margins of every approach, with this share of the constants that other parts chose.
-    pub(super) fn with_constants(&self, held: &[Held], share: f64) -> Vec<Held> {
-        let mut changed = held.to_vec();
-        for Third { groups, constants, approaches } in &self.0 {
-            for (object, approaches) in approaches.iter().enumerate() {
-                for &approach in approaches {
-                    let Some(margins) = &mut changed[object][approach] else { continue };
-                    groups
-                        .taught
-                        .iter()
-                        .zip(constants)
-                        .for_each(|(&taught, constant)| margins[taught] += share * constant);
-                }
-            }
-        }
-        changed
     }
 }
 

@@ -18,35 +18,12 @@ pub(super) fn check(
     settings: &Settings,
 ) -> Result<Descriptor> {
     let descriptor = of_vectors(ensemble, settings)?;
-    none_missing(ensemble, &[known])?;
+    none_missing(ensemble, known)?;
     let is_known = |object: &&ObjectTouches| !Candidate::Full(ensemble).outputs_of(&object.name).is_empty();
     if let Some(object) = recorded.objects.iter().find(is_known) {
         return Err(TeachProblem::Known { object: object.name.clone() }.into());
     }
     names(ensemble, recorded)?;
-    comparable(ensemble, descriptor, known, recorded)?;
-    Ok(descriptor)
-}
-
-/// Rejects recordings that a model cannot be adjusted to, before the work begins.
-pub(super) fn adjustable(
-    ensemble: &Ensemble,
-    known: &Dataset,
-    recorded: &Dataset,
-    settings: &Settings,
-) -> Result<Descriptor> {
-    let descriptor = of_vectors(ensemble, settings)?;
-    let is_known = |name: &String| ensemble.objects[..ensemble.known_count()].contains(name);
-    if recorded.objects.is_empty() {
-        return Err(TeachProblem::Nothing.into());
-    }
-    if let Some(object) = recorded.objects.iter().find(|object| !is_known(&object.name)) {
-        if !Candidate::Full(ensemble).outputs_of(&object.name).is_empty() {
-            return Err(TeachProblem::NoPlacement { object: object.name.clone() }.into());
-        }
-        return Err(TeachProblem::NotKnown { object: object.name.clone() }.into());
-    }
-    none_missing(ensemble, &[known, recorded])?;
     comparable(ensemble, descriptor, known, recorded)?;
     Ok(descriptor)
 }
@@ -62,10 +39,9 @@ fn of_vectors(ensemble: &Ensemble, settings: &Settings) -> Result<Descriptor> {
     Ok(descriptor)
 }
 
-/// Touches of each of the ensemble's objects in one of the data sets.
-fn none_missing(ensemble: &Ensemble, datasets: &[&Dataset]) -> Result<()> {
-    let objects = datasets.iter().flat_map(|dataset| &dataset.objects);
-    let has_touches = |name: &&String| objects.clone().any(|object| object.name == **name && !object.is_empty());
+/// Touches of each of the ensemble's objects.
+fn none_missing(ensemble: &Ensemble, known: &Dataset) -> Result<()> {
+    let has_touches = |name: &&String| known.objects.iter().any(|object| object.name == **name && !object.is_empty());
     let missing: Vec<String> = ensemble.objects.iter().filter(|name| !has_touches(name)).cloned().collect();
     if missing.is_empty() { Ok(()) } else { Err(TeachProblem::Missing { objects: missing }.into()) }
 }

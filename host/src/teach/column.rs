@@ -1,6 +1,6 @@
 //! A column of leaf values for an object that the trees were not grown on.
 
-use super::rows::{Leaves, Rows, log_sum};
+use super::rows::{Leaves, Rows};
 use crate::ensemble::train::BASE_MARGIN;
 
 /// Rounds over all trees. Values hardly move after three.
@@ -19,24 +19,6 @@ pub(super) struct Part<'r> {
     pub(super) column: Option<usize>,
 }
 
-impl Part<'_> {
-    /// For each chosen row the margins of the columns before any step, and the logarithm of the sum of the exponentials of the
-    /// margins of all objects that have no column.
-    fn begun(&self, own: &[Option<usize>]) -> (Vec<f64>, Vec<f64>) {
-        let (mut begun, mut log_sums) = (Vec::with_capacity(self.chosen.len() * own.len()), Vec::new());
-        for &row in &self.chosen {
-            let margins = self.rows.margins(row as usize);
-            begun.extend(own.iter().map(|own| f64::from(own.map_or(BASE_MARGIN, |own| margins[own]))));
-            let others = margins.iter().enumerate().filter(|(object, _)| !own.contains(&Some(*object)));
-            log_sums.push(match own.iter().all(Option::is_none) {
-                true => self.rows.log_sums[row as usize],
-                false => log_sum(others.map(|(_, &margin)| f64::from(margin))),
-            });
-        }
-        (begun, log_sums)
-    }
-}
-
 /// Fits columns of leaf values; the values of the objects that the trees know stay as they are.
 ///
 /// Minimizes the softmax loss over all objects with Σ prior·v²/2 added for each column, which is convex:
@@ -44,11 +26,8 @@ impl Part<'_> {
 /// splits are given. `priors` are in touches of the column's object: a leaf that so many of its touches reach is half
 /// way to what they say.
 ///
-/// A column is of a new object, or of one that the trees know, whose index `own` gives: then it is what is added to the
-/// object's values, which the prior draws towards 0.
-///
 /// The columns have one value for each leaf of all trees.
-pub(super) fn fit(leaves: &Leaves, parts: &[Part<'_>], priors: &[f64], own: &[Option<usize>]) -> Vec<Vec<f64>> {
+pub(super) fn fit(leaves: &Leaves, parts: &[Part<'_>], priors: &[f64]) -> Vec<Vec<f64>> {
     let width = priors.len();
     let ridge = |column: usize| {
         let own = parts.iter().find(|part| part.column == Some(column));
@@ -56,16 +35,17 @@ pub(super) fn fit(leaves: &Leaves, parts: &[Part<'_>], priors: &[f64], own: &[Op
     };
     let ridges: Vec<f64> = (0..width).map(ridge).collect();
     let mut columns = vec![vec![0.0; leaves.count()]; width];
-    let (mut margins, log_sums): (Vec<Vec<f64>>, Vec<Vec<f64>>) = parts.iter().map(|part| part.begun(own)).unzip();
+    let begun = |part: &Part<'_>| vec![f64::from(BASE_MARGIN); part.chosen.len() * width];
+    let mut margins: Vec<Vec<f64>> = parts.iter().map(begun).collect();
     let mut shares = vec![0.0; width];
     for _ in 0..PASSES {
         for (tree, of_tree) in leaves.trees.iter().enumerate() {
             let mut slopes = vec![[0.0_f64; 2]; of_tree.len() * width];
-            for ((part, margins), log_sums) in parts.iter().zip(&margins).zip(&log_sums) {
+            for (part, margins) in parts.iter().zip(&margins) {
                 let weight = 1.0 / part.chosen.len().max(1) as f64;
-                for ((&row, margins), &log_sum) in part.chosen.iter().zip(margins.chunks(width)).zip(log_sums) {
+                for (&row, margins) in part.chosen.iter().zip(margins.chunks(width)) {
                     let row = row as usize;
-                    posteriors(log_sum, margins, &mut shares);
+                    posteriors(part.rows.log_sums[row], margins, &mut shares);
                     let leaf = part.rows.leaf(row, tree) - of_tree.start;
                     for (column, (&share, [first, second])) in
                         shares.iter().zip(&mut slopes[leaf * width..(leaf + 1) * width]).enumerate()

@@ -29,18 +29,6 @@ pub enum TeachProblem {
         /// The name.
         object: String,
     },
-    /// A model is adjusted to objects that it knows.
-    #[error("{object} is not known: a model is adjusted to recorded touches of the objects that it knows")]
-    NotKnown {
-        /// The name.
-        object: String,
-    },
-    /// A model with an output for each placement is adjusted to recordings that state none.
-    #[error("the recordings of {object} state no placement, and the model has an output for each")]
-    NoPlacement {
-        /// The object.
-        object: String,
-    },
     /// Partial touches are evidence, but none were recorded.
     #[error(
         "only full touches were recorded, but the model takes {} as evidence: it would learn that the objects never \
@@ -89,13 +77,8 @@ impl Problem for TeachProblem {
                 "Give the data set that the ensemble was trained on, or another one of the same objects."
             }
             Self::Known { .. } => {
-                "Adjust the model to the recorded touches of objects that it knows, or rename the recording to teach it as \
-                 another object."
+                "Fit the probe to recordings of objects that it knows, or rename the recording to teach it as another object."
             }
-            Self::NoPlacement { .. } => {
-                "Record it in its placements (`palpate data record --object OBJECT/PLACEMENT`), or leave it out."
-            }
-            Self::NotKnown { .. } => "Teach it as a new object.",
             Self::FullTouches { .. } => {
                 "Record every approach, also those that missed a finger, or train on full touches."
             }

@@ -47,11 +47,6 @@ impl Division {
     pub(super) fn uses(self, part: usize, held_out: usize) -> bool {
         (1..=self.used).any(|step| (held_out + step) % self.parts == part)
     }
-
-    /// The share of the touches that is fitted on.
-    pub(super) fn share(self) -> f64 {
-        self.used as f64 / self.parts as f64
-    }
 }
 
 /// Everything that columns are fitted on.
@@ -87,7 +82,7 @@ pub(super) fn places(name: &str, count: usize, seed: u64) -> Vec<f64> {
 }
 
 /// Place of a touch of an object that the trees know: spread evenly, by the golden ratio.
-pub(super) fn known_place(source: u32) -> f64 {
+fn known_place(source: u32) -> f64 {
     (f64::from(source) * 0.618_033_988_749_894_9).fract()
 }
 
@@ -147,7 +142,7 @@ impl Material {
         });
         let parts: Vec<Part<'_>> = known.chain(recorded).collect();
         let priors: Vec<f64> = smoothings.iter().map(|smoothing| smoothing.prior).collect();
-        fit(&self.leaves, &parts, &priors, &vec![None; priors.len()])
+        fit(&self.leaves, &parts, &priors)
     }
 
     /// The columns of all recorded objects, fitted on all touches.

@@ -4,33 +4,23 @@
 //! A few hundred touches suffice where new trees would need thousands, and the values of the other objects do not change.
 //! [`alone`](fn@alone) trains an ensemble on recorded touches only.
 //!
-//! [`adjust`](fn@adjust) changes the values of objects that an ensemble knows by recorded touches of them, if that helps.
-//!
 //! Few touches do not show every way to touch an object. So they are repeated under jitter, and a prior draws the values
 //! of leaves towards 0; the strength of both is chosen for each object by cross-validation. Then a constant is added to the
 //! object's margin with every touch, so that errors balance: it is missed as often as others are mistaken for it. No touch
 //! is fitted on while it or a copy of it is held out.
 
-mod adjust;
-#[cfg(test)]
-mod adjust_tests;
 mod alone;
 mod balance;
 mod check;
 mod column;
-mod curve;
 pub(crate) mod error;
 mod held_out;
-mod promise;
 mod rows;
 #[cfg(test)]
 mod tests;
 
-pub use adjust::{Adjusted, AdjustedObject, Fitness, adjust};
 pub use alone::alone;
-pub use curve::{Curve, Point};
 pub use held_out::jitter;
-pub use promise::{Needed, RATE};
 
 use crate::ensemble::train::{BASE_MARGIN, round_leaves};
 use crate::ensemble::{Ensemble, Node, TouchOrigin, train};
@@ -116,8 +106,6 @@ pub struct Taught {
     pub objects: Vec<TaughtObject>,
     /// The share of groups of the other objects that are recognized; none if there are none.
     pub others: Option<f64>,
-    /// Requirements of a promise of 1 % wrong names.
-    pub promise: Needed,
 }
 
 /// Results for one of them.
@@ -137,8 +125,6 @@ pub struct TaughtObject {
     pub recognized: f64,
     /// The share of the others' groups that are mistaken for it, summed over the other objects.
     pub taken_for_it: f64,
-    /// Results with fewer approaches, and with more.
-    pub curve: Curve,
 }
 
 /// Adds the objects of `recorded` to `ensemble`, without changing its trees' splits or the values of the objects that it
@@ -176,21 +162,16 @@ pub fn teach(
         check::enough(recorded, &evidence)?;
         let smoothings = smoothings(&material, touches.len(), progress)?;
         let all: Vec<usize> = (0..touches.len()).collect();
-        progress.begin("cross-validating", Some((BALANCED.parts + curve::parts()) as u64));
+        progress.begin("cross-validating", Some(BALANCED.parts as u64));
         let held = material.held_out(&all, &smoothings, 1, BALANCED, progress)?;
         let approaches = settings.approaches.min(balance::most_approaches(recorded.fewest_in_sequence()));
         let background = ensemble.origin.background.then(|| ensemble.known_count());
         let sizes = [settings.groups, approaches];
         let taught: Vec<usize> = (material.known_count()..held.len()).collect();
-        let judged = |held: &[balance::Held]| Judged::new((held, &sources), &taught, background, sizes, settings.seed);
-        let constants = Groups::draw((&held, &sources), taught.clone(), background, sizes, settings.seed).balanced();
-        let mut curves = curve::curves(&material, &smoothings, &judged, progress)?;
-        let drawn = judged(&held);
+        let drawn = Judged::new((&held, &sources), &taught, background, sizes, settings.seed);
+        let constants = Groups::draw((&held, &sources), taught, background, sizes, settings.seed).balanced();
         let objects = recorded.objects.iter().zip(&evidence).enumerate().map(|(index, (object, &touches))| {
             let named = drawn.named(index);
-            let share = BALANCED.share();
-            let mut curve = std::mem::take(&mut curves[index]);
-            curve.finish(object.len(), share, named);
             TaughtObject {
                 name: object.name.clone(),
                 approaches: object.len(),
@@ -199,15 +180,9 @@ pub fn teach(
                 constant: constants[index],
                 recognized: named.right,
                 taken_for_it: named.wrong,
-                curve,
             }
         });
-        let found = Taught {
-            approaches,
-            objects: objects.collect(),
-            others: Some(drawn.others()),
-            promise: Needed::new((&held, &sources), &taught, background, &constants, settings.seed),
-        };
+        let found = Taught { approaches, objects: objects.collect(), others: Some(drawn.others()) };
         let columns = material.fitted(&smoothings);
         let mut extended = extended(ensemble, recorded, &columns, &constants);
         let stated = TouchOrigin::of(&extended.origin)?.placements;

@@ -1,6 +1,5 @@
 use super::balance::{Groups, Held, Judged, Named};
 use super::column::{Part, fit};
-use super::curve::expected;
 use super::held_out::{places, repeated};
 use super::rows::{Leaves, Rows};
 use super::*;
@@ -83,7 +82,7 @@ fn a_prior_counts_touches_and_not_their_copies() {
             Part { rows, chosen: (0..rows.count() as u32).collect(), column }
         };
         let parts = [part(&known[0], None), part(&known[1], None), part(&own, Some(0))];
-        fit(&leaves, &parts, &[4.0], &[None]).remove(0)
+        fit(&leaves, &parts, &[4.0]).remove(0)
     };
     let (single, thrice) = (columns(once), columns(&once.repeat(3)));
     assert!(single.iter().zip(&thrice).all(|(a, b)| (a - b).abs() < 1e-9));
@@ -177,22 +176,6 @@ fn errors_stated_of_taught_objects_are_those_of_fresh_groups_and_not_of_the_grou
 }
 
 #[test]
-fn a_promise_takes_as_many_approaches_as_sequences_to_the_strictest_threshold_do() {
-    // 1 nat with every second approach: 4.6 + 2.5 nats take 8 touches, 16 approaches or 15.
-    let held = |of_first: bool| -> Held {
-        let margins = if of_first { vec![1.0, 0.0] } else { vec![0.0, 1.0] };
-        (0..200).map(|index| (index % 2 == 0).then(|| margins.clone())).collect()
-    };
-    let sources = [one_source(200), one_source(200)];
-    let needed = Needed::new((&[held(true), held(false)], &sources), &[1], None, &[0.0], 1);
-    assert_eq!((needed.sequences, needed.of_each), (299, 150));
-    assert!((150 * 13..150 * 18).contains(&needed.approaches), "{needed:?}");
-    // One in two sequences ends without a name where evidence hardly adds up: twice as many are needed, and longer ones.
-    let slow: Held = (0..200).map(|_| Some(vec![0.0, 0.001])).collect();
-    assert!(Needed::new((&[held(true), slow], &sources), &[1], None, &[0.0], 1).approaches > 100_000);
-}
-
-#[test]
 fn where_nothing_is_wrong_no_constant_is_added_and_where_a_range_balances_the_nearest_to_0_is() {
     let clear = [ramp(5.0, 0.1, true), ramp(5.0, 0.1, false)];
     assert_eq!(groups(&clear, vec![1], None, [100, 1], 1).balanced(), [0.0]);
@@ -208,17 +191,6 @@ fn groups_without_evidence_recognize_nothing() {
     let drawn = groups(&held, vec![1], None, [10, 5], 1);
     assert_eq!(drawn.named(0, &[0.0]), Named { right: 1.0, wrong: 0.0 });
     assert_eq!(drawn.others(&[0.0]), 0.0);
-}
-
-#[test]
-fn errors_that_fall_with_a_power_are_carried_on() {
-    let point = |approaches: usize, error| Point { approaches, recognized: 1.0 - error, error };
-    let root: Vec<Point> = [100, 200, 400].map(|count| point(count, 2.0 / f64::from(count as u32).sqrt())).into();
-    assert!((expected(&root, 1_600) - 0.05).abs() < 1e-9);
-    // More touches never make it worse.
-    assert!((expected(&[point(100, 0.1), point(400, 0.4)], 1_600) - 0.2).abs() < 1e-9);
-    assert!((expected(&[point(100, 0.3)], 1_600) - 0.3).abs() < 1e-9);
-    assert!(expected(&[point(100, 0.0), point(200, 0.0)], 400) <= 1.001e-3);
 }
 
 #[test]

@@ -29,9 +29,6 @@ fn a_taught_object_is_recognized_and_the_others_still_are() {
     assert_eq!((object.name.as_str(), object.approaches, object.touches), ("object2", 300, 300));
     // What was said beforehand came true.
     assert!((object.recognized - curve.object_accuracy(2, 30).value).abs() < 0.08, "{taught:?}");
-    let points = &object.curve.points;
-    assert_eq!(points.iter().map(|point| point.approaches).collect::<Vec<_>>(), [38, 75, 150, 270]);
-    assert!(points[0].error >= points[3].error, "{points:?}");
 }
 
 #[test]
@@ -84,9 +81,9 @@ fn a_background_stays_the_last_and_is_no_name() {
     let ensemble = train_with_background(&known, &shapes, &few_trees(), &()).unwrap();
     let mut all = known.clone();
     all.objects.push(ObjectTouches::joined(BACKGROUND, &shapes.objects));
-    let (extended, taught) = teach(&ensemble, &all, &recorded, &few_groups(), &()).unwrap();
+    let (extended, _) = teach(&ensemble, &all, &recorded, &few_groups(), &()).unwrap();
     assert_eq!(extended.objects, ["object0", "object1", "object2", BACKGROUND]);
-    assert_eq!((extended.known_count(), taught.promise.of_each), (3, 100));
+    assert_eq!(extended.known_count(), 3);
     // Without the background's touches there is nothing to compare with.
     let error = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap_err();
     let missing = TeachProblem::Missing { objects: vec![BACKGROUND.into()] };
@@ -159,8 +156,6 @@ fn recorded_touches_alone_make_an_ensemble_that_states_them() {
     let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
     assert_eq!(compiled_trained_on(&CompiledModel::from_bytes(bytes).unwrap(), &recorded).len(), 2);
     assert!(TouchOrigin::of(&ensemble.origin).unwrap().noise.is_none() && taught.others.is_none());
-    let ends: Vec<usize> = taught.objects[0].curve.points.iter().map(|point| point.approaches).collect();
-    assert_eq!(ends, [38, 75, 120]);
     let again = alone(&recorded, &few_trees(), &with!(few_groups(), threads = Some(1)), &()).unwrap();
     assert_eq!(again, (ensemble, taught));
     let few = synthetic::dataset(&[150, 10], 1);

@@ -282,8 +282,7 @@ impl PatternShares {
     }
 }
 
-/// Kind of touches that a model was trained on, to test it on others: 12 bytes, and 2 for each object; 2 more if it was
-/// adjusted to recordings.
+/// Kind of touches that a model was trained on, to test it on others: 12 bytes, and 2 for each object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrainedCapture<'a> {
     /// 16 bits of a checksum of the capture's seed and settings; 0 if no capture is known.
@@ -291,7 +290,6 @@ pub struct TrainedCapture<'a> {
     /// The samples of each object; an end of `u32::MAX` stands for that or more.
     pub samples: Range<u32>,
     objects: &'a [[u8; 2]],
-    adjusted: &'a [[u8; 2]],
 }
 
 /// Bytes of [`TrainedCapture`] before the objects.
@@ -313,12 +311,11 @@ impl<'a> TrainedCapture<'a> {
     /// Cost: a few instructions.
     pub fn from_bytes(bytes: &'a [u8], objects: usize) -> Option<Self> {
         let (&[a, b, _, _, c, d, e, f, g, h, i, j], rest) = bytes.split_first_chunk::<CAPTURE>()?;
-        let (objects, adjusted) = rest.as_chunks().0.split_at_checked(objects)?;
+        let (objects, _) = rest.as_chunks().0.split_at_checked(objects)?;
         Some(Self {
             settings: u16::from_le_bytes([a, b]),
             samples: u32::from_le_bytes([c, d, e, f])..u32::from_le_bytes([g, h, i, j]),
             objects,
-            adjusted,
         })
     }
 
@@ -326,13 +323,6 @@ impl<'a> TrainedCapture<'a> {
     /// known.
     pub fn object(&self, object: usize) -> Option<u16> {
         self.objects.get(object).map(|bytes| u16::from_le_bytes(*bytes)).filter(|&object| object != 0)
-    }
-
-    /// 16 bits of a checksum of the first recorded touches of an object that the model was adjusted to; none if it was not.
-    ///
-    /// Cost: a few instructions. Cannot fail.
-    pub fn adjusted(&self, object: usize) -> Option<u16> {
-        self.adjusted.get(object).map(|bytes| u16::from_le_bytes(*bytes)).filter(|&object| object != 0)
     }
 }
 

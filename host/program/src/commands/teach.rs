@@ -2,16 +2,15 @@
 
 use palpate::error::{Error, Place, Result, TouchesProblem};
 use palpate::probe::file::ProbeFile;
-use palpate::teach::{Adjusted, Taught, TaughtObject};
+use palpate::teach::{Taught, TaughtObject};
 use palpate::touches::{Dataset, ObjectTouches, Origin, is_log};
-use palpate_report::teach::{more_approaches, page, promise};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Recorded touches, and what they are taught to.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct TeachArguments {
-    /// Recorded touches of new objects, or of known ones to adjust to; a directory, a file called like its object, or a log; repeatable
+    /// Recorded touches of new objects; a directory, a file called like its object, or a log; repeatable
     #[arg(long, value_name = "DIR|FILE")]
     pub(crate) teach: Vec<PathBuf>,
     /// Teach the recorded touches to this ensemble, instead of training another one
@@ -23,9 +22,6 @@ pub(crate) struct TeachArguments {
         conflicts_with_all = ["preset", "descriptor", "evidence", "trees", "probe", "real"]
     )]
     pub(crate) extend: Option<PathBuf>,
-    /// Also write a page of the results; how well the recorded objects are recognized
-    #[arg(long, value_name = "FILE", requires = "teach")]
-    pub(crate) page: Option<PathBuf>,
 }
 
 impl TeachArguments {
@@ -41,24 +37,6 @@ impl TeachArguments {
             }
         }
         Ok(all)
-    }
-
-    /// Refuses a page about nothing.
-    pub(crate) fn check_page(&self, taught: Option<&Taught>) -> Result<()> {
-        match &self.page {
-            Some(path) if taught.is_none() => {
-                Err(Error::setting("page", path.display(), "it with recorded touches of a new object"))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Writes the page, if one is wanted. The command that remakes it is this program's own.
-    pub(crate) fn write_page(&self, taught: Option<&Taught>) -> Result<()> {
-        let Some((path, taught)) = self.page.as_ref().zip(taught) else { return Ok(()) };
-        let words: Vec<String> = std::env::args().skip(1).collect();
-        let command = super::shell::command(std::iter::once("palpate").chain(words.iter().map(String::as_str)));
-        page(taught, &command)?.write(path).map(drop)
     }
 
     /// The files that are read, none of which may be written.
@@ -115,13 +93,12 @@ fn add(all: &mut Dataset, mut read: Dataset, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Taught objects, their figures, and the expected gain from more approaches.
+/// Taught objects and their figures.
 pub(crate) fn text(taught: &Taught) -> String {
     let mut text = String::new();
     for object in &taught.objects {
+        // Writing to a string cannot fail.
         _ = writeln!(text, "\n{}", of_object(object, taught));
-        _ = writeln!(text, "{}", table(object));
-        _ = writeln!(text, "{}", more_approaches(object));
     }
     if let Some(others) = taught.others {
         _ = writeln!(
@@ -131,36 +108,7 @@ pub(crate) fn text(taught: &Taught) -> String {
             taught.approaches
         );
     }
-    _ = writeln!(text, "\n{}", promise(taught));
     text
-}
-
-/// Results of adjusting to recorded touches of known objects.
-pub(crate) fn adjusted(adjusted: &Adjusted) -> String {
-    let Adjusted { objects, prior, share, approaches, given, adjusted: after, is_better } = adjusted;
-    let recorded: Vec<String> =
-        objects.iter().map(|object| format!("{} ({})", object.name, object.approaches)).collect();
-    let leaves = match prior {
-        Some(prior) => format!("leaves with a prior of {prior} touches"),
-        None => "leaves as they were".into(),
-    };
-    let constants = match *share {
-        0.0 => "no constants".into(),
-        share => format!("{} % of the constants that balance errors", 100.0 * share),
-    };
-    let mut text = format!(
-        "\nRecorded approaches to known objects: {}. Chosen on touches that were held out: {leaves}, {constants}.\n",
-        recorded.join(", ")
-    );
-    // Writing to a string cannot fail.
-    _ = writeln!(text, "{:>14}  {:>15}  recognized after {approaches} approaches", "", "loss of a touch");
-    for (name, fitness) in [("as given", given), ("adjusted", after)] {
-        _ = writeln!(text, "{name:>14}  {:>10.4} nats  {:>8} %", fitness.loss, percent(fitness.recognized));
-    }
-    text + match is_better {
-        true => "The adjusted model is better, and was saved.\n",
-        false => "warning: the adjusted model is no better than the given one, which was saved as it was.\n",
-    }
 }
 
 fn of_object(object: &TaughtObject, taught: &Taught) -> String {
@@ -180,20 +128,6 @@ fn of_object(object: &TaughtObject, taught: &Taught) -> String {
         percent(object.recognized),
         percent(object.taken_for_it),
     )
-}
-
-fn table(object: &TaughtObject) -> String {
-    let mut text = format!("{:>12}  {:>10}  {:>6}", "approaches", "recognized", "error");
-    for point in &object.curve.points {
-        _ = write!(
-            text,
-            "\n{:>12}  {:>8} %  {:>4} %",
-            point.approaches,
-            percent(point.recognized),
-            percent(point.error)
-        );
-    }
-    text
 }
 
 fn percent(share: f64) -> String {

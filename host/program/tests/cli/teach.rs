@@ -1,7 +1,7 @@
 //! Objects that are learned from recorded touches: `palpate train --teach`.
 
 use crate::fixtures::TAUGHT;
-use crate::{Folder, complains, fails, figures, holds, palpate, says, shapes, succeeds};
+use crate::{Folder, complains, fails, figures, holds, palpate, shapes, succeeds};
 use std::fs;
 use std::path::Path;
 
@@ -18,23 +18,15 @@ fn a_recorded_object_is_taught_exported_and_recognized() {
     let expected = [
         "pot: 300 recorded approaches, 300 of them evidence",
         "recorded touches that were held out",
-        "approaches  recognized",
         "Of the other objects",
-        "No promise can be made yet. To promise 1 % wrong names takes 299 sequences that end with a name, none of them a wrong one, 100 of each object",
     ];
     holds(&text, &expected);
-    assert!(
-        text.contains("to pot would hardly help") || text.contains("approaches to pot the error would be"),
-        "{text}"
-    );
     succeeds(at, "export t.json -o t.palpate");
-    let extend = "train data --extend t.json --teach cup.txt -o u.json --page cup.html";
+    let extend = "train data --extend t.json --teach cup.txt -o u.json";
     touches(&at.join("cup.txt"), 20_000, 100, 9);
     complains(palpate(at, extend), extend, 1, "there are no touches of pot, which the ensemble knows");
     fs::copy(at.join("unseen/pot.txt"), at.join("data/pot.txt")).unwrap();
     succeeds(at, extend);
-    let page = fs::read_to_string(at.join("cup.html")).unwrap();
-    holds(&page, &["Errors against approaches", "palpate train data --extend t.json", "<svg", "cup"]);
     let found = figures(at, "evaluate t.palpate unseen --at 20 --sequences 300");
     for object in ["bowl", "fork", "pot"] {
         assert!(found["per_object"][object]["20"].as_f64() > Some(0.8), "{object}: {}", found["per_object"]);
@@ -71,33 +63,9 @@ fn several_recordings_are_taught_at_once_and_alone() {
 }
 
 #[test]
-fn recorded_touches_of_known_objects_adjust_the_model_and_new_ones_are_taught() {
-    let at = &TAUGHT.folder();
-    // This bowl and fork bend more than the simulated ones.
-    touches(&at.join("robot/bowl.txt"), 170_000, 300, 5);
-    touches(&at.join("robot/fork.txt"), 330_000, 300, 6);
-    let train = "train data --teach robot -o adjusted.json --trees rounds=6,depth=4";
-    let made = figures(at, train);
-    assert_eq!((&made["objects"], &made["adjusted"]["is_better"]), (&2.into(), &true.into()), "{made}");
-    assert!(made["adjusted"]["adjusted"]["loss"].as_f64() < made["adjusted"]["given"]["loss"].as_f64(), "{made}");
-    assert!(made["taught"].is_null(), "{made}");
-    says(at, train, &["bowl (300), fork (300)", "The adjusted model is better"]);
-    let made = figures(at, &format!("{train} --teach pot.txt"));
-    assert_eq!((&made["objects"], &made["taught"]["objects"][0]["name"]), (&3.into(), &"pot".into()), "{made}");
-    // Recordings like the simulation do not improve it.
-    touches(&at.join("same/bowl.txt"), 100_000, 60, 8);
-    let text = succeeds(at, "train data --teach same -o same.json --trees rounds=6,depth=4");
-    let is_kept = text.contains("no better than the given one");
-    assert!(is_kept || text.contains("is better"), "{text}");
-    let is_same = fs::read(at.join("same.json")).unwrap() == fs::read(at.join("ensemble.json")).unwrap();
-    assert_eq!(is_same, is_kept, "{text}");
-}
-
-#[test]
 fn what_does_not_go_together_is_named_and_nothing_is_written() {
     let at = &TAUGHT.folder();
     touches(&at.join("few/pot.txt"), 500_000, 12, 5);
-    touches(&at.join("shy/bowl.txt"), 100_000, 12, 5);
     fs::write(at.join("cup.txt"), "0 0.1 0.2\n0 0.1 -\n0 zero 0.2\n").unwrap();
     touches(&at.join("known/bowl.txt"), 170_000, 100, 5);
     fs::write(at.join("cup.csv"), "0 0.1 0.2\n").unwrap();
@@ -105,14 +73,13 @@ fn what_does_not_go_together_is_named_and_nothing_is_written() {
     fs::write(at.join("full.txt"), "0 0.1 0.2\n0 0.2 0.3\n".repeat(50)).unwrap();
     for (words, code, expected) in [
         ("train data --teach few -o t.json --trees rounds=2", 1, "only 12 recorded touches of pot are evidence"),
-        ("train data --teach shy -o t.json --trees rounds=2", 1, "only 12 recorded touches of bowl are evidence"),
         ("train data --teach cup.txt -o t.json", 1, "cup.txt:3: \"zero\" is not a number"),
         ("train data --teach cup.csv -o t.json", 1, "cup.csv: not a file of touches by its name"),
         ("train data --teach nowhere.txt -o t.json", 1, "nowhere.txt: cannot read"),
         ("train data --teach full.txt -o t.json --trees rounds=2", 1, "only full touches were recorded"),
         ("train data --teach pot.txt -o t.json --preset paper", 1, "a leaf of the ensemble holds one value"),
         ("train data --teach pot.txt --teach unseen -o t.json", 1, "pot was given twice"),
-        ("train data --teach known -o t.json --trees rounds=2 --page p.html", 2, "page is p.html"),
+        ("train data --teach known -o t.json --trees rounds=2", 1, "bowl is known already"),
         ("train --teach pot.txt -o t.json", 1, "there is only one object to train on"),
         ("train --teach pot.txt --teach known -o t.json --real noise=5ms", 2, "recorded ones have noise of their own"),
         ("train -o t.json", 2, "<DIRECTORY>"),
