@@ -12,7 +12,5 @@ pub use crate::locate::error::*;
 #[cfg(feature = "train")]
 pub use crate::teach::error::*;
 pub use crate::touches::error::*;
-#[cfg(feature = "train")]
-pub use crate::tune::error::*;
 pub use palpate_simulator::error::*;
 pub use palpate_trees::error::*;

@@ -70,7 +70,6 @@
 //! | `compare` | recorded with simulated touches, and what their difference costs | `compare::compare` |
 //! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
 //! | `teach` | objects that are learned from recorded touches | `teach::teach` |
-//! | `tune` | searches for the best model that fits a chip | `tune::tune` |
 //! | [`stream`] | verdicts of streams of rows, as early as a promised error rate allows | [`stream::calibrate`](fn@stream::calibrate) |
 //! | [`play`] | objects touched one approach after the other, and models that follow: the page of `palpate view --play` | [`play::Game`] |
 //! | [`locate`] | what an object on a table is and where it lies, for a hand that knows where it is | [`locate::learn`](fn@locate::learn) |
@@ -85,7 +84,7 @@
 //! | feature | default | what it adds |
 //! |---|---|---|
 //! | none | | simulator, compiler, evaluator |
-//! | `train` | yes | `ensemble::train`, `fit`, `compare`, `strangers`, `teach` and `tune` |
+//! | `train` | yes | `ensemble::train`, `fit`, `compare`, `strangers` and `teach` |
 //! | `objects` | yes | `mesh::builtin`: ten objects made from implicit functions. 21 crates more, through fidget |
 //! | `parquet` | yes | touches as Parquet. 11 crates more |
 //! | `mcap` | yes | touches and verdicts in robots' logs (MCAP). 21 crates more |
@@ -115,8 +114,6 @@ pub mod compare;
 
 #[cfg(feature = "train")]
 pub mod teach;
-#[cfg(feature = "train")]
-pub mod tune;
 
 #[cfg(feature = "train")]
 pub mod strangers;

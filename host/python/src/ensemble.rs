@@ -7,7 +7,7 @@ use crate::named::{descriptor_of, noise_of};
 use crate::work::{Callback, long};
 use numpy::ndarray::{Ix1, Ix2};
 use palpate::ensemble::import::{Options, PartTree, Parts};
-use palpate::ensemble::train::{self as library, Outputs, Settings, Small};
+use palpate::ensemble::train::{self as library, Outputs, Settings};
 use palpate::ensemble::{self, Inputs, Node, OverTouches, Probability, StatedProbe, Threshold};
 use palpate::error::{Error, EvaluateProblem};
 use palpate::rows::{Features, notes};
@@ -259,14 +259,12 @@ impl Ensemble {
 
 /// Trains an ensemble on a data set: gradient boosting with XGBoost's algorithm and parameters.
 ///
-/// `preset` is "compact" (30 trees with one leaf value per object, on curvature and slope) or "paper" (the published
-/// method); other arguments replace parts of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
+/// `preset` is "compact" (30 trees with one leaf value per object, on curvature and slope), "small" or "tiny" (half its bytes,
+/// or a fifth) or "paper" (the published method); other arguments replace parts of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
 /// `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
 /// approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
 /// With objects on a table each placement is an output, or with `outputs` "objects" each object.
 /// `background` is a data set of many other shapes, which stand for everything that the model does not know.
-/// `different_leaves` grows trees for little flash: their leaves share at most this many leaf vectors. A new threshold has
-/// to reduce the mean loss of a touch by `threshold_cost` nats (2e-5 by default).
 ///
 /// >>> import palpate
 /// >>> data = palpate.capture(["bowl", "mouse"], touches=300)
@@ -274,8 +272,7 @@ impl Ensemble {
 /// Ensemble(5 trees, curvature, 2 objects)
 #[pyo3::pyfunction]
 #[pyo3(signature = (data, *, preset="compact", descriptor=None, counted=None, rounds=None, depth=None, eta=None,
-    min_child_weight=None, bins=None, leaf_bits=None, different_leaves=None, threshold_cost=None, multi_output=None,
-    noise="", timer="", outputs="placements", background=None, seed=1, threads=None, progress=None))]
+    min_child_weight=None, bins=None, leaf_bits=None, multi_output=None, noise="", timer="", outputs="placements", background=None, seed=1, threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn train(
     py: Python<'_>,
@@ -289,8 +286,6 @@ pub(crate) fn train(
     min_child_weight: Option<f64>,
     bins: Option<usize>,
     leaf_bits: Option<u32>,
-    different_leaves: Option<usize>,
-    threshold_cost: Option<f64>,
     multi_output: Option<bool>,
     noise: &str,
     timer: &str,
@@ -302,22 +297,15 @@ pub(crate) fn train(
 ) -> Result<Ensemble, Failure> {
     let preset = match preset {
         "compact" => Settings::compact(),
+        "small" => Settings::small(),
+        "tiny" => Settings::tiny(),
         "paper" => Settings::paper(),
-        other => return Err(Error::setting("preset", other, "compact or paper").into()),
+        other => return Err(Error::setting("preset", other, "compact, small, tiny or paper").into()),
     };
     let descriptor = descriptor.map(descriptor_of);
     let counted = counted.map(|name| {
         let found = Counted::ALL.iter().copied().find(|counted| counted.name() == name);
         found.ok_or_else(|| Error::setting("counted", name, "full, contacts or all"))
-    });
-    if different_leaves.is_none()
-        && let Some(cost) = threshold_cost
-    {
-        return Err(Error::setting("threshold_cost", cost, "none without different_leaves").into());
-    }
-    let small = different_leaves.map(|leaves| {
-        let threshold_cost = threshold_cost.unwrap_or(Small::default().threshold_cost);
-        Small { leaves, threshold_cost }
     });
     let dataset = &data.get().dataset;
     let settings = with!(
@@ -330,7 +318,6 @@ pub(crate) fn train(
         min_child_weight = min_child_weight.unwrap_or(preset.min_child_weight),
         bins = bins.unwrap_or(preset.bins),
         leaf_bits = leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
-        small = small.or(preset.small),
         multi_output = multi_output.unwrap_or(preset.multi_output),
         noise = noise_of(noise, timer)?,
         outputs = match outputs {

@@ -1,4 +1,4 @@
-"""The Python of docs/guide/locate.md runs as it stands there, with a simulated robot."""
+"""The Python of the guides runs as it stands there; that of docs/guide/locate.md with a simulated robot."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import palpate
 import pytest
 
-GUIDE = Path(__file__).parents[3] / "docs" / "guide" / "locate.md"
+GUIDES = Path(__file__).parents[3] / "docs" / "guide"
 
 
 class Robot:
@@ -47,7 +47,9 @@ def cylinder() -> tuple[np.ndarray, np.ndarray]:
     return corners, np.vstack(sides + ends)
 
 
-def test_the_guide_locates_an_object(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A can and its lid in meshes/ of the current directory."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "meshes").mkdir()
     corners, faces = cylinder()
@@ -55,14 +57,39 @@ def test_the_guide_locates_an_object(tmp_path: Path, monkeypatch: pytest.MonkeyP
     (tmp_path / "meshes" / "can.obj").write_text("\n".join(lines) + "\n")
     flat = [f"v {x / 10} {y / 10} {z / 30}" for x, y, z in corners] + lines[len(corners) :]
     (tmp_path / "meshes" / "lid.obj").write_text("\n".join(flat) + "\n")
-    blocks = re.findall(r"^```python guide\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+
+
+def followed(guide: str, **given: object) -> dict[str, object]:
+    """The names that the Python of a guide leaves."""
+    path = GUIDES / guide
+    blocks = re.findall(r"^```python guide\n(.*?)^```", path.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
     assert blocks
-    names: dict[str, object] = {"robot": Robot()}
     for block in blocks:
-        exec(compile(block, str(GUIDE), "exec"), names)
+        exec(compile(block, str(path), "exec"), given)
+    return given
+
+
+@pytest.mark.usefixtures("meshes")
+def test_the_guide_locates_an_object() -> None:
+    names = followed("locate.md", robot=Robot())
     locator = names["locator"]
     assert isinstance(locator, palpate.Locator)
     located = locator.located
     mode = located.placed
     assert located.object == "can" and mode is not None and located.touches < 25
     assert abs(mode.x - Robot.place[0]) < 3 and abs(mode.y - Robot.place[1]) < 3
+
+
+@pytest.mark.usefixtures("meshes")
+def test_a_loop_over_settings_finds_a_small_model(tmp_path: Path) -> None:
+    names = followed("small.md")
+    smallest = names["smallest"]
+    assert isinstance(smallest, palpate.Model) and smallest.leaf == "i8"
+    assert palpate.Model.load(tmp_path / "small.palpate").to_bytes() == smallest.to_bytes()
+
+
+@pytest.mark.usefixtures("meshes")
+def test_a_loop_over_probes_finds_one_that_needs_few_approaches() -> None:
+    names = followed("real-probe.md")
+    best, approaches = names["best"], names["approaches"]
+    assert isinstance(best, palpate.Probe) and callable(approaches) and 1 < approaches(best) < 100

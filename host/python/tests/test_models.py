@@ -141,14 +141,12 @@ def test_the_same_seed_trains_the_same_model(touches: palpate.DataSet) -> None:
     assert other.to_bytes() != one.to_bytes()
 
 
-def test_few_different_leaves_make_a_smaller_model(touches: palpate.DataSet) -> None:
-    options = {"rounds": 30, "depth": 5, "min_child_weight": 1.0}
-    plain = palpate.compile(palpate.train(touches, **options), leaf="i8", goal="size")
-    few = palpate.train(touches, leaf_bits=8, different_leaves=16, threshold_cost=1e-4, **options)
-    small = palpate.compile(few, leaf="i8", goal="size")
-    assert len(small.to_bytes()) < len(plain.to_bytes())
-    with pytest.raises(palpate.SettingError, match="threshold_cost"):
-        palpate.train(touches, threshold_cost=1e-4)
+def test_smaller_presets_make_smaller_models(touches: palpate.DataSet) -> None:
+    trained = [palpate.train(touches, preset=preset) for preset in ("compact", "small", "tiny")]
+    sizes = [len(palpate.compile(ensemble, leaf="i8").to_bytes()) for ensemble in trained]
+    assert sizes[0] > sizes[1] > sizes[2]
+    with pytest.raises(palpate.SettingError, match="compact, small, tiny or paper"):
+        palpate.train(touches, preset="large")
 
 
 def test_placements_on_a_table_are_outputs_and_a_verdict_names_one_with_its_share() -> None:

@@ -6,13 +6,11 @@ use crate::compare::{self, compare};
 use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::train::{self, Outputs, train};
 use crate::ensemble::{Ensemble, StatedProbe, TouchOrigin};
-use crate::error::{CalibrateProblem, EvaluateProblem, ProbeProblem, TeachProblem};
+use crate::error::{CalibrateProblem, EvaluateProblem, ProbeProblem};
 use crate::evaluate::{Candidate, Margins, SequentialSettings, parity};
 use crate::mesh::{Mesh, Object};
-use crate::strangers;
 use crate::teach;
 use crate::touches::{Dataset, ObjectTouches, Origin, Recorded, Source, Surroundings};
-use crate::tune;
 use palpate_shared::Descriptor;
 
 /// Touches of two objects that lie in several ways and of one that lies in one.
@@ -107,17 +105,6 @@ fn names_are_of_objects_and_placements_are_named_beside_them() {
     let single = self::compiled(&trained(Outputs::Objects));
     let names = single.names();
     assert_eq!(tested.matching(&names).names(), names);
-}
-
-#[test]
-fn a_tuned_model_has_an_output_for_each_placement() {
-    let dataset = touched(1, 1_500);
-    let settings =
-        tune::Settings { descriptor: Descriptor::Gravity, max_bytes: Some(24 << 10), groups: 60, ..Default::default() };
-    let tuned = tune::tune(&dataset, &settings, &()).unwrap();
-    assert_eq!(tuned.ensemble.objects, dataset.placement_shares().into_keys().collect::<Vec<_>>());
-    let model = compile::open(&tuned.model).unwrap();
-    assert_eq!(model.outputs().unwrap().most(), 2);
 }
 
 #[test]
@@ -334,21 +321,6 @@ fn a_promise_for_a_table_is_tested_on_recordings_with_and_without_placements() {
 }
 
 #[test]
-fn a_test_for_strangers_is_calibrated_on_recordings_that_state_no_placement() {
-    let compiled = compiled(&trained(Outputs::Placements));
-    let model = compiled.model();
-    let simulated = touched(2, 30_000).matching(&compiled.names());
-    let settings = strangers::Settings::default();
-    for is_stated in [true, false] {
-        let recorded = recorded(&touched(5, 6_000), is_stated).matching(&compiled.names());
-        let found = strangers::calibrate_recorded(&model, &simulated, &recorded, &[], &settings).unwrap();
-        let on = found.recorded.unwrap();
-        assert!(on.sequences > 30 && on.supported >= 0.02, "{on:?}");
-        assert_eq!(on.before.objects.keys().cloned().collect::<Vec<_>>(), recorded.names());
-    }
-}
-
-#[test]
 fn recordings_are_compared_with_the_placements_that_they_may_be_of() {
     let simulated = touched(1, 9_000);
     let settings = compare::Settings { descriptor: Descriptor::Gravity, groups: 100, ..Default::default() };
@@ -366,26 +338,4 @@ fn recordings_are_compared_with_the_placements_that_they_may_be_of() {
         assert!(at >= 20 && loss.abs() < 0.06, "{cost:?}");
         assert!(cost.confused.iter().all(|pair| !pair.named.contains('/')), "{cost:?}");
     }
-}
-
-#[test]
-fn a_model_of_placements_is_adjusted_only_to_recordings_that_state_theirs() {
-    let known = touched(1, 2_000);
-    let settings = train::Settings {
-        descriptor: Descriptor::Gravity,
-        rounds: 6,
-        multi_output: true,
-        ..train::Settings::compact()
-    };
-    let ensemble = train(&known, &settings, &()).unwrap();
-    let how = teach::Settings { groups: 40, ..teach::Settings::default() };
-    let bricks = |is_stated| recorded(&touched(5, 900), is_stated).only(|name| name == "brick");
-    let error = teach::adjust(&ensemble, &known, &bricks(false), &how, &()).unwrap_err();
-    let problem = TeachProblem::NoPlacement { object: "brick".into() };
-    assert_eq!(error.problem::<TeachProblem>(), Some(&problem), "{error}");
-    let (_, adjusted) = teach::adjust(&ensemble, &known, &bricks(true), &how, &()).unwrap();
-    assert!(adjusted.objects.iter().all(|object| object.name.starts_with("brick/")), "{adjusted:?}");
-    // Nor is it another object.
-    let error = teach::teach(&ensemble, &known, &bricks(false), &how, &()).unwrap_err();
-    assert!(matches!(error.problem(), Some(TeachProblem::Known { .. })), "{error}");
 }

@@ -12,11 +12,11 @@ pub(crate) use palpate::onboard::{Model, Recognizer, Stopping, Verdict};
 pub(crate) use palpate::probe::approach::Probe;
 pub(crate) use palpate::probe::noise::Noise;
 pub(crate) use palpate::random::{Purpose, generator};
-pub(crate) use palpate::shared::format::{Counted, Held, Length, Per};
+pub(crate) use palpate::shared::format::{Counted, Length, Per};
 pub(crate) use palpate::shared::{ContactTime, Descriptor, Pose, Q15_ONE, Touch};
 pub(crate) use palpate::touches::{Dataset, ObjectTouches, Origin, Recorded, Source, Surroundings};
 pub(crate) use palpate::with;
-pub(crate) use std::collections::{BTreeMap, BTreeSet};
+pub(crate) use std::collections::BTreeMap;
 pub(crate) use std::path::Path;
 pub(crate) use std::sync::LazyLock;
 

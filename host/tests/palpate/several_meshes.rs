@@ -13,7 +13,7 @@ use palpate::ensemble::train::{self, train};
 use palpate::error::Result;
 use palpate::evaluate::{self, Evaluation, Sequential};
 use palpate::touches::folds;
-use palpate::{strangers, teach, tune};
+use palpate::{strangers, teach};
 
 /// The instances of each object: none is like the others of its object, and some are nearer to another object's.
 const KINDS: [&[usize]; 3] = [&[5, 8], &[28, 39], &[15, 24]];
@@ -164,7 +164,7 @@ fn promises_are_kept_where_objects_have_several_meshes() {
         let shapes = synthetic::dataset(&[400; 30], 5).objects;
         let terms = with!(promise(Per::Average, seed), rate = LARGER_RATE);
         let (model, other) = (MODEL.model(), touches(16_000, 2_000 + seed));
-        let tested = strangers::calibrate_with_promise(&model, &other, None, &shapes, &settings, &terms, &());
+        let tested = strangers::calibrate_with_promise(&model, &other, &shapes, &settings, &terms, &());
         let tested = promised(tested).map(|(tested, _)| ends(&tested.model));
         broken[2] += u64::from(tested.is_some_and(|[unknown, _]| unknown > settings.alarms));
         broken[3] += u64::from(tested.is_some_and(|[_, wrong]| wrong > LARGER_RATE));
@@ -208,13 +208,11 @@ fn what_calibrations_count_is_what_fresh_touches_give() {
     let given = (average.sequences as f64) * (1.0 - average.undecided);
     Share::of(average.error, given).agrees("calibrate, wrong names", Share::of(wrong, 2_000.0));
     let model = compile::open(&average.model).unwrap();
-    for held in [Held::Likely, Held::Certain] {
-        let settings = with!(strangers::Settings::default(), held, sequences = 1_500);
-        let tested = strangers::calibrate(&model, &touches(12_000, 4), &[], &settings).unwrap();
-        let sequences = f64::from(tested.terms.sequences);
-        let stated = Share::of(tested.alarms as f64 / sequences, sequences);
-        stated.agrees("calibrate --strangers, false alarms", Share::of(ends(&tested.bytes)[0], 1_000.0));
-    }
+    let settings = with!(strangers::Settings::default(), sequences = 1_500);
+    let tested = strangers::calibrate(&model, &touches(12_000, 4), &[], &settings).unwrap();
+    let sequences = f64::from(tested.terms.sequences);
+    let stated = Share::of(tested.alarms as f64 / sequences, sequences);
+    stated.agrees("calibrate --strangers, false alarms", Share::of(ends(&tested.bytes)[0], 1_000.0));
 }
 
 #[test]
@@ -241,20 +239,6 @@ fn figures_of_a_part_of_the_touches_are_those_of_fresh_ones() {
     let [stated, ..] = measured(candidate, &noisy);
     let [measured, ..] = measured(candidate, &other);
     Share(stated.0, 0.04).agrees("with noise, accuracy", Share(measured.0, 0.02));
-}
-
-#[test]
-fn what_tune_states_is_what_its_model_does() {
-    let settings = with!(tune::Settings::default(), error_rate = 0.2, groups = 300);
-    let tuned = tune::tune(&touches(10_000, 6), &settings, &()).unwrap();
-    let model = compile::open(&tuned.model).unwrap();
-    let tested = touches(1_000, 6);
-    let fresh = measured(Candidate::Compiled(&model), &FRESH);
-    agree("tune", figures(&tuned.test, &tested), fresh);
-    let calibration = tuned.calibration.ok_or(tuned.uncalibrated).unwrap();
-    let given = calibration.sequences as f64 * (1.0 - calibration.undecided);
-    let promised = Share::of(calibration.promised, given);
-    assert!(fresh[1].0 <= promised.0 + 3.0 * promised.1.hypot(fresh[1].1), "{promised:?} promised, {:?}", fresh[1]);
 }
 
 #[test]

@@ -9,7 +9,7 @@
 //! Times are the least of rounds in which the choices of a kind take turns, on one thread: others were disturbed.
 
 use palpate::capture::{self, Settings as Capture};
-use palpate::compile::{self, Compiled, Layout, Leaf, compile};
+use palpate::compile::{self, Compiled, Leaf, compile};
 use palpate::ensemble::Ensemble;
 use palpate::ensemble::train::{self, train};
 use palpate::error::Result;
@@ -43,7 +43,6 @@ fn main() -> Result<()> {
     };
     let (trained, test) = (dataset(1)?, dataset(2)?);
     leaves(rounds, &trained, &test)?;
-    tables(rounds, &trained, &test)?;
     exponentials(rounds);
     Ok(())
 }
@@ -137,24 +136,10 @@ fn models(rounds: usize, models: &[(String, &Ensemble, Compiled)], test: &Datase
 fn leaves(rounds: usize, trained: &Dataset, test: &Dataset) -> Result<()> {
     let ensemble = train(trained, &with!(train::Settings::compact(), leaf_bits = None), &())?;
     let compiled = [Leaf::F32, Leaf::I16, Leaf::I8].map(|leaf| {
-        let settings = with!(compile::Settings::default(), leaf, layout = Some(Layout::Complete));
+        let settings = with!(compile::Settings::default(), leaf);
         Ok((format!("leaves as {}", leaf.name()), &ensemble, compile(&ensemble, &settings)?))
     });
     models(rounds, &compiled.into_iter().collect::<Result<Vec<_>>>()?, test)
-}
-
-/// Sizes of tables compared.
-fn tables(rounds: usize, trained: &Dataset, test: &Dataset) -> Result<()> {
-    let ensembles = [16, 32, 64, 128, 256].map(|bins| {
-        let settings = with!(train::Settings::compact(), feature_bins = Some(vec![bins; 2]), leaf_bits = None);
-        Ok((bins, train(trained, &settings, &())?))
-    });
-    let ensembles = ensembles.into_iter().collect::<Result<Vec<_>>>()?;
-    let compiled = ensembles.iter().map(|(bins, ensemble)| {
-        let settings = with!(compile::Settings::default(), leaf = Leaf::I8, layout = Some(Layout::Grid));
-        Ok((format!("table of {bins} × {bins} bins, i8"), ensemble, compile(ensemble, &settings)?))
-    });
-    models(rounds, &compiled.collect::<Result<Vec<_>>>()?, test)
 }
 
 /// The exponential of evidence, over -20 to 0 nats.

@@ -1,6 +1,6 @@
 //! `palpate completions`: the parser's scripts, which also complete keys and values of options.
 
-use super::{Global, design, maps, trees};
+use super::{Global, maps, trees};
 use clap_complete::Shell;
 use palpate::Result;
 use palpate::compile::code::Form;
@@ -51,7 +51,6 @@ fn options() -> Vec<(&'static str, Vec<String>)> {
     vec![
         ("maps", keys(maps::keys().collect())),
         ("real", keys(PartialNoise::KEYS.into())),
-        ("search", keys(design::KEYS.into())),
         ("trees", keys(trees::keys().collect())),
         ("layout", values(Layout::ALL.iter().map(|layout| layout.name()).chain(goals).collect())),
         ("leaf", values(Leaf::ALL.iter().map(|leaf| leaf.name()).collect())),
@@ -61,7 +60,7 @@ fn options() -> Vec<(&'static str, Vec<String>)> {
 }
 
 /// Commands that touch or show objects.
-const TOUCH: &str = "run report capture view design fit objects";
+const TOUCH: &str = "run report capture view fit objects";
 
 /// Names of objects that need no file.
 fn objects() -> String {

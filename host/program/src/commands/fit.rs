@@ -1,4 +1,4 @@
-//! `palpate probe fit`.
+//! `palpate probe`, and `palpate probe fit`.
 
 use super::numbers::count;
 use super::probe::{IN_MILLIMETERS, SizeArguments, refuse_unstated};
@@ -18,6 +18,19 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
+#[command(arg_required_else_help = true, subcommand_required = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Measure how your probe differs from the ideal, from its touches
+    Fit(Box<FitArguments>),
+}
+
+#[derive(clap::Args)]
 #[command(after_help = "\
 RECORDED is a data set that your probe made, of objects whose meshes you have, matched by their names. The probe that explains the recorded touches best is written: how fast it really is, how late each finger touches, its noise, what it misses, its timer. `palpate capture --probe probe.toml` then gives touches as it would.
 
@@ -34,7 +47,7 @@ Examples:
       --true-size mm
   palpate probe fit presses.txt -o fitted.toml --probe hand.toml
   palpate probe fit recorded meshes/ -o probe.toml --scene table")]
-pub(super) struct FitArguments {
+struct FitArguments {
     /// The recorded touches: a directory with a file for each object; or, without SOURCE, a file of presses on a bare table
     #[arg(value_name = "RECORDED")]
     recorded: PathBuf,
@@ -56,7 +69,12 @@ pub(super) struct FitArguments {
     scene: SceneArguments,
 }
 
-pub(super) fn run(arguments: &FitArguments, global: &Global) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Command::Fit(arguments) = arguments.command;
+    run_fit(&arguments, global)
+}
+
+fn run_fit(arguments: &FitArguments, global: &Global) -> Result<()> {
     let inputs = super::files_of(&arguments.recorded).into_iter().chain(arguments.plate.clone());
     output::admit(&arguments.output, inputs)?;
     if arguments.sources.is_empty() {

@@ -5,7 +5,6 @@ mod capture;
 mod chips;
 mod completions;
 mod data;
-mod design;
 mod evaluate;
 mod expected;
 mod export;
@@ -40,7 +39,6 @@ mod teach;
 mod thresholds;
 mod train;
 mod trees;
-mod tune;
 mod unstated;
 mod verify;
 mod view;
@@ -85,8 +83,6 @@ commands! {
     Calibrate => calibrate,
     /// Measure how often a model is right, and after how many touches
     Evaluate => evaluate,
-    /// Find the best model that fits a chip
-    Tune => tune,
     /// Compare a compiled model with what it was exported from
     Verify => verify,
     /// Recognize objects from a stream of touches
@@ -101,8 +97,8 @@ commands! {
     View => view,
     /// Check, compare and record data sets of touches; write built-in objects
     Data => data,
-    /// Find the probe to build for your objects, and how yours differs from the ideal
-    Probe => design,
+    /// Measure how your probe differs from the ideal
+    Probe => fit,
     /// Print a script that completes this program's commands and options in a shell
     #[command(hide = true)]
     Completions => completions,
@@ -208,8 +204,8 @@ fn remark(text: &str) {
 /// The commands as the program's help lists them.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Everything at once", &["run", "report"]),
-    ("Step by step", &["capture", "train", "export", "calibrate", "evaluate", "tune", "recognize"]),
-    ("A real probe", &["probe design", "probe fit", "data record", "data check", "link"]),
+    ("Step by step", &["capture", "train", "export", "calibrate", "evaluate", "recognize"]),
+    ("A real probe", &["probe fit", "data record", "data check", "link"]),
     ("Models from elsewhere", &["export", "verify"]),
     ("Look", &["inspect", "view", "data objects"]),
 ];

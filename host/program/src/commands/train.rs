@@ -11,7 +11,7 @@ use palpate::evaluate::{self, CostOfNoise};
 use palpate::mesh::BACKGROUND;
 use palpate::output;
 use palpate::probe::noise::Noise;
-use palpate::teach::{self, Adjusted, Taught};
+use palpate::teach::{self, Taught};
 use palpate::touches::{Dataset, ObjectTouches};
 use palpate::with;
 use palpate::wording::{count, decimal, percent};
@@ -27,18 +27,17 @@ use std::time::Instant;
 #[command(after_help = "\
 From touches with a position (capture --position) it makes a model of maps, ready for calibrate and recognize. The ensemble is XGBoost's JSON. Its features are in microseconds, where data sets have seconds, and cosines in units of 1/32767.
 
-Presets: compact is small and accurate (leaves hold a value per object; curvature), paper the published method (one tree per object and round; contact times). Keys of --trees: rounds, depth, eta, min_child_weight, bins, leaves, leaf_bits, different_leaves, threshold_cost, trainer; docs/reference/options.md explains them, --teach and --evidence.
+Presets: compact is accurate (leaves hold a value per object; curvature), small takes half its bytes, tiny a fifth; paper is the published method (one tree per object and round; contact times). Keys of --trees: rounds, depth, eta, min_child_weight, bins, leaves, leaf_bits, trainer; docs/reference/options.md explains them, --teach and --evidence.
 
 Examples:
   palpate train data -o ensemble.json
   palpate train data -o paper.json --preset paper
-  palpate train data -o small.json --trees rounds=20,depth=5
-  palpate train data -o table.json --trees bins=64/16
-  palpate train data -o tiny.json --trees different_leaves=128,leaf_bits=8
+  palpate train data -o small.json --preset small
+  palpate train data -o trees.json --trees rounds=20,depth=5
   palpate train data -o robust.json --real noise=0..10ms,timer=1ms
   palpate train approaches -o all.json --evidence all
   palpate train approaches -o wary.json --background shapes
-  palpate train approaches -o taught.json --teach pot.txt --page pot.html
+  palpate train approaches -o taught.json --teach pot.txt
   palpate train located -o maps.palpate --maps cell=2mm
   palpate train located -o maps.palpate --teach pot.txt
   palpate train --teach recorded -o own.json")]
@@ -54,7 +53,7 @@ pub(crate) struct Arguments {
     /// Touches of many other shapes; they train a column for what the model does not know
     #[arg(long, value_name = "DIR")]
     background: Option<PathBuf>,
-    /// Preset that the settings start from: compact or paper [default: compact]
+    /// Preset that the settings start from: compact, small, tiny or paper [default: compact]
     #[arg(long, value_parser = preset, value_name = "NAME")]
     preset: Option<Preset>,
     /// Features of a touch: times, curvature, gravity or oriented [default: the preset's]
@@ -81,6 +80,8 @@ pub(crate) struct Arguments {
 #[derive(Clone, Copy)]
 enum Preset {
     Compact,
+    Small,
+    Tiny,
     Paper,
 }
 
@@ -102,9 +103,6 @@ struct Trained<'m> {
     /// Results of teaching from recorded touches.
     #[serde(skip_serializing_if = "Option::is_none")]
     taught: Option<&'m Taught>,
-    /// Results of adjusting to recorded touches of known objects.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    adjusted: Option<&'m Adjusted>,
 }
 
 /// The noise whose cost is given, in microseconds: what a good switch and a timer add.
@@ -115,7 +113,6 @@ struct Made {
     ensemble: Ensemble,
     dataset: Dataset,
     taught: Option<Taught>,
-    adjusted: Option<Adjusted>,
     /// True if it was trained here, on simulated touches without noise.
     is_clean: bool,
     settings: Settings,
@@ -125,7 +122,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let read = arguments.directory.iter().flat_map(|directory| super::files_of(directory));
     let read: Vec<PathBuf> = read.chain(arguments.teach.files()).collect();
     output::admit(&arguments.output, &read)?;
-    arguments.teach.page.iter().try_for_each(|page| output::admit(page, &read))?;
     let start = Instant::now();
     let recorded = arguments.teach.read()?;
     let dataset = arguments.directory.as_deref().map(super::dataset).transpose()?;
@@ -147,17 +143,15 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         (Some((dataset, directory)), recorded) => simulated(&arguments, global, directory, dataset, recorded.as_ref())?,
         (None, recorded) => alone(&arguments, global, recorded.unwrap_or_default())?,
     };
-    arguments.teach.check_page(made.taught.as_ref())?;
     let seconds = start.elapsed().as_secs_f64();
     made.ensemble.save(&arguments.output)?;
-    arguments.teach.write_page(made.taught.as_ref())?;
     let trained = Trained::new(&made, seconds)?;
     global.print_about(&arguments.output, &trained, || text(&arguments.output, &trained, &made))
 }
 
 impl<'m> Trained<'m> {
     fn new(made: &'m Made, seconds: f64) -> Result<Self> {
-        let Made { ensemble, dataset, taught, adjusted, is_clean, settings } = made;
+        let Made { ensemble, dataset, taught, is_clean, settings } = made;
         let evidence = ensemble.trained_touches();
         let is_used = |touch: &&Touch| Refused::check(&evidence, touch).is_ok();
         let nodes: usize = ensemble.trees.iter().map(|tree| tree.nodes.len()).sum();
@@ -175,7 +169,6 @@ impl<'m> Trained<'m> {
             leaves: nodes - splits,
             seconds,
             taught: taught.as_ref(),
-            adjusted: adjusted.as_ref(),
             cost_of_noise: match is_clean {
                 true => evaluate::cost_of_noise(dataset, settings, &Noise::gaussian(SWITCH))?,
                 false => None,
@@ -205,16 +198,13 @@ fn text(output: &Path, trained: &Trained<'_>, made: &Made) -> String {
     );
     // A remark, not a result.
     let cost = if super::is_quiet() { String::new() } else { cost(trained, made.is_clean) };
-    text + &cost
-        + &trained.adjusted.map_or_else(String::new, super::teach::adjusted)
-        + &trained.taught.map_or_else(String::new, super::teach::text)
+    text + &cost + &trained.taught.map_or_else(String::new, super::teach::text)
 }
 
 /// Trains maps on touches with a position, without the options of trees.
 fn maps(arguments: &Arguments, simulated: Option<Dataset>, recorded: Option<Dataset>, global: &Global) -> Result<()> {
     let of_trees = [
         ("extend", arguments.teach.extend.is_some()),
-        ("page", arguments.teach.page.is_some()),
         ("background", arguments.background.is_some()),
         ("preset", arguments.preset.is_some()),
         ("descriptor", arguments.descriptor.is_some()),
@@ -265,7 +255,7 @@ fn simulated(
     let is_placed = !dataset.placement_shares().is_empty();
     let is_clean = recorded.is_none() && !is_placed && dataset.real().and(&settings.noise).is_none();
     let Some(recorded) = recorded else {
-        return Ok(Made { ensemble, dataset, taught: None, adjusted: None, is_clean, settings });
+        return Ok(Made { ensemble, dataset, taught: None, is_clean, settings });
     };
     let mut known = dataset.clone();
     if let Some(background) = background {
@@ -274,25 +264,8 @@ fn simulated(
     // An ensemble that is there states what it was trained for.
     let noise = arguments.teach.extend.is_none().then_some(settings.noise);
     let how = with!(teaching(&settings), noise);
-    // An output is an object, or a placement of one.
-    let is_of = |own: &str, name: &str| own == name || own.rsplit_once('/').is_some_and(|(object, _)| object == name);
-    let [old, new] = [true, false]
-        .map(|is_known| recorded.only(|name| ensemble.objects.iter().any(|own| is_of(own, name)) == is_known));
-    let (ensemble, adjusted) = match old.objects.is_empty() {
-        true => (ensemble, None),
-        false => {
-            let (ensemble, adjusted) = teach::adjust(&ensemble, &known, &old, &how, &Bar::new())?;
-            (ensemble, Some(adjusted))
-        }
-    };
-    let (ensemble, taught) = match new.objects.is_empty() && adjusted.is_some() {
-        true => (ensemble, None),
-        false => {
-            let (ensemble, taught) = teach::teach(&ensemble, &known, &new, &how, &Bar::new())?;
-            (ensemble, Some(taught))
-        }
-    };
-    Ok(Made { ensemble, dataset, taught, adjusted, is_clean, settings })
+    let (ensemble, taught) = teach::teach(&ensemble, &known, recorded, &how, &Bar::new())?;
+    Ok(Made { ensemble, dataset, taught: Some(taught), is_clean, settings })
 }
 
 /// Trains on recorded touches alone.
@@ -312,7 +285,7 @@ fn alone(arguments: &Arguments, global: &Global, recorded: Dataset) -> Result<Ma
     let probe = arguments.probe.of_dataset(file.as_ref(), &recorded)?;
     let settings = with!(arguments.settings(global, &recorded), probe, noise = Noise::default());
     let (ensemble, taught) = teach::alone(&recorded, &settings, &teaching(&settings), &Bar::new())?;
-    Ok(Made { ensemble, dataset: recorded, taught: Some(taught), adjusted: None, is_clean: false, settings })
+    Ok(Made { ensemble, dataset: recorded, taught: Some(taught), is_clean: false, settings })
 }
 
 /// Settings for teaching objects to an ensemble of such a training.
@@ -356,6 +329,8 @@ impl Arguments {
         };
         let preset = match self.preset.unwrap_or(Preset::Compact) {
             Preset::Compact => Settings::compact_for(self.descriptor.unwrap_or(Descriptor::Curvature), outputs),
+            Preset::Small => Settings::small(),
+            Preset::Tiny => Settings::tiny(),
             Preset::Paper => Settings::paper(),
         };
         let settings = with!(
@@ -374,8 +349,10 @@ impl Arguments {
 fn preset(name: &str) -> Result<Preset, String> {
     match name {
         "compact" => Ok(Preset::Compact),
+        "small" => Ok(Preset::Small),
+        "tiny" => Ok(Preset::Tiny),
         "paper" => Ok(Preset::Paper),
-        _ => Err("use compact or paper".into()),
+        _ => Err("use one of compact, small, tiny, paper".into()),
     }
 }
 

@@ -1,6 +1,6 @@
 //! The option for how trees are grown: `rounds=100,depth=6,eta=0.3`.
 
-use palpate::ensemble::train::{Engine, Settings, Small};
+use palpate::ensemble::train::{Engine, Settings};
 use palpate::with;
 use std::str::FromStr;
 
@@ -11,27 +11,22 @@ pub(crate) struct Trees {
     depth: Option<usize>,
     eta: Option<f64>,
     min_child_weight: Option<f64>,
-    /// One number for all features, or one for each.
-    bins: Vec<usize>,
+    bins: Option<usize>,
     multi_output: Option<bool>,
     /// 0 leaves leaves as they are.
     leaf_bits: Option<u32>,
-    different_leaves: Option<usize>,
-    threshold_cost: Option<f64>,
     trainer: Option<Engine>,
 }
 
 /// Keys, and what each takes.
-const KEYS: [(&str, &str); 10] = [
+const KEYS: [(&str, &str); 8] = [
     ("rounds", "a number such as 30"),
     ("depth", "a number such as 6"),
     ("eta", "a number such as 0.3"),
     ("min_child_weight", "a number such as 30"),
-    ("bins", "a number such as 256, or one for each feature such as 64/16"),
+    ("bins", "a number such as 256"),
     ("leaves", "each (a value for each object) or one (each object has its own trees)"),
     ("leaf_bits", "a number of bits such as 16, or 0 to leave leaves as they are"),
-    ("different_leaves", "a number such as 128"),
-    ("threshold_cost", "a number such as 2e-5, with different_leaves"),
     ("trainer", "palpate or xgboost"),
 ];
 
@@ -50,10 +45,7 @@ impl FromStr for Trees {
             let wanted = KEYS.iter().find(|own| own.0 == key).map_or("", |own| own.1);
             trees.set(key, value).ok_or_else(|| format!("{key} is {value:?}; use {wanted}"))?;
         }
-        match trees.threshold_cost.is_some() && trees.different_leaves.is_none() {
-            true => Err("threshold_cost is given; use it with different_leaves".into()),
-            false => Ok(trees),
-        }
+        Ok(trees)
     }
 }
 
@@ -64,11 +56,9 @@ impl Trees {
             "depth" => self.depth = Some(value.parse().ok()?),
             "eta" => self.eta = Some(value.parse().ok()?),
             "min_child_weight" => self.min_child_weight = Some(value.parse().ok()?),
-            "bins" => self.bins = value.split('/').map(|bins| bins.trim().parse().ok()).collect::<Option<_>>()?,
+            "bins" => self.bins = Some(value.parse().ok()?),
             "leaves" => self.multi_output = Some(choice(value, [("each", true), ("one", false)])?),
             "leaf_bits" => self.leaf_bits = Some(value.parse().ok()?),
-            "different_leaves" => self.different_leaves = Some(value.parse().ok()?),
-            "threshold_cost" => self.threshold_cost = Some(value.parse().ok()?),
             _ => self.trainer = Some(choice(value, [("palpate", Engine::Palpate), ("xgboost", Engine::Xgboost)])?),
         }
         Some(())
@@ -83,13 +73,8 @@ impl Trees {
             depth = self.depth.unwrap_or(preset.depth),
             eta = self.eta.unwrap_or(preset.eta),
             min_child_weight = self.min_child_weight.unwrap_or(preset.min_child_weight),
-            bins = if let [bins] = self.bins[..] { bins } else { preset.bins },
-            feature_bins = (self.bins.len() > 1).then(|| self.bins.clone()),
+            bins = self.bins.unwrap_or(preset.bins),
             leaf_bits = self.leaf_bits.map_or(preset.leaf_bits, |bits| (bits > 0).then_some(bits)),
-            small = self.different_leaves.map(|leaves| {
-                let threshold_cost = self.threshold_cost.unwrap_or(Small::default().threshold_cost);
-                Small { leaves, threshold_cost }
-            }),
             trainer = self.trainer.unwrap_or(preset.trainer)
         )
     }
@@ -110,12 +95,9 @@ mod tests {
         let preset = Settings::compact;
         let all = set("rounds=7,depth=3,eta=0.5,min-child-weight=2,bins=64,leaves=one,leaf_bits=8,trainer=xgboost");
         assert_eq!((all.rounds, all.depth, all.eta, all.min_child_weight), (7, 3, 0.5, 2.0));
-        assert_eq!((all.bins, all.feature_bins, all.multi_output, all.leaf_bits), (64, None, false, Some(8)));
+        assert_eq!((all.bins, all.multi_output, all.leaf_bits), (64, false, Some(8)));
         assert_eq!(all.descriptor, preset().descriptor);
-        assert_eq!(set("bins=64/16").feature_bins, Some(vec![64, 16]));
-        assert_eq!((set("bins=64/16").bins, set("leaf_bits=0").leaf_bits), (preset().bins, None));
-        assert_eq!(set("different_leaves=128").small.unwrap().threshold_cost, Small::default().threshold_cost);
-        assert_eq!(set("different_leaves=128,threshold_cost=1e-4").small.unwrap().threshold_cost, 1e-4);
+        assert_eq!((set("leaf_bits=0").bins, set("leaf_bits=0").leaf_bits), (preset().bins, None));
         assert_eq!((set("depth=3").rounds, set("depth=3").depth), (preset().rounds, 3));
     }
 
@@ -125,11 +107,11 @@ mod tests {
             ("", "\"\" is not a setting of trees; use rounds=30,depth=6"),
             ("rounds", "rounds is \"\"; use a number"),
             ("rounds=-1", "rounds is \"-1\"; use a number such as 30"),
-            ("bins=64/", "bins is \"64/\"; use a number such as 256, or one for each feature such as 64/16"),
+            ("bins=64/16", "bins is \"64/16\"; use a number such as 256"),
             ("leaves=two", "leaves is \"two\"; use each"),
             ("gamma=1", "\"gamma=1\" is not a setting of trees"),
             ("depth=3,depth=4", "depth is given twice"),
-            ("threshold_cost=1", "threshold_cost is given; use it with different_leaves"),
+            ("different_leaves=128", "\"different_leaves=128\" is not a setting of trees"),
             ("trainer=lightgbm", "trainer is \"lightgbm\"; use palpate or xgboost"),
         ] {
             let error = text.parse::<Trees>().unwrap_err();

@@ -5,7 +5,6 @@ mod cast;
 mod chip;
 mod compiled;
 mod data;
-mod design;
 mod fit;
 mod fixtures;
 mod formats;

@@ -1,4 +1,4 @@
-//! The commands that make and measure models, as a user calls them: train, tune, evaluate, calibrate.
+//! The commands that make and measure models, as a user calls them: train, evaluate, calibrate.
 
 use crate::fixtures::{BOWL_AND_FORK, CALIBRATED, boxes};
 use crate::{Folder, cut, fails, figures, parts_are_all_bytes, read, says, shapes, succeeds};
@@ -53,40 +53,16 @@ fn training_says_what_a_millisecond_of_noise_would_cost_and_an_ensemble_states_i
 }
 
 #[test]
-fn trees_of_few_different_leaves_make_a_smaller_model_that_is_exact() {
+fn smaller_presets_make_smaller_models_that_are_exact() {
     let at = &BOWL_AND_FORK.folder();
-    let export = |more: &str| {
-        succeeds(at, &format!("train data -o e.json --trees rounds=10,leaf_bits=8{more}"));
-        figures(at, "export e.json -o m.palpate --leaf i8 --layout size")
-    };
-    let usual = export("");
-    let small = export(",different_leaves=16");
-    let dear = export(",different_leaves=16,threshold_cost=0.01");
-    let number = |exported: &Value, key: &str| exported[key].as_f64().unwrap();
-    assert!(number(&small, "shared_leaves") <= 16.0 && number(&small, "margin_error") == 0.0, "{small:#}");
-    let bytes = [&usual, &small, &dear].map(|exported| number(exported, "bytes"));
+    let bytes = ["compact", "small", "tiny"].map(|preset| {
+        succeeds(at, &format!("train data -o e.json --preset {preset}"));
+        let exported = figures(at, "export e.json -o m.palpate");
+        assert_eq!(exported["margin_error"], 0.0, "{exported:#}");
+        exported["bytes"].as_u64().unwrap()
+    });
     assert!(bytes[0] > bytes[1] && bytes[1] > bytes[2], "{bytes:?}");
-    for (words, code, expected) in [
-        ("train data -o x.json --trees different_leaves=0", 2, "different_leaves is 0"),
-        ("train data -o x.json --trees threshold_cost=1", 2, "use it with different_leaves"),
-        ("train data -o x.json --trees different_leaves=8,leaves=one", 2, "leaves"),
-    ] {
-        fails(at, words, code, expected);
-    }
-}
-
-#[test]
-fn tuning_writes_a_model_within_the_limit() {
-    let at = &BOWL_AND_FORK.folder();
-    let tuned = figures(at, "tune data --max-bytes 2K --sequences 20 -o tuned.palpate --real noise=1ms");
-    let chosen = usize::try_from(tuned["chosen"].as_u64().unwrap()).unwrap();
-    let bytes = fs::metadata(at.join("tuned.palpate")).unwrap().len();
-    assert!(bytes <= 2048);
-    // With the bytes of a promise, for which there are too few touches here.
-    assert!(tuned["calibration"].is_null(), "{tuned:#}");
-    let stated = tuned["rows"][chosen]["bytes"].as_u64().unwrap();
-    assert!((bytes..=2048).contains(&stated), "{stated} for {bytes}");
-    succeeds(at, "evaluate tuned.palpate data --sequences 20");
+    fails(at, "train data -o e.json --preset large", 2, "use one of compact, small, tiny, paper");
 }
 
 #[test]
@@ -116,13 +92,11 @@ fn what_cannot_be_trained_is_refused_and_an_older_ensemble_stays() {
         ("data --descriptor shape", 2, "curvature"),
         ("data --trees rounds=0", 2, "rounds is 0"),
         ("data --real noise=5", 2, "unit"),
-        ("data --trees bins=9/9/9", 2, "bins is "),
+        ("data --trees bins=9/9", 2, "bins is "),
         ("data --no-such-option", 2, "--no-such-option"),
     ] {
         fails(at, &format!("train {words} -o ensemble.json"), code, expected);
     }
-    fails(at, "tune data --max-bytes 9 --sequences 5 -o ensemble.json", 1, "the smallest has");
-    fails(at, "tune data --max-bytes many", 2, "16K");
     assert_eq!(fs::read(at.join("ensemble.json")).unwrap(), before);
     let left = ["broken", "data", "empty", "ensemble.json", "lonely", "many", "model.palpate", "tab"];
     assert_eq!(crate::listing(at), left);
@@ -168,12 +142,8 @@ fn the_probe_of_the_capture_stands_in_every_model_made_of_it() {
     succeeds(at, "capture meshes -o data --touches 60 --probe probe.toml");
     succeeds(at, "train data -o ensemble.json --trees rounds=2");
     succeeds(at, "export ensemble.json -o model.palpate");
-    succeeds(at, "tune data -o tuned.palpate --sequences 5 --ensemble tuned.json");
-    succeeds(at, "export tuned.json -o again.palpate");
-    for model in ["model", "tuned", "again"] {
-        let probe = &figures(at, &format!("inspect {model}.palpate"))["probe"];
-        assert_eq!((probe["spacing"].as_f64(), probe["speed"].as_f64()), (Some(2.0), Some(20.0)), "{model}");
-    }
+    let probe = &figures(at, "inspect model.palpate")["probe"];
+    assert_eq!((probe["spacing"].as_f64(), probe["speed"].as_f64()), (Some(2.0), Some(20.0)));
 }
 
 #[test]
@@ -242,18 +212,6 @@ fn evaluate_shows_undecided_sequences_and_the_confusion_of_objects() {
     for row in found["confusion"]["counts"].as_array().unwrap() {
         assert_eq!(row.as_array().unwrap().iter().map(|count| count.as_u64().unwrap()).sum::<u64>(), 100);
     }
-}
-
-#[test]
-fn tune_names_the_file_it_wrote_and_the_features_that_the_chip_needs() {
-    let at = &BOWL_AND_FORK.folder();
-    let tune = "tune data --max-instructions 2000 --chip m0+ --sequences 20";
-    let written = says(at, &format!("{tune} -o tuned.palpate"), &["Wrote the model: tuned.palpate"]);
-    let inspected = figures(at, "inspect tuned.palpate");
-    assert!(inspected["instructions"]["m0_plus"].as_u64() <= Some(2000), "{inspected}");
-    let [layout, leaf] = ["layout", "leaf"].map(|key| inspected[key].as_str().unwrap());
-    assert!(written.contains(&format!("build palpate-onboard with: {layout}, {leaf}-leaves")), "{written}");
-    says(at, tune, &["The model was not written"]);
 }
 
 #[test]

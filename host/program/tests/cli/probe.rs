@@ -95,7 +95,7 @@ fn two_probes_that_meet_have_to_be_the_same() {
 }
 
 #[test]
-fn run_tune_and_view_take_the_probe_file() {
+fn run_and_view_take_the_probe_file() {
     let at = &set_up();
     succeeds(at, "run meshes -o out --touches 300 --true-size mm --probe probe.toml");
     assert_eq!(read(&at.join("out/data/dataset.json"))["settings"]["unit"], "mm");
@@ -104,7 +104,7 @@ fn run_tune_and_view_take_the_probe_file() {
     succeeds(at, "view meshes/globe.obj -o globe.html --true-size mm --probe probe.toml");
     assert!(fs::read_to_string(at.join("globe.html")).unwrap().contains("globe"));
     let expected = "state different probes: unit \"unit\" and \"mm\"";
-    fails(at, "tune out/data --probe published.toml", 1, expected);
+    fails(at, "train out/data -o x.json --probe published.toml", 1, expected);
     fails(at, "run meshes -o out --true-size mm", 2, "--probe is not given");
 }
 

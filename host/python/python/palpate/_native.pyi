@@ -745,18 +745,16 @@ def sources(meshes: SupportsGetItem[int, str | PathLike[str]]) -> list[tuple[str
     The objects that sources stand for: their names, sorted, and what `capture` takes for each alone. Nothing is read.
     """
 
-def train(data: DataSet, *, preset: str = "compact", descriptor: str | None = None, counted: str | None = None, rounds: SupportsIndex | None = None, depth: SupportsIndex | None = None, eta: SupportsFloat | SupportsIndex | None = None, min_child_weight: SupportsFloat | SupportsIndex | None = None, bins: SupportsIndex | None = None, leaf_bits: SupportsIndex | None = None, different_leaves: SupportsIndex | None = None, threshold_cost: SupportsFloat | SupportsIndex | None = None, multi_output: bool | None = None, noise: str = "", timer: str = "", outputs: str = "placements", background: DataSet | None = None, seed: SupportsIndex = 1, threads: SupportsIndex | None = None, progress: Progress | None = None) -> Ensemble:
+def train(data: DataSet, *, preset: str = "compact", descriptor: str | None = None, counted: str | None = None, rounds: SupportsIndex | None = None, depth: SupportsIndex | None = None, eta: SupportsFloat | SupportsIndex | None = None, min_child_weight: SupportsFloat | SupportsIndex | None = None, bins: SupportsIndex | None = None, leaf_bits: SupportsIndex | None = None, multi_output: bool | None = None, noise: str = "", timer: str = "", outputs: str = "placements", background: DataSet | None = None, seed: SupportsIndex = 1, threads: SupportsIndex | None = None, progress: Progress | None = None) -> Ensemble:
     """
     Trains an ensemble on a data set: gradient boosting with XGBoost's algorithm and parameters.
 
-    `preset` is "compact" (30 trees with one leaf value per object, on curvature and slope) or "paper" (the published
-    method); other arguments replace parts of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
+    `preset` is "compact" (30 trees with one leaf value per object, on curvature and slope), "small" or "tiny" (half its bytes,
+    or a fifth) or "paper" (the published method); other arguments replace parts of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
     `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
     approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
     With objects on a table each placement is an output, or with `outputs` "objects" each object.
     `background` is a data set of many other shapes, which stand for everything that the model does not know.
-    `different_leaves` grows trees for little flash: their leaves share at most this many leaf vectors. A new threshold has
-    to reduce the mean loss of a touch by `threshold_cost` nats (2e-5 by default).
 
     >>> import palpate
     >>> data = palpate.capture(["bowl", "mouse"], touches=300)

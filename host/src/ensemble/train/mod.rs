@@ -1,8 +1,8 @@
 //! From touches to an ensemble.
 //!
-//! The trainer ([`palpate_trees::train`]) is gradient boosting with softmax loss over histograms, XGBoost's algorithm and parameters. Two
-//! presets: the published method, and a compact one, whose trees hold one leaf value for each object, so that one walk through a
-//! tree serves all objects.
+//! The trainer ([`palpate_trees::train`]) is gradient boosting with softmax loss over histograms, XGBoost's algorithm and parameters.
+//! Presets: the published method; and a compact one, whose trees hold one leaf value for each object, so that one walk through a
+//! tree serves all objects, with two of fewer trees for less flash.
 //!
 //! Every object is weighted equally, however many touches it has: touches are weighted by the inverse of their object's
 //! share. Otherwise each margin would hold the log of that share, and summing margins over touches would count that prior
@@ -25,12 +25,8 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 pub(crate) mod error;
-mod small;
 #[cfg(feature = "xgboost")]
 mod xgboost;
-
-pub use small::Small;
-pub(crate) use small::train_each as train_small;
 
 /// Starting value of every margin; the same for all objects, so it changes no verdict. XGBoost's default.
 pub const BASE_MARGIN: f32 = 0.5;
@@ -69,17 +65,9 @@ pub struct Settings {
     /// `max_bin`: the most bins of a feature's histogram: at most `bins − 1` different thresholds per feature, and one
     /// more where contacts are missing.
     pub bins: usize,
-    /// Bins of each feature, at quantiles, if they are to differ: values are rounded down to the lower edge of their bin
-    /// before training, so that no feature has more thresholds than that. For models that are compiled to a table. One
-    /// number for each feature of the descriptor, or of its form for full touches.
-    pub feature_bins: Option<Vec<usize>>,
     /// Rounds the leaves to whole multiples of a power of two, so that the largest leaf takes at most this many bits
     /// with its sign; `None` leaves them as the trainer made them.
     pub leaf_bits: Option<u32>,
-    /// Grows trees with few thresholds and few different leaves, for models of a few KB; `None` grows them for accuracy alone.
-    /// Needs [`multi_output`](Self::multi_output). With [`leaf_bits`](Self::leaf_bits) of 8 a model with leaves of one byte is
-    /// exact.
-    pub small: Option<Small>,
     /// Noise added to the touches before training, every touch made by a robot of its own; on top of what the data set
     /// states that they have already ([`Dataset::real`]).
     pub noise: Noise,
@@ -122,9 +110,7 @@ impl Settings {
             eta: 0.3,
             min_child_weight: 1.0,
             bins: 256,
-            feature_bins: None,
             leaf_bits: None,
-            small: None,
             noise: Noise::default(),
             seed: 1,
             threads: None,
@@ -146,6 +132,16 @@ impl Settings {
             leaf_bits: Some(16),
             ..Self::paper()
         }
+    }
+
+    /// The compact preset with fewer trees, each with a larger share, and leaves of one byte: 15 KB for ten objects.
+    pub fn small() -> Self {
+        Self { rounds: 22, eta: 0.4, min_child_weight: 60.0, leaf_bits: Some(8), ..Self::compact() }
+    }
+
+    /// Eleven shallow trees with leaves of one byte: 5.5 KB for ten objects.
+    pub fn tiny() -> Self {
+        Self { rounds: 11, depth: 5, eta: 0.65, leaf_bits: Some(8), ..Self::compact() }
     }
 
     /// The compact preset for a descriptor and a number of outputs, on a chip with 64 KB: with a pose 60 trees, or fewer where
@@ -170,17 +166,7 @@ impl Settings {
             Counted::Full => self.descriptor.for_full_touches(),
             Counted::Contacts | Counted::All => self.descriptor.for_contacts().unwrap_or(self.descriptor),
         };
-        // Bins of the form for full touches: the pattern keeps its six values, the pair gets as many as the slope.
-        let feature_bins = match self.feature_bins.as_deref() {
-            Some([curvature, slope, pose @ ..])
-                if descriptor.uses_partial_touches()
-                    && pose.len() + 2 == descriptor.for_full_touches().feature_count() =>
-            {
-                Some([&[8, *curvature, *slope, *slope], pose].concat())
-            }
-            bins => bins.map(<[usize]>::to_vec),
-        };
-        Self { counted: Some(counted), descriptor, feature_bins, ..self.clone() }
+        Self { counted: Some(counted), descriptor, ..self.clone() }
     }
 }
 
@@ -217,11 +203,6 @@ pub(crate) fn state_placements(ensemble: &mut Ensemble, shares: &BTreeMap<String
 
 /// Trains one output for each object.
 fn train_outputs(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
-    if let Some(Small { leaves, threshold_cost }) = settings.small {
-        let stop = (settings.rounds, leaves);
-        let mut ensembles = train_small(dataset, settings, threshold_cost, &[stop], progress)?;
-        return Ok(ensembles.remove(0));
-    }
     check(dataset, settings.descriptor)?;
     let settings = &settings.resolved(dataset);
     let parameters = parameters(settings)?;
@@ -380,7 +361,6 @@ fn check(dataset: &Dataset, descriptor: Descriptor) -> Result<()> {
 /// The trainer's parameters.
 fn parameters(settings: &Settings) -> Result<boost::Parameters> {
     let Settings { rounds, depth, eta, min_child_weight, bins, .. } = *settings;
-    let bins_allowed = 2..=65_536;
     if !(1..=10_000).contains(&rounds) {
         return Err(Error::setting("rounds", rounds, "1 to 10000"));
     }
@@ -393,14 +373,8 @@ fn parameters(settings: &Settings) -> Result<boost::Parameters> {
     if !(min_child_weight >= 0.0 && min_child_weight.is_finite()) {
         return Err(Error::setting("min_child_weight", min_child_weight, "a number of at least 0"));
     }
-    if !bins_allowed.contains(&bins) {
+    if !(2..=65_536).contains(&bins) {
         return Err(Error::setting("bins", bins, "2 to 65536"));
-    }
-    if let Some(bins) = &settings.feature_bins
-        && (bins.len() != settings.descriptor.feature_count() || bins.iter().any(|bins| !bins_allowed.contains(bins)))
-    {
-        let bins = bins.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
-        return Err(Error::setting("bins", bins, "one number from 2 to 65536 for all features, or one for each"));
     }
     if let Some(bits) = settings.leaf_bits.filter(|bits| !(4..=24).contains(bits)) {
         return Err(Error::setting("leaf_bits", bits, "4 to 24, or 0 to leave the leaves as they are"));
@@ -490,15 +464,11 @@ impl Rows {
             let rows: Vec<Vec<f32>> = touches.par_iter().map(|touch| feature_row(descriptor, touch)).collect();
             rows.into_iter().flatten()
         });
-        let mut features: Vec<f32> = features.collect();
-        for (column, &bins) in settings.feature_bins.iter().flatten().enumerate() {
-            round_down(&mut features, column, descriptor.feature_count(), bins);
-        }
         let counts = || objects.iter().map(|touches| touches.len());
         let equal = objects.windows(2).all(|pair| pair[0].len() == pair[1].len());
         let weight = |count: usize| (total as f64 / (count * objects.len()) as f64) as f32;
         Self {
-            features,
+            features: features.collect(),
             labels: (0..).zip(counts()).flat_map(|(label, count)| std::iter::repeat_n(label, count)).collect(),
             weights: (!equal).then(|| counts().flat_map(|count| std::iter::repeat_n(weight(count), count)).collect()),
             columns: descriptor.feature_count(),
@@ -508,19 +478,6 @@ impl Rows {
     fn lent(&self) -> boost::Rows<'_> {
         let Self { features, labels, weights, columns } = self;
         boost::Rows { features, columns: *columns, labels, weights: weights.as_deref() }
-    }
-}
-
-/// Rounds a column's values down to the edges of `bins` bins that hold equally many of them. Missing values stay.
-fn round_down(features: &mut [f32], column: usize, columns: usize, bins: usize) {
-    let mut values: Vec<f32> =
-        features.iter().skip(column).step_by(columns).copied().filter(|value| !value.is_nan()).collect();
-    values.sort_unstable_by(f32::total_cmp);
-    let mut edges: Vec<f32> = (0..bins).filter_map(|bin| values.get(bin * values.len() / bins)).copied().collect();
-    edges.dedup();
-    for value in features.iter_mut().skip(column).step_by(columns).filter(|value| !value.is_nan()) {
-        // The first edge is the smallest value, so there is always one at or below.
-        *value = edges[edges.partition_point(|edge| *edge <= *value).max(1) - 1];
     }
 }
 

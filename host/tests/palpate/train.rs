@@ -1,5 +1,3 @@
-mod small;
-
 use crate::fixtures::*;
 use crate::synthetic;
 use palpate::compile::{self, compile};
@@ -60,8 +58,6 @@ fn settings_out_of_range_are_refused_by_name() {
         (with!(quick(), eta = f64::NAN), "eta"),
         (with!(quick(), min_child_weight = -1.0), "min_child_weight"),
         (with!(quick(), bins = 1), "bins"),
-        (with!(quick(), feature_bins = Some(vec![9])), "bins"),
-        (with!(quick(), feature_bins = Some(vec![9, 1])), "bins"),
         (with!(quick(), leaf_bits = Some(3)), "leaf_bits"),
         (with!(quick(), noise = Noise::gaussian(f64::INFINITY)), "noise"),
         (with!(quick(), threads = Some(0)), "threads"),
@@ -74,21 +70,6 @@ fn settings_out_of_range_are_refused_by_name() {
         );
         assert!(!error.to_string().contains("--"), "the library names an option: {error}");
     }
-}
-
-#[test]
-fn no_feature_has_more_thresholds_than_its_bins_leave() {
-    let settings = with!(quick(), rounds = 20, feature_bins = Some(vec![12, 5]));
-    let ensemble = train(&synthetic::dataset(&[2_000, 2_000], 7), &settings, &()).unwrap();
-    let mut thresholds = [const { std::collections::BTreeSet::new() }; 2];
-    for node in ensemble.trees.iter().flat_map(|tree| &tree.nodes) {
-        if let Node::Split { feature, threshold, .. } = node {
-            thresholds[*feature].insert(threshold.to_bits());
-        }
-    }
-    let [curvature, slope] = thresholds.map(|set| set.len());
-    // One threshold fewer than bins, and one that separates missing values from all others.
-    assert!((6..=12).contains(&curvature) && (2..=5).contains(&slope), "{curvature} {slope}");
 }
 
 #[test]
