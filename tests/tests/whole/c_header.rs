@@ -299,7 +299,11 @@ fn damaged(most: u64, seconds: Option<u64>) {
     println!("seed {seed}: {count} damaged models, {rate:.0} per second; {accepted} taken; by reason: {reasons:?}");
     assert!(differences.is_empty(), "{} models differ:\n{}", differences.len(), differences.join("\n"));
     assert!(count < 50_000 || 10 * accepted > count, "{accepted} of {count}");
-    assert!(count < 50_000 || reasons[..8].iter().chain([&reasons[10]]).all(|&own| own > count / 3_000), "{reasons:?}");
+    // The rarest are met about once in 4,400; how many there are in a minute depends on the machine.
+    assert!(
+        count < 50_000 || reasons[..8].iter().chain([&reasons[10]]).all(|&own| own > count / 10_000),
+        "{reasons:?}"
+    );
 }
 
 #[test]
