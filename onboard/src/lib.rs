@@ -105,7 +105,7 @@ pub use bytes::{Aligned, ModelError};
 #[cfg(feature = "sequences")]
 pub use decide::Ongoing;
 pub use decide::{
-    CapacityError, Familiarity, Forgetting, NothingExpected, Posterior, Proposal, Recognizer, Rivals, RowsSeen,
+    CapacityError, Familiarity, NothingExpected, Posterior, Proposal, Recognizer, Rivals, RowsSeen,
     Stopping, Verdict,
 };
 #[cfg(feature = "link")]

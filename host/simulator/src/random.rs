@@ -32,8 +32,6 @@ pub enum Purpose {
     Calibration = 9,
     /// Approaches that an evaluation draws from those in a pose.
     Active = 16,
-    /// Times at which objects are exchanged, and their successors.
-    Switch = 17,
     /// The order in which touches are used to calibrate a misfit test.
     Misfit = 11,
     /// Noise that a real probe adds to the touches of a capture.

@@ -187,7 +187,7 @@ pub fn follow(
     progress: &dyn Progress,
 ) -> Result<Vec<Sequence>> {
     let of = |(supply, wanted): (&mut MarginSupply<'_, '_, '_>, usize)| {
-        let mut follower = chip(model, Stopping::from_odds(0, u32::MAX), None, None);
+        let mut follower = chip(model, Stopping::from_odds(0, u32::MAX), None);
         evidence::sequences(supply, &mut *follower, wanted, limit)
     };
     let mut drawn: Vec<MarginSupply<'_, '_, '_>> =

@@ -54,7 +54,7 @@ impl Sequences<Chip<'_>> for Watched<'_, '_, '_> {
 /// For each sequence of a supply the positions of the touches that it uses.
 fn used(model: &Model<'_>, supply: &mut TouchSupply<'_>, limit: Limit) -> Vec<Vec<u32>> {
     let mut watched = Watched { drawn: MarginSupply::new(model, supply, &()), used: Vec::new(), margins: None };
-    let mut follower = chip(model, Stopping::from_odds(0, u32::MAX), None, None);
+    let mut follower = chip(model, Stopping::from_odds(0, u32::MAX), None);
     let found = sequences(&mut watched, &mut *follower, usize::MAX, limit).unwrap();
     watched.used.truncate(found.len());
     assert!(watched.used.iter().map(Vec::len).eq(found.iter().map(|sequence| sequence.approaches as usize)));

@@ -124,12 +124,6 @@ pub enum EvaluateProblem {
         /// Smallest number allowed.
         needed: usize,
     },
-    /// Something was asked for that only compiled models do.
-    #[error("forgetting is a feature of a compiled model's recognizer, and this is an ensemble")]
-    NotCompiled,
-    /// There is one object only.
-    #[error("the data set has one object: there is nothing to exchange it for")]
-    NothingToSwitch,
     /// Recorded and simulated touches cannot be compared.
     #[error("the touches cannot be compared: {detail}")]
     Incomparable {
@@ -212,8 +206,6 @@ impl Problem for EvaluateProblem {
                     needed.div_ceil((*found).max(1)).max(2)
                 );
             }
-            Self::NotCompiled => "Export the ensemble first.",
-            Self::NothingToSwitch => "Capture another object.",
             Self::Incomparable { .. } => "Give recorded and simulated touches of the same objects, and simulate every approach (--approaches N).",
             Self::Touch { .. } => "Correct the line.",
             Self::TimeTooLong { .. } => "Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms.",

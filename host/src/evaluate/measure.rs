@@ -2,7 +2,7 @@
 
 use super::plan::{Active, evaluate_active};
 use super::{
-    ActiveFacts, Candidate, Evaluation, LEAST_GROUPS, Margins, OnStrangers, Settings, Switched, evaluate, strangers,
+    ActiveFacts, Candidate, Evaluation, LEAST_GROUPS, Margins, OnStrangers, Settings, evaluate, strangers,
 };
 use crate::error::{Error, Result};
 use crate::probe::noise::Noise;
@@ -29,8 +29,6 @@ pub struct Wanted<'d> {
     pub confusion: Option<usize>,
     /// True if each approach is made where the model's plan says.
     pub active: bool,
-    /// The nats at which recognizers forget, where the object is exchanged.
-    pub switch: Option<f32>,
     /// Touches of objects that the model does not know, and where they are from.
     pub unknown: Option<(&'d Path, &'d Dataset)>,
 }
@@ -54,9 +52,6 @@ pub struct Evaluated {
     /// Stock that the plan proposed approaches from, where it did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub active: Option<ActiveFacts>,
-    /// Sequences in which the object is exchanged.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub switch: Option<Switched>,
     /// Answers to objects that the model does not know.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strangers: Option<OnStrangers>,
@@ -118,14 +113,13 @@ pub fn measure(
         Some(active) => evaluate_active(&margins, active, &settings)?,
         None => evaluate(&margins, &settings)?,
     };
-    let switch = wanted.switch.map(|nats| margins.switched(&settings.sequences(), nats)).transpose()?;
     let strangers = wanted.unknown.map(|(directory, dataset)| {
         let unknown = Margins::of_strangers(candidate, dataset).map_err(|error| error.in_file(directory))?;
         strangers((&margins, &evaluation.sequential), &unknown, &settings.sequences())
     });
     let (confusion, strangers) = (confusion.transpose()?, strangers.transpose()?);
     let (instances, active) = (dataset.several(), active.map(|active| active.facts()));
-    Ok(Evaluated { evaluation, robots: 1, instances, trained_on: Vec::new(), confusion, active, switch, strangers })
+    Ok(Evaluated { evaluation, robots: 1, instances, trained_on: Vec::new(), confusion, active, strangers })
 }
 
 /// The numbers of touches to give the accuracy after: those asked for, or the usual ones that enough groups can be drawn

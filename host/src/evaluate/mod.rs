@@ -48,7 +48,6 @@ mod plan;
 pub(crate) mod promise;
 mod sequential;
 mod strangers;
-mod switch;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 pub mod together;
@@ -79,7 +78,6 @@ pub(crate) use sequential::significant;
 pub use sequential::{Sequential, SequentialSettings};
 pub use strangers::OnStrangers;
 pub(crate) use strangers::strangers;
-pub use switch::{Rule, Stopped, Switched};
 
 use crate::error::{Error, Result};
 use crate::probe::noise::Noise;

@@ -253,7 +253,7 @@ impl Margins<'_> {
         let outcome = match &self.tested[position].values {
             Values::Compiled(model, values) => {
                 let steps = approaches.map(|touch| touch.map(|touch| &values[at(touch)]));
-                outcome(&mut Given::new(steps), &mut *chip(model, stopping, self.weights.as_deref(), None))
+                outcome(&mut Given::new(steps), &mut *chip(model, stopping, self.weights.as_deref()))
             }
             Values::Full(values) => {
                 let known = (self.candidate.known_count(), self.numbers().map(<[u8]>::to_vec));

@@ -1,23 +1,18 @@
 //! The chip's own recognizer as a follower of margins.
 
 use super::Follower;
-use palpate_onboard::{Familiarity, Forgetting, Model, Recognizer, Stopping, Verdict};
+use palpate_onboard::{Familiarity, Model, Recognizer, Stopping, Verdict};
 
 /// A follower of rows of margins.
 pub(crate) type Chip<'m> = dyn Follower<Step = [i32]> + 'm;
 
 /// The recognizer of a model that stops at these thresholds. `weights` say how often each object is touched, if not as often
-/// as the model's priors; with `forgets` it forgets at so many nats.
-pub(crate) fn chip<'m>(
-    model: &Model<'m>,
-    stopping: Stopping,
-    weights: Option<&'m [u32]>,
-    forgets: Option<f32>,
-) -> Box<Chip<'m>> {
+/// as the model's priors.
+pub(crate) fn chip<'m>(model: &Model<'m>, stopping: Stopping, weights: Option<&'m [u32]>) -> Box<Chip<'m>> {
     match model.object_count() {
-        0..=16 => of::<16>(model, stopping, weights, forgets),
-        17..=64 => of::<64>(model, stopping, weights, forgets),
-        _ => of::<256>(model, stopping, weights, forgets),
+        0..=16 => of::<16>(model, stopping, weights),
+        17..=64 => of::<64>(model, stopping, weights),
+        _ => of::<256>(model, stopping, weights),
     }
 }
 
@@ -25,18 +20,16 @@ fn of<'m, const N: usize>(
     model: &Model<'m>,
     stopping: Stopping,
     weights: Option<&'m [u32]>,
-    forgets: Option<f32>,
 ) -> Box<Chip<'m>> {
     let Ok(recognizer) = Recognizer::<N>::new(model, stopping) else {
         unreachable!("there is room for as many objects, and models have at most 256")
     };
-    Box::new(Onboard { recognizer, weights, forgetting: forgets.map(|nats| Forgetting::new(model, nats)) })
+    Box::new(Onboard { recognizer, weights })
 }
 
 struct Onboard<'m, const N: usize> {
     recognizer: Recognizer<'m, N>,
     weights: Option<&'m [u32]>,
-    forgetting: Option<Forgetting<N>>,
 }
 
 impl<const N: usize> Follower for Onboard<'_, N> {
@@ -48,18 +41,10 @@ impl<const N: usize> Follower for Onboard<'_, N> {
             Some(weights) => _ = self.recognizer.reset_to(weights),
             None => self.recognizer.reset(),
         }
-        self.forgetting.iter_mut().for_each(Forgetting::reset);
     }
 
     fn push(&mut self, margins: &[i32]) -> Verdict {
-        match &mut self.forgetting {
-            None => self.recognizer.push_margins(margins),
-            Some(forgetting) => {
-                let mut own = [0; N];
-                own.iter_mut().zip(margins).for_each(|(to, from)| *to = *from);
-                self.recognizer.push_margins_forgetting(&own, forgetting)
-            }
-        }
+        self.recognizer.push_margins(margins)
     }
 
     fn leader(&self) -> usize {

@@ -32,8 +32,6 @@ pub struct Wanted {
     pub max_rows: Option<u32>,
     /// A weight for each class, if not the model's priors.
     pub weights: Option<Vec<u32>>,
-    /// Also follow streams in which the class changes, with and without forgetting at so many nats.
-    pub switch: Option<f32>,
 }
 
 /// Results on sequences of rows; as JSON, `palpate evaluate --json`.
@@ -70,9 +68,6 @@ pub struct Evaluated {
     pub names: Vec<String>,
     /// Number of sequences of each class (outer) that were given each name (inner), and last without one.
     pub confusion: Vec<Vec<usize>>,
-    /// Streams in which the class changes half way.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub switched: Option<Switched>,
     /// The evidence of one sequence as it grows.
     #[serde(skip)]
     pub grown: Option<Grown>,
@@ -136,27 +131,6 @@ pub struct Grown {
     pub longer: Option<f64>,
 }
 
-/// Streams of two sequences of different classes, one after the other, the second of which comes in the middle of the first's
-/// evidence.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Switched {
-    /// Nats at which evidence is forgotten.
-    pub nats: f32,
-    /// Without a change: error rate and mean rows, without and with forgetting.
-    pub unchanged: [Point; 2],
-    /// With a change after half of the rows that a verdict takes: names of the class that came first are wrong.
-    pub changed: [Point; 2],
-}
-
-impl Switched {
-    /// True if forgetting makes fewer names wrong where the class changes, of so many streams: by more than two standard errors.
-    pub fn helps(&self, streams: usize) -> bool {
-        let [without, with] = self.changed;
-        let variance = |point: &Point| point.error * (1.0 - point.error) / (point.named * streams as f64).max(1.0);
-        without.error - with.error > 2.0 * (variance(&without) + variance(&with)).sqrt()
-    }
-}
-
 /// Measures a model on sequences of rows.
 ///
 /// # Errors
@@ -212,7 +186,6 @@ pub(super) fn measured(
         promise: model.promise().filter(|_| is_own).map(|promise| check_promise(&promise, sequences, &ends, &names)),
         comparison: if compares { run.compared(sequences, max_rows, totals.error()) } else { Comparison::default() },
         confusion,
-        switched: wanted.switch.map(|nats| run.switched(sequences, stopping, nats, totals.mean_touches())),
         grown: if compares { run.grown(sequences, &ends, stopping) } else { None },
         names,
     })
@@ -302,8 +275,8 @@ struct Run<'r> {
 }
 
 impl Run<'_> {
-    fn chip(&self, stopping: Stopping, forgets: Option<f32>) -> Box<Chip<'_>> {
-        chip(self.model, stopping, self.weights, forgets)
+    fn chip(&self, stopping: Stopping) -> Box<Chip<'_>> {
+        chip(self.model, stopping, self.weights)
     }
 
     /// Outcome of these rows, as one sequence.
@@ -315,7 +288,7 @@ impl Run<'_> {
     /// Verdicts on all sequences, as the chip gives them.
     fn ends(&self, sequences: &[RowSequence], stopping: Stopping) -> Vec<Outcome> {
         let chunk = |sequences: &[RowSequence]| -> Vec<Outcome> {
-            let mut follower = self.chip(stopping, None);
+            let mut follower = self.chip(stopping);
             sequences.iter().map(|sequence| self.outcome(sequence.rows.clone(), &mut *follower)).collect()
         };
         sequences.par_chunks(64).map(chunk).collect::<Vec<_>>().concat()
@@ -335,7 +308,7 @@ impl Run<'_> {
         // For each number of rows whether the class with the most evidence, and that with the most rows, is wrong.
         let chunk = |sequences: &[RowSequence]| {
             let mut wrong = vec![(0_u64, 0_u64, 0_u64); last];
-            let mut follower = self.chip(Stopping::from_odds(0, u32::MAX), None);
+            let mut follower = self.chip(Stopping::from_odds(0, u32::MAX));
             for sequence in sequences {
                 follower.reset();
                 let mut votes = vec![0_u32; self.model.known_count()];
@@ -391,27 +364,6 @@ impl Run<'_> {
         let longer =
             order.iter().filter(|&&other| ends[other].touches > end.touches).count() as f64 / order.len() as f64;
         Some(Grown { class: sequence.class, posteriors, ended, longer: Some(longer).filter(|share| share.is_finite()) })
-    }
-
-    /// Streams in which the class changes, without and with forgetting. Streams are of a sequence, cut where half of the
-    /// rows of a verdict are over, and the next one of another class.
-    fn switched(&self, sequences: &[RowSequence], stopping: Stopping, nats: f32, mean_rows: f64) -> Switched {
-        let cut = ((mean_rows / 2.0).round() as usize).max(1);
-        let of = |changed: bool, forgets: bool| {
-            let mut follower = self.chip(stopping, forgets.then_some(nats));
-            let one = |number: usize| {
-                let last = &sequences[number];
-                let first = (1..sequences.len())
-                    .map(|step| &sequences[(number + step) % sequences.len()])
-                    .find(|other| other.class != last.class)
-                    .filter(|_| changed);
-                let first = first.map_or(0..0, |first| first.rows.start..first.rows.end.min(first.rows.start + cut));
-                self.outcome(first.chain(last.rows.clone()), &mut *follower)
-            };
-            (0..sequences.len()).map(one).collect::<Vec<_>>()
-        };
-        let both = |changed| [false, true].map(|forgets| point(sequences, &of(changed, forgets)));
-        Switched { nats, unchanged: both(false), changed: both(true) }
     }
 }
 

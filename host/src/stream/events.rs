@@ -302,7 +302,7 @@ fn cut(mut runs: Recording, rows: usize) -> Recording {
 fn led(model: &Model<'_>, rows: &Rows<'_>, recordings: &[Recording]) -> Vec<Vec<Led>> {
     let of = |runs: &Recording| {
         // No verdict silences anything: the evidence depends on none.
-        let mut chip = chip(model, Stopping::from_odds(0, u32::MAX), None, None);
+        let mut chip = chip(model, Stopping::from_odds(0, u32::MAX), None);
         let rows = runs.iter().flat_map(|run| run.rows.clone()).map(|row| rows.row(row));
         let led = rows.map(|margins| {
             chip.push(margins);

@@ -17,7 +17,7 @@ const AT_ONCE: usize = 128;
 pub(super) fn follow(model: &Model<'_>, rows: &Rows<'_>, sequences: &[&RowSequence], limit: Limit) -> Vec<Sequence> {
     let chunk = |sequences: &[&RowSequence]| {
         let mut supply = RowSupply { rows, sequences: sequences.iter(), coming: 0..0 };
-        let mut follower = chip(model, Stopping::from_odds(0, u32::MAX), None, None);
+        let mut follower = chip(model, Stopping::from_odds(0, u32::MAX), None);
         let Ok(found) = evidence::sequences(&mut supply, &mut *follower, usize::MAX, limit);
         found
     };

@@ -37,7 +37,7 @@ mod settings;
 mod shape;
 
 pub use calibrate::{calibrate, calibrate_with};
-pub use evaluate::{Comparison, Evaluated, Grown, Point, PromiseOfSequences, Switched, Wanted, evaluate};
+pub use evaluate::{Comparison, Evaluated, Grown, Point, PromiseOfSequences, Wanted, evaluate};
 pub use events::{
     EventCounts, EventSettings, EventsCalibrated, EventsEvaluated, RowRule, calibrate_events, evaluate_events,
 };

@@ -50,7 +50,6 @@ fn measured(model: &Model<'_>, known: &Dataset, unknown: &Dataset) -> Result<Eva
         noise: Noise::default(),
         confusion: None,
         active: false,
-        switch: None,
         unknown: Some((Path::new("strangers"), unknown)),
     };
     measure(Candidate::Compiled(model), known, &wanted, |_, _| Ok(None))

@@ -9,7 +9,7 @@ use palpate::rows::{Encoder, RowSequence, Sequences};
 use palpate::shared::format::Weights;
 use palpate::strangers;
 use palpate::stream::{
-    EventCounts, EventSettings, Learned, Point, Settings, StrangerTest, Switched, Wanted, calibrate, calibrate_events,
+    EventCounts, EventSettings, Learned, Settings, StrangerTest, Wanted, calibrate, calibrate_events,
     calibrate_with, estimate, evaluate, evaluate_events,
 };
 use rand::RngExt;
@@ -503,30 +503,6 @@ fn a_promise_depends_little_on_which_sequences_are_learned_from() {
     }
     println!("{refused} of 80 refused, {broken} broken");
     assert!(refused <= 8, "{refused} of 80");
-}
-
-#[test]
-fn forgetting_helps_if_it_makes_fewer_names_wrong_than_chance_explains() {
-    let point = |error: f64| Point { rows: 10.0, error, named: 1.0 };
-    let switched = |changed: [f64; 2]| Switched { nats: 3.0, unchanged: [point(0.05); 2], changed: changed.map(point) };
-    for (changed, expected) in
-        [([0.4147, 0.4150], false), ([0.4147, 0.40], false), ([0.4147, 0.2], true), ([0.1, 0.3], false)]
-    {
-        assert_eq!(switched(changed).helps(2_000), expected, "{changed:?}");
-    }
-}
-
-#[test]
-fn forgetting_finds_the_class_that_comes_later() {
-    let made = sequences(Kind::Independent, 3_000, 60, 3);
-    let calibrated = calibrate(&MODEL, &made, &Settings::default(), &()).unwrap();
-    let fresh = sequences(Kind::Independent, 3_000, 60, 4);
-    let wanted = Wanted { switch: Some(5.0), ..Wanted::default() };
-    let found = evaluate(&compile::open(&calibrated.model).unwrap(), &fresh, &wanted).unwrap().switched.unwrap();
-    println!("{found:?}");
-    let [plain, forgetting] = found.changed;
-    assert!(forgetting.error < plain.error, "{found:?}");
-    assert!(found.unchanged[1].rows < 1.3 * found.unchanged[0].rows, "{found:?}");
 }
 
 /// A ramp that rises, or falls, from 0 to 1 in ten rows: its value tells the class only with the row's number.

@@ -5,7 +5,6 @@ mod approach;
 mod events;
 mod evidence;
 mod expected;
-mod forgetting;
 #[cfg(feature = "sequences")]
 mod ongoing;
 mod recognizer;
@@ -19,7 +18,6 @@ mod together;
 pub use approach::Proposal;
 pub use evidence::{Posterior, Rivals};
 pub use expected::NothingExpected;
-pub use forgetting::Forgetting;
 #[cfg(feature = "sequences")]
 pub use ongoing::Ongoing;
 #[cfg(feature = "station")]

@@ -2,10 +2,10 @@
 
 use palpate::compile::{Leaf, Restated, restate};
 use palpate_onboard::station::{NoStorage, Station, serve};
-use palpate_onboard::{Forgetting, Model, Proposal, Recognizer, Stopping, Verdict};
+use palpate_onboard::{Model, Proposal, Recognizer, Stopping};
 use palpate_shared::format::{Plan, Tag};
 use palpate_shared::link::{ApproachMessage, Device, POSE_BYTES, Query, Refusal};
-use palpate_shared::{Descriptor, Poses, Touch};
+use palpate_shared::{Descriptor, Poses};
 use palpate_tests::desk::{Desk, OBJECTS, Step, push};
 use palpate_tests::random::{self, Shape};
 use rand::rngs::SmallRng;
@@ -159,76 +159,4 @@ fn a_chip_without_a_plan_refuses_to_propose() {
     let mut desk = Desk::new([Step::Ask(Query::NextApproach { without: [0; POSE_BYTES] })], 0);
     serve::<OBJECTS, _, _>(&bytes, &mut NoStorage, 0, &mut desk).unwrap();
     assert_eq!(desk.answers, ["Refused(NoPlan)"]);
-}
-
-/// Units in a nat.
-fn units(model: &Model<'_>, nats: f32) -> i32 {
-    (nats / model.unit()) as i32
-}
-
-#[test]
-fn recent_touches_that_contradict_the_evidence_restart_it_and_become_it() {
-    let bytes = model(3);
-    let model = Model::new(&bytes).unwrap();
-    let (mut recognizer, mut forgetting) = (recognizer::<3>(&model), Forgetting::new(&model, 5.0));
-    let one = units(&model, 1.0);
-    for _ in 0..10 {
-        assert_eq!(recognizer.push_margins_forgetting(&[one, 0, 0], &mut forgetting), Verdict::Undecided);
-    }
-    assert_eq!((recognizer.best(), forgetting.restarts()), (0, 0));
-    for number in 1..=5 {
-        assert_eq!((recognizer.best(), forgetting.restarts()), (0, 0), "touch {number}");
-        recognizer.push_margins_forgetting(&[0, one, one / 2], &mut forgetting);
-    }
-    // Five nats against the leader: only what these touches said is left, with the prior.
-    let expected: Vec<i64> = [0, 5 * one, 5 * (one / 2)]
-        .into_iter()
-        .enumerate()
-        .map(|(object, evidence)| i64::from(evidence) + i64::from(model.prior(object)))
-        .collect();
-    assert_eq!((recognizer.best(), forgetting.restarts()), (1, 1));
-    assert_eq!(recognizer.evidence(), expected);
-    assert_eq!(recognizer.touches(), 15);
-    // A restart can decide at once, and after a verdict nothing changes.
-    let mut hasty = Recognizer::<3>::new(&model, Stopping::new(0.01, 100).unwrap()).unwrap();
-    hasty.push_margins_forgetting(&[one, 0, 0], &mut forgetting);
-    let verdict = hasty.push_margins_forgetting(&[0, 20 * one, 0], &mut forgetting);
-    assert!(matches!(verdict, Verdict::Recognized { object: 1, touches: 2, .. }), "{verdict:?}");
-    assert_eq!(hasty.push_margins_forgetting(&[90 * one, 0, 0], &mut forgetting), verdict);
-}
-
-#[test]
-fn touches_that_speak_for_the_leader_in_between_keep_the_evidence() {
-    let bytes = model(2);
-    let model = Model::new(&bytes).unwrap();
-    let (mut recognizer, mut forgetting) = (recognizer::<2>(&model), Forgetting::new(&model, 5.0));
-    let one = units(&model, 1.0);
-    let mut plain = self::recognizer::<2>(&model);
-    for margins in std::iter::repeat_n([[one, 0], [one, 0], [0, one], [one, 0], [0, one], [0, one]], 200).flatten() {
-        recognizer.push_margins_forgetting(&margins, &mut forgetting);
-        plain.push_margins(&margins);
-    }
-    assert_eq!(forgetting.restarts(), 0);
-    assert_eq!(recognizer.evidence(), plain.evidence());
-}
-
-#[test]
-fn no_limit_and_no_margin_makes_forgetting_panic() {
-    let bytes = model(4);
-    let model = Model::new(&bytes).unwrap();
-    for nats in [f32::NAN, f32::NEG_INFINITY, -1.0, 0.0, f32::MIN_POSITIVE, 1e30, f32::INFINITY] {
-        let (mut recognizer, mut forgetting) = (recognizer::<4>(&model), Forgetting::new(&model, nats));
-        for margins in [[i32::MIN, i32::MAX, i32::MAX, i32::MIN], [i32::MAX, i32::MIN, i32::MIN, i32::MAX]]
-            .into_iter()
-            .cycle()
-            .take(9)
-        {
-            recognizer.push_margins_forgetting(&margins, &mut forgetting);
-        }
-        assert_eq!(recognizer.touches(), 9);
-    }
-    let refused =
-        recognizer::<4>(&model).push_forgetting(&Touch::from_micros([0, 1, 2]), &mut Forgetting::new(&model, 5.0));
-    // It needs a pose.
-    assert!(refused.is_err());
 }

@@ -1,7 +1,7 @@
 //! Misfit tests in models, and backgrounds.
 
 use palpate::compile::Settings;
-use palpate_onboard::{Familiarity, Forgetting, Model, Recognizer, Rivals, SNAPSHOT_LENGTH, Stopping, Verdict};
+use palpate_onboard::{Familiarity, Model, Recognizer, Rivals, Stopping, Verdict};
 use palpate_shared::format::{Held, MisfitTerms, ObjectMisfit, Strangers, Tag};
 use palpate_tests::random::{self, Shape};
 
@@ -130,106 +130,6 @@ fn verdicts_survive_a_snapshot() {
     let mut other = Recognizer::<4>::new(&plain, stopping).unwrap();
     other.restore(snapshot).unwrap();
     assert_eq!(other.verdict(), Verdict::GaveUp);
-}
-
-/// Units by which a touch speaks for an object: the largest power of two that is at most a nat.
-fn step(model: &Model<'_>) -> i32 {
-    1 << ((1.0 / model.unit()) as i32).ilog2()
-}
-
-/// A model with a misfit test that only touches fit which speak by a step for an object against each other one.
-fn strict() -> Vec<u8> {
-    let bytes = model();
-    let step = step(&Model::new(&bytes).unwrap());
-    let terms = MisfitTerms { first: 2, least: 3, threshold: 2_560, doubt: 2_048, ..TERMS };
-    let mut section = Strangers::header(false, true).to_vec();
-    section.extend(terms.to_bytes());
-    for object in 0..OBJECTS as u8 {
-        let rivals: Vec<u8> = (0..OBJECTS as u8).filter(|&rival| rival != object).collect();
-        // The means, no slopes, and a diagonal matrix that makes 16 of a step.
-        let mean = i16::try_from(-(step >> 4)).unwrap();
-        let numbers = [mean, mean, mean, 0, 0, 0, 16, 0, 16, 0, 0, 16];
-        let put = &mut |part: &[u8]| section.extend_from_slice(part);
-        ObjectMisfit::write([4, step.ilog2() as u8, 0], 0, &rivals, numbers.into_iter(), put);
-    }
-    with(&bytes, section).unwrap()
-}
-
-/// The margins of a touch that speaks by a step for an object.
-fn speaks_for(object: usize, model: &Model<'_>) -> [i32; OBJECTS] {
-    let mut margins = [0; OBJECTS];
-    margins[object] = step(model);
-    margins
-}
-
-#[test]
-fn an_object_that_is_exchanged_is_named_and_not_unknown_for_the_touches_that_were_forgotten() {
-    let bytes = strict();
-    let model = Model::new(&bytes).unwrap();
-    let stopping = Stopping::new(1e-12, 200).unwrap();
-    let mut recognizer = Recognizer::<OBJECTS>::new(&model, stopping).unwrap();
-    // Touches that contradict each other do not fit.
-    (0..10).for_each(|index| _ = recognizer.push_margins(&speaks_for(index % 2, &model)));
-    assert_eq!(recognizer.familiarity(), Familiarity::Stranger);
-    recognizer.reset();
-    let mut forgetting = Forgetting::new(&model, 5.0 * step(&model) as f32 * model.unit());
-    for object in [0, 3, 1] {
-        for number in 0..20 {
-            let verdict = recognizer.push_margins_forgetting(&speaks_for(object, &model), &mut forgetting);
-            assert_eq!(verdict, Verdict::Undecided, "touch {number} of object {object}");
-            // Before the restart touches of both objects are evidence, and after the first touch there is no look.
-            if number > 1 && object == 0 || number > 5 {
-                assert_eq!(
-                    (recognizer.familiarity(), recognizer.best()),
-                    (Familiarity::Known, object),
-                    "touch {number}"
-                );
-            }
-            // A snapshot holds how many touches are forgotten.
-            let mut buffer = [0; SNAPSHOT_LENGTH + 10 * OBJECTS];
-            let snapshot = recognizer.snapshot(&mut buffer).unwrap().to_vec();
-            let mut restored = Recognizer::<OBJECTS>::new(&model, stopping).unwrap();
-            restored.restore(&snapshot).unwrap();
-            assert_eq!(
-                (restored.familiarity(), restored.touches(), restored.evidence()),
-                (recognizer.familiarity(), recognizer.touches(), recognizer.evidence())
-            );
-            assert_eq!(restored.snapshot(&mut buffer).unwrap(), snapshot);
-        }
-    }
-    assert_eq!(forgetting.restarts(), 2);
-}
-
-#[test]
-fn an_object_of_weight_0_is_none_after_a_restart_and_the_others_keep_their_weights() {
-    let bytes = model();
-    let model = Model::new(&bytes).unwrap();
-    let stopping = Stopping::new(1e-12, 200).unwrap();
-    for is_restored in [false, true] {
-        let mut recognizer = Recognizer::<OBJECTS>::new(&model, stopping).unwrap();
-        let mut forgetting = Forgetting::new(&model, 5.0);
-        recognizer.reset_to(&[3, 1, 0, 6]).unwrap();
-        let expected = recognizer.posterior(1);
-        for (object, touches) in [(0, 20), (2, 20), (1, 12)] {
-            for _ in 0..touches {
-                recognizer.push_margins_forgetting(&speaks_for(object, &model), &mut forgetting);
-                assert!(recognizer.best() != 2 && recognizer.posterior(2).q56() == 0);
-            }
-            // What speaks for an object that is not there is no reason to forget.
-            assert_eq!(forgetting.restarts(), u32::from(object == 1));
-            if is_restored {
-                let mut buffer = [0; SNAPSHOT_LENGTH + 10 * OBJECTS];
-                let snapshot = recognizer.snapshot(&mut buffer).unwrap();
-                recognizer.restore(snapshot).unwrap();
-            }
-        }
-        // All but the twelve last touches are forgotten, which speak for object 1: the others are as far behind as their weights say.
-        let evidence = recognizer.evidence();
-        let nats = |object: usize| f64::from((evidence[object] - evidence[0]) as i32) * f64::from(model.unit());
-        let own = f64::from(12 * speaks_for(1, &model)[1]) * f64::from(model.unit());
-        assert!((nats(3) - 2_f64.ln()).abs() < 1e-3 && (nats(1) - own - (1.0_f64 / 3.0).ln()).abs() < 1e-3);
-        assert!((expected.to_f64() - 0.1).abs() < 1e-3);
-    }
 }
 
 #[test]

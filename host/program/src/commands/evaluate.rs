@@ -74,9 +74,6 @@ pub(crate) struct Arguments {
     /// Follow the model's plan of approaches
     #[arg(long)]
     active: bool,
-    /// Also exchange the object, with and without forgetting at so many nats [default: 5]
-    #[arg(long, value_name = "NATS", num_args = 0..=1, default_missing_value = "5")]
-    switch: Option<f32>,
     #[command(flatten)]
     probe: ProbeArguments,
     #[command(flatten)]
@@ -86,13 +83,13 @@ pub(crate) struct Arguments {
 }
 
 /// The options that approaches on a simulated table have no use for.
-const TOUCHES: [&str; 11] =
-    ["directory", "label", "unknown", "at", "error_rate", "confusion", "active", "switch", "probe", "only", "prior"];
+const TOUCHES: [&str; 10] =
+    ["directory", "label", "unknown", "at", "error_rate", "confusion", "active", "probe", "only", "prior"];
 
 impl Arguments {
     /// True if there is an option for sequences of touches or rows.
     fn stops(&self) -> bool {
-        self.error_rate.is_some() || self.max_touches.is_some() || self.switch.is_some() || self.expected.is_given()
+        self.error_rate.is_some() || self.max_touches.is_some() || self.expected.is_given()
     }
 }
 
@@ -159,7 +156,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         noise: stated,
         confusion: arguments.confusion,
         active: arguments.active,
-        switch: arguments.switch,
         unknown: unknown.as_ref().map(|(directory, dataset)| (*directory, dataset)),
     };
     let expecting = |objects: &[String], own: &[f64]| arguments.expected.weights(objects, own);
@@ -180,12 +176,12 @@ fn sequences_of(
     let ModelFile::Compiled(compiled) = file else { return Err(sequences::needs_compiled(&arguments.model)) };
     let model = compiled.model();
     let weights = arguments.expected.weights(&compiled.names(), &evaluate::own_weights(&model))?;
-    let Arguments { error_rate, max_touches, switch, .. } = *arguments;
+    let Arguments { error_rate, max_touches, .. } = *arguments;
     let asked = Evaluation {
         model: &arguments.model,
         rows,
         columns,
-        wanted: stream::Wanted { error_rate, max_rows: max_touches, weights, switch },
+        wanted: stream::Wanted { error_rate, max_rows: max_touches, weights },
         page: arguments.page.as_deref(),
     };
     sequences::evaluate(asked, compiled, global)

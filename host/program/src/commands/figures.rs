@@ -1,8 +1,8 @@
 //! The figures of an evaluation as JSON and as text.
 
 use palpate::evaluate::{
-    ActiveFacts, AlarmCheck, Approaches, Confusion, Evaluated, Evaluation, Finding, OnStrangers, PromiseCheck, Rule,
-    Sequential, Switched,
+    ActiveFacts, AlarmCheck, Approaches, Confusion, Evaluated, Evaluation, Finding, OnStrangers, PromiseCheck,
+    Sequential,
 };
 use palpate::wording::{self, count, counted, rate};
 use palpate_shared::DIRECTIONS;
@@ -40,9 +40,6 @@ pub(super) fn text(evaluated: &Evaluated) -> String {
     }
     if let Some(confusion) = &evaluated.confusion {
         text += &confusion_table(confusion);
-    }
-    if let Some(switch) = &evaluated.switch {
-        text += &switch_table(switch);
     }
     if let Some(strangers) = &evaluated.strangers {
         text += &strangers_table(strangers);
@@ -248,30 +245,6 @@ fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> 
         100.0 * sequential.undecided,
         shares.collect::<Vec<_>>().join(", "),
     )
-}
-
-/// Figures of an exchanged object: one row per rule.
-fn switch_table(switch: &Switched) -> String {
-    let mut text = format!(
-        "\n{:20} {:>22} {:>8} {:>26} {:>8} {:>8}\n",
-        "forgetting", "approaches, same object", "wrong", "approaches after exchange", "wrong", "the old"
-    );
-    for (name, Rule { still, switched, old }) in
-        [("off".to_owned(), &switch.off), (format!("at {} nats", switch.nats), &switch.on)]
-    {
-        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
-        // Writing to a string cannot fail.
-        _ = writeln!(
-            text,
-            "{name:20} {:>22.1} {:>8} {:>26.1} {:>8} {:>8}",
-            still.mean_approaches,
-            percent(still.error),
-            switched.mean_approaches,
-            percent(switched.error),
-            percent(*old)
-        );
-    }
-    text + "Exchanged at a random approach before the verdict; wrong is any name but that of the object touched last.\n"
 }
 
 /// Answers to strangers, in percent: one row per object.

@@ -126,7 +126,6 @@ fn evaluate_events(asked: &Evaluation<'_>, model: &Model<'_>, global: &Global) -
         ("error_rate", asked.wanted.error_rate.is_some()),
         ("max_touches", asked.wanted.max_rows.is_some()),
         ("prior", asked.wanted.weights.is_some()),
-        ("switch", asked.wanted.switch.is_some()),
     ];
     if let Some((option, _)) = other.iter().find(|(_, is_given)| *is_given) {
         return Err(Error::setting(option, "given", "it with a model without events"));
@@ -295,29 +294,6 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
         "as few wrong by a majority of rows: {}",
         fixed(comparison.vote_rows, "all of each sequence are not enough")
     );
-    if let Some(switched) = evaluated.switched {
-        let [plain, forgetting] = switched.changed;
-        let [before, cost] = switched.unchanged;
-        _ = writeln!(
-            text,
-            "where the class changes: {} wrong after {:.1} rows; with forgetting at {} nats {} after {:.1}\n\
-             where it does not: {} after {:.1} rows; with forgetting {} after {:.1}",
-            percent(plain.error),
-            plain.rows,
-            switched.nats,
-            percent(forgetting.error),
-            forgetting.rows,
-            percent(before.error),
-            before.rows,
-            percent(cost.error),
-            cost.rows,
-        );
-        text += match (switched.helps(*sequences), forgetting.error > plain.error) {
-            (true, _) => "",
-            (false, true) => "Forgetting does not help: no fewer names are wrong where the class changes.\n",
-            (false, false) => "Forgetting does not help: so small a decrease in wrong names may be chance.\n",
-        };
-    }
     let mut recognized = evaluated.names.clone();
     recognized.push("no name".into());
     text + &shares_table(

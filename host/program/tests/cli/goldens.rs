@@ -81,7 +81,7 @@ fn calibration_and_evaluation_on_touches_stay() {
         "calibrate full.palpate fresh -o average.palpate --sequences 5000 --error-rate 5% --json",
         "calibrate full.palpate fresh -o name.palpate --sequences 5000 --error-rate 20% --per name --json",
         "calibrate full.palpate fresh -o object.palpate --sequences 5000 --error-rate 20% --per object",
-        "evaluate average.palpate fresh --sequences 200 --switch 5 --prior bowl=0.5 --json",
+        "evaluate average.palpate fresh --sequences 200 --prior bowl=0.5 --json",
         "evaluate average.palpate fresh --sequences 200 --only bowl,fork --real noise=2ms,missed=2% --json",
         "evaluate name.palpate fresh --sequences 200 --confusion 5",
         // Every approach, and approaches that are chosen.
@@ -164,7 +164,7 @@ fn calibration_and_evaluation_on_rows_stay() {
             "calibrate rows.palpate calibration.csv {columns} --group-column person -o groups.palpate --error-rate 10% --json"
         ),
         format!("evaluate average.palpate unseen.csv {columns} --json"),
-        format!("evaluate name.palpate unseen.csv {columns} --switch"),
+        format!("evaluate name.palpate unseen.csv {columns}"),
         format!("evaluate groups.palpate unseen.csv {columns} --group-column person --json"),
         "evaluate rows.palpate unseen.csv --label kind --json".to_owned(),
     ] {

@@ -226,7 +226,6 @@ fn touches_of_one_object_of_a_model_are_evaluated() {
     holds(&text, &["\nbowl ", "promised for all 10 objects of the model, tested on 1"]);
     assert!(text.contains("Taken for, after 5 touches"), "{text}");
     // What needs a second object says so, and neither a model nor a promise comes of one.
-    fails(at, &format!("{evaluate} --switch"), 1, "nothing to exchange it for");
     fails(at, "train one -o e.json", 1, "only one object here, bowl");
     says(at, "data check one", &["only bowl is here", "1 object, 150 touches"]);
 }

@@ -48,7 +48,7 @@ fn a_plan_is_made_evaluated_shown_and_followed() {
 #[test]
 fn an_evaluation_under_a_plan_is_the_same_on_any_number_of_threads() {
     let at = &PLANNED.folder();
-    let evaluate = "evaluate planned.palpate unseen --sequences 50 --active --switch --json";
+    let evaluate = "evaluate planned.palpate unseen --sequences 50 --active --json";
     let on = |threads: &str| {
         let mut command = command(evaluate.split(' '));
         stdout(command.current_dir(at).env("RAYON_NUM_THREADS", threads).output().unwrap())
@@ -74,8 +74,6 @@ fn what_cannot_be_planned_or_followed_is_refused_with_what_to_do() {
         ("evaluate ensemble.json unseen --active", 1, "has no plan"),
         ("recognize model.palpate unseen/disc.txt --active", 1, make),
         ("evaluate planned.palpate full --active", 1, "--approaches N --pose"),
-        ("evaluate ensemble.json unseen --switch", 1, "Export the ensemble first"),
-        ("evaluate model.palpate unseen --switch 0", 2, "--switch is 0"),
         // Nothing is written over what is read.
         ("calibrate model.palpate fresh -o model.palpate --plan 1", 2, "model.palpate"),
     ] {
@@ -103,21 +101,4 @@ fn a_promise_is_calibrated_under_the_plan_kept_under_it_and_another_one_at_rando
     let passive = figures(at, "evaluate calibrated.palpate unseen --sequences 200");
     let void = passive["promise"]["void"].to_string();
     assert!(void.contains("as the plan proposes") && void.contains("at random"), "{void}");
-}
-
-#[test]
-fn forgetting_finds_an_exchanged_object_sooner() {
-    let at = &PLANNED.folder();
-    let figures = figures(at, "evaluate model.palpate unseen --sequences 500 --switch 3");
-    let of = |rule: &str, case: &str, figure: &str| figures["switch"][rule][case][figure].as_f64().unwrap();
-    assert_eq!(figures["switch"]["nats"], 3.0);
-    let after = |rule| of(rule, "switched", "mean_approaches");
-    assert!(after("on") < after("off"), "{figures:#}");
-    // Nearly all errors of the exchanged are decisions before the exchange, which no rule can mend.
-    let beyond = |case| of("on", case, "error") - of("off", case, "error");
-    assert!(beyond("switched") <= 2.0 * of("off", "switched", "error_standard_error"), "{figures:#}");
-    assert!(beyond("still") < 0.01, "{figures:#}");
-    let old = figures["switch"]["on"]["old"].as_f64().unwrap();
-    assert!(of("on", "switched", "error") - old < 0.02, "{figures:#}");
-    says(at, "evaluate model.palpate unseen --switch", &["at 5 nats"]);
 }

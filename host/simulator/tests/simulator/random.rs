@@ -26,7 +26,6 @@ fn purposes_of_one_seed_share_no_stream() {
         Approaches,
         Calibration,
         Active,
-        Switch,
         Misfit,
         Capture,
         Fit,

@@ -94,7 +94,7 @@ impl Margins<'_> {
         see: impl FnMut(&Chip<'_>, Counted) -> bool,
     ) {
         if let Some((model, mut chosen)) = self.chosen(active, which, seed) {
-            let Ok(_) = follow(&mut chosen, &mut *chip(model, stopping, None, None), see);
+            let Ok(_) = follow(&mut chosen, &mut *chip(model, stopping, None), see);
         }
     }
 
@@ -106,7 +106,7 @@ impl Margins<'_> {
         (stopping, seed): (Stopping, u64),
     ) -> Outcome {
         let Some((model, mut chosen)) = self.chosen(active, which, seed) else { return Outcome::default() };
-        let Ok(outcome) = outcome(&mut chosen, &mut *chip(model, stopping, None, None));
+        let Ok(outcome) = outcome(&mut chosen, &mut *chip(model, stopping, None));
         outcome
     }
 
