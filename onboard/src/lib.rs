@@ -105,8 +105,7 @@ pub use bytes::{Aligned, ModelError};
 #[cfg(feature = "sequences")]
 pub use decide::Ongoing;
 pub use decide::{
-    CapacityError, Familiarity, NothingExpected, Posterior, Proposal, Recognizer, Rivals, RowsSeen,
-    Stopping, Verdict,
+    CapacityError, Familiarity, NothingExpected, Posterior, Proposal, Recognizer, Rivals, RowsSeen, Stopping, Verdict,
 };
 #[cfg(feature = "link")]
 pub use decide::{SNAPSHOT_LENGTH, SnapshotError};

@@ -1,6 +1,7 @@
 //! Code that the tests between the crates share.
 
 pub mod abuse;
+pub mod bad_line;
 pub mod chips;
 pub mod desk;
 pub mod flash;

@@ -14,12 +14,6 @@ pub enum ChipProblem {
         /// Text that was given.
         text: String,
     },
-    /// Faults of a bad line are written in a way that means nothing.
-    #[error("`{text}` does not describe a bad line")]
-    NotFaults {
-        /// Text that was given.
-        text: String,
-    },
     /// This build of the library has no serial ports.
     #[error("this build of Palpate has no serial ports")]
     NoSerialPorts,
@@ -95,12 +89,6 @@ pub enum ChipProblem {
         /// The first difference.
         first: String,
     },
-    /// A line of a journal is wrong.
-    #[error("not an entry of a journal: {reason}")]
-    NotAnEntry {
-        /// The parser's message.
-        reason: String,
-    },
     /// The emulator is not installed.
     #[error("the emulator is not installed")]
     NoEmulator,
@@ -143,7 +131,6 @@ impl Problem for ChipProblem {
     fn fix(&self) -> String {
         match self {
             Self::NotAPort { .. } => "Give a serial port, tcp://HOST:PORT or emulator.",
-            Self::NotFaults { .. } => "Give three probabilities and milliseconds, as in 0.001,0.001,0.01,5.",
             Self::NoSerialPorts => "Build it with the feature `serial`, or reach the chip through tcp://HOST:PORT.",
             Self::CannotOpen { ports, .. } => {
                 let ports = match ports.as_slice() {
@@ -183,7 +170,6 @@ impl Problem for ChipProblem {
             Self::ModelRefused(_) => "Load another model; the chip still uses the one it had.",
             Self::OtherModel { .. } => "Load the model into the chip first.",
             Self::Differs { .. } => "Report this as a bug, with the model and the touches.",
-            Self::NotAnEntry { .. } => "Give a journal that `palpate link` wrote.",
             Self::NoEmulator => "Install it: apt-get install qemu-system-arm, brew install qemu.",
             Self::NoImage { .. } => "Build it: cd onboard/firmware && cargo build --release.",
             Self::EmulatorEnded { .. } => "Check that the firmware image is an ELF file for the emulated machine.",

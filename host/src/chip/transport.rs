@@ -1,18 +1,16 @@
-//! Bytes to and from a chip, over a line that can be made bad on purpose.
+//! Bytes to and from a chip.
 
 use super::qemu::Qemu;
-use super::{BadLine, Faults};
 use crate::error::{ChipProblem, Error, Place, Result};
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 use std::io::{ErrorKind, Read, Write};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Bytes to and from a chip.
 pub struct Transport {
     name: String,
     received: Receiver<std::io::Result<Vec<u8>>>,
     writer: Box<dyn Write + Send>,
-    bad: Option<(BadLine, BadLine)>,
     emulator: Option<Qemu>,
 }
 
@@ -45,17 +43,11 @@ impl Transport {
                 }
             }
         });
-        Self { name, received, writer: Box::new(writer), bad: None, emulator: None }
+        Self { name, received, writer: Box::new(writer), emulator: None }
     }
 
     pub(super) fn with_emulator(mut self, emulator: Qemu) -> Self {
         self.emulator = Some(emulator);
-        self
-    }
-
-    /// Makes the line bad.
-    pub fn with_faults(mut self, faults: Faults, seed: u64) -> Self {
-        self.bad = Some((BadLine::new(faults, seed), BadLine::new(faults, !seed)));
         self
     }
 
@@ -75,30 +67,13 @@ impl Transport {
         }
     }
 
-    /// Sends bytes, at once or, on a bad line, when they are due.
+    /// Sends bytes.
     ///
     /// # Errors
     /// When the other end is gone.
     pub(crate) fn send(&mut self, bytes: &[u8]) -> Result<()> {
-        match &mut self.bad {
-            Some((down, _)) => {
-                down.push(bytes, Instant::now());
-                self.send_due()
-            }
-            None => self.write(bytes),
-        }
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> Result<()> {
         let written = self.writer.write_all(bytes).and_then(|()| self.writer.flush());
         written.map_err(|source| self.lost(&source))
-    }
-
-    fn send_due(&mut self) -> Result<()> {
-        while let Some(bytes) = self.bad.as_mut().and_then(|(down, _)| down.pop(Instant::now())) {
-            self.write(&bytes)?;
-        }
-        Ok(())
     }
 
     /// Waits for bytes, at most for `wait`. No bytes mean that none came.
@@ -106,21 +81,12 @@ impl Transport {
     /// # Errors
     /// When the other end is gone.
     pub(crate) fn receive(&mut self, wait: Duration) -> Result<Vec<u8>> {
-        self.send_due()?;
-        let wait = if self.bad.is_some() { wait.min(Duration::from_millis(1)) } else { wait };
-        let bytes = match self.received.recv_timeout(wait) {
-            Ok(Ok(bytes)) => bytes,
-            Ok(Err(source)) => return Err(self.lost(&source)),
-            Err(RecvTimeoutError::Timeout) => Vec::new(),
-            Err(RecvTimeoutError::Disconnected) => return Err(self.lost(&ErrorKind::UnexpectedEof.into())),
-        };
-        let Some((_, up)) = &mut self.bad else { return Ok(bytes) };
-        up.push(&bytes, Instant::now());
-        let mut due = Vec::new();
-        while let Some(bytes) = up.pop(Instant::now()) {
-            due.extend(bytes);
+        match self.received.recv_timeout(wait) {
+            Ok(Ok(bytes)) => Ok(bytes),
+            Ok(Err(source)) => Err(self.lost(&source)),
+            Err(RecvTimeoutError::Timeout) => Ok(Vec::new()),
+            Err(RecvTimeoutError::Disconnected) => Err(self.lost(&ErrorKind::UnexpectedEof.into())),
         }
-        Ok(due)
     }
 
     /// The error for a line that broke.

@@ -1,9 +1,7 @@
 //! Everything that is measured of a model on touches, as one call.
 
 use super::plan::{Active, evaluate_active};
-use super::{
-    ActiveFacts, Candidate, Evaluation, LEAST_GROUPS, Margins, OnStrangers, Settings, evaluate, strangers,
-};
+use super::{ActiveFacts, Candidate, Evaluation, LEAST_GROUPS, Margins, OnStrangers, Settings, evaluate, strangers};
 use crate::error::{Error, Result};
 use crate::probe::noise::Noise;
 use crate::touches::Dataset;
@@ -25,8 +23,6 @@ pub struct Wanted<'d> {
     pub seed: u64,
     /// Noise of the touches, with which a promise is compared.
     pub noise: Noise,
-    /// The number of touches after which to give the confusion matrix.
-    pub confusion: Option<usize>,
     /// True if each approach is made where the model's plan says.
     pub active: bool,
     /// Touches of objects that the model does not know, and where they are from.
@@ -46,28 +42,12 @@ pub struct Evaluated {
     pub instances: BTreeMap<String, usize>,
     /// Objects whose touches are those that the model was trained on.
     pub trained_on: Vec<String>,
-    /// The confusion matrix.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub confusion: Option<Confusion>,
     /// Stock that the plan proposed approaches from, where it did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub active: Option<ActiveFacts>,
     /// Answers to objects that the model does not know.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strangers: Option<OnStrangers>,
-}
-
-/// A confusion matrix.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Confusion {
-    /// After this many touches.
-    pub touches: usize,
-    /// Rows.
-    pub touched: Vec<String>,
-    /// Columns.
-    pub recognized: Vec<String>,
-    /// Groups.
-    pub counts: Vec<Vec<usize>>,
 }
 
 /// Measures a model on touches that have their noise already. `expecting` gives the weight of each object, of the objects'
@@ -100,14 +80,6 @@ pub fn measure(
         seed: wanted.seed,
         noise: wanted.noise,
     };
-    let confusion = wanted.confusion.map(|touches| -> Result<_> {
-        Ok(Confusion {
-            touches,
-            touched: margins.tested_names.clone(),
-            recognized: margins.objects.clone(),
-            counts: margins.confusion(touches, wanted.groups, wanted.seed)?,
-        })
-    });
     let active = wanted.active.then(|| Active::new(&margins, dataset)).transpose()?;
     let evaluation = match &active {
         Some(active) => evaluate_active(&margins, active, &settings)?,
@@ -117,9 +89,9 @@ pub fn measure(
         let unknown = Margins::of_strangers(candidate, dataset).map_err(|error| error.in_file(directory))?;
         strangers((&margins, &evaluation.sequential), &unknown, &settings.sequences())
     });
-    let (confusion, strangers) = (confusion.transpose()?, strangers.transpose()?);
+    let strangers = strangers.transpose()?;
     let (instances, active) = (dataset.several(), active.map(|active| active.facts()));
-    Ok(Evaluated { evaluation, robots: 1, instances, trained_on: Vec::new(), confusion, active, strangers })
+    Ok(Evaluated { evaluation, robots: 1, instances, trained_on: Vec::new(), active, strangers })
 }
 
 /// The numbers of touches to give the accuracy after: those asked for, or the usual ones that enough groups can be drawn

@@ -64,7 +64,7 @@ pub(crate) use margins::best;
 pub use margins::{Margins, delivered};
 #[cfg(feature = "train")]
 pub(crate) use margins::{leading, objects_of};
-pub use measure::{Confusion, Evaluated, Wanted, measure, own_weights};
+pub use measure::{Evaluated, Wanted, measure, own_weights};
 #[cfg(feature = "train")]
 pub(crate) use noisy::ROBOTS;
 pub use noisy::add_noise;

@@ -16,11 +16,7 @@ pub(crate) fn chip<'m>(model: &Model<'m>, stopping: Stopping, weights: Option<&'
     }
 }
 
-fn of<'m, const N: usize>(
-    model: &Model<'m>,
-    stopping: Stopping,
-    weights: Option<&'m [u32]>,
-) -> Box<Chip<'m>> {
+fn of<'m, const N: usize>(model: &Model<'m>, stopping: Stopping, weights: Option<&'m [u32]>) -> Box<Chip<'m>> {
     let Ok(recognizer) = Recognizer::<N>::new(model, stopping) else {
         unreachable!("there is room for as many objects, and models have at most 256")
     };

@@ -48,7 +48,6 @@ fn measured(model: &Model<'_>, known: &Dataset, unknown: &Dataset) -> Result<Eva
         max_touches: None,
         seed: 1,
         noise: Noise::default(),
-        confusion: None,
         active: false,
         unknown: Some((Path::new("strangers"), unknown)),
     };

@@ -9,8 +9,8 @@ use palpate::rows::{Encoder, RowSequence, Sequences};
 use palpate::shared::format::Weights;
 use palpate::strangers;
 use palpate::stream::{
-    EventCounts, EventSettings, Learned, Settings, StrangerTest, Wanted, calibrate, calibrate_events,
-    calibrate_with, estimate, evaluate, evaluate_events,
+    EventCounts, EventSettings, Learned, Settings, StrangerTest, Wanted, calibrate, calibrate_events, calibrate_with,
+    estimate, evaluate, evaluate_events,
 };
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};

@@ -4,7 +4,7 @@
 //! `cargo test --release -p palpate-tests --test whole firmware:: -- --ignored`. It builds the images itself. With
 //! `PALPATE_SOAK=1000000` a million touches go through the chips instead of ten thousand.
 
-use palpate::chip::{Asks, Connection, Emulator, Faults, Steps, Summary, Update, stream};
+use palpate::chip::{Asks, Connection, Emulator, Port, Steps, Summary, Transport, Update, stream};
 use palpate::compile::Leaf;
 use palpate::mesh::builtin;
 use palpate::probe::approach::Probe;
@@ -17,6 +17,7 @@ use palpate_shared::link::{
     Decision, Decoder, Detail, Event, FaultKind, HostSettings, Message, TouchMessage, VerdictMessage,
 };
 use palpate_shared::{ContactTime, Descriptor, Patterns, Touch};
+use palpate_tests::bad_line::{Faults, relay};
 use palpate_tests::chips::{M0, M4F, build, cargo};
 use palpate_tests::pins::{APPROACH, Edges, edges};
 use palpate_tests::random::{self, Shape};
@@ -27,7 +28,7 @@ use rand::{RngExt, SeedableRng};
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
@@ -60,6 +61,32 @@ const BRISK: HostSettings = HostSettings { retry: 500_000, attempts: 50 };
 /// Settings for a line that loses much.
 const HASTY: HostSettings = HostSettings { retry: 50_000, attempts: 200 };
 
+/// A line that loses and changes bytes now and then, doubles them, and delays them by up to 2 ms.
+const BAD: Faults = Faults { lost: 0.0005, changed: 0.0005, doubled: 0.01, delay: Duration::from_millis(2) };
+
+/// An emulator at the other end of a bad line, which ends with this.
+struct Emulated(std::process::Child);
+
+impl Drop for Emulated {
+    fn drop(&mut self) {
+        self.0.kill().and_then(|()| self.0.wait()).unwrap();
+    }
+}
+
+/// The line to an emulated chip that runs this image.
+fn started(image: PathBuf, faults: Option<Faults>) -> (Transport, Option<Emulated>) {
+    let emulator = Emulator::for_firmware(image);
+    let Some(faults) = faults else { return (emulator.start().unwrap(), None) };
+    let [chip, host] = [(); 2].map(|()| TcpListener::bind("127.0.0.1:0").unwrap());
+    let mut qemu = Command::new(&emulator.program);
+    qemu.args(["-machine", &emulator.machine, "-display", "none", "-monitor", "none", "-serial"]);
+    qemu.arg(format!("tcp:{}", chip.local_addr().unwrap())).args(["-semihosting-config", "enable=on,target=native"]);
+    let child = qemu.arg("-kernel").arg(&emulator.firmware).stdin(Stdio::null()).spawn().unwrap();
+    let port = Port::Tcp(host.local_addr().unwrap().to_string());
+    relay(host, chip.accept().unwrap().0, faults, 1);
+    (port.open(115_200, &emulator).unwrap(), Some(Emulated(child)))
+}
+
 /// Streams touches to an emulated chip that gets `model` first, and holds it against the host.
 fn parity(
     target: &str,
@@ -69,11 +96,7 @@ fn parity(
     settings: HostSettings,
     mut each: impl FnMut(&mut Connection, &Update),
 ) -> Summary {
-    let firmware = build("uart", target, &[], None);
-    let mut transport = Emulator::for_firmware(firmware).start().unwrap();
-    if let Some(faults) = faults {
-        transport = transport.with_faults(faults, 1);
-    }
+    let (transport, _emulator) = started(build("uart", target, &[], None), faults);
     let mut connection = Connection::open(transport, settings).unwrap();
     connection.load(model, &()).unwrap();
     let chip = connection.model().unwrap();
@@ -110,8 +133,7 @@ fn ten_thousand_touches_give_the_hosts_verdicts_on_both_chips_and_for_both_descr
 #[test]
 #[ignore = "needs an emulator; see the top of tests/tests/whole/firmware.rs"]
 fn ten_thousand_touches_arrive_exactly_once_over_a_bad_line() {
-    let faults = "0.0005,0.0005,0.01,2".parse().unwrap();
-    let summary = parity(M4F, &model(Descriptor::Curvature, 1), 10_000, Some(faults), HASTY, |_, _| ());
+    let summary = parity(M4F, &model(Descriptor::Curvature, 1), 10_000, Some(BAD), HASTY, |_, _| ());
     eprintln!("{summary:?}");
     assert_eq!(
         (summary.touches + summary.refused, summary.compared, summary.differences),
@@ -142,12 +164,8 @@ fn touches_with_a_position_give_the_hosts_verdicts_places_and_approaches_over_a_
     let settings = with!(locate::Settings::default(), fine = false);
     let surfaces = locate::learn(&dataset, &settings).unwrap();
     let model = locate::write(&surfaces, &dataset.names(), &probe, &settings).unwrap();
-    for (faults, settings, touches) in [(None, PATIENT, 100), (Some("0.0005,0.0005,0.01,2"), BRISK, 40)] {
-        let mut transport =
-            Emulator::for_firmware(build("uart", M4F, &["--features", "locate"], None)).start().unwrap();
-        if let Some(faults) = faults {
-            transport = transport.with_faults(faults.parse().unwrap(), 1);
-        }
+    for (faults, settings, touches) in [(None, PATIENT, 100), (Some(BAD), BRISK, 40)] {
+        let (transport, _emulator) = started(build("uart", M4F, &["--features", "locate"], None), faults);
         let mut connection = Connection::open(transport, settings).unwrap();
         connection.load(&model, &()).unwrap();
         let chip = connection.model().unwrap();

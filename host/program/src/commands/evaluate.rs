@@ -1,6 +1,6 @@
 use super::Global;
 use super::expected::ExpectedArguments;
-use super::figures::{confusion_table, text};
+use super::figures::{shares_table, text};
 use super::numbers::{error_rate, sequences};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
@@ -11,7 +11,7 @@ use palpate::calibrate::{Per, Terms};
 use palpate::ensemble::OverTouches;
 use palpate::error::{EvaluateProblem, RowsProblem};
 use palpate::evaluate::model_file::ModelFile;
-use palpate::evaluate::{self, Classes, Confusion, Evaluated, Regression, RowsEvaluation, Wanted, evaluate_rows};
+use palpate::evaluate::{self, Classes, Evaluated, Regression, RowsEvaluation, Wanted, evaluate_rows};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
@@ -68,9 +68,6 @@ pub(crate) struct Arguments {
     /// Give up after this many touches [default: the model's own limit]
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
-    /// Show the confusion matrix after this many touches
-    #[arg(long, value_name = "N", conflicts_with = "label")]
-    confusion: Option<usize>,
     /// Follow the model's plan of approaches
     #[arg(long)]
     active: bool,
@@ -83,8 +80,7 @@ pub(crate) struct Arguments {
 }
 
 /// The options that approaches on a simulated table have no use for.
-const TOUCHES: [&str; 10] =
-    ["directory", "label", "unknown", "at", "error_rate", "confusion", "active", "probe", "only", "prior"];
+const TOUCHES: [&str; 9] = ["directory", "label", "unknown", "at", "error_rate", "active", "probe", "only", "prior"];
 
 impl Arguments {
     /// True if there is an option for sequences of touches or rows.
@@ -154,7 +150,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         max_touches: arguments.max_touches,
         seed: global.seed(),
         noise: stated,
-        confusion: arguments.confusion,
         active: arguments.active,
         unknown: unknown.as_ref().map(|(directory, dataset)| (*directory, dataset)),
     };
@@ -214,8 +209,7 @@ fn rows(directory: &Path, arguments: &Arguments, file: &ModelFile, label: &str, 
             100.0 * accuracy,
             100.0 * accuracy_standard_error
         );
-        text +=
-            &confusion_table(&Confusion { touches: 1, touched: names.clone(), recognized: names, counts: confusion });
+        text += &shares_table("Taken for", &names, &names, &confusion);
     }
     if let Some(Regression { mean_absolute_error, root_mean_square_error }) = regression {
         text = format!(

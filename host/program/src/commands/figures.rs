@@ -1,8 +1,7 @@
 //! The figures of an evaluation as JSON and as text.
 
 use palpate::evaluate::{
-    ActiveFacts, AlarmCheck, Approaches, Confusion, Evaluated, Evaluation, Finding, OnStrangers, PromiseCheck,
-    Sequential,
+    ActiveFacts, AlarmCheck, Approaches, Evaluated, Evaluation, Finding, OnStrangers, PromiseCheck, Sequential,
 };
 use palpate::wording::{self, count, counted, rate};
 use palpate_shared::DIRECTIONS;
@@ -37,9 +36,6 @@ pub(super) fn text(evaluated: &Evaluated) -> String {
     }
     if let Some(most) = evaluated.instances.values().max() {
         _ = writeln!(text, "Objects have up to {most} instances or recordings; each group is of touches of one.");
-    }
-    if let Some(confusion) = &evaluated.confusion {
-        text += &confusion_table(confusion);
     }
     if let Some(strangers) = &evaluated.strangers {
         text += &strangers_table(strangers);
@@ -301,21 +297,15 @@ fn used_up(strangers: &OnStrangers) -> String {
     )
 }
 
-/// Shares in percent: one row per touched object, one column per object that it was taken for.
-pub(super) fn confusion_table(confusion: &Confusion) -> String {
-    let s = if confusion.touches == 1 { "" } else { "es" };
-    shares_table(&format!("Taken for, after {} touch{s}", confusion.touches), confusion)
-}
-
-/// A confusion matrix in shares of its rows, under a title.
-pub(super) fn shares_table(title: &str, confusion: &Confusion) -> String {
-    let names = confusion.touched.iter().chain(&confusion.recognized);
+/// A confusion matrix in shares of its rows, under a title: a row for each of these names, a column for each of those.
+pub(super) fn shares_table(title: &str, rows: &[String], columns: &[String], counts: &[Vec<usize>]) -> String {
+    let names = rows.iter().chain(columns);
     let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max("7.1 %".len() + 2);
     let mut text = format!("\n{title}\n{:width$}", "");
     // Writing to a string cannot fail.
-    confusion.recognized.iter().for_each(|name| _ = write!(text, " {name:>width$}"));
+    columns.iter().for_each(|name| _ = write!(text, " {name:>width$}"));
     text.push('\n');
-    for (name, counts) in confusion.touched.iter().zip(&confusion.counts) {
+    for (name, counts) in rows.iter().zip(counts) {
         let groups = counts.iter().sum::<usize>().max(1) as f64;
         _ = write!(text, "{name:width$}");
         for &count in counts {

@@ -4,7 +4,7 @@ use palpate::chip::inspect::{
     Defaults, Feature, Inspected, Limited, Noise, OfEvents, OnChip, PlanOf, Predicts, Probe, Promised, SomeColumns,
     Tested, Touches, TrainedOn, inspect, on_chip,
 };
-use palpate::compile::{CompiledModel, Core, FEATURES, Memory};
+use palpate::compile::{CompiledModel, Core, Memory};
 use palpate::locate::MapsFile;
 use palpate::wording::{self, count, counted, rate, scientific};
 use palpate::{Error, Result};
@@ -15,12 +15,11 @@ use std::path::PathBuf;
 /// Say what is in a compiled model, and what it costs on a chip.
 #[derive(clap::Args)]
 #[command(after_help = "\
-With --chip, instructions per touch are measured where QEMU is installed and the firmware's `cost` image is built (onboard/firmware, seen from the current directory); otherwise they are estimated, right to 15 %. The time is that of one instruction per cycle: memory that makes the processor wait adds to it.
+Instructions per touch are estimated, right to 15 %; at one instruction per cycle 4,000 of them take 83 µs at 48 MHz. Memory that makes the processor wait adds to it.
 
 Examples:
   palpate inspect model.palpate
-  palpate inspect model.palpate --chip m0+ --mhz 48
-  palpate inspect model.palpate --chip m4f --config compact,complete,i8-leaves
+  palpate inspect model.palpate --chip m0+
   palpate inspect model.palpate --json")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
@@ -28,12 +27,6 @@ pub(crate) struct Arguments {
     /// The processor, m0+ or m4f; says what the model costs on it
     #[arg(long, value_parser = core, value_name = "NAME")]
     chip: Option<Core>,
-    /// The processor's clock in MHz, to give the time per touch
-    #[arg(long, requires = "chip", value_name = "MHZ", value_parser = megahertz)]
-    mhz: Option<f64>,
-    /// The features that palpate-onboard is built with, such as compact,i8-leaves,strangers [default: those that the model needs]
-    #[arg(long, requires = "chip", value_name = "FEATURES", value_delimiter = ',', value_parser = FEATURES.map(|(name, _)| name))]
-    config: Vec<String>,
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
@@ -46,9 +39,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let compiled = CompiledModel::read(&arguments.model)?;
     let model = compiled.model();
     let mut inspected = inspect(&model);
-    let features: Vec<&str> = arguments.config.iter().map(String::as_str).collect();
-    let features = Some(&features[..]).filter(|features| !features.is_empty());
-    inspected.chip = arguments.chip.map(|core| on_chip(&model, core, arguments.mhz, features)).transpose()?;
+    inspected.chip = arguments.chip.map(|core| on_chip(&model, core));
     global.print(&inspected, || text(&inspected))
 }
 
@@ -326,19 +317,9 @@ fn chip_lines(lines: &mut Lines, chip: &OnChip) {
     lines.line("RAM", format!("{ram} bytes, estimated (the opened model, and a recognizer of just its objects)"));
     lines.line("stack", format!("{stack} bytes, estimated"));
     let [margins, verdict] = [chip.margin_instructions, chip.verdict_instructions].map(known);
-    lines.line("instructions", format!("{margins} to the margins, {verdict} to the verdict (per touch, {})", chip.how));
+    lines.line("instructions", format!("{margins} to the margins, {verdict} to the verdict (per touch, estimated)"));
     lines.line(
         "worst case",
         format!("{} to the margins, the longest way through all trees, estimated", known(chip.most_instructions)),
     );
-    if let (Some(mhz), Some(microseconds)) = (chip.mhz, chip.microseconds) {
-        lines.line("time", format!("{microseconds:.0} µs per touch at {mhz} MHz, one instruction per cycle"));
-    }
-}
-
-fn megahertz(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(mhz) if mhz > 0.0 && mhz.is_finite() => Ok(mhz),
-        _ => Err("give a number above 0, such as 48".into()),
-    }
 }

@@ -5,7 +5,7 @@ use super::figures::shares_table;
 use palpate::Result;
 use palpate::compile::{self, CompiledModel};
 use palpate::error::{Error, Place, RowsProblem};
-use palpate::evaluate::{Confusion, Finding};
+use palpate::evaluate::Finding;
 use palpate::output;
 use palpate::rows::{Features, SequenceColumns, Sequences};
 use palpate::stream::{self, Evaluated, EventCounts, EventSettings, EventsCalibrated, EventsEvaluated, RowRule};
@@ -296,10 +296,7 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
     );
     let mut recognized = evaluated.names.clone();
     recognized.push("no name".into());
-    text + &shares_table(
-        "Confusion matrix",
-        &Confusion { touches: 0, touched: evaluated.names.clone(), recognized, counts: evaluated.confusion.clone() },
-    )
+    text + &shares_table("Confusion matrix", &evaluated.names, &recognized, &evaluated.confusion)
 }
 
 /// Refuses sequences of an ensemble: only a compiled model stops.

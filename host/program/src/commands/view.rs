@@ -50,14 +50,11 @@ pub(crate) struct Arguments {
     /// Touches of each object; to show [default: 24], or with --play --scene table to learn maps from [default: 50000]
     #[arg(long, value_name = "N", value_parser = super::numbers::count)]
     touches: Option<u64>,
-    /// Approaches to show in which a finger missed
-    #[arg(long, value_name = "N", default_value = "12", conflicts_with = "play")]
-    misses: usize,
     /// Make a page on which the objects are touched
     #[arg(long)]
     play: bool,
     /// Make a page that watches a chip at a serial port
-    #[arg(long, conflicts_with_all = ["play", "sources", "touches", "misses", "trace"])]
+    #[arg(long, conflicts_with_all = ["play", "sources", "touches", "trace"])]
     #[arg(conflicts_with_all = ["ProbeArguments", "UnitArguments", "SceneArguments", "RealArguments"])]
     port: bool,
     /// A compiled model for the page; may be given several times, with --port once
@@ -95,7 +92,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         let wanted = play::Wanted { sources, model, output, touches, trace, size, real };
         return if scene.is_floating() { play::run(wanted, global) } else { play::on_table(wanted, &on, global) };
     }
-    let Arguments { sources, output, touches, misses, size, real, .. } = &arguments;
+    let Arguments { sources, output, touches, size, real, .. } = &arguments;
     if (1..=2).contains(&sources.len()) && sources.iter().all(|source| shape::is_touches(source)) {
         return maps(&arguments, global);
     }
@@ -118,7 +115,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let touches = touches.map_or(view::Settings::default().touches, |touches| touches as usize);
     let page = view::page(
         &object,
-        &view::Settings { touches, misses: *misses, seed: global.seed(), length, clearance, probe, cone: scene.cone() },
+        &view::Settings { touches, seed: global.seed(), length, clearance, probe, cone: scene.cone() },
     )?;
     output::write_bytes(output, page.as_bytes())?;
     let facts = Facts::of(object.mesh());

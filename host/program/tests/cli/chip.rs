@@ -1,12 +1,16 @@
-//! The commands that talk to a chip: link and watch, with a chip's whole program behind a TCP connection.
+//! The commands that talk to a chip, with a chip's whole program behind a TCP connection.
 
 use crate::fixtures::{LOCATED, ONE_SPLIT};
 use crate::locate::{of_one_placement, recognized};
 use crate::{command, complains, fails, figures, json, lines, listen, piped, run, says, stderr, stdout, succeeds};
-use palpate_onboard::station::{Memory, NoStorage, Table, record_length, serve, serve_with};
+use palpate_onboard::Model;
+use palpate_onboard::station::{Memory, NoStorage, Station, Table, record_length, serve, serve_with};
+use palpate_shared::Touch;
+use palpate_shared::link::{DeviceEnd, Event, FaultKind, Progress, Refusal, TouchMessage};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
+use std::time::Duration;
 
 const OBJECTS: usize = 2;
 
@@ -73,7 +77,7 @@ fn a_chip_with_maps_says_verdicts_places_and_approaches_as_the_host_does() {
     let link = |chip: String, words: &str| succeeds(at, &format!("link {chip} {words}"));
     let text = link(chip_with_table(), "lines.txt --load maps.palpate --next");
     assert_eq!(lines(&text), said);
-    let words = "--parity data --stop-after 12 --per-object 6 --next --workspace 15 --bad-line 0.001,0.001,0.02,0";
+    let words = "--parity data --stop-after 12 --next --workspace 15";
     let text = link(chip_with_table(), &format!("--load maps.palpate {words}"));
     assert!(text.contains("compared with the host: 12 touches and 12 proposed approaches, 0 differences"), "{text}");
     assert!(link(chip_with_table(), "--load maps.palpate").contains(", maps, 2 objects: brick, slab"));
@@ -122,46 +126,16 @@ fn link_loads_a_model_and_says_what_is_on_the_chip() {
 }
 
 #[test]
-fn link_recognizes_as_the_host_does_and_watch_shows_its_journal() {
+fn link_recognizes_as_the_host_does() {
     let place = ONE_SPLIT.folder();
-    let (model, data, journal) = (place.text("model.palpate"), place.text("data"), place.text("journal.jsonl"));
-    let arguments = ["--load", &model, "--parity", &data, "--stop-after", "40", "--per-object", "5"];
+    let arguments = ["--load", &place.text("model.palpate"), "--parity", &place.text("data"), "--stop-after", "240"];
     let mut command = command(["link", &chip()]);
-    let summary = json(command.args(arguments).args(["--journal", &journal, "--json"]).output().unwrap());
+    let summary = json(command.args(arguments).arg("--json").output().unwrap());
     assert_eq!(
         (&summary["touches"], &summary["compared"], &summary["differences"]),
-        (&40.into(), &40.into(), &0.into())
+        (&240.into(), &240.into(), &0.into())
     );
-    assert_eq!((&summary["right"], &summary["wrong"], &summary["undecided"]), (&8.into(), &0.into(), &0.into()));
-
-    let entries = lines(&std::fs::read_to_string(&journal).unwrap());
-    let kinds = |kind: &str| entries.iter().filter(|entry| entry["is"] == kind).count();
-    assert_eq!((kinds("model"), kinds("object"), kinds("touch"), kinds("link")), (1, 8, 40, 1));
-
-    // A journal is replaced by the next one.
-    let mut again = crate::command(["link", &chip()]);
-    json(again.args(arguments).args(["--journal", &journal, "--json"]).output().unwrap());
-    let watched = stdout(run(["link", &journal, "--watch"]));
-    let lines: Vec<&str> = watched.lines().collect();
-    assert_eq!(lines.len(), entries.len(), "{watched}");
-    assert!(lines[0].starts_with("model of ") && lines[0].ends_with(": bowl, fork"), "{watched}");
-    assert_eq!(lines[1], "another object: bowl");
-    assert!(lines[2].starts_with("    1 ") && lines[2].contains(" ms  perhaps bowl 8"), "{watched}");
-    assert!(lines[5].ends_with(" ms  bowl"), "{watched}");
-    // A chip that has just started makes the host send again what is under way.
-    let resent = &entries[49]["resent"];
-    assert_eq!(lines[49], format!("link: {resent} frames sent again, 0 garbled, 0 events missed"));
-    assert_eq!(&summary["resent"], resent);
-}
-
-#[test]
-fn link_counts_every_touch_once_over_a_bad_line() {
-    let place = ONE_SPLIT.folder();
-    let (model, data) = (place.text("model.palpate"), place.text("data"));
-    let arguments = ["--load", &model, "--parity", &data, "--stop-after", "500", "--bad-line", "0.001,0.001,0.02,0"];
-    let summary = json(command(["link", &chip(), "--json"]).args(arguments).output().unwrap());
-    assert_eq!((&summary["touches"], &summary["differences"]), (&500.into(), &0.into()));
-    assert!(summary["resent"].as_u64().unwrap() > 0, "{summary}");
+    assert_eq!((&summary["right"], &summary["wrong"], &summary["undecided"]), (&4.into(), &0.into(), &0.into()));
 }
 
 #[test]
@@ -192,38 +166,55 @@ fn a_chip_without_a_model_and_a_chip_that_is_gone_say_what_to_do() {
 }
 
 #[test]
-fn bad_arguments_of_link_and_watch_exit_with_2() {
+fn bad_arguments_of_link_exit_with_2() {
     let place = ONE_SPLIT.folder();
     let error = stderr(run(["link", "emulator", "--parity", &place.text("data")]), 2);
-    assert!(error.contains("--load") && error.contains("--against"), "{error}");
-    for arguments in [&["link", "http://host:1"][..], &["link", "http://host:1", "--watch"]] {
-        let error = stderr(run(arguments), 2);
-        assert!(error.contains("`http://host:1` is not a port. Give a serial port"), "{error}");
-    }
-    let error = stderr(run(["link", "emulator", "--bad-line", "often"]), 2);
-    assert!(error.contains("Give three probabilities and milliseconds"), "{error}");
+    assert!(error.contains("--load"), "{error}");
+    let error = stderr(run(["link", "http://host:1"]), 2);
+    assert!(error.contains("`http://host:1` is not a port. Give a serial port"), "{error}");
+}
+
+/// A chip with this model whose own fingers touch once the host has asked what it wants to know.
+fn chip_with_fingers(bytes: Vec<u8>) -> String {
+    port(move |mut stream| {
+        let mut station = Station::<OBJECTS>::new(&Model::new(&bytes).unwrap());
+        let mut end = DeviceEnd::new(Progress::NONE, 1);
+        let mut buffer = [0; 256];
+        stream.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
+        while let Ok(count @ 1..) = stream.read(&mut buffer) {
+            end.receive(&buffer[..count], &mut station, |frame| stream.write_all(frame).unwrap());
+        }
+        let touch = Touch::from_micros([0, 1_000, 80_000]);
+        for _ in 0..2 {
+            let verdict = station.push(&touch, false).unwrap();
+            let event = Event::Touch { touch: TouchMessage::from(&touch), pose_age: None, verdict };
+            end.tell(event, |frame| stream.write_all(frame).unwrap());
+        }
+        let fault = Event::Fault { kind: FaultKind::Silent, finger: 2 };
+        end.tell(fault, |frame| stream.write_all(frame).unwrap());
+        let refused = Event::Refused { touch: TouchMessage::from(&touch), refusal: Refusal::NoPose };
+        end.tell(refused, |frame| stream.write_all(frame).unwrap());
+        stream.set_read_timeout(None).unwrap();
+        while !matches!(stream.read(&mut buffer), Ok(0) | Err(_)) {}
+    })
 }
 
 #[test]
-fn watch_shows_a_chip_that_gets_a_data_set() {
-    let place = ONE_SPLIT.folder();
-    let arguments = ["link", &chip(), &place.text("data"), "--watch", "--load", &place.text("model.palpate")];
-    let text = stdout(run(arguments));
+fn link_without_touches_prints_a_line_for_each_touch_of_the_chips_own_fingers() {
+    let at = &ONE_SPLIT.folder();
+    let model = std::fs::read(at.join("model.palpate")).unwrap();
+    let text = succeeds(at, &format!("link {} --stop-after 3", chip_with_fingers(model.clone())));
     let lines: Vec<&str> = text.lines().collect();
-    assert!(lines[0].starts_with("model of ") && lines[1] == "another object: bowl", "{text}");
-    assert_eq!(lines.iter().filter(|line| line.contains(" ms  ")).count(), 4, "{text}");
-    assert!(lines.last().unwrap().starts_with("link: "), "{text}");
-}
-
-#[test]
-fn watch_names_the_line_of_a_journal_that_is_wrong() {
-    let place = ONE_SPLIT.folder();
-    let journal = place.text("journal.jsonl");
-    std::fs::write(&journal, "{\"is\":\"object\",\"name\":\"cup\"}\nnonsense\n").unwrap();
-    let output = run(["link", &journal, "--watch"]);
-    assert_eq!(String::from_utf8_lossy(&output.stdout), "another object: cup\n");
-    let error = stderr(output, 1);
-    assert!(error.contains("journal.jsonl:2: not an entry of a journal"), "{error}");
+    assert!(lines[0].starts_with("model of ") && lines[0].ends_with(": bowl, fork"), "{text}");
+    let expected = [
+        "    1     0.000     1.000    80.000 ms  perhaps fork",
+        "    2     0.000     1.000    80.000 ms  perhaps fork",
+        "fault: finger 3: silent",
+        "fault: a touch was not counted: the model needs the probe's pose, and the touch has none",
+    ];
+    assert_eq!(lines[1..], expected, "{text}");
+    let said = crate::lines(&succeeds(at, &format!("link {} --stop-after 1 --json", chip_with_fingers(model))));
+    assert_eq!((&said[0]["is"], &said[1]["is"], &said[1]["best"]), (&"model".into(), &"touch".into(), &"fork".into()));
 }
 
 /// A stream that ends where nothing comes for a while.
@@ -262,11 +253,11 @@ fn chip_that_is_reset(before: Vec<u8>, after: Vec<u8>) -> String {
 }
 
 #[test]
-fn a_chip_that_is_reset_and_has_another_model_then_is_not_watched_with_the_names_of_the_one_before() {
+fn a_chip_that_is_reset_and_has_another_model_then_is_not_shown_with_the_names_of_the_one_before() {
     let household = include_bytes!("../../../../models/household.palpate").to_vec();
     let own = std::fs::read(ONE_SPLIT.folder().join("model.palpate")).unwrap();
     for after in [own, Vec::new()] {
-        let output = run(["link", &chip_that_is_reset(household.clone(), after), "--watch"]);
+        let output = run(["link", &chip_that_is_reset(household.clone(), after)]);
         assert!(String::from_utf8_lossy(&output.stdout).starts_with("model of 44336 bytes"));
         let error = stderr(output, 1);
         assert!(

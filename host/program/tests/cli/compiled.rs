@@ -68,24 +68,20 @@ fn export_and_inspect_say_size_splits_leaves_error_and_cost_of_the_file() {
 }
 
 #[test]
-fn inspect_says_what_a_model_costs_on_a_chip_and_how_it_knows() {
+fn inspect_says_what_a_model_costs_on_a_chip() {
     let at = &ONE_SPLIT.folder();
     for (chip, name) in [("m0+", "Cortex-M0+"), ("m4f", "Cortex-M4F")] {
-        let inspect = format!("inspect model.palpate --chip {chip} --mhz 48");
+        let inspect = format!("inspect model.palpate --chip {chip}");
         let inspected = figures(at, &inspect);
         let cost = &inspected["chip"];
-        assert_eq!((&cost["core"], &cost["how"]), (&chip.into(), &"estimated".into()));
+        assert_eq!(cost["core"], chip);
         assert_eq!(cost["model_flash"], inspected["bytes"]);
-        for bytes in ["code_flash", "ram", "stack", "margin_instructions"] {
+        for bytes in ["code_flash", "ram", "stack", "margin_instructions", "verdict_instructions"] {
             assert!(cost[bytes].as_u64() > Some(0), "{bytes} in {cost}");
         }
-        let time = cost["verdict_instructions"].as_f64().unwrap() / 48.0;
-        assert_eq!(cost["microseconds"].as_f64(), Some(time));
-        let expected = [name, "flash", "RAM", "stack", "(per touch, estimated)", "µs per touch at 48 MHz"];
-        says(at, &inspect, &expected);
+        says(at, &inspect, &[name, "flash", "RAM", "stack", "(per touch, estimated)"]);
     }
     fails(at, "inspect model.palpate --chip z80", 2, "z80");
-    fails(at, "inspect model.palpate --mhz 48", 2, "--chip");
 }
 
 #[test]

@@ -83,7 +83,7 @@ fn calibration_and_evaluation_on_touches_stay() {
         "calibrate full.palpate fresh -o object.palpate --sequences 5000 --error-rate 20% --per object",
         "evaluate average.palpate fresh --sequences 200 --prior bowl=0.5 --json",
         "evaluate average.palpate fresh --sequences 200 --only bowl,fork --real noise=2ms,missed=2% --json",
-        "evaluate name.palpate fresh --sequences 200 --confusion 5",
+        "evaluate name.palpate fresh --sequences 200",
         // Every approach, and approaches that are chosen.
         "capture bowl fork hammer winebottle -o all --approaches 3000 --pose --json",
         "train all -o oriented.json --descriptor oriented --evidence all --trees rounds=12,depth=4",

@@ -199,19 +199,15 @@ fn a_compiled_model_knows_the_capture_that_it_was_trained_on_and_no_promise_is_m
 }
 
 #[test]
-fn evaluate_shows_undecided_sequences_and_the_confusion_of_objects() {
+fn evaluate_shows_undecided_sequences() {
     let at = &BOWL_AND_FORK.folder();
-    let evaluate = "evaluate ensemble.json data --sequences 100 --max-touches 1 --confusion 5";
+    let evaluate = "evaluate ensemble.json data --sequences 100 --max-touches 1";
     let table = succeeds(at, evaluate);
     assert!(table.lines().next().unwrap().ends_with("undecided"), "{table}");
-    assert!(table.contains("Taken for, after 5 touches"), "{table}");
     let found = figures(at, evaluate);
     let sequential = &found["sequential"];
     assert!(sequential["undecided"].as_f64() > Some(0.5), "{sequential}");
     assert!(sequential["undecided_per_object"]["bowl"].is_number());
-    for row in found["confusion"]["counts"].as_array().unwrap() {
-        assert_eq!(row.as_array().unwrap().iter().map(|count| count.as_u64().unwrap()).sum::<u64>(), 100);
-    }
 }
 
 #[test]

@@ -67,7 +67,6 @@ const WRITERS: &[Writer] = &[
         ],
     ),
     slow("report ball.obj -o out", &["index.html", "summary.json"]),
-    slow("link tcp://127.0.0.1:9 data --journal out/journal.jsonl", &["journal.jsonl"]),
     slow("data record touches.txt -o out --object ball", &["ball.txt"]),
 ];
 

@@ -20,13 +20,14 @@ use palpate::probe::scene::{Scene, Table};
 use palpate::random::{self, Purpose};
 use palpate::wording::{count, decimal, percent};
 
+/// Approaches on a page that not all fingers touched.
+const MISSES: usize = 12;
+
 /// Settings of a page.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     /// Number of full touches.
     pub touches: usize,
-    /// Number of approaches that not all fingers touched.
-    pub misses: usize,
     /// The seed from which approaches are drawn.
     pub seed: u64,
     /// The longest side of the object's bounding box, in units.
@@ -39,18 +40,10 @@ pub struct Settings {
     pub cone: Option<f64>,
 }
 
-/// Two dozen touches and a dozen misses of the published probe.
+/// Two dozen touches of the published probe.
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            touches: 24,
-            misses: 12,
-            seed: 1,
-            length: 10.0,
-            clearance: CLEARANCE,
-            probe: Probe::default(),
-            cone: None,
-        }
+        Self { touches: 24, seed: 1, length: 10.0, clearance: CLEARANCE, probe: Probe::default(), cone: None }
     }
 }
 
@@ -220,7 +213,7 @@ fn draw(scene: &Scene, settings: &Settings) -> Approaches {
     let mut rng = random::generator(settings.seed, Purpose::View, "", 0);
     let (mut touches, mut misses) = (Vec::new(), Vec::new());
     let (mut tried, mut full) = (0, 0);
-    while tried < MOST_APPROACHES && (touches.len() < settings.touches || misses.len() < settings.misses) {
+    while tried < MOST_APPROACHES && (touches.len() < settings.touches || misses.len() < MISSES) {
         let approach = Approach::draw_to(&mut rng, scene, scene.bounds(), settings.probe.tilt, settings.clearance);
         let distances = approach.distances(scene, &settings.probe);
         let times = approach.touch(distances, &settings.probe).times();
@@ -234,7 +227,7 @@ fn draw(scene: &Scene, settings: &Settings) -> Approaches {
         tried += 1;
         let is_full = drawn.is_full();
         full += u64::from(is_full);
-        let (kept, most) = if is_full { (&mut touches, settings.touches) } else { (&mut misses, settings.misses) };
+        let (kept, most) = if is_full { (&mut touches, settings.touches) } else { (&mut misses, MISSES) };
         if kept.len() < most {
             kept.push(drawn);
         }

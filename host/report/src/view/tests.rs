@@ -50,14 +50,14 @@ fn a_page_refers_to_nothing_outside_itself_and_its_buttons_and_headings_have_nam
 }
 
 #[test]
-fn a_page_has_the_touches_and_misses_that_were_asked_for() {
-    let settings = Settings { touches: 7, misses: 3, ..Settings::default() };
+fn a_page_has_the_touches_that_were_asked_for_and_a_dozen_misses() {
+    let settings = Settings { touches: 7, ..Settings::default() };
     let page = page(&BOWL, &settings).unwrap();
     let data = data(&page);
     let approaches = data["approaches"].as_array().unwrap();
     let full = |approach: &&serde_json::Value| approach["distances"].as_array().unwrap().iter().all(|d| d.is_number());
-    assert_eq!((approaches.len(), approaches.iter().filter(full).count()), (10, 7));
-    assert_eq!(page.matches("<tr data-approach").count(), 10);
+    assert_eq!((approaches.len(), approaches.iter().filter(full).count()), (19, 7));
+    assert_eq!(page.matches("<tr data-approach").count(), 19);
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! A page that watches a chip at a serial port of the visitor's computer: verdict, posteriors and touches, as `palpate link
-//! --watch` shows them, without a program.
+//! A page that watches a chip at a serial port of the visitor's computer: verdict, posteriors and touches, as `palpate link`
+//! prints them, without a program.
 //!
 //! The page is self-contained and asks the network for nothing. It reaches the chip by Web Serial and speaks the link with the
 //! lines of Rust that the program does ([`palpate_shared::link`], compiled to WebAssembly by `host/web/link`). Names and

@@ -9,7 +9,7 @@
   };
   if (!("serial" in navigator)) {
     return fail("This browser offers no Web Serial, so it cannot reach a chip. On a computer, Chrome, Edge and Opera do, and "
-      + "Firefox from version 151; on Android, Chrome from 148. Safari does not. Or use the program: palpate link PORT --watch.");
+      + "Firefox from version 151; on Android, Chrome from 148. Safari does not. Or use the program: palpate link PORT.");
   }
   let link;
   try {

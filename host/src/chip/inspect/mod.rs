@@ -7,13 +7,10 @@ pub use stated::{
     TrainedOn,
 };
 
-use super::instructions::Chip;
 use crate::compile::{self, Core, Instructions, Memory};
-use crate::error::{Error, Result};
 use crate::evaluate;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH};
-use palpate_shared::{Pose, Q15_ONE, Touch};
 use stated::{
     events, evidence, features, guard, noise, pattern, plan, position, predicts, priors, probe, promised, tested,
     trained_on,
@@ -115,21 +112,15 @@ pub struct OnChip {
     /// Flash, memory and stack.
     #[serde(flatten)]
     pub memory: Memory,
-    /// "measured" or "estimated".
-    pub how: &'static str,
-    /// From contact times to margins.
+    /// From contact times to margins, estimated.
     pub margin_instructions: Option<u64>,
-    /// From contact times to the verdict.
+    /// From contact times to the verdict, estimated.
     pub verdict_instructions: Option<u64>,
     /// Up to the margins, if features lead the longest way through every tree; estimated.
     pub most_instructions: Option<u64>,
-    /// The clock.
-    pub mhz: Option<f64>,
-    /// From contact times to the verdict, at one instruction per cycle.
-    pub microseconds: Option<f64>,
 }
 
-/// Instructions of a verdict beyond the margins, where nothing is measured: between 500 and 1,400.
+/// Instructions of a verdict beyond the margins: between 500 and 1,400.
 const VERDICT: u64 = 1_000;
 
 /// Contents and statements of a model, without its cost on a chip.
@@ -199,55 +190,14 @@ fn parts(model: &Model<'_>) -> BTreeMap<&'static str, usize> {
     ])
 }
 
-/// The cost of a model on a processor, at a clock in MHz if one is given: measured where QEMU and the firmware's image are
-/// there, else estimated. The flash is that with these [`features`](compile::features) of palpate-onboard, by default those that
-/// the model needs.
-///
-/// # Errors
-/// If the model needs another feature. As [`Chip::measure`].
-pub fn on_chip(model: &Model<'_>, core: Core, mhz: Option<f64>, features: Option<&[&str]>) -> Result<OnChip> {
-    let needed = compile::features(model);
-    let features = features.unwrap_or(&needed);
-    if let Some(missing) = needed.iter().find(|name| !features.contains(name)) {
-        return Err(Error::setting("config", features.join(","), format!("also {missing}, which the model needs")));
-    }
-    let emulated = match core {
-        Core::M4F => Chip::M4F,
-        Core::M0Plus => Chip::M0Plus,
-    };
-    // The image expects touches; a model over rows of features cannot be measured with it.
-    let measured = match model.descriptor() {
-        Some(_) if emulated.is_there() => Some(emulated.measure(model.bytes(), &spread_touches(model))?),
-        _ => None,
-    };
-    let (how, margins, verdict) = match measured {
-        Some(cost) => ("measured", Some(cost.margins), Some(cost.push)),
-        None => {
-            let margins = Instructions::of_model(model).on(core);
-            ("estimated", margins, margins.map(|margins| margins + VERDICT))
-        }
-    };
-    Ok(OnChip {
+/// The estimated cost of a model on a processor.
+pub fn on_chip(model: &Model<'_>, core: Core) -> OnChip {
+    let margins = Instructions::of_model(model).on(core);
+    OnChip {
         core,
-        memory: Memory::of_model(model, core, features),
-        how,
+        memory: Memory::of_model(model, core, &compile::features(model)),
         margin_instructions: margins,
-        verdict_instructions: verdict,
+        verdict_instructions: margins.map(|margins| margins + VERDICT),
         most_instructions: Instructions::of_longest_ways(model).on(core),
-        mhz,
-        microseconds: mhz.zip(verdict).map(|(mhz, verdict)| verdict as f64 / mhz),
-    })
-}
-
-/// Touches that spread evenly over the range of the model's probe, the same every time.
-fn spread_touches(model: &Model<'_>) -> Vec<Touch> {
-    // Most contacts come within a twentieth of the longest time.
-    let range = compile::longest_time(model) * 1e6 / 20.0;
-    let spread = |index: u32, step: f64| ((f64::from(index) * step).fract() * range) as u32;
-    let touch = |index| {
-        let pose = Pose { direction: [0, 0, -Q15_ONE], alignment: [Q15_ONE, 0, 0] };
-        let times = [spread(index, 0.618_034), spread(index, 0.754_878), spread(index, 0.569_840)];
-        Touch::from_micros(times).with_pose(pose)
-    };
-    (0..64).map(touch).collect()
+    }
 }

@@ -1,5 +1,5 @@
 //! Recognizes from three switches on three pins, and reports every touch and fault to a host over the UART
-//! (`palpate link --watch`). A verdict ends an object; the next touch begins another. What was touched is kept through resets.
+//! (`palpate link PORT`). A verdict ends an object; the next touch begins another. What was touched is kept through resets.
 //!
 //! A model is built in; another: `PALPATE_MODEL=/path/to/model.palpate cargo build --release --bin gpio`, or over the
 //! link: `palpate link PORT --load model.palpate`.

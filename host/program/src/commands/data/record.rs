@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
         }
         let port = source.parse()?;
         let recording = record.open(directory, object, source, SystemTime::now())?;
-        let from = (&arguments.line, &port, global.seed());
+        let from = (&arguments.line, &port);
         return from_chip(from, recording, directory, arguments.stop_after, global.json);
     }
     let (source, lines): (_, Box<dyn Read>) = match source == "-" {

@@ -1,31 +1,31 @@
 //! `palpate link`, and what it has in common with `palpate data record`.
 
 pub(super) mod record;
-mod screen;
-mod watch;
 
 use crate::commands::progress::Bar;
 use crate::commands::recognize_lines::Line;
 use crate::commands::recognize_maps::print_located;
 use crate::commands::{self, Global};
-use clap::ArgGroup;
 use palpate::chip::{
-    Asks, ChipModel, Connection, Emulator, Entry, Faults, Journal, Located, Port, Steps, Summary, Transport, Update,
+    Asks, ChipModel, Connection, Emulator, Entry, Located, Port, Received, Steps, Summary, Transport, Update,
     probability, stream,
 };
 use palpate::compile::CompiledModel;
 use palpate::error::{ChipProblem, Place};
 use palpate::locate::{self, MapsFile};
-use palpate::output::{print, print_json, refuse_foreign};
+use palpate::output::{print, print_json};
 use palpate::progress::Progress;
 use palpate::touches::{Log, is_log};
 use palpate::{Error, Result};
 use palpate_shared::format::SignedModel;
-use palpate_shared::link::{Decision, HostSettings, Refusal, VerdictMessage};
+use palpate_shared::link::{Decision, Event, HostSettings, Refusal, VerdictMessage};
 use std::io::BufReader;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// Touches of one object of a data set before the next object begins.
+const PER_OBJECT: usize = 60;
 
 /// Line to a chip.
 #[derive(clap::Args)]
@@ -33,72 +33,43 @@ pub(crate) struct LineOptions {
     /// Speed of a serial port, in bits per second
     #[arg(long, value_name = "BAUD", default_value = "115200")]
     baud: u32,
-    /// Image that the emulator runs [default: uart in onboard/firmware]
-    #[arg(long, value_name = "ELF")]
-    firmware: Option<PathBuf>,
-    /// Make the line bad: probabilities of lost and changed bytes and doubled frames, longest delay in ms
-    #[arg(long, value_name = "FAULTS")]
-    bad_line: Option<Faults>,
 }
 
 impl LineOptions {
-    /// Opens the line; its faults are drawn from `seed`.
-    pub(crate) fn transport(&self, port: &Port, seed: u64) -> Result<Transport> {
-        let emulator = self.firmware.clone().map_or_else(Emulator::default, Emulator::for_firmware);
-        let transport = port.open(self.baud, &emulator)?;
-        Ok(match self.bad_line {
-            Some(faults) => transport.with_faults(faults, seed),
-            None => transport,
-        })
+    /// Opens the line.
+    pub(crate) fn transport(&self, port: &Port) -> Result<Transport> {
+        port.open(self.baud, &Emulator::default())
     }
 
     /// Opens a session.
-    pub(crate) fn open(&self, port: &Port, seed: u64) -> Result<Connection> {
-        let settings = match self.bad_line {
-            // A bad line fails often: retry sooner, and more often.
-            Some(_) => HostSettings { retry: 50_000, attempts: 200 },
-            None => HostSettings::default(),
-        };
-        Connection::open(self.transport(port, seed)?, settings)
+    pub(crate) fn open(&self, port: &Port) -> Result<Connection> {
+        Connection::open(self.transport(port)?, HostSettings::default())
     }
 }
 
 #[derive(clap::Args)]
-#[command(group(ArgGroup::new("expected").args(["against", "load"])), after_help = "\
-The chip runs the firmware in onboard/firmware (uart), or a program of your own around palpate_onboard::station. A touch is one line of three contact times in seconds (- for a missing contact), as in a data set; an empty line begins another object. Maps take twelve columns, as `palpate recognize` does. `palpate data record` records what the chip's own fingers touch.
+#[command(after_help = "\
+The chip runs the firmware in onboard/firmware (uart), or a program of your own around palpate_onboard::station. A touch is one line of three contact times in seconds (- for a missing contact), as in a data set; an empty line begins another object. Maps take twelve columns, as `palpate recognize` does. Without touches, a line is printed for each touch of the chip's own fingers, until Ctrl-C or --stop-after; `palpate data record` records them.
 
 Examples:
-  palpate link /dev/ttyACM0                           what is on the chip?
+  palpate link /dev/ttyACM0                           what is on the chip, and what do its fingers touch?
   palpate link /dev/ttyACM0 --load model.palpate      load a model into it
   palpate link /dev/ttyACM0 touches/                  recognize a data set
   echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -  recognize typed touches
   palpate link /dev/ttyACM0 - --active                where to touch next
   robot | palpate link /dev/ttyACM0 - --load maps.palpate --next
-  palpate link /dev/ttyACM0 --watch                   watch its own fingers
-  palpate link journal.jsonl --watch                  watch another link
-  palpate link emulator --load model.palpate --parity touches/ \\
-      --stop-after 10000 --bad-line 0.001,0.001,0.01,5")]
+  palpate link emulator --load model.palpate --parity touches/ --stop-after 10000")]
 pub(crate) struct Arguments {
-    /// A serial port, tcp://HOST:PORT, or emulator; with --watch also a journal that another link writes
-    #[arg(value_parser = port)]
-    port: String,
+    /// A serial port, tcp://HOST:PORT, or emulator
+    port: Port,
     /// Touches to recognize: a data set's directory, a file of lines, a robot's log (MCAP), or - for standard input
     source: Option<PathBuf>,
-    /// Load this model into the chip first; it is checked there before it is used
+    /// Load this model into the chip first; it is checked there before it is used. Without touches, that is all
     #[arg(long, value_name = "FILE")]
     load: Option<PathBuf>,
-    /// Watch the chip on a screen while it recognizes; plain lines where the output is no terminal
-    #[arg(long, conflicts_with_all = ["parity", "journal", "against"])]
-    watch: bool,
     /// Recognize a data set's touches, and compare every verdict, posterior and evidence with the host's recognizer
-    #[arg(long, value_name = "DIR", conflicts_with = "source", requires = "expected")]
+    #[arg(long, value_name = "DIR", conflicts_with = "source", requires = "load")]
     parity: Option<PathBuf>,
-    /// The model to compare with, if it is on the chip already
-    #[arg(long, value_name = "FILE")]
-    against: Option<PathBuf>,
-    /// Touches of one object before the next object of a data set begins
-    #[arg(long, value_name = "N", default_value = "60")]
-    per_object: usize,
     /// Stop after this many touches in all [default: all that there are]
     #[arg(long, value_name = "N")]
     stop_after: Option<u64>,
@@ -106,31 +77,20 @@ pub(crate) struct Arguments {
     #[arg(long)]
     active: bool,
     /// With a model of maps: print each touch's verdict, place and next approach as JSON
-    #[arg(long, conflicts_with_all = ["active", "watch"])]
+    #[arg(long, conflicts_with = "active")]
     next: bool,
     /// Proposed approaches send the middle finger at most so far from the table's origin in x and y [default: twice the maps' range]
     #[arg(long, value_name = "MM", requires = "next")]
     workspace: Option<f64>,
-    /// Write what happens to a file, which `palpate link FILE --watch` follows
-    #[arg(long, value_name = "FILE")]
-    journal: Option<PathBuf>,
     #[command(flatten)]
     line: LineOptions,
 }
 
-/// The name of a port, or of a journal: a serial port is a file, too, but none with lines to follow.
-fn port(text: &str) -> Result<String> {
-    if !Path::new(text).is_file() {
-        text.parse::<Port>()?;
-    }
-    Ok(text.into())
-}
-
 impl Arguments {
     /// Opens a session, and loads the model if there is one to load.
-    fn open(&self, port: &Port, seed: u64) -> Result<(Connection, Option<Vec<u8>>)> {
+    fn open(&self) -> Result<(Connection, Option<Vec<u8>>)> {
         let loaded = self.load.as_deref().map(with_signature).transpose()?;
-        let mut connection = self.line.open(port, seed)?;
+        let mut connection = self.line.open(&self.port)?;
         if let Some((bytes, _)) = &loaded {
             connection.load(bytes, &Bar::new())?;
         }
@@ -159,7 +119,7 @@ impl Arguments {
         if source.is_dir() {
             let dataset = commands::dataset(source)?;
             let count = self.stop_after.unwrap_or(dataset.len() as u64);
-            return Ok(Steps::sequences(dataset, self.per_object, count));
+            return Ok(Steps::sequences(dataset, PER_OBJECT, count));
         }
         if is_log(source) {
             let log = Log::read(source)?;
@@ -195,25 +155,24 @@ fn with_signature(path: &Path) -> Result<(Vec<u8>, Vec<u8>)> {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
-    arguments.journal.iter().try_for_each(|journal| refuse_foreign(journal))?;
-    if arguments.watch {
-        return watch::run(&arguments, global);
-    }
-    let port: Port = arguments.port.parse()?;
-    let named = arguments.against.as_deref().map(model_of_touches).transpose()?;
     let steps = match arguments.parity.as_ref().or(arguments.source.as_ref()) {
         Some(source) => Some(arguments.steps(source)?),
         None => None,
     };
-    let (mut connection, loaded) = arguments.open(&port, global.seed())?;
+    let (mut connection, model) = arguments.open()?;
     let chip = connection.model()?;
     if steps.is_some() && chip.info.descriptor().is_none() && !chip.info.has_maps() {
         return Err(ChipProblem::Rows.into());
     }
-    let mut printer = Printer::new(&chip, global.json, arguments.journal.as_deref())?;
-    let Some(steps) = steps else { return printer.model(&port) };
+    let mut printer = Printer::new(&chip, global.json);
+    let Some(steps) = steps else {
+        if model.is_some() {
+            return printer.model(&arguments.port);
+        }
+        return own_fingers(&mut connection, &chip, &arguments, global.json);
+    };
 
-    let (asks, model) = (arguments.asks(&chip)?, named.or(loaded));
+    let asks = arguments.asks(&chip)?;
     printer.prints_places = arguments.next;
     let progress = Bar::new();
     progress.begin("touching", steps.count());
@@ -236,11 +195,41 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     }
 }
 
-/// Prints what happens, and writes it to a journal.
+/// Prints a line for the chip's model, and for each touch of its own fingers until there were as many as wanted.
+fn own_fingers(connection: &mut Connection, chip: &ChipModel, arguments: &Arguments, json: bool) -> Result<()> {
+    let say = |entry: &Entry| if json { commands::print_line(entry) } else { print(&format!("{entry}\n")) };
+    let asks = match arguments.asks(chip)? {
+        Asks::Place { .. } => return Err(Error::setting("next", "given", "it with touches")),
+        asks => asks == Asks::Approach,
+    };
+    say(&Entry::model(chip))?;
+    let (start, mut touches) = (Instant::now(), 0);
+    while arguments.stop_after != Some(touches) {
+        let (event, missed) = match connection.hear(Duration::from_millis(50))? {
+            Some(Received::Event(event, missed)) => (event, missed),
+            Some(Received::Earlier(event)) => (event, 0),
+            _ => continue,
+        };
+        if missed > 0 {
+            commands::remark(&format!("palpate: warning: {missed} reports of the chip were lost on the way"));
+        }
+        if let Some(entry) = Entry::of(&Update::Event(event, missed), chip, start.elapsed()) {
+            say(&entry)?;
+        }
+        if matches!(event, Event::Touch { .. } | Event::Refused { .. }) {
+            touches += 1;
+            if asks {
+                say(&Entry::next(&connection.next_approach()?))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Prints what happens.
 struct Printer<'c> {
     chip: &'c ChipModel,
     json: bool,
-    journal: Option<Journal>,
     start: Instant,
     object: Option<String>,
     /// Places are printed, as JSON, and nothing else of a touch.
@@ -251,13 +240,9 @@ struct Printer<'c> {
 }
 
 impl<'c> Printer<'c> {
-    fn new(chip: &'c ChipModel, json: bool, journal: Option<&Path>) -> Result<Self> {
-        let mut journal = journal.map(Journal::create).transpose()?;
-        if let Some(journal) = &mut journal {
-            journal.write(&Entry::model(chip))?;
-        }
+    fn new(chip: &'c ChipModel, json: bool) -> Self {
         let (start, object, last, refused) = (Instant::now(), None, None, None);
-        Ok(Self { chip, json, journal, start, object, prints_places: false, last, refused })
+        Self { chip, json, start, object, prints_places: false, last, refused }
     }
 
     fn model(&self, port: &Port) -> Result<()> {
@@ -282,9 +267,6 @@ impl<'c> Printer<'c> {
 
     fn update(&mut self, update: &Update, every_touch: bool) -> Result<()> {
         let entry = Entry::of(update, self.chip, self.start.elapsed());
-        if let (Some(journal), Some(entry)) = (&mut self.journal, &entry) {
-            journal.write(entry)?;
-        }
         match update {
             Update::Object(name) => (self.object, self.last) = (name.clone(), None),
             Update::Touch { verdict, .. } if self.prints_places => (self.last, self.refused) = (Some(*verdict), None),
@@ -339,10 +321,6 @@ impl<'c> Printer<'c> {
 
     /// Prints a summary, except where lines of JSON are all that is printed.
     fn summary(&mut self, summary: &Summary, is_silent: bool) -> Result<()> {
-        if let Some(journal) = &mut self.journal {
-            let garbled = summary.garbled + summary.chip_garbled;
-            journal.write(&Entry::Link { resent: summary.resent, garbled, missed: summary.missed_events })?;
-        }
         if is_silent {
             return Ok(());
         }

@@ -58,14 +58,14 @@ impl RecordArguments {
 
 /// Records what a chip reports until there are `count` touches, and prints each.
 pub(crate) fn from_chip(
-    (options, port, seed): (&LineOptions, &Port, u64),
+    (options, port): (&LineOptions, &Port),
     mut recording: Recording,
     directory: &Path,
     count: Option<u64>,
     json: bool,
 ) -> Result<()> {
-    let mut connection = options.open(port, seed)?;
-    let reopen = || options.transport(port, seed);
+    let mut connection = options.open(port)?;
+    let reopen = || options.transport(port);
     let mut names = Vec::new();
     let object = recording.object().to_owned();
     let summarized = record(&mut connection, reopen, &mut recording, count, |heard| {

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | GP2, GP3, GP4 | the three switches in their order along the row, each to ground |
 //! | GP5 | a button to ground that is pressed after an approach, or the robot's output that is low between approaches: those that touched nothing are told too. May stay open |
-//! | GP0, GP1 | UART to the host, 115,200 baud: `palpate link /dev/ttyUSB0 --watch` |
+//! | GP0, GP1 | UART to the host, 115,200 baud: `palpate link /dev/ttyUSB0` |
 //! | GP25 | the Pico's LED: lit from a recognition to the next touch |
 //!
 //! The host may load another model (`palpate link /dev/ttyUSB0 --load model.palpate`), which is kept in flash, as is what

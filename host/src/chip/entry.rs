@@ -1,18 +1,14 @@
-//! Journal of a link, as lines of JSON: for programs, and to be watched meanwhile or later.
+//! What happens on a link, as lines of JSON for programs and lines of text for people.
 
 use super::{ChipModel, Update};
-use crate::error::{Error, Result};
-use crate::output;
 use palpate_shared::Pose;
 use palpate_shared::link::{ApproachMessage, Decision, Event};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::fmt;
-use std::io::{ErrorKind, Write};
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// One line of a journal. Its `Display` is the same for people.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Something that happened. Its `Display` is the same for people.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "is", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Entry {
@@ -61,51 +57,6 @@ pub enum Entry {
         /// Description of the fault.
         what: String,
     },
-    /// Counts of both ends of the link so far.
-    Link {
-        /// Frames that one end sent again.
-        resent: u64,
-        /// Garbled frames that either end received.
-        garbled: u64,
-        /// The chip's own events that were lost.
-        missed: u64,
-    },
-}
-
-/// A journal being written: each line is there for readers as soon as it is complete.
-pub struct Journal {
-    path: PathBuf,
-    file: std::fs::File,
-}
-
-impl Journal {
-    /// Begins a journal. A journal of this name is replaced, not emptied: its other readers can still read the rest of it.
-    ///
-    /// # Errors
-    /// When the file cannot be written, and [`Foreign`](crate::error::Foreign) if a file there is not a journal.
-    pub fn create(path: &Path) -> Result<Self> {
-        output::refuse_foreign(path)?;
-        let io = |source| Error::io(path, "write the journal", source);
-        match std::fs::canonicalize(path) {
-            // Only files are removed: devices and pipes are written to, and links stay.
-            Ok(target) if target.is_file() => std::fs::remove_file(target).map_err(io)?,
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(io(error)),
-            _ => {}
-        }
-        let file = std::fs::File::create(path).map_err(io)?;
-        Ok(Self { path: path.into(), file })
-    }
-
-    /// Appends an entry.
-    ///
-    /// # Errors
-    /// When the file cannot be written.
-    pub fn write(&mut self, entry: &Entry) -> Result<()> {
-        let io = |source| Error::io(&self.path, "write the journal", source);
-        let mut line = serde_json::to_vec(entry).map_err(|e| io(e.into()))?;
-        line.push(b'\n');
-        self.file.write_all(&line).map_err(io)
-    }
 }
 
 impl Entry {
@@ -190,9 +141,6 @@ impl fmt::Display for Entry {
                 "next: pose {pose}, along {x:.2} {y:.2} {z:.2}, row {u:.2} {v:.2} {w:.2}, separation {score:.3}"
             ),
             Self::Fault { what } => write!(f, "fault: {what}"),
-            Self::Link { resent, garbled, missed } => {
-                write!(f, "link: {resent} frames sent again, {garbled} garbled, {missed} events missed")
-            }
         }
     }
 }
