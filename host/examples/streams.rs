@@ -43,7 +43,7 @@ fn read(path: &Path, label: &str, sequence: &str) -> Result<(Sequences, Vec<Stri
     let names: BTreeSet<String> = lines.filter_map(|line| line.get(column).map(ToString::to_string)).collect();
     let names: Vec<String> = names.into_iter().collect();
     let features: Vec<&str> = header.iter().copied().filter(|name| *name != label && *name != sequence).collect();
-    let columns = SequenceColumns { label: Some(label), sequence, group: None, by_run: false };
+    let columns = SequenceColumns { label: Some(label), sequence, group: None };
     Ok((stream::read(path, &features, &columns, &names)?, names))
 }
 

@@ -201,7 +201,6 @@ typedef struct {
 #if PALPATE_SEQUENCES
     const uint8_t *position_; /* the feature that is a row's number, or NULL */
     const uint8_t *guard_;    /* limits of each feature, or NULL */
-    const uint8_t *events_;   /* events in a stream of rows, or NULL */
 #endif
 #if PALPATE_OUTPUTS
     const uint8_t *outputs_; /* the objects that outputs belong to; NULL if each is an object */
@@ -238,10 +237,6 @@ typedef struct {
     uint32_t forgotten;   /* of the touches, the first ones that are no longer part of the evidence: of some snapshots */
 #if PALPATE_ROW_EVIDENCE
     uint32_t unit_, from_, span_; /* bits in a unit of evidence of this number of touches, and of this many numbers */
-#endif
-#if PALPATE_SEQUENCES
-    uint32_t silent;  /* of a stream of events: rows until the next verdict */
-    uint16_t ongoing; /* and the class that holds; PALPATE_NO_CLASS before the first that is sure */
 #endif
     int64_t evidence[PALPATE_MAX_OBJECTS];
 } palpate_recognizer;
@@ -596,18 +591,6 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 model->guard_ = content;
                 pieces = model->features;
                 piece = 12;
-            } else if (last == 23) {
-                /* A hold-off and a memory above 0, a background that exists or none, in a model over rows without outputs. */
-                if (!palpate_holds_(length, 32, 0, 0) || palpate_u32_(content + 4) == 0 || palpate_i32_(content + 8) < 1 ||
-                    PALPATE_BYTE(content + 1) > 1 || PALPATE_BYTE(content) >= model->objects || model->descriptor != 255) {
-                    return PALPATE_FIELD;
-                }
-#if PALPATE_OUTPUTS
-                if (model->outputs_ != NULL) {
-                    return PALPATE_FIELD;
-                }
-#endif
-                model->events_ = content;
 #endif
 #if PALPATE_OUTPUTS
             } else if (last == 18) {
@@ -915,7 +898,6 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
 #if PALPATE_SEQUENCES
     model->position_ = NULL;
     model->guard_ = NULL;
-    model->events_ = NULL;
 #endif
 #if PALPATE_OUTPUTS
     model->outputs_ = NULL;
@@ -1650,10 +1632,6 @@ PALPATE_API void palpate_reset(palpate_recognizer *recognizer)
     recognizer->forgotten = 0;
     recognizer->verdict = PALPATE_UNDECIDED;
     recognizer->object = 0;
-#if PALPATE_SEQUENCES
-    recognizer->silent = 0;
-    recognizer->ongoing = PALPATE_NO_CLASS;
-#endif
     for (i = 0; i < model->objects; i++) {
         recognizer->evidence[i] = palpate_prior_(model, i);
     }
@@ -1985,56 +1963,6 @@ PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
     return PALPATE_AS_(uint16_t, palpate_leader_(recognizer, recognizer->model->known));
 }
 
-#if PALPATE_SEQUENCES
-/* Takes in a row of a stream of events by its evidence. Before it no class is behind the leader by more than the model's memory. A
- * verdict, of this row alone, is a change to another class than the one that holds, unless that is the background; after it there is
- * none for the hold-off. */
-static inline void palpate_push_event_(palpate_recognizer *recognizer, const int32_t *evidence)
-{
-    const palpate_model *model = recognizer->model;
-    const uint8_t *events = model->events_;
-    const uint32_t bits = palpate_u32_(model->bytes + 36);
-    const int64_t least = -PALPATE_AS_(int64_t, palpate_i32_(events + 8));
-    const int64_t most = recognizer->evidence[palpate_leader_(recognizer, model->objects)];
-    uint64_t left = recognizer->odds;
-    uint_fast16_t best, i;
-    int is_sure = 1, is_background;
-    for (i = 0; i < model->objects; i++) {
-        int64_t own = recognizer->evidence[i];
-        /* One whose weight was 0 stays as it is. */
-        if (own > INT64_MIN / 2) {
-            own = palpate_add_(own, -most);
-            own = own < least ? least : own;
-        }
-        recognizer->evidence[i] = palpate_add_(own, evidence[i]);
-    }
-    recognizer->touches += recognizer->touches != UINT32_MAX;
-    best = palpate_leader_(recognizer, model->known);
-    if (recognizer->by_object != 0 && model->odds_ != NULL) {
-        left = PALPATE_AS_(uint64_t, palpate_u32_(model->odds_ + 4 * PALPATE_AS_(size_t, best))) << 24;
-    }
-    for (i = 0; is_sure && i < model->objects; i++) {
-        if (i != best) {
-            const uint64_t weight = palpate_exp2(palpate_behind_(recognizer, best, i, bits));
-            /* What is not known may lead. */
-            is_sure = weight <= left && recognizer->evidence[i] <= recognizer->evidence[best];
-            left -= weight;
-        }
-    }
-    recognizer->silent -= recognizer->silent != 0;
-    is_background = PALPATE_BYTE(events + 1) != 0 && PALPATE_BYTE(events) == best;
-    recognizer->verdict = PALPATE_UNDECIDED;
-    if (is_sure && recognizer->ongoing != best && (is_background || recognizer->silent == 0)) {
-        recognizer->ongoing = PALPATE_AS_(uint16_t, best);
-        if (!is_background) {
-            recognizer->silent = palpate_u32_(events + 4);
-            recognizer->verdict = PALPATE_RECOGNIZED;
-        }
-    }
-    recognizer->object = PALPATE_AS_(uint8_t, best);
-}
-#endif
-
 /* Takes in a touch by its margins, or a row by its evidence. */
 static inline void palpate_push_evidence_(palpate_recognizer *recognizer, const int32_t *evidence)
 {
@@ -2043,12 +1971,6 @@ static inline void palpate_push_evidence_(palpate_recognizer *recognizer, const 
     palpate_verdict verdict = PALPATE_RECOGNIZED;
     uint32_t bits;
     uint_fast16_t best, i;
-#if PALPATE_SEQUENCES
-    if (model->events_ != NULL) {
-        palpate_push_event_(recognizer, evidence);
-        return;
-    }
-#endif
     if (recognizer->verdict != PALPATE_UNDECIDED) {
         return;
     }

@@ -102,8 +102,6 @@ mod model;
 pub mod station;
 
 pub use bytes::{Aligned, ModelError};
-#[cfg(feature = "sequences")]
-pub use decide::Ongoing;
 pub use decide::{
     CapacityError, Familiarity, NothingExpected, Posterior, Proposal, Recognizer, Rivals, RowsSeen, Stopping, Verdict,
 };

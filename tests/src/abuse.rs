@@ -8,9 +8,9 @@ use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::with;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
-    Axis, Counted, EarlyExit, Events, Group, HEADER_LENGTH, Header, Held, Length, Limits, Link, MUST_UNDERSTAND,
-    MisfitTerms, ObjectMisfit, Outputs, Plan, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained,
-    TrainedNoise, TrainedProbe, TrainedTouches, checksum, write_section,
+    Axis, Counted, EarlyExit, Group, HEADER_LENGTH, Header, Held, Length, Limits, Link, MUST_UNDERSTAND, MisfitTerms,
+    ObjectMisfit, Outputs, Plan, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, TrainedNoise,
+    TrainedProbe, TrainedTouches, checksum, write_section,
 };
 use palpate_shared::{Descriptor, Patterns, Poses};
 
@@ -492,31 +492,7 @@ fn sequences(put: Put<'_>) {
     }
     with("a guard in a model over touches", &plain, Tag::Guard, &guard);
     with("a guard of fewer features than there are", &rows, Tag::Guard, &guard[1..]);
-    let events = EVENTS.to_bytes();
-    with("events in a model over touches", &plain, Tag::Events, &events);
-    with("events that are cut", &rows, Tag::Events, &events[..31]);
-    for (name, wrong) in [
-        ("events with a background that is no class", Events { background: Some(plain[14] + 1), ..EVENTS }),
-        ("events without a hold-off", Events { hold_off: 0, ..EVENTS }),
-        ("events without a memory", Events { memory: 0, ..EVENTS }),
-    ] {
-        with(name, &rows, Tag::Events, &wrong.to_bytes());
-    }
-    let mut strange = events;
-    strange[1] = 2;
-    with("events with half a background", &rows, Tag::Events, &strange);
 }
-
-const EVENTS: Events = Events {
-    background: Some(0),
-    hold_off: 2,
-    memory: 1 << 12,
-    rows_per_hour: 3600.0,
-    per_hour: 1.0,
-    confidence: 0.95,
-    grace: 1,
-    longest: 100,
-};
 
 /// The model over touches as one over rows of as many features.
 fn changed_to_rows(model: &[u8]) -> Vec<u8> {
@@ -564,7 +540,7 @@ fn splits_of(model: &[u8]) -> usize {
 /// # Panics
 /// Never.
 pub fn cuts() -> Vec<(String, Vec<u8>, Vec<Cut>)> {
-    let mut all = vec![touches_with_all_sections(), rows_with_all_sections(), rows_with_events()];
+    let mut all = vec![touches_with_all_sections(), rows_with_all_sections()];
     for layout in [Layout::Compact, Layout::Complete, Layout::Wide, Layout::Grid, Layout::Patterns] {
         let base = model(layout, Leaf::I8, true);
         let cuts = cuts_of_parts(&base);
@@ -701,14 +677,6 @@ fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
     ];
     let (base, cuts) = with_cuts(&plain, &sections);
     ("cut, rows with all sections".into(), base, cuts)
-}
-
-/// Outputs that belong together have no events.
-fn rows_with_events() -> (String, Vec<u8>, Vec<Cut>) {
-    let plain = changed_to_rows(&model(Layout::Complete, Leaf::I8, true));
-    let events = (Tag::Events.code() | MUST_UNDERSTAND, EVENTS.to_bytes().to_vec(), Events::LENGTH);
-    let (base, cuts) = with_cuts(&plain, &[events]);
-    ("cut, rows with events".into(), base, cuts)
 }
 
 /// The parts of a model that has no optional sections.

@@ -6,8 +6,8 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-    EarlyExit, Events, Held, Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Position,
-    Prediction, RowEvidence, Section, Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
+    EarlyExit, Held, Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Position, Prediction,
+    RowEvidence, Section, Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;
@@ -95,8 +95,7 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
         let content: Vec<u8> = exits.flat_map(EarlyExit::to_bytes).collect();
         write_section(Tag::EarlyExit, false, &content, &mut put);
     }
-    let has_outputs = rng.random_bool(0.5);
-    if has_outputs {
+    if rng.random_bool(0.5) {
         write_section(Tag::Outputs, true, &outputs(objects, rng), &mut put);
     }
     if model.descriptor().is_none() {
@@ -105,9 +104,6 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
         }
         if rng.random_bool(0.5) {
             write_section(Tag::Guard, true, &guard(model.feature_count(), rng), &mut put);
-        }
-        if !has_outputs && rng.random_bool(0.5) {
-            write_section(Tag::Events, true, &events(objects, rng).to_bytes(), &mut put);
         }
     }
     Section { tag: 300, must_understand: false, content: b"later" }.write(&mut put);
@@ -156,20 +152,6 @@ fn guard(features: usize, rng: &mut SmallRng) -> Vec<u8> {
         Limits { low, high: most, may_miss: rng.random_bool(0.7), most_equal: rng.random_range(0..4) }
     };
     (0..features).map(limits).flat_map(Limits::to_bytes).collect()
-}
-
-/// Events with memories from less than a margin to more than any evidence.
-fn events(objects: usize, rng: &mut SmallRng) -> Events {
-    Events {
-        background: rng.random_bool(0.7).then(|| rng.random_range(0..objects) as u8),
-        hold_off: [1, 2, rng.random_range(1..20)][rng.random_range(0..3)],
-        memory: 1 << rng.random_range(0..31),
-        rows_per_hour: 3600.0,
-        per_hour: 1.0,
-        confidence: 0.95,
-        grace: 0,
-        longest: 0,
-    }
 }
 
 /// A background, and mostly a misfit test, with limits that some touches pass and some do not.

@@ -37,7 +37,7 @@ mod _native {
     #[pymodule_export]
     use crate::shape::Shape;
     #[pymodule_export]
-    use crate::stream::{calibrate, calibrate_events, estimate_sequences, evaluate_events, evaluate_sequences};
+    use crate::stream::{calibrate, estimate_sequences, evaluate_sequences};
     #[pymodule_export]
     use crate::surface::Surface;
 }

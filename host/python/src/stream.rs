@@ -11,7 +11,7 @@ use palpate::compile;
 use palpate::error::{Error, RowsProblem};
 use palpate::rows::{Features, RowOf, Sequences, SequencesBuilder};
 use palpate::strangers;
-use palpate::stream::{self, EventSettings, Learned, Settings, StrangerTest, Wanted};
+use palpate::stream::{self, Learned, Settings, StrangerTest, Wanted};
 use palpate::with;
 use pyo3::prelude::*;
 
@@ -23,24 +23,11 @@ fn sequences(
     ids: &[String],
     groups: Option<&[String]>,
 ) -> Result<Sequences, Failure> {
-    sequences_of(model, rows, labels, ids, groups, false)
-}
-
-/// Sequences of an array's rows; `by_run` if the label may change within one.
-fn sequences_of(
-    model: &palpate::onboard::Model<'_>,
-    rows: &Input<'_, f64, Ix2>,
-    labels: Option<&[String]>,
-    ids: &[String],
-    groups: Option<&[String]>,
-    by_run: bool,
-) -> Result<Sequences, Failure> {
     let wanted = model.measured_count();
     let values = taken(&Features::measured(model), rows.rows()?)?;
     let count = values.len() / wanted;
-    let unit = if by_run { "recording" } else { "sequence" };
     let lengths =
-        [("y", labels.map(<[String]>::len)), (unit, Some(ids.len())), ("groups", groups.map(<[String]>::len))];
+        [("y", labels.map(<[String]>::len)), ("sequence", Some(ids.len())), ("groups", groups.map(<[String]>::len))];
     for (name, length) in lengths {
         if let Some(length) = length.filter(|length| *length != count) {
             return Err(Error::setting(name, format!("{length} values"), format!("{count}, one for each row")).into());
@@ -48,8 +35,7 @@ fn sequences_of(
     }
     let mut classes = compile::names(model);
     classes.truncate(model.known_count());
-    let builder = SequencesBuilder::new(wanted, &classes);
-    let mut builder = if by_run { builder.by_run() } else { builder };
+    let mut builder = SequencesBuilder::new(wanted, &classes);
     for (number, row) in values.chunks_exact(wanted).enumerate() {
         let of = |texts: &'_ [String]| texts.get(number).map(String::as_str).unwrap_or_default().to_owned();
         let (label, group) = (labels.map_or_else(|| "0".into(), of), groups.map(of));
@@ -167,58 +153,6 @@ pub(crate) fn evaluate_sequences(
     let wanted = Wanted { error_rate, max_rows, ..Wanted::default() };
     let found = long(py, None, |_| stream::evaluate(opened, &rows, &wanted))?;
     Ok(json(&found))
-}
-
-/// Sets a model's threshold on recordings of events, and returns the model and what `palpate calibrate --json` prints.
-#[pyo3::pyfunction]
-#[pyo3(signature = (model, rows, labels, recording, *, background, rows_per_second, false_per_hour, hold_off, grace, confidence,
-    seed, progress=None))]
-#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
-pub(crate) fn calibrate_events(
-    py: Python<'_>,
-    model: Bound<'_, Model>,
-    rows: Input<'_, f64, Ix2>,
-    labels: Vec<String>,
-    recording: Vec<String>,
-    background: Option<&str>,
-    rows_per_second: f64,
-    false_per_hour: f64,
-    hold_off: f64,
-    grace: f64,
-    confidence: f64,
-    seed: u64,
-    progress: Option<Callback>,
-) -> Result<(Model, String), Failure> {
-    let opened = model.get().model();
-    stream::check(opened)?;
-    let background = background
-        .map(|name| {
-            let class = (0..opened.known_count()).find(|class| opened.object_name(*class) == name);
-            class.ok_or_else(|| Error::setting("background", name, "a class of the model, or None"))
-        })
-        .transpose()?;
-    let rows = sequences_of(opened, &rows, Some(&labels), &recording, None, true)?;
-    let settings =
-        with!(EventSettings::default(), background, rows_per_second, false_per_hour, hold_off, grace, confidence, seed);
-    let calibrated =
-        long(py, progress.as_ref(), |progress| stream::calibrate_events(opened, &rows, &settings, progress))?;
-    let text = json(&calibrated);
-    Ok((Model::of(calibrated.model)?, text))
-}
-
-/// Measures a model with events on recordings, and returns what `palpate evaluate --json` prints.
-#[pyo3::pyfunction]
-pub(crate) fn evaluate_events(
-    py: Python<'_>,
-    model: Bound<'_, Model>,
-    rows: Input<'_, f64, Ix2>,
-    labels: Vec<String>,
-    recording: Vec<String>,
-) -> Result<String, Failure> {
-    let opened = model.get().model();
-    stream::check(opened)?;
-    let rows = sequences_of(opened, &rows, Some(&labels), &recording, None, true)?;
-    Ok(json(&long(py, None, |_| stream::evaluate_events(opened, &rows))?))
 }
 
 fn json(value: &impl serde::Serialize) -> String {

@@ -362,38 +362,3 @@ def test_a_class_with_few_sequences_is_in_every_fold_or_named() -> None:
         except palpate.InputError as error:
             errors.append(str(error))
     assert any(error.startswith("no sequence of rare is among those to train on") for error in errors), errors
-
-
-def recordings(count: int, seed: int) -> tuple[npt.NDArray[np.float32], Any, Any]:
-    """Rows, classes and recordings: rest between events of two classes."""
-    generator = np.random.default_rng(seed)
-    classes = np.tile(np.repeat([0, 1, 0, 2], 25), count)
-    rows = (2.0 * classes + generator.normal(size=classes.size)).astype(np.float32).reshape(-1, 1)
-    return rows, np.array(["rest", "wave", "tap"])[classes], np.repeat(np.arange(count), 100)
-
-
-def test_events_keep_the_promised_rate_and_a_recognizer_names_those_that_the_evaluation_counts() -> None:
-    X, y, _ = recordings(30, 1)
-    estimator = ensemble.RandomForestClassifier(n_estimators=20, max_depth=4, random_state=1).fit(X, y)
-    X, y, recording = recordings(200, 2)
-    promised: dict[str, Any] = {"background": "rest", "rows_per_second": 10, "false_per_hour": 120}
-    sure = palpate.calibrate_events(estimator, X, y, recording=recording, **promised)
-    assert sure.false_per_hour <= 120 and sure.named > sure.events / 2, sure
-    X, y, recording = recordings(200, 3)
-    found = palpate.evaluate_events(sure.model, X, y, recording=recording)
-    assert found.raw["finding"] == "kept" and found.events == 400 and found.mean_delay < 2.0, found
-    recognizer = palpate.Recognizer(sure.model)
-    verdicts = 0
-    for number in range(200):
-        recognizer.reset()
-        for row in X[recording == number]:
-            verdict = recognizer.push_row(row)
-            verdicts += verdict.decided
-            assert verdict.object != "rest" or not verdict.decided
-    assert verdicts == found.named + found.false + found.repeated
-    with pytest.raises(palpate.SettingError, match="a class of the model"):
-        palpate.calibrate_events(estimator, X, y, recording=recording, **{**promised, "background": "idle"})
-    with pytest.raises(palpate.InputError, match="are too few to promise"):
-        palpate.calibrate_events(estimator, X[:500], y[:500], recording=recording[:500], **promised)
-    with pytest.raises(palpate.InputError, match="no events"):
-        palpate.evaluate_events(palpate.compile(estimator), X, y, recording=recording)

@@ -110,38 +110,6 @@ pub enum CalibrateProblem {
         /// True if the promise is for groups.
         groups: bool,
     },
-    /// There are too few recordings of events for a promise, even without a false verdict.
-    #[error("{found} recordings ({hours:.2} h of them tested) are too few to promise {per_hour} false verdicts per hour: {} none of them false; the hold-off allows {most} verdicts in a recording", about(*needed))]
-    TooFewRecordings {
-        /// Recordings.
-        found: u64,
-        /// About as many are needed, of the same length; 0 if that is not known.
-        needed: u64,
-        /// The promised rate.
-        per_hour: f64,
-        /// Hours of those that are not learned from.
-        hours: f64,
-        /// Most verdicts that the hold-off allows in a recording.
-        most: u64,
-    },
-    /// No threshold keeps the promise on recordings of events.
-    #[error(
-        "no threshold that was tested keeps {per_hour} false verdicts per hour: at the strictest {wrong} are false or repeated in {hours:.2} h of {recordings} recordings, and {named} of {events} events are named"
-    )]
-    NotKeptByEvents {
-        /// The promised rate.
-        per_hour: f64,
-        /// False or repeated verdicts, at the first threshold that failed.
-        wrong: u64,
-        /// Hours of the recordings.
-        hours: f64,
-        /// Events that got their verdict.
-        named: u64,
-        /// Events.
-        events: u64,
-        /// Recordings that were tested on.
-        recordings: u64,
-    },
     /// Sequences of some classes are missing.
     #[error("there is no sequence of {}", objects.join(", "))]
     MissingSequences {
@@ -313,11 +281,6 @@ impl Problem for CalibrateProblem {
             Self::NotKeptByRows { .. } => {
                 "Promise a higher error rate, give sequences of more rows, or train the model on rows like these."
             }
-            Self::TooFewRecordings { .. } => "Record more, accept more false verdicts per hour, or lengthen the hold-off.",
-            Self::NotKeptByEvents { .. } => {
-                "Accept more false verdicts (--false-per-hour), lengthen the hold-off or the grace, or train the model on more rows \
-                 between events."
-            }
             Self::MissingSequences { .. } => "Add sequences of them.",
             Self::TooFew { supplied: None, .. } => "Allow more sequences, or promise a higher error rate.",
             Self::TooFew { supplied: Some(_), .. } => "Record or capture more touches, or promise a higher error rate.",
@@ -341,13 +304,6 @@ impl Problem for CalibrateProblem {
             Self::OneObject => "Give a model of two or more objects.",
         }
         .into()
-    }
-}
-
-fn about(needed: u64) -> String {
-    match needed {
-        0 => "more are needed,".into(),
-        needed => format!("about {needed} like these are needed,"),
     }
 }
 

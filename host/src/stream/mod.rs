@@ -26,7 +26,6 @@ mod background;
 mod calibrate;
 mod copies;
 mod evaluate;
-mod events;
 mod folds;
 mod follow;
 mod guard;
@@ -38,9 +37,6 @@ mod shape;
 
 pub use calibrate::{calibrate, calibrate_with};
 pub use evaluate::{Comparison, Evaluated, Grown, Point, PromiseOfSequences, Wanted, evaluate};
-pub use events::{
-    EventCounts, EventSettings, EventsCalibrated, EventsEvaluated, RowRule, calibrate_events, evaluate_events,
-};
 pub use folds::{Estimated, Learned, estimate};
 pub use guard::{GUARD_MARGIN, GUARD_RUN};
 pub use settings::Settings;

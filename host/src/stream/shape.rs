@@ -379,7 +379,6 @@ pub(super) fn shaped(model: &Model<'_>, fitted: &Fitted, max_rows: u32) -> Resul
         (Tag::ThresholdsByObject, None),
         (Tag::Promise, None),
         (Tag::Temperature, None),
-        (Tag::Events, None),
     ];
     let restated = Restated { max_touches: Some(max_rows), sections, ..Restated::default() };
     let shaped = restate(model, &restated)?;

@@ -8,10 +8,7 @@ use palpate::onboard::RowsSeen;
 use palpate::rows::{Encoder, RowSequence, Sequences};
 use palpate::shared::format::Weights;
 use palpate::strangers;
-use palpate::stream::{
-    EventCounts, EventSettings, Learned, Settings, StrangerTest, Wanted, calibrate, calibrate_events, calibrate_with,
-    estimate, evaluate, evaluate_events,
-};
+use palpate::stream::{Learned, Settings, StrangerTest, Wanted, calibrate, calibrate_with, estimate, evaluate};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -711,150 +708,45 @@ fn folds_leave_all_sequences_to_the_test_keep_the_promise_and_estimate_the_error
     assert!(two.unwrap());
 }
 
-/// Recordings of `length` rows each: the first class between events of the others.
-fn recordings(kind: Kind, count: usize, length: usize, seed: u64) -> Sequences {
-    let mut made = Sequences { features: 1, ..Sequences::default() };
-    for number in 0..count {
-        let mut random = generator(seed, Purpose::Synthetic, "recordings", number as u64);
-        let (start, mut class, mut state) = (made.values.len(), 0, 0.0);
-        while made.values.len() < start + length {
-            let rows = if class == 0 { random.random_range(20..80) } else { random.random_range(15..40) };
-            let first = made.values.len();
-            for _ in first..(first + rows).min(start + length) {
-                let own: f64 = StandardNormal.sample(&mut random);
-                state = match kind {
-                    Kind::Autoregressive(rho) => rho * state + (1.0 - rho * rho).sqrt() * own,
-                    _ => own,
-                };
-                made.values.push(PLACES[class] + state);
-            }
-            made.sequences.push(RowSequence { rows: first..made.values.len(), class, group: Some(number) });
-            class = if class == 0 { random.random_range(1..CLASSES) } else { 0 };
+/// Rows of the first class between runs of the others, and for each row its class.
+fn recording(runs: usize, seed: u64) -> (Vec<f64>, Vec<usize>) {
+    let mut random = generator(seed, Purpose::Synthetic, "recording", 0);
+    let (mut rows, mut classes) = (Vec::new(), Vec::new());
+    for run in 0..runs {
+        let class = if run % 2 == 0 { 0 } else { random.random_range(1..CLASSES) };
+        for _ in 0..random.random_range(30..60) {
+            let own: f64 = StandardNormal.sample(&mut random);
+            rows.push(PLACES[class] + own);
+            classes.push(class);
         }
     }
-    made
+    (rows, classes)
 }
 
-/// Recordings drawn with replacement.
-fn drawn_recordings(all: &Sequences, count: usize, seed: u64) -> Sequences {
-    let mut random = generator(seed, Purpose::Synthetic, "drawn", 0);
-    let runs: Vec<&[RowSequence]> = all.sequences.chunk_by(|one, next| one.group == next.group).collect();
-    let mut made = Sequences { features: 1, ..Sequences::default() };
-    for number in 0..count {
-        for run in runs[random.random_range(0..runs.len())] {
-            let start = made.values.len();
-            made.values.extend_from_slice(&all.values[run.rows.clone()]);
-            made.sequences.push(RowSequence { rows: start..made.values.len(), class: run.class, group: Some(number) });
-        }
-    }
-    made
-}
-
-fn event_settings(seed: u64) -> EventSettings {
-    with!(
-        EventSettings::default(),
-        background = Some(0),
-        rows_per_second = 10.0,
-        false_per_hour = 60.0,
-        hold_off = 3.0,
-        seed
-    )
-}
-
-/// `PALPATE_REPETITIONS=200 cargo test --release -p palpate --test palpate stream::events -- --nocapture` repeats it as often.
 #[test]
-fn events_keep_the_promised_rate_of_false_verdicts_on_independent_and_dependent_rows() {
-    let repetitions = repetitions(3);
-    for kind in [Kind::Independent, Kind::Autoregressive(0.7)] {
-        let all = recordings(kind, many_or(400, repetitions, 1_000), 300, 7);
-        let (mut broken, mut refused, mut named) = (0, 0, Vec::new());
-        for run in 0..repetitions {
-            match calibrate_events(&MODEL, &drawn_recordings(&all, 200, run), &event_settings(run), &()) {
-                Ok(made) => {
-                    let found = evaluate_events(&compile::open(&made.model).unwrap(), &all).unwrap();
-                    broken += u64::from(found.counts.false_per_hour > 60.0);
-                    named.push(found.counts.named as f64 / found.counts.events as f64);
+fn a_recognizer_that_begins_again_names_most_runs_of_a_stream_without_stated_ends() {
+    const HOLD_OFF: usize = 20;
+    let calibrated = calibrate(&MODEL, &sequences(Kind::Independent, 3_000, 40, 3), &Settings::default(), &()).unwrap();
+    let model = compile::open(&calibrated.model).unwrap();
+    let (rows, classes) = recording(400, 1);
+    let encoder = Encoder::of(&model);
+    let mut recognizer = Recognizer::<3>::new(&model, Stopping::from_model(&model).with_max_touches(25)).unwrap();
+    let (mut holds, mut silent, mut named, mut wrong) = (0, 0, 0, 0);
+    for (row, class) in rows.iter().zip(&classes) {
+        silent = usize::saturating_sub(silent, 1);
+        match recognizer.push_features(&encoder.row(&[*row])).unwrap() {
+            Verdict::Undecided => continue,
+            Verdict::Recognized { object, .. } if object != holds && (object == 0 || silent == 0) => {
+                holds = object;
+                if object != 0 {
+                    silent = HOLD_OFF;
+                    if usize::from(object) == *class { named += 1 } else { wrong += 1 }
                 }
-                Err(_) => refused += 1,
             }
+            _ => {}
         }
-        println!(
-            "{kind:?}: {broken} of {repetitions} broken, {refused} refused, median {:.3} named",
-            Figures::median(&named)
-        );
-        assert_at_most_15_of_200(&format!("{kind:?}"), broken, repetitions);
-        assert!(refused <= repetitions / 3 && Figures::median(&named) > 0.3, "{refused} refused, {named:?} named");
-    }
-}
-
-#[test]
-fn events_of_the_chip_are_those_that_the_evaluation_counts_and_more_than_rules_over_rows_name() {
-    let made = calibrate_events(&MODEL, &recordings(Kind::Independent, 200, 300, 1), &event_settings(1), &()).unwrap();
-    println!("{:?}", made.counts);
-    let stated = compile::open(&made.model).unwrap();
-    let fresh = recordings(Kind::Independent, 300, 300, 2);
-    let found = evaluate_events(&stated, &fresh).unwrap();
-    println!("{found:#?}");
-    let mut recognizer = Recognizer::<3>::new(&stated, Stopping::from_model(&stated)).unwrap();
-    let encoder = Encoder::of(&stated);
-    let mut verdicts = 0;
-    for runs in fresh.sequences.chunk_by(|one, next| one.group == next.group) {
         recognizer.reset();
-        let mut last = None;
-        for row in runs.iter().flat_map(|run| run.rows.clone()) {
-            let verdict = recognizer.push_features(&encoder.row(&fresh.values[row..=row])).unwrap();
-            if let Verdict::Recognized { object, .. } = verdict {
-                assert_ne!(object, 0, "the background is no event");
-                assert!(last.is_none_or(|last| row >= last + 30), "within the hold-off");
-                assert_eq!(recognizer.ongoing(), Some(object));
-                (last, verdicts) = (Some(row), verdicts + 1);
-            }
-        }
     }
-    let EventCounts { named, wrong, repeated, events, .. } = found.counts;
-    assert_eq!(verdicts, named + wrong + repeated);
-    assert!(named * 2 > events && found.finding != Some(Finding::Broken), "{named} of {events}");
-    for rule in [&found.majority, &found.debounced].into_iter().flatten() {
-        assert!(rule.counts.named < named, "{rule:?}");
-    }
-    // Sequences with stated ends are calibrated again as if there had been no events.
-    let again =
-        calibrate(&stated, &sequences(Kind::Independent, 300, 30, 3), &with!(Settings::default(), rate = 0.1), &());
-    assert!(compile::open(&again.unwrap().model).unwrap().events().is_none());
-}
-
-#[test]
-fn too_few_recordings_say_how_many_are_needed_and_so_many_are_enough() {
-    let refused = |count, settings: &EventSettings| {
-        calibrate_events(&MODEL, &recordings(Kind::Independent, count, 300, 1), settings, &()).unwrap_err()
-    };
-    let few = refused(20, &event_settings(1));
-    let Some(CalibrateProblem::TooFewRecordings { needed, found: 20, most: 10, .. }) = few.problem() else {
-        panic!("{few}")
-    };
-    assert!(few.to_string().contains(&format!("about {needed} like these are needed, none of them false")), "{few}");
-    // With thresholds at which nothing is false they are enough: what is refused is refused for what is false.
-    let enough =
-        calibrate_events(&MODEL, &recordings(Kind::Independent, *needed as usize + 1, 300, 1), &event_settings(1), &());
-    assert!(!enough.is_err_and(|error| matches!(error.problem(), Some(CalibrateProblem::TooFewRecordings { .. }))));
-    // Labels without an event: every verdict is false.
-    let mut wrong = recordings(Kind::Independent, 200, 300, 1);
-    wrong.sequences.iter_mut().for_each(|run| run.class = 0);
-    let error = calibrate_events(&MODEL, &wrong, &event_settings(1), &()).unwrap_err();
-    assert!(matches!(error.problem(), Some(CalibrateProblem::NotKeptByEvents { .. })), "{error}");
-    for (settings, part) in [
-        (with!(event_settings(1), hold_off = 0.0), "hold_off"),
-        (with!(event_settings(1), rows_per_second = f64::NAN), "rows_per_second"),
-        (with!(event_settings(1), background = Some(3)), "background"),
-        (with!(event_settings(1), confidence = 1.0), "confidence"),
-    ] {
-        let error = refused(200, &settings).to_string();
-        assert!(error.contains(part), "{error}");
-    }
-    let numbered = ramp_model(0, None);
-    let error =
-        calibrate_events(&compile::open(&numbered).unwrap(), &ramps(10, 1), &event_settings(1), &()).unwrap_err();
-    assert!(error.to_string().contains("row number"), "{error}");
-    let error = evaluate_events(&MODEL, &recordings(Kind::Independent, 2, 300, 1)).unwrap_err();
-    assert!(error.to_string().contains("no events"), "{error}");
+    println!("{named} of 200 runs named, {wrong} verdicts false or late");
+    assert!(named > 170 && wrong < 20, "{named} named, {wrong} false or late");
 }

@@ -1,12 +1,8 @@
 //! Margins to a verdict: evidence, when to stop, what fits no object, and the state as bytes.
 
 mod approach;
-#[cfg(feature = "sequences")]
-mod events;
 mod evidence;
 mod expected;
-#[cfg(feature = "sequences")]
-mod ongoing;
 mod recognizer;
 mod seen;
 #[cfg(feature = "link")]
@@ -18,8 +14,6 @@ mod together;
 pub use approach::Proposal;
 pub use evidence::{Posterior, Rivals};
 pub use expected::NothingExpected;
-#[cfg(feature = "sequences")]
-pub use ongoing::Ongoing;
 #[cfg(feature = "station")]
 pub(crate) use recognizer::State;
 pub use recognizer::{CapacityError, Recognizer, Verdict};

@@ -2,8 +2,6 @@
 
 use super::evidence::{self, Posterior, Rivals, SHARPNESS, Unit};
 use super::expected::{self, NothingExpected};
-#[cfg(feature = "sequences")]
-use super::ongoing::Ongoing;
 use super::stopping::Stopping;
 use super::strangers::{self, Familiarity};
 use super::together::{self, Leading};
@@ -90,9 +88,6 @@ pub(crate) struct State<const N: usize> {
     /// Number of the first touches that are no longer part of the evidence.
     forgotten: u32,
     decided: Decided,
-    /// For a model with events.
-    #[cfg(feature = "sequences")]
-    pub(super) ongoing: Ongoing,
 }
 
 /// A verdict without what else is known of it, so that it takes a few instructions to copy.
@@ -127,8 +122,6 @@ impl<'m, const N: usize> Recognizer<'m, N> {
                 touches: 0,
                 forgotten: 0,
                 decided: Decided::Fresh,
-                #[cfg(feature = "sequences")]
-                ongoing: Ongoing::new(),
             },
         })
     }
@@ -287,10 +280,6 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         self.state.touches = 0;
         self.state.forgotten = 0;
         self.state.decided = Decided::Fresh;
-        #[cfg(feature = "sequences")]
-        {
-            self.state.ongoing = Ongoing::new();
-        }
     }
 
     /// Forgets all touches, for the next object, which is one of those with a weight: `weights` say how often each
@@ -347,10 +336,6 @@ impl<'m, const N: usize> Recognizer<'m, N> {
 
     /// Takes in a touch by its evidence: its margins, or their evidence by the model's table.
     pub(super) fn add(&mut self, margins: &[i32]) -> Verdict {
-        #[cfg(feature = "sequences")]
-        if let Some(events) = self.model.events() {
-            return self.state.add_event(&self.model, margins, &events);
-        }
         if matches!(self.state.decided, Decided::Object(_) | Decided::Unknown | Decided::GaveUp) {
             return self.verdict();
         }
@@ -484,35 +469,11 @@ impl<const N: usize> State<N> {
         if best.0 == object { evidence::rivals(evidence, best, u64::MAX, unit_of(model, covered)) } else { None }
     }
 
-    #[cfg(feature = "sequences")]
-    pub(super) fn evidence_mut(&mut self, model: &Model<'_>) -> &mut [i64] {
-        self.evidence.get_mut(..model.object_count()).unwrap_or_default()
-    }
-
-    #[cfg(feature = "sequences")]
-    pub(super) const fn stopping(&self) -> &Stopping {
-        &self.stopping
-    }
-
-    /// Counts a row in a stream of events, after which there is a verdict, or none.
-    #[cfg(feature = "sequences")]
-    pub(super) fn event(&mut self, object: u8, verdict: Option<Rivals>) {
-        self.touches = self.touches.saturating_add(1);
-        self.decided = verdict.map_or(Decided::Nothing, |rivals| {
-            self.rivals = rivals;
-            Decided::Object(object)
-        });
-    }
-
     /// Takes over a state: evidence, touches so far, how many of these are no longer part of the evidence, and the verdict.
     pub(crate) const fn set(&mut self, evidence: [i64; N], touches: u32, forgotten: u32, verdict: Verdict) {
         self.evidence = evidence;
         self.touches = touches;
         self.forgotten = forgotten;
-        #[cfg(feature = "sequences")]
-        {
-            self.ongoing = Ongoing::new();
-        }
         self.decided = match verdict {
             Verdict::Undecided => Decided::Nothing,
             Verdict::Recognized { object, rivals, .. } => {

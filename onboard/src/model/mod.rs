@@ -23,7 +23,7 @@ pub use refused::Refused;
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
-    Counted, EarlyExit, Events, Feature, Guard, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, Outputs,
+    Counted, EarlyExit, Feature, Guard, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, Outputs,
     PatternShares, Plan, Position, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature,
     TrainedCapture, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
 };
@@ -53,7 +53,7 @@ pub(crate) struct Stated {
     largest_spread: u32,
     /// Offset of thresholds by object; 0 if there are none. The seven highest bits are flags of
     /// sections about strangers, of shared leaves, of features that stand for a missing value, of weights by the number of
-    /// touches, of the evidence of a row, of outputs that belong together, and of rows that are numbered or guarded, or a stream of events.
+    /// touches, of the evidence of a row, of outputs that belong together, and of rows that are numbered or guarded.
     by_object: u32,
 }
 
@@ -69,7 +69,7 @@ const HAS_WEIGHTS: u32 = 1 << 28;
 const HAS_ROW_EVIDENCE: u32 = 1 << 27;
 /// Flag of outputs that belong together.
 const HAS_OUTPUTS: u32 = 1 << 26;
-/// Flag of rows that are numbered or guarded, or a stream of events.
+/// Flag of rows that are numbered or guarded.
 const HAS_SEQUENCES: u32 = 1 << 25;
 /// Flags that are not a place in [`Stated::by_object`].
 const MARKS: u32 =
@@ -266,8 +266,7 @@ impl<'a> Model<'a> {
             .map_or(Weights::ONE, |weights| weights.of(touches))
     }
 
-    /// True if rows of a sequence are numbered or guarded, or a stream of events: see [`position`](Model::position),
-    /// [`guard`](Model::guard) and [`events`](Model::events).
+    /// True if rows of a sequence are numbered or guarded: see [`position`](Model::position) and [`guard`](Model::guard).
     pub(crate) fn has_sequences(&self) -> bool {
         cfg!(feature = "sequences") && self.stated.by_object & HAS_SEQUENCES != 0
     }
@@ -292,17 +291,6 @@ impl<'a> Model<'a> {
             return None;
         }
         Guard::from_bytes(optional::find(self.optional(), Tag::Guard), self.feature_count())
-    }
-
-    /// Events in a stream of rows, if verdicts of the model go on: a [recognizer](crate::Recognizer) then stops at none of them,
-    /// and its limit of touches does not count.
-    ///
-    /// Cost: as [`position`](Model::position). Cannot fail.
-    pub fn events(&self) -> Option<Events> {
-        if !self.has_sequences() {
-            return None;
-        }
-        Events::from_bytes(optional::find(self.optional(), Tag::Events), self.object_count())
     }
 
     /// Number of features of a row that someone measures: all but the [position](Model::position).

@@ -7,8 +7,8 @@ use super::{
 use crate::bytes::Wrong;
 use crate::layouts::{Sections, built_in};
 use palpate_shared::format::{
-    Events, Guard, Layout, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence, Section, Sentinel,
-    SharedLeaves, Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_section,
+    Guard, Layout, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence, Section, Sentinel, SharedLeaves,
+    Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_section,
 };
 
 /// The content of the section with this tag; empty if there is none; no section that is read is empty.
@@ -76,12 +76,6 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
                     false => Guard::from_bytes(content, features).is_some(),
                 };
                 is_read && stated.descriptor.is_none()
-            }
-            // A model whose outputs belong together has no events, nor has one over touches.
-            _ if cfg!(feature = "sequences") && tag == Tag::Events.code() => {
-                stated.by_object |= HAS_SEQUENCES;
-                let is_of_rows = stated.descriptor.is_none() && stated.by_object & HAS_OUTPUTS == 0;
-                is_of_rows && Events::from_bytes(content, model.objects()).is_some()
             }
             _ if must_understand => return Err(Wrong::NotUnderstood(offset)),
             _ => true,

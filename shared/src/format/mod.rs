@@ -33,7 +33,7 @@ pub use plan::Plan;
 pub use prediction::{Link, Prediction, Sentinel};
 pub use promise::{OddsByObject, Promise, PromisedNoise, Temperature};
 pub use records::{Axis, Columns, Group};
-pub use sequences::{Events, Fault, Guard, Limits, Position};
+pub use sequences::{Fault, Guard, Limits, Position};
 pub use signature::{SIGNATURE_LENGTH, SignedModel};
 pub use strangers::{MisfitTerms, MisfitTest, ObjectMisfit, Strangers};
 pub use trained::{

@@ -1,4 +1,4 @@
-//! Rows of a sequence: the feature that is their number, the rows that a model takes, and events in a stream of them.
+//! Rows of a sequence: the feature that is their number, and the rows that a model takes.
 
 use super::f32_key;
 use crate::MISSING_FEATURE;
@@ -133,88 +133,9 @@ impl<'a> Guard<'a> {
     }
 }
 
-/// Events in a stream of rows without stated ends: how a model's verdicts go on, and what it promises of them: 32 bytes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Events {
-    /// Class between events, which is never a verdict; `None` if there is none.
-    pub background: Option<u8>,
-    /// Least number of rows from one verdict to the next, at least 1.
-    pub hold_off: u32,
-    /// Most evidence by which a class can be behind the leader before a row, in units of a margin, above 0.
-    pub memory: i32,
-    /// Rows in an hour.
-    pub rows_per_hour: f32,
-    /// Promised false or repeated verdicts per hour; 0 without a promise.
-    pub per_hour: f32,
-    /// Probability that the promise is kept.
-    pub confidence: f32,
-    /// Rows after the end of an event in which its verdict still counts.
-    pub grace: u32,
-    /// Rows of the longest recording that the promise covers.
-    pub longest: u32,
-}
-
-impl Events {
-    /// Bytes of the section.
-    pub const LENGTH: usize = 32;
-
-    /// The section's content.
-    pub fn to_bytes(self) -> [u8; Self::LENGTH] {
-        let class = [self.background.unwrap_or(0), self.background.is_some().into(), 0, 0];
-        let [rate, promised, confidence] = [self.rows_per_hour, self.per_hour, self.confidence].map(f32::to_le_bytes);
-        let [hold_off, grace, longest] = [self.hold_off, self.grace, self.longest].map(u32::to_le_bytes);
-        let numbers = [class, hold_off, self.memory.to_le_bytes(), rate, promised, confidence, grace, longest];
-        let mut bytes = [0; Self::LENGTH];
-        bytes.iter_mut().zip(numbers.into_iter().flatten()).for_each(|(to, from)| *to = from);
-        bytes
-    }
-
-    /// Reads a section; `None` if it is too short, or its hold-off, memory or background makes no sense in a model with so
-    /// many objects. Numbers that only a promise needs are not checked. Bytes after those that are known are ignored.
-    ///
-    /// Cost: a few instructions.
-    pub fn from_bytes(bytes: &[u8], objects: usize) -> Option<Self> {
-        let words = bytes.as_chunks::<4>().0.first_chunk::<8>()?;
-        let [[class, has_background, ..], hold_off, memory, rate, promised, confidence, grace, longest] = *words;
-        let (hold_off, memory) = (u32::from_le_bytes(hold_off), i32::from_le_bytes(memory));
-        let is_sound = hold_off > 0 && memory > 0 && has_background <= 1 && usize::from(class) < objects;
-        let [rows_per_hour, per_hour, confidence] = [rate, promised, confidence].map(f32::from_le_bytes);
-        let [grace, longest] = [grace, longest].map(u32::from_le_bytes);
-        let background = (has_background == 1).then_some(class);
-        let own = Self { background, hold_off, memory, rows_per_hour, per_hour, confidence, grace, longest };
-        is_sound.then_some(own)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn events_are_read_back_and_what_makes_no_sense_is_refused() {
-        let events = Events {
-            background: Some(2),
-            hold_off: 50,
-            memory: 900,
-            rows_per_hour: 36_000.0,
-            per_hour: 2.5,
-            confidence: 0.95,
-            grace: 7,
-            longest: 1_234_567,
-        };
-        assert_eq!(Events::from_bytes(&events.to_bytes(), 3), Some(events));
-        assert_eq!(Events::from_bytes(&events.to_bytes(), 2), None, "a background that is no class");
-        assert_eq!(Events::from_bytes(&events.to_bytes()[..31], 3), None);
-        let without = Events { background: None, ..events };
-        assert_eq!(Events::from_bytes(&without.to_bytes(), 1), Some(without));
-        for wrong in [Events { hold_off: 0, ..events }, Events { memory: 0, ..events }, Events { memory: -1, ..events }]
-        {
-            assert_eq!(Events::from_bytes(&wrong.to_bytes(), 3), None);
-        }
-        let mut bytes = events.to_bytes();
-        bytes[1] = 2;
-        assert_eq!(Events::from_bytes(&bytes, 3), None);
-    }
 
     #[test]
     fn a_position_is_read_back_and_what_makes_no_sense_is_refused() {

@@ -53,8 +53,6 @@ pub enum Tag {
     Position,
     /// Rows that a model takes in a sequence: [`Guard`](super::Guard).
     Guard,
-    /// Events in a stream of rows: [`Events`](super::Events).
-    Events,
 }
 
 impl Tag {
@@ -83,7 +81,6 @@ impl Tag {
             Self::Maps => 20,
             Self::Position => 21,
             Self::Guard => 22,
-            Self::Events => 23,
         }
     }
 }

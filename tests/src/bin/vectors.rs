@@ -9,7 +9,7 @@ use palpate::ensemble::Node;
 use palpate::with;
 use palpate_onboard::{Model, Recognizer, Refused, RowsSeen, SNAPSHOT_LENGTH, Stopping, Verdict, exp2_negative};
 use palpate_shared::format::{
-    Counted, Events, Limits, Outputs, PatternShares, Position, Sentinel, Trained, TrainedTouches, checksum, f32_key,
+    Counted, Limits, Outputs, PatternShares, Position, Sentinel, Trained, TrainedTouches, checksum, f32_key,
 };
 use palpate_shared::{ContactTime, Descriptor, MISSING_FEATURE, Patterns, Pose, Touch};
 use palpate_tests::abuse::{self, changed, section};
@@ -27,7 +27,6 @@ fn main() {
     sections(&mut text);
     rows(&mut text);
     sequences(&mut text);
-    events(&mut text);
     decisions(&mut text);
     shared_leaves(&mut text);
     early_exits(&mut text);
@@ -368,32 +367,6 @@ fn play_sequences(text: &mut String, name: &str, bytes: &[u8]) {
             (_, Err(Refused::Guarded(feature, _))) => *text += &format!("guarded {feature}\n"),
             (_, refused) => panic!("{refused:?}"),
         }
-    }
-}
-
-/// Verdicts that go on, with a background and without, at a threshold that rows pass alone and at one that takes several.
-fn events(text: &mut String) {
-    let stated = Events {
-        background: Some(0),
-        hold_off: 3,
-        memory: 0,
-        rows_per_hour: 36_000.0,
-        per_hour: 1.0,
-        confidence: 0.95,
-        grace: 5,
-        longest: 3_000,
-    };
-    for (name, background, memory, hold_off, rate) in
-        [("events between a background", Some(0), 4.0, 2, 0.3), ("events without a background", None, 6.0, 1, 0.1)]
-    {
-        let shape = Shape { leaf: 3.0, ..SHAPE };
-        let settings = with!(Settings::default(), leaf = Leaf::I8, error_rate = rate);
-        let bytes = compile(&random::over_rows(random::ensemble(shape, 31), 5, 1.000_001e-3), &settings)
-            .expect("it fits")
-            .bytes;
-        let memory = (memory / Model::new(&bytes).expect("a model").unit()) as i32;
-        let section = section(23 | 1 << 15, &Events { background, memory, hold_off, ..stated }.to_bytes());
-        play_rows(text, name, &with_sections(&bytes, &section), true);
     }
 }
 

@@ -4,7 +4,7 @@ use super::plan::{self, Wanted};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
-use super::sequences::{self, EventArguments, SequenceArguments};
+use super::sequences::{self, SequenceArguments};
 use super::strangers::StrangersArguments;
 use super::table::{self, TableArguments};
 use super::thresholds;
@@ -15,9 +15,8 @@ use palpate::ensemble::compiled_trained_on;
 use palpate::error::{CalibrateProblem, Error, Place};
 use palpate::output;
 use palpate::probe::noise::Noise;
-use palpate::rows::SequenceColumns;
 use palpate::strangers;
-use palpate::stream::{self, EventsCalibrated, StrangerTest};
+use palpate::stream::{self, StrangerTest};
 use palpate::touches::Dataset;
 use palpate::with;
 use palpate::wording::{self, count, decimal};
@@ -82,8 +81,6 @@ pub(crate) struct Arguments {
     /// Refuse rows of dead, stuck or railed sensors, of a model over rows
     #[arg(long, requires = "sequence_column")]
     guard: bool,
-    #[command(flatten)]
-    events: EventArguments,
     #[command(flatten)]
     strangers: StrangersArguments,
     #[command(flatten)]
@@ -161,11 +158,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if let Some(rolls) = arguments.plan {
         let Arguments { model, output, probe, real, .. } = &arguments;
         return plan::run(&Wanted { model, directory, output, rolls, probe, real }, global);
-    }
-    if let Some(calibrated) = on_events(&arguments, directory, global)? {
-        output::write_bytes(&arguments.output, &calibrated.model)?;
-        let text = || sequences::calibrated_events_text(&calibrated);
-        return global.print_about(&arguments.output, &calibrated, text);
     }
     let calibrated = match arguments.rows.label.is_some() {
         true => on_rows(&arguments, directory, global)?,
@@ -269,22 +261,6 @@ fn on_rows(arguments: &Arguments, rows: &PathBuf, global: &Global) -> Result<Cal
         seed = global.seed()
     );
     stream::calibrate(&model, &found, &settings, &Bar::new()).map_err(|error| error.in_file(rows))
-}
-
-/// Calibrates on recordings of events, if that is asked for.
-fn on_events(arguments: &Arguments, rows: &PathBuf, global: &Global) -> Result<Option<EventsCalibrated>> {
-    let Some(columns) = arguments.rows.columns().filter(|_| arguments.events.is_given()) else { return Ok(None) };
-    let path = &arguments.model;
-    output::admit(&arguments.output, [path, rows])?;
-    let compiled = CompiledModel::read(path)?;
-    let model = compiled.model();
-    let Some(settings) = arguments.events.settings(&model, arguments.confidence, global.seed())? else {
-        return Ok(None);
-    };
-    stream::check(&model).map_err(|error| error.in_file(path))?;
-    let found = sequences::read(rows, &model, &SequenceColumns { by_run: true, ..columns })?;
-    let calibrated = stream::calibrate_events(&model, &found, &settings, &Bar::new());
-    calibrated.map(Some).map_err(|error| error.in_file(rows))
 }
 
 /// Touches that the model was not trained on.

@@ -1,12 +1,12 @@
 use super::Global;
 use super::chips::{core, instructions};
 use palpate::chip::inspect::{
-    Defaults, Feature, Inspected, Limited, Noise, OfEvents, OnChip, PlanOf, Predicts, Probe, Promised, SomeColumns,
-    Tested, Touches, TrainedOn, inspect, on_chip,
+    Defaults, Feature, Inspected, Limited, Noise, OnChip, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested,
+    Touches, TrainedOn, inspect, on_chip,
 };
 use palpate::compile::{CompiledModel, Core, Memory};
 use palpate::locate::MapsFile;
-use palpate::wording::{self, count, counted, rate, scientific};
+use palpate::wording::{count, counted, rate, scientific};
 use palpate::{Error, Result};
 use palpate_shared::DIRECTIONS;
 use std::fmt::Write as _;
@@ -121,9 +121,6 @@ fn what_it_is(lines: &mut Lines, inspected: &Inspected<'_>) {
     if let Some(guard) = &inspected.guard {
         guard_lines(lines, guard);
     }
-    if let Some(events) = &inspected.events {
-        lines.line("events", events_text(events));
-    }
     let objects = inspected.objects.join(", ");
     match &inspected.predicts {
         Some(Predicts { what: "value", .. }) => lines.line("output", objects),
@@ -147,32 +144,9 @@ fn what_it_is(lines: &mut Lines, inspected: &Inspected<'_>) {
     let things = if inspected.predicts.is_some() { "rows" } else { "touches" };
     let Defaults { error_rate, max_touches } = inspected.stopping;
     match inspected.promise {
-        None if inspected.events.is_some() => {
-            lines.line("stopping", format!("error rate {} %", wording::decimal(100.0 * error_rate, 2)));
-        }
         None => lines.line("stopping", format!("error rate {}, at most {max_touches} {things}", rate(error_rate))),
         Some(_) => lines.line("stopping", format!("at most {max_touches} {things}")),
     }
-}
-
-fn events_text(events: &OfEvents) -> String {
-    let OfEvents { background, hold_off, grace, longest, rows_per_second, memory, false_per_hour, confidence } = events;
-    let decimal = |number: &f64| wording::decimal(*number, 1);
-    let between = background.as_ref().map_or_else(|| "one after the other".into(), |class| format!("between {class}"));
-    let promised = false_per_hour.map_or_else(String::new, |rate| {
-        format!(
-            "; at most {rate} false or repeated verdicts per hour, with a probability of {} %, in the first {} s of a recording",
-            super::percent(*confidence),
-            decimal(longest)
-        )
-    });
-    format!(
-        "{between}, at {} rows per second; {} s from one verdict to the next, a grace of {} s, a memory of {} nats{promised}",
-        decimal(rows_per_second),
-        decimal(hold_off),
-        decimal(grace),
-        decimal(memory)
-    )
 }
 
 fn guard_lines(lines: &mut Lines, guard: &[Limited]) {

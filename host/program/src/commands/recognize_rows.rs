@@ -97,10 +97,9 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
     let has_targets = model.prediction().targets;
     let has_classes = model.object_count() > 1 && !has_targets;
     let mut scratch = vec![0; model.object_count()];
-    let goes_on = model.events().is_some();
     for (number, row) in (1..).zip(rows.iter()) {
         let encoded = encoder.row(row);
-        let is_over = recognizer.verdict() != Verdict::Undecided && !goes_on;
+        let is_over = recognizer.verdict() != Verdict::Undecided;
         let is_first = if sequence.is_some() { starts.contains(&(number - 1)) } else { number == 1 || is_over };
         if is_over && !is_first && adds_up {
             // The sequence has its verdict.

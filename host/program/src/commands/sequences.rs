@@ -8,8 +8,7 @@ use palpate::error::{Error, Place, RowsProblem};
 use palpate::evaluate::Finding;
 use palpate::output;
 use palpate::rows::{Features, SequenceColumns, Sequences};
-use palpate::stream::{self, Evaluated, EventCounts, EventSettings, EventsCalibrated, EventsEvaluated, RowRule};
-use palpate::with;
+use palpate::stream::{self, Evaluated};
 use palpate::wording;
 use palpate_onboard::Model;
 use std::fmt::Write as _;
@@ -33,140 +32,8 @@ impl SequenceArguments {
     /// The columns, if the file has sequences.
     pub(crate) fn columns(&self) -> Option<SequenceColumns<'_>> {
         let (label, sequence) = (self.label.as_deref(), self.sequence_column.as_deref()?);
-        Some(SequenceColumns { label, sequence, group: self.group_column.as_deref(), by_run: false })
+        Some(SequenceColumns { label, sequence, group: self.group_column.as_deref() })
     }
-}
-
-/// Events in recordings without stated ends.
-#[derive(clap::Args, Clone, Debug)]
-pub(crate) struct EventArguments {
-    /// Verdicts go on through each sequence, a recording; CLASS is the one between events, if there is one
-    #[arg(long, value_name = "CLASS", num_args = 0..=1, default_missing_value = "", conflicts_with_all = NOT_OF_EVENTS,
-        requires_all = ["sequence_column", "rows_per_second"])]
-    events: Option<String>,
-    /// Rows in a second
-    #[arg(long, value_name = "N", requires = "events")]
-    rows_per_second: Option<f64>,
-    /// False or repeated verdicts to accept per hour; what is promised
-    #[arg(long, value_name = "N", default_value_t = 1.0, requires = "events")]
-    false_per_hour: f64,
-    /// Seconds from a verdict to the next, at least
-    #[arg(long, value_name = "S", default_value_t = 2.0, requires = "events")]
-    hold_off: f64,
-    /// Seconds after the end of an event in which its verdict counts
-    #[arg(long, value_name = "S", default_value_t = 1.0, requires = "events")]
-    grace: f64,
-}
-
-/// The options that recordings of events have no use for.
-const NOT_OF_EVENTS: [&str; 8] =
-    ["group_column", "guard", "strangers", "background", "per", "error_rate", "max_touches", "sequences"];
-
-impl EventArguments {
-    /// True if recordings of events are asked for.
-    pub(crate) fn is_given(&self) -> bool {
-        self.events.is_some()
-    }
-
-    /// Settings of a promise about events, if there are any.
-    pub(crate) fn settings(&self, model: &Model<'_>, confidence: f64, seed: u64) -> Result<Option<EventSettings>> {
-        let (Some(class), Some(rows_per_second)) = (self.events.as_deref(), self.rows_per_second) else {
-            return Ok(None);
-        };
-        let names = known(model);
-        let background = if class.is_empty() { None } else { names.iter().position(|name| name == class) };
-        if background.is_none() && !class.is_empty() {
-            return Err(Error::setting("events", class, format!("a class of the model: {}", names.join(", "))));
-        }
-        let &Self { false_per_hour, hold_off, grace, .. } = self;
-        let settings = EventSettings::default();
-        Ok(Some(with!(settings, background, rows_per_second, false_per_hour, hold_off, grace, confidence, seed)))
-    }
-}
-
-/// Statement of how events were calibrated.
-pub(crate) fn calibrated_events_text(calibrated: &EventsCalibrated) -> String {
-    let EventsCalibrated { promised, confidence, learned, longest, threshold, memory, row_evidence, counts, .. } =
-        calibrated;
-    format!(
-        "Promised: at most {promised} false or repeated verdicts per hour, with a probability of {} %, in the first {} of a recording.\n\
-         {}; learned from {learned} others.\n\
-         A verdict takes a lead of {} nats over a memory of {}{}.\n",
-        super::percent(*confidence),
-        seconds(*longest),
-        counts_text(counts),
-        wording::decimal(*threshold, 1),
-        wording::decimal(*memory, 1),
-        if *row_evidence { ", with evidence by a table of margins" } else { "" },
-    )
-}
-
-fn seconds(seconds: f64) -> String {
-    format!("{} s", wording::decimal(seconds, if seconds < 100.0 { 1 } else { 0 }))
-}
-
-fn counts_text(counts: &EventCounts) -> String {
-    let EventCounts { recordings, hours, events, named, wrong, repeated, false_per_hour, mean_delay, median_delay } =
-        counts;
-    format!(
-        "{recordings} recordings, {} h: {named} of {events} events named, {} after their onset on average, a median of {}; \
-         {wrong} false and {repeated} repeated verdicts, {} per hour",
-        wording::decimal(*hours, 2),
-        seconds(*mean_delay),
-        seconds(*median_delay),
-        wording::decimal(*false_per_hour, 2),
-    )
-}
-
-/// Evaluates a model with events on recordings.
-fn evaluate_events(asked: &Evaluation<'_>, model: &Model<'_>, global: &Global) -> Result<()> {
-    let other = [
-        ("page", asked.page.is_some()),
-        ("group_column", asked.columns.group.is_some()),
-        ("error_rate", asked.wanted.error_rate.is_some()),
-        ("max_touches", asked.wanted.max_rows.is_some()),
-        ("prior", asked.wanted.weights.is_some()),
-    ];
-    if let Some((option, _)) = other.iter().find(|(_, is_given)| *is_given) {
-        return Err(Error::setting(option, "given", "it with a model without events"));
-    }
-    let recordings = read(asked.rows, model, &SequenceColumns { by_run: true, ..asked.columns })?;
-    let evaluated = stream::evaluate_events(model, &recordings).map_err(|error| error.in_file(asked.rows))?;
-    if global.json {
-        return output::print_json(&evaluated);
-    }
-    output::print(&evaluated_events_text(&evaluated))
-}
-
-fn evaluated_events_text(evaluated: &EventsEvaluated) -> String {
-    let EventsEvaluated { counts, promised, finding, too_long, majority, debounced } = evaluated;
-    let mut text = format!("{}\n", counts_text(counts));
-    if let (Some(promised), Some(finding)) = (promised, finding) {
-        // Writing to a string cannot fail.
-        _ = writeln!(
-            text,
-            "promised: at most {promised} per hour; {} were: {}",
-            wording::decimal(counts.false_per_hour, 2),
-            found(*finding, "no verdict was given"),
-        );
-    }
-    if *too_long > 0 {
-        _ = writeln!(text, "{too_long} recordings are longer than the promise covers");
-    }
-    for (name, rule) in [("a majority", majority), ("debouncing", debounced)] {
-        _ = match rule {
-            Some(RowRule { rows, counts }) => {
-                let EventCounts { events, named, mean_delay, .. } = counts;
-                let after = seconds(*mean_delay);
-                writeln!(
-                    text,
-                    "as few false by {name} of {rows} rows: {named} of {events} events named, {after} after their onset"
-                )
-            }
-            None => writeln!(text, "as few false by {name} of rows: no number of rows"),
-        };
-    }
-    text
 }
 
 fn found(finding: Finding, untested: &'static str) -> &'static str {
@@ -220,9 +87,6 @@ pub(crate) struct Evaluation<'a> {
 pub(crate) fn evaluate(asked: Evaluation<'_>, compiled: &CompiledModel, global: &Global) -> Result<()> {
     let model = compiled.model();
     stream::check(&model).map_err(|error| error.in_file(asked.model))?;
-    if model.events().is_some() {
-        return evaluate_events(&asked, &model, global);
-    }
     if let Some(page) = asked.page {
         output::admit(page, [asked.rows, asked.model])?;
     }

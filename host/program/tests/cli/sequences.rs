@@ -2,7 +2,7 @@
 
 use crate::{Folder, fails, figures, lines, normal, says, succeeds};
 use palpate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -184,83 +184,4 @@ fn numbers_of_rows_and_guards_are_refused_where_there_is_no_such_feature_or_no_s
         fails(at, words, code, expected);
     }
     assert!(!at.join("x").exists());
-}
-
-/// Recordings of 100 rows: `low` between events of `middle` and `high`.
-fn recordings(count: usize, mut state: u64) -> String {
-    let mut text = "id,kind,x\n".to_owned();
-    for id in 0..count {
-        for (class, name) in [(0.0, "low"), (3.0, "high"), (0.0, "low"), (1.5, "middle"), (0.0, "low")] {
-            for _ in 0..20 {
-                writeln!(text, "{id},{name},{:.5}", class + normal(&mut state)).unwrap();
-            }
-        }
-    }
-    text
-}
-
-/// A model of such recordings.
-fn classes_of_recordings(at: &Path) {
-    let inputs = Inputs::Rows(vec!["x".into()]);
-    crate::goldens::densities(inputs, ["low", "middle", "high"], [0.0, 1.5, 3.0], -12..=18)
-        .save(at.join("steps.json"))
-        .unwrap();
-    succeeds(at, "export steps.json -o steps");
-}
-
-#[test]
-fn verdicts_go_on_through_recordings_of_events_at_a_promised_rate_and_as_evaluate_counts_them() {
-    let at = &place();
-    classes_of_recordings(at);
-    for (name, count, seed) in [("known.csv", 240, 1), ("unseen.csv", 100, 2)] {
-        fs::write(at.join(name), recordings(count, seed)).unwrap();
-    }
-    let events = "--events low --rows-per-second 10 --false-per-hour 120 --hold-off 1.5";
-    let calibrate = format!("calibrate steps known.csv -o sure {COLUMNS} {events}");
-    let text = succeeds(at, &calibrate);
-    assert!(
-        text.contains("Promised: at most 120 false or repeated verdicts per hour, with a probability of 95 %"),
-        "{text}"
-    );
-    assert!(text.contains("in the first 10.0 s of a recording") && text.contains("180 recordings"), "{text}");
-    let evaluate = format!("evaluate sure unseen.csv {COLUMNS}");
-    let found = figures(at, &evaluate);
-    let number = |key: &str| found[key].as_f64().unwrap();
-    assert_eq!([number("recordings"), number("events"), number("too_long")], [100.0, 200.0, 0.0]);
-    assert!(number("named") > 150.0 && number("mean_delay") < 1.5 && found["finding"] == "kept", "{found}");
-    let text = says(at, &evaluate, &["promised: at most 120 per hour", "as few false by a majority of "]);
-    assert!(text.contains("as few false by debouncing of "), "{text}");
-    let said = succeeds(at, "recognize sure unseen.csv --features --add-up --sequence-column id --json");
-    let verdicts: Vec<Value> = lines(&said).into_iter().filter(|line| line["verdict"] == "recognized").collect();
-    assert_eq!(verdicts.len() as f64, number("named") + number("false") + number("repeated"));
-    assert!(verdicts.iter().all(|line| line["class"] != "low"));
-    let inspected = figures(at, "inspect sure");
-    assert_eq!(inspected["events"]["background"], "low");
-    assert_eq!([&inspected["events"]["hold_off"], &inspected["events"]["grace"]], [1.5, 1.0]);
-    says(at, "inspect sure", &["between low, at 10.0 rows per second; 1.5 s from one verdict to the next"]);
-    // The same seed gives the same bytes.
-    let first = fs::read(at.join("sure")).unwrap();
-    succeeds(at, &calibrate);
-    assert_eq!(fs::read(at.join("sure")).unwrap(), first);
-}
-
-#[test]
-fn what_is_wrong_with_recordings_of_events_is_said_and_nothing_is_written() {
-    let at = &place();
-    classes_of_recordings(at);
-    fs::write(at.join("recordings.csv"), recordings(20, 1)).unwrap();
-    for (options, code, expected) in [
-        ("--events low --rows-per-second 10", 1, "20 recordings"),
-        ("--events low --rows-per-second 10", 1, "are too few to promise 1 false verdicts per hour: about "),
-        ("--events none --rows-per-second 10", 2, "a class of the model: low, middle, high"),
-        ("--events low --rows-per-second 0", 2, "--rows-per-second is 0. Use above 0"),
-        ("--events low", 2, "--rows-per-second"),
-        ("--hold-off 1", 2, "--events"),
-        ("--events low --rows-per-second 9 --guard", 2, "--guard"),
-        // Sequences have one label, unless they are recordings of events.
-        ("", 1, "has the labels"),
-    ] {
-        fails(at, &format!("calibrate steps recordings.csv -o sure {COLUMNS} {options}"), code, expected);
-    }
-    assert!(!at.join("sure").exists());
 }

@@ -12,7 +12,7 @@ from pandas import DataFrame
 from pathlib import Path
 from typing import Any, SupportsFloat, SupportsIndex, final
 
-__all__ = ["DataSet", "Ensemble", "Locator", "Maps", "Model", "Recognizer", "Shape", "Surface", "calibrate", "calibrate_events", "capture", "checksums", "compile", "estimate_sequences", "evaluate", "evaluate_events", "evaluate_sequences", "parity", "sources", "train"]
+__all__ = ["DataSet", "Ensemble", "Locator", "Maps", "Model", "Recognizer", "Shape", "Surface", "calibrate", "capture", "checksums", "compile", "estimate_sequences", "evaluate", "evaluate_sequences", "parity", "sources", "train"]
 
 @final
 class DataSet:
@@ -657,11 +657,6 @@ def calibrate(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], 
     Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
     """
 
-def calibrate_events(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], recording: SupportsGetItem[int, str], *, background: str | None, rows_per_second: SupportsFloat | SupportsIndex, false_per_hour: SupportsFloat | SupportsIndex, hold_off: SupportsFloat | SupportsIndex, grace: SupportsFloat | SupportsIndex, confidence: SupportsFloat | SupportsIndex, seed: SupportsIndex, progress: Progress | None = None) -> tuple[Model, str]:
-    """
-    Sets a model's threshold on recordings of events, and returns the model and what `palpate calibrate --json` prints.
-    """
-
 def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", cone: SupportsFloat | SupportsIndex | None = None, position: bool = False, within: SupportsFloat | SupportsIndex | None = None, length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, shard: str = "1/1", out: str | PathLike[str] | None = None, format: str = "text", resume: bool = False, add: bool = False, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
     """
     Touches objects with a simulated probe.
@@ -722,11 +717,6 @@ def estimate_sequences(model: Model, folds: SupportsGetItem[int, tuple[Model, Ar
 def evaluate(model: Model | Ensemble, data: DataSet, *, at: SupportsGetItem[int, SupportsIndex] | None = None, groups: SupportsIndex = 1000, error_rate: SupportsFloat | SupportsIndex | None = None, max_touches: SupportsIndex | None = None, noise: str = "", timer: str = "", seed: SupportsIndex = 1) -> str:
     """
     Evaluates a model on touches that it was not trained on, and returns what `palpate evaluate --json` prints.
-    """
-
-def evaluate_events(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], recording: SupportsGetItem[int, str]) -> str:
-    """
-    Measures a model with events on recordings, and returns what `palpate evaluate --json` prints.
     """
 
 def evaluate_sequences(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], sequence: SupportsGetItem[int, str], *, groups: SupportsGetItem[int, str] | None = None, error_rate: SupportsFloat | SupportsIndex | None = None, max_rows: SupportsIndex | None = None) -> str:

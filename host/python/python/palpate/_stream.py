@@ -80,30 +80,6 @@ class Ends:
     """All figures, as `palpate evaluate --json` prints them."""
 
 
-@dataclass(frozen=True)
-class Events:
-    """Verdicts on recordings of events. Times are in seconds."""
-
-    model: Model
-    """The model; after `calibrate_events` with its threshold."""
-    hours: float
-    """Hours of all recordings."""
-    events: int
-    """Events in them."""
-    named: int
-    """Events that got their verdict."""
-    false: int
-    """Verdicts that no event of their class explains."""
-    repeated: int
-    """Further verdicts of an event that had one."""
-    false_per_hour: float
-    """False and repeated verdicts per hour."""
-    mean_delay: float
-    """Time from the onset of an event to its verdict, on average."""
-    raw: dict[str, Any] = field(repr=False)
-    """All figures, as `palpate calibrate --json` or `palpate evaluate --json` prints them."""
-
-
 def _texts(values: _Ids) -> list[str]:
     return [str(value) for value in np.asarray(values).tolist()]
 
@@ -253,84 +229,6 @@ def evaluate_sequences(
     raw: dict[str, Any] = json.loads(text)
     return Ends(
         raw["error"], raw["undecided"], raw["unknown"], raw["mean_rows"], raw["comparison"]["fixed_rows"], raw
-    )
-
-
-def calibrate_events(
-    model: object,
-    rows: npt.ArrayLike,
-    labels: _Ids,
-    *,
-    recording: _Ids,
-    background: object | None = None,
-    rows_per_second: float,
-    false_per_hour: float = 1.0,
-    hold_off: float = 2.0,
-    grace: float = 1.0,
-    confidence: float = 0.95,
-    seed: int = 1,
-    progress: Progress | None = None,
-) -> Events:
-    """Makes a model's verdicts go on through a stream: a verdict for each event, at a promised rate of false ones.
-
-    Rows with the same value of `recording` follow each other, and each has the class that it is of. A run of rows of one class
-    other than the `background` is an event. A verdict is right if it is the first of an event of its class, up to `grace`
-    seconds after its end; after a verdict there is none for `hold_off` seconds. At most `false_per_hour` other verdicts are
-    promised, of recordings like these, which must be independent of each other and of the training.
-
-    >>> import numpy as np, palpate
-    >>> from sklearn.ensemble import HistGradientBoostingClassifier
-    >>> random = np.random.default_rng(1)
-    >>> y = np.tile(np.repeat([0, 1, 0, 2], 25), 500)
-    >>> X = (2 * y + random.normal(size=y.size)).reshape(-1, 1)
-    >>> recording = np.repeat(np.arange(250), 200)
-    >>> estimator = HistGradientBoostingClassifier(max_iter=5).fit(X[:10000], y[:10000])
-    >>> sure = palpate.calibrate_events(
-    ...     estimator, X[10000:], y[10000:], recording=recording[10000:], background=0,
-    ...     rows_per_second=10, false_per_hour=60,
-    ... )
-    >>> sure.false_per_hour <= 60, sure.named > sure.events / 2
-    (True, True)
-    """
-    compiled = model if isinstance(model, Model) else compile(model)
-    calibrated, text = _native.calibrate_events(
-        compiled,
-        rows_of(Recognizer(compiled), rows),
-        _texts(labels),
-        _ids(recording, "recording"),
-        background=None if background is None else str(background),
-        rows_per_second=rows_per_second,
-        false_per_hour=false_per_hour,
-        hold_off=hold_off,
-        grace=grace,
-        confidence=confidence,
-        seed=seed,
-        progress=progress,
-    )
-    return _events(calibrated, text)
-
-
-def evaluate_events(model: Model, rows: npt.ArrayLike, labels: _Ids, *, recording: _Ids) -> Events:
-    """Verdicts of a model with events on recordings that it was neither trained nor calibrated on; arguments are as for
-    `calibrate_events`. `raw` also has a majority of rows and debouncing with as few false verdicts."""
-    text = _native.evaluate_events(
-        model, rows_of(Recognizer(model), rows), _texts(labels), _ids(recording, "recording")
-    )
-    return _events(model, text)
-
-
-def _events(model: Model, text: str) -> Events:
-    raw: dict[str, Any] = json.loads(text)
-    return Events(
-        model,
-        raw["hours"],
-        raw["events"],
-        raw["named"],
-        raw["false"],
-        raw["repeated"],
-        raw["false_per_hour"],
-        raw["mean_delay"],
-        raw,
     )
 
 

@@ -3,8 +3,7 @@
 mod stated;
 
 pub use stated::{
-    Defaults, Feature, Limited, Noise, OfEvents, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches,
-    TrainedOn,
+    Defaults, Feature, Limited, Noise, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches, TrainedOn,
 };
 
 use crate::compile::{self, Core, Instructions, Memory};
@@ -12,8 +11,7 @@ use crate::evaluate;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH};
 use stated::{
-    events, evidence, features, guard, noise, pattern, plan, position, predicts, priors, probe, promised, tested,
-    trained_on,
+    evidence, features, guard, noise, pattern, plan, position, predicts, priors, probe, promised, tested, trained_on,
 };
 use std::collections::BTreeMap;
 
@@ -42,9 +40,6 @@ pub struct Inspected<'a> {
     /// Limits of each feature in the rows of a sequence, for a model that states them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guard: Option<Vec<Limited>>,
-    /// Events, if verdicts go on through a stream of rows.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub events: Option<OfEvents>,
     /// The objects' names.
     pub objects: Vec<&'a str>,
     /// Predictions of a model over rows.
@@ -137,7 +132,6 @@ pub fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         columns: palpate_trees::rows::columns_of(model).map(|(all, used)| SomeColumns { all, used }),
         position: position(model),
         guard: guard(model),
-        events: events(model),
         objects: (0..model.known_count()).map(|object| model.object_name(object)).collect(),
         predicts: predicts(model),
         layout: model.layout().name(),

@@ -38,27 +38,6 @@ impl Limited {
     }
 }
 
-/// Events in a stream of rows, and what is promised of their verdicts. Times are in seconds.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct OfEvents {
-    /// The class between events; null if there is none.
-    pub background: Option<String>,
-    /// Least time from a verdict to the next.
-    pub hold_off: f64,
-    /// Time after the end of an event in which its verdict counts.
-    pub grace: f64,
-    /// Length of a recording up to which the promise holds.
-    pub longest: f64,
-    /// Rows in a second.
-    pub rows_per_second: f64,
-    /// Most evidence by which a class can be behind before a row, in nats.
-    pub memory: f64,
-    /// Promised false or repeated verdicts per hour; null without a promise.
-    pub false_per_hour: Option<f64>,
-    /// The probability that the promise is kept.
-    pub confidence: f64,
-}
-
 /// Default end of recognizers' sequences.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Defaults {
@@ -386,21 +365,4 @@ pub(super) fn plan(model: &Model<'_>) -> Option<PlanOf> {
     let poses = plan.poses();
     let left_out = (0..poses.count()).filter(|&pose| !plan.may_touch(pose)).count();
     Some(PlanOf { rolls: poses.rolls(), poses: poses.count(), left_out })
-}
-
-/// Events in a stream of rows, and the promise about their verdicts.
-pub(super) fn events(model: &Model<'_>) -> Option<OfEvents> {
-    let events = model.events()?;
-    let seconds = |rows: u32| f64::from(rows) * 3600.0 / f64::from(events.rows_per_hour);
-    Some(OfEvents {
-        background: events.background.map(|class| model.object_name(class.into()).to_owned()),
-        hold_off: seconds(events.hold_off),
-        grace: seconds(events.grace),
-        longest: seconds(events.longest),
-        rows_per_second: f64::from(events.rows_per_hour) / 3600.0,
-        memory: f64::from(events.memory) * f64::from(model.unit()),
-        false_per_hour: Some(f64::from(events.per_hour)).filter(|promised| *promised > 0.0),
-        // An f32 in the model.
-        confidence: (f64::from(events.confidence) * 1e6).round() / 1e6,
-    })
 }

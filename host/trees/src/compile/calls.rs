@@ -95,7 +95,7 @@ impl Calls<'_> {
             "/* The model as palpate_open leaves it: its bytes were checked when it was exported. */\n\
              static const palpate_model {name}_opened_ = {{\n    {name}_model,\n    {{{parts}}},\n    \
              {cuts}, {odds}, {strangers}, {table}, {sentinel}, {weights}, {rows}, {start}, {most}u,\n\
-             #if PALPATE_SEQUENCES\n    {position}, {guard}, {events},\n#endif\n\
+             #if PALPATE_SEQUENCES\n    {position}, {guard},\n#endif\n\
              #if PALPATE_OUTPUTS\n    {outputs},\n#endif\n#if PALPATE_EARLY\n    {exits}, {ends},\n#endif\n    \
              0, {spread}u, {objects}, {known}, {features}, {layout}, {leaf}, {descriptor}, {real}, {patterns}, {oriented}\n\
              #if PALPATE_LAYOUTS & PALPATE_CODE\n    , {code}\n#endif\n}};\n\n",
@@ -111,7 +111,6 @@ impl Calls<'_> {
             most = row.1,
             position = pointer(21, 0),
             guard = pointer(22, 0),
-            events = pointer(23, 0),
             outputs = pointer(18, 0),
             exits = pointer(17, 0),
             ends = found[17].map_or_else(|| "NULL".into(), |_| at(exits_end)),
@@ -260,7 +259,7 @@ impl Calls<'_> {
         )
     }
 
-    /// Functions of a model that numbers the rows of a sequence, states which of them it takes, or goes on after a verdict.
+    /// Functions of a model that numbers the rows of a sequence, or states which of them it takes.
     fn of_sequences(&self) -> String {
         let (name, features) = (self.name, self.model.feature_count());
         let (row, missing) = self.row();
@@ -283,38 +282,26 @@ impl Calls<'_> {
             );
         }
         let number = if place.is_some() { ", whose number is counted here," } else { "" };
-        // A decision stays; after an event the next row counts again.
-        let otherwise = match self.model.events() {
-            None => "state->verdict == PALPATE_UNDECIDED ? -4 : palpate_decided_(state)",
-            Some(_) => "-4",
-        };
         let (begin, push, refused) = match is_guarded {
             true => (
                 "    seen->rows = 0;\n    seen->refused = 0;\n",
                 format!(
                     "    seen->refused = palpate_next_row(&{name}_opened_, {argument}, keys);\n    \
-                         if (seen->refused != 0) {{\n        return {otherwise};\n    }}\n"
+                         if (seen->refused != 0) {{\n        \
+                         return state->verdict == PALPATE_UNDECIDED ? -4 : palpate_decided_(state);\n    }}\n"
                 ),
                 ", -4 if the model does not take the row, which adds nothing",
             ),
             false => ("", format!("    (void)palpate_next_row(&{name}_opened_, {argument}, keys);\n"), ""),
-        };
-        let answer = match self.model.events() {
-            None => format!(
-                "the number of the object that is recognized; -1 while none is, -2 if none fits, -3 at the limit of steps{refused}. After a \
-                 decision nothing changes until {name}_begin."
-            ),
-            Some(_) => format!(
-                "the number of an event's class in the row after which it is sure, and -1 in all others{refused}. \
-                 {name}_begin begins another recording; state->ongoing is the class that holds."
-            ),
         };
         let rows = if is_guarded { "" } else { "    uint32_t rows = palpate_rows_(state);\n" };
         text + &format!(
             "/* Begins a sequence: nothing was added yet. {OWN} */\n\
              static inline void {name}_begin(palpate_recognizer *state{seen})\n{{\n    \
              palpate_start_(state, &{name}_opened_);\n{begin}}}\n\n\
-             /* Adds a row of {measured} features{number} {missing} where one is missing: {answer} {OWN} */\n\
+             /* Adds a row of {measured} features{number} {missing} where one is missing: the number of the object that is recognized; -1 \
+             while none is, -2 if none fits, -3 at the limit of steps{refused}. After a decision nothing changes until {name}_begin. \
+             {OWN} */\n\
              static inline int {name}_push(palpate_recognizer *state{seen}, const {row} *row)\n{{\n    int32_t keys[{features}];\n\
              {rows}    int i;\n    for (i = 0; i < {features}; i++) {{\n        keys[i] = {value};\n    }}\n{push}    \
              (void)palpate_push_features(state, keys, {features});\n    return palpate_decided_(state);\n}}\n\n\

@@ -136,9 +136,9 @@ pub const FEATURES: [(&str, [usize; 2]); 15] = [
 /// Flash of what all images of verdicts have.
 const COMMON: [usize; 2] = [5_948, 5_472];
 
-/// True if the model numbers the rows of a sequence, states which of them it takes, or goes on after a verdict.
+/// True if the model numbers the rows of a sequence, or states which of them it takes.
 pub(super) fn has_sequences(model: &Model<'_>) -> bool {
-    model.position().is_some() || model.guard().is_some() || model.events().is_some()
+    model.position().is_some() || model.guard().is_some()
 }
 
 /// Features of palpate-onboard that a model needs.

@@ -252,15 +252,6 @@ pub enum RowsProblem {
         /// The name of its output.
         output: String,
     },
-    /// Events were asked for of a model without them.
-    #[error("the model has no events: its verdicts end with the first of a sequence")]
-    NoEvents,
-    /// A model of events would number rows.
-    #[error("the model has the row number as a feature, which means nothing in a stream without stated ends")]
-    NumberedEvents,
-    /// A model of events would have several outputs of a class.
-    #[error("several outputs of the model belong to one class, and events need an output for each")]
-    EventsOfOutputs,
 }
 
 /// The first names of many, `?` for those that are not text.
@@ -336,9 +327,6 @@ impl Problem for RowsProblem {
                  library's margins."
             }
             Self::Regression { .. } => "Give a model of two or more classes.",
-            Self::NoEvents => "Calibrate it on recordings of events: `palpate calibrate --events`.",
-            Self::NumberedEvents => "Train and export a model without `--row-number`.",
-            Self::EventsOfOutputs => "Give a model with one output for each class.",
             Self::Label { .. } => "Correct the label, or name the model's classes with `export --names`.",
         }
         .into()

@@ -42,8 +42,6 @@ pub struct SequenceColumns<'c> {
     pub sequence: &'c str,
     /// The group that the sequence belongs to, such as a person or a machine.
     pub group: Option<&'c str>,
-    /// True if the class may change within a sequence: see [`SequencesBuilder::by_run`].
-    pub by_run: bool,
 }
 
 /// Statements of a row beside its features.
@@ -67,20 +65,12 @@ pub struct SequencesBuilder {
     groups: HashMap<String, usize>,
     /// Name and label of the last sequence.
     last: Option<[String; 2]>,
-    by_run: bool,
 }
 
 impl SequencesBuilder {
     /// For rows of this many features, and these classes.
     pub fn new(features: usize, classes: &[String]) -> Self {
         Self { classes: classes.to_vec(), built: Sequences { features, ..Sequences::default() }, ..Self::default() }
-    }
-
-    /// Takes sequences in which the class may change: each run of rows with one class becomes a sequence, and its group is the
-    /// sequence that it is part of.
-    #[must_use]
-    pub fn by_run(self) -> Self {
-        Self { by_run: true, ..self }
     }
 
     /// Takes in a row; `values` are as many as there are features.
@@ -94,11 +84,10 @@ impl SequencesBuilder {
                 return Err(RowsProblem::Nameless { what });
             }
         }
-        let row = if self.by_run { RowOf { group: Some(row.sequence), ..row } } else { row };
         let number = self.built.len() + 1;
         let group = row.group.unwrap_or_default();
         match &self.last {
-            Some([sequence, label]) if sequence == row.sequence && !(self.by_run && label != row.label) => {
+            Some([sequence, label]) if sequence == row.sequence => {
                 if label != row.label {
                     let labels = [label.clone(), row.label.into()];
                     return Err(RowsProblem::TwoLabels { sequence: row.sequence.into(), labels });
@@ -112,8 +101,7 @@ impl SequencesBuilder {
             }
             _ => {
                 let count = self.built.sequences.len();
-                let goes_on = self.last.as_ref().is_some_and(|[sequence, _]| sequence == row.sequence);
-                if self.seen.insert(row.sequence.into(), count).is_some() && !goes_on {
+                if self.seen.insert(row.sequence.into(), count).is_some() {
                     return Err(RowsProblem::ComesBack { sequence: row.sequence.into() });
                 }
                 let class = class(&self.classes, row.label).ok_or_else(|| RowsProblem::Label {
@@ -196,8 +184,7 @@ impl Sequences {
         let others: Vec<usize> = [sequence].into_iter().chain(label).chain(group).collect();
         let features = features.into();
         let matched = features.among(header, &others).map_err(|problem| Error::at(place(1), problem))?;
-        let builder = SequencesBuilder::new(features.count(), classes);
-        let mut builder = if names.by_run { builder.by_run() } else { builder };
+        let mut builder = SequencesBuilder::new(features.count(), classes);
         let mut values = vec![0.0; features.count()];
         for record in records {
             let (line, record) = record?;

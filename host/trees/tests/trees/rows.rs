@@ -159,8 +159,7 @@ fn a_name_that_is_there_twice_is_an_error() {
     assert_eq!(among(&["a", "a"], &["0", "1"]), Ok((vec![0, 1], true)));
 }
 
-const COLUMNS: SequenceColumns<'_> =
-    SequenceColumns { label: Some("kind"), sequence: "id", group: Some("who"), by_run: false };
+const COLUMNS: SequenceColumns<'_> = SequenceColumns { label: Some("kind"), sequence: "id", group: Some("who") };
 
 fn read_sequences(text: &str, columns: &SequenceColumns<'_>) -> Result<Sequences, String> {
     let classes = ["cup", "jug"].map(String::from);
@@ -207,20 +206,6 @@ fn what_is_wrong_with_a_sequence_is_said_with_its_line() {
         let complaint = read_sequences(text, columns).unwrap_err();
         assert!(complaint.starts_with(expected), "{complaint}");
     }
-}
-
-#[test]
-fn runs_of_a_label_are_sequences_of_their_recording() {
-    let text = "id,a,b,kind\n7,1,2,cup\n7,3,4,cup\n7,5,6,jug\n7,7,8,cup\nx,9,0,cup\n";
-    let columns = SequenceColumns { group: None, by_run: true, ..COLUMNS };
-    let read_all = read_sequences(text, &columns).unwrap();
-    let of = |rows, class, group| RowSequence { rows, class, group: Some(group) };
-    assert_eq!(read_all.sequences, [of(0..2, 0, 0), of(2..3, 1, 0), of(3..4, 0, 0), of(4..5, 0, 1)]);
-    assert_eq!(read_all.groups, ["7", "x"]);
-    let complaint = read_sequences("id,a,b,kind\n1,1,2,cup\n2,1,2,jug\n1,1,2,jug\n", &columns).unwrap_err();
-    assert!(complaint.starts_with(":4: the sequence \"1\" comes back after another"), "{complaint}");
-    let complaint = read_sequences("id,a,b,kind\n1,1,2,cup\n1,1,2,pan\n", &columns).unwrap_err();
-    assert!(complaint.starts_with(":3: the label \"pan\" in row 2 is none of"), "{complaint}");
 }
 
 #[test]
