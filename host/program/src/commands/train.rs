@@ -27,7 +27,7 @@ use std::time::Instant;
 #[command(after_help = "\
 From touches with a position (capture --position) it makes a model of maps, ready for calibrate and recognize. The ensemble is XGBoost's JSON. Its features are in microseconds, where data sets have seconds, and cosines in units of 1/32767.
 
-Presets: compact is accurate (leaves hold a value per object; curvature), small takes half its bytes, tiny a fifth; paper is the published method (one tree per object and round; contact times). Keys of --trees: rounds, depth, eta, min_child_weight, bins, leaves, leaf_bits, trainer; docs/reference/options.md explains them, --teach and --evidence.
+Presets: compact is accurate (leaves hold a value per object; curvature), small takes two fifths of its bytes, tiny a seventh; paper is the published method (one tree per object and round; contact times). Keys of --trees: rounds, depth, eta, min_child_weight, bins, leaves, leaf_bits, trainer; docs/reference/options.md explains them, --teach and --evidence.
 
 Examples:
   palpate train data -o ensemble.json

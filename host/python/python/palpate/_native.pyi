@@ -739,10 +739,11 @@ def train(data: DataSet, *, preset: str = "compact", descriptor: str | None = No
     """
     Trains an ensemble on a data set: gradient boosting with XGBoost's algorithm and parameters.
 
-    `preset` is "compact" (30 trees with one leaf value per object, on curvature and slope), "small" or "tiny" (half its bytes,
-    or a fifth) or "paper" (the published method); other arguments replace parts of it. `descriptor` is "times", "curvature", "gravity" or "oriented".
-    `counted` says which touches are evidence: "full", "contacts" or "all"; by default those with a contact of a data set of
-    approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and "1ms", are added to the touches.
+    `preset` is "compact" (30 trees with one leaf value per object, on curvature and slope), "small" or "tiny" (two fifths
+    of its bytes, or a seventh) or "paper" (the published method); other arguments replace parts of it. `descriptor` is
+    "times", "curvature", "gravity" or "oriented". `counted` says which touches are evidence: "full", "contacts" or "all"; by
+    default those with a contact of a data set of approaches, and full ones of others. `noise` and `timer`, such as "0..5ms" and
+    "1ms", are added to the touches.
     With objects on a table each placement is an output, or with `outputs` "objects" each object.
     `background` is a data set of many other shapes, which stand for everything that the model does not know.
 
