@@ -332,7 +332,7 @@ def run(tree, log, target, only):
             continue
         tests = [binary for binary in found if is_in(room, binary) and check(binary)["tests"]]
         began, by, why = time.monotonic(), None, None
-        for binary in sorted(tests, key=lambda binary: check(binary)["wall"]):
+        for binary in sorted(tests, key=lambda binary: (binary["package"] == TESTS, check(binary)["wall"])):
             end = execute(tree, binary, number, check(binary)["failed"], check(binary))
             if end.why:
                 by, why = f"{binary['label']}: {end.failed[0] if end.failed else end.why}", end.why
