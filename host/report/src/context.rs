@@ -186,25 +186,8 @@ pub(super) fn compiled_f32(ensemble: &Ensemble) -> Result<compile::Compiled> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::small::meshes;
     use palpate::evaluate::{Candidate, Margins};
-    use palpate::mesh::{Instance, Mesh, Object};
-
-    /// Three objects of two meshes each.
-    fn meshes() -> Vec<Object> {
-        let sides = [
-            ("one", [[1.0, 1.0, 1.0], [1.0, 0.6, 0.7]]),
-            ("three", [[1.0, 0.9, 0.1], [1.0, 0.5, 0.12]]),
-            ("two", [[1.0, 0.1, 0.1], [1.0, 0.35, 0.25]]),
-        ];
-        let object = |(name, sides): (&str, [[f32; 3]; 2])| {
-            let instance = |(number, sides): (usize, [f32; 3])| Instance {
-                name: format!("{name} {number}"),
-                mesh: Mesh::globe(10).stretched(sides),
-            };
-            Object::of_instances(name, sides.into_iter().enumerate().map(instance).collect()).unwrap()
-        };
-        sides.map(object).into()
-    }
 
     #[test]
     fn what_a_fold_states_of_objects_with_several_meshes_is_what_fresh_touches_give() {

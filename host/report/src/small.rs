@@ -6,6 +6,11 @@ use palpate::mesh::{Object, builtin};
 use palpate_shared::Descriptor;
 use std::sync::LazyLock;
 
+pub(crate) use meshes::meshes;
+
+#[path = "../../src/tests/meshes.rs"]
+mod meshes;
+
 /// A built-in object, made once.
 pub(crate) static BOWL: LazyLock<Object> = LazyLock::new(|| builtin::one("bowl").unwrap());
 

@@ -1,16 +1,10 @@
 use super::*;
 use crate::compile::{Settings as Compilation, compile};
 use crate::ensemble::train::{self, train, train_with_background};
-use crate::tests::synthetic;
+use crate::tests::synthetic::of;
 
 /// Object k bends up to 80 ms · (k + 1). Three are known.
 const KNOWN: usize = 3;
-
-fn of(objects: std::ops::Range<usize>, count: usize, seed: u64) -> Dataset {
-    let mut all = synthetic::dataset(&vec![count; objects.end], seed);
-    all.objects.drain(..objects.start);
-    all
-}
 
 fn training() -> train::Settings {
     train::Settings { rounds: 20, depth: 4, ..train::Settings::compact() }

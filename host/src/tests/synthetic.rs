@@ -8,6 +8,7 @@ use palpate::shared::{ContactTime, Touch};
 use palpate::touches::{Dataset, ObjectTouches, Source};
 use palpate::with;
 use rand::{Rng, RngExt};
+use std::ops::Range;
 use std::sync::LazyLock;
 
 /// An ensemble of three objects.
@@ -43,6 +44,13 @@ pub(crate) fn dataset(counts: &[usize], seed: u64) -> Dataset {
         ObjectTouches::new(name, touches, Source::Object)
     };
     Dataset::new(counts.iter().enumerate().map(object).collect())
+}
+
+/// As many touches of each of the objects with these numbers.
+pub(crate) fn of(objects: Range<usize>, count: usize, seed: u64) -> Dataset {
+    let mut all = dataset(&vec![count; objects.end], seed);
+    all.objects.drain(..objects.start);
+    all
 }
 
 /// A touch of the object of this number.

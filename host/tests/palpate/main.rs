@@ -21,5 +21,7 @@ mod train;
 
 #[path = "../../src/tests/repetitions.rs"]
 mod repetitions;
+#[path = "../../src/tests/shares.rs"]
+mod shares;
 #[path = "../../src/tests/synthetic.rs"]
 mod synthetic;

@@ -5,6 +5,7 @@
 //! meets: an object would be known from the mean of its meshes.
 
 use crate::fixtures::*;
+use crate::shares::{Share, cases};
 use crate::synthetic;
 use palpate::calibrate::{self};
 use palpate::compare;
@@ -54,30 +55,6 @@ static MODEL: LazyLock<CompiledModel> = LazyLock::new(|| {
 
 /// Touches that nothing was trained, chosen or calibrated on.
 static FRESH: LazyLock<Dataset> = LazyLock::new(|| touches(20_000, 77));
-
-/// A share, and its standard error.
-#[derive(Clone, Copy, Debug)]
-struct Share(f64, f64);
-
-impl Share {
-    /// A share of this many independent cases.
-    fn of(value: f64, cases: f64) -> Self {
-        // One that is 0 or 1 is not known exactly.
-        let spread = value.clamp(1.0 / (cases + 2.0), 1.0 - 1.0 / (cases + 2.0));
-        Self(value, (spread * (1.0 - spread) / cases).sqrt())
-    }
-
-    /// Checks that another one's share is within three standard errors of the difference.
-    fn agrees(self, what: &str, measured: Self) {
-        let error = self.1.hypot(measured.1);
-        assert!((self.0 - measured.0).abs() <= 3.0 * error, "{what}: {self:?} stated, {measured:?} measured");
-    }
-}
-
-/// Number of cases that `groups` groups of `length` make: at most as many as are disjoint.
-fn cases(groups: usize, touches: usize, length: f64) -> f64 {
-    (groups as f64).min(touches as f64 / length)
-}
 
 /// Results of a candidate on touches of `dataset`: its accuracy after ten, and wrong and unknown ends of its sequences.
 fn measured(candidate: Candidate<'_>, dataset: &Dataset) -> [Share; 3] {

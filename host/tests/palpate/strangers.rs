@@ -1,5 +1,5 @@
 use crate::fixtures::*;
-use crate::synthetic;
+use crate::synthetic::of;
 use palpate::calibrate::{self as promises, Calibrated};
 use palpate::compile::{self, Settings as Compilation, compile};
 use palpate::ensemble::train::{self, train, train_with_background};
@@ -11,12 +11,6 @@ use palpate::strangers::{Settings, Tested, calibrate, calibrate_with_promise, wi
 
 /// Object k bends up to 80 ms · (k + 1). Three are known; objects 5 and 9 are not.
 const KNOWN: usize = 3;
-
-fn of(objects: std::ops::Range<usize>, count: usize, seed: u64) -> Dataset {
-    let mut all = synthetic::dataset(&vec![count; objects.end], seed);
-    all.objects.drain(..objects.start);
-    all
-}
 
 /// Ensembles of three objects, without and with a background.
 static ENSEMBLES: LazyLock<[Ensemble; 2]> = LazyLock::new(|| {

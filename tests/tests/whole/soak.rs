@@ -9,39 +9,19 @@ use palpate_onboard::station::{Memory, record_length, serve};
 use palpate_shared::Descriptor;
 use palpate_shared::link::HostSettings;
 use palpate_tests::random::{self, Shape};
-use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::ops::ControlFlow;
 use std::process::{Command, Stdio};
+use wire::Wire;
+
+#[path = "../../../host/program/tests/cli/chip_wire.rs"]
+mod wire;
 
 const OBJECTS: usize = 10;
 /// Tells the chip's process where its host is.
 const HOST: &str = "PALPATE_SOAK_HOST";
 /// Tells the test that its process has no other tests, whose memory would count.
 const ALONE: &str = "PALPATE_SOAK_ALONE";
-
-/// A stream of the standard library's as the chip's transport.
-struct Wire(TcpStream);
-
-impl embedded_io::ErrorType for Wire {
-    type Error = embedded_io::ErrorKind;
-}
-
-impl embedded_io::Read for Wire {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Self::Error> {
-        self.0.read(buffer).map_err(|_| embedded_io::ErrorKind::Other)
-    }
-}
-
-impl embedded_io::Write for Wire {
-    fn write(&mut self, buffer: &[u8]) -> Result<usize, Self::Error> {
-        self.0.write(buffer).map_err(|_| embedded_io::ErrorKind::Other)
-    }
-
-    fn flush(&mut self) -> Result<(), Self::Error> {
-        self.0.flush().map_err(|_| embedded_io::ErrorKind::Other)
-    }
-}
 
 /// Passes on everything that it gets, until either end is gone.
 fn pass(mut from: TcpStream, mut to: TcpStream) {

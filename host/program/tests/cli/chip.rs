@@ -1,5 +1,6 @@
 //! The commands that talk to a chip, with a chip's whole program behind a TCP connection.
 
+use crate::chip_wire::Wire;
 use crate::fixtures::{LOCATED, ONE_SPLIT};
 use crate::locate::{of_one_placement, recognized};
 use crate::{command, complains, fails, figures, json, lines, listen, piped, run, says, stderr, stdout, succeeds};
@@ -13,29 +14,6 @@ use std::path::Path;
 use std::time::Duration;
 
 const OBJECTS: usize = 2;
-
-/// A stream of the standard library as the chip's transport.
-struct Wire(TcpStream);
-
-impl embedded_io::ErrorType for Wire {
-    type Error = embedded_io::ErrorKind;
-}
-
-impl embedded_io::Read for Wire {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Self::Error> {
-        self.0.read(buffer).map_err(|_| embedded_io::ErrorKind::Other)
-    }
-}
-
-impl embedded_io::Write for Wire {
-    fn write(&mut self, buffer: &[u8]) -> Result<usize, Self::Error> {
-        self.0.write(buffer).map_err(|_| embedded_io::ErrorKind::Other)
-    }
-
-    fn flush(&mut self) -> Result<(), Self::Error> {
-        self.0.flush().map_err(|_| embedded_io::ErrorKind::Other)
-    }
-}
 
 /// A port at which `chip` gets the first connection.
 fn port(chip: impl FnOnce(TcpStream) + Send + 'static) -> String {

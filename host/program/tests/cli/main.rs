@@ -3,6 +3,7 @@
 mod capture;
 mod cast;
 mod chip;
+mod chip_wire;
 mod compiled;
 mod data;
 mod fit;

@@ -1,43 +1,14 @@
 //! The figures of a run over objects with several very different meshes agree with fresh touches.
 
 use crate::run::*;
+use meshes::meshes;
 use palpate::evaluate::SequentialSettings;
-use palpate::mesh::{Instance, Mesh};
+use shares::{Share, cases};
 
-/// Standard error of a share of this many independent cases.
-fn standard_error(value: f64, cases: f64) -> f64 {
-    // A share of 0 or 1 is not known exactly.
-    let spread = value.clamp(1.0 / (cases + 2.0), 1.0 - 1.0 / (cases + 2.0));
-    (spread * (1.0 - spread) / cases).sqrt()
-}
-
-/// Two shares, each with its cases, are within three standard errors of their difference.
-fn agree(what: &str, stated: [f64; 2], measured: [f64; 2]) {
-    let [a, b] = [stated, measured].map(|[value, cases]| standard_error(value, cases));
-    assert!((stated[0] - measured[0]).abs() <= 3.0 * a.hypot(b), "{what}: {stated:?} stated, {measured:?} measured");
-}
-
-/// The cases that groups of `length` of `touches` touches make: as many as do not share any.
-fn cases(groups: usize, touches: usize, length: f64) -> f64 {
-    (groups as f64).min(touches as f64 / length)
-}
-
-/// Three objects of two meshes each.
-fn meshes() -> Vec<Object> {
-    let sides = [
-        ("one", [[1.0, 1.0, 1.0], [1.0, 0.6, 0.7]]),
-        ("three", [[1.0, 0.9, 0.1], [1.0, 0.5, 0.12]]),
-        ("two", [[1.0, 0.1, 0.1], [1.0, 0.35, 0.25]]),
-    ];
-    let object = |(name, sides): (&str, [[f32; 3]; 2])| {
-        let instance = |(number, sides): (usize, [f32; 3])| Instance {
-            name: format!("{name} {number}"),
-            mesh: Mesh::globe(10).stretched(sides),
-        };
-        Object::of_instances(name, sides.into_iter().enumerate().map(instance).collect()).unwrap()
-    };
-    sides.map(object).into()
-}
+#[path = "../../../../src/tests/meshes.rs"]
+mod meshes;
+#[path = "../../../../src/tests/shares.rs"]
+mod shares;
 
 #[test]
 fn what_a_run_states_is_what_its_model_does() {
@@ -63,11 +34,12 @@ fn what_a_run_states_is_what_its_model_does() {
     let sequences = SequentialSettings { error_rate: None, max_touches: None, sequences: 500, seed: 9 };
     let measured = margins.approaches(&[20], &sequences).unwrap();
     let stated = summary.ours.evaluation.approaches.unwrap();
-    let of_20 = [stated.accuracy[&20], cases(900, 900, 20.0)];
-    agree("run, accuracy", of_20, [measured.accuracy[&20], cases(1_500, 18_000, 20.0)]);
+    let of_20 = Share::of(measured.accuracy[&20], cases(1_500, 18_000, 20.0));
+    Share::of(stated.accuracy[&20], cases(900, 900, 20.0)).agrees("run, accuracy", of_20);
     let (own, other) = (&stated.sequential, &measured.sequential);
     let (own_cases, cases) = (cases(900, 900, own.mean().value), cases(1_500, 18_000, other.mean().value));
-    agree("run, wrong names", [own.error, own_cases], [other.error, cases]);
+    let wrong = Share::of(other.error, cases);
+    Share::of(own.error, own_cases).agrees("run, wrong names", wrong);
     let promised = summary.ours.calibration.ok_or(summary.ours.uncalibrated).unwrap();
-    assert!(other.error <= promised.promised + 3.0 * standard_error(other.error, cases), "{}", other.error);
+    assert!(wrong.0 <= promised.promised + 3.0 * wrong.1, "{wrong:?}");
 }
