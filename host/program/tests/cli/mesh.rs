@@ -1,7 +1,6 @@
 //! Meshes that something is wrong with, given to `capture` and `view` alike.
 
 use crate::{Folder, command, fails, globe, holds, palpate, says, stderr, stdout, succeeds};
-use palpate::mesh::builtin;
 use std::path::Path;
 
 /// A copy of an OBJ file with its lines changed.
@@ -30,18 +29,6 @@ fn a_capture_of_an_open_or_inside_out_mesh_says_so_in_one_line_for_each() {
 }
 
 #[test]
-fn a_capture_of_a_misspelled_object_lists_the_names_as_view_does() {
-    let at = &Folder::new();
-    for words in ["capture builtin mug -o out", "view mug -o out"] {
-        let error = stderr(palpate(at, words), 1);
-        assert!(error.contains("mug: cannot read the mesh: this is neither a file"), "{error}");
-        assert!(builtin::names().iter().all(|name| error.contains(name)), "{error}");
-        assert!(!error.contains("os error"), "{error}");
-    }
-    assert!(crate::listing(at).is_empty());
-}
-
-#[test]
 fn a_file_named_like_a_built_in_object_comes_first_in_capture_and_view_alike() {
     let at = &Folder::new();
     let mesh = globe(at, "globe", 6);
@@ -58,27 +45,6 @@ fn a_file_named_like_a_built_in_object_comes_first_in_capture_and_view_alike() {
     here("capture fork -o built-in --touches 5");
     let touches = |name: &str| std::fs::read(at.join(name).join("fork.txt")).unwrap();
     assert_ne!(touches("file"), touches("built-in"));
-}
-
-#[test]
-fn a_broken_mesh_is_refused_with_its_file_its_line_and_a_cure() {
-    let at = &Folder::new();
-    let cure = "Correct the line, or export the mesh again.";
-    let range = "cup.obj:4: vertex 4 of a face is out of range: the file has 3 vertices.";
-    for (text, expected, cure) in [
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", range, cure),
-        ("v 0 nan 0\n", "cup.obj:1: the coordinate y = \"nan\" is not finite", cure),
-        ("v 0 0 0\nv 1 zero 0\n", "cup.obj:2: \"zero\" is not a number.", cure),
-        ("v 0 0 0\n\nf 1 1 x\n", "cup.obj:3: \"x\" is not a vertex of a face.", cure),
-        ("v 0 0 0\n", "cup.obj: the mesh has no faces. Export the mesh as", ""),
-        ("v 1 1 1\nf 1 1 1\n", "cup.obj: the mesh has no extent", ""),
-    ] {
-        std::fs::write(at.join("cup.obj"), text).unwrap();
-        for command in ["capture", "view"] {
-            fails(at, &format!("{command} cup.obj -o out"), 1, &format!("{expected} … {cure}"));
-        }
-    }
-    assert!(!at.join("out").exists());
 }
 
 /// Runs `palpate capture` in a directory: what it prints to stderr.
@@ -143,21 +109,6 @@ fn objects_that_cannot_be_touched_are_named_with_their_sizes_before_anything_is_
     let said = captured(at, "one.obj flat.obj -o data --touches 5 --scene table --skip-bad", 0);
     assert!(said.contains("palpate: left out: flat (10 × 8.89 × 0 units): none of"), "{said}");
     assert_eq!(crate::listing(&at.join("data")), [".lock", "dataset.json", "one.txt"]);
-    assert!(
-        captured(at, "one.obj -o none --approaches 0", 2).starts_with("palpate: --approaches is 0. Use 1 or more.")
-    );
-}
-
-#[test]
-fn two_directories_with_a_file_of_one_name_lead_to_the_option_for_that() {
-    let at = &Folder::new();
-    for name in ["cup", "ball"] {
-        std::fs::create_dir_all(at.join("set").join(name)).unwrap();
-        globe(&at.join("set").join(name), "mesh", 4);
-    }
-    let expected = "two objects are called mesh … \n--instances takes each directory as one object";
-    fails(at, "capture set -o data --touches 5", 1, expected);
-    captured(at, "set -o data --touches 5 --instances", 0);
 }
 
 #[test]

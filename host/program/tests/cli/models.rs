@@ -105,14 +105,11 @@ fn what_cannot_be_trained_is_refused_and_an_older_ensemble_stays() {
 #[test]
 fn what_cannot_be_evaluated_is_refused() {
     let at = &BOWL_AND_FORK.folder();
-    let text = fs::read_to_string(at.join("ensemble.json")).unwrap();
-    fs::write(at.join("times.json"), text.replace("\"curvature\"", "\"times\"")).unwrap();
     fs::write(at.join("cut.palpate"), &fs::read(at.join("model.palpate")).unwrap()[..100]).unwrap();
     for (from, to) in [("bowl", "others/bowl"), ("fork", "others/spoon"), ("bowl", "few/bowl"), ("fork", "few/fork")] {
         cut(&at.join(format!("data/{from}.txt")), &at.join(format!("{to}.txt")), 30);
     }
     for (words, code, expected) in [
-        ("times.json data", 1, "times.json: it has 2 features, but its descriptor times has 3"),
         ("cut.palpate data", 1, "cut.palpate: byte 100:"),
         ("missing.palpate data", 1, "missing.palpate: cannot read"),
         ("data/bowl.txt data", 1, "bowl.txt"),
@@ -132,18 +129,6 @@ fn what_cannot_be_evaluated_is_refused() {
     let found = figures(at, "evaluate model.palpate few --sequences 50");
     let given: Vec<&String> = found["accuracy"].as_object().unwrap().keys().collect();
     assert_eq!(given, ["10", "20", "5"]);
-}
-
-#[test]
-fn the_probe_of_the_capture_stands_in_every_model_made_of_it() {
-    let at = &Folder::new();
-    fs::write(at.join("probe.toml"), "radius = 0.15\nspacing = 2\nspeed = 20\n").unwrap();
-    shapes(at);
-    succeeds(at, "capture meshes -o data --touches 60 --probe probe.toml");
-    succeeds(at, "train data -o ensemble.json --trees rounds=2");
-    succeeds(at, "export ensemble.json -o model.palpate");
-    let probe = &figures(at, "inspect model.palpate")["probe"];
-    assert_eq!((probe["spacing"].as_f64(), probe["speed"].as_f64()), (Some(2.0), Some(20.0)));
 }
 
 #[test]

@@ -101,6 +101,7 @@ fn run_and_view_take_the_probe_file() {
     assert_eq!(read(&at.join("out/data/dataset.json"))["settings"]["unit"], "mm");
     let saved = fs::read_to_string(at.join("out/ensemble.json")).unwrap();
     assert!(saved.contains(r#"\"unit\":\"mm\""#), "{}", &saved[..400]);
+    assert_eq!(figures(at, "inspect out/model.palpate")["probe"]["speed"], 2.0);
     succeeds(at, "view meshes/globe.obj -o globe.html --true-size mm --probe probe.toml");
     assert!(fs::read_to_string(at.join("globe.html")).unwrap().contains("globe"));
     let expected = "state different probes: unit \"unit\" and \"mm\"";
@@ -116,6 +117,8 @@ fn a_directory_of_meshes_is_one_object_with_instances() {
         fs::create_dir_all(&meshes).unwrap();
         rings.into_iter().zip(["a", "b", "c"]).for_each(|(rings, name)| _ = globe(&meshes, name, rings));
     }
+    let expected = "two objects are called a … \n--instances takes each directory as one object";
+    fails(at, "capture meshes -o data --touches 300", 1, expected);
     let capture = "capture meshes -o data --touches 300 --instances";
     assert_eq!(figures(at, capture)["objects"].as_array().unwrap().len(), 2);
     assert_eq!(read(&at.join("data/dataset.json"))["objects"][1]["instances"], json!(["a", "b", "c"]));

@@ -112,12 +112,6 @@ fn recorded_and_simulated_touches_are_never_mixed() {
         fails(at, &format!("capture bowl.obj --touches 20 -o recorded {more}"), 1, expected);
     }
     assert_eq!(Dataset::read_any(&at.join("recorded")).unwrap().len(), 3);
-    let again = "standard input: the same 3 touches of mug were recorded before, on 20";
-    refuses(LINES, "-o recorded", again);
-    fs::write(at.join("probe.toml"), "unit = \"mm\"\nradius = 2\nspacing = 20\nspeed = 80\n").unwrap();
-    let other = "cannot add to these recorded touches: unit is unit there and mm here … Record as these \
-                 touches were, or into another directory.";
-    refuses("0 0 0\n", "-o recorded --probe probe.toml", other);
 }
 
 /// A chip without a model whose fingers touch when this test says so.

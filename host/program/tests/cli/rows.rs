@@ -137,9 +137,8 @@ fn each_row_gets_a_verdict_of_its_own_or_adds_to_the_last() {
 #[test]
 fn columns_are_found_by_their_names_in_every_command_and_by_position_only_where_there_are_none() {
     let at = &three_classes("xgboost-2.1-softprob.ubj");
-    let write = |text: &str| fs::write(at.join("asked.csv"), text).unwrap();
     let margins = |text: &str| {
-        write(text);
+        fs::write(at.join("asked.csv"), text).unwrap();
         let said = palpate(at, "recognize model.palpate asked.csv --features --json");
         let note = String::from_utf8_lossy(&said.stderr).into_owned();
         (json(said)["margins"].clone(), note)
@@ -166,17 +165,6 @@ fn columns_are_found_by_their_names_in_every_command_and_by_position_only_where_
         let expected =
             "labeled.csv:1: no column is named height; its columns are width, Height, count, angle, kind, id";
         fails(at, words, 1, expected);
-    }
-    for (text, expected) in [
-        ("1,990,2,0.5\n2,980,1,0.25\n", "asked.csv:1: its columns are named 1, 990, 2, 0.5: numbers alone"),
-        ("0,1,2\n1,990,2\n", "asked.csv:1: it has 3 columns for 4 features"),
-        ("width,height,count,angle,width\n1,990,2,0.5,1\n", "two columns are named \"width\""),
-        ("width;height;count;angle\n1;990;2;0,5\n", "asked.csv:1: its cells are separated by \";\""),
-        ("width,height,count,angle\n1,990,2\n", "asked.csv:2: it has 3 cells, where the header has 4"),
-        ("width,height,count,angle\n1,990,2,0\n\n1,990,2,0\n", "asked.csv:3: the line is empty"),
-    ] {
-        write(text);
-        fails(at, "recognize model.palpate asked.csv --features", 1, expected);
     }
 }
 
@@ -265,7 +253,6 @@ fn labeled_rows_are_evaluated_one_by_one() {
     // The file's own classes have no such names.
     let expected = "labeled.csv: the label … none of the model's classes";
     fails(at, "evaluate source.ubj labeled.csv --label kind", 1, expected);
-    fails(at, "evaluate model.palpate labeled.csv --label color", 1, "no column \"color\"");
 }
 
 #[test]
@@ -604,7 +591,7 @@ fn a_promise_for_groups_says_when_none_are_given_and_copies_are_noted() {
 }
 
 #[test]
-fn what_is_wrong_with_sequences_of_rows_names_the_line_and_what_to_do() {
+fn what_cannot_be_promised_of_sequences_of_rows_is_refused_with_what_to_do() {
     let at = &three_classes("xgboost-3.4-softprob.ubj");
     succeeds(at, &format!("export {} -o value.palpate", data("xgboost-2.1-squarederror.ubj")));
     let good = &sequences(at, 240, 0);
@@ -612,10 +599,6 @@ fn what_is_wrong_with_sequences_of_rows_names_the_line_and_what_to_do() {
     let all = "model.palpate --sequence-column id";
     for (text, more, code, expected) in [
         (good.clone(), all, 1, few),
-        (good.replacen("0,cup", "0,jug", 1), all, 1, ":3: the sequence \"0\" has the labels"),
-        (good.replacen("0,cup", "0,bowl", 6), all, 1, ":2: the label \"bowl\""),
-        (good.clone() + good.lines().nth(1).unwrap(), all, 1, ":1442: the sequence \"0\" comes back"),
-        (good.clone(), &format!("{all} --group-column person"), 1, ":1: it has no column \"person\""),
         (good.clone(), "model.palpate", 2, "--sequence-column"),
         (good.clone(), "value.palpate --sequence-column id", 1, "predicts a value"),
     ] {

@@ -2,7 +2,7 @@
 //! command that takes recordings.
 
 use crate::fixtures::TABLE;
-use crate::{Folder, cut, fails, figures, listing, read, says, succeeds};
+use crate::{cut, fails, figures, listing, read, says, succeeds};
 
 #[test]
 fn recordings_on_a_table_are_taken_by_every_command_with_their_placements_or_without() {
@@ -55,15 +55,4 @@ fn a_probe_over_a_table_is_fitted_from_objects_that_stand_on_it() {
     assert!((speed - 1.0).abs() < 0.05, "{said}");
     // Densities of so few are too coarse to find touches of other objects.
     assert!(said.contains("fewer than 12,000 approaches to each object were simulated: brick/"), "{said}");
-}
-
-#[test]
-fn names_of_placements_that_cannot_be_are_refused_by_name() {
-    let at = &Folder::new();
-    std::fs::write(at.join("lines.txt"), "0 0.1 -\n0 0.2 0.3\n").unwrap();
-    for object in ["bowl/", "/+z", "bowl/+z/2", "bowl/..", "a\\b/+z"] {
-        let record = format!("data record lines.txt -o out --object {object}");
-        fails(at, &record, 1, "no file can be named after … OBJECT/PLACEMENT");
-    }
-    assert!(!at.join("out/dataset.json").exists());
 }

@@ -1,7 +1,7 @@
 //! Objects that are learned from recorded touches: `palpate train --teach`.
 
 use crate::fixtures::TAUGHT;
-use crate::{Folder, complains, fails, figures, holds, palpate, shapes, succeeds};
+use crate::{complains, fails, figures, holds, palpate, succeeds};
 use std::fs;
 use std::path::Path;
 
@@ -92,28 +92,4 @@ fn what_does_not_go_together_is_named_and_nothing_is_written() {
     }
     assert!(!at.join("t.json").exists(), "something was written");
     succeeds(at, "train data --teach full.txt -o full.json --trees rounds=2 --evidence full");
-}
-
-#[test]
-fn a_recording_with_another_probe_or_without_poses_is_refused() {
-    let at = &Folder::new();
-    fs::create_dir(at.join("data")).unwrap();
-    for (name, most) in [("data/bowl", 100_000), ("data/fork", 200_000), ("pot", 500_000)] {
-        crate::touches(&at.join(format!("{name}.txt")), [most, 300, 1], true, " 0 0 1 1 0 0");
-    }
-    touches(&at.join("plain/cup.txt"), 500_000, 100, 5);
-    let oriented = "train data -o posed.json --descriptor oriented --trees rounds=2 --teach";
-    fails(at, &format!("{oriented} plain"), 1, "touches of cup have no pose");
-    succeeds(at, &format!("{oriented} pot.txt"));
-    // Poses that the model does not need are no obstacle.
-    succeeds(at, "train data --teach pot.txt -o blind.json --trees rounds=2");
-    shapes(at);
-    for (directory, spacing, objects) in
-        [("narrow", "1.5", "meshes/ball.obj meshes/cigar.obj"), ("wide", "2", "meshes/disc.obj")]
-    {
-        let probe = format!("radius = 0.15\nspacing = {spacing}\nspeed = 10.0\n");
-        fs::write(at.join("probe.toml"), probe).unwrap();
-        succeeds(at, &format!("capture {objects} -o {directory} --approaches 300 --probe probe.toml"));
-    }
-    fails(at, "train narrow --teach wide -o t.json --trees rounds=2", 1, "spacing");
 }

@@ -19,14 +19,6 @@ fn a_page_shows_a_mesh_of_ones_own_with_the_touches_that_were_asked_for() {
 }
 
 #[test]
-fn a_built_in_object_is_shown_by_its_name() {
-    let at = &Folder::new();
-    succeeds(at, "view bowl -o bowl.html");
-    let text = std::fs::read_to_string(at.join("bowl.html")).unwrap();
-    assert!(text.contains("<title>bowl") && text.contains("<dt>Right side out</dt><dd class=\"\">yes</dd>"));
-}
-
-#[test]
 fn a_page_that_watches_a_chip_needs_no_object_and_takes_one_model() {
     let at = &Folder::new();
     let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
