@@ -95,32 +95,6 @@ fn tables_by_contact_pattern_give_the_margins_worked_out_by_hand() {
     }
 }
 
-#[test]
-fn a_golden_model_gives_the_margins_worked_out_by_hand() {
-    let touches = [
-        // κ = 80000, slope = 20000: right, right; right.
-        (Touch::from_micros([30_000, 0, 50_000]), [0.5 - 0.5 - 0.125, -0.5 + 0.0 + 0.0625]),
-        // κ = 100, slope = 100: left; left.
-        (Touch::from_micros([0, 0, 100]), [0.5 + 1.0 + 0.125, -0.5 - 1.0]),
-        // κ missing, slope missing: left; left.
-        (Touch::new([ContactTime::FIRST, ContactTime::MISSING, ContactTime::MISSING]), [1.625, -1.5]),
-    ];
-    let plain = SECTIONS.map(|(leaf, layout, _)| compiled(&ensemble(), leaf, layout, false));
-    let shared = [Layout::Compact, Layout::Complete, Layout::Wide]
-        .map(|layout| compiled(&ensemble(), Settings::default().leaf, layout, true));
-    for bytes in plain.iter().chain(&shared).chain([&palpate_tests::unaligned::model()]) {
-        let model = Model::new(bytes).unwrap();
-        for (touch, expected) in touches {
-            let mut margins = [0; 2];
-            model.margins(&touch, &mut margins);
-            for (margin, expected) in margins.into_iter().zip(expected) {
-                let margin = f64::from(margin) * f64::from(model.unit());
-                assert!((margin - expected).abs() <= f64::from(model.margin_error()), "{margin} for {expected}");
-            }
-        }
-    }
-}
-
 const HEADER: [&str; 6] = [
     "50 4c 50 54 01 00 01 00 bc 00 00 00 01 00 01 01",
     "02 00 02 00 02 00 00 00 03 00 00 00 05 00 00 00",

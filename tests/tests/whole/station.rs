@@ -83,15 +83,6 @@ fn touches_that_the_model_was_not_trained_for_are_refused_counted_and_reported_o
 }
 
 #[test]
-fn verdicts_posteriors_and_evidence_are_those_of_a_recognizer() {
-    let touches = touches(300);
-    let bytes = model(1);
-    let mut desk = Desk::new(touches.iter().map(push), 0);
-    Chip::new(bytes.clone()).run(&mut desk).unwrap();
-    assert_eq!(desk.outcomes, expected(&bytes, &touches));
-}
-
-#[test]
 fn without_a_model_touches_are_refused_and_nothing_else_happens() {
     let mut desk = Desk::new([push(&touches(1)[0]), Step::Do(Command::Reset), Step::Ask(Query::Model)], 0);
     Chip::new(Vec::new()).run(&mut desk).unwrap();

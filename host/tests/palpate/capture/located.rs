@@ -95,32 +95,6 @@ fn a_square_about_the_middle_may_be_aimed_at_instead_of_the_box() {
 }
 
 #[test]
-fn contacts_later_than_the_stroke_are_missing_and_a_short_travel_meets_nothing() {
-    let origin = origin(1_000);
-    let short = Origin { probe: with!(probe(), stroke = Some(12.0)), ..origin.clone() };
-    let (whole, short) = (captured(origin.clone()), captured(short));
-    let mut cut = 0;
-    for (whole, short) in whole.touches().zip(short.touches()) {
-        assert_eq!((whole.position(), whole.pose()), (short.position(), short.pose()));
-        for (whole, short) in whole.times().into_iter().zip(short.times()) {
-            let is_late = whole.micros().unwrap() > 120_000;
-            assert_eq!(short.micros(), whole.micros().filter(|_| !is_late));
-            cut += usize::from(is_late);
-        }
-    }
-    assert!(cut > 100, "{cut}");
-    // The start is half of the longest side above the top: a travel of 10 mm ends 20 mm above it.
-    let high = captured(Origin { probe: with!(probe(), travel = Some(10.0)), ..origin.clone() });
-    let (object, sides) = (&high.objects[0], sides(&origin));
-    for (index, touch) in object.touches().iter().enumerate() {
-        let side = sides[object.source_of(index)];
-        let end = side.z + side.max_element() / 2.0 - 10.0;
-        assert!(touch.is_empty());
-        assert_eq!(f64::from(touch.position().unwrap().micrometers[2]), (1e3 * end).round());
-    }
-}
-
-#[test]
 fn noise_and_lost_contacts_are_added_and_the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let real = with!(Noise::gaussian(5_000.0), position = 1_000.0, missed = [0.05; 3]);
     for format in Format::ALL {
