@@ -67,7 +67,6 @@
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`evaluate`] | accuracy, touches to a verdict, comparison of two models | [`evaluate::evaluate`](fn@evaluate::evaluate) |
 //! | [`calibrate`] | thresholds that keep a promised error rate | [`calibrate::calibrate`](fn@calibrate::calibrate) |
-//! | `compare` | recorded with simulated touches, and what their difference costs | `compare::compare` |
 //! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
 //! | `teach` | objects that are learned from recorded touches | `teach::teach` |
 //! | [`stream`] | verdicts of streams of rows, as early as a promised error rate allows | [`stream::calibrate`](fn@stream::calibrate) |
@@ -84,7 +83,7 @@
 //! | feature | default | what it adds |
 //! |---|---|---|
 //! | none | | simulator, compiler, evaluator |
-//! | `train` | yes | `ensemble::train`, `fit`, `compare`, `strangers` and `teach` |
+//! | `train` | yes | `ensemble::train`, `fit`, `strangers` and `teach` |
 //! | `objects` | yes | `mesh::builtin`: ten objects made from implicit functions. 21 crates more, through fidget |
 //! | `parquet` | yes | touches as Parquet. 11 crates more |
 //! | `mcap` | yes | touches and verdicts in robots' logs (MCAP). 21 crates more |
@@ -109,9 +108,6 @@ pub mod evaluate;
 mod evidence;
 
 pub mod calibrate;
-#[cfg(feature = "train")]
-pub mod compare;
-
 #[cfg(feature = "train")]
 pub mod teach;
 

@@ -124,12 +124,6 @@ pub enum EvaluateProblem {
         /// Smallest number allowed.
         needed: usize,
     },
-    /// Recorded and simulated touches cannot be compared.
-    #[error("the touches cannot be compared: {detail}")]
-    Incomparable {
-        /// The reason.
-        detail: String,
-    },
     /// A line is not a touch.
     #[error("{detail}")]
     Touch {
@@ -206,7 +200,6 @@ impl Problem for EvaluateProblem {
                     needed.div_ceil((*found).max(1)).max(2)
                 );
             }
-            Self::Incomparable { .. } => "Give recorded and simulated touches of the same objects, and simulate every approach (--approaches N).",
             Self::Touch { .. } => "Correct the line.",
             Self::TimeTooLong { .. } => "Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms.",
         }

@@ -108,7 +108,7 @@ pub fn delivered(model: &Model<'_>, touch: &Touch) -> Touch {
 }
 
 /// The objects that a model with these outputs knows, in the order of the outputs.
-pub(crate) fn objects_of(outputs: &[String], has_placements: bool) -> Vec<String> {
+fn objects_of(outputs: &[String], has_placements: bool) -> Vec<String> {
     let mut names: Vec<String> = match has_placements {
         true => outputs.iter().map(|output| object_of(output).to_owned()).collect(),
         false => outputs.to_vec(),
@@ -339,12 +339,6 @@ impl<'m> Margins<'m> {
             .as_ref()
             .is_some_and(|numbers| output < self.known && touched < self.known && numbers[output] == numbers[touched]);
         if is_same { touched } else { output }
-    }
-
-    /// True if outputs are placements of objects.
-    #[cfg(feature = "train")]
-    pub(crate) fn has_placements(&self) -> bool {
-        self.numbers.is_some()
     }
 
     /// The number of each output's object, where several belong to one.

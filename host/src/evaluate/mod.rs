@@ -63,7 +63,7 @@ pub(crate) use margins::OfTouches;
 pub(crate) use margins::best;
 pub use margins::{Margins, delivered};
 #[cfg(feature = "train")]
-pub(crate) use margins::{leading, objects_of};
+pub(crate) use margins::leading;
 pub use measure::{Evaluated, Wanted, measure, own_weights};
 #[cfg(feature = "train")]
 pub(crate) use noisy::ROBOTS;

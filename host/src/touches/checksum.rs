@@ -8,7 +8,7 @@ use std::path::Path;
 pub(super) static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
 /// The checksum of a file, as listings state it.
-pub fn checksum(path: &Path) -> Result<u32> {
+pub(crate) fn checksum(path: &Path) -> Result<u32> {
     let io = |error| Error::io(path, "read the touches", error);
     let mut file = Checked::new(std::fs::File::open(path).map_err(io)?);
     std::io::copy(&mut file, &mut std::io::sink()).map_err(io)?;

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// The objects' names and files in a directory, sorted by name, regardless of any listing.
-pub fn files(directory: &Path) -> Result<Vec<(String, PathBuf, Format)>> {
+pub(crate) fn files(directory: &Path) -> Result<Vec<(String, PathBuf, Format)>> {
     let io = |source| Error::io(directory, "read the data set", source);
     let mut files = Vec::new();
     for entry in std::fs::read_dir(directory).map_err(io)? {

@@ -62,10 +62,10 @@ mod warning;
 
 pub(crate) use captured::short;
 pub use captured::{Captured, Meshes};
-pub use checksum::checksum;
+pub(crate) use checksum::checksum;
 pub use dataset::Dataset;
 pub(crate) use dataset::logs;
-pub use files::files;
+pub(crate) use files::files;
 pub use format::Format;
 pub use listing::{Entry, Listing, Lying};
 pub use log::{Log, LogWriter, Logged, begins_log, is_log, read_touches};

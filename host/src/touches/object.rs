@@ -464,7 +464,7 @@ impl ObjectTouches {
 
     /// The touches that `keep` says.
     #[must_use]
-    #[cfg(any(feature = "train", test))]
+    #[cfg(test)]
     pub(crate) fn filtered(&self, keep: impl Fn(&Touch) -> bool) -> Self {
         self.select((0..self.len()).filter(|&touch| keep(&self.touches[touch])))
     }

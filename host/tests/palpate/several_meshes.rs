@@ -8,7 +8,6 @@ use crate::fixtures::*;
 use crate::shares::{Share, cases};
 use crate::synthetic;
 use palpate::calibrate::{self};
-use palpate::compare;
 use palpate::compile::{self, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::error::Result;
@@ -216,23 +215,6 @@ fn figures_of_a_part_of_the_touches_are_those_of_fresh_ones() {
     let [stated, ..] = measured(candidate, &noisy);
     let [measured, ..] = measured(candidate, &other);
     Share(stated.0, 0.04).agrees("with noise, accuracy", Share(measured.0, 0.02));
-}
-
-#[test]
-fn what_a_comparison_states_is_what_its_model_does() {
-    let (recorded, simulated) = (touches(2_000, 7), touches(6_000, 8));
-    let settings = with!(compare::Settings::default(), groups = 500);
-    let compared = compare::compare(&recorded, &simulated, &settings, &()).unwrap();
-    assert!(compared.told_apart.low < 0.51, "{:?}", compared.told_apart);
-    let split = folds::split(&simulated, 0.25, settings.seed).unwrap();
-    let ensemble = train(&split.train, &train::Settings::compact(), &()).unwrap();
-    let margins = Margins::new(Candidate::Full(&ensemble), &FRESH).unwrap();
-    let sequences = SequentialSettings { error_rate: None, max_touches: None, sequences: 1_000, seed: 9 };
-    let fresh = margins.approaches(&[20], &sequences).unwrap();
-    let cost = compared.cost.unwrap();
-    let measured = Share::of(fresh.accuracy[&20], 3_000.0);
-    Share::of(cost.simulated[&20].value, cases(1_500, 4_500, 20.0)).agrees("simulated", measured);
-    Share::of(cost.recorded[&20].value, cases(1_500, 6_000, 20.0)).agrees("recorded", measured);
 }
 
 /// An object's figures in a group of `approaches` approaches, and on fresh touches.

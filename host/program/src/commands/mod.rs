@@ -95,7 +95,7 @@ commands! {
     Link => link,
     /// Show an object or a chip on a page, or touch objects there
     View => view,
-    /// Check, compare and record data sets of touches; write built-in objects
+    /// Check and record data sets of touches; write built-in objects
     Data => data,
     /// Measure how your probe differs from the ideal
     Probe => fit,

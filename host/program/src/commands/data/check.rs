@@ -1,52 +1,28 @@
-//! `palpate data check` of one data set.
+//! `palpate data check`.
 
 use crate::commands::Global;
-use crate::commands::numbers::sequences;
-use crate::commands::train::descriptor;
 use palpate::Result;
-use palpate::compare::Settings;
 use palpate::error::{Error, Place, TouchesProblem};
 use palpate::touches::Origin;
 use palpate::touches::check::{Check, ObjectSummary, Quantiles, Summary};
-use palpate::with;
-use palpate_shared::Descriptor;
 use palpate_shared::format::Length;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-For one data set, the command names every line that it cannot read, and data that can be read but would train badly: a file appended to itself, one object under two names, times that are not in seconds, an incomplete capture. The exit code is 1 if training would go wrong; anything that may be intended is only a note.
-
-For two data sets, the verdict states what their difference costs a model trained on the simulated touches: the accuracy that it loses on recorded ones, the names that it confuses there, whether a promise made on simulated touches is kept. Below the verdict are the accuracy of a classifier that distinguishes recorded from simulated touches (50 % is guessing) and the difference of each feature.
+The command names every line that it cannot read, and data that can be read but would train badly: a file appended to itself, one object under two names, times that are not in seconds, an incomplete capture. The exit code is 1 if training would go wrong; anything that may be intended is only a note.
 
 Examples:
   palpate data check recorded
-  palpate data check monday.mcap --json
-  palpate capture meshes/ -o simulated --approaches 20000 --probe probe.toml
-  palpate data check recorded simulated
-  palpate data check recorded simulated --descriptor oriented")]
+  palpate data check monday.mcap --json")]
 pub(super) struct Arguments {
     /// A directory with a file of touches for each object, or a robot's log (MCAP)
     #[arg(value_name = "DIR")]
     directory: PathBuf,
-    /// Simulated touches of the same objects, to compare the recorded ones in DIR with
-    #[arg(value_name = "SIMULATED")]
-    simulated: Option<PathBuf>,
-    /// Features of a touch: times, curvature, gravity or oriented; where two data sets are compared
-    #[arg(long, value_parser = descriptor, value_name = "NAME", default_value = "curvature", requires = "simulated")]
-    descriptor: Descriptor,
-    /// Sequences of touches to draw; of each object, where two data sets are compared
-    #[arg(long, value_name = "N", value_parser = sequences, default_value_t = Settings::default().groups, requires = "simulated")]
-    sequences: usize,
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
-    if let Some(simulated) = &arguments.simulated {
-        let (descriptor, groups) = (arguments.descriptor, arguments.sequences);
-        let settings = with!(Settings::default(), descriptor, groups, seed = global.seed());
-        return super::compare::run(&arguments.directory, simulated, &settings, global);
-    }
     let check = Check::of(&arguments.directory)?;
     global.print(&check, || text(&check))?;
     match check.wrong() {

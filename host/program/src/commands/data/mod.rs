@@ -2,7 +2,6 @@
 
 mod cast;
 mod check;
-mod compare;
 mod objects;
 mod record;
 
@@ -18,7 +17,7 @@ pub(crate) struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum Command {
-    /// Check a data set, or compare it with simulated touches
+    /// Check a data set
     Check(check::Arguments),
     /// Record touches of a real probe: from lines, a log, or a chip
     Record(Box<record::Arguments>),
