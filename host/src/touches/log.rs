@@ -1,13 +1,12 @@
 //! Touches out of a robot's log, which is an MCAP file: `docs/reference/mcap.md` says what belongs in it.
 
-use super::logged::{Channels, Content, LoggedVerdict, Message};
+use super::logged::{Channels, Message};
 use super::{ObjectTouches, Source, Warning, mcap, text};
 use crate::error::{Error, Place, Result, TouchesProblem};
-use crate::output;
 use palpate_shared::Touch;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
-use std::io::{BufWriter, Read, Seek, SeekFrom};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The first byte of an MCAP file. No text in UTF-8 begins with it.
@@ -83,8 +82,7 @@ impl Log {
     pub fn of(bytes: impl Read, path: &Path) -> Result<Self> {
         let (mut touches, mut objects, mut numbers, mut size) = (Vec::new(), Vec::new(), HashMap::new(), 0);
         let mut alike = text::Alike::default();
-        let channels = mcap::read(bytes, path, |Message { time, offset, content }| {
-            let Content::Touch(touch, object) = content else { return Ok(()) };
+        let channels = mcap::read(bytes, path, |Message { time, offset, touch, object }| {
             let wrong = |problem| Err(Error::at(Place::byte(path, offset), problem));
             if let Err(problem) = alike.admit(touch) {
                 return wrong(problem);
@@ -186,56 +184,4 @@ impl Log {
             _ => Ok(()),
         }
     }
-}
-
-/// A log that is being written: touches and verdicts, as JSON, in chunks with an index, uncompressed.
-///
-/// Equal touches and verdicts give equal bytes. They are kept in a temporary file until
-/// [`finish`](Self::finish).
-pub struct LogWriter {
-    writer: mcap::Writer<BufWriter<File>>,
-}
-
-impl LogWriter {
-    /// Begins a log with verdicts about these objects.
-    ///
-    /// # Errors
-    /// When there is no place for temporary files, or this build has no MCAP.
-    pub fn new(objects: &[String]) -> Result<Self> {
-        let file = tempfile::tempfile().map_err(temporary)?;
-        Ok(Self { writer: mcap::Writer::new(BufWriter::new(file), objects)? })
-    }
-
-    /// Adds a touch, with the time of the log that it is from, where it is from one; others are a second apart. The time
-    /// is moved on where it is not after that of the message before.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub fn touch(&mut self, touch: &Touch, object: Option<&str>, time: Option<u64>) -> Result<()> {
-        self.writer.touch(touch, object, time)
-    }
-
-    /// Adds the verdict about the touches so far, a microsecond after the last touch.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub fn verdict(&mut self, verdict: &LoggedVerdict) -> Result<()> {
-        self.writer.verdict(verdict)
-    }
-
-    /// Writes the log to `path`, whole or not at all.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub fn finish(self, path: &Path) -> Result<()> {
-        let file = self.writer.finish()?.into_inner().map_err(|error| temporary(error.into_error()));
-        let mut file = file?;
-        file.seek(SeekFrom::Start(0)).map_err(temporary)?;
-        output::write_whole(path, |out| std::io::copy(&mut file, out).map(drop))
-    }
-}
-
-/// An error about a file without a name.
-fn temporary(error: std::io::Error) -> Error {
-    Error::io(std::env::temp_dir(), "write a temporary file", error)
 }

@@ -68,8 +68,8 @@ pub(crate) use dataset::logs;
 pub(crate) use files::files;
 pub use format::Format;
 pub use listing::{Entry, Listing, Lying};
-pub use log::{Log, LogWriter, Logged, begins_log, is_log, read_touches};
-pub use logged::{Channels, Content, LoggedVerdict, Message};
+pub use log::{Log, Logged, begins_log, is_log, read_touches};
+pub use logged::{Channels, Message};
 pub use object::{ObjectTouches, Pool, Source};
 pub use origin::Origin;
 #[cfg(feature = "parquet")]

@@ -1,4 +1,4 @@
-//! Robots' logs: reading, rejected logs with their errors, and writing.
+//! Robots' logs: reading, and rejected logs with their errors.
 
 #[path = "../mcap/files.rs"]
 mod files;
@@ -8,11 +8,8 @@ use palpate::chip::{Step, Steps};
 use palpate::error::{Error, Place, Problem, TouchesProblem};
 use palpate::shared::Touch;
 use palpate::touches::check::Check;
-use palpate::touches::mcap::{self, TOUCH, VERDICT, Writer};
-use palpate::touches::{
-    Content, Dataset, Log, LoggedVerdict, Message, is_log, parse_touch, read_touches, touch_of_seconds,
-};
-use std::io::Cursor;
+use palpate::touches::mcap::TOUCH;
+use palpate::touches::{Dataset, Log, is_log, parse_touch, read_touches, touch_of_seconds};
 use std::path::Path;
 
 fn read(bytes: &[u8]) -> Result<Log, Error> {
@@ -61,9 +58,12 @@ fn logs_of_the_usual_library_are_read_however_they_are_compressed() {
             _ => ("/probe/touch", "palpate.Touch"),
         };
         assert_eq!(channels.touches, [format!("{topic} ({schema})")]);
-        assert_eq!(channels.others.len(), 1);
         let said = log.skipped().unwrap().to_string();
-        assert!(said.ends_with(&format!("{name}: skipped 1 other channel: {}", channels.others[0])), "{said}");
+        let skipped = match name {
+            "ros2.mcap" => "2 other channels: /joints (std_msgs/msg/String), /verdict (palpate_msgs/msg/Verdict)",
+            _ => "1 other channel: /joints (robot.Joints)",
+        };
+        assert!(said.ends_with(&format!("{name}: skipped {skipped}")), "{said}");
     }
 }
 
@@ -77,30 +77,6 @@ fn touches_come_in_the_order_of_their_log_times_from_any_clock() {
     let objects = log.by_object("plain").unwrap();
     assert_eq!((objects.len(), objects[0].name.as_str(), objects[0].touches().len()), (1, "plain", 40));
     assert_eq!(read_touches(&path).unwrap(), found);
-}
-
-#[test]
-fn verdicts_of_a_robot_are_read_too() {
-    let mut verdicts = Vec::new();
-    let bytes = std::fs::read(python("ros2.mcap")).unwrap();
-    mcap::read(bytes.as_slice(), Path::new("ros2.mcap"), |message| {
-        if let Message { content: Content::Verdict(verdict), .. } = message {
-            verdicts.push(verdict);
-        }
-        Ok(())
-    })
-    .unwrap();
-    let verdict = |touch, object: &str, refused: Option<&str>, posteriors: [f64; 2]| LoggedVerdict {
-        touch,
-        verdict: "undecided".into(),
-        object: object.into(),
-        posterior: 0.75,
-        refused: refused.map(String::from),
-        posteriors: ["bowl", "mug"].map(String::from).into_iter().zip(posteriors).collect(),
-    };
-    assert_eq!(verdicts.len(), 40);
-    assert_eq!(verdicts[0], verdict(1, "bowl", Some("too soon"), [0.75, 0.25]));
-    assert_eq!(verdicts[39], verdict(40, "mug", None, [0.25, 0.75]));
 }
 
 /// A CDR message from hexadecimal digits.
@@ -180,7 +156,6 @@ fn a_definition_counts_without_its_comments_and_another_one_is_refused() {
     let said = error(&log(&TOUCH.replace("float64[3] times", "float32[3] times")));
     assert!(said.contains("/touch (palpate_msgs/msg/Touch) is defined as \"float32[3] times; bool"), "{said}");
     assert!(said.contains("where Palpate has \"float64[3] times; bool has_pose;"), "{said}");
-    assert!(VERDICT.contains("float64[] posteriors"));
 }
 
 #[test]
@@ -257,28 +232,6 @@ fn a_message_that_is_no_touch_is_named_with_file_byte_number_topic_and_what_is_w
 /// First bytes of the record of a message with this text.
 fn record_head(text: &str) -> Vec<u8> {
     record(files::MESSAGE, &vec![0; 22 + text.len()])[..9].to_vec()
-}
-
-#[test]
-fn a_verdict_that_is_none_is_refused_as_a_touch_is() {
-    let log = |text: &str| {
-        file(&[
-            schema(1, "palpate.Touch", "jsonschema", ""),
-            schema(2, "palpate.Verdict", "jsonschema", ""),
-            channel(1, 1, "/touch", "json"),
-            channel(2, 2, "/verdict", "json"),
-            message(1, 1, br#"{"times": [0, 0, 0]}"#),
-            message(2, 2, text.as_bytes()),
-        ])
-    };
-    let good = r#"{"touch": 1, "verdict": "undecided", "object": "bowl", "posterior": 0.5}"#;
-    assert_eq!(read(&log(good)).unwrap().channels().verdicts, ["/verdict (palpate.Verdict)"]);
-    let said = error(&log(&good.replace("undecided", "certain")));
-    assert!(
-        said.contains("message 1 on /verdict: no verdict: \"certain\", where undecided, recognized, unknown, gave-up")
-    );
-    assert!(error(&log(&good.replace("0.5", "1.5"))).contains("no verdict: a posterior of 1.5"));
-    assert!(error(&log("[]")).contains("no verdict in JSON: "));
 }
 
 #[test]
@@ -427,81 +380,6 @@ fn a_directory_holds_logs_beside_text_and_the_content_says_which_is_which() {
     assert!(said.contains("monday.mcap: not a usable MCAP file: it does not begin or end as one"), "{said}");
     let finding = Check::of(&path("fork.mcap")).unwrap();
     assert!(finding.wrong() == 0 && finding.findings.iter().any(|finding| finding.what.contains("has been recorded")));
-}
-
-fn verdict(touch: u32) -> LoggedVerdict {
-    LoggedVerdict {
-        touch,
-        verdict: if touch < 9 { "undecided" } else { "recognized" }.into(),
-        object: "mug".into(),
-        posterior: 0.5 + f64::from(touch) / 40.0,
-        refused: (touch == 3).then(|| "no".into()),
-        posteriors: vec![("mug".into(), 0.75), ("big bowl".into(), 0.25)],
-    }
-}
-
-/// A log with ten touches and their verdicts.
-fn written() -> Vec<u8> {
-    let objects = ["mug", "big bowl"].map(String::from);
-    let mut writer = Writer::new(Cursor::new(Vec::new()), &objects).unwrap();
-    for (i, (touch, name)) in expected(true).into_iter().take(10).enumerate() {
-        // Half of them with times, two of which are the same, and one of which is before the others.
-        let time = [None, Some(1_767_225_600_000_000_000), Some(1_767_225_600_000_000_000), Some(7)]
-            .get(i % 5)
-            .copied()
-            .flatten();
-        writer.touch(&touch, (i % 2 == 0).then_some(name), time).unwrap();
-        writer.verdict(&verdict(i as u32)).unwrap();
-    }
-    writer.finish().unwrap().into_inner()
-}
-
-#[test]
-fn what_is_written_is_read_back_and_the_same_to_the_byte_each_time() {
-    let bytes = written();
-    assert_eq!(bytes, written());
-    let (mut said, mut times) = (Vec::new(), Vec::new());
-    let channels = mcap::read(bytes.as_slice(), Path::new("robot.mcap"), |message| {
-        times.push(message.time);
-        said.push(message.content);
-        Ok(())
-    });
-    assert!(times.is_sorted_by(|a, b| a < b), "{times:?}");
-    assert_eq!((times[0], times[1]), (1_000_000_000, 1_000_001_000));
-    assert_eq!(channels.unwrap().others.len(), 0);
-    let expected: Vec<Content> = expected(true)
-        .into_iter()
-        .take(10)
-        .zip(0..)
-        .flat_map(|((touch, name), i)| {
-            let mut verdict = verdict(i);
-            verdict.posteriors.sort_by(|a, b| a.0.cmp(&b.0));
-            [Content::Touch(touch, (i % 2 == 0).then(|| name.into())), Content::Verdict(verdict)]
-        })
-        .collect();
-    assert_eq!(said, expected);
-}
-
-#[test]
-fn what_is_written_satisfies_the_reader_of_the_mcap_crate_with_its_index() {
-    let bytes = written();
-    let messages = ::mcap::MessageStream::new(&bytes).unwrap().collect::<Result<Vec<_>, _>>().unwrap();
-    assert_eq!(messages.len(), 20);
-    let first = &messages[0];
-    let schema = first.channel.schema.as_ref().unwrap();
-    assert_eq!((first.channel.topic.as_str(), schema.name.as_str()), ("/touch", "palpate.Touch"));
-    assert_eq!((first.channel.message_encoding.as_str(), schema.encoding.as_str()), ("json", "jsonschema"));
-    let text: serde_json::Value = serde_json::from_slice(&messages[1].data).unwrap();
-    assert_eq!(text["posteriors"]["big bowl"], 0.25);
-    let schema: serde_json::Value = serde_json::from_slice(&messages[1].channel.schema.as_ref().unwrap().data).unwrap();
-    assert_eq!(schema["properties"]["posteriors"]["properties"]["big bowl"]["type"], "number");
-    let summary = ::mcap::Summary::read(&bytes).unwrap().unwrap();
-    let statistics = summary.stats.as_ref().unwrap();
-    assert_eq!((statistics.message_count, statistics.channel_count), (20, 2));
-    assert_eq!(statistics.message_start_time, 1_000_000_000);
-    let [index] = summary.chunk_indexes.as_slice() else { panic!("{}", summary.chunk_indexes.len()) };
-    assert!(index.compression.is_empty());
-    assert_eq!(summary.stream_chunk(&bytes, index).unwrap().count(), 20);
 }
 
 #[test]

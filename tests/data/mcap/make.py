@@ -9,8 +9,8 @@ json.mcap       JSON, chunks uncompressed, unit vectors of the pose with every t
 json-lz4.mcap   the same in chunks compressed by LZ4
 json-zstd.mcap  and by Zstandard
 plain.mcap      JSON without chunks, no object named, in the wrong order of log times, no pose
-ros2.mcap       CDR by host/msg, as rosbag2 stores it, in chunks compressed by Zstandard, and verdicts; the one that is here
-                was made by a definition of the touch without a position
+ros2.mcap       CDR by host/msg, as rosbag2 stores it, in chunks compressed by Zstandard, beside verdicts, which are skipped; the
+                one that is here was made by a definition of the touch without a position
 """
 
 import json

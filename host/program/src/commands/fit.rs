@@ -134,7 +134,7 @@ fn fit_bare(arguments: &FitArguments, global: &Global) -> Result<()> {
     let probe = file.ok_or_else(|| Error::setting("probe", "not in millimeters", IN_MILLIMETERS))?.probe;
     let mut presses = Vec::new();
     each_of(path, &mut |event| {
-        if let Event::Touch { touch, place, .. } = event {
+        if let Event::Touch { touch, place } = event {
             presses.push((place, *touch));
         }
         Ok(())

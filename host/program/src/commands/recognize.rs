@@ -9,13 +9,11 @@ use palpate::chip::Entry;
 use palpate::compile::{self, CompiledModel};
 use palpate::error::{Error, EvaluateProblem, Place};
 use palpate::locate::MapsFile;
-use palpate::output;
-use palpate::touches::{LogWriter, LoggedVerdict};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::format::Counted;
 use palpate_shared::link::ApproachMessage;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Recognize objects from a stream of touches.
 #[derive(clap::Args)]
@@ -33,7 +31,7 @@ Examples:
   probe | palpate recognize planned.palpate --active
   robot | palpate recognize maps.palpate --next
   robot | palpate recognize hand.toml --explore=2mm/50%
-  palpate recognize model.palpate monday.mcap --mcap verdicts.mcap
+  palpate recognize model.palpate monday.mcap
   palpate recognize model.palpate rows.csv --features --json
   palpate recognize a.palpate a.csv --features --add-up --sequence-column id")]
 pub(crate) struct Arguments {
@@ -58,11 +56,11 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N")]
     max_touches: Option<u32>,
     /// With a model of maps: print each touch's verdict, place and next approach as JSON
-    #[arg(long, conflicts_with_all = ["features", "active", "mcap"])]
+    #[arg(long, conflicts_with_all = ["features", "active"])]
     next: bool,
     /// Map an object that stands still: prints as JSON where to touch next, until the heights of this share of its cells are known to this many millimeters
     #[arg(long, value_name = "MM/SHARE", num_args = 0..=1, require_equals = true, default_missing_value = "2mm/50%")]
-    #[arg(conflicts_with_all = ["next", "features", "active", "mcap"])]
+    #[arg(conflicts_with_all = ["next", "features", "active"])]
     explore: Option<super::shape::Known>,
     /// Proposed approaches send the middle finger at most so far from the table's origin in x and y [default: twice the maps' range; 60 with --explore]
     #[arg(long, value_name = "MM")]
@@ -70,9 +68,6 @@ pub(crate) struct Arguments {
     /// Follow the model's plan of approaches; says after each touch where to touch next
     #[arg(long)]
     active: bool,
-    /// Write touches, verdicts and posteriors as a log, which Foxglove shows
-    #[arg(long, value_name = "FILE", conflicts_with = "features")]
-    mcap: Option<PathBuf>,
     #[command(flatten)]
     expected: ExpectedArguments,
 }
@@ -99,7 +94,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     }
     if let Some(maps) = MapsFile::read(&arguments.model)? {
         let Arguments { features, active, error_rate, max_touches, next, workspace, .. } = arguments;
-        let of_trees = [("features", features), ("active", active), ("mcap", arguments.mcap.is_some())];
+        let of_trees = [("features", features), ("active", active)];
         if let Some((option, _)) = of_trees.iter().find(|(_, is_given)| *is_given) {
             let allowed = "it with a model of trees; a model of maps says with --next where to touch next";
             return Err(Error::setting(option, "given", allowed));
@@ -142,27 +137,14 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     }
     let longest = compile::longest_time(&model);
     let (active, json) = (arguments.active, global.json);
-    let log = arguments.mcap.as_deref().map(|log| log_to(log, &arguments, &compiled.names())).transpose()?;
     let mut stream =
-        Stream { recognizer, model: &model, weights, longest, active, json, log, touches: 0, is_any_partial: false };
+        Stream { recognizer, model: &model, weights, longest, active, json, touches: 0, is_any_partial: false };
     stream.reset();
     each_of(&arguments.file, &mut |event| stream.take(event))?;
     if model.trained_touches().counted != Counted::Full {
         super::warn_of_full(stream.touches, stream.is_any_partial);
     }
-    match (stream.log, &arguments.mcap) {
-        (Some(log), Some(path)) => log.finish(path),
-        _ => Ok(()),
-    }
-}
-
-/// A log of verdicts that is to become the file at `path`.
-fn log_to(path: &Path, arguments: &Arguments, objects: &[String]) -> Result<LogWriter> {
-    if output::is_stdout(path) {
-        return Err(Error::setting("mcap", "standard output", "a file: the verdicts are printed there"));
-    }
-    output::admit(path, [&arguments.model, &arguments.file])?;
-    LogWriter::new(objects)
+    Ok(())
 }
 
 /// A stream of touches and what recognizes them.
@@ -175,8 +157,6 @@ struct Stream<'m> {
     longest: f64,
     active: bool,
     json: bool,
-    /// Log to which touches and verdicts are also written.
-    log: Option<LogWriter>,
     /// Number of touches, and whether a finger was missing in any of them.
     touches: usize,
     is_any_partial: bool,
@@ -186,37 +166,22 @@ impl<'m> Stream<'m> {
     fn take(&mut self, event: Event<'_>) -> Result<()> {
         match event {
             Event::Begin => self.reset(),
-            Event::Touch { touch, place, object, time } => {
+            Event::Touch { touch, place } => {
                 self.check(touch).map_err(|problem| Error::at(place, problem))?;
-                self.push(touch, object, time)?;
+                self.push(touch)?;
             }
         }
         Ok(())
     }
 
-    /// Takes a touch, with what a log says of it.
-    fn push(&mut self, touch: &Touch, object: Option<&str>, time: Option<u64>) -> Result<()> {
+    /// Takes a touch.
+    fn push(&mut self, touch: &Touch) -> Result<()> {
         self.touches += 1;
         self.is_any_partial |= !touch.is_full();
         // A little later than the stroke is missing, as on the chip.
         let touch = &palpate::evaluate::delivered(self.model, touch);
         let refused = self.recognizer.push(touch).err().map(|refused| refused.to_string());
-        let line = self.line(refused);
-        line.print(self.json)?;
-        if let Some(log) = &mut self.log {
-            let posteriors = (0..self.model.object_count())
-                .map(|object| (self.model.object_name(object).into(), self.recognizer.posterior(object).to_f64()));
-            let verdict = LoggedVerdict {
-                touch: line.touch,
-                verdict: line.verdict.into(),
-                object: line.object.into(),
-                posterior: line.posterior,
-                refused: line.refused,
-                posteriors: posteriors.collect(),
-            };
-            log.touch(touch, object, time)?;
-            log.verdict(&verdict)?;
-        }
+        self.line(refused).print(self.json)?;
         if self.recognizer.verdict() != Verdict::Undecided {
             self.reset();
         }

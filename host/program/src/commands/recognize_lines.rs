@@ -51,16 +51,12 @@ impl Line<'_> {
 pub(super) enum Event<'e> {
     /// Another object begins.
     Begin,
-    /// A touch, with its place in the file and what a log says of it.
+    /// A touch, with its place in the file.
     Touch {
         /// The touch.
         touch: &'e Touch,
         /// Its place.
         place: Place,
-        /// Name of its object.
-        object: Option<&'e str>,
-        /// Its time, in nanoseconds.
-        time: Option<u64>,
     },
 }
 
@@ -93,7 +89,7 @@ fn each(touches: impl Read, path: &Path, take: &mut dyn FnMut(Event<'_>) -> Resu
             continue;
         }
         let touch = parse_touch(line).map_err(|problem| Error::at(place(), problem))?;
-        take(Event::Touch { touch: &touch, place: place(), object: None, time: None })?;
+        take(Event::Touch { touch: &touch, place: place() })?;
     }
     Ok(())
 }
@@ -102,13 +98,13 @@ fn each_of_log(log: &Log, path: &Path, take: &mut dyn FnMut(Event<'_>) -> Result
     log.skipped().iter().for_each(super::say);
     let mut before = None;
     for logged in log.touches() {
-        let Logged { time, touch, offset, .. } = logged;
+        let Logged { touch, offset, .. } = logged;
         let object = log.object(logged);
         if object != before {
             take(Event::Begin)?;
         }
         before = object;
-        take(Event::Touch { touch, place: Place::byte(path, *offset), object, time: Some(*time) })?;
+        take(Event::Touch { touch, place: Place::byte(path, *offset) })?;
     }
     Ok(())
 }

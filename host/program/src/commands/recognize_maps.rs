@@ -169,7 +169,7 @@ impl<'m> Stream<'m> {
     }
 
     fn take(&mut self, event: Event<'_>) -> Result<()> {
-        let Event::Touch { touch, place, .. } = event else {
+        let Event::Touch { touch, place } = event else {
             self.begin();
             return Ok(());
         };

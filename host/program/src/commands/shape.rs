@@ -28,7 +28,7 @@ pub(super) struct Touched {
 pub(super) fn read(path: &Path, file: &ProbeFile) -> Result<Touched> {
     let (mut touches, mut samples) = (Vec::new(), Vec::new());
     each_of(path, &mut |event| {
-        if let Event::Touch { touch, place, .. } = event {
+        if let Event::Touch { touch, place } = event {
             samples.extend(locate::samples(touch, &file.probe).map_err(|problem| Error::at(place, problem))?);
             touches.push(*touch);
         }
@@ -113,7 +113,7 @@ pub(super) fn explore(goal: Known, model: &Path, touches: &Path, workspace: Opti
     let begin = || Shape::within(&file.probe, [half; 2], noise(&file));
     let (mut shape, mut touch) = (begin(), 0);
     each_of(touches, &mut |event| {
-        let Event::Touch { touch: met, place, .. } = event else {
+        let Event::Touch { touch: met, place } = event else {
             (shape, touch) = (begin(), 0);
             return Ok(());
         };

@@ -1,10 +1,12 @@
-//! Robots' logs, as a user meets them: recognized, evaluated, recorded, checked, trained on, and written.
+//! Robots' logs, as a user meets them: recognized, evaluated, recorded, checked and trained on.
+
+#[allow(dead_code, reason = "the library's tests use the rest")]
+#[path = "../../../tests/mcap/files.rs"]
+mod files;
 
 use crate::fixtures::ONE_SPLIT;
-use crate::{Folder, command, complains, fails, figures, holds, palpate, piped, run, says, stderr, stdout, succeeds};
-use palpate::touches::mcap::{Writer, read};
-use palpate::touches::{Content, Dataset, Log, is_log, parse_touch};
-use std::io::Cursor;
+use crate::{Folder, command, complains, fails, figures, holds, palpate, piped, says, stderr, stdout, succeeds};
+use palpate::touches::{Dataset, Log, is_log};
 use std::path::Path;
 use std::process::Output;
 
@@ -13,11 +15,13 @@ const PYTHON: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/mcap
 
 /// Writes a log with these touches, lines of text, and the objects that they name.
 fn log<'a>(path: &Path, touches: impl IntoIterator<Item = (&'a str, Option<&'a str>)>) {
-    let mut writer = Writer::new(Cursor::new(Vec::new()), &[]).unwrap();
-    for (line, object) in touches {
-        writer.touch(&parse_touch(line).unwrap(), object, None).unwrap();
-    }
-    std::fs::write(path, writer.finish().unwrap().into_inner()).unwrap();
+    let message = |(line, object): (&str, Option<&str>)| {
+        let times: Vec<Option<f64>> = line.split_whitespace().map(|time| time.parse().ok()).collect();
+        serde_json::json!({"times": times, "object": object}).to_string()
+    };
+    let messages: Vec<String> = touches.into_iter().map(message).collect();
+    let messages: Vec<&str> = messages.iter().map(String::as_str).collect();
+    std::fs::write(path, files::touches(&messages)).unwrap();
 }
 
 fn error_of(output: &Output) -> String {
@@ -58,57 +62,6 @@ fn channels_that_are_skipped_are_named_and_a_damaged_log_is_refused_with_its_byt
     log(&at.join("cut.mcap"), [("0 0 0.08", None), ("0 0 80", None)]);
     let recognize = "recognize model.palpate cut.mcap";
     complains(palpate(at, recognize), recognize, 1, "cut.mcap: byte … 80");
-}
-
-#[test]
-fn touches_and_verdicts_become_a_log_that_is_recognized_again() {
-    let place = ONE_SPLIT.folder();
-    let (model, out) = (place.text("model.palpate"), place.text("verdicts.mcap"));
-    std::fs::write(place.join("lines.txt"), "0 0 0.08\n".repeat(4) + "0 0 -\n0 0 0.01\n").unwrap();
-    let recognize = |file: &str, out: &str| run(["recognize", &model, &place.text(file), "--json", "--mcap", out]);
-    let lines = stdout(recognize("lines.txt", &out));
-    let bytes = std::fs::read(&out).unwrap();
-    let (mut touches, mut verdicts, mut times) = (Vec::new(), Vec::new(), Vec::new());
-    read(bytes.as_slice(), Path::new("verdicts.mcap"), |message| {
-        times.push(message.time);
-        match message.content {
-            Content::Touch(touch, object) => touches.push((touch, object)),
-            Content::Verdict(verdict) => verdicts.push(verdict),
-        }
-        Ok(())
-    })
-    .unwrap();
-    assert!(times.is_sorted_by(|a, b| a < b), "{times:?}");
-    assert_eq!((touches.len(), touches[4].clone()), (6, (parse_touch("0 0 -").unwrap(), None)));
-    for (line, verdict) in lines.lines().zip(&verdicts) {
-        let line: serde_json::Value = serde_json::from_str(line).unwrap();
-        assert_eq!(line["touch"], verdict.touch);
-        assert_eq!(
-            (&line["verdict"], &line["object"]),
-            (&verdict.verdict.as_str().into(), &verdict.object.as_str().into())
-        );
-        assert_eq!(
-            (line["posterior"].as_f64(), line["refused"].as_str()),
-            (Some(verdict.posterior), verdict.refused.as_deref())
-        );
-        let names: Vec<_> = verdict.posteriors.iter().map(|(name, _)| name.as_str()).collect();
-        assert_eq!(names, ["bowl", "fork"]);
-        let sum: f64 = verdict.posteriors.iter().map(|(_, posterior)| posterior).sum();
-        assert!((sum - 1.0).abs() < 1e-3, "{sum}");
-    }
-    assert_eq!((verdicts.len(), verdicts[3].verdict.as_str(), verdicts[4].touch), (6, "recognized", 0));
-    assert!(verdicts[4].refused.is_some());
-    // What was written is a log like any other, and the bytes are always the same.
-    assert_eq!(stdout(recognize("verdicts.mcap", &place.text("again.mcap"))), lines);
-    assert!(std::fs::read(place.join("again.mcap")).unwrap() == bytes);
-    let said = stderr(recognize("lines.txt", "-"), 2);
-    assert!(said.contains("--mcap is standard output. Use a file"), "{said}");
-    let said = stderr(recognize("verdicts.mcap", &out), 2);
-    assert!(said.contains("Use another file than what is read."), "{said}");
-    // Nothing is left of a run that fails.
-    std::fs::write(place.join("lines.txt"), "0 0 0.08\nnonsense\n").unwrap();
-    stderr(recognize("lines.txt", &place.text("none.mcap")), 1);
-    assert!(!place.join("none.mcap").exists());
 }
 
 #[test]

@@ -37,7 +37,6 @@ const WRITERS: &[Writer] = &[
         &["copy.palpate", "copy.rs", "copy.h", "palpate.h"],
     ),
     quick("verify model.palpate ensemble.json --prove out/proof.txt", &["proof.txt"]),
-    quick("recognize model.palpate touches.txt --mcap out/log.mcap", &["log.mcap"]),
     quick("train data -o out/trained.json --trees rounds=2", &["trained.json"]),
     quick("view ball.obj -o out/ball.html", &["ball.html"]),
     quick("view --port -o out/port.html", &["port.html"]),

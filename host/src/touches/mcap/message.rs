@@ -1,14 +1,11 @@
-//! The messages: JSON and CDR.
+//! A touch's message: JSON and CDR.
 
-use super::Kind;
 use crate::error::TouchesProblem;
 use crate::touches::listing::is_file_name;
-use crate::touches::logged::{Content, LoggedVerdict};
 use crate::touches::{located, touch_of_seconds};
 use byteorder::{BigEndian, LittleEndian};
-use palpate_shared::{Q15_ONE, Touch};
-use serde::{Deserialize, Serialize, Serializer};
-use std::collections::BTreeMap;
+use palpate_shared::Touch;
+use serde::Deserialize;
 
 /// Encoding of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,51 +17,19 @@ pub(super) enum Encoding {
 }
 
 /// `palpate.Touch`.
-#[derive(Deserialize, Serialize)]
-pub(super) struct JsonTouch {
+#[derive(Deserialize)]
+struct JsonTouch {
     times: [Option<f64>; 3],
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pose: Option<JsonPose>,
     /// In meters.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     position: Option<[f64; 3]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     object: Option<String>,
 }
 
-#[derive(Deserialize, Serialize)]
+#[derive(Deserialize)]
 struct JsonPose {
     direction: [f64; 3],
     alignment: [f64; 3],
-}
-
-/// `palpate.Verdict`.
-#[derive(Deserialize, Serialize)]
-pub(super) struct JsonVerdict {
-    touch: u32,
-    verdict: String,
-    object: String,
-    posterior: f64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    refused: Option<String>,
-    #[serde(default)]
-    posteriors: Posteriors,
-}
-
-/// By the objects' names: in JSON an object, which is written in the order of the model.
-#[derive(Default)]
-struct Posteriors(Vec<(String, f64)>);
-
-impl<'de> Deserialize<'de> for Posteriors {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        BTreeMap::deserialize(deserializer).map(|pairs| Self(pairs.into_iter().collect()))
-    }
-}
-
-impl Serialize for Posteriors {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(name, posterior)| (name, posterior)))
-    }
 }
 
 /// `Touch.msg` up to the object, where it ended before touches had positions.
@@ -85,55 +50,29 @@ struct CdrLocated {
     position: [f64; 3],
 }
 
-/// `Verdict.msg`.
-#[derive(Deserialize)]
-struct CdrVerdict {
-    touch: u32,
-    verdict: String,
-    object: String,
-    posterior: f64,
-    refused: String,
-    objects: Vec<String>,
-    posteriors: Vec<f64>,
-}
-
 impl Encoding {
-    /// Decodes a message.
-    pub(super) fn read(self, kind: Kind, data: &[u8]) -> Result<Content, TouchesProblem> {
-        match (self, kind) {
-            (Self::Json, Kind::Touch) => touch(json(data, "touch in JSON")?),
-            (Self::Json, Kind::Verdict) => {
-                let JsonVerdict { touch, verdict, object, posterior, refused, posteriors } =
-                    json(data, "verdict in JSON")?;
-                checked(LoggedVerdict { touch, verdict, object, posterior, refused, posteriors: posteriors.0 })
+    /// Decodes a message: a touch, and its object if that is known.
+    pub(super) fn read(self, data: &[u8]) -> Result<(Touch, Option<String>), TouchesProblem> {
+        match self {
+            Self::Json => {
+                let wrong = |error: serde_json::Error| TouchesProblem::BadMessage {
+                    what: "touch in JSON",
+                    message: error.to_string(),
+                };
+                touch(serde_json::from_slice(data).map_err(wrong)?)
             }
-            (Self::Cdr, Kind::Touch) => {
-                let CdrLocated { touch, has_position, position } = cdr(data, "touch in CDR")?;
+            Self::Cdr => {
+                let CdrLocated { touch, has_position, position } = cdr(data)?;
                 felt(touch, has_position.then_some(position))
             }
-            (Self::CdrBefore, Kind::Touch) => felt(cdr(data, "touch in CDR")?, None),
-            (Self::Cdr | Self::CdrBefore, Kind::Verdict) => {
-                let CdrVerdict { touch, verdict, object, posterior, refused, objects, posteriors } =
-                    cdr(data, "verdict in CDR")?;
-                if objects.len() != posteriors.len() {
-                    let message = format!("{} objects and {} posteriors", objects.len(), posteriors.len());
-                    return Err(TouchesProblem::BadMessage { what: "verdict in CDR", message });
-                }
-                let posteriors = objects.into_iter().zip(posteriors).collect();
-                let refused = Some(refused).filter(|refused| !refused.is_empty());
-                checked(LoggedVerdict { touch, verdict, object, posterior, refused, posteriors })
-            }
+            Self::CdrBefore => felt(cdr(data)?, None),
         }
     }
 }
 
-fn json<'de, T: Deserialize<'de>>(data: &'de [u8], what: &'static str) -> Result<T, TouchesProblem> {
-    serde_json::from_slice(data).map_err(|error| TouchesProblem::BadMessage { what, message: error.to_string() })
-}
-
 /// A message behind its header of four bytes, which says how numbers are ordered.
-fn cdr<T: serde::de::DeserializeOwned>(data: &[u8], what: &'static str) -> Result<T, TouchesProblem> {
-    let wrong = |message: String| TouchesProblem::BadMessage { what, message };
+fn cdr<T: serde::de::DeserializeOwned>(data: &[u8]) -> Result<T, TouchesProblem> {
+    let wrong = |message: String| TouchesProblem::BadMessage { what: "touch in CDR", message };
     let Some((&[first, kind, _, _], body)) = data.split_first_chunk() else {
         return Err(wrong(format!("{} bytes, where its header has 4", data.len())));
     };
@@ -153,7 +92,7 @@ fn cdr<T: serde::de::DeserializeOwned>(data: &[u8], what: &'static str) -> Resul
 /// The longest time that a touch can hold, in seconds.
 const LONGEST: f64 = 4294.0;
 
-fn felt(touched: CdrTouch, position: Option<[f64; 3]>) -> Result<Content, TouchesProblem> {
+fn felt(touched: CdrTouch, position: Option<[f64; 3]>) -> Result<(Touch, Option<String>), TouchesProblem> {
     let CdrTouch { times, has_pose, direction, alignment, object } = touched;
     touch(JsonTouch {
         times: times.map(|time| (!time.is_nan()).then_some(time)),
@@ -163,7 +102,8 @@ fn felt(touched: CdrTouch, position: Option<[f64; 3]>) -> Result<Content, Touche
     })
 }
 
-fn touch(JsonTouch { times, pose, position, object }: JsonTouch) -> Result<Content, TouchesProblem> {
+fn touch(message: JsonTouch) -> Result<(Touch, Option<String>), TouchesProblem> {
+    let JsonTouch { times, pose, position, object } = message;
     let object = object.filter(|object| !object.is_empty());
     if let Some(name) = object.as_ref().filter(|name| !is_file_name(name)) {
         return Err(TouchesProblem::BadName { name: name.clone() });
@@ -178,20 +118,7 @@ fn touch(JsonTouch { times, pose, position, object }: JsonTouch) -> Result<Conte
         Some(meters) => located(touch, meters.map(|meters| 1e3 * meters))?,
         None => touch,
     };
-    Ok(Content::Touch(touch, object))
-}
-
-fn checked(verdict: LoggedVerdict) -> Result<Content, TouchesProblem> {
-    let wrong = |message: String| Err(TouchesProblem::BadMessage { what: "verdict", message });
-    if !LoggedVerdict::VERDICTS.contains(&verdict.verdict.as_str()) {
-        return wrong(format!("{:?}, where {} are known", verdict.verdict, LoggedVerdict::VERDICTS.join(", ")));
-    }
-    let posteriors = verdict.posteriors.iter().map(|(_, posterior)| posterior);
-    if let Some(posterior) = posteriors.chain([&verdict.posterior]).find(|posterior| !(0.0..=1.0).contains(*posterior))
-    {
-        return wrong(format!("a posterior of {posterior}"));
-    }
-    Ok(Content::Verdict(verdict))
+    Ok((touch, object))
 }
 
 /// Essence of a definition in ROS 2: its lines without comments and needless spaces, up to those of other messages.
@@ -201,21 +128,4 @@ pub(super) fn essence(definition: &[u8]) -> String {
     let words = lines.map(|line| line.split('#').next().unwrap_or_default().split_whitespace());
     let lines = words.map(|words| words.collect::<Vec<_>>().join(" ")).filter(|line| !line.is_empty());
     lines.collect::<Vec<_>>().join("; ")
-}
-
-/// A touch as JSON.
-pub(super) fn touch_json(touch: &Touch, object: Option<&str>) -> Result<Vec<u8>, serde_json::Error> {
-    let unit = |vector: [i16; 3]| vector.map(|cosine| f64::from(cosine) / f64::from(Q15_ONE));
-    serde_json::to_vec(&JsonTouch {
-        times: touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e6)),
-        pose: touch.pose().map(|pose| JsonPose { direction: unit(pose.direction), alignment: unit(pose.alignment) }),
-        position: touch.position().map(|position| position.micrometers.map(|micrometers| f64::from(micrometers) / 1e6)),
-        object: object.map(String::from),
-    })
-}
-
-/// A verdict as JSON.
-pub(super) fn verdict_json(verdict: &LoggedVerdict) -> Result<Vec<u8>, serde_json::Error> {
-    let LoggedVerdict { touch, verdict, object, posterior, refused, posteriors } = verdict.clone();
-    serde_json::to_vec(&JsonVerdict { touch, verdict, object, posterior, refused, posteriors: Posteriors(posteriors) })
 }

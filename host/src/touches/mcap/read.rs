@@ -1,8 +1,8 @@
-//! From a file's records to touches and verdicts.
+//! From a file's records to touches.
 
 use super::message::Encoding;
 use super::records::{self, Chunk};
-use super::{Kind, LARGEST, chunk};
+use super::{LARGEST, NAMES, TOUCH, chunk};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::touches::logged::{Channels, Message};
 use ::mcap::records::op;
@@ -15,7 +15,7 @@ use std::path::Path;
 /// Number of bytes requested at a time.
 const STEP: usize = 1 << 16;
 /// Largest size of the names and definitions of a file's channels, in bytes.
-const NAMES: usize = 16 << 20;
+const MOST_NAMES: usize = 16 << 20;
 /// An opcode and a length.
 const HEAD: usize = 9;
 /// The end of the definition of a touch that earlier versions did not have.
@@ -23,11 +23,11 @@ const LOCATED: &str = "; bool has_position; float64[3] position";
 /// The latest log time, in nanoseconds: in the year 2262.
 const LATEST: u64 = i64::MAX as u64;
 
-/// Reads a log from its first byte to its last, and hands on every touch and verdict in the order of the file.
+/// Reads a log from its first byte to its last, and hands on every touch in the order of the file.
 ///
 /// # Errors
 /// Errors of `each`; when the file cannot be read, is damaged or ends early, has no channel of touches, or a message on a
-/// channel of touches or verdicts that is none. The byte is named at which the record, or the chunk with it, begins.
+/// channel of touches that is none. The byte is named at which the record, or the chunk with it, begins.
 pub fn read(mut bytes: impl Read, path: &Path, each: impl FnMut(Message) -> Result<()>) -> Result<Channels> {
     let options = LinearReaderOptions::default()
         .with_emit_chunks(true)
@@ -99,7 +99,7 @@ struct Channel {
     topic: String,
     schema: u16,
     encoding: String,
-    reads: Option<(Kind, Encoding)>,
+    reads: Option<Encoding>,
     messages: u64,
 }
 
@@ -136,7 +136,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
         match opcode {
             op::SCHEMA => {
                 let records::Schema { id, name, encoding, data } = records::Schema::of(data).map_err(wrong)?;
-                let definition = Kind::of(name).map(|_| super::message::essence(data));
+                let definition = NAMES.contains(&name).then(|| super::message::essence(data));
                 self.schema(id, Schema { name: name.into(), encoding: encoding.into(), definition }).map_err(wrong)
             }
             op::CHANNEL => {
@@ -177,21 +177,20 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
         if *number != 0 && schema.is_none() {
             return Err(not_mcap(format!("{topic} has the schema {number}, which is missing")));
         }
-        if let Some((schema, kind)) = schema.and_then(|schema| Kind::of(&schema.name).map(|kind| (schema, kind))) {
+        if let Some(schema) = schema.filter(|schema| NAMES.contains(&schema.name.as_str())) {
             let said = || format!("{topic} ({})", schema.name);
             channel.reads = Some(match (encoding.as_str(), schema.encoding.as_str()) {
-                ("json", _) => (kind, Encoding::Json),
+                ("json", _) => Encoding::Json,
                 ("cdr", "ros2msg") => {
-                    let expected = super::message::essence(kind.definition().as_bytes());
+                    let expected = super::message::essence(TOUCH.as_bytes());
                     let found = schema.definition.clone().unwrap_or_default();
-                    let before = expected.strip_suffix(LOCATED).filter(|_| kind == Kind::Touch);
-                    if before == Some(found.as_str()) {
-                        (kind, Encoding::CdrBefore)
+                    if expected.strip_suffix(LOCATED) == Some(found.as_str()) {
+                        Encoding::CdrBefore
                     } else if found != expected {
                         let found = found.chars().take(300).collect();
                         return Err(TouchesProblem::OtherDefinition { channel: said(), found, expected });
                     } else {
-                        (kind, Encoding::Cdr)
+                        Encoding::Cdr
                     }
                 }
                 (encoding, schema) => {
@@ -210,23 +209,24 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
             return Err(wrong(not_mcap(format!("a message of channel {}, which is missing", message.channel))));
         };
         channel.messages += 1;
-        let Some((kind, encoding)) = channel.reads else { return Ok(()) };
-        let content = match message.log_time {
-            ..=LATEST => encoding.read(kind, message.data),
+        let Some(encoding) = channel.reads else { return Ok(()) };
+        let read = match message.log_time {
+            ..=LATEST => encoding.read(message.data),
             time => Err(TouchesProblem::BadMessage { what: "log time", message: format!("{time} ns, after 2262") }),
         };
-        let content = content.map_err(|problem| {
+        let read = read.map_err(|problem| {
             let (topic, number) = (channel.topic.clone(), channel.messages);
             wrong(TouchesProblem::Message { topic, number, problem: problem.into() })
         });
-        (self.each)(Message { time: message.log_time, offset, content: content? })
+        let (touch, object) = read?;
+        (self.each)(Message { time: message.log_time, offset, touch, object })
     }
 
     /// Takes memory for names.
     fn take(&mut self, bytes: usize) -> Result<(), TouchesProblem> {
         self.names += bytes;
-        let most = NAMES as u64;
-        match self.names <= NAMES {
+        let most = MOST_NAMES as u64;
+        match self.names <= MOST_NAMES {
             true => Ok(()),
             false => Err(TouchesProblem::TooLarge { what: "names of channels".into(), bytes: self.names as u64, most }),
         }
@@ -238,14 +238,13 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
             let schema = self.schemas.get(&channel.schema).map_or("no schema", |schema| schema.name.as_str());
             let said = format!("{} ({schema})", channel.topic);
             match channel.reads {
-                Some((Kind::Touch, _)) => channels.touches.push(said),
-                Some((Kind::Verdict, _)) => channels.verdicts.push(said),
+                Some(_) => channels.touches.push(said),
                 None => channels.others.push(said),
             }
         }
         if channels.touches.is_empty() {
-            let there = channels.verdicts.iter().chain(&channels.others).cloned().collect();
-            return Err(Error::at(Place::file(self.path), TouchesProblem::NoTouchChannel { channels: there }));
+            let problem = TouchesProblem::NoTouchChannel { channels: channels.others };
+            return Err(Error::at(Place::file(self.path), problem));
         }
         Ok(channels)
     }
