@@ -48,6 +48,11 @@ impl Number for f32 {
     );
 }
 
+impl Number for i64 {
+    const ARRAY: PyStaticExpr =
+        type_hint_subscript!(type_hint_identifier!("numpy.typing", "NDArray"), type_hint_identifier!("numpy", "int64"));
+}
+
 impl Number for i16 {
     const ARRAY: PyStaticExpr =
         type_hint_subscript!(type_hint_identifier!("numpy.typing", "NDArray"), type_hint_identifier!("numpy", "int16"));

@@ -45,6 +45,7 @@ pub(crate) struct DataSet {
     instances: PyOnceLock<Py<PyArray1<i16>>>,
     poses: PyOnceLock<[Py<PyArray2<f32>>; 2]>,
     positions: PyOnceLock<Py<PyArray2<f64>>>,
+    robots: PyOnceLock<Py<PyArray1<i64>>>,
 }
 
 impl DataSet {
@@ -57,6 +58,7 @@ impl DataSet {
             instances: PyOnceLock::new(),
             poses: PyOnceLock::new(),
             positions: PyOnceLock::new(),
+            robots: PyOnceLock::new(),
         }
     }
 
@@ -116,10 +118,11 @@ impl DataSet {
     /// `direction` and `alignment` are unit vectors, `position` where the hand was at the first contact, on a table, in
     /// millimeters (the `probe` is in millimeters then). Without a `probe` nothing is known about it. `instances` are numbers
     /// that say which mesh, or recording, of its object each touch is of, where objects have several: a sequence is of one.
+    /// `robots` are numbers that say which robot made each touch, where robots differ: a sequence is of one, too.
     #[staticmethod]
     #[pyo3(signature = (
         times, objects, names, *, direction=None, alignment=None, position=None, probe=None, approaches=false,
-        instances=None
+        instances=None, robots=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn from_arrays(
@@ -132,6 +135,7 @@ impl DataSet {
         probe: Option<Probe>,
         approaches: bool,
         instances: Option<Input<'_, i64, Ix1>>,
+        robots: Option<Input<'_, i64, Ix1>>,
     ) -> Result<Self, Failure> {
         let times = triples(&times, "times")?;
         let objects = objects.values()?;
@@ -139,11 +143,13 @@ impl DataSet {
         let alignment = alignment.as_ref().map(|array| triples(array, "alignment")).transpose()?;
         let position = position.as_ref().map(|array| triples(array, "position")).transpose()?;
         let instances = instances.as_ref().map(Input::values).transpose()?;
+        let robots = robots.as_ref().map(Input::values).transpose()?;
         let vectors = [direction, alignment, position].map(|vectors| vectors.map(<[_]>::len));
-        let lengths = [Some(objects.len()), instances.map(<[_]>::len)].into_iter().chain(vectors);
+        let numbers = [instances, robots].map(|numbers| numbers.map(<[_]>::len));
+        let lengths = [Some(objects.len())].into_iter().chain(numbers).chain(vectors);
         if lengths.flatten().any(|length| length != times.len()) {
             let rows = "as many rows as times";
-            let all = "objects, direction, alignment, position and instances";
+            let all = "objects, direction, alignment, position, instances and robots";
             return Err(Error::setting(all, "of another length", rows).into());
         }
         let mut order: Vec<usize> = (0..names.len()).collect();
@@ -151,7 +157,7 @@ impl DataSet {
         if let Some(pair) = order.windows(2).find(|pair| names[pair[0]] == names[pair[1]]) {
             return Err(Error::setting("names", format!("{} twice", names[pair[0]]), "different names").into());
         }
-        let mut touches = vec![Vec::new(); names.len()];
+        let (mut touches, mut robots_of) = (vec![Vec::new(); names.len()], vec![Vec::new(); names.len()]);
         for (row, (times, object)) in times.iter().zip(objects).enumerate() {
             let there = |vectors: Option<&[[f64; 3]]>| {
                 vectors.map(|vectors| vectors[row]).filter(|vector| !vector.iter().all(|cosine| cosine.is_nan()))
@@ -169,13 +175,20 @@ impl DataSet {
                 row: row as u64 + 1,
                 problem: Box::new(problem),
             });
-            let slot = usize::try_from(*object).ok().and_then(|object| touches.get_mut(object));
-            let slot =
-                slot.ok_or_else(|| Error::setting("objects", object, format!("0 to {}", names.len().max(1) - 1)))?;
-            slot.push((touch.map_err(Error::from)?, instances.map_or(0, |instances| instances[row])));
+            let index = usize::try_from(*object).ok().filter(|object| *object < names.len());
+            let index =
+                index.ok_or_else(|| Error::setting("objects", object, format!("0 to {}", names.len().max(1) - 1)))?;
+            touches[index].push((touch.map_err(Error::from)?, instances.map_or(0, |instances| instances[row])));
+            if let Some(robots) = robots {
+                let robot = u32::try_from(robots[row]);
+                robots_of[index]
+                    .push(robot.map_err(|_| Error::setting("robots", robots[row], "numbers of 32 bits, from 0"))?);
+            }
         }
-        let objects =
-            order.into_iter().map(|index| ObjectTouches::numbered(&names[index], &std::mem::take(&mut touches[index])));
+        let objects = order.into_iter().map(|index| {
+            let object = ObjectTouches::numbered(&names[index], &touches[index]);
+            if robots.is_some() { object.of_robots(std::mem::take(&mut robots_of[index])) } else { object }
+        });
         let objects: Vec<ObjectTouches> = objects.collect();
         if objects.is_empty() || objects.iter().any(|object| object.is_empty()) {
             return Err(Error::from(palpate::error::EvaluateProblem::NoTouches).into());
@@ -278,6 +291,22 @@ impl DataSet {
         Ok(Output(made.bind(py).clone()))
     }
 
+    /// Number of the robot that made each touch: all touches of a sequence are from one; `None` if robots do not differ.
+    #[getter]
+    fn robots<'py>(&self, py: Python<'py>) -> PyResult<Option<Output<'py, i64, Ix1>>> {
+        let of = |object: &ObjectTouches| (0..object.len()).filter_map(|touch| object.robot_of(touch)).collect::<Vec<_>>();
+        let all: Vec<i64> = self.dataset.objects.iter().flat_map(of).map(i64::from).collect();
+        if all.len() < self.dataset.len() {
+            return Ok(None);
+        }
+        let made = self.robots.get_or_try_init(py, || {
+            let Output(array) = one(py, all);
+            array.call_method("setflags", (), Some(&pyo3::types::IntoPyDict::into_py_dict([("write", false)], py)?))?;
+            PyResult::Ok(array.unbind())
+        })?;
+        Ok(Some(Output(made.bind(py).clone())))
+    }
+
     /// The probe's direction at each touch, a unit vector; `None` if no touch has a pose.
     #[getter]
     fn direction<'py>(&self, py: Python<'py>) -> PyResult<Option<Output<'py, f32, Ix2>>> {
@@ -337,11 +366,27 @@ impl DataSet {
         Ok(Self::new(noisy, self.approaches.clone()))
     }
 
-    /// The touches as a table: object (a category), t1, t2 and t3, and, if known, direction, alignment and position.
-    /// The columns are those of the arrays, without copies. Needs pandas.
+    /// The touches as a table: object (a category), t1, t2 and t3, and, if known, direction, alignment and position by their
+    /// axes, such as direction_x; instance, where objects have several, and robot, where robots differ. The columns are those of
+    /// the arrays, without copies. Needs pandas, which also writes and reads Parquet.
     fn to_pandas<'py>(slf: Bound<'py, Self>) -> PyResult<DataFrame<'py>> {
         let frames = slf.py().import("palpate._frames")?;
         Ok(DataFrame(frames.call_method1("to_pandas", (slf,))?))
+    }
+
+    /// A data set of a table with the columns of `to_pandas`; times are rounded to microseconds. Rows keep their order within an
+    /// object. Without a `probe` nothing is known about it. Needs pandas.
+    #[staticmethod]
+    #[pyo3(signature = (table, *, probe=None, approaches=false))]
+    fn from_pandas<'py>(
+        py: Python<'py>,
+        table: DataFrame<'py>,
+        probe: Option<Probe>,
+        approaches: bool,
+    ) -> PyResult<Bound<'py, Self>> {
+        let DataFrame(table) = table;
+        let made = py.import("palpate._frames")?.call_method1("from_pandas", (table, probe, approaches))?;
+        Ok(made.cast_into::<Self>()?)
     }
 
     /// Writes `<object>.parquet` for each object and, if the probe is known, `dataset.json`, into a directory that holds

@@ -52,6 +52,16 @@ handed_out! {
     DataFrame is "pandas"."DataFrame";
 }
 
+impl<'a, 'py> FromPyObject<'a, 'py> for DataFrame<'py> {
+    type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = type_hint_identifier!("pandas", "DataFrame");
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        Ok(Self(object.to_owned()))
+    }
+}
+
 /// A probe's measures.
 pub(crate) struct Probe(pub(crate) Measures);
 

@@ -87,6 +87,72 @@ def test_tables_share_the_arrays_memory() -> None:
     assert table.groupby("object", observed=True).size().to_dict() == {"bowl": 50, "mouse": 50}
 
 
+def same(data: palpate.DataSet, other: palpate.DataSet) -> None:
+    assert (data.names, data.counts) == (other.names, other.counts)
+    for name in ("times", "objects", "instances", "robots", "direction", "alignment", "position"):
+        np.testing.assert_array_equal(getattr(data, name), getattr(other, name), err_msg=name)
+
+
+def test_a_table_comes_back_as_the_same_touches_also_through_parquet(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    nan, count = np.nan, 600
+    micros = rng.integers(0, 4_000_000_000, (count, 3))
+    micros[np.arange(count), rng.integers(0, 3, count)] = 0
+    times = np.where(rng.random((count, 3)) < 0.2, nan, micros / 1e6)
+    direction, alignment = (touched[:count] for touched in poses())
+    poseless = rng.random(count) < 0.1
+    some = np.where(poseless[:, None], nan, direction), np.where(poseless[:, None], nan, alignment)
+    position = rng.integers(-2_000_000_000, 2_000_000_000, (count, 3)) / 1e3
+    objects, instances, robots = rng.integers(0, 3, count), rng.integers(0, 4, count), rng.integers(0, 5, count)
+    names = ["mug", "fork", "a cup"]
+
+    def made(**more: object) -> palpate.DataSet:
+        return palpate.DataSet.from_arrays(times, objects, names, **more)
+
+    posed = {"direction": some[0], "alignment": some[1]}
+    located = {"direction": direction, "alignment": alignment, "position": position}
+    for number, data in enumerate(
+        [made(), made(instances=instances), made(robots=robots), made(**posed), made(**located, instances=instances, robots=robots)]
+    ):
+        table = data.to_pandas()
+        same(palpate.DataSet.from_pandas(table), data)
+        table.to_parquet(tmp_path / f"{number}.parquet")
+        read = pandas.read_parquet(tmp_path / f"{number}.parquet")
+        same(palpate.DataSet.from_pandas(read), data)
+        # As other programs write it: names as text, and nulls.
+        plain = table.astype({"object": str}).convert_dtypes()
+        same(palpate.DataSet.from_pandas(plain), data)
+    assert {"instance", "robot", "position_z", "alignment_x"} <= set(table.columns)
+    # To the microsecond, in the order of the rows within an object.
+    order = np.argsort(np.array(names)[objects], kind="stable")
+    expected = np.round(1e6 * (times - np.fmin.reduce(times, axis=1)[:, None]))
+    np.testing.assert_array_equal(np.round(1e6 * data.times), expected[order])
+    probe = palpate.Probe(spacing=1.25)
+    stated = palpate.DataSet.from_pandas(made().to_pandas(), probe=probe, approaches=True)
+    assert stated.probe == probe and stated.holds_approaches
+
+
+def poses() -> tuple[np.ndarray, np.ndarray]:
+    data = palpate.capture(["bowl", "mouse"], touches=300, pose=True)
+    assert data.direction is not None and data.alignment is not None
+    return data.direction, data.alignment
+
+
+def test_a_table_that_is_no_data_set_is_refused_by_name() -> None:
+    table = palpate.DataSet.from_arrays([[0.0, 0.1, 0.2]], [0], ["cup"], robots=[3]).to_pandas()
+    assert table["robot"].tolist() == [3]
+    for wrong, message in [
+        (table.drop(columns="t2"), "no column t2"),
+        (table.drop(columns="object"), "no column object"),
+        (table.assign(object=None), "a row without an object"),
+        (table.assign(direction_x=1.0), "direction_x without"),
+        (table.assign(t1=-1.0), "row 1: the time -1 is negative"),
+        (table.assign(robot=-1), "robots is -1"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            palpate.DataSet.from_pandas(wrong)
+
+
 def test_parquet_and_text_come_back_as_they_were(tmp_path: Path) -> None:
     data = palpate.capture(["bowl", "mouse"], touches=80, pose=True, approaches=True)
     data.to_parquet(tmp_path / "parquet")

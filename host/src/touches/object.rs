@@ -432,6 +432,18 @@ impl ObjectTouches {
         if pools.is_empty() { vec![Pool { source: 0, touches: Vec::new() }] } else { pools }
     }
 
+    /// These touches, each made by the robot with this number.
+    #[must_use]
+    pub fn of_robots(self, mut robots: Vec<u32>) -> Self {
+        robots.resize(self.len(), 0);
+        Self { robot_of: robots, ..self }
+    }
+
+    /// The number of the robot that made a touch; none if robots do not differ.
+    pub fn robot_of(&self, touch: usize) -> Option<u32> {
+        self.robot_of.get(touch).copied()
+    }
+
     /// True if every sequence must be of one robot's touches, since robots differ.
     pub(crate) fn has_robots(&self) -> bool {
         !self.robot_of.is_empty()
