@@ -44,7 +44,7 @@ fn read(path: &Path, label: &str, sequence: &str) -> Result<(Sequences, Vec<Stri
     let names: Vec<String> = names.into_iter().collect();
     let features: Vec<&str> = header.iter().copied().filter(|name| *name != label && *name != sequence).collect();
     let columns = SequenceColumns { label: Some(label), sequence, group: None };
-    Ok((stream::read(path, &features, &columns, &names)?, names))
+    Ok((Sequences::read(path, &features, &columns, &names)?, names))
 }
 
 /// Four classes that differ in two of three features, by less than a row's noise.

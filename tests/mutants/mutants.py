@@ -58,7 +58,7 @@ LEFT_OUT = [
     r"shared_leaves",
     r"^host/src/capture/(admission|store)\.rs",
     r"resume|shard|checkpoint",
-    r"^host/src/touches/(captured|checksum|shard|save|format|no_mcap|files|parquet/.*)",
+    r"^host/src/touches/(captured|checksum|shard|save|format|no_mcap|files)",
     r"^host/simulator/src/mesh/(builtin/|scan/|no_builtin|facts/mod|facts/gaps)",
     r"/sweep/(precision|budget)|probe/cast",
     r"Cloud|instances|complaints|::verdict.*mesh|guess",

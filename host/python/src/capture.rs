@@ -147,8 +147,8 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 /// approaches come within that many degrees of straight down. `position` keeps where the hand was, too, of all approaches
 /// straight down to objects of true size on a table; `within` is how far from an object's middle they aim at most. The same
 /// `seed` gives the same touches on any number of `threads`, and the same as the program's. `shard` is "K/N" for a part. With
-/// `instances` a directory inside a directory is one object. With `out` the touches are written there, as "text" or "parquet",
-/// as `palpate capture` does: `resume`, `add` and `force` are its options.
+/// `instances` a directory inside a directory is one object. With `out` the touches are written there as
+/// `palpate capture` does: `resume`, `add` and `force` are its options.
 ///
 /// `progress` is called with a stage, the steps done and their number. Ctrl-C stops the call.
 ///
@@ -160,7 +160,7 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 /// ((200, 3), True)
 #[pyo3::pyfunction]
 #[pyo3(signature = (meshes, *, touches=21_000, seed=1, probe=None, approaches=false, pose=false, aim="box", cone=None,
-    position=false, within=None, length=10.0, millimeters=None, instances=false, shard="1/1", out=None, format="text", resume=false, add=false, force=false,
+    position=false, within=None, length=10.0, millimeters=None, instances=false, shard="1/1", out=None, resume=false, add=false, force=false,
     threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "they are keywords in Python")]
 pub(crate) fn capture(
@@ -180,7 +180,6 @@ pub(crate) fn capture(
     instances: bool,
     shard: &str,
     out: Option<PathBuf>,
-    format: &str,
     resume: bool,
     add: bool,
     force: bool,
@@ -202,7 +201,6 @@ pub(crate) fn capture(
         within,
         approaches: approaches || position,
         scene: cone.or(position.then_some(0.0)).map_or(Surroundings::Floating, |cone| Surroundings::Table { cone }),
-        format: format.parse().map_err(Error::from)?,
         shard: shard.parse().map_err(Error::from)?,
         ..Origin::default()
     };

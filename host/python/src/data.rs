@@ -12,7 +12,7 @@ use palpate::error::Error;
 use palpate::shared::format::Length;
 use palpate::shared::{Q15_ONE, Touch};
 use palpate::touches::{
-    Dataset, Format, Listing, ObjectTouches, Origin, Surroundings, folds, located, touch_of_seconds,
+    Dataset, Listing, ObjectTouches, Origin, Surroundings, folds, located, touch_of_seconds,
 };
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -104,8 +104,8 @@ impl DataSet {
 
 #[pyo3::pymethods]
 impl DataSet {
-    /// Reads the data set in a directory, which `capture` or `palpate capture` wrote, or which holds `<object>.txt` or
-    /// `<object>.parquet` for each object.
+    /// Reads the data set in a directory, which `capture` or `palpate capture` wrote, or which holds `<object>.txt`
+    /// for each object.
     #[staticmethod]
     fn read(py: Python<'_>, directory: PathBuf) -> Result<Self, Failure> {
         long(py, None, |_| Self::of_directory(&directory))
@@ -389,20 +389,9 @@ impl DataSet {
         Ok(made.cast_into::<Self>()?)
     }
 
-    /// Writes `<object>.parquet` for each object and, if the probe is known, `dataset.json`, into a directory that holds
-    /// no touches yet: what `read`, `palpate train` and pandas read. Which touch is of which instance or recording is kept.
-    fn to_parquet(&self, py: Python<'_>, directory: PathBuf) -> Result<(), Failure> {
-        self.write(py, directory, Format::Parquet)
-    }
-
-    /// Writes the touches as text, one line per touch.
+    /// Writes `<object>.txt` for each object, one line per touch, and, if the probe is known, `dataset.json`, into a directory
+    /// that holds no touches yet: what `read` and `palpate train` read. Which touch is of which instance or recording is kept.
     fn to_text(&self, py: Python<'_>, directory: PathBuf) -> Result<(), Failure> {
-        self.write(py, directory, Format::Text)
-    }
-}
-
-impl DataSet {
-    fn write(&self, py: Python<'_>, directory: PathBuf, format: Format) -> Result<(), Failure> {
-        long(py, None, |_| self.dataset.write(&directory, format, self.approaches.as_deref()))
+        long(py, None, |_| self.dataset.write(&directory, self.approaches.as_deref()))
     }
 }

@@ -153,19 +153,18 @@ def test_a_table_that_is_no_data_set_is_refused_by_name() -> None:
             palpate.DataSet.from_pandas(wrong)
 
 
-def test_parquet_and_text_come_back_as_they_were(tmp_path: Path) -> None:
+def test_text_comes_back_as_it_was_and_parquet_is_refused_with_what_to_use_instead(tmp_path: Path) -> None:
     data = palpate.capture(["bowl", "mouse"], touches=80, pose=True, approaches=True)
-    data.to_parquet(tmp_path / "parquet")
     data.to_text(tmp_path / "text")
-    for kind in ("parquet", "text"):
-        read = palpate.DataSet.read(tmp_path / kind)
-        np.testing.assert_array_equal(read.times, data.times)
-        np.testing.assert_array_equal(read.alignment, data.alignment)
-        assert read.probe == data.probe and read.approaches == [80, 80]
-    table = pandas.read_parquet(tmp_path / "parquet" / "bowl.parquet")
-    np.testing.assert_array_equal(table[["t1", "t2", "t3"]].to_numpy(), data.times[:80])
-    with pytest.raises(palpate.InputError, match="bowl.parquet"):
-        data.to_parquet(tmp_path / "parquet")
+    read = palpate.DataSet.read(tmp_path / "text")
+    same(read, data)
+    assert read.probe == data.probe and read.approaches == [80, 80]
+    with pytest.raises(palpate.InputError, match="bowl.txt"):
+        data.to_text(tmp_path / "text")
+    (tmp_path / "tables").mkdir()
+    data.to_pandas().to_parquet(tmp_path / "tables" / "bowl.parquet")
+    with pytest.raises(palpate.InputError, match="bowl.parquet: Parquet is not read. Instead, write text or CSV"):
+        palpate.DataSet.read(tmp_path / "tables")
 
 
 def test_touches_from_arrays_are_rounded_and_start_at_zero() -> None:
@@ -200,10 +199,9 @@ def test_no_data_set_forgets_which_touch_is_of_which_instance(tmp_path: Path) ->
     assert all(np.bincount(test.instances[test.objects == cup]).tolist() == [4, 4, 4] for cup in (0, 1))
     assert kept(data) and kept(train) and kept(test)
     for number, part in enumerate((data, train, test)):
-        for kind in ("parquet", "text"):
-            directory = tmp_path / f"{kind}-{number}"
-            part.to_parquet(directory) if kind == "parquet" else part.to_text(directory)
-            assert kept(palpate.DataSet.read(directory))
+        part.to_text(tmp_path / f"{number}")
+        assert kept(palpate.DataSet.read(tmp_path / f"{number}"))
+        assert kept(palpate.DataSet.from_pandas(part.to_pandas()))
     # Noise changes neither, and a copy states it.
     noisy = data.noisy("5ms")
     np.testing.assert_array_equal(noisy.instances, data.instances)

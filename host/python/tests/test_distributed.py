@@ -14,8 +14,10 @@ from pathlib import Path
 
 import cloudpickle
 import distributed
+import numpy as np
 import palpate
 import palpate.distributed
+import pandas
 import pytest
 
 # Dask warns of much that is its own affair, such as ports and unclosed sockets of processes that were killed.
@@ -86,7 +88,8 @@ def mortal() -> Iterator[tuple[distributed.Client, Cluster]]:
 
 
 def files(directory: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in sorted(directory.iterdir()) if path.is_file() and path.name != ".lock"}
+    """What the directory holds of a data set."""
+    return {path.name: path.read_bytes() for path in sorted(directory.iterdir()) if path.suffix in (".txt", ".json")}
 
 
 def once(act: Callable[[], None], after: int) -> palpate.Progress:
@@ -106,11 +109,17 @@ def once(act: Callable[[], None], after: int) -> palpate.Progress:
 def test_the_result_is_that_of_one_machine(
     client: distributed.Client, tmp_path: Path, format: palpate.distributed.Format
 ) -> None:
-    options = {"seed": 3, "approaches": True, "probe": palpate.Probe(spacing=1.25), "format": format}
-    palpate.capture(OBJECTS, touches=500, out=tmp_path / "one", **options)
+    one = {"seed": 3, "approaches": True, "pose": True, "probe": palpate.Probe(spacing=1.25)}
+    data = palpate.capture(OBJECTS, touches=500, out=tmp_path / "one", **one)
+    options = {**one, "format": format}
     out = tmp_path / "many"
     summary = palpate.distributed.capture(client, OBJECTS, 500, out, touches_per_shard=250, **options)
     assert files(out) == files(tmp_path / "one")
+    if format == "parquet":
+        tables = [pandas.read_parquet(out / f"{name}.parquet") for name in OBJECTS]
+        read = palpate.DataSet.from_pandas(pandas.concat(tables), probe=one["probe"], approaches=True)
+        for name in ("times", "objects", "direction", "alignment"):
+            np.testing.assert_array_equal(getattr(read, name), getattr(data, name))
     assert (summary.objects, summary.done, summary.kept, summary.refused) == (2, 4, 0, [])
     # Once more: only a part that was damaged is done again.
     (out / "parts" / "bowl" / "2-of-2.txt").write_bytes(b"0 0 0\n")
@@ -127,9 +136,7 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(
     palpate.capture(OBJECTS, touches=2400, out=tmp_path / "one")
     out = tmp_path / "many"
     progress = once(cluster.processes[1].kill, after=3)
-    summary = palpate.distributed.capture(
-        client, OBJECTS, 2400, out, format="text", touches_per_shard=300, progress=progress
-    )
+    summary = palpate.distributed.capture(client, OBJECTS, 2400, out, touches_per_shard=300, progress=progress)
     assert cluster.processes[1].wait() == -signal.SIGKILL
     assert summary.refused == [] and summary.done == 16
     assert files(out) == files(tmp_path / "one")
@@ -147,9 +154,7 @@ def test_a_scheduler_that_is_restarted_costs_nothing_but_time(
         cluster.start()
 
     progress = once(restart, after=3)
-    summary = palpate.distributed.capture(
-        client, OBJECTS, 2400, out, format="text", touches_per_shard=300, progress=progress
-    )
+    summary = palpate.distributed.capture(client, OBJECTS, 2400, out, touches_per_shard=300, progress=progress)
     assert summary.refused == [] and summary.resubmitted > 0
     assert files(out) == files(tmp_path / "one")
 
@@ -181,7 +186,7 @@ def test_a_shard_that_kills_its_worker_each_time_is_named_and_the_others_finish(
         cluster.scheduler.allowed_failures = 0
         client.register_plugin(Deadly(f"capture-{digest}"))
         summary = palpate.distributed.capture(
-            client, ["fork", *OBJECTS], 900, out, format="text", touches_per_shard=300
+            client, ["fork", *OBJECTS], 900, out, touches_per_shard=300
         )
     assert {(lost.object, lost.shard) for lost in summary.refused} == {("fork", f"{part}/3") for part in (1, 2, 3)}
     assert all("its worker died in each of 3 attempts" in lost.reason for lost in summary.refused)
@@ -191,7 +196,7 @@ def test_a_shard_that_kills_its_worker_each_time_is_named_and_the_others_finish(
 def test_a_mesh_that_is_refused_is_named_and_the_others_finish(client: distributed.Client, tmp_path: Path) -> None:
     (tmp_path / "broken.obj").write_text("v 0 0 0\nf 1 2 3\n")
     summary = palpate.distributed.capture(
-        client, ["bowl", str(tmp_path / "broken.obj")], 100, tmp_path / "out", format="text"
+        client, ["bowl", str(tmp_path / "broken.obj")], 100, tmp_path / "out"
     )
     assert [lost.object for lost in summary.refused] == ["broken"] and "broken.obj" in summary.refused[0].reason
     assert set(files(tmp_path / "out")) == {"bowl.txt"}
@@ -222,7 +227,7 @@ def test_a_buffer_beside_a_gltf_that_was_changed_is_captured_again(client: distr
 
     def captured() -> tuple[int, int]:
         meshes = ["bowl", str(tmp_path / "wedge.gltf")]
-        summary = palpate.distributed.capture(client, meshes, 100, tmp_path / "out", format="text")
+        summary = palpate.distributed.capture(client, meshes, 100, tmp_path / "out")
         return summary.done, summary.kept
 
     write(1.0)
@@ -232,7 +237,7 @@ def test_a_buffer_beside_a_gltf_that_was_changed_is_captured_again(client: distr
 
 
 def test_xgboost_trains_over_the_cluster_and_its_model_is_imported(client: distributed.Client, tmp_path: Path) -> None:
-    palpate.distributed.capture(client, OBJECTS, 3000, tmp_path / "data", touches_per_shard=1500)
+    palpate.distributed.capture(client, OBJECTS, 3000, tmp_path / "data", format="parquet", touches_per_shard=1500)
     assert json.loads((tmp_path / "data" / "dataset.json").read_text())["complete"]
     ensemble = palpate.distributed.train(client, tmp_path / "data", rounds=8)
     assert ensemble.objects == OBJECTS and ensemble.descriptor == "curvature" and ensemble.trees == 16
@@ -244,7 +249,7 @@ def test_xgboost_trains_over_the_cluster_and_its_model_is_imported(client: distr
 def test_the_program_captures_on_this_machine(tmp_path: Path) -> None:
     palpate.capture(OBJECTS, touches=200, out=tmp_path / "one")
     command = [sys.executable, "-m", "palpate.distributed"]
-    out = ["-o", str(tmp_path / "many"), "--touches", "200", "--workers", "2", "--format", "text"]
+    out = ["-o", str(tmp_path / "many"), "--touches", "200", "--workers", "2"]
     done = subprocess.run([*command, *OBJECTS, *out], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("2 objects are complete; 2 shards were captured, 0 were there")
     assert files(tmp_path / "many") == files(tmp_path / "one")

@@ -2,7 +2,7 @@
 
 use super::Settings;
 use crate::error::{CaptureProblem, Error, Place, Result};
-use crate::touches::{Entry, Format, Listing, Lying, Origin, files};
+use crate::touches::{Entry, Listing, Lying, Origin, files};
 use std::path::{Path, PathBuf};
 
 /// State that a capture begins with.
@@ -18,12 +18,10 @@ pub(super) fn part(directory: &Path, name: &str) -> PathBuf {
     directory.join(format!("{name}.part"))
 }
 
-/// The files that hold an object's touches, complete or not, in any format.
+/// The files that hold an object's touches, complete or not.
 pub(super) fn own_files(directory: &Path, name: &str) -> impl Iterator<Item = PathBuf> {
     let entry = Entry { name: name.into(), ..Entry::default() };
-    let done = Format::ALL.map(|format| entry.file(directory, format));
-    let unfinished = [part(directory, name), directory.join(format!("{name}.parquet.part"))];
-    done.into_iter().chain(unfinished)
+    [entry.file(directory), part(directory, name)].into_iter()
 }
 
 /// Compares the content of a directory with the planned capture, and rejects losses.
@@ -42,7 +40,7 @@ pub(super) fn admit(directory: &Path, settings: &Settings, objects: &[Entry]) ->
         objects.iter().filter(|entry| !is_listed(&entry.name)).flat_map(|entry| own_files(directory, &entry.name));
     let mut foreign: Vec<String> = unlisted.filter(|path| path.exists()).filter_map(|path| file_name(&path)).collect();
     if found.is_none() {
-        foreign.extend(files(directory)?.iter().filter_map(|(_, path, _)| file_name(path)));
+        foreign.extend(files(directory)?.iter().filter_map(|(_, path)| file_name(path)));
     }
     foreign.sort();
     foreign.dedup();

@@ -50,7 +50,7 @@ fn touch(objects: &[&Object], settings: &Settings, progress: &dyn Progress) -> R
         };
         let drawn: Vec<Vec<(Touch, u64)>> = in_order(chunks.into_par_iter().map(chunk))?;
         approaches.push(drawn.iter().flatten().map(|(_, approaches)| approaches).sum());
-        let kept = |(touch, _): (Touch, u64)| if origin.writes_pose() { touch } else { Touch::new(touch.times()) };
+        let kept = |(touch, _): (Touch, u64)| if origin.pose { touch } else { Touch::new(touch.times()) };
         let touches = drawn.into_iter().flatten().map(kept).collect();
         let (sources, entry) = (sources(object, scenes), entry(object, scenes, origin));
         let meshes = Meshes { checksums: entry.meshes, millimeters: entry.millimeters };

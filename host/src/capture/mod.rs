@@ -134,7 +134,7 @@ impl Summary {
     }
 }
 
-/// Touches the objects and writes `DIR/<object>.txt` (or `.parquet`) for each, and `DIR/dataset.json`.
+/// Touches the objects and writes `DIR/<object>.txt` for each, and `DIR/dataset.json`.
 ///
 /// # Errors
 /// When a setting is wrong, a mesh cannot be touched, the directory cannot be written to, another capture is writing to

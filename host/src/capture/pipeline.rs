@@ -138,7 +138,7 @@ fn compute(sampler: &Sampler<'_>, settings: &Settings, samples: Range<u64>, prog
     for sample in samples {
         progress::check(progress)?;
         let drawn = sampler.drawn(sample)?;
-        write_touch(&mut chunk.text, &drawn.touch, settings.origin.writes_pose());
+        write_touch(&mut chunk.text, &drawn.touch, settings.origin.pose);
         chunk.approaches += drawn.approaches;
         chunk.late.iter_mut().zip(drawn.late).for_each(|(late, more)| *late += more);
         chunk.touching += u64::from(drawn.touch.pattern() != ContactPattern::None);

@@ -1,7 +1,7 @@
 //! A data set on its way to the disk.
 //!
 //! Touches of an object are appended to `<object>.part`, which becomes `<object>.txt` when it is complete, or is
-//! converted to `<object>.parquet`. Twice a second the part is flushed to the disk, then the listing is written, which
+//! complete. Twice a second the part is flushed to the disk, then the listing is written, which
 //! says how much of it counts: bytes behind that, left by an interruption, are cut off when the capture is resumed.
 //!
 //! Touches are only deleted after a listing that says `"complete": false` was written: at no moment does a complete
@@ -11,7 +11,7 @@ use super::Settings;
 use super::admission::{Admission, admit, own_files, part};
 use crate::error::{CaptureProblem, Error, Place, Result};
 use crate::output;
-use crate::touches::{Entry, Format, Listing, checksum};
+use crate::touches::{Entry, Listing, checksum};
 use std::fs::File;
 use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -53,7 +53,7 @@ impl Store {
             if entry.touches == 0 {
                 remove_touches(directory, &entry.name)?;
             } else if entry.touches < samples {
-                remove(&entry.file(directory, listing.origin.format))?;
+                remove(&entry.file(directory))?;
             }
         }
         let position = |object: &Entry| listing.objects.iter().position(|entry| entry.name == object.name);
@@ -92,17 +92,13 @@ impl Store {
     /// Gives the object's file its name, once all its touches are there, and takes its checksum. An interruption between
     /// any two of these steps is repaired when the capture is resumed.
     pub(super) fn complete(&mut self, object: usize) -> Result<()> {
-        let format = self.listing.origin.format;
-        let (part, done) = (self.part(object), self.entry(object).file(&self.directory, format));
+        let (part, done) = (self.part(object), self.entry(object).file(&self.directory));
         debug_assert_eq!(self.entry(object).touches, self.samples);
         if !done.exists() {
             self.part_file(object)?;
             self.checkpoint()?;
             self.open = None;
-            match format {
-                Format::Text => std::fs::rename(&part, &done).map_err(|error| stopped(&part, &error))?,
-                Format::Parquet => convert(&part, &done, &self.entry(object).name)?,
-            }
+            std::fs::rename(&part, &done).map_err(|error| stopped(&part, &error))?;
         }
         if self.entry(object).crc32.is_none() {
             let bytes = std::fs::metadata(&done).map_err(|error| Error::io(&done, "read the touches", error))?.len();
@@ -159,22 +155,6 @@ impl Store {
     fn part(&self, object: usize) -> PathBuf {
         part(&self.directory, &self.entry(object).name)
     }
-}
-
-/// Turns a complete part into a Parquet file.
-#[cfg(feature = "parquet")]
-fn convert(part: &Path, done: &Path, object: &str) -> Result<()> {
-    let unfinished = done.with_extension("parquet.part");
-    let io = |error| stopped(&unfinished, &error);
-    let file = File::create(&unfinished).map_err(io)?;
-    crate::touches::parquet::write(&unfinished, &file, object, crate::touches::text::lines(part)?)?;
-    file.sync_all().map_err(io)?;
-    std::fs::rename(&unfinished, done).map_err(io)
-}
-
-#[cfg(not(feature = "parquet"))]
-fn convert(_: &Path, done: &Path, _: &str) -> Result<()> {
-    Err(Error::at(Place::file(done), crate::error::TouchesProblem::NoParquet))
 }
 
 fn remove_touches(directory: &Path, name: &str) -> Result<()> {

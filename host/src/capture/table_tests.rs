@@ -190,7 +190,7 @@ fn parts_and_copies_of_a_data_set_keep_the_placements_and_their_weights() {
     }
     for (number, part) in [&whole, &train, &test].into_iter().enumerate() {
         let directory = place.path().join(number.to_string());
-        part.write(&directory, crate::touches::Format::Text, None).unwrap();
+        part.write(&directory, None).unwrap();
         let read = Dataset::read(&directory).unwrap();
         for (object, own) in part.objects.iter().zip(&read.objects) {
             assert_eq!(own.placement_weights(), object.placement_weights());

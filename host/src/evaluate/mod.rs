@@ -61,9 +61,9 @@ pub use curve::{Confidence, Curve};
 pub(crate) use margins::OfTouches;
 #[cfg(feature = "train")]
 pub(crate) use margins::best;
-pub use margins::{Margins, delivered};
 #[cfg(feature = "train")]
 pub(crate) use margins::leading;
+pub use margins::{Margins, delivered};
 pub use measure::{Evaluated, Wanted, measure, own_weights};
 #[cfg(feature = "train")]
 pub(crate) use noisy::ROBOTS;

@@ -29,8 +29,6 @@ mod evaluate;
 mod folds;
 mod follow;
 mod guard;
-#[cfg(feature = "parquet")]
-mod parquet;
 mod parts;
 mod settings;
 mod shape;
@@ -47,9 +45,8 @@ use crate::error::{EvaluateProblem, Result, RowsProblem};
 use crate::evaluate::together::units_of_rows;
 use palpate_onboard::{Model, Refused, RowsSeen};
 use palpate_shared::format::Position;
-use palpate_trees::rows::{Encoder, Features, SequenceColumns, Sequences, feature_names};
+use palpate_trees::rows::{Encoder, feature_names};
 use std::borrow::Cow;
-use std::path::Path;
 
 /// The margins of rows, in a model's units.
 #[derive(Clone, Debug)]
@@ -153,21 +150,4 @@ pub fn refusal(model: &Model<'_>, refused: Refused) -> String {
         }
         _ => refused.to_string(),
     }
-}
-
-/// Reads sequences from CSV, or from Parquet if the file ends in `.parquet`.
-///
-/// # Errors
-/// Errors of [`Sequences::read`]; in Parquet rows are counted as lines of a CSV file, from 2.
-pub fn read(
-    path: &Path,
-    features: impl Into<Features>,
-    columns: &SequenceColumns<'_>,
-    classes: &[String],
-) -> Result<Sequences> {
-    #[cfg(feature = "parquet")]
-    if path.extension().is_some_and(|extension| extension == "parquet") {
-        return parquet::read(path, features, columns, classes);
-    }
-    Sequences::read(path, features, columns, classes)
 }

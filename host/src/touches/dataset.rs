@@ -1,10 +1,9 @@
 //! A data set: a directory with one file per object.
 
-use super::checksum::checksum;
-use super::files::files;
+use super::files::{EXTENSION, files};
 use super::text::Alike;
 use super::warning::Warning;
-use super::{Entry, Format, Listing, Log, ObjectTouches, Origin, Recorded, Source, is_log, recording};
+use super::{Entry, Listing, Log, ObjectTouches, Origin, Recorded, Source, is_log, recording, text};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
 use crate::probe::hand;
@@ -13,6 +12,9 @@ use palpate_shared::Touch;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// The extension of tables that are refused with what to use instead.
+const PARQUET: &str = "parquet";
 
 /// The touches of two or more objects, and how they were made.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -145,16 +147,14 @@ impl Dataset {
     }
 
     /// Reads the data set in a directory: the files that its `dataset.json` names and no other, or, without one, every
-    /// `<object>.txt`, `<object>.parquet` and log (`<name>.mcap`, see [`Log::by_object`]; its content decides that a file
-    /// is one). Touches of one object in several logs are joined in the order of the logs' names. The path of a log is a data
+    /// `<object>.txt` and log (`<name>.mcap`, see [`Log::by_object`]; its content decides that a file is one). Touches of one object in several logs are joined in the order of the logs' names. The path of a log is a data
     /// set too.
     ///
     /// A text file that was changed since its capture but has as many touches as stated is a [`Warning`].
     ///
     /// # Errors
     /// When the directory cannot be read, holds fewer than two objects or an unfinished capture; when a listed file is
-    /// missing, has another number of touches than stated, or is a Parquet file with another checksum; when a file
-    /// holds no touch, and when a line or row is wrong, or a row is of another object (it is named); when some touches have a
+    /// missing or has another number of touches than stated; when a file holds no touch, and when a line or row is wrong, or a row is of another object (it is named); when some touches have a
     /// position and others have none, or `dataset.json` states otherwise.
     pub fn read(directory: &Path) -> Result<Self> {
         let dataset = Self::read_any(directory)?;
@@ -193,12 +193,12 @@ impl Dataset {
     /// cannot be read, holds no touch, or has a wrong line.
     pub fn read_file(path: &Path) -> Result<ObjectTouches> {
         let extension = path.extension().unwrap_or_default();
-        let format = Format::ALL.into_iter().find(|format| extension == format.extension());
-        let name = path.file_stem().and_then(|stem| stem.to_str());
-        let Some((format, name)) = format.zip(name) else {
-            return Err(Error::at(Place::file(path), TouchesProblem::NoFormat));
-        };
-        Ok(ObjectTouches::new(name, format.read(path)?, Source::Object))
+        let wrong = |problem| Err(Error::at(Place::file(path), problem));
+        match path.file_stem().and_then(|stem| stem.to_str()) {
+            Some(name) if extension == EXTENSION => Ok(ObjectTouches::new(name, text::read(path)?, Source::Object)),
+            _ if extension == PARQUET => wrong(TouchesProblem::Parquet),
+            _ => wrong(TouchesProblem::NoFormat),
+        }
     }
 
     /// Reads the data set that a listing describes.
@@ -207,13 +207,13 @@ impl Dataset {
             return Err(Error::at(Place::file(directory), TouchesProblem::Incomplete));
         }
         let (mut objects, mut warnings) = (Vec::with_capacity(listing.objects.len()), Vec::new());
-        // Text may grow while it is recorded; what is copied to another format is complete.
-        let may_grow = listing.is_recorded() && listing.origin.format == Format::Text;
+        // It may grow while it is recorded.
+        let may_grow = listing.is_recorded();
         for entry in &listing.objects {
-            let path = entry.file(directory, listing.origin.format);
+            let path = entry.file(directory);
             let touches = match may_grow {
                 true => recording::read(entry, &path, &mut warnings)?,
-                false => read_listed(entry, listing.origin.format, &path, &mut warnings)?,
+                false => read_listed(entry, &path, &mut warnings)?,
             };
             if touches.first().is_some_and(|touch| touch.position().is_some() != listing.origin.position) {
                 let (has_position, others) = (!listing.origin.position, Listing::STATED);
@@ -232,21 +232,16 @@ impl Dataset {
 
     /// Every file of touches.
     fn found(directory: &Path) -> Result<Self> {
-        let files = files(directory)?;
-        if let Some([first, second]) = files.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-            let [file, other] = [first, second].map(|(_, path, _)| path.clone());
-            return Err(Error::at(
-                Place::file(directory),
-                TouchesProblem::TwoFiles { name: first.0.clone(), file, other },
-            ));
+        if let Some(table) = of_extension(directory, PARQUET)?.first() {
+            return Err(Error::at(Place::file(table), TouchesProblem::Parquet));
         }
         let mut logs = logs(directory)?;
         let mut objects = BTreeMap::new();
-        for (name, path, format) in files {
+        for (name, path) in files(directory)? {
             match is_log(&path) {
                 true => logs.push(path),
                 false => {
-                    let touches = ObjectTouches::new(name.clone(), format.read(&path)?, Source::Object);
+                    let touches = ObjectTouches::new(name.clone(), text::read(&path)?, Source::Object);
                     objects.insert(name, Found { touches, file: path });
                 }
             }
@@ -316,26 +311,16 @@ impl Dataset {
 }
 
 /// Reads an object's file, and compares it with the listing.
-fn read_listed(entry: &Entry, format: Format, path: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
+fn read_listed(entry: &Entry, path: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
     let wrong = |problem| Error::at(Place::file(path), problem);
     if !path.exists() {
         return Err(wrong(TouchesProblem::Missing { name: entry.name.clone() }));
     }
-    let (touches, is_changed) = match format {
-        Format::Text => {
-            let (touches, found) = super::text::read_with_checksum(path)?;
-            (touches, entry.crc32.is_some_and(|stated| stated != found))
-        }
-        // Checked before it is decoded: a damaged file is better described by its checksum than by what it breaks.
-        Format::Parquet => match entry.crc32 {
-            Some(stated) if checksum(path)? != stated => return Err(wrong(TouchesProblem::OtherChecksum)),
-            _ => (format.read(path)?, false),
-        },
-    };
+    let (touches, found) = text::read_with_checksum(path)?;
     if touches.len() as u64 != entry.touches {
         return Err(wrong(TouchesProblem::OtherCount { stated: entry.touches, found: touches.len() as u64 }));
     }
-    if is_changed {
+    if entry.crc32.is_some_and(|stated| stated != found) {
         warnings.push(Warning::Changed { path: path.into() });
     }
     Ok(touches)
@@ -379,10 +364,15 @@ fn objects_of(found: BTreeMap<String, Found>) -> Vec<ObjectTouches> {
 
 /// The logs in a directory by their names, which end in `.mcap`, sorted.
 pub(crate) fn logs(directory: &Path) -> Result<Vec<PathBuf>> {
+    of_extension(directory, Log::EXTENSION)
+}
+
+/// The files in a directory whose names end like this, sorted.
+fn of_extension(directory: &Path, ending: &str) -> Result<Vec<PathBuf>> {
     let io = |source| Error::io(directory, "read the data set", source);
     let entries = std::fs::read_dir(directory).map_err(io)?;
     let mut paths = entries.map(|entry| Ok(entry.map_err(io)?.path())).collect::<Result<Vec<_>>>()?;
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == Log::EXTENSION));
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == ending));
     paths.sort();
     Ok(paths)
 }
@@ -395,31 +385,20 @@ pub(super) fn name_of(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::touches::checksum;
 
-    /// A complete data set of two objects in a format, with its listing.
-    fn captured(format: Format) -> tempfile::TempDir {
+    /// A complete data set of two objects, with its listing.
+    fn captured() -> tempfile::TempDir {
         let directory = tempfile::tempdir().unwrap();
-        let origin = Origin { touches: 3, format, ..Origin::default() };
+        let origin = Origin { touches: 3, ..Origin::default() };
         let mut listing = Listing::new(&origin, ["fork".into(), "spoon".into()]);
         listing.complete = true;
         for (index, entry) in listing.objects.iter_mut().enumerate() {
-            let path = entry.file(directory.path(), format);
+            let path = entry.file(directory.path());
             let touch = |i: u32| Touch::from_micros([0, i, index as u32]);
-            match format {
-                Format::Text => {
-                    let mut text = String::new();
-                    (0..3).for_each(|i| super::super::write_touch(&mut text, &touch(i), false));
-                    std::fs::write(&path, text).unwrap();
-                }
-                #[cfg(feature = "parquet")]
-                Format::Parquet => {
-                    let file = std::fs::File::create(&path).unwrap();
-                    let touches = (0..3).map(|i| Ok(touch(i)));
-                    super::super::parquet::write(&path, &file, &entry.name, touches).unwrap();
-                }
-                #[cfg(not(feature = "parquet"))]
-                Format::Parquet => unreachable!(),
-            }
+            let mut text = String::new();
+            (0..3).for_each(|i| super::super::write_touch(&mut text, &touch(i), false));
+            std::fs::write(&path, text).unwrap();
             entry.touches = 3;
             entry.crc32 = Some(checksum(&path).unwrap());
         }
@@ -473,7 +452,7 @@ mod tests {
 
     #[test]
     fn objects_with_and_without_positions_are_refused_and_so_are_others_than_the_listing_states() {
-        let directory = captured(Format::Text);
+        let directory = captured();
         let path = directory.path().join("spoon.txt");
         std::fs::write(&path, "0 0 0 0 0 -1 1 0 0 1 2 3\n".repeat(3)).unwrap();
         let other = |has_position, others| TouchesProblem::OtherPosition { has_position, others };
@@ -488,17 +467,21 @@ mod tests {
     }
 
     #[test]
-    fn one_object_in_two_formats_is_refused_where_nothing_says_which_counts() {
+    fn a_parquet_file_is_refused_with_what_to_use_instead() {
         let directory = tempfile::tempdir().unwrap();
         for name in ["fork.txt", "fork.parquet", "spoon.txt"] {
             std::fs::write(directory.path().join(name), "0 0 0\n").unwrap();
         }
-        assert!(matches!(problem(directory.path()), TouchesProblem::TwoFiles { name, .. } if name == "fork"));
+        let file = Dataset::read_file(&directory.path().join("fork.parquet")).unwrap_err();
+        for error in [Dataset::read(directory.path()).unwrap_err(), file] {
+            let said = error.to_string();
+            assert!(said.contains("fork.parquet: Parquet is not read. Instead, write text or CSV"), "{said}");
+        }
     }
 
     #[test]
     fn a_data_set_knows_the_probe_that_its_listing_states() {
-        let dataset = Dataset::read(captured(Format::Text).path()).unwrap();
+        let dataset = Dataset::read(captured().path()).unwrap();
         assert_eq!(dataset.probe(), Some(&Probe::default()));
         assert_eq!(dataset.only(|_| false).probe(), dataset.probe());
         assert_eq!(dataset.warnings, []);
@@ -506,7 +489,7 @@ mod tests {
 
     #[test]
     fn an_old_file_that_the_listing_does_not_name_is_never_used() {
-        let directory = captured(Format::Text);
+        let directory = captured();
         std::fs::write(directory.path().join("cup.txt"), "0 0 0\n").unwrap();
         std::fs::write(directory.path().join("fork.parquet"), "no touches").unwrap();
         assert_eq!(Dataset::read(directory.path()).unwrap().names(), ["fork", "spoon"]);
@@ -514,14 +497,14 @@ mod tests {
 
     #[test]
     fn a_missing_file_of_a_listed_object_is_an_error() {
-        let directory = captured(Format::Text);
+        let directory = captured();
         std::fs::remove_file(directory.path().join("spoon.txt")).unwrap();
         assert_eq!(problem(directory.path()), TouchesProblem::Missing { name: "spoon".into() });
     }
 
     #[test]
     fn a_file_cut_at_a_line_end_is_an_error() {
-        let directory = captured(Format::Text);
+        let directory = captured();
         let path = directory.path().join("spoon.txt");
         let text = std::fs::read_to_string(&path).unwrap();
         for (touches, stated) in [(2, 3), (1, 3)] {
@@ -535,7 +518,7 @@ mod tests {
 
     #[test]
     fn an_edited_text_file_is_a_warning_that_names_it() {
-        let directory = captured(Format::Text);
+        let directory = captured();
         let path = directory.path().join("spoon.txt");
         let text = std::fs::read_to_string(&path).unwrap().replace("0.000002", "0.000003");
         std::fs::write(&path, text).unwrap();
@@ -547,36 +530,11 @@ mod tests {
 
     #[test]
     fn an_unfinished_capture_is_no_data_set() {
-        let directory = captured(Format::Text);
+        let directory = captured();
         let mut listing = Listing::read(directory.path()).unwrap().unwrap();
         listing.complete = false;
         listing.write(directory.path()).unwrap();
         assert_eq!(problem(directory.path()), TouchesProblem::Incomplete);
-    }
-
-    #[cfg(feature = "parquet")]
-    #[test]
-    fn damage_that_leaves_a_parquet_file_readable_is_an_error() {
-        let directory = captured(Format::Parquet);
-        let path = directory.path().join("spoon.parquet");
-        assert_eq!(Dataset::read(directory.path()).unwrap().len(), 6);
-        let whole = std::fs::read(&path).unwrap();
-        for position in 0..whole.len() {
-            let mut damaged = whole.clone();
-            damaged[position] ^= 1;
-            std::fs::write(&path, damaged).unwrap();
-            assert_eq!(problem(directory.path()), TouchesProblem::OtherChecksum, "byte {position}");
-        }
-    }
-
-    #[cfg(feature = "parquet")]
-    #[test]
-    fn another_number_of_rows_than_stated_is_an_error() {
-        let directory = captured(Format::Parquet);
-        let mut listing = Listing::read(directory.path()).unwrap().unwrap();
-        listing.objects[1].touches = 4;
-        listing.write(directory.path()).unwrap();
-        assert_eq!(problem(directory.path()), TouchesProblem::OtherCount { stated: 4, found: 3 });
     }
 
     #[test]

@@ -75,7 +75,7 @@ pub enum TouchesProblem {
     /// A line is not UTF-8.
     #[error("not text (no UTF-8)")]
     NotText,
-    /// A row of a Parquet file is wrong.
+    /// A row of a table is wrong.
     #[error("row {row}: {problem}")]
     Row {
         /// The row, counted from 1.
@@ -83,43 +83,9 @@ pub enum TouchesProblem {
         /// Description of the fault.
         problem: Box<Self>,
     },
-    /// A row of a file of touches names another object than the file.
-    #[error("a touch of {found:?} in the file of {object:?}")]
-    OtherObject {
-        /// The object that the row names.
-        found: String,
-        /// The object that the file is called after.
-        object: String,
-    },
-    /// A file is not Parquet, or its structure is damaged.
-    #[error("not a usable Parquet file ({message})")]
-    NotParquet {
-        /// The reader's message.
-        message: String,
-    },
-    /// A Parquet file lacks a column.
-    #[error("no column {name}")]
-    NoColumn {
-        /// The column.
-        name: &'static str,
-    },
-    /// A column of a Parquet file has another type than required.
-    #[error("column {name}: {message}")]
-    Column {
-        /// The column.
-        name: &'static str,
-        /// Description of the fault.
-        message: String,
-    },
-    /// Touches could not be written as Parquet.
-    #[error("cannot write the touches ({message})")]
-    ParquetNotWritten {
-        /// The writer's message.
-        message: String,
-    },
-    /// A Parquet file, read by a build without Parquet.
-    #[error("this program was built without Parquet")]
-    NoParquet,
+    /// A file is Parquet.
+    #[error("Parquet is not read")]
+    Parquet,
     /// A file is no log in MCAP, or is damaged.
     #[error("not a usable MCAP file: {message}")]
     NotMcap {
@@ -210,7 +176,7 @@ pub enum TouchesProblem {
     #[error("no touches in it")]
     NoTouches,
     /// A directory holds no file of touches.
-    #[error("no touches here (no .txt, .parquet or .mcap file)")]
+    #[error("no touches here (no .txt or .mcap file)")]
     NoObjects,
     /// A directory holds one object.
     #[error("only one object here, {name}, and nothing to distinguish it from")]
@@ -218,7 +184,7 @@ pub enum TouchesProblem {
         /// The object.
         name: String,
     },
-    /// An object has files in two formats, and no listing says which counts.
+    /// An object is in a log and in a file of lines, and no listing says which counts.
     #[error("two files of the object {name}: {} and {}", file.display(), other.display())]
     TwoFiles {
         /// The object.
@@ -280,9 +246,6 @@ pub enum TouchesProblem {
         /// Number of touches found.
         found: u64,
     },
-    /// A Parquet file is not the one that was captured.
-    #[error("damaged or changed: its checksum is not the one in dataset.json")]
-    OtherChecksum,
     /// Another program has locked the directory.
     #[error("another program is writing into this directory")]
     Busy,
@@ -332,12 +295,6 @@ pub enum TouchesProblem {
     BadShard {
         /// The text.
         text: String,
-    },
-    /// A text names no format of touches.
-    #[error("{name:?} is not a format of touches")]
-    UnknownFormat {
-        /// The text.
-        name: String,
     },
     /// A directory that touches are to be saved in holds others, or a listing.
     #[error("holds {}, and touches are not saved over others", shown(files))]
@@ -389,18 +346,14 @@ impl Problem for TouchesProblem {
             Self::PositionWithoutPose => "Give direction and alignment, too.",
             Self::OtherPosition { .. } => "Give every touch of the data set a position, or none.",
             Self::HalfPose { .. } => "Give both or neither.",
-            Self::OtherObject { .. } => "Give each object a file with its name.",
             Self::Row { problem, .. } => match **problem {
                 Self::HalfPose { .. } => "Give both or neither.",
-                Self::OtherObject { .. } => "Give each object a file with its name.",
                 Self::PositionWithoutPose => "Give direction and alignment, too.",
                 Self::OtherPosition { .. } => "Give every touch of the data set a position, or none.",
-                _ => "Correct the row, or capture the object again.",
+                _ => "Correct the row.",
             },
-            Self::NotParquet { .. } | Self::NoColumn { .. } | Self::Column { .. } | Self::NoTouches => {
-                "Capture the object again, or remove the file."
-            }
-            Self::ParquetNotWritten { .. } => "Check the disk and the space on it, then resume the capture.",
+            Self::Parquet => return format!("Instead, {}.", crate::gone::instead(".parquet").unwrap_or_default()),
+            Self::NoTouches => "Capture the object again, or remove the file.",
             Self::NotMcap { .. } => "Repair it with `mcap recover`, or copy the log again.",
             Self::NoMcap => "Build it with the feature mcap, which is on by default.",
             Self::TooLarge { .. } => {
@@ -419,7 +372,6 @@ impl Problem for TouchesProblem {
             }
             Self::NamelessTouch => "Name the object in every message, or in none.",
             Self::NotInLog { .. } => "Give one of these names, or the log of the other object.",
-            Self::NoParquet => "Build it with the feature parquet, which is on by default.",
             Self::NoObjects => "Fill it with: palpate capture builtin -o DIR.",
             Self::OneObject { .. } => "Capture at least two objects into the directory.",
             Self::TwoFiles { .. } => "Remove one of them.",
@@ -445,12 +397,10 @@ impl Problem for TouchesProblem {
             Self::RecordedBefore { .. } => "Give other lines.",
             Self::NoPose => "Give direction and alignment after the times, or record without the pose.",
             Self::LaterThanStroke { .. } => "Give the probe file the stroke that the hand has, and record into another directory.",
-            Self::OtherChecksum => "Capture the objects again.",
             Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
             Self::HoldsFiles { .. } => "Give another directory, or move the files away.",
-            Self::NoFormat => "Name it after the object, with the extension .txt or .parquet.",
+            Self::NoFormat => "Name it after the object, with the extension .txt.",
             Self::RecordedTwice { .. } => "Put its touches into one file.",
-            Self::UnknownFormat { .. } => "Use text or parquet.",
             Self::WouldTrainWrong { .. } => "Correct the faults listed above, then check again.",
             Self::TooFew { least, .. } => return format!("Capture at least {least} touches of each object."),
         }

@@ -1,6 +1,7 @@
 //! `dataset.json`: the content and origin of a data set, and whether it is complete.
 
-use super::{Format, Meshes, ObjectTouches, Origin, Recorded, Source};
+use super::files::EXTENSION;
+use super::{Meshes, ObjectTouches, Origin, Recorded, Source};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
 use palpate_shared::Touch;
@@ -214,8 +215,8 @@ impl Listing {
 
 impl Entry {
     /// The object's file of touches in a directory.
-    pub fn file(&self, directory: &Path, format: Format) -> PathBuf {
-        directory.join(format!("{}.{}", self.name, format.extension()))
+    pub fn file(&self, directory: &Path) -> PathBuf {
+        directory.join(format!("{}.{EXTENSION}", self.name))
     }
 }
 
@@ -242,7 +243,6 @@ mod tests {
     "probe": {"radius": 0.15, "spacing": 2.0, "speed": 10.0, "tilt": 10.0},
     "pose": false,
     "approaches": false,
-    "format": "text",
     "shard": "1/1"
   },
   "objects": [

@@ -1,7 +1,6 @@
 //! Touches in memory and on disk.
 //!
-//! A data set is a directory with one file per object: `<object>.txt`, one line per touch ([`text`]), or
-//! `<object>.parquet` (`parquet`). A directory that [`capture`](crate::capture) wrote also holds `dataset.json`, its
+//! A data set is a directory with one file per object: `<object>.txt`, one line per touch ([`text`]). A directory that [`capture`](crate::capture) wrote also holds `dataset.json`, its
 //! [`Listing`]: which objects there are, how many touches of each, their files' checksums, and how the touches were made
 //! ([`Origin`]). A directory without a listing is a data set too, and states nothing about its probe; it
 //! may also hold logs of robots (`<object>.mcap`, or of any objects that their messages name), and a log is a data set by
@@ -39,7 +38,6 @@ mod dataset;
 pub(crate) mod error;
 mod files;
 pub mod folds;
-mod format;
 mod listing;
 mod log;
 mod logged;
@@ -50,8 +48,6 @@ pub mod mcap;
 mod mcap;
 mod object;
 mod origin;
-#[cfg(feature = "parquet")]
-pub mod parquet;
 mod recording;
 mod save;
 mod seconds;
@@ -66,14 +62,11 @@ pub(crate) use checksum::checksum;
 pub use dataset::Dataset;
 pub(crate) use dataset::logs;
 pub(crate) use files::files;
-pub use format::Format;
 pub use listing::{Entry, Listing, Lying};
 pub use log::{Log, Logged, begins_log, is_log, read_touches};
 pub use logged::{Channels, Message};
 pub use object::{ObjectTouches, Pool, Source};
 pub use origin::Origin;
-#[cfg(feature = "parquet")]
-pub(crate) use parquet::table as parquet_table;
 pub use recording::{Recorded, Recording};
 pub use seconds::{located, touch_of_seconds};
 pub use shard::Shard;

@@ -1,6 +1,6 @@
 //! Origin of touches.
 
-use super::{Format, Shard, Surroundings};
+use super::{Shard, Surroundings};
 use crate::error::{Error, Result};
 use crate::mesh::{Instance, Object};
 use crate::probe::approach::{Aim, CLEARANCE, Probe};
@@ -45,8 +45,6 @@ pub struct Origin {
     pub within: Option<f64>,
     /// True if every approach is kept, not only full touches: sample i is then approach i.
     pub approaches: bool,
-    /// Format of the touches on the disk; Parquet keeps the pose in any case.
-    pub format: Format,
     /// The part of the samples that this data set holds.
     pub shard: Shard,
     /// Noise that the real probe added to each touch, as far as the touches were made as a real probe would make them.
@@ -68,7 +66,6 @@ impl Default for Origin {
             position: false,
             within: None,
             approaches: false,
-            format: Format::Text,
             shard: Shard::WHOLE,
             real: Noise::default(),
         }
@@ -92,9 +89,6 @@ impl Origin {
         if self.touches == 0 {
             let name = if self.approaches { "approaches" } else { "touches" };
             return Err(Error::setting(name, 0, "1 or more"));
-        }
-        if !self.format.is_built_in() {
-            return Err(Error::setting("format", self.format.name(), "text, or build with the feature parquet"));
         }
         self.real.check()?;
         self.check_position()?;
@@ -166,10 +160,5 @@ impl Origin {
     /// The samples of each object: the shard's part of all.
     pub(crate) fn samples(&self) -> Range<u64> {
         self.shard.part(self.touches)
-    }
-
-    /// True if the pose is written.
-    pub(crate) fn writes_pose(&self) -> bool {
-        self.pose || self.format == Format::Parquet
     }
 }

@@ -1,6 +1,6 @@
 //! A data set in memory, to the disk.
 
-use super::{Dataset, Entry, Format, Listing, Lying, ObjectTouches, Source, checksum, files, write_touch};
+use super::{Dataset, Entry, Listing, Lying, ObjectTouches, Source, checksum, files, write_touch};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
 use std::path::Path;
@@ -20,47 +20,41 @@ impl Dataset {
     /// # Errors
     /// [`TouchesProblem::HoldsFiles`] if the directory holds touches; [`TouchesProblem::Unsaid`] if an object has several
     /// instances or logs, and there would be no `dataset.json` to say so; when a file cannot be written.
-    pub fn write(&self, directory: &Path, format: Format, approaches: Option<&[u64]>) -> Result<()> {
-        if !format.is_built_in() {
-            return Err(Error::at(Place::file(directory), TouchesProblem::NoParquet));
-        }
+    pub fn write(&self, directory: &Path, approaches: Option<&[u64]>) -> Result<()> {
         std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, "make the directory", error))?;
         let there = files(directory)?;
-        let mut names: Vec<String> = there.iter().filter_map(|(_, path, _)| path.file_name()).map(lossy).collect();
+        let mut names: Vec<String> = there.iter().filter_map(|(_, path)| path.file_name()).map(lossy).collect();
         if Listing::path(directory).exists() {
             names.push(Listing::FILE.into());
         }
         if !names.is_empty() {
             return Err(Error::at(Place::file(directory), TouchesProblem::HoldsFiles { files: names }));
         }
-        let origin = self.origin.clone().map(|origin| super::Origin { format, ..origin });
+        let origin = &self.origin;
         let of_several = |object: &&ObjectTouches| object.sources().len() > 1;
-        if let (None, Some(several)) = (&origin, self.objects.iter().find(of_several)) {
+        if let (None, Some(several)) = (origin, self.objects.iter().find(of_several)) {
             let (name, sources) = (several.name.clone(), several.sources().len());
             return Err(Error::at(Place::file(directory), TouchesProblem::Unsaid { name, sources }));
         }
         if let Some(object) = self.objects.iter().find(|object| object.has_robots()) {
             return Err(Error::at(Place::file(directory), TouchesProblem::OfRobots { name: object.name.clone() }));
         }
-        let poses = origin.as_ref().is_none_or(super::Origin::writes_pose) || self.is_recorded();
+        let poses = origin.as_ref().is_none_or(|origin| origin.pose) || self.is_recorded();
         let mut listing = Listing::new(&origin.clone().unwrap_or_default(), self.names());
         listing.recorded = self.recorded();
         let first = origin.as_ref().map_or(0, |origin| origin.samples().start);
         for (index, (object, entry)) in self.objects.iter().zip(&mut listing.objects).enumerate() {
             let object = &arranged(object, first, entry);
-            let path = entry.file(directory, format);
-            match format {
-                Format::Text => output::write_whole(&path, |out| {
-                    let mut line = String::new();
-                    for touch in object.touches() {
-                        line.clear();
-                        write_touch(&mut line, touch, poses);
-                        out.write_all(line.as_bytes())?;
-                    }
-                    Ok(())
-                })?,
-                Format::Parquet => write_parquet(&path, &object.name, object.touches())?,
-            }
+            let path = entry.file(directory);
+            output::write_whole(&path, |out| {
+                let mut line = String::new();
+                for touch in object.touches() {
+                    line.clear();
+                    write_touch(&mut line, touch, poses);
+                    out.write_all(line.as_bytes())?;
+                }
+                Ok(())
+            })?;
             // A part is not told from the rest of its capture.
             let is_whole = origin.as_ref().is_some_and(|origin| {
                 let samples = origin.samples();
@@ -72,7 +66,7 @@ impl Dataset {
             entry.touches = object.len() as u64;
             entry.bytes = std::fs::metadata(&path).map_err(|error| Error::io(&path, "read the touches", error))?.len();
             entry.crc32 = Some(checksum(&path)?);
-            entry.approaches = match (approaches.and_then(|approaches| approaches.get(index)), &origin) {
+            entry.approaches = match (approaches.and_then(|approaches| approaches.get(index)), origin) {
                 (Some(&approaches), _) => approaches,
                 (None, Some(origin)) if origin.approaches => entry.touches,
                 (None, _) => 0,
@@ -123,21 +117,6 @@ fn lossy(name: &std::ffi::OsStr) -> String {
     name.to_string_lossy().into_owned()
 }
 
-#[cfg(feature = "parquet")]
-fn write_parquet(path: &Path, object: &str, touches: &[palpate_shared::Touch]) -> Result<()> {
-    let unfinished = path.with_extension("parquet.part");
-    let io = |error| Error::io(&unfinished, "write the touches", error);
-    let file = std::fs::File::create(&unfinished).map_err(io)?;
-    super::parquet::write(&unfinished, &file, object, touches.iter().copied().map(Ok))?;
-    file.sync_all().map_err(io)?;
-    std::fs::rename(&unfinished, path).map_err(io)
-}
-
-#[cfg(not(feature = "parquet"))]
-fn write_parquet(path: &Path, _: &str, _: &[palpate_shared::Touch]) -> Result<()> {
-    Err(Error::at(Place::file(path), TouchesProblem::NoParquet))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,12 +135,10 @@ mod tests {
     #[test]
     fn what_is_written_is_read_back() {
         let origin = Origin { touches: 3, approaches: true, pose: true, ..Origin::default() };
-        for format in Format::ALL.into_iter().filter(|format| format.is_built_in()) {
-            for origin in [None, Some(Origin { format, ..origin.clone() })] {
-                let (dataset, directory) = (dataset(origin), tempfile::tempdir().unwrap());
-                dataset.write(directory.path(), format, None).unwrap();
-                assert_eq!(Dataset::read(directory.path()).unwrap(), dataset);
-            }
+        for origin in [None, Some(origin)] {
+            let (dataset, directory) = (dataset(origin), tempfile::tempdir().unwrap());
+            dataset.write(directory.path(), None).unwrap();
+            assert_eq!(Dataset::read(directory.path()).unwrap(), dataset);
         }
     }
 
@@ -203,24 +180,21 @@ mod tests {
 
     #[test]
     fn a_copy_on_the_disk_knows_instances_and_recordings() {
-        for format in Format::ALL.into_iter().filter(|format| format.is_built_in()) {
-            let origin = Origin { touches: 31, format, ..Origin::default() };
-            for dataset in of_several(&origin) {
-                let folds::Split { train, test } = folds::split(&dataset, 0.3, 1).unwrap();
-                for (part, is_whole) in [(&dataset, true), (&train, false), (&test, false)] {
-                    let directory = tempfile::tempdir().unwrap();
-                    part.write(directory.path(), format, None).unwrap();
-                    let read = Dataset::read(directory.path()).unwrap();
-                    assert_eq!(by_source(&read), by_source(part));
-                    assert_eq!((read.recorded(), read.is_recorded()), (part.recorded(), part.is_recorded()));
-                    assert!(!is_whole || read == *part);
-                    // What a real probe made is never replaced.
-                    let settings = crate::capture::Settings { force: true, ..origin.clone().into() };
-                    let objects =
-                        ["cup", "vase"].map(|name| crate::mesh::Object::new(name, crate::mesh::Mesh::globe(6)));
-                    let again = crate::capture::capture(&objects, &settings, directory.path(), &());
-                    assert_eq!(again.is_err(), part.is_recorded(), "{again:?}");
-                }
+        let origin = Origin { touches: 31, ..Origin::default() };
+        for dataset in of_several(&origin) {
+            let folds::Split { train, test } = folds::split(&dataset, 0.3, 1).unwrap();
+            for (part, is_whole) in [(&dataset, true), (&train, false), (&test, false)] {
+                let directory = tempfile::tempdir().unwrap();
+                part.write(directory.path(), None).unwrap();
+                let read = Dataset::read(directory.path()).unwrap();
+                assert_eq!(by_source(&read), by_source(part));
+                assert_eq!((read.recorded(), read.is_recorded()), (part.recorded(), part.is_recorded()));
+                assert!(!is_whole || read == *part);
+                // What a real probe made is never replaced.
+                let settings = crate::capture::Settings { force: true, ..origin.clone().into() };
+                let objects = ["cup", "vase"].map(|name| crate::mesh::Object::new(name, crate::mesh::Mesh::globe(6)));
+                let again = crate::capture::capture(&objects, &settings, directory.path(), &());
+                assert_eq!(again.is_err(), part.is_recorded(), "{again:?}");
             }
         }
     }
@@ -231,7 +205,7 @@ mod tests {
         let [mut dataset, _] = of_several(&origin);
         dataset.add_noise(&Noise::gaussian(4_000.0), 1, 1);
         let directory = tempfile::tempdir().unwrap();
-        dataset.write(directory.path(), Format::Text, None).unwrap();
+        dataset.write(directory.path(), None).unwrap();
         assert_eq!(Dataset::read(directory.path()).unwrap().real(), Noise::gaussian(5_000.0));
     }
 
@@ -239,11 +213,10 @@ mod tests {
     fn what_no_listing_could_say_is_not_written() {
         let [instances, _] = of_several(&Origin::default());
         let directory = tempfile::tempdir().unwrap();
-        let refused =
-            |dataset: &Dataset| match dataset.write(directory.path(), Format::Text, None).unwrap_err().problem() {
-                Some(problem) => TouchesProblem::clone(problem),
-                other => panic!("{other:?}"),
-            };
+        let refused = |dataset: &Dataset| match dataset.write(directory.path(), None).unwrap_err().problem() {
+            Some(problem) => TouchesProblem::clone(problem),
+            other => panic!("{other:?}"),
+        };
         let unknown = Dataset { origin: None, ..instances.clone() };
         assert_eq!(refused(&unknown), TouchesProblem::Unsaid { name: "cup".into(), sources: 2 });
         let mut robots = instances;
@@ -256,7 +229,7 @@ mod tests {
     fn nothing_is_written_over_touches_that_are_there() {
         let directory = tempfile::tempdir().unwrap();
         std::fs::write(directory.path().join("spoon.txt"), "0 0 0\n").unwrap();
-        let error = dataset(None).write(directory.path(), Format::Text, None).unwrap_err();
+        let error = dataset(None).write(directory.path(), None).unwrap_err();
         let holds = TouchesProblem::HoldsFiles { files: vec!["spoon.txt".into()] };
         assert_eq!(error.problem::<TouchesProblem>(), Some(&holds));
         assert!(!directory.path().join("cup.txt").exists());

@@ -38,18 +38,6 @@ pub fn touches(mut text: impl BufRead, path: &Path) -> impl Iterator<Item = Resu
     })
 }
 
-/// The touches in a text file, one after the other.
-///
-/// # Errors
-/// When the file cannot be opened; then each line that is wrong.
-pub fn lines(path: &Path) -> Result<impl Iterator<Item = Result<Touch>>> {
-    Ok(touches(BufReader::with_capacity(1 << 16, open(path)?), path))
-}
-
-fn open(path: &Path) -> Result<File> {
-    File::open(path).map_err(|source| Error::io(path, "read the touches", source))
-}
-
 /// Reads the touches of one text file; blank lines are skipped.
 ///
 /// # Errors
@@ -60,7 +48,8 @@ pub fn read(path: &Path) -> Result<Vec<Touch>> {
 
 /// Reads the touches, and the file's checksum.
 pub(super) fn read_with_checksum(path: &Path) -> Result<(Vec<Touch>, u32)> {
-    let mut text = BufReader::with_capacity(1 << 16, Checked::new(open(path)?));
+    let file = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
+    let mut text = BufReader::with_capacity(1 << 16, Checked::new(file));
     let touches = touches(&mut text, path).collect::<Result<Vec<_>>>()?;
     if touches.is_empty() {
         return Err(Error::at(Place::file(path), TouchesProblem::NoTouches));

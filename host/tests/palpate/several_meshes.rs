@@ -204,7 +204,7 @@ fn figures_of_a_part_of_the_touches_are_those_of_fresh_ones() {
     let directory = tempfile::tempdir().unwrap();
     let origin = palpate::touches::Origin { approaches: true, ..Default::default() };
     let stated = Dataset { origin: Some(origin), ..test };
-    stated.write(directory.path(), palpate::touches::Format::Text, None).unwrap();
+    stated.write(directory.path(), None).unwrap();
     agree("a copy", measured(candidate, &Dataset::read(directory.path()).unwrap()), fresh);
     // With noise too, whose robots differ.
     let noise = with!(Noise::gaussian(5_000.0), speed_bias = 0.1);

@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 /// Set a model's thresholds so that it keeps a promised error rate, and uses it up.
 #[derive(clap::Args)]
 #[command(after_help = "\
-The promise holds for touches like those of DIR, which the model was not trained on, or with --recorded for touches like the recorded ones. A sequence without a name is neither right nor wrong. For a model of maps, the promise holds for approaches to the meshes on a simulated table, with the noise of the model and of --real. With --plan, DIR holds approaches with a pose. For a model over rows, DIR is a CSV or Parquet file: rows of a sequence may depend on each other, but sequences (with --group-column, groups) must not. Calibrate once. Where several seeds, rates or models are tried on the same data, the one that looks best keeps its promise less often than stated. docs/reference/options.md has the method.
+The promise holds for touches like those of DIR, which the model was not trained on, or with --recorded for touches like the recorded ones. A sequence without a name is neither right nor wrong. For a model of maps, the promise holds for approaches to the meshes on a simulated table, with the noise of the model and of --real. With --plan, DIR holds approaches with a pose. For a model over rows, DIR is a CSV file: rows of a sequence may depend on each other, but sequences (with --group-column, groups) must not. Calibrate once. Where several seeds, rates or models are tried on the same data, the one that looks best keeps its promise less often than stated. docs/reference/options.md has the method.
 
 Examples:
   palpate capture builtin -o fresh --approaches 100000 --seed 3

@@ -9,7 +9,7 @@ use palpate::mesh::BACKGROUND;
 use palpate::mesh::facts::Facts;
 use palpate::output;
 use palpate::probe::approach::Aim;
-use palpate::touches::{Format, Listing, Origin, Shard};
+use palpate::touches::{Listing, Origin, Shard};
 use palpate::with;
 use palpate::wording::{count, decimal};
 use palpate::{Error, Result};
@@ -65,9 +65,6 @@ pub(crate) struct Arguments {
     /// With --position: aims at most so far from the object's middle in x and y [default: its box and 5 mm about it]
     #[arg(long, value_name = "MM")]
     within: Option<f64>,
-    /// Format: text or parquet [default: text]
-    #[arg(long, value_name = "KIND", value_parser = parsed::<Format>)]
-    format: Option<Format>,
     /// Capture the K-th of N parts only [default: 1/1]
     #[arg(long, value_name = "K/N", value_parser = parsed::<Shard>)]
     shard: Option<Shard>,
@@ -178,7 +175,6 @@ impl Arguments {
             position,
             within: self.within.or(base.within),
             approaches: self.approaches.is_some() || base.approaches || position,
-            format: self.format.unwrap_or(base.format),
             shard: self.shard.unwrap_or(base.shard),
             real: self.size.probe.read()?.map_or(base.real, |file| file.real),
             ..base

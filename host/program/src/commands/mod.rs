@@ -46,7 +46,7 @@ mod view;
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use palpate::error::{CaptureProblem, EvaluateProblem, Foreign, MeshProblem, Place, Setting, TouchesProblem};
-use palpate::touches::{Dataset, Format, Listing, Log, Warning};
+use palpate::touches::{Dataset, Listing, Log, Warning};
 use palpate::{Error, Result, output};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -467,9 +467,7 @@ fn files_of(directory: &Path) -> Vec<PathBuf> {
     }
     let is_touches = |path: &PathBuf| {
         let extension = path.extension().unwrap_or_default();
-        path.file_name().is_some_and(|name| name == Listing::FILE)
-            || extension == Log::EXTENSION
-            || Format::ALL.iter().any(|format| extension == format.extension())
+        path.file_name().is_some_and(|name| name == Listing::FILE) || extension == Log::EXTENSION || extension == "txt"
     };
     let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
     entries.map(|entry| entry.path()).filter(is_touches).collect()

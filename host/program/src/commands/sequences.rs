@@ -58,7 +58,7 @@ pub(crate) fn read(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>
 
 /// Reads sequences of these classes.
 fn read_of(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'_>, classes: &[String]) -> Result<Sequences> {
-    let sequences = stream::read(path, Features::measured(model), columns, classes)?;
+    let sequences = Sequences::read(path, Features::measured(model), columns, classes)?;
     super::rows::say_by_position(path, sequences.by_position);
     Ok(sequences)
 }

@@ -107,7 +107,7 @@ fn wrong_arguments_are_refused_by_name_and_nothing_is_left_behind() {
         (capture, "--approaches 0", 2, "--approaches is 0. Use 1 or more."),
         (capture, "--touches 1e6", 2, "write the number out: 1000000"),
         (capture, "--sed 1", 2, "--sed"),
-        (capture, "--format csv", 2, "\"csv\" is not a format of touches. Use text or parquet."),
+        (capture, "--format parquet", 2, "`--format` was removed: data sets are text; DataSet.to_pandas() in Python"),
         (capture, "--shard 3/2", 2, "Give K/N with K from 1 to N, like 2/5."),
         (capture, "--cone 30", 2, "--scene table"),
         (capture, "--placements globe/+z=1", 2, "--scene table"),

@@ -172,7 +172,7 @@ pub(crate) fn boxes(directory: &Path) {
 pub(crate) static TABLE: Fixture = Fixture::new(|at| {
     boxes(at);
     for (name, seed, count) in [("data", 1, 2_000), ("robot", 2, 600), ("fresh", 3, 4_000)] {
-        let scene = "--scene table --pose --format text";
+        let scene = "--scene table --pose";
         succeeds(at, &format!("capture meshes -o {name} {scene} --approaches {count} --seed {seed}"));
     }
     succeeds(at, "train data -o e.json --descriptor gravity --evidence all --trees rounds=8,leaf_bits=16");

@@ -44,6 +44,7 @@ ATTEMPTS = 3
 """The largest number of times that a shard is submitted."""
 
 Format = Literal["text", "parquet"]
+"""Parquet is written beside the text."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +164,7 @@ def capture(
     aim: str = "box",
     length: float = 10.0,
     millimeters: float | None = None,
-    format: Format = "parquet",
+    format: Format = "text",
     touches_per_shard: int = 100_000,
     progress: Progress | None = None,
 ) -> Summary:
@@ -175,7 +176,8 @@ def capture(
     kills its worker each time, or whose mesh is refused, is named in the summary, and the others finish.
 
     The other arguments are those of `palpate.capture`. Afterwards `out` holds what `palpate capture` would have written:
-    `<object>.parquet` (or `.txt`) for each object and, if none was refused, `dataset.json`.
+    `<object>.txt` for each object and, if none was refused, `dataset.json`. The format "parquet" adds `<object>.parquet`, the
+    table of `DataSet.to_pandas`, for `train` and others; it needs pandas and pyarrow here and on the workers.
     """
     import distributed
 
@@ -189,8 +191,7 @@ def capture(
         "seed": seed,
         "probe": probe,
         "approaches": approaches,
-        # Parquet has the pose in any case.
-        "pose": pose or format == "parquet",
+        "pose": pose,
         "aim": aim,
         "length": length,
         "millimeters": millimeters,
@@ -237,7 +238,7 @@ def capture(
     whole = [shards for name, shards in objects.items() if name not in lacking]
     entries = _join(client, whole, format, progress)
     if not lacking:
-        settings = {**json.loads(entries[0]["settings"]), "pose": pose, "format": format, "shard": "1/1"}
+        settings = {**json.loads(entries[0]["settings"]), "shard": "1/1"}
         listing = {
             "palpate": entries[0]["palpate"],
             "complete": True,
@@ -374,14 +375,12 @@ def _put_together(shards: list[_Job], format: Format) -> dict[str, str]:
         pieces.append(piece)
         records.append(record)
     content = b"".join(pieces)
+    store.write(f"{name}.txt", content)
     if format == "parquet":
         with tempfile.TemporaryDirectory() as directory:
-            text, table = Path(directory) / "text", Path(directory) / "table"
-            text.mkdir()
-            (text / f"{name}.txt").write_bytes(content)
-            DataSet.read(text).to_parquet(table)
-            content = (table / f"{name}.parquet").read_bytes()
-    store.write(f"{name}.{'txt' if format == 'text' else 'parquet'}", content)
+            (Path(directory) / f"{name}.txt").write_bytes(content)
+            table = DataSet.read(directory).to_pandas().astype({"object": str})
+        store.write(f"{name}.parquet", table.to_parquet(index=False))
     entry = json.loads(records[0]["entry"])
     for field_ in ("touches", "approaches"):
         entry[field_] = sum(json.loads(record["entry"])[field_] for record in records)
@@ -397,7 +396,7 @@ def train(
     rounds: int = 30,
     parameters: Mapping[str, object] | None = None,
 ) -> Ensemble:
-    """Trains XGBoost over the cluster on full touches that `capture` wrote as Parquet, and imports its model.
+    """Trains XGBoost over the cluster on full touches that `capture` wrote as Parquet too, and imports its model.
 
     The settings are those of the published method unless `parameters` say otherwise, by XGBoost's names; every object is
     weighted equally. Trees depend on how XGBoost divides the data among workers: they may differ from those of one machine,
@@ -415,7 +414,8 @@ def train(
     names = [entry["name"] for entry in listing["objects"]]
     weights = {entry["name"]: 1.0 / entry["touches"] for entry in listing["objects"]}
     mean = sum(entry["touches"] for entry in listing["objects"]) / len(names)
-    columns = ["t1", "t2", "t3", "direction", "alignment"]
+    poses = [f"{vector}_{axis}" for vector in ("direction", "alignment") for axis in "xyz"]
+    columns = ["t1", "t2", "t3", *(poses if listing["settings"]["pose"] else [])]
     count = len(_features(pd.DataFrame({name: [] for name in columns}), descriptor).columns)
 
     def rows(table: Any) -> Any:
@@ -446,26 +446,13 @@ def train(
 
 def _features(table: Any, descriptor: str) -> Any:
     """The features of a table's touches, by the code that runs on the chip."""
-    import numpy as np
     import pandas as pd
 
-    def vectors(name: str) -> Any:
-        if table[name].isna().all():
-            return None
-        return np.stack([np.full(3, np.nan) if vector is None else vector for vector in table[name]])
-
     if len(table) == 0:
-        data = DataSet.from_arrays([[0.0, 0.0, 0.0]], [0], ["x"])
-        features = data.features(descriptor)[:0]
+        features = DataSet.from_arrays([[0.0, 0.0, 0.0]], [0], ["x"]).features(descriptor)[:0]
     else:
-        data = DataSet.from_arrays(
-            table[["t1", "t2", "t3"]].to_numpy("f8"),
-            np.zeros(len(table), "i8"),
-            ["x"],
-            direction=vectors("direction"),
-            alignment=vectors("alignment"),
-        )
-        features = data.features(descriptor)
+        # As those of one object, whose rows keep their order.
+        features = DataSet.from_pandas(table.assign(object="x")).features(descriptor)
     return pd.DataFrame(features, columns=[f"f{i}" for i in range(features.shape[1])], index=table.index)
 
 
@@ -484,8 +471,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--touches", type=int, default=21_000, help="touches of each object (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="the seed of all that is random (default: %(default)s)")
     parser.add_argument("--approaches", action="store_true", help="keep every approach, also those that miss")
-    parser.add_argument("--pose", action="store_true", help="keep the probe's direction and alignment (Parquet always does)")
-    parser.add_argument("--format", choices=["text", "parquet"], default="parquet", help="default: %(default)s")
+    parser.add_argument("--pose", action="store_true", help="keep the probe's direction and alignment")
+    parser.add_argument("--format", choices=["text", "parquet"], default="text", help="parquet: tables beside the text")
     parser.add_argument("--touches-per-shard", type=int, default=100_000, help="default: %(default)s")
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--scheduler", metavar="ADDRESS", help="the scheduler of a cluster that runs")

@@ -7,10 +7,10 @@ mod summary;
 
 pub use summary::{ObjectSummary, Quantiles, Summary};
 
-use super::checksum::{Checked, checksum};
+use super::checksum::Checked;
 use super::dataset::name_of;
 use super::warning::channels_said;
-use super::{Entry, Format, Listing, Log, Origin, Warning, is_log, logs, text};
+use super::{Entry, Listing, Log, Origin, Warning, is_log, logs, text};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
@@ -123,25 +123,19 @@ fn listed(directory: &Path, listing: Listing, findings: &mut Findings) -> Result
     if !listing.complete {
         findings.problem(directory, TouchesProblem::Incomplete);
     }
-    let format = listing.origin.format;
     let mut objects = Vec::new();
     for Entry { name, touches: stated, approaches, crc32, .. } in listing.objects {
-        let path = directory.join(format!("{name}.{}", format.extension()));
+        let path = directory.join(format!("{name}.{}", super::files::EXTENSION));
         if !path.exists() {
             findings.problem(&path, TouchesProblem::Missing { name });
             continue;
         }
         let before = findings.0.len();
-        let (touches, found) = read(&path, format, findings)?;
+        let (touches, found) = read(&path, findings)?;
         if findings.0.len() == before && touches.len() as u64 != stated {
             findings.problem(&path, TouchesProblem::OtherCount { stated, found: touches.len() as u64 });
         } else if crc32.is_some_and(|stated| stated != found) {
-            match format {
-                Format::Parquet => findings.problem(&path, TouchesProblem::OtherChecksum),
-                Format::Text => {
-                    findings.note(&path, "changed since its capture", "Capture it again if that is not meant.")
-                }
-            }
+            findings.note(&path, "changed since its capture", "Capture it again if that is not meant.");
         }
         objects.push(Read { name, path, touches, approaches: Some(approaches), is_logged: false });
     }
@@ -149,12 +143,12 @@ fn listed(directory: &Path, listing: Listing, findings: &mut Findings) -> Result
         let what = format!("a log, which is not read beside {}", Listing::FILE);
         findings.note(&path, &what, "Record its touches with `palpate data record`, or move it away.");
     }
-    for (name, path, _) in super::files(directory)? {
+    for (name, path) in super::files(directory)? {
         if !objects.iter().any(|object| object.path == path)
             && !findings.0.iter().any(|finding| finding.is_about(&path))
         {
             let what = format!("the object {name} is not listed in {}, so it is not read", Listing::FILE);
-            findings.note(&path, &what, "Capture it with --add, or remove the file.");
+            findings.note(&path, &what, "Capture all objects together, or remove the file.");
         }
     }
     Ok(objects)
@@ -164,17 +158,12 @@ fn listed(directory: &Path, listing: Listing, findings: &mut Findings) -> Result
 fn found(directory: &Path, findings: &mut Findings) -> Result<Vec<Read>> {
     let mut objects: Vec<Read> = Vec::new();
     let mut logs = logs(directory)?;
-    for (name, path, format) in super::files(directory)? {
+    for (name, path) in super::files(directory)? {
         if is_log(&path) {
             logs.push(path);
             continue;
         }
-        if let Some(other) = objects.iter().find(|object| object.name == name) {
-            let (file, other) = (path, other.path.clone());
-            findings.problem(directory, TouchesProblem::TwoFiles { name, file, other });
-            continue;
-        }
-        let (touches, _) = read(&path, format, findings)?;
+        let (touches, _) = read(&path, findings)?;
         objects.push(Read { name, path, touches, approaches: None, is_logged: false });
     }
     logs.sort();
@@ -220,18 +209,7 @@ fn logged(path: &Path, objects: &mut Vec<Read>, findings: &mut Findings) -> Resu
 }
 
 /// The touches of a file that can be read, and the file's checksum.
-fn read(path: &Path, format: Format, findings: &mut Findings) -> Result<(Vec<Touch>, u32)> {
-    if format == Format::Parquet {
-        let touches = match format.read(path) {
-            Err(error @ Error::Io { .. }) => return Err(error),
-            Err(error) => {
-                findings.error(error);
-                Vec::new()
-            }
-            Ok(touches) => touches,
-        };
-        return Ok((touches, checksum(path)?));
-    }
+fn read(path: &Path, findings: &mut Findings) -> Result<(Vec<Touch>, u32)> {
     let file = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
     let mut reader = BufReader::with_capacity(1 << 16, Checked::new(file));
     let (mut touches, mut wrong) = (Vec::new(), 0);

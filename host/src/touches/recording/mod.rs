@@ -11,7 +11,7 @@ mod tests;
 use super::checksum::CRC;
 use super::files::files;
 use super::listing::is_file_name;
-use super::{Entry, Format, Listing, Origin, Warning, text, write_touch};
+use super::{Entry, Listing, Origin, Warning, text, write_touch};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
 use crc::{Digest, Table};
@@ -107,7 +107,7 @@ impl Recording {
         let listing = match Listing::read(directory)? {
             Some(listing) => admit(listing, origin).map_err(wrong)?,
             None => {
-                let names = |(_, path, _): &(_, PathBuf, _)| path.file_name().map(|name| name.display().to_string());
+                let names = |(_, path): &(_, PathBuf)| path.file_name().map(|name| name.display().to_string());
                 let files: Vec<String> = files(directory)?.iter().filter_map(names).collect();
                 if !files.is_empty() {
                     return Err(wrong(TouchesProblem::Unlisted { files: files.join(", ") }));
@@ -116,7 +116,7 @@ impl Recording {
                 Listing { complete: true, ..Listing::new(&origin.cloned().unwrap_or_else(usual), []) }
             }
         };
-        let path = Entry { name: object.into(), ..Entry::default() }.file(directory, Format::Text);
+        let path = Entry { name: object.into(), ..Entry::default() }.file(directory);
         let is_listed = listing.objects.iter().any(|entry| entry.name == object);
         if !is_listed && path.metadata().is_ok_and(|there| there.len() > 0) {
             let files = path.file_name().unwrap_or_default().display().to_string();
@@ -332,10 +332,7 @@ fn admit(listing: Listing, origin: Option<&Origin>) -> Result<Listing, TouchesPr
         let (objects, touches) = (listing.names().join(", "), listing.objects.iter().map(|entry| entry.touches).sum());
         return Err(TouchesProblem::HoldsSimulated { objects, touches });
     }
-    let mut differences = origin.map_or_else(Vec::new, |origin| differences(&listing.origin, origin));
-    if listing.origin.format != Format::Text {
-        differences.push(format!("format is {} there and text here", listing.origin.format.name()));
-    }
+    let differences = origin.map_or_else(Vec::new, |origin| differences(&listing.origin, origin));
     match differences.is_empty() {
         true => Ok(listing),
         false => Err(TouchesProblem::OtherRecording { differences: differences.join(", ") }),

@@ -19,12 +19,9 @@ pub enum RowsProblem {
         /// The parser's message.
         detail: String,
     },
-    /// The file is no table in another format than CSV.
-    #[error("not rows of features: {detail}")]
-    NotTable {
-        /// The reader's message.
-        detail: String,
-    },
+    /// The file is Parquet.
+    #[error("not rows of features as CSV: it is a Parquet file")]
+    Parquet,
     /// There is no row.
     #[error("it has no rows")]
     Empty,
@@ -281,7 +278,7 @@ impl Problem for RowsProblem {
     fn fix(&self) -> String {
         match self {
             Self::NotRows { .. } => "Give a header line with the features' names, then one row per line.",
-            Self::NotTable { .. } => "Give a Parquet file with a column for each feature, numbers or text.",
+            Self::Parquet => return format!("Instead, {}.", palpate_base::gone::instead(".parquet").unwrap_or_default()),
             Self::Empty => "Give at least one row below the header.",
             Self::Columns { .. } => {
                 "Name the columns as the features (`palpate inspect` lists them), or give as many columns as features, in their order."

@@ -100,9 +100,7 @@ impl Table {
             csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
                 RowsProblem::Ragged { found: *len, wanted: *expected_len }
             }
-            csv::ErrorKind::Utf8 { .. } if self.bytes.starts_with(b"PAR1") => {
-                RowsProblem::NotRows { detail: "it is a Parquet file".into() }
-            }
+            csv::ErrorKind::Utf8 { .. } if self.bytes.starts_with(b"PAR1") => RowsProblem::Parquet,
             csv::ErrorKind::Utf8 { .. } => RowsProblem::NotRows { detail: "it is not UTF-8".into() },
             _ => RowsProblem::NotRows { detail: error.to_string() },
         };
