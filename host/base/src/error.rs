@@ -85,17 +85,6 @@ impl Problem for Setting {
     }
 }
 
-/// A file is where another one is to be written, and Palpate did not write it.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a file is there already that Palpate did not write, and it is not replaced")]
-pub struct Foreign;
-
-impl Problem for Foreign {
-    fn fix(&self) -> String {
-        "Give another path, or move that file away.".into()
-    }
-}
-
 /// An error: where it is, what is wrong, what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {

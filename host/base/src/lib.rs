@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | [`error`] | one error, with any crate's problem, its place and its fix | [`error::Error`] |
 //! | [`gone`] | what earlier versions had, and what to use instead | [`gone::instead`] |
-//! | [`output`] | files that appear whole or not at all | [`output::write_whole`] |
+//! | [`output`] | files and directories that appear whole or not at all | [`output::write_whole`] |
 //! | [`progress`] | progress of long calls, and a way to cancel them | [`progress::Progress`] |
 //! | [`wording`] | numbers as people read them | [`wording::decimal`] |
 //!

@@ -1,9 +1,8 @@
-//! Files that appear whole or not at all, and replace nothing that Palpate did not write.
+//! Files and directories that appear whole or not at all.
 
-use crate::error::{Error, Foreign, Place, Result};
-use palpate_shared::format::MAGIC;
+use crate::error::{Error, Result};
 use std::fs::{File, TryLockError};
-use std::io::{BufWriter, ErrorKind, Read, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -88,118 +87,16 @@ pub fn is_stdout(path: &Path) -> bool {
     ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|stdout| path == Path::new(stdout))
 }
 
-/// True if files that Palpate did not write are replaced.
-static REPLACES_FOREIGN: AtomicBool = AtomicBool::new(false);
-
-/// Lets files be replaced that Palpate did not write, or not: for the whole process, as a program's option `--force` does.
-pub fn replace_foreign(replaces: bool) {
-    REPLACES_FOREIGN.store(replaces, Ordering::Relaxed);
-}
-
-/// Beginnings of files that Palpate writes.
-const BEGINNINGS: [&[u8]; 10] = [
-    // A compiled model, and the header that reads it in C.
-    &MAGIC,
-    b"/* palpate.h: recognize objects by touch",
-    // A certificate, a probe file, a mesh.
-    b"palpate certificate ",
-    b"# Found by `palpate probe ",
-    b"# Written by Palpate.",
-    // A page; those of versions up to 0.3.
-    b"<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"generator\" content=\"Palpate ",
-    b"<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, \
-      initial-scale=1\"><meta name=\"color-scheme\" content=\"light dark\"><meta http-equiv=\"Content-Security-Policy\" \
-      content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'",
-    // The listing of a data set, the summary of a run or of a report, a journal.
-    b"{\n  \"palpate\": \"",
-    b"{\n  \"made_from\": {",
-    b"{\"is\":\"",
-];
-
-/// Beginnings of files of which other programs write the same, and what only those of Palpate have soon after.
-const WITH_MARKS: [(&[u8], &[u8], usize); 3] = [
-    // An ensemble as XGBoost's JSON.
-    (b"{\"learner\":{\"attributes\":{", b"\"palpate_objects\":", HEAD),
-    // A log, and a picture.
-    (b"\x89MCAP0\r\n", b"palpate ", 64),
-    (b"\x89PNG\r\n", b"Software\0Palpate", 128),
-];
-
-/// Words in one of the first two lines of source code.
-const IN_SOURCE: &[u8] = b"Written by `palpate export`; not to be edited.";
-
-/// Number of bytes that are looked at.
-const HEAD: usize = 1 << 16;
-
-/// True if a file that starts with `head` is one of Palpate's.
-fn is_own(head: &[u8]) -> bool {
-    let has = |bytes: &[u8], mark: &[u8]| bytes.windows(mark.len()).any(|part| part == mark);
-    BEGINNINGS.iter().any(|beginning| head.starts_with(beginning))
-        || WITH_MARKS
-            .iter()
-            .any(|(beginning, mark, within)| head.starts_with(beginning) && has(&head[..head.len().min(*within)], mark))
-        || head.split(|&byte| byte == b'\n').take(2).any(|line| has(line, IN_SOURCE))
-}
-
-/// Refuses to replace a file that Palpate did not write, unless [`replace_foreign`] allows it: its first bytes say who wrote
-/// it. An empty file is nobody's.
-///
-/// # Errors
-/// [`Foreign`] naming `path`, or [`Error::Io`].
-pub fn refuse_foreign(path: &Path) -> Result<()> {
-    refuse_unless(path, is_own)
-}
-
-/// Refuses to replace a file by `bytes`, of a format that has no room for a mark of Palpate's, unless its first line is the
-/// same or [`replace_foreign`] allows it.
-///
-/// # Errors
-/// Errors of [`refuse_foreign`].
-pub fn refuse_unlike(path: &Path, bytes: &[u8]) -> Result<()> {
-    let line = |bytes: &[u8]| bytes.split(|&byte| byte == b'\n').next().unwrap_or_default().to_vec();
-    refuse_unless(path, |head| line(head) == line(bytes))
-}
-
-fn refuse_unless(path: &Path, is_own: impl Fn(&[u8]) -> bool) -> Result<()> {
-    let io = |source| Error::io(path, "read what is there", source);
-    if REPLACES_FOREIGN.load(Ordering::Relaxed) {
-        return Ok(());
-    }
-    let Ok(Target::File(file)) = target(path) else { return Ok(()) };
-    let mut head = Vec::new();
-    match File::open(file) {
-        Ok(file) if file.metadata().map_err(io)?.is_file() => {
-            file.take(HEAD as u64).read_to_end(&mut head).map_err(io)?;
-        }
-        // A directory is refused where it is written to.
-        Ok(_) => return Ok(()),
-        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => return Ok(()),
-        Err(error) => return Err(io(error)),
-    }
-    if head.is_empty() || is_own(&head) { Ok(()) } else { Err(Error::at(Place::file(path), Foreign)) }
-}
-
 /// Writes `path` through `fill`: to a temporary name beside it, flushed to the disk, then renamed, so that neither an
 /// error nor a power cut leaves a half-written file, and an older file stays until the new one is complete. Missing
-/// directories above it are made. A file that Palpate did not write is [not replaced](refuse_foreign).
+/// directories above it are made.
 ///
 /// A symbolic link stays one: what it leads to is written. Devices and pipes are written directly, and `-` is standard
 /// output.
 ///
 /// # Errors
-/// Errors of `fill`; [`Error::Io`] naming `path`; [`Foreign`]; [`Error::Closed`] if the reader of standard output went
-/// away.
+/// Errors of `fill`; [`Error::Io`] naming `path`; [`Error::Closed`] if the reader of standard output went away.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
-    refuse_foreign(path)?;
-    replace_whole(path, fill)
-}
-
-/// Writes `path` as [`write_whole`] does, whoever wrote what is there: for a file that is known to be Palpate's, such as one
-/// that another file of Palpate's names.
-///
-/// # Errors
-/// Errors of [`write_whole`], except [`Foreign`].
-pub fn replace_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let io = |source| Error::io(path, "write", source);
     match target(path).map_err(io)? {
         Target::Stdout => {
@@ -234,27 +131,81 @@ fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>
     Ok(())
 }
 
-/// Refuses to write onto what is being read: the file `output` must be none of the `inputs`.
+/// A directory that is written beside its place, and appears there as a whole. What is dropped unfinished is removed.
+pub struct Folder {
+    unfinished: tempfile::TempDir,
+    place: PathBuf,
+}
+
+impl Folder {
+    /// Begins what is to become the directory `place`; missing directories above it are made.
+    ///
+    /// # Errors
+    /// [`Setting`](crate::error::Setting), `output`, if the program runs in that directory; [`Error::Io`] naming it.
+    pub fn begin(place: &Path) -> Result<Self> {
+        let io = |error| Error::io(place, "make the directory", error);
+        // A symbolic link stays one.
+        let place = match place.canonicalize() {
+            Err(error) if error.kind() == ErrorKind::NotFound => place.to_owned(),
+            place => place.map_err(io)?,
+        };
+        if std::env::current_dir().is_ok_and(|current| current.starts_with(&place)) {
+            return Err(Error::setting("output", place.display(), "another directory than the current one"));
+        }
+        let parent = directory_of(&place);
+        std::fs::create_dir_all(parent).map_err(io)?;
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o777));
+        }
+        let unfinished = builder.prefix(PREFIX).suffix(".unfinished").tempdir_in(parent).map_err(io)?;
+        Ok(Self { unfinished, place })
+    }
+
+    /// Its path until it is finished.
+    pub fn path(&self) -> &Path {
+        self.unfinished.path()
+    }
+
+    /// Puts the directory in its place. Of one that is there, these files are removed, and others stay.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the directory.
+    pub fn finish(self, replaced: &[String]) -> Result<()> {
+        let Self { unfinished, place } = self;
+        let put = || {
+            if place.is_dir() {
+                for entry in std::fs::read_dir(&place)? {
+                    let (name, path) = entry.map(|entry| (entry.file_name(), entry.path()))?;
+                    let moved = unfinished.path().join(&name);
+                    if !replaced.iter().any(|own| name == own.as_str()) && !moved.exists() {
+                        std::fs::rename(path, moved)?;
+                    }
+                }
+                std::fs::remove_dir_all(&place)?;
+            }
+            std::fs::rename(unfinished.path(), &place)
+        };
+        put().map_err(|error| Error::io(&place, "put the directory in its place", error))?;
+        // There is nothing left to remove.
+        _ = unfinished.keep();
+        Ok(())
+    }
+}
+
+/// Refuses to write onto what is being read, before any work is done: the file `output` must be none of the `inputs`.
 ///
 /// # Errors
 /// [`Setting`](crate::error::Setting), `output`.
-pub fn refuse_input<P: AsRef<Path>>(output: &Path, inputs: impl IntoIterator<Item = P>) -> Result<()> {
+pub fn admit<P: AsRef<Path>>(output: &Path, inputs: impl IntoIterator<Item = P>) -> Result<()> {
     let Ok(written) = output.canonicalize() else { return Ok(()) };
     let is_written = |input: P| written.is_file() && input.as_ref().canonicalize().is_ok_and(|input| input == written);
     if inputs.into_iter().any(is_written) {
         return Err(Error::setting("output", output.display(), "another file than what is read"));
     }
     Ok(())
-}
-
-/// Refuses an output before any work is done: what is being read, as [`refuse_input`] does, and what Palpate did not write, as
-/// [`refuse_foreign`] does.
-///
-/// # Errors
-/// Errors of both.
-pub fn admit<P: AsRef<Path>>(output: &Path, inputs: impl IntoIterator<Item = P>) -> Result<()> {
-    refuse_input(output, inputs)?;
-    refuse_foreign(output)
 }
 
 /// Refuses `-` where a directory belongs.
@@ -276,35 +227,15 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write_whole(path, |out| out.write_all(bytes))
 }
 
-/// Writes `bytes`, of a format that has no room for a mark of Palpate's, to `path` as [`write_whole`] does. What is there is
-/// replaced if its first line is the same.
-///
-/// # Errors
-/// Errors of [`write_whole`].
-pub fn write_unmarked(path: &Path, bytes: &[u8]) -> Result<()> {
-    refuse_unlike(path, bytes)?;
-    replace_whole(path, |out| out.write_all(bytes))
-}
-
 /// Writes `value` to `path` as indented JSON with a final newline, as [`write_whole`] does.
 ///
 /// # Errors
 /// Errors of [`write_whole`].
 pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
-    write_whole(path, |out| fill_json(out, value))
-}
-
-/// Writes `value` to `path` as [`write_json`] does, and replaces what is there as [`replace_whole`] does.
-///
-/// # Errors
-/// Errors of [`replace_whole`].
-pub fn replace_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
-    replace_whole(path, |out| fill_json(out, value))
-}
-
-fn fill_json(mut out: &mut dyn Write, value: &impl serde::Serialize) -> std::io::Result<()> {
-    serde_json::to_writer_pretty(&mut out, value)?;
-    out.write_all(b"\n")
+    write_whole(path, |mut out| {
+        serde_json::to_writer_pretty(&mut out, value)?;
+        out.write_all(b"\n")
+    })
 }
 
 /// Prints to standard output; a reader that went away is [`Error::Closed`].
@@ -384,59 +315,15 @@ mod tests {
     fn an_error_while_writing_keeps_the_old_file_and_leaves_no_other() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("new/model.palpate");
-        write_bytes(&path, &MAGIC).unwrap();
+        write_bytes(&path, b"old").unwrap();
         let error = write_whole(&path, |out| {
             out.write_all(b"half")?;
             Err(std::io::Error::from(std::io::ErrorKind::StorageFull))
         })
         .unwrap_err();
         assert!(error.to_string().contains("model.palpate: cannot write"), "{error}");
-        assert_eq!(std::fs::read(&path).unwrap(), MAGIC);
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
         assert_eq!(std::fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
-    }
-
-    #[test]
-    fn what_palpate_did_not_write_is_not_replaced_and_what_it_wrote_is() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("there");
-        let is_replaced = |there: &[u8]| {
-            std::fs::write(&path, there).unwrap();
-            let written = write_bytes(&path, b"new");
-            match written {
-                Ok(()) => assert_eq!(std::fs::read(&path).unwrap(), b"new"),
-                Err(error) => {
-                    assert!(error.problem::<Foreign>().is_some() && error.exit_code() == 1, "{error}");
-                    assert_eq!(std::fs::read(&path).unwrap(), there);
-                    assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1);
-                }
-            }
-            std::fs::read(&path).unwrap() == b"new"
-        };
-        for own in BEGINNINGS {
-            assert!(is_replaced(&[own, b" and so on"].concat()), "{}", String::from_utf8_lossy(own));
-            assert!(!is_replaced(&[b" ", own].concat()));
-        }
-        for (beginning, mark, within) in WITH_MARKS {
-            assert!(is_replaced(&[beginning, b"0.3", mark].concat()));
-            assert!(!is_replaced(beginning) && !is_replaced(mark));
-            assert!(!is_replaced(&[beginning, &vec![b'x'; within], mark].concat()));
-        }
-        assert!(is_replaced(&[b"/* of ten objects\n * ", IN_SOURCE, b" */"].concat()));
-        // A program with a model in it, and one that uses it.
-        assert!(!is_replaced(&[b"fn main() {}\n\n// of ten objects.", IN_SOURCE].concat()));
-        assert!(!is_replaced(b"//! Recognizes with palpate.\nuse palpate_onboard::Model;\n"));
-        assert!(is_replaced(b"") && !is_replaced(b"v 0 0 0\n"));
-    }
-
-    #[test]
-    fn a_file_without_a_mark_is_replaced_if_its_first_line_is_the_same() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("table.csv");
-        for text in ["set,time\na,1\n", "set,time\na,2\n"] {
-            write_unmarked(&path, text.as_bytes()).unwrap();
-            assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
-        }
-        assert!(write_unmarked(&path, b"set\na\n").unwrap_err().problem::<Foreign>().is_some());
     }
 
     #[cfg(unix)]
@@ -448,12 +335,11 @@ mod tests {
         std::os::unix::fs::symlink("second", &link).unwrap();
         std::os::unix::fs::symlink("deep/model", &second).unwrap();
         // To nothing yet, then to a file.
-        for text in ["# Written by Palpate.", "newer"] {
+        for text in ["new", "newer"] {
             write_bytes(&link, text.as_bytes()).unwrap();
             assert!(link.is_symlink() && second.is_symlink());
             assert_eq!(std::fs::read_to_string(&file).unwrap(), text);
         }
-        assert!(write_bytes(&link, b"newest").unwrap_err().problem::<Foreign>().is_some());
         std::fs::remove_file(&second).unwrap();
         std::os::unix::fs::symlink("link", &second).unwrap();
         assert!(write_bytes(&link, b"lost").unwrap_err().to_string().contains("a circle of symbolic links"));
@@ -501,13 +387,55 @@ mod tests {
         let [input, other] = ["input.json", "other.json"].map(|name| directory.path().join(name));
         std::fs::write(&input, "").unwrap();
         let roundabout = directory.path().join("..").join(directory.path().file_name().unwrap()).join("input.json");
-        let error = refuse_input(&roundabout, [&other, &input]).unwrap_err();
+        let error = admit(&roundabout, [&other, &input]).unwrap_err();
         assert!(error.to_string().contains("Use another file than what is read."), "{error}");
         assert_eq!(error.exit_code(), 2);
-        refuse_input(&other, [&input]).unwrap();
+        admit(&other, [&input]).unwrap();
         std::fs::write(&other, "").unwrap();
-        refuse_input(&other, [&input]).unwrap();
-        refuse_input(directory.path(), [directory.path()]).unwrap();
+        admit(&other, [&input]).unwrap();
+        admit(directory.path(), [directory.path()]).unwrap();
+    }
+
+    #[test]
+    fn a_folder_appears_as_a_whole_and_keeps_what_it_does_not_replace() {
+        let directory = tempfile::tempdir().unwrap();
+        let place = directory.path().join("deep/data");
+        let names = |of: &Path| {
+            let mut names: Vec<_> = std::fs::read_dir(of).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+            names.sort();
+            names
+        };
+        let written = |names: &[&str], replaced: &[&str]| {
+            let folder = Folder::begin(&place).unwrap();
+            names.iter().for_each(|name| std::fs::write(folder.path().join(name), *name).unwrap());
+            folder.finish(&replaced.iter().map(ToString::to_string).collect::<Vec<_>>()).unwrap();
+        };
+        let unfinished = Folder::begin(&place).unwrap();
+        std::fs::write(unfinished.path().join("a.txt"), "").unwrap();
+        assert!(!place.exists());
+        drop(unfinished);
+        assert_eq!(names(place.parent().unwrap()).len(), 0, "nothing is left of what was not finished");
+        written(&["a.txt", "b.txt"], &[]);
+        std::fs::write(place.join("notes.md"), "mine").unwrap();
+        std::fs::write(place.join("c.txt"), "old").unwrap();
+        written(&["a.txt", "c.txt"], &["a.txt", "b.txt"]);
+        assert_eq!(names(&place), ["a.txt", "c.txt", "notes.md"]);
+        assert_eq!(std::fs::read_to_string(place.join("c.txt")).unwrap(), "c.txt");
+        assert_eq!(names(place.parent().unwrap()), ["data"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_is_as_readable_as_any_and_a_link_to_one_stays() {
+        use std::os::unix::fs::PermissionsExt;
+        let directory = tempfile::tempdir().unwrap();
+        let [place, link, plain] = ["data", "link", "plain"].map(|name| directory.path().join(name));
+        [&place, &plain].into_iter().for_each(|made| std::fs::create_dir(made).unwrap());
+        std::os::unix::fs::symlink("data", &link).unwrap();
+        Folder::begin(&link).unwrap().finish(&[]).unwrap();
+        assert!(link.is_symlink() && place.is_dir());
+        let [mode, usual] = [&place, &plain].map(|made| made.metadata().unwrap().permissions().mode());
+        assert_eq!(mode, usual);
     }
 
     #[test]

@@ -227,7 +227,6 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let made_from = made_from(objects, settings)?;
     if !settings.replace {
         results::refuse_others(out, &made_from, &FILES, Some("data/dataset.json"))?;
-        FILES.iter().try_for_each(|file| output::refuse_foreign(&out.join(file)))?;
     }
     let mut stages = Stages::new();
     let data = out.join("data");

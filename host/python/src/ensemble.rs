@@ -166,7 +166,7 @@ impl Ensemble {
         Self { ensemble: Arc::new(ensemble) }
     }
 
-    /// Writes an ensemble over touches as XGBoost's JSON. A file that Palpate did not write is not replaced.
+    /// Writes an ensemble over touches as XGBoost's JSON.
     fn save(&self, py: Python<'_>, path: PathBuf) -> Result<(), Failure> {
         Ok(py.detach(|| self.ensemble.save(&path))?)
     }

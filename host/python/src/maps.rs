@@ -280,7 +280,7 @@ impl Maps {
         Ok(objects::MapsEvaluation(class.call1((raw(py, &found)?,))?))
     }
 
-    /// Writes the maps, whole or not at all. A file that Palpate did not write is not replaced.
+    /// Writes the maps, whole or not at all.
     fn save(&self, py: Python<'_>, path: PathBuf) -> Result<(), Failure> {
         Ok(py.detach(|| output::write_bytes(&path, self.maps().model()))?)
     }

@@ -192,15 +192,14 @@ impl Model {
         Ok(py.detach(|| CompiledModel::read(&path).and_then(|model| Self::of(model.into_bytes())))?)
     }
 
-    /// Writes the model, whole or not at all. A file that Palpate did not write is not replaced.
+    /// Writes the model, whole or not at all.
     fn save(&self, py: Python<'_>, path: PathBuf) -> Result<(), Failure> {
         Ok(py.detach(|| output::write_bytes(&path, self.model().bytes()))?)
     }
 
     /// Writes the model as source code, and returns the files. `form` is "c" (an array), "rust", "c-code" (trees as C),
     /// "thumb" or "thumb-m4f" (trees as assembly, for C and Rust); without it a name that ends in ".h" means "c", ".rs" "rust"
-    /// and ".s" "thumb". What has to be built with it, such as palpate.h, is written beside it, and for assembly the model. A
-    /// file that Palpate did not write is not replaced.
+    /// and ".s" "thumb". What has to be built with it, such as palpate.h, is written beside it, and for assembly the model.
     #[pyo3(signature = (path, *, form=None))]
     fn emit(&self, py: Python<'_>, path: PathBuf, form: Option<&str>) -> Result<Vec<PathBuf>, Failure> {
         let of_suffix = path.extension().and_then(|extension| match extension.to_str() {

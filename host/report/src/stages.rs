@@ -9,7 +9,7 @@ use crate::page::document::{Page, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::mesh::Object;
-use palpate::output::{refuse_foreign, write_json};
+use palpate::output::write_json;
 use palpate::progress::{self, Progress};
 use palpate::wording::count;
 use serde::Serialize;
@@ -102,7 +102,6 @@ pub fn report(
     let made_from = json!({ "job": "report", "settings": Settings { command: String::new(), ..settings.clone() } });
     if !replace {
         results::refuse_others(directory, &made_from, &["index.html"], None)?;
-        refuse_foreign(&directory.join("index.html"))?;
     }
     let objects = objects()?;
     if objects.len() < 2 {

@@ -13,7 +13,7 @@ const CRATES: [&str; 6] =
 const BUILT_ON: [(&str, &[&str]); 8] = [
     ("shared", &[]),
     ("onboard", &["shared"]),
-    ("host/base", &["shared"]),
+    ("host/base", &[]),
     ("host/trees", &["base", "onboard", "shared"]),
     ("host/simulator", &["base", "shared"]),
     ("host", &["base", "onboard", "shared", "simulator", "trees"]),

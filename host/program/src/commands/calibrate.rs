@@ -182,7 +182,7 @@ impl Arguments {
 fn on_touches(arguments: &Arguments, directory: &PathBuf, global: &Global) -> Result<Calibrated> {
     output::admit(&arguments.output, super::files_of(directory))?;
     if let Some(recorded) = &arguments.recorded {
-        output::refuse_input(&arguments.output, super::files_of(recorded))?;
+        output::admit(&arguments.output, super::files_of(recorded))?;
     }
     let compiled = CompiledModel::read(&arguments.model)?;
     let dataset = untrained(&compiled, directory)?;

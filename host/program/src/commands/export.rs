@@ -371,7 +371,7 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
     }
     let emitted = places(arguments)?;
     // The model itself may be what the source code is to stand beside.
-    if output::refuse_input(&arguments.output, [model]).is_ok() {
+    if output::admit(&arguments.output, [model]).is_ok() {
         output::write_bytes(&arguments.output, compiled.bytes())?;
     }
     let name = arguments.output.file_stem().unwrap_or_default().to_string_lossy();

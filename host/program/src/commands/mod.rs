@@ -45,7 +45,7 @@ mod view;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use palpate::error::{CaptureProblem, EvaluateProblem, Foreign, MeshProblem, Place, Setting, TouchesProblem};
+use palpate::error::{CaptureProblem, EvaluateProblem, MeshProblem, Place, Setting};
 use palpate::touches::{Dataset, Listing, Log, Warning};
 use palpate::{Error, Result, output};
 use std::path::{Path, PathBuf};
@@ -138,7 +138,7 @@ pub(crate) struct Global {
     /// Print neither progress nor remarks
     #[arg(long, global = true)]
     quiet: bool,
-    /// Replace existing files; also those that Palpate did not write
+    /// Replace what a directory holds
     #[arg(long, global = true)]
     force: bool,
 }
@@ -162,7 +162,6 @@ impl Global {
     /// Makes the options count that concern the whole process.
     fn apply(&self) -> Result<()> {
         QUIET.store(self.quiet, Ordering::Relaxed);
-        palpate::output::replace_foreign(self.force);
         // More are of no use, and cost memory.
         let Some(asked) = self.threads.map(|asked| asked.min(MOST_THREADS)) else { return Ok(()) };
         let built = rayon::ThreadPoolBuilder::new().num_threads(asked).build_global();
@@ -232,7 +231,7 @@ Global options:
   --threads <N>  Threads; results do not depend on them
   --seed <N>     Seed of all that is random
   --quiet        Print neither progress nor remarks
-  --force        Replace existing files, also those of others
+  --force        Replace what a directory holds
   --help         Print help; `palpate help capture`, with examples
   --version      Print the version
 
@@ -256,11 +255,9 @@ fn has_option(command: &str, option: &str) -> bool {
 /// Addition to an error with which `command` ends: its options that help.
 fn hint(error: &Error, command: &str) -> Option<String> {
     let has = |option: &str| has_option(command, option);
-    let said = match (error.problem(), error.problem(), error.problem()) {
-        (Some(Foreign), ..) => "--force replaces it.",
-        (_, Some(TouchesProblem::Incomplete), _) => "Repeat the command of the capture with --resume.",
-        (.., Some(MeshProblem::Unread { .. })) if has("skip-bad") => "--skip-bad goes on without what cannot be read.",
-        (.., Some(MeshProblem::SameName { first, second, .. }))
+    let said = match error.problem() {
+        Some(MeshProblem::Unread { .. }) if has("skip-bad") => "--skip-bad goes on without what cannot be read.",
+        Some(MeshProblem::SameName { first, second, .. })
             if has("instances") && first.parent() != second.parent() && first.file_stem() == second.file_stem() =>
         {
             "--instances takes each directory as one object, called like the directory."

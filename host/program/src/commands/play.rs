@@ -77,7 +77,7 @@ pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
     output::write_bytes(&output, page.as_bytes())?;
     if let Some(trace) = trace {
         let surfaces = play::surfaces(&objects, &settings.origin)?;
-        output::write_unmarked(&trace, play::trace(&surfaces, &contenders, &settings, ROUNDS)?.as_bytes())?;
+        output::write_bytes(&trace, play::trace(&surfaces, &contenders, &settings, ROUNDS)?.as_bytes())?;
     }
     let text = || format!("{}: open it in a browser\n", output.display());
     global.print_about(&output, &serde_json::json!({ "page": output }), text)

@@ -180,14 +180,11 @@ impl Page {
     }
 
     /// Writes the page to `path`, and with [`Page::files`] every figure's SVG and CSV and every table's CSV beside it.
-    /// The page comes last, each file whole or not at all. Returns what was written. Files that Palpate did not write are not
-    /// replaced, and then none is: those of figures and tables are its own if the page that is there links them, or if their first
-    /// line is the same.
+    /// The page comes last, each file whole or not at all. Returns what was written.
     ///
     /// # Errors
-    /// [`palpate::Error::Io`] naming the file, and [`Foreign`](palpate::error::Foreign).
+    /// [`palpate::Error::Io`] naming the file.
     pub fn write(&self, path: &Path) -> Result<Vec<PathBuf>> {
-        output::refuse_foreign(path)?;
         let mut files = Vec::new();
         if self.files {
             for figure in self.figures() {
@@ -198,15 +195,10 @@ impl Page {
                 files.push((format!("{}.csv", table.id), table.data.csv()?));
             }
         }
-        let before = if self.files { std::fs::read_to_string(path).unwrap_or_default() } else { String::new() };
-        let is_linked = |name: &str| before.contains(&format!("href=\"{name}\""));
-        for (name, bytes) in files.iter().filter(|(name, _)| !is_linked(name)) {
-            output::refuse_unlike(&path.with_file_name(name), bytes)?;
-        }
         let mut written = Vec::new();
         for (name, bytes) in files {
             let file = path.with_file_name(name);
-            output::replace_whole(&file, |out| out.write_all(&bytes))?;
+            output::write_bytes(&file, &bytes)?;
             written.push(file);
         }
         output::write_bytes(path, self.html().as_bytes())?;
@@ -346,27 +338,6 @@ mod tests {
         for part in ["http:", "https:", "url(", "@import", "<link rel=\"stylesheet\"", "src=\"/"] {
             assert!(!html.contains(part), "{part}");
         }
-    }
-
-    #[test]
-    fn tables_that_the_page_links_are_replaced_with_it_and_foreign_ones_keep_it_from_being_written() {
-        let directory = tempfile::tempdir().unwrap();
-        let (path, csv) = (directory.path().join("index.html"), directory.path().join("t.csv"));
-        let page = |columns: [&str; 2]| page("A", "", Records::new(columns));
-        std::fs::write(&csv, "mine,yours\n").unwrap();
-        let error = page(["name", "value"]).write(&path).unwrap_err();
-        assert!(error.to_string().contains("t.csv: a file is there already that Palpate did not write"), "{error}");
-        assert_eq!((path.exists(), std::fs::read_to_string(&csv).unwrap()), (false, "mine,yours\n".into()));
-        std::fs::remove_file(&csv).unwrap();
-        for columns in [["name", "value"], ["name", "other"]] {
-            assert_eq!(page(columns).write(&path).unwrap().len(), 2);
-            assert_eq!(std::fs::read_to_string(&csv).unwrap(), columns.join(",") + "\n");
-        }
-        // Left by a report that was interrupted before its page was written.
-        std::fs::remove_file(&path).unwrap();
-        page(["name", "other"]).write(&path).unwrap();
-        std::fs::write(&path, "<html>mine</html>").unwrap();
-        assert!(page(["name", "other"]).write(&path).unwrap_err().to_string().contains("index.html: a file is there"));
     }
 
     #[test]

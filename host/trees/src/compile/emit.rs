@@ -81,8 +81,7 @@ pub const HEADER: &str = "palpate.h";
 /// Returns their paths.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) `output` for a name that a file may not have here; a file that Palpate did not write is
-/// there; [`Error::Io`].
+/// [`Setting`](crate::error::Setting) `output` for a name that a file may not have here; [`Error::Io`].
 pub fn write_sources(path: &Path, files: &[(&'static str, String)]) -> Result<Vec<PathBuf>> {
     let places: Vec<PathBuf> = files.iter().map(|(extension, _)| path.with_extension(extension)).collect();
     for place in &places {
@@ -100,7 +99,7 @@ pub fn write_sources(path: &Path, files: &[(&'static str, String)]) -> Result<Ve
 /// Refuses a place beside `path` that source code may not have.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) `output`, like [`write_sources`]; a file that Palpate did not write is there.
+/// [`Setting`](crate::error::Setting) `output`, like [`write_sources`].
 pub fn check_place(path: &Path, place: &Path) -> Result<()> {
     // A name such as .palpate has no stem, and what is beside it would be hidden.
     let is_hidden = path.file_name().is_none_or(|name| name.as_encoded_bytes().starts_with(b"."));
@@ -111,10 +110,7 @@ pub fn check_place(path: &Path, place: &Path) -> Result<()> {
         );
         return Err(Error::setting("output", path.display(), allowed));
     }
-    if place.extension().is_some_and(|extension| extension == "h") {
-        output::refuse_foreign(&place.with_file_name(HEADER))?;
-    }
-    output::refuse_foreign(place)
+    Ok(())
 }
 
 /// Source file of a model whose bytes alone are known. It is the one that [`Compiled::sources`] writes, without probabilities: the

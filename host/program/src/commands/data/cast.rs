@@ -69,8 +69,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
             false => output::print(&text),
         };
     };
-    output::refuse_input(path, [&arguments.mesh, &arguments.casts])?;
-    output::write_unmarked(path, text.as_bytes())?;
+    output::admit(path, [&arguments.mesh, &arguments.casts])?;
+    output::write_bytes(path, text.as_bytes())?;
     let agreement = cast::agreement(&lines, &times);
     global.print_about(path, &agreement, || table(&agreement))
 }
