@@ -12,7 +12,7 @@ use palpate::mesh::source::{self, Source};
 use palpate::mesh::{Mesh, Object};
 use palpate::probe::approach::Aim;
 use palpate::shared::format::Length;
-use palpate::touches::{Origin, Surroundings};
+use palpate::touches::{Origin, Samples, Surroundings};
 use palpate::with;
 use pyo3::exceptions::PyTypeError;
 use pyo3::inspect::PyStaticExpr;
@@ -146,9 +146,9 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 /// `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a table in each of their placements, and
 /// approaches come within that many degrees of straight down. `position` keeps where the hand was, too, of all approaches
 /// straight down to objects of true size on a table; `within` is how far from an object's middle they aim at most. The same
-/// `seed` gives the same touches on any number of `threads`, and the same as the program's. `shard` is "K/N" for a part. With
-/// `instances` a directory inside a directory is one object. With `out` the touches are written there as
-/// `palpate capture` does: `resume`, `add` and `force` are its options.
+/// `seed` gives the same touches on any number of `threads`, and the same as the program's. `samples` are the first of
+/// a part of these touches or approaches, from 0, and the one after its last. With `instances` a directory inside a directory
+/// is one object. With `out` the touches are written there as `palpate capture` does: `force` is its option.
 ///
 /// `progress` is called with a stage, the steps done and their number. Ctrl-C stops the call.
 ///
@@ -160,7 +160,7 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 /// ((200, 3), True)
 #[pyo3::pyfunction]
 #[pyo3(signature = (meshes, *, touches=21_000, seed=1, probe=None, approaches=false, pose=false, aim="box", cone=None,
-    position=false, within=None, length=10.0, millimeters=None, instances=false, shard="1/1", out=None, resume=false, add=false, force=false,
+    position=false, within=None, length=10.0, millimeters=None, instances=false, samples=None, out=None, force=false,
     threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "they are keywords in Python")]
 pub(crate) fn capture(
@@ -178,10 +178,8 @@ pub(crate) fn capture(
     length: f64,
     millimeters: Option<f64>,
     instances: bool,
-    shard: &str,
+    samples: Option<(u64, u64)>,
     out: Option<PathBuf>,
-    resume: bool,
-    add: bool,
     force: bool,
     threads: Option<usize>,
     progress: Option<Callback>,
@@ -201,10 +199,10 @@ pub(crate) fn capture(
         within,
         approaches: approaches || position,
         scene: cone.or(position.then_some(0.0)).map_or(Surroundings::Floating, |cone| Surroundings::Table { cone }),
-        shard: shard.parse().map_err(Error::from)?,
+        samples: samples.map(|(first, end)| format!("{first}..{end}").parse::<Samples>()).transpose().map_err(Error::from)?,
         ..Origin::default()
     };
-    let settings = with!(Settings::default(), origin, resume, add, force, threads);
+    let settings = with!(Settings::default(), origin, force, threads);
     settings.check()?;
     long(py, progress.as_ref(), |progress| {
         let mut objects = meshes.objects(instances)?;

@@ -24,9 +24,10 @@ def test_a_capture_in_memory_is_the_one_on_the_disk(tmp_path: Path) -> None:
     assert memory.holds_approaches and np.isnan(memory.times).any()
 
 
-def test_threads_and_shards_change_no_touch() -> None:
+def test_threads_and_parts_change_no_touch() -> None:
     whole = palpate.capture(["bowl", "mouse"], touches=90, threads=1)
-    parts = [palpate.capture(["bowl", "mouse"], touches=90, shard=f"{part}/3", threads=2) for part in (1, 2, 3)]
+    ends = [(0, 1), (1, 40), (40, 90)]
+    parts = [palpate.capture(["bowl", "mouse"], touches=90, samples=part, threads=2) for part in ends]
     joined = [part.times[part.objects == 0] for part in parts]
     np.testing.assert_array_equal(np.concatenate(joined), whole.times[whole.objects == 0])
 
@@ -145,7 +146,7 @@ def test_a_table_that_is_no_data_set_is_refused_by_name() -> None:
         (table.drop(columns="t2"), "no column t2"),
         (table.drop(columns="object"), "no column object"),
         (table.assign(object=None), "a row without an object"),
-        (table.assign(direction_x=1.0), "direction_x without"),
+        (table.assign(direction_x=1.0), "no column direction_y"),
         (table.assign(t1=-1.0), "row 1: the time -1 is negative"),
         (table.assign(robot=-1), "robots is -1"),
     ]:

@@ -41,29 +41,10 @@ pub enum CaptureProblem {
         /// True if the objects have their true size.
         is_true_size: bool,
     },
-    /// Another capture has locked the directory.
-    #[error("another capture is writing into this directory")]
-    Busy,
-    /// The directory holds a data set of objects that the capture would not write.
-    #[error("holds {touches} touches of {}, which this capture would not write", list(objects))]
-    HoldsOtherObjects {
-        /// The objects.
-        objects: Vec<String>,
-        /// Number of touches of them.
-        touches: u64,
-    },
-    /// The directory holds a data set of the same objects that was made in another way.
-    #[error("holds touches of {} that were made with other settings: {differences}", list(objects))]
-    HoldsOtherSettings {
-        /// The objects.
-        objects: Vec<String>,
-        /// The settings that differ, with both values.
-        differences: String,
-    },
-    /// The directory holds files of touches that no listing names.
-    #[error("holds {}, which no capture has listed, and which this one would replace or never use", list(files))]
-    HoldsFiles {
-        /// The files' names.
+    /// The directory holds something else than this capture's touches.
+    #[error("holds {}, which this capture would not write", list(files))]
+    HoldsOthers {
+        /// The names of the files.
         files: Vec<String>,
     },
     /// The directory holds recorded touches, which no capture could make again.
@@ -73,50 +54,6 @@ pub enum CaptureProblem {
         objects: Vec<String>,
         /// Number of touches of them.
         touches: u64,
-    },
-    /// The directory holds an unfinished capture.
-    #[error("holds an unfinished capture of {}, with {touches} touches so far", list(objects))]
-    HoldsUnfinished {
-        /// Its objects.
-        objects: Vec<String>,
-        /// Number of touches.
-        touches: u64,
-    },
-    /// Objects to add are there already.
-    #[error("already holds touches of {}", list(objects))]
-    AlreadyThere {
-        /// The objects.
-        objects: Vec<String>,
-    },
-    /// Objects cannot be added to a data set that was made in another way.
-    #[error("cannot add to these touches: other settings: {differences}")]
-    AddsOtherSettings {
-        /// The settings that differ, with both values.
-        differences: String,
-    },
-    /// The capture to resume was started by another version.
-    #[error("cannot resume: started by version {found}, this is {}", env!("CARGO_PKG_VERSION"))]
-    ResumesOtherVersion {
-        /// Version that captured it.
-        found: String,
-    },
-    /// The capture to resume was started with other settings.
-    #[error("cannot resume: other settings: {differences}")]
-    ResumesOtherSettings {
-        /// The settings that differ, with both values.
-        differences: String,
-    },
-    /// The capture to resume was started with other objects.
-    #[error("cannot resume: other objects: it was started with {}", list(objects))]
-    ResumesOtherObjects {
-        /// Its objects.
-        objects: Vec<String>,
-    },
-    /// A part lost checkpointed touches.
-    #[error("shorter than the {bytes} bytes that dataset.json states")]
-    Shorter {
-        /// Stated size in bytes.
-        bytes: u64,
     },
     /// Touches could not be written.
     #[error("cannot write the touches: {message}")]
@@ -154,26 +91,12 @@ impl Problem for CaptureProblem {
                  keep every approach, also those that miss, or leave the object out."
             }
             Self::NoTrueSize { .. } => "State the unit of the mesh: mm, cm, m or in.",
-            Self::Busy => "Wait until it is done, or give another directory.",
-            Self::HoldsOtherObjects { .. } => "Give another directory, add to these touches, or replace them.",
-            Self::HoldsOtherSettings { .. } => "Give another directory, or replace these touches.",
             Self::HoldsRecorded { .. } => "Give another directory: recorded and simulated touches are not mixed.",
-            Self::HoldsFiles { .. } => "Give another directory, or move the files away.",
-            Self::HoldsUnfinished { .. } => "Resume that capture, replace it, or give another directory.",
-            Self::AlreadyThere { .. } => "Leave them out, or give another directory.",
-            Self::AddsOtherSettings { .. } => {
-                "Capture with the settings and meshes of these touches, or give another directory."
-            }
-            Self::ResumesOtherVersion { .. } | Self::ResumesOtherSettings { .. } | Self::ResumesOtherObjects { .. } => {
-                "Repeat the arguments and restore the meshes of the first capture, or give another directory."
-            }
-            Self::Shorter { .. } => "Capture again from the beginning, replacing these touches.",
+            Self::HoldsOthers { .. } => "Give another directory, move these away, or replace the touches that are there.",
             Self::NotWritten { kind: ErrorKind::StorageFull | ErrorKind::QuotaExceeded, .. } => {
-                "Free some space, then resume the capture: everything up to the last checkpoint is safe."
+                "Free some space, then repeat the capture."
             }
-            Self::NotWritten { .. } => {
-                "Check the disk, then resume the capture: everything up to the last checkpoint is safe."
-            }
+            Self::NotWritten { .. } => "Check the disk, then repeat the capture.",
             Self::Threads { .. } => "Use fewer threads.",
             Self::WorkerStopped => "Report this as a bug.",
         }

@@ -73,7 +73,13 @@ mod tests {
             .map(|(name, height)| Object::new(name, Mesh::globe(12).stretched([1.0, 1.0, height])));
         for origin in [
             Origin { touches: 700, ..Origin::default() },
-            Origin { touches: 700, approaches: true, pose: true, shard: "2/3".parse().unwrap(), ..Origin::default() },
+            Origin {
+                touches: 700,
+                approaches: true,
+                pose: true,
+                samples: Some("233..466".parse().unwrap()),
+                ..Origin::default()
+            },
         ] {
             let directory = tempfile::tempdir().unwrap();
             let settings = Settings { threads: Some(3), ..origin.into() };

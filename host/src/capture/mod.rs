@@ -1,10 +1,9 @@
 //! Virtual touches of objects, as many as wanted.
 //!
 //! Sample i of an object is a pure function of (seed, object's name, i) ([`Sampler`]), so neither the number of threads
-//! nor shards nor an interruption changes a data set. Producers compute chunks of samples, one writer puts them on the
-//! disk in order, and bounded channels between them keep the memory flat (`pipeline`). What is on the disk is
-//! checkpointed every half second, so that an interrupted capture can be resumed (`store`). A capture never replaces
-//! touches that it would not write itself, unless it is told to (`admission`).
+//! nor a division into [parts](crate::touches::Samples) changes a touch. Producers compute chunks of samples, one writer puts
+//! them on the disk in order, and bounded channels between them keep the memory flat (`pipeline`). The data set's directory
+//! appears as a whole or not at all ([`Folder`]).
 //!
 //! ```
 //! use palpate::capture::{self, capture};
@@ -25,26 +24,27 @@
 //! # }
 //! ```
 
-mod admission;
 pub(crate) mod error;
 mod memory;
 mod pipeline;
 mod sample;
-mod store;
 #[cfg(test)]
 mod table_tests;
 #[cfg(test)]
 mod tests;
 
-use crate::error::{CaptureProblem, Error, Result};
+use crate::error::{CaptureProblem, Error, Place, Result};
 use crate::in_order::in_order;
 use crate::mesh::{Instance, Object, placements};
+use crate::output::Folder;
 use crate::probe::approach::FINGERS;
 use crate::probe::scene::{Scene, Table};
 use crate::progress::{self, Progress};
-use crate::touches::{Entry, Lying, ObjectTouches, Origin, Source};
+use crate::touches::{Entry, Listing, Lying, ObjectTouches, Origin, Source};
 use palpate_shared::format::Length;
 use rayon::prelude::*;
+use std::fs::DirEntry;
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
@@ -52,17 +52,13 @@ use std::time::Instant;
 pub use memory::in_memory;
 pub use sample::Sampler;
 
-/// Settings of a capture, and its treatment of existing files.
+/// Settings of a capture.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Settings {
     /// Origin of the touches.
     pub origin: Origin,
-    /// Go on where an interrupted capture into the same directory stopped.
-    pub resume: bool,
-    /// Add objects to the data set in the directory, which must have been made in the same way.
-    pub add: bool,
-    /// Replace the data set in the directory, regardless of its content. Takes precedence over `resume` and `add`.
+    /// Replace simulated touches in the directory, however they were made; what else is in it stays.
     pub force: bool,
     /// Number of threads to use, at most 256; by default as many as the machine has.
     pub threads: Option<usize>,
@@ -100,25 +96,23 @@ pub struct Summary {
     pub seconds: f64,
 }
 
-/// Results of a capture for one object, in this run.
+/// Results of a capture for one object.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct ObjectSummary {
     /// The object's name.
     pub name: String,
-    /// Number of touches there are now.
+    /// Number of touches.
     pub touches: u64,
-    /// Number of approaches that they took, since the capture was first started.
+    /// Number of approaches that they took.
     pub approaches: u64,
-    /// Number of approaches made in this run.
-    pub approaches_now: u64,
-    /// Contacts of each finger in this run that came later than the stroke, and are missing; where only full touches
-    /// are kept, in approaches in which all fingers would have touched.
+    /// Contacts of each finger that came later than the stroke, and are missing; where only full touches are kept, in
+    /// approaches in which all fingers would have touched.
     pub late: [u64; FINGERS],
-    /// Number of approaches in this run in which a finger touched; if only full touches are kept, of full touches.
+    /// Number of approaches in which a finger touched; if only full touches are kept, of full touches.
     pub touching: u64,
-    /// Number of approaches in this run that ended before the first contact, at the end of the travel.
+    /// Number of approaches that ended before the first contact, at the end of the travel.
     pub turned_back: u64,
-    /// Duration of this run for the object, in seconds.
+    /// Duration for the object, in seconds.
     pub seconds: f64,
 }
 
@@ -134,12 +128,12 @@ impl Summary {
     }
 }
 
-/// Touches the objects and writes `DIR/<object>.txt` for each, and `DIR/dataset.json`.
+/// Touches the objects and writes `DIR/<object>.txt` for each, and `DIR/dataset.json`. The directory appears when all is done.
+/// The same capture may be repeated.
 ///
 /// # Errors
-/// When a setting is wrong, a mesh cannot be touched, the directory cannot be written to, another capture is writing to
-/// it, or it holds what this capture would not write; [`Error::Cancelled`] if `progress` cancels it. Whatever was
-/// written at the last of the half-second checkpoints can be resumed.
+/// When a setting is wrong, a mesh cannot be touched, the directory cannot be written, or it holds anything else and
+/// [`Settings::force`] is not set, or recorded touches; [`Error::Cancelled`] if `progress` cancels it.
 pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progress: &dyn Progress) -> Result<Summary> {
     settings.check()?;
     let start = Instant::now();
@@ -154,12 +148,56 @@ pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progre
     if let Some(problem) = untouched(&samplers, &settings.origin)? {
         return Err(problem.into());
     }
-    let entries: Vec<Entry> =
-        objects.iter().zip(&scenes).map(|(object, scenes)| entry(object, scenes, &settings.origin)).collect();
-    let mut store = store::Store::open(directory, settings, &entries)?;
-    let objects = pipeline::run(&samplers, settings, &mut store, progress)?;
-    store.finish()?;
+    let entries = objects.iter().zip(&scenes).map(|(object, scenes)| entry(object, scenes, &settings.origin)).collect();
+    let mut listing = Listing { objects: entries, ..Listing::new(&settings.origin, []) };
+    let replaced = replaced(directory, &listing, settings.force)?;
+    let folder = Folder::begin(directory)?;
+    let objects = pipeline::run(&samplers, settings, folder.path(), &mut listing.objects, progress)?;
+    listing.write(folder.path())?;
+    folder.finish(&replaced)?;
     Ok(Summary { objects, seconds: start.elapsed().as_secs_f64() })
+}
+
+/// The names of the files in the directory that a capture with this listing replaces.
+///
+/// # Errors
+/// [`CaptureProblem::HoldsRecorded`]; [`CaptureProblem::HoldsOthers`] if something else than this capture's own touches is there,
+/// unless it is forced.
+fn replaced(directory: &Path, wanted: &Listing, force: bool) -> Result<Vec<String>> {
+    let io = |source| Error::io(directory, "list", source);
+    let there = match std::fs::read_dir(directory) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries.map_err(io)?,
+    };
+    let name = |entry: std::io::Result<DirEntry>| Ok(entry.map_err(io)?.file_name().to_string_lossy().into_owned());
+    let mut there: Vec<String> = there.map(name).collect::<Result<_>>()?;
+    there.sort();
+    let refuse = |problem| Err(Error::at(Place::file(directory), problem));
+    let found = match Listing::read(directory) {
+        // What cannot be read says nothing of other files.
+        Err(Error::At { .. }) if force => None,
+        found => found?,
+    };
+    let mut own = vec![Listing::FILE.to_owned()];
+    if let Some(found) = &found {
+        if found.is_recorded() {
+            let (objects, touches) = (found.names(), found.objects.iter().map(|entry| entry.touches).sum());
+            return refuse(CaptureProblem::HoldsRecorded { objects, touches });
+        }
+        let file = |entry: &Entry| entry.file(Path::new("")).to_string_lossy().into_owned();
+        own.extend(found.objects.iter().map(file));
+    }
+    // Regardless of the version, and of what only the capture tells.
+    let stated = |listing: &Listing| {
+        let of = |entry: &Entry| Entry { touches: 0, approaches: 0, bytes: 0, crc32: None, ..entry.clone() };
+        (listing.origin.clone(), listing.objects.iter().map(of).collect::<Vec<_>>())
+    };
+    let is_same = found.is_some_and(|found| stated(&found) == stated(wanted));
+    let others: Vec<String> = there.into_iter().filter(|name| !is_same || !own.contains(name)).collect();
+    if !force && !others.is_empty() {
+        return refuse(CaptureProblem::HoldsOthers { files: others });
+    }
+    Ok(own)
 }
 
 /// The objects of these that cannot be touched with all fingers, as [`CaptureProblem::Untouchable`]; none if all can, or if every

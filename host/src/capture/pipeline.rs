@@ -4,15 +4,17 @@
 //! its own channel; the writer takes one from each channel in turn, which is the sequence again. A producer that is
 //! ahead waits, so at most a few chunks are in memory regardless of the number of touches.
 
-use super::store::Store;
 use super::{ObjectSummary, Sampler, Settings};
-use crate::error::{CaptureProblem, Result};
+use crate::error::{CaptureProblem, Error, Place, Result};
 use crate::probe::approach::FINGERS;
 use crate::progress::{self, Progress};
-use crate::touches::write_touch;
+use crate::touches::{CRC, Entry, write_touch};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use palpate_shared::ContactPattern;
+use std::fs::File;
+use std::io::Write as _;
 use std::ops::Range;
+use std::path::Path;
 use std::time::Instant;
 
 /// Number of samples in a chunk: some milliseconds of work.
@@ -33,26 +35,25 @@ struct Chunk {
     turned_back: u64,
 }
 
-/// Captures everything that the store does not have yet.
+/// Captures all samples of each object into a file of the folder, and lists them in the object's entry.
 pub(super) fn run(
     samplers: &[Sampler<'_>],
     settings: &Settings,
-    store: &mut Store,
+    folder: &Path,
+    entries: &mut [Entry],
     progress: &dyn Progress,
 ) -> Result<Vec<ObjectSummary>> {
     let samples = settings.origin.samples();
-    let total = samples.end - samples.start;
-    let rest = |object: usize| samples.start + store.entry(object).touches..samples.end;
-    let jobs: Vec<(usize, Range<u64>)> = (0..samplers.len()).map(|object| (object, rest(object))).collect();
-    progress.begin("touching", Some(total * samplers.len() as u64));
+    progress.begin("touching", Some((samples.end - samples.start) * samplers.len() as u64));
+    let chunks = || chunks(samplers.len(), &samples);
     // More threads than chunks would have nothing to do.
-    let threads = settings.threads().min(MOST_THREADS).min(chunks(&jobs).take(MOST_THREADS).count()).max(1);
+    let threads = settings.threads().min(MOST_THREADS).min(chunks().take(MOST_THREADS).count()).max(1);
     std::thread::scope(|scope| {
         let mut channels = Vec::with_capacity(threads);
         let (go, started) = bounded(threads);
         for producer in 0..threads {
             let (sender, receiver) = bounded(AHEAD);
-            let chunks = chunks(&jobs).skip(producer).step_by(threads);
+            let chunks = chunks().skip(producer).step_by(threads);
             let started = started.clone();
             let work = move || {
                 if started.recv().is_ok() {
@@ -73,28 +74,33 @@ pub(super) fn run(
         }
         let mut turns = (0..threads).cycle();
         let mut summaries = Vec::with_capacity(samplers.len());
-        for (object, samples) in &jobs {
+        for entry in entries {
             let start = Instant::now();
-            let before = store.entry(*object).clone();
             let (mut late, mut touching, mut turned_back) = ([0; FINGERS], 0, 0);
-            progress.advance(before.touches);
-            for part in split(samples) {
+            let path = entry.file(folder);
+            let io = |error| not_written(&path, &error);
+            let mut file = File::create(&path).map_err(io)?;
+            let mut digest = CRC.digest();
+            for part in split(&samples) {
                 let turn = turns.next().unwrap_or(0);
                 let chunk = receive(&channels[turn])?;
                 let touches = part.end - part.start;
-                store.append(*object, chunk.text.as_bytes(), touches, chunk.approaches)?;
+                file.write_all(chunk.text.as_bytes()).map_err(io)?;
+                digest.update(chunk.text.as_bytes());
+                entry.touches += touches;
+                entry.approaches += chunk.approaches;
+                entry.bytes += chunk.text.len() as u64;
                 late.iter_mut().zip(chunk.late).for_each(|(late, more)| *late += more);
                 touching += chunk.touching;
                 turned_back += chunk.turned_back;
                 progress::advance(progress, touches)?;
             }
-            store.complete(*object)?;
-            let entry = store.entry(*object).clone();
+            file.sync_all().map_err(io)?;
+            entry.crc32 = Some(digest.finalize());
             summaries.push(ObjectSummary {
-                name: entry.name,
+                name: entry.name.clone(),
                 touches: entry.touches,
                 approaches: entry.approaches,
-                approaches_now: entry.approaches - before.approaches,
                 late,
                 touching,
                 turned_back,
@@ -111,9 +117,15 @@ fn split(samples: &Range<u64>) -> impl Iterator<Item = Range<u64>> + Clone + use
     samples.clone().step_by(CHUNK as usize).map(move |start| start..end.min(start + CHUNK))
 }
 
-/// The chunks of all objects, in the order in which they are written.
-fn chunks(jobs: &[(usize, Range<u64>)]) -> impl Iterator<Item = (usize, Range<u64>)> {
-    jobs.iter().flat_map(|(object, samples)| split(samples).map(|part| (*object, part)))
+/// The chunks of so many objects, in the order in which they are written.
+fn chunks(objects: usize, samples: &Range<u64>) -> impl Iterator<Item = (usize, Range<u64>)> + use<> {
+    let parts = split(samples);
+    (0..objects).flat_map(move |object| parts.clone().map(move |part| (object, part)))
+}
+
+fn not_written(path: &Path, error: &std::io::Error) -> Error {
+    let problem = CaptureProblem::NotWritten { kind: error.kind(), message: error.to_string() };
+    Error::at(Place::file(path), problem)
 }
 
 /// Computes chunks until they are all done, one fails, the capture is cancelled or the writer is started.

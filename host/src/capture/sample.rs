@@ -1,7 +1,7 @@
 //! Sample i of an object: a pure function of (seed, object's name, i).
 //!
-//! The stream of random numbers must stay the same, byte for byte: data sets are resumed, added to and compared across
-//! versions. It is therefore not one of the streams of `random`.
+//! The stream of random numbers must stay the same, byte for byte: data sets are put together from parts and compared
+//! across versions. It is therefore not one of the streams of `random`.
 
 use super::error::Untouched;
 use crate::error::{CaptureProblem, Result};

@@ -135,7 +135,7 @@ fn samples_are_of_instances_and_placements_in_turn_and_the_data_set_names_them()
     let (settings, directory) = (Settings::from(origin(700)), tempfile::tempdir().unwrap());
     let scenes = scenes(&[&object], &settings.origin, &()).unwrap().remove(0);
     let summary = capture(&[object.clone(), disc.clone()], &settings, directory.path(), &()).unwrap();
-    assert!(summary.objects.iter().all(|one| one.touching > 0 && one.touching < one.approaches_now));
+    assert!(summary.objects.iter().all(|one| one.touching > 0 && one.touching < one.approaches));
     let listing = Listing::read(directory.path()).unwrap().unwrap();
     let entry = &listing.objects[1];
     assert_eq!(
@@ -223,34 +223,24 @@ fn stated_weights_replace_solid_angles_and_unknown_placements_are_refused_with_t
 }
 
 #[test]
-fn a_capture_of_another_scene_or_other_weights_neither_resumes_nor_adds_nor_replaces() {
+fn a_capture_of_another_scene_or_other_weights_replaces_none_unless_it_is_forced() {
     let (directory, objects) = (tempfile::tempdir().unwrap(), objects());
-    let run = |origin: Origin, object: &Object, resume, add, force| {
-        let settings = Settings { resume, add, force, ..origin.into() };
+    let run = |origin: Origin, object: &Object, force| {
+        let settings = Settings { force, ..origin.into() };
         capture(std::slice::from_ref(object), &settings, directory.path(), &()).map_err(|error| error.to_string())
     };
-    let [brick, disc] = &objects;
-    run(origin(50), brick, false, false, false).unwrap();
+    let brick = &objects[0];
+    run(origin(50), brick, false).unwrap();
     let floating = Origin { scene: Surroundings::Floating, ..origin(50) };
     let steeper = Origin { scene: Surroundings::Table { cone: 30.0 }, ..origin(50) };
     let mut weighed = brick.clone();
     weighed.placement_weights = vec![("+z".into(), 1.0)];
-    for other in [&floating, &steeper] {
-        let added = run(other.clone(), disc, false, true, false).unwrap_err();
-        assert!(
-            added.contains("cannot add") && added.contains("scene is {\"table\":{\"cone\":50.0}} there"),
-            "{added}"
-        );
-        for resume in [true, false] {
-            let again = run(other.clone(), brick, resume, false, false).unwrap_err();
-            assert!(again.contains("other settings: scene is"), "{again}");
-        }
+    for (other, object) in [(&floating, brick), (&steeper, brick), (&origin(50), &weighed)] {
+        let again = run(other.clone(), object, false).unwrap_err();
+        assert!(again.contains("holds brick.txt, dataset.json, which this capture would not write"), "{again}");
     }
-    let again = run(origin(50), &weighed, true, false, false).unwrap_err();
-    assert!(again.contains("brick's placements are") && again.contains("+z=1 here"), "{again}");
-    run(origin(50), disc, false, true, false).unwrap();
-    assert_eq!(Dataset::read(directory.path()).unwrap().names(), ["brick", "disc"]);
-    run(floating, brick, false, false, true).unwrap();
+    run(origin(50), brick, false).unwrap();
+    run(floating, brick, true).unwrap();
     assert_eq!(Listing::read(directory.path()).unwrap().unwrap().objects[0].placements, []);
 }
 

@@ -1,7 +1,6 @@
 use super::*;
 use crate::mesh::Mesh;
 use crate::probe::approach::Probe;
-use crate::touches::Listing;
 use crate::with;
 
 fn objects() -> Vec<Object> {
@@ -16,16 +15,6 @@ fn origin(touches: u64) -> Origin {
 
 fn settings() -> Settings {
     Settings { threads: Some(2), ..origin(1500).into() }
-}
-
-#[test]
-fn a_part_that_lost_what_was_checkpointed_is_not_resumed() {
-    let directory = tempfile::tempdir().unwrap();
-    let mut listing = Listing::new(&origin(1500), ["disc".into(), "globe".into()]);
-    listing.objects[0] = Entry { name: "disc".into(), touches: 9, approaches: 99, bytes: 252, ..Entry::default() };
-    listing.write(directory.path()).unwrap();
-    let error = capture(&objects(), &Settings { resume: true, ..settings() }, directory.path(), &()).unwrap_err();
-    assert!(error.to_string().contains("disc.part: shorter than the 252 bytes"), "{error}");
 }
 
 #[test]

@@ -45,7 +45,7 @@ use crate::error::{EvaluateProblem, Result, RowsProblem};
 use crate::evaluate::together::units_of_rows;
 use palpate_onboard::{Model, Refused, RowsSeen};
 use palpate_shared::format::Position;
-use palpate_trees::rows::{Encoder, feature_names};
+use palpate_trees::rows::{Encoder, Sequences, feature_names};
 use std::borrow::Cow;
 
 /// The margins of rows, in a model's units.

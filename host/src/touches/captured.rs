@@ -139,6 +139,7 @@ mod tests {
     use super::*;
     use crate::capture::{Settings, in_memory};
     use crate::mesh::{Mesh, Object};
+    use crate::touches::Samples;
     use crate::with;
 
     fn captured(width: f32, origin: Origin) -> Captured {
@@ -149,18 +150,19 @@ mod tests {
 
     #[test]
     fn the_same_seed_objects_and_settings_are_the_same_touches_however_many() {
-        let origin = |touches, shard: &str| Origin { touches, shard: shard.parse().unwrap(), ..Origin::default() };
-        let trained = captured(0.5, origin(10, "1/1"));
-        assert_eq!(trained.shared(&captured(0.5, origin(30, "1/1"))), ["disc", "globe"]);
-        let kept = Origin { approaches: true, pose: true, ..origin(5, "1/1") };
+        let origin = |touches| Origin { touches, ..Origin::default() };
+        let part = |first, end| Origin { samples: Some(Samples { first, end }), ..origin(20) };
+        let trained = captured(0.5, origin(10));
+        assert_eq!(trained.shared(&captured(0.5, origin(30))), ["disc", "globe"]);
+        let kept = Origin { approaches: true, pose: true, ..origin(5) };
         assert_eq!(trained.shared(&captured(0.5, kept)), ["disc", "globe"], "approaches, some of them full");
-        assert_eq!(trained.shared(&captured(0.4, origin(10, "1/1"))), ["globe"], "another mesh of the other");
+        assert_eq!(trained.shared(&captured(0.4, origin(10))), ["globe"], "another mesh of the other");
         // Of the whole, one half has these samples and the other one has not.
-        assert_eq!(trained.shared(&captured(0.5, origin(20, "1/2"))), ["disc", "globe"]);
-        assert!(trained.shared(&captured(0.5, origin(20, "2/2"))).is_empty());
-        assert!(trained.shared(&captured(0.5, Origin { seed: 2, ..origin(10, "1/1") })).is_empty());
+        assert_eq!(trained.shared(&captured(0.5, part(0, 10))), ["disc", "globe"]);
+        assert!(trained.shared(&captured(0.5, part(10, 20))).is_empty());
+        assert!(trained.shared(&captured(0.5, Origin { seed: 2, ..origin(10) })).is_empty());
         let probe = with!(crate::probe::approach::Probe::default(), spacing = 1.6);
-        assert!(trained.shared(&captured(0.5, Origin { probe, ..origin(10, "1/1") })).is_empty());
+        assert!(trained.shared(&captured(0.5, Origin { probe, ..origin(10) })).is_empty());
     }
 
     #[test]

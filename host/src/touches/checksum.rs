@@ -5,7 +5,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use std::io::Read;
 use std::path::Path;
 
-pub(super) static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
+pub(crate) static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
 /// The checksum of a file, as listings state it.
 pub(crate) fn checksum(path: &Path) -> Result<u32> {

@@ -153,7 +153,7 @@ impl Dataset {
     /// A text file that was changed since its capture but has as many touches as stated is a [`Warning`].
     ///
     /// # Errors
-    /// When the directory cannot be read, holds fewer than two objects or an unfinished capture; when a listed file is
+    /// When the directory cannot be read, or holds fewer than two objects; when a listed file is
     /// missing or has another number of touches than stated; when a file holds no touch, and when a line or row is wrong, or a row is of another object (it is named); when some touches have a
     /// position and others have none, or `dataset.json` states otherwise.
     pub fn read(directory: &Path) -> Result<Self> {
@@ -203,9 +203,6 @@ impl Dataset {
 
     /// Reads the data set that a listing describes.
     fn listed(directory: &Path, listing: Listing) -> Result<Self> {
-        if !listing.complete {
-            return Err(Error::at(Place::file(directory), TouchesProblem::Incomplete));
-        }
         let (mut objects, mut warnings) = (Vec::with_capacity(listing.objects.len()), Vec::new());
         // It may grow while it is recorded.
         let may_grow = listing.is_recorded();
@@ -387,12 +384,11 @@ mod tests {
     use super::*;
     use crate::touches::checksum;
 
-    /// A complete data set of two objects, with its listing.
+    /// A data set of two objects, with its listing.
     fn captured() -> tempfile::TempDir {
         let directory = tempfile::tempdir().unwrap();
         let origin = Origin { touches: 3, ..Origin::default() };
         let mut listing = Listing::new(&origin, ["fork".into(), "spoon".into()]);
-        listing.complete = true;
         for (index, entry) in listing.objects.iter_mut().enumerate() {
             let path = entry.file(directory.path());
             let touch = |i: u32| Touch::from_micros([0, i, index as u32]);
@@ -526,15 +522,6 @@ mod tests {
         assert_eq!(dataset.warnings, [Warning::Changed { path: path.clone() }]);
         assert!(dataset.warnings[0].to_string().contains("spoon.txt: changed since its capture"));
         assert_eq!(dataset.objects[1].touches()[2].times()[1].micros(), Some(3));
-    }
-
-    #[test]
-    fn an_unfinished_capture_is_no_data_set() {
-        let directory = captured();
-        let mut listing = Listing::read(directory.path()).unwrap().unwrap();
-        listing.complete = false;
-        listing.write(directory.path()).unwrap();
-        assert_eq!(problem(directory.path()), TouchesProblem::Incomplete);
     }
 
     #[test]

@@ -194,9 +194,6 @@ pub enum TouchesProblem {
         /// The other.
         other: PathBuf,
     },
-    /// The capture of a data set was interrupted.
-    #[error("the capture of these touches is not complete")]
-    Incomplete,
     /// `dataset.json` is no listing.
     #[error("not the listing of a data set ({message})")]
     BadListing {
@@ -290,9 +287,9 @@ pub enum TouchesProblem {
         /// The latest contact's time.
         latest: String,
     },
-    /// A text names no shard.
-    #[error("{text:?} is not a shard")]
-    BadShard {
+    /// A text names no samples.
+    #[error("{text:?} is not a range of samples")]
+    BadSamples {
         /// The text.
         text: String,
     },
@@ -375,7 +372,6 @@ impl Problem for TouchesProblem {
             Self::NoObjects => "Fill it with: palpate capture builtin -o DIR.",
             Self::OneObject { .. } => "Capture at least two objects into the directory.",
             Self::TwoFiles { .. } => "Remove one of them.",
-            Self::Incomplete => "Resume the capture.",
             Self::BadName { .. } => {
                 "Give a name that a file can have, for an object on a table OBJECT/PLACEMENT. If it stands in a dataset.json from \
                  elsewhere, remove that file."
@@ -397,7 +393,7 @@ impl Problem for TouchesProblem {
             Self::RecordedBefore { .. } => "Give other lines.",
             Self::NoPose => "Give direction and alignment after the times, or record without the pose.",
             Self::LaterThanStroke { .. } => "Give the probe file the stroke that the hand has, and record into another directory.",
-            Self::BadShard { .. } => "Give K/N with K from 1 to N, like 2/5.",
+            Self::BadSamples { .. } => "Give A..B with A below B: 0..5000 are the first 5000.",
             Self::HoldsFiles { .. } => "Give another directory, or move the files away.",
             Self::NoFormat => "Name it after the object, with the extension .txt.",
             Self::RecordedTwice { .. } => "Put its touches into one file.",

@@ -1,4 +1,4 @@
-//! `dataset.json`: the content and origin of a data set, and whether it is complete.
+//! `dataset.json`: the content and origin of a data set.
 
 use super::files::EXTENSION;
 use super::{Meshes, ObjectTouches, Origin, Recorded, Source};
@@ -13,8 +13,6 @@ use std::path::{Component, Path, PathBuf};
 pub struct Listing {
     /// The version of the program that made it.
     pub palpate: String,
-    /// True if every touch is there.
-    pub complete: bool,
     /// Origin of the touches.
     #[serde(rename = "settings")]
     pub origin: Origin,
@@ -34,9 +32,9 @@ pub struct Entry {
     pub touches: u64,
     /// Number of approaches that they took.
     pub approaches: u64,
-    /// The size of the object's file; of the text so far, while the object is being captured.
+    /// The size of the object's file.
     pub bytes: u64,
-    /// The CRC-32 (ISO-HDLC, as in gzip and PNG) of the object's complete file. None while the object is being captured.
+    /// The CRC-32 (ISO-HDLC, as in gzip and PNG) of the object's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crc32: Option<u32>,
     /// The names of its instances, if it has several: sample i is of instance i modulo their number, unless `counts` says
@@ -112,7 +110,6 @@ impl Listing {
     pub(crate) fn new(origin: &Origin, names: impl IntoIterator<Item = String>) -> Self {
         Self {
             palpate: env!("CARGO_PKG_VERSION").into(),
-            complete: false,
             origin: origin.clone(),
             objects: names.into_iter().map(|name| Entry { name, ..Entry::default() }).collect(),
             recorded: Vec::new(),
@@ -168,7 +165,7 @@ impl Listing {
     /// # Errors
     /// When it cannot be written.
     pub fn write(&self, directory: &Path) -> Result<()> {
-        output::replace_json(&Self::path(directory), self)
+        output::write_json(&Self::path(directory), self)
     }
 
     /// The touches of a listed object, and what each of them is of.
@@ -235,15 +232,13 @@ mod tests {
     /// A listing without checksums.
     const PLAIN: &str = r#"{
   "palpate": "0.3.0",
-  "complete": true,
   "settings": {
     "touches": 2,
     "seed": 1,
     "length": 10.0,
     "probe": {"radius": 0.15, "spacing": 2.0, "speed": 10.0, "tilt": 10.0},
     "pose": false,
-    "approaches": false,
-    "shard": "1/1"
+    "approaches": false
   },
   "objects": [
     {"name": "fork", "touches": 2, "approaches": 31, "bytes": 54}
@@ -287,7 +282,7 @@ mod tests {
 
     #[test]
     fn what_is_no_listing_is_refused_with_its_line() {
-        for (text, line) in [("", 1), ("{", 1), ("[]", 1), (&PLAIN.replace("seed", "sed"), 6)] {
+        for (text, line) in [("", 1), ("{", 1), ("[]", 1), (&PLAIN.replace("seed", "sed"), 5)] {
             let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err().to_string();
             assert!(error.starts_with(&format!("dataset.json:{line}: not the listing of a data set")), "{error}");
         }

@@ -1,6 +1,6 @@
 //! Origin of touches.
 
-use super::{Shard, Surroundings};
+use super::{Samples, Surroundings};
 use crate::error::{Error, Result};
 use crate::mesh::{Instance, Object};
 use crate::probe::approach::{Aim, CLEARANCE, Probe};
@@ -15,7 +15,7 @@ use std::ops::Range;
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
-    /// Number of touches of each object; with `approaches`, number of approaches. Of all shards together.
+    /// Number of touches of each object; with `approaches`, number of approaches. Of all parts together.
     pub touches: u64,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -45,8 +45,9 @@ pub struct Origin {
     pub within: Option<f64>,
     /// True if every approach is kept, not only full touches: sample i is then approach i.
     pub approaches: bool,
-    /// The part of the samples that this data set holds.
-    pub shard: Shard,
+    /// The samples that this data set holds, if it is a part of them all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub samples: Option<Samples>,
     /// Noise that the real probe added to each touch, as far as the touches were made as a real probe would make them.
     #[serde(default, skip_serializing_if = "Noise::is_none")]
     pub real: Noise,
@@ -66,7 +67,7 @@ impl Default for Origin {
             position: false,
             within: None,
             approaches: false,
-            shard: Shard::WHOLE,
+            samples: None,
             real: Noise::default(),
         }
     }
@@ -89,6 +90,10 @@ impl Origin {
         if self.touches == 0 {
             let name = if self.approaches { "approaches" } else { "touches" };
             return Err(Error::setting(name, 0, "1 or more"));
+        }
+        if let Some(samples) = self.samples.filter(|samples| samples.end > self.touches) {
+            let allowed = format!("samples up to {}, as many as each object has", self.touches);
+            return Err(Error::setting("samples", samples, allowed));
         }
         self.real.check()?;
         self.check_position()?;
@@ -157,8 +162,8 @@ impl Origin {
         }
     }
 
-    /// The samples of each object: the shard's part of all.
+    /// The samples of each object: all, or the part of them.
     pub(crate) fn samples(&self) -> Range<u64> {
-        self.shard.part(self.touches)
+        self.samples.map_or(0..self.touches, Range::from)
     }
 }

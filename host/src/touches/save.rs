@@ -75,7 +75,6 @@ impl Dataset {
         if origin.is_none() {
             return Ok(());
         }
-        listing.complete = true;
         listing.write(directory)
     }
 }

@@ -82,7 +82,7 @@ fn main() -> Result<()> {
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    palpate::output::replace_whole(path, |out| out.write_all(bytes))
+    palpate::output::write_whole(path, |out| out.write_all(bytes))
 }
 
 /// A run's touches, trained and tested on.

@@ -72,9 +72,9 @@ impl Hands {
     /// Plays every approach of a file; how many there are. Those that miss take their time as well.
     fn touch(&mut self, file: &Path, pins: &mut impl Write) -> Result<usize, Box<dyn Error>> {
         let mut count = 0;
-        for touch in text::lines(file)? {
+        for touch in text::read(file)? {
             let mut played = Edges::default();
-            for (at, finger, closed) in edges(&touch?, &mut self.rng) {
+            for (at, finger, closed) in edges(&touch, &mut self.rng) {
                 played.edge(finger, closed, self.now.wrapping_add(at));
             }
             let next = self.now.wrapping_add(APPROACH);

@@ -1,15 +1,15 @@
 use super::numbers;
 use super::probe::{SizeArguments, refuse_unstated};
-use super::progress::Bar;
+use super::progress::{Bar, cancel_when_interrupted};
 use super::scene::{SceneArguments, described};
 use super::{Global, remark};
-use palpate::capture::{self, ObjectSummary, Settings, Summary};
+use palpate::capture::{self, Settings, Summary};
 use palpate::error::{CaptureProblem, Problem, TouchesProblem};
 use palpate::mesh::BACKGROUND;
 use palpate::mesh::facts::Facts;
 use palpate::output;
 use palpate::probe::approach::Aim;
-use palpate::touches::{Listing, Origin, Shard};
+use palpate::touches::{Origin, Samples};
 use palpate::with;
 use palpate::wording::{count, decimal};
 use palpate::{Error, Result};
@@ -18,12 +18,11 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-The directory gets NAME.txt for each object, one line per touch: three contact times in seconds after the first contact, `-` for a finger that never touched; dataset.json says how they were made. Touches that are there already are kept: a capture that would replace others is refused.
+The directory gets NAME.txt for each object, one line per touch: three contact times in seconds after the first contact, `-` for a finger that never touched; dataset.json says how they were made. The directory appears when all is done; one that holds anything else is refused.
 
 Examples:
   palpate capture builtin -o data                  21,000 touches per object
   palpate capture cup.stl bowls/ builtin -o data   your meshes beside them
-  palpate capture jug.obj -o data --add            one more, touched alike
   palpate capture meshes/ -o data --approaches 60000
                                                    also those that miss
   palpate capture meshes/ -o data --true-size mm --probe probe.toml
@@ -32,7 +31,8 @@ Examples:
   palpate capture meshes/ -o data --scene table    as they lie, from above
   palpate capture meshes/ -o data --scene table --position --probe probe.toml
                                                    and where the hand was
-  palpate capture meshes/ -o part2 --shard 2/8     the second of eight parts")]
+  palpate capture meshes/ -o part2 --samples 7000..14000
+                                                   the second of three parts")]
 pub(crate) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
     #[arg(value_name = "SOURCE", required = true)]
@@ -65,30 +65,19 @@ pub(crate) struct Arguments {
     /// With --position: aims at most so far from the object's middle in x and y [default: its box and 5 mm about it]
     #[arg(long, value_name = "MM")]
     within: Option<f64>,
-    /// Capture the K-th of N parts only [default: 1/1]
-    #[arg(long, value_name = "K/N", value_parser = parsed::<Shard>)]
-    shard: Option<Shard>,
-    /// Continue what was interrupted
-    #[arg(long)]
-    resume: bool,
-    /// Add the objects to the data set that is there
-    #[arg(long)]
-    add: bool,
+    /// Capture only these of each object's touches or approaches; the files of all parts, one after the other, are the whole's
+    #[arg(long, value_name = "A..B", value_parser = parsed::<Samples>)]
+    samples: Option<Samples>,
 }
 
 pub(crate) fn run(mut arguments: Arguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
-    if global.force && (arguments.resume || arguments.add) {
-        return Err(Error::setting("force", "given", "it without --resume and --add, which keep what is there"));
-    }
     if arguments.position {
         arguments.size.units.imply_true_size();
     }
     let settings = with!(
         Settings::default(),
         origin = arguments.origin(global.seed)?,
-        resume = arguments.resume,
-        add = arguments.add,
         force = global.force,
         threads = global.threads
     );
@@ -108,6 +97,7 @@ pub(crate) fn run(mut arguments: Arguments, global: &Global) -> Result<()> {
             }
         }
     }
+    cancel_when_interrupted();
     let summary = capture::capture(&objects, &settings, &arguments.output, &Bar::new())?;
     if global.json {
         return output::print_json(&summary);
@@ -119,7 +109,7 @@ pub(crate) fn run(mut arguments: Arguments, global: &Global) -> Result<()> {
 
 /// Contacts that are missing because the hand had stopped, by finger, and why.
 fn unreached(summary: &Summary, origin: &Origin) -> String {
-    let approaches: u64 = summary.objects.iter().map(|object| object.approaches_now).sum();
+    let approaches: u64 = summary.objects.iter().map(|object| object.approaches).sum();
     let percent = |count: u64| 100.0 * count as f64 / approaches.max(1) as f64;
     let mut text = String::new();
     if let Some((stroke, window)) = origin.probe.stroke.zip(origin.probe.window()) {
@@ -147,14 +137,11 @@ fn unreached(summary: &Summary, origin: &Origin) -> String {
 }
 
 impl Arguments {
-    /// Settings from the options; where they are open, the defaults or, for objects to add, the data set's.
+    /// Settings from the options; where they are open, the defaults.
     fn origin(&self, seed: Option<u64>) -> Result<Origin> {
-        let there = if self.add { Listing::read(&self.output)? } else { None };
-        let base = self.size.origin(there.map_or_else(Origin::default, |listing| listing.origin))?;
-        if !self.add {
-            refuse_unstated(&self.size)?;
-        }
-        let position = self.position || base.position;
+        let base = self.size.origin(Origin::default())?;
+        refuse_unstated(&self.size)?;
+        let position = self.position;
         if let (true, Some(touches)) = (position, self.touches) {
             return Err(Error::setting(
                 "touches",
@@ -171,11 +158,11 @@ impl Arguments {
             length: self.length.unwrap_or(base.length),
             aim: self.aim.unwrap_or(base.aim),
             scene: if position { self.scene.straight_down(base.scene)? } else { self.scene.scene(base.scene)? },
-            pose: self.pose || base.pose || position,
+            pose: self.pose || position,
             position,
-            within: self.within.or(base.within),
-            approaches: self.approaches.is_some() || base.approaches || position,
-            shard: self.shard.unwrap_or(base.shard),
+            within: self.within,
+            approaches: self.approaches.is_some() || position,
+            samples: self.samples,
             real: self.size.probe.read()?.map_or(base.real, |file| file.real),
             ..base
         })
@@ -194,17 +181,11 @@ fn parsed<T: std::str::FromStr<Err = TouchesProblem>>(text: &str) -> Result<T, S
 /// Options that help where a capture is refused, of those that the command has.
 pub(super) fn hint(error: &Error, has: &dyn Fn(&str) -> bool) -> Option<String> {
     let said = match error.problem::<CaptureProblem>()? {
-        CaptureProblem::HoldsOtherObjects { .. } if has("add") => "--add adds to what is there, --force replaces it.",
-        CaptureProblem::HoldsOtherObjects { .. }
-        | CaptureProblem::HoldsOtherSettings { .. }
-        | CaptureProblem::Shorter { .. } => "--force replaces what is there.",
-        CaptureProblem::HoldsFiles { .. } => "--force replaces what is there, also touches of other objects.",
-        CaptureProblem::HoldsUnfinished { .. } if has("resume") => "--resume resumes it, --force replaces it.",
-        CaptureProblem::NotWritten { .. } if has("resume") => "To resume, repeat the command with --resume.",
+        CaptureProblem::HoldsOthers { .. } => "--force replaces the data set that is there; other files stay.",
         CaptureProblem::Untouchable { is_true_size, .. } => {
             let size = if *is_true_size { "--true-size" } else { "--length" };
             let options = [
-                (has("approaches") && has("resume")).then_some("--approaches N keeps every approach."),
+                (has("approaches") && has("samples")).then_some("--approaches N keeps every approach."),
                 has("skip-bad").then_some("--skip-bad leaves such objects out."),
             ];
             let options: String = options.into_iter().flatten().map(|option| format!("{option} ")).collect();
@@ -221,22 +202,17 @@ pub(super) fn hint(error: &Error, has: &dyn Fn(&str) -> bool) -> Option<String> 
 fn kept(summary: &Summary) -> String {
     let width = summary.objects.iter().map(|object| object.name.len()).max().unwrap_or(0).max(6);
     let mut text = format!("{:width$}  {:>12}  {:>8}  {:>14}\n", "object", "approaches", "touching", "approaches/s");
-    let mut row = |name: &str, approaches: u64, [now, touching]: [u64; 2], seconds: f64| {
-        let share = 100.0 * touching as f64 / now.max(1) as f64;
-        let (approaches, rate) = (count(approaches), decimal(now as f64 / seconds, 0));
+    let mut row = |name: &str, approaches: u64, touching: u64, seconds: f64| {
+        let share = 100.0 * touching as f64 / approaches.max(1) as f64;
+        let (approaches, rate) = (count(approaches), decimal(approaches as f64 / seconds, 0));
         // Writing to a string cannot fail.
         _ = writeln!(text, "{name:width$}  {approaches:>12}  {share:>7.1}%  {rate:>14}");
     };
     for object in &summary.objects {
-        row(&object.name, object.approaches, [object.approaches_now, object.touching], object.seconds);
+        row(&object.name, object.approaches, object.touching, object.seconds);
     }
-    let sum = |of: fn(&ObjectSummary) -> u64| summary.objects.iter().map(of).sum();
-    row(
-        "all",
-        summary.approaches(),
-        [sum(|object| object.approaches_now), sum(|object| object.touching)],
-        summary.seconds,
-    );
+    let touching = summary.objects.iter().map(|object| object.touching).sum();
+    row("all", summary.approaches(), touching, summary.seconds);
     text + "Every approach was kept, also those that touched nothing: `palpate data check` counts which fingers touched.\n"
 }
 
@@ -246,16 +222,16 @@ fn table(summary: &Summary) -> String {
         "{:width$}  {:>10}  {:>12}  {:>7}  {:>14}\n",
         "object", "touches", "approaches", "share", "approaches/s"
     );
-    let mut row = |name: &str, touches: u64, approaches: u64, now: u64, seconds: f64| {
+    let mut row = |name: &str, touches: u64, approaches: u64, seconds: f64| {
         let share = 100.0 * touches as f64 / approaches.max(1) as f64;
-        let (touches, approaches, rate) = (count(touches), count(approaches), decimal(now as f64 / seconds, 0));
+        let rate = decimal(approaches as f64 / seconds, 0);
+        let (touches, approaches) = (count(touches), count(approaches));
         // Writing to a string cannot fail.
         _ = writeln!(text, "{name:width$}  {touches:>10}  {approaches:>12}  {share:>6.1}%  {rate:>14}");
     };
     for object in &summary.objects {
-        row(&object.name, object.touches, object.approaches, object.approaches_now, object.seconds);
+        row(&object.name, object.touches, object.approaches, object.seconds);
     }
-    let now = summary.objects.iter().map(|object| object.approaches_now).sum();
-    row("all", summary.touches(), summary.approaches(), now, summary.seconds);
+    row("all", summary.touches(), summary.approaches(), summary.seconds);
     text
 }

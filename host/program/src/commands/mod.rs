@@ -309,9 +309,6 @@ pub fn main() -> ExitCode {
         error.exit()
     });
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    if has_option(matches.subcommand_name().unwrap_or_default(), "resume") {
-        progress::tell_when_interrupted();
-    }
     match cli.global.apply().and_then(|()| cli.command.run(&cli.global)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

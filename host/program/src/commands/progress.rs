@@ -2,31 +2,28 @@
 
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use palpate::progress::Progress;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// The newest bar, to say how far it came.
-static NEWEST: Mutex<Option<ProgressBar>> = Mutex::new(None);
+/// True once Ctrl-C was pressed.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Has Ctrl-C say how far a command came that goes on with `--resume`.
+/// Has Ctrl-C cancel a call, which then removes what is unfinished; pressed again, it ends the program.
 #[cfg(unix)]
-pub(super) fn tell_when_interrupted() {
-    // Without this, Ctrl-C ends the program as well.
+pub(super) fn cancel_when_interrupted() {
     let Ok(mut signals) = signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT]) else { return };
     std::thread::spawn(move || {
-        signals.forever().next();
-        let bar = NEWEST.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let far = bar.and_then(|bar| Some(format!(" at {} of {}, {}", bar.position(), bar.length()?, bar.message())));
-        eprintln!(
-            "\npalpate: interrupted{}. What is done is kept: repeat the command with --resume.",
-            far.unwrap_or_default()
-        );
+        let mut pressed = signals.forever();
+        pressed.next();
+        INTERRUPTED.store(true, Ordering::Relaxed);
+        pressed.next();
         std::process::exit(130);
     });
 }
 
 #[cfg(not(unix))]
-pub(super) fn tell_when_interrupted() {}
+pub(super) fn cancel_when_interrupted() {}
 
 /// Draws the current stage of a long call: a bar where the number of steps is known, else a spinner. Silent where
 /// stderr is no terminal; cleared when dropped.
@@ -64,12 +61,15 @@ impl Progress for Bar {
             }
         };
         let bar = bar.with_message(stage.to_owned()).with_finish(ProgressFinish::AndClear);
-        *NEWEST.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
         std::mem::replace(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner), bar).finish_and_clear();
     }
 
     fn advance(&self, steps: u64) {
         self.current().inc(steps);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        INTERRUPTED.load(Ordering::Relaxed)
     }
 }
 

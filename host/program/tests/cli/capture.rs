@@ -1,10 +1,11 @@
+use crate::fixtures::{HAND, brick};
 use crate::{
     Folder, command, complains, fails, figures, globe, listing, palpate, read, says, stderr, stdout, succeeds,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A capture of the meshes in `directory` into its folder `output`.
 fn capture(directory: &Path, output: &str, more: &[&str]) -> Command {
@@ -26,19 +27,6 @@ fn meshes() -> Folder {
 fn files(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     let names = listing(directory).into_iter().filter(|name| name != ".lock");
     names.map(|name| (name.clone(), std::fs::read(directory.join(name)).unwrap())).collect()
-}
-
-fn is_complete(directory: &Path) -> bool {
-    read(&directory.join("dataset.json"))["complete"].as_bool().unwrap()
-}
-
-/// Waits until the capture has written its first checkpoint, or a minute.
-fn wait_for(path: &Path) {
-    let start = Instant::now();
-    while !path.exists() {
-        assert!(start.elapsed() < Duration::from_secs(60), "{} never appeared", path.display());
-        std::thread::sleep(Duration::from_millis(5));
-    }
 }
 
 /// A child that does not outlive its test.
@@ -108,7 +96,14 @@ fn wrong_arguments_are_refused_by_name_and_nothing_is_left_behind() {
         (capture, "--touches 1e6", 2, "write the number out: 1000000"),
         (capture, "--sed 1", 2, "--sed"),
         (capture, "--format parquet", 2, "`--format` was removed: data sets are text; DataSet.to_pandas() in Python"),
-        (capture, "--shard 3/2", 2, "Give K/N with K from 1 to N, like 2/5."),
+        (capture, "--samples 3..2", 2, "Give A..B with A below B: 0..5000 are the first 5000."),
+        (
+            capture,
+            "--touches 30 --samples 20..31",
+            2,
+            "--samples is 20..31. Use samples up to 30, as many as each object has",
+        ),
+        (capture, "--shard 1/2", 2, "`--shard` was removed: capture parts on several machines with --samples A..B"),
         (capture, "--cone 30", 2, "--scene table"),
         (capture, "--placements globe/+z=1", 2, "--scene table"),
         (capture, "--scene table --cone 91", 2, "at most 90 degrees"),
@@ -127,37 +122,6 @@ fn wrong_arguments_are_refused_by_name_and_nothing_is_left_behind() {
 }
 
 #[test]
-fn a_second_capture_into_the_same_directory_is_refused() {
-    let at = &meshes();
-    let mut first = capture(at, "out", &["--touches", "100000000"]);
-    let _first = Running(first.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
-    wait_for(&at.join("out/dataset.json"));
-    for more in [&["--touches", "10"][..], &["--touches", "100000000", "--resume"]] {
-        let error = stderr(capture(at, "out", more).output().unwrap(), 1);
-        assert!(error.contains("another capture is writing into this directory"), "{error}");
-    }
-}
-
-#[test]
-fn a_capture_that_is_killed_again_and_again_ends_with_the_same_bytes() {
-    let at = &meshes();
-    let more = ["--touches", "60000", "--seed", "3", "--resume"];
-    stdout(capture(at, "whole", &more).output().unwrap());
-    let killed = at.join("killed");
-    for _ in 0..2 {
-        let mut running = capture(at, "killed", &more);
-        let mut running = Running(running.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
-        wait_for(&killed.join("apple.part"));
-        running.0.kill().unwrap();
-        running.0.wait().unwrap();
-        assert!(!is_complete(&killed), "no kill came while the capture was writing");
-    }
-    stdout(capture(at, "killed", &more).output().unwrap());
-    assert!(files(&killed) == files(&at.join("whole")));
-    assert!(is_complete(&killed));
-}
-
-#[test]
 fn objects_on_a_table_are_captured_in_their_placements_which_the_output_and_the_data_set_name() {
     let at = &meshes();
     let said = succeeds(at, "capture meshes -o out --scene table --approaches 300 --pose --cone 45");
@@ -168,12 +132,6 @@ fn objects_on_a_table_are_captured_in_their_placements_which_the_output_and_the_
     let first = &listing["objects"][1]["placements"][0];
     let name = first["name"].as_str().unwrap();
     assert!(first["weight"].as_f64().unwrap() > 0.0 && said.contains(&format!(": {name} ")), "{said}");
-    // What is added is touched as the rest, and cannot be touched otherwise.
-    globe(at, "pear", 9);
-    let expected = "cannot add to these touches: other settings: scene";
-    fails(at, "capture pear.obj -o out --add --cone 30", 1, expected);
-    succeeds(at, "capture pear.obj -o out --add");
-    assert!(out.join("pear.txt").exists());
 }
 
 #[test]
@@ -197,30 +155,6 @@ fn touches_with_a_position_are_captured_straight_down_and_recorded_with_it() {
     assert_eq!(std::fs::read_to_string(at.join("recorded/globe.txt")).unwrap(), lines);
 }
 
-#[test]
-fn resuming_with_other_arguments_is_refused() {
-    let at = &meshes();
-    succeeds(at, "capture meshes -o out --touches 20");
-    let before = files(&at.join("out"));
-    for other in ["--touches 30 --resume", "--touches 20 --seed 2 --resume"] {
-        let error = stderr(palpate(at, &format!("capture meshes -o out {other}")), 1);
-        assert!(error.contains("dataset.json: cannot resume: other settings"), "{error}");
-        assert!(error.contains(" there and "), "what differs: {error}");
-    }
-    succeeds(at, "capture meshes -o out --touches 20 --resume");
-    assert_eq!(files(&at.join("out")), before);
-}
-
-/// Resumes a capture of 50,000 touches, which ends as one that was never stopped.
-#[cfg(unix)]
-fn resumes(at: &Path) {
-    assert!(!is_complete(&at.join("out")));
-    for output in ["out", "whole"] {
-        succeeds(at, &format!("capture meshes -o {output} --touches 50000 --resume"));
-    }
-    assert!(files(&at.join("out")) == files(&at.join("whole")));
-}
-
 /// Runs a shell script, which gets the program as $1 and the directory as $2; none where it cannot be run.
 #[cfg(unix)]
 fn shell(script: &str, directory: &Path) -> std::process::Output {
@@ -229,33 +163,33 @@ fn shell(script: &str, directory: &Path) -> std::process::Output {
 
 #[cfg(unix)]
 #[test]
-fn a_file_that_may_not_grow_stops_the_capture_which_can_be_resumed() {
+fn a_file_that_may_not_grow_stops_the_capture_and_nothing_is_left() {
     // The shell's limit is in blocks of 512 or 1024 bytes; the signal is ignored so that writing fails instead.
     let at = &meshes();
     let script = "trap '' XFSZ; ulimit -f 400; exec \"$1\" capture \"$2/meshes\" -o \"$2/out\" --touches 50000";
     let error = stderr(shell(script, at), 1);
-    assert!(error.contains("apple.part: cannot write the touches") && error.contains("--resume"), "{error}");
-    resumes(at);
+    assert!(error.contains("apple.txt: cannot write the touches") && error.contains("repeat the capture"), "{error}");
+    assert_eq!(listing(at), ["meshes"]);
 }
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_stops_the_capture_which_can_be_resumed() {
-    // A disk of one megabyte, in a mount namespace of its own; what it holds is copied out before it goes.
+fn a_full_disk_stops_the_capture_and_nothing_is_left() {
+    // A disk of one megabyte, in a mount namespace of its own; what it holds is listed before it goes.
     let at = &meshes();
     std::fs::create_dir(at.join("disk")).unwrap();
     let script = "exec unshare -rm sh -c '
         mount -t tmpfs -o size=1m none \"$2/disk\" || exit 99
         \"$1\" capture \"$2/meshes\" -o \"$2/disk/out\" --touches 50000; code=$?
-        cp -r \"$2/disk/out\" \"$2/out\"; exit $code' sh \"$1\" \"$2\"";
+        ls -A \"$2/disk\" >\"$2/left\"; exit $code' sh \"$1\" \"$2\"";
     let output = shell(script, at);
-    if !at.join("out").exists() {
+    let Ok(left) = std::fs::read_to_string(at.join("left")) else {
         eprintln!("SKIPPED: no disk of our own ({})", String::from_utf8_lossy(&output.stderr).trim());
         return;
-    }
+    };
     let error = stderr(output, 1);
-    assert!(error.contains("No space left on device") && error.contains("--resume"), "{error}");
-    resumes(at);
+    assert!(error.contains("No space left on device") && error.contains("Free some space"), "{error}");
+    assert_eq!(left, "");
 }
 
 #[cfg(target_os = "linux")]
@@ -280,54 +214,6 @@ fn memory_does_not_grow_with_the_number_of_touches() {
     let (few, many) = (peak("5000"), peak("200000"));
     // Up to a megabyte either way is the allocator's.
     assert!(many <= few + few / 5 + 1024, "{few} kB for 5,000 touches, {many} kB for 200,000");
-}
-
-#[test]
-fn touches_of_other_objects_are_kept_unless_the_capture_is_forced() {
-    let at = &meshes();
-    let [apple, globe] = ["apple", "globe"].map(|name| format!("capture meshes/{name}.obj -o real --touches 20"));
-    succeeds(at, &apple);
-    let before = files(&at.join("real"));
-    let expected = "real: holds 20 touches of apple, which this capture would not write … --add … --force";
-    fails(at, &globe, 1, expected);
-    assert_eq!(files(&at.join("real")), before);
-    succeeds(at, &format!("{globe} --force"));
-    assert_eq!(files(&at.join("real")).keys().collect::<Vec<_>>(), ["dataset.json", "globe.txt"]);
-    fails(at, &format!("{apple} --force --add"), 2, "--force");
-}
-
-#[test]
-fn an_object_is_added_with_the_settings_of_the_others() {
-    let at = &meshes();
-    std::fs::write(at.join("probe.toml"), "radius = 0.15\nspacing = 2\nspeed = 10\n").unwrap();
-    let settings = "--touches 30 --seed 5 --probe probe.toml --pose";
-    let add = "capture meshes/apple.obj -o real --add";
-    succeeds(at, &format!("capture meshes/globe.obj -o real {settings}"));
-    succeeds(at, add);
-    succeeds(at, &format!("capture meshes -o together {settings}"));
-    assert!(files(&at.join("real")) == files(&at.join("together")));
-    fails(at, add, 1, "already holds touches of apple");
-    let expected = "cannot add to these touches: other settings: seed is 5 there and 6 here";
-    fails(at, &format!("{add} --seed 6"), 1, expected);
-}
-
-#[test]
-fn an_unfinished_capture_is_neither_overwritten_nor_forgotten() {
-    let at = &meshes();
-    let mut first = capture(at, "out", &["--touches", "100000000"]);
-    let mut first = Running(first.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
-    wait_for(&at.join("out/apple.part"));
-    first.0.kill().unwrap();
-    first.0.wait().unwrap();
-    let before = files(&at.join("out"));
-    for touches in ["100000000", "20"] {
-        let error = stderr(capture(at, "out", &["--touches", touches]).output().unwrap(), 1);
-        assert!(error.contains("out: holds an unfinished capture of apple, globe"), "{error}");
-        assert!(error.contains("--resume") && error.contains("--force"), "{error}");
-        assert!(files(&at.join("out")) == before);
-    }
-    stdout(capture(at, "out", &["--touches", "20", "--force"]).output().unwrap());
-    assert!(is_complete(&at.join("out")));
 }
 
 #[cfg(target_os = "linux")]
@@ -385,5 +271,68 @@ fn results_go_through_links_and_to_standard_output_and_never_onto_what_is_read()
         let before = std::fs::read(at.join(output)).unwrap();
         fails(at, &words, 2, "Use another file than what is read");
         assert_eq!(std::fs::read(at.join(output)).unwrap(), before);
+    }
+}
+
+/// Two boxes in `meshes`, several of each in `set`, and probes.
+fn bricks() -> Folder {
+    let at = Folder::new();
+    ["meshes", "set/brick", "set/slab"].into_iter().for_each(|made| std::fs::create_dir_all(at.join(made)).unwrap());
+    for (name, sides) in [
+        ("meshes/brick", [60.0, 40.0, 30.0]),
+        ("meshes/slab", [70.0, 50.0, 10.0]),
+        ("set/brick/a", [60.0, 40.0, 30.0]),
+        ("set/brick/b", [60.0, 30.0, 20.0]),
+        ("set/brick/c", [50.0, 50.0, 20.0]),
+        ("set/slab/a", [70.0, 50.0, 10.0]),
+        ("set/slab/b", [90.0, 40.0, 12.0]),
+    ] {
+        brick(&at.join(format!("{name}.obj")), sides);
+    }
+    let real = "speed_factor = 0.9\noffsets = [0.0, -0.04, 0.0]\nnoise = \"2ms\"\ntimer = \"1ms\"\nmissed = [\"0%\", \"4%\", \"0%\"]\n";
+    let probe = format!("radius = 0.15\nspacing = 1.5\nspeed = 10.0\n[real]\n{real}");
+    std::fs::write(at.join("real.toml"), probe).unwrap();
+    std::fs::write(at.join("hand.toml"), HAND).unwrap();
+    at
+}
+
+#[test]
+fn touches_are_those_of_version_0_3_0_in_one_thread_in_four_and_in_parts() {
+    let at = &bricks();
+    // The checksums of the files of both objects as that version wrote them: whole in one thread and in four, and in three shards.
+    for (words, count, expected) in [
+        ("meshes --seed 1 --touches", 301, [577_710_658, 1_912_490_814]),
+        ("meshes --seed 2 --pose --touches", 300, [3_269_272_418, 2_120_952_123]),
+        ("meshes --seed 3 --approaches", 500, [470_500_592, 2_922_138_810]),
+        ("meshes --seed 4 --pose --aim mass --approaches", 700, [2_178_824_318, 2_169_447_840]),
+        ("meshes --seed 5 --probe real.toml --touches", 200, [2_268_446_266, 4_118_118_332]),
+        ("meshes --seed 6 --scene table --pose --approaches", 400, [2_592_788_561, 339_739_495]),
+        ("meshes --seed 7 --scene table --cone 30 --touches", 200, [420_478_625, 1_441_037_996]),
+        (
+            "meshes --seed 8 --scene table --position --true-size mm --probe hand.toml --approaches",
+            300,
+            [2_402_765_942, 2_582_309_632],
+        ),
+        ("set --seed 9 --instances --touches", 300, [1_938_372_531, 861_611_217]),
+        ("meshes --seed 10 --length 5 --aim middle --touches", 300, [2_798_672_090_u32, 3_616_987_438]),
+    ] {
+        let capture = |out: &str, more: &str| {
+            succeeds(at, &format!("capture {words} {count} -o {out} --force {more}"));
+            files(&at.join(out))
+        };
+        let whole = capture("one", "--threads 1");
+        let listed = read(&at.join("one/dataset.json"))["objects"].take();
+        assert_eq!(
+            [0, 1].map(|object| listed[object]["crc32"].as_u64()),
+            expected.map(|crc32| Some(crc32.into())),
+            "{words}"
+        );
+        assert!(capture("four", "--threads 4") == whole, "{words}");
+        let middle = count / 3 + 1;
+        let parts = [format!("0..{middle}"), format!("{middle}..{count}")];
+        let [first, second] = parts.map(|part| capture("part", &format!("--samples {part}")));
+        for name in ["brick.txt", "slab.txt"] {
+            assert!([&first[name][..], &second[name]].concat() == whole[name], "{words}, {name}");
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! `palpate probe fit` and `palpate capture --probe`, as a user calls them.
 
 use crate::fixtures::CROOKED;
-use crate::{Folder, complains, fails, figures, globe, palpate, read, says, shapes, succeeds};
+use crate::{Folder, complains, fails, figures, palpate, read, says, shapes, succeeds};
 use serde_json::Value;
 use std::fs;
 
@@ -37,9 +37,6 @@ fn a_crooked_probe_is_fitted_and_touches_are_captured_as_it_gives_them() {
     assert_eq!(figures(at, evaluate)["accuracy"], with_probe["accuracy"]);
     let expected = "true.toml and the data set state different probes: [real]: ";
     fails(at, "evaluate ensemble.json touches --probe true.toml", 1, expected);
-    globe(at, "fork", 4);
-    // Another probe's touches are not added to a data set.
-    fails(at, "capture fork.obj -o touches --approaches 500 --add --probe true.toml", 1, "real is ");
 }
 
 #[test]

@@ -49,10 +49,10 @@ def from_pandas(table: pandas.DataFrame, probe: Probe | None, approaches: bool) 
 
     def vectors(name: str) -> NDArray[np.float64] | None:
         columns = [f"{name}_{axis}" for axis in "xyz"]
-        there = [column for column in columns if column in table.columns]
-        if there and there != columns:
-            raise InputError(f"the table has {there[0]} without {columns[0]}, {columns[1]} and {columns[2]}. Give all three.")
-        return table[columns].to_numpy("f8", na_value=float("nan")) if there else None
+        lacking = [column for column in columns if column not in table.columns]
+        if 0 < len(lacking) < len(columns):
+            raise InputError(f"the table has no column {lacking[0]}, and another one of {name}. Give all three.")
+        return None if lacking else table[columns].to_numpy("f8", na_value=float("nan"))
 
     def numbers(name: str) -> NDArray[np.int64] | None:
         return table[name].to_numpy("i8") if name in table.columns else None

@@ -3,7 +3,7 @@ The part of the package palpate that is written in Rust.
 """
 
 from _typeshed import SupportsGetItem
-from numpy import float32, float64, int16
+from numpy import float32, float64, int16, int64
 from numpy.typing import ArrayLike, NDArray
 from os import PathLike
 from palpate._locate import CalibratedMaps, MapsEvaluation
@@ -63,7 +63,7 @@ class DataSet:
         32767), NaN where one is missing: for training with another library. The code is the chip's.
         """
     @staticmethod
-    def from_arrays(times: ArrayLike, objects: ArrayLike, names: SupportsGetItem[int, str], *, direction: ArrayLike | None = None, alignment: ArrayLike | None = None, position: ArrayLike | None = None, probe: Probe | None = None, approaches: bool = False, instances: ArrayLike | None = None) -> DataSet:
+    def from_arrays(times: ArrayLike, objects: ArrayLike, names: SupportsGetItem[int, str], *, direction: ArrayLike | None = None, alignment: ArrayLike | None = None, position: ArrayLike | None = None, probe: Probe | None = None, approaches: bool = False, instances: ArrayLike | None = None, robots: ArrayLike | None = None) -> DataSet:
         """
         A data set of touches from elsewhere.
 
@@ -72,6 +72,13 @@ class DataSet:
         `direction` and `alignment` are unit vectors, `position` where the hand was at the first contact, on a table, in
         millimeters (the `probe` is in millimeters then). Without a `probe` nothing is known about it. `instances` are numbers
         that say which mesh, or recording, of its object each touch is of, where objects have several: a sequence is of one.
+        `robots` are numbers that say which robot made each touch, where robots differ: a sequence is of one, too.
+        """
+    @staticmethod
+    def from_pandas(table: DataFrame, *, probe: Probe | None = None, approaches: bool = False) -> DataSet:
+        """
+        A data set of a table with the columns of `to_pandas`; times are rounded to microseconds. Rows keep their order within an
+        object. Without a `probe` nothing is known about it. Needs pandas.
         """
     @property
     def holds_approaches(self, /) -> bool:
@@ -111,8 +118,13 @@ class DataSet:
     @staticmethod
     def read(directory: str | PathLike[str]) -> DataSet:
         """
-        Reads the data set in a directory, which `capture` or `palpate capture` wrote, or which holds `<object>.txt` or
-        `<object>.parquet` for each object.
+        Reads the data set in a directory, which `capture` or `palpate capture` wrote, or which holds `<object>.txt`
+        for each object.
+        """
+    @property
+    def robots(self, /) -> NDArray[int64] | None:
+        """
+        Number of the robot that made each touch: all touches of a sequence are from one; `None` if robots do not differ.
         """
     def split(self, /, test_share: SupportsFloat | SupportsIndex = 0.1, seed: SupportsIndex = 1) -> tuple[DataSet, DataSet]:
         """
@@ -126,17 +138,14 @@ class DataSet:
         """
     def to_pandas(self, /) -> DataFrame:
         """
-        The touches as a table: object (a category), t1, t2 and t3, and, if known, direction, alignment and position.
-        The columns are those of the arrays, without copies. Needs pandas.
-        """
-    def to_parquet(self, /, directory: str | PathLike[str]) -> None:
-        """
-        Writes `<object>.parquet` for each object and, if the probe is known, `dataset.json`, into a directory that holds
-        no touches yet: what `read`, `palpate train` and pandas read. Which touch is of which instance or recording is kept.
+        The touches as a table: object (a category), t1, t2 and t3, and, if known, direction, alignment and position by their
+        axes, such as direction_x; instance, where objects have several, and robot, where robots differ. The columns are those of
+        the arrays, without copies. Needs pandas, which also writes and reads Parquet.
         """
     def to_text(self, /, directory: str | PathLike[str]) -> None:
         """
-        Writes the touches as text, one line per touch.
+        Writes `<object>.txt` for each object, one line per touch, and, if the probe is known, `dataset.json`, into a directory
+        that holds no touches yet: what `read` and `palpate train` read. Which touch is of which instance or recording is kept.
         """
     @property
     def warnings(self, /) -> list[str]:
@@ -223,7 +232,7 @@ class Ensemble:
         """
     def save(self, /, path: str | PathLike[str]) -> None:
         """
-        Writes an ensemble over touches as XGBoost's JSON. A file that Palpate did not write is not replaced.
+        Writes an ensemble over touches as XGBoost's JSON.
         """
     @property
     def trees(self, /) -> int:
@@ -379,7 +388,7 @@ class Maps:
         """
     def save(self, /, path: str | PathLike[str]) -> None:
         """
-        Writes the maps, whole or not at all. A file that Palpate did not write is not replaced.
+        Writes the maps, whole or not at all.
         """
     @property
     def size(self, /) -> int:
@@ -433,8 +442,7 @@ class Model:
         """
         Writes the model as source code, and returns the files. `form` is "c" (an array), "rust", "c-code" (trees as C),
         "thumb" or "thumb-m4f" (trees as assembly, for C and Rust); without it a name that ends in ".h" means "c", ".rs" "rust"
-        and ".s" "thumb". What has to be built with it, such as palpate.h, is written beside it, and for assembly the model. A
-        file that Palpate did not write is not replaced.
+        and ".s" "thumb". What has to be built with it, such as palpate.h, is written beside it, and for assembly the model.
         """
     @property
     def features(self, /) -> list[str]:
@@ -495,7 +503,7 @@ class Model:
         """
     def save(self, /, path: str | PathLike[str]) -> None:
         """
-        Writes the model, whole or not at all. A file that Palpate did not write is not replaced.
+        Writes the model, whole or not at all.
         """
     @property
     def size(self, /) -> int:
@@ -657,7 +665,7 @@ def calibrate(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], 
     Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
     """
 
-def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", cone: SupportsFloat | SupportsIndex | None = None, position: bool = False, within: SupportsFloat | SupportsIndex | None = None, length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, shard: str = "1/1", out: str | PathLike[str] | None = None, format: str = "text", resume: bool = False, add: bool = False, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
+def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", cone: SupportsFloat | SupportsIndex | None = None, position: bool = False, within: SupportsFloat | SupportsIndex | None = None, length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, samples: tuple[SupportsIndex, SupportsIndex] | None = None, out: str | PathLike[str] | None = None, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
     """
     Touches objects with a simulated probe.
 
@@ -670,9 +678,9 @@ def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsInd
     `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a table in each of their placements, and
     approaches come within that many degrees of straight down. `position` keeps where the hand was, too, of all approaches
     straight down to objects of true size on a table; `within` is how far from an object's middle they aim at most. The same
-    `seed` gives the same touches on any number of `threads`, and the same as the program's. `shard` is "K/N" for a part. With
-    `instances` a directory inside a directory is one object. With `out` the touches are written there, as "text" or "parquet",
-    as `palpate capture` does: `resume`, `add` and `force` are its options.
+    `seed` gives the same touches on any number of `threads`, and the same as the program's. `samples` are the first of
+    a part of these touches or approaches, from 0, and the one after its last. With `instances` a directory inside a directory
+    is one object. With `out` the touches are written there as `palpate capture` does: `force` is its option.
 
     `progress` is called with a stage, the steps done and their number. Ctrl-C stops the call.
 

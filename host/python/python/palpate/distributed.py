@@ -93,6 +93,12 @@ class _Job:
         return f"{self.part}/{self.parts}"
 
     @property
+    def samples(self) -> tuple[int, int]:
+        """The first of its touches, and the one after its last."""
+        touches: int = self.options["touches"]
+        return touches * (self.part - 1) // self.parts, touches * self.part // self.parts
+
+    @property
     def path(self) -> str:
         """The path of the part."""
         return f"parts/{self.name}/{self.part}-of-{self.parts}.txt"
@@ -238,10 +244,10 @@ def capture(
     whole = [shards for name, shards in objects.items() if name not in lacking]
     entries = _join(client, whole, format, progress)
     if not lacking:
-        settings = {**json.loads(entries[0]["settings"]), "shard": "1/1"}
+        settings = json.loads(entries[0]["settings"])
+        del settings["samples"]
         listing = {
             "palpate": entries[0]["palpate"],
-            "complete": True,
             "settings": settings,
             "objects": [json.loads(entry["entry"]) for entry in entries],
         }
@@ -314,7 +320,7 @@ def _capture(job: _Job) -> None:
     store = _Store(job.target)
     with tempfile.TemporaryDirectory() as directory:
         out = Path(directory) / "data"
-        _native.capture({job.name: job.mesh}, **job.options, shard=job.shard, out=out, threads=1)
+        _native.capture({job.name: job.mesh}, **job.options, samples=job.samples, out=out, threads=1)
         listing = json.loads((out / "dataset.json").read_text(encoding="utf-8"))
         (entry,) = listing["objects"]
         if job.checksums and entry["meshes"] != job.checksums:
@@ -409,8 +415,8 @@ def train(
 
     url = os.fspath(directory)
     listing = json.loads(_Store(url).read("dataset.json") or b"{}")
-    if not listing.get("complete"):
-        raise InputError(f"{url}: no complete data set. Capture it first.")
+    if not listing:
+        raise InputError(f"{url}: no data set. Capture it first.")
     names = [entry["name"] for entry in listing["objects"]]
     weights = {entry["name"]: 1.0 / entry["touches"] for entry in listing["objects"]}
     mean = sum(entry["touches"] for entry in listing["objects"]) / len(names)

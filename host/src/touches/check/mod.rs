@@ -120,9 +120,6 @@ struct Read {
 
 /// The objects that a listing names.
 fn listed(directory: &Path, listing: Listing, findings: &mut Findings) -> Result<Vec<Read>> {
-    if !listing.complete {
-        findings.problem(directory, TouchesProblem::Incomplete);
-    }
     let mut objects = Vec::new();
     for Entry { name, touches: stated, approaches, crc32, .. } in listing.objects {
         let path = directory.join(format!("{name}.{}", super::files::EXTENSION));

@@ -113,7 +113,7 @@ impl Recording {
                     return Err(wrong(TouchesProblem::Unlisted { files: files.join(", ") }));
                 }
                 let usual = || Origin::recorded(super::Origin::default().probe, Length::Tenth, false);
-                Listing { complete: true, ..Listing::new(&origin.cloned().unwrap_or_else(usual), []) }
+                Listing::new(&origin.cloned().unwrap_or_else(usual), [])
             }
         };
         let path = Entry { name: object.into(), ..Entry::default() }.file(directory);

@@ -8,7 +8,7 @@ use palpate::probe::approach::Approach;
 use palpate::probe::hand;
 use palpate::probe::scene::Scene;
 use palpate::progress::Progress;
-use palpate::touches::{Listing, Shard, write_touch};
+use palpate::touches::{Listing, Samples, write_touch};
 
 fn objects() -> Vec<Object> {
     [("disc", 0.1), ("globe", 1.0)]
@@ -65,23 +65,19 @@ fn another_seed_or_name_gives_other_touches() {
 }
 
 #[test]
-fn shards_put_together_are_the_whole() {
+fn parts_put_together_are_the_whole() {
     for approaches in [false, true] {
         let origin = Origin { approaches, ..origin(1000) };
         let whole = files(&with(origin.clone()));
         let mut joined = BTreeMap::new();
-        for number in 1..=7 {
-            for (name, text) in files(&with(Origin { shard: shard(number), ..origin.clone() })) {
+        for (first, end) in [(0, 1), (1, 142), (142, 700), (700, 1000)] {
+            for (name, text) in files(&with(Origin { samples: Some(Samples { first, end }), ..origin.clone() })) {
                 *joined.entry(name).or_insert_with(String::new) += &text;
             }
         }
         assert_eq!(joined["disc.txt"], whole["disc.txt"]);
         assert_eq!(joined["globe.txt"], whole["globe.txt"]);
     }
-}
-
-fn shard(number: u64) -> Shard {
-    format!("{number}/7").parse().unwrap()
 }
 
 #[test]
@@ -97,7 +93,6 @@ fn touches_in_memory_are_those_on_the_disk() {
         assert!(read.touches().iter().all(|touch| touch.is_full() && touch.pose().is_some()));
     }
     let listing = Listing::read(directory.path()).unwrap().unwrap();
-    assert!(listing.complete);
     assert_eq!(listing.objects[0].approaches, summary.objects[0].approaches);
     assert!(summary.objects[0].approaches > 2 * summary.objects[0].touches, "a disc is often missed");
 }
@@ -120,37 +115,6 @@ fn full_touches_are_the_full_ones_of_all_approaches_however_they_are_found() {
             full += u32::from(plain.is_some());
         }
         assert!(full > 100);
-    }
-}
-
-#[test]
-fn what_an_interruption_left_behind_is_cut_off_and_the_rest_is_the_same() {
-    let whole = files(&settings());
-    let mut listing: Listing = serde_json::from_str(&whole["dataset.json"]).unwrap();
-    let objects = objects();
-    let scenes = scenes(&objects.iter().collect::<Vec<_>>(), &Origin::default(), &()).unwrap();
-    for (object, kept) in [(0, 0), (0, 1), (0, 777), (0, 1500), (1, 0), (1, 1499), (1, 1500)] {
-        // As if it had been killed after a checkpoint at N touches of this object.
-        let directory = tempfile::tempdir().unwrap();
-        listing.complete = false;
-        for (index, entry) in listing.objects.iter_mut().enumerate() {
-            let kept = [kept, if index < object { 1500 } else { 0 }][usize::from(index != object)];
-            let text = &whole[&format!("{}.txt", entry.name)];
-            let sampler = Sampler::of_instances(&scenes[index], &entry.name, &listing.origin);
-            entry.crc32 = None;
-            entry.touches = kept;
-            entry.approaches = (0..kept).map(|sample| sampler.sample(sample).unwrap().1).sum();
-            entry.bytes = text.lines().take(kept as usize).map(|line| line.len() as u64 + 1).sum();
-            let end = if index == object { "part" } else { "txt" };
-            if index <= object {
-                let mut left = text[..entry.bytes as usize].to_owned();
-                left += if index == object { "0.000000 0.1" } else { "" };
-                std::fs::write(directory.path().join(format!("{}.{end}", entry.name)), left).unwrap();
-            }
-        }
-        listing.write(directory.path()).unwrap();
-        capture(&objects, &with!(settings(), resume = true), directory.path(), &()).unwrap();
-        assert!(read_files(directory.path()) == whole, "object {object}, {kept} touches");
     }
 }
 
@@ -199,72 +163,6 @@ fn globe_called(name: &str) -> Object {
 }
 
 #[test]
-fn a_capture_into_a_directory_with_other_objects_is_refused() {
-    let directory = tempfile::tempdir().unwrap();
-    let settings = with(origin(20));
-    capture(&[globe_called("mug")], &settings, directory.path(), &()).unwrap();
-    let boxed = [globe_called("box")];
-    let holds = CaptureProblem::HoldsOtherObjects { objects: vec!["mug".into()], touches: 20 };
-    assert_eq!(refusal(&boxed, &settings, directory.path()), holds);
-    capture(&boxed, &with!(settings, force = true), directory.path(), &()).unwrap();
-    assert_eq!(read_files(directory.path()).keys().collect::<Vec<_>>(), ["box.txt", "dataset.json"]);
-}
-
-#[test]
-fn a_capture_over_touches_of_other_settings_is_refused() {
-    let directory = tempfile::tempdir().unwrap();
-    capture(&objects(), &with(origin(20)), directory.path(), &()).unwrap();
-    match refusal(&objects(), &with(Origin { seed: 2, ..origin(10) }), directory.path()) {
-        CaptureProblem::HoldsOtherSettings { objects, differences } => {
-            assert_eq!(objects, ["disc", "globe"]);
-            assert_eq!(differences, "seed is 1 there and 2 here, touches is 20 there and 10 here");
-        }
-        other => panic!("{other}"),
-    }
-    let replaced = with!(with(origin(10)), force = true);
-    capture(&objects(), &replaced, directory.path(), &()).unwrap();
-    assert_eq!(read_files(directory.path())["globe.txt"].lines().count(), 10);
-}
-
-#[test]
-fn touches_of_a_mesh_that_was_replaced_are_not_mixed_with_those_of_the_old_one() {
-    let changed: Vec<Object> = objects()
-        .into_iter()
-        .map(|object| match object.name.as_str() {
-            "globe" => Object::new("globe", Mesh::globe(13)),
-            _ => object,
-        })
-        .collect();
-    let said = "globe's mesh is another one there than here";
-    // Resumed: before, the file went on with touches of the other mesh, and the data set was called complete.
-    let directory = tempfile::tempdir().unwrap();
-    cancelled(&settings(), directory.path());
-    let resume = with!(settings(), resume = true);
-    match refusal(&changed, &resume, directory.path()) {
-        CaptureProblem::ResumesOtherSettings { differences } => assert_eq!(differences, said),
-        other => panic!("{other}"),
-    }
-    capture(&objects(), &resume, directory.path(), &()).unwrap();
-    // Repeated, which would delete the touches of the old mesh.
-    match refusal(&changed, &settings(), directory.path()) {
-        CaptureProblem::HoldsOtherSettings { differences, .. } => assert_eq!(differences, said),
-        other => panic!("{other}"),
-    }
-    // Added to, after an interruption.
-    let of = |name: &str, rings| Object::of_instances("cups", vec![instance("one", 5), instance(name, rings)]);
-    let add = with!(settings(), add = true);
-    capture(&[of("two", 6).unwrap()], &add, directory.path(), &CancelAfter(1.into())).unwrap_err();
-    match refusal(&[of("two", 7).unwrap()], &with!(add.clone(), resume = true), directory.path()) {
-        CaptureProblem::ResumesOtherSettings { differences } => {
-            assert_eq!(differences, "cups's mesh of instance two is another one there than here");
-        }
-        other => panic!("{other}"),
-    }
-    capture(&[of("two", 6).unwrap()], &with!(add, resume = true), directory.path(), &()).unwrap();
-    capture(&changed, &with!(settings(), force = true), directory.path(), &()).unwrap();
-}
-
-#[test]
 fn the_same_capture_may_be_repeated_and_gives_the_same_bytes() {
     let directory = tempfile::tempdir().unwrap();
     capture(&objects(), &with(origin(20)), directory.path(), &()).unwrap();
@@ -280,7 +178,7 @@ fn a_capture_into_a_directory_with_touches_from_elsewhere_is_refused() {
     for name in ["fork.txt", "globe.txt"] {
         std::fs::write(directory.path().join(name), "0 0 0\n").unwrap();
     }
-    let holds = CaptureProblem::HoldsFiles { files: vec!["fork.txt".into(), "globe.txt".into()] };
+    let holds = CaptureProblem::HoldsOthers { files: vec!["fork.txt".into(), "globe.txt".into()] };
     assert_eq!(refusal(&objects(), &with(origin(20)), directory.path()), holds);
 }
 
@@ -292,36 +190,6 @@ fn a_listing_that_cannot_be_read_is_not_written_over() {
     assert!(error.contains("dataset.json:1: not the listing of a data set"), "{error}");
     capture(&objects(), &with!(with(origin(20)), force = true), directory.path(), &()).unwrap();
     assert_eq!(Dataset::read(directory.path()).unwrap().len(), 40);
-}
-
-#[test]
-fn an_unfinished_capture_repeated_without_resuming_is_refused() {
-    let directory = tempfile::tempdir().unwrap();
-    cancelled(&settings(), directory.path());
-    match refusal(&objects(), &settings(), directory.path()) {
-        CaptureProblem::HoldsUnfinished { objects, .. } => assert_eq!(objects, ["disc", "globe"]),
-        other => panic!("{other}"),
-    }
-    capture(&objects(), &with!(settings(), force = true), directory.path(), &()).unwrap();
-    assert!(read_files(directory.path()) == files(&settings()));
-}
-
-#[test]
-fn a_kill_while_old_touches_are_deleted_leaves_no_complete_listing() {
-    // The first file to delete cannot be deleted: it stands for the moment of the kill.
-    let directory = tempfile::tempdir().unwrap();
-    capture(&objects(), &with(origin(20)), directory.path(), &()).unwrap();
-    let obstacle = directory.path().join("globe.txt");
-    std::fs::remove_file(&obstacle).unwrap();
-    std::fs::create_dir(&obstacle).unwrap();
-    let forced = with!(with(origin(30)), force = true);
-    let error = capture(&objects(), &forced, directory.path(), &()).unwrap_err().to_string();
-    assert!(error.contains("globe.txt: cannot remove the old touches"), "{error}");
-    assert!(!directory.path().join("disc.txt").exists(), "deleted before the obstacle");
-    assert!(Dataset::read(directory.path()).unwrap_err().to_string().contains("not complete"));
-    std::fs::remove_dir(&obstacle).unwrap();
-    capture(&objects(), &forced, directory.path(), &()).unwrap();
-    assert_eq!(Dataset::read(directory.path()).unwrap().len(), 60);
 }
 
 /// Cancels once this many touches are reported.
@@ -337,51 +205,44 @@ impl Progress for CancelAfter {
     }
 }
 
-/// Captures until the first chunk is written.
-fn cancelled(settings: &Settings, directory: &Path) {
-    let error = capture(&objects(), settings, directory, &CancelAfter(1.into())).unwrap_err();
-    assert!(matches!(error, Error::Cancelled), "{error}");
+#[test]
+fn a_cancelled_capture_leaves_nothing_and_what_was_there_as_it_was() {
+    let place = tempfile::tempdir().unwrap();
+    let directory = place.path().join("data");
+    let cancelled = |settings: &Settings| {
+        let error = capture(&objects(), settings, &directory, &CancelAfter(1.into())).unwrap_err();
+        assert!(matches!(error, Error::Cancelled), "{error}");
+    };
+    cancelled(&settings());
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
+    capture(&objects(), &with(origin(20)), &directory, &()).unwrap();
+    let before = read_files(&directory);
+    cancelled(&with!(settings(), force = true));
+    assert_eq!(read_files(&directory), before);
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 1);
 }
 
 #[test]
-fn a_cancelled_capture_stops_and_can_be_resumed() {
-    let directory = tempfile::tempdir().unwrap();
-    cancelled(&settings(), directory.path());
-    let listing = Listing::read(directory.path()).unwrap().unwrap();
-    assert!(!listing.complete);
-    assert!(Dataset::read(directory.path()).unwrap_err().to_string().contains("not complete"));
-    assert!(!directory.path().join("globe.txt").exists(), "the second object was never begun");
-    capture(&objects(), &with!(settings(), resume = true), directory.path(), &()).unwrap();
-    assert!(read_files(directory.path()) == files(&settings()));
-}
-
-#[test]
-fn objects_added_later_are_as_if_captured_together() {
-    let together = files(&settings());
-    let directory = tempfile::tempdir().unwrap();
+fn a_directory_is_replaced_by_the_same_capture_or_by_force_only() {
+    let place = tempfile::tempdir().unwrap();
+    let directory = place.path().join("data");
+    let holds = |files: &[&str]| CaptureProblem::HoldsOthers { files: files.iter().map(ToString::to_string).collect() };
+    capture(&objects(), &with(origin(20)), &directory, &()).unwrap();
+    let all = holds(&["dataset.json", "disc.txt", "globe.txt"]);
     let [disc, globe] = objects().try_into().unwrap();
-    let add = with!(settings(), add = true);
-    for object in [globe.clone(), disc.clone()] {
-        capture(&[object], &add, directory.path(), &()).unwrap();
+    for other in [with(Origin { seed: 2, ..origin(20) }), with(origin(21)), with(Origin { pose: true, ..origin(20) })] {
+        assert_eq!(refusal(&objects(), &other, &directory), all);
     }
-    assert!(read_files(directory.path()) == together);
-    // What cannot be added.
-    let there = CaptureProblem::AlreadyThere { objects: vec!["disc".into()] };
-    assert_eq!(refusal(&[disc.clone(), globe_called("cup")], &add, directory.path()), there);
-    let other = with!(with(origin(9)), add = true);
-    let problem = refusal(&[globe_called("cup")], &other, directory.path());
-    assert!(matches!(problem, CaptureProblem::AddsOtherSettings { .. }), "{problem}");
-    // An interrupted addition can be resumed, and nothing else be added before it is.
-    let error = capture(&[globe_called("cup")], &add, directory.path(), &CancelAfter(1.into())).unwrap_err();
-    assert!(matches!(error, Error::Cancelled), "{error}");
-    let problem = refusal(&[globe_called("jug")], &add, directory.path());
-    assert!(matches!(problem, CaptureProblem::HoldsUnfinished { .. }), "{problem}");
-    let resume = with!(add, resume = true);
-    let problem = refusal(&[globe_called("jug")], &resume, directory.path());
-    assert!(matches!(problem, CaptureProblem::ResumesOtherObjects { .. }), "{problem}");
-    capture(&[globe_called("cup")], &resume, directory.path(), &()).unwrap();
-    let dataset = Dataset::read(directory.path()).unwrap();
-    assert_eq!((dataset.names(), dataset.len()), (["cup", "disc", "globe"].map(String::from).into(), 4500));
+    // Another mesh, and other objects.
+    for objects in [vec![disc.clone(), globe_called("globe")], vec![disc], vec![globe_called("mug")]] {
+        assert_eq!(refusal(&objects, &with(origin(20)), &directory), all);
+    }
+    std::fs::write(directory.join("mug.txt"), "0 0 0\n").unwrap();
+    assert_eq!(refusal(&objects(), &with(origin(20)), &directory), holds(&["mug.txt"]));
+    capture(&[globe], &with!(with(origin(30)), force = true), &directory, &()).unwrap();
+    let files = read_files(&directory);
+    assert_eq!(files.keys().collect::<Vec<_>>(), ["dataset.json", "globe.txt", "mug.txt"]);
+    assert_eq!(files["globe.txt"].lines().count(), 30);
 }
 
 #[test]
@@ -399,7 +260,7 @@ fn a_mesh_that_makes_no_scene_is_named_once_with_one_remedy() {
 
 #[test]
 fn the_samples_are_those_of_version_0_1_0() {
-    // Written by `palpate capture` of that version: data sets are resumed, added to and compared across versions.
+    // Written by `palpate capture` of that version: data sets are put together from parts and compared across versions.
     let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mesh = Mesh { vertices, triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] };
     let scene = [Scene::new(&mesh, 10.0).unwrap()];
