@@ -635,7 +635,7 @@ fn touches_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
         (Tag::Promise.code(), vec![0; 48], 0),
         (Tag::Temperature.code(), vec![0, 0, 2, 0], 0),
         (must(Tag::SharedLeaves), table.clone(), 4),
-        (Tag::Capture.code(), vec![7; 18], 0),
+        (Tag::Fingerprints.code(), vec![7; 6], 0),
     ];
     let (base, mut cuts) = with_cuts(&plain, &sections);
     // Beyond its head, a table that is cut lacks the values of a leaf, whose number is at fault.

@@ -1,11 +1,11 @@
 //! A capture that stays in memory.
 
-use super::{Sampler, Settings, entry, scenes, sources};
+use super::{Sampler, Settings, scenes, sources};
 use crate::error::{CaptureProblem, Result};
 use crate::in_order::in_order;
 use crate::mesh::Object;
 use crate::progress::{self, Progress};
-use crate::touches::{Dataset, Meshes, ObjectTouches};
+use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Touch;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -52,10 +52,8 @@ fn touch(objects: &[&Object], settings: &Settings, progress: &dyn Progress) -> R
         approaches.push(drawn.iter().flatten().map(|(_, approaches)| approaches).sum());
         let kept = |(touch, _): (Touch, u64)| if origin.pose { touch } else { Touch::new(touch.times()) };
         let touches = drawn.into_iter().flatten().map(kept).collect();
-        let (sources, entry) = (sources(object, scenes), entry(object, scenes, origin));
-        let meshes = Meshes { checksums: entry.meshes, millimeters: entry.millimeters };
-        let object = ObjectTouches::in_turn(&object.name, touches, &sources, samples.start);
-        touched.push(object.of_meshes(Some(meshes)).of_origin(origin));
+        let sources = sources(object, scenes);
+        touched.push(ObjectTouches::in_turn(&object.name, touches, &sources, samples.start).of_origin(origin));
     }
     Ok((Dataset { origin: Some(origin.clone()), ..Dataset::new(touched) }, approaches))
 }

@@ -4,7 +4,7 @@ use super::*;
 use crate::error::MeshProblem;
 use crate::mesh::Mesh;
 use crate::probe::noise::Noise;
-use crate::touches::{Captured, Dataset, Listing, Surroundings, folds};
+use crate::touches::{Dataset, Listing, Surroundings, folds};
 use crate::with;
 use glam::DVec3;
 
@@ -242,20 +242,6 @@ fn a_capture_of_another_scene_or_other_weights_replaces_none_unless_it_is_forced
     run(origin(50), brick, false).unwrap();
     run(floating, brick, true).unwrap();
     assert_eq!(Listing::read(directory.path()).unwrap().unwrap().objects[0].placements, []);
-}
-
-#[test]
-fn touches_of_another_scene_are_others() {
-    let captured = |scene| {
-        let origin = Origin { scene, ..origin(20) };
-        Captured::of(&in_memory(&objects(), &origin.into(), &()).unwrap().0).unwrap()
-    };
-    let [floating, table, steeper] =
-        [Surroundings::Floating, Surroundings::Table { cone: 50.0 }, Surroundings::Table { cone: 30.0 }].map(captured);
-    assert_eq!(table.shared(&table), ["brick", "disc"]);
-    for (one, other) in [(&floating, &table), (&table, &floating), (&table, &steeper)] {
-        assert!(one.shared(other).is_empty());
-    }
 }
 
 #[test]

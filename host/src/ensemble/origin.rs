@@ -6,7 +6,7 @@ use crate::probe::approach::Probe;
 use crate::probe::hand;
 use crate::probe::noise::Noise;
 use crate::probe::unit::{self, tenth};
-use crate::touches::{self, Captured, Dataset, Surroundings, short};
+use crate::touches::{self, Dataset, Surroundings};
 use palpate_shared::format::{Length, Outputs, Tag, TrainedProbe};
 use palpate_trees::compile::{self, CompiledModel, OwnedSection};
 use serde::{Deserialize, Serialize};
@@ -23,8 +23,6 @@ pub struct TouchOrigin {
     pub touches: BTreeMap<String, u64>,
     /// Kind of touches, and so which ones are evidence.
     pub trained: Option<Trained>,
-    /// The capture that made them, where that is known.
-    pub captured: Option<Captured>,
     /// For outputs that are placements of objects, called `object/placement`: the weight of each among those of its object.
     pub placements: BTreeMap<String, f64>,
 }
@@ -34,12 +32,11 @@ impl TouchOrigin {
     const NOISE: &str = "palpate_noise";
     const TOUCHES: &str = "palpate_touches";
     const TRAINED: &str = "palpate_trained";
-    const CAPTURED: &str = "palpate_captured";
     const PLACEMENTS: &str = "palpate_placements";
 
     /// Statements of touches about themselves, and the probe that they were made with.
     pub fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
-        Self { probe, touches: fingerprints(dataset), captured: Captured::of(dataset), ..Self::default() }
+        Self { probe, touches: fingerprints(dataset), ..Self::default() }
     }
 
     /// Statements of `origin`.
@@ -62,7 +59,6 @@ impl TouchOrigin {
             noise: parsed(attributes, Self::NOISE, "a JSON object of what was added to the touches in training")?,
             touches: numbers(Self::TOUCHES)?,
             trained: trained(origin)?,
-            captured: parsed(attributes, Self::CAPTURED, "a JSON object of settings, samples and objects")?,
             placements: parsed(attributes, Self::PLACEMENTS, "a JSON object of weights")?.unwrap_or_default(),
         })
     }
@@ -81,7 +77,6 @@ impl TouchOrigin {
             (Self::NOISE, self.noise.and_then(|noise| serde_json::to_string(&noise).ok())),
             (Self::TOUCHES, hexadecimal(&self.touches)),
             (Self::TRAINED, self.trained.and_then(|trained| serde_json::to_string(&trained).ok())),
-            (Self::CAPTURED, self.captured.as_ref().and_then(|captured| serde_json::to_string(captured).ok())),
             (Self::PLACEMENTS, placements.and_then(|placements| serde_json::to_string(placements).ok())),
         ];
         for (name, statement) in statements {
@@ -120,8 +115,8 @@ impl TouchOrigin {
         if let Some(shares) = self.trained.and_then(|trained| trained.pattern_shares()) {
             put(Tag::PatternShares, false, &shares.to_bytes());
         }
-        if let Some(capture) = self.section(objects) {
-            put(Tag::Capture, false, &capture);
+        if let Some(fingerprints) = self.section(objects) {
+            put(Tag::Fingerprints, false, &fingerprints);
         }
         if let Some(outputs) = self.outputs(objects) {
             let mut content = Vec::new();
@@ -148,31 +143,18 @@ impl TouchOrigin {
 
     /// The content of the section that says which touches they were, for a model of these objects; none where nothing is known.
     fn section(&self, objects: &[String]) -> Option<Vec<u8>> {
-        let captured = self.captured.as_ref();
-        let stated = |name: &String| {
-            let captured = captured.and_then(|captured| captured.stated_of(name));
-            captured.or_else(|| self.touches.get(name).map(|&fingerprint| short(fingerprint))).unwrap_or_default()
-        };
-        let stated: Vec<u16> = objects.iter().map(stated).collect();
-        let (settings, samples) = captured.map_or((0, 0..u32::MAX), Captured::stated);
+        let of = |name: &String| self.touches.get(name).map_or(0, |&fingerprint| short(fingerprint));
+        let stated: Vec<u16> = objects.iter().map(of).collect();
         let is_known = stated.iter().any(|&object| object != 0);
-        is_known.then(|| {
-            let head = palpate_shared::format::TrainedCapture::head(settings, samples).into_iter();
-            head.chain(stated.into_iter().flat_map(u16::to_le_bytes)).collect()
-        })
+        is_known.then(|| stated.into_iter().flat_map(u16::to_le_bytes).collect())
     }
 
-    /// The objects whose touches in `dataset` are of the capture that made those of the training, or begin like those: the
-    /// same touches, or more or fewer of them. What becomes of them elsewhere, such as noise, does not count. A part of a data
-    /// set that was trained on counts as the whole.
+    /// The objects whose touches in `dataset` begin like those of the training: the same touches, or more or fewer of them. What
+    /// becomes of them elsewhere, such as noise, does not count.
     pub(crate) fn trained_on<'d>(&self, dataset: &'d Dataset) -> Vec<&'d str> {
         let own = fingerprints(dataset);
-        let captured = self.captured.as_ref().zip(Captured::of(dataset));
-        let shared: Vec<String> = captured
-            .map_or_else(Vec::new, |(trained, tested)| trained.shared(&tested).into_iter().map(String::from).collect());
         let begins = |name: &&str| own.contains_key(*name) && self.touches.get(*name) == own.get(*name);
-        let same = |name: &&str| begins(name) || shared.iter().any(|shared| shared == name);
-        dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
+        dataset.objects.iter().map(|object| object.name.as_str()).filter(begins).collect()
     }
 }
 
@@ -393,18 +375,19 @@ const FINGERPRINTED: usize = 16;
 /// about others. One in 65,536 other objects is taken for one of these.
 pub fn compiled_trained_on<'d>(compiled: &CompiledModel, dataset: &'d Dataset) -> Vec<&'d str> {
     let (model, names) = (compiled.model(), compiled.names());
-    let Some(stated) = model.trained_capture() else { return Vec::new() };
-    let captured = Captured::of(dataset);
-    let is_near = captured.as_ref().is_some_and(|captured| captured.is_near(&stated));
-    // A capture with another seed has other touches; recordings are identified by their first touches.
-    let fingerprints = if captured.is_none() || stated.settings == 0 { fingerprints(dataset) } else { BTreeMap::new() };
+    let Some(stated) = model.fingerprints() else { return Vec::new() };
+    let own = fingerprints(dataset);
     let same = |name: &&str| {
         let object = names.iter().position(|own| own == name).and_then(|object| stated.object(object));
-        let is_captured = is_near && captured.as_ref().and_then(|captured| captured.stated_of(name)) == object;
-        let begins = fingerprints.get(*name).map(|&fingerprint| short(fingerprint));
-        object.is_some() && (is_captured || begins == object)
+        object.is_some() && object == own.get(*name).map(|&fingerprint| short(fingerprint))
     };
     dataset.objects.iter().map(|object| object.name.as_str()).filter(same).collect()
+}
+
+/// The part of a fingerprint that a compiled model states; never 0, which stands for none.
+fn short(fingerprint: u64) -> u16 {
+    // The upper bits, all that are left.
+    u16::try_from(fingerprint >> 48).unwrap_or_default().max(1)
 }
 
 /// The touches that an ensemble states to be trained on.

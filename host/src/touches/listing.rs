@@ -1,7 +1,7 @@
 //! `dataset.json`: the content and origin of a data set.
 
 use super::files::EXTENSION;
-use super::{Meshes, ObjectTouches, Origin, Recorded, Source};
+use super::{ObjectTouches, Origin, Recorded, Source};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
 use palpate_shared::Touch;
@@ -49,8 +49,7 @@ pub struct Entry {
     /// modulo their number, unless `counts` has a number of touches for each of them. Empty if it floats.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub placements: Vec<Lying>,
-    /// The [checksum](crate::mesh::Mesh::checksum) of each instance's mesh, as it was read, in hexadecimal digits. Versions
-    /// before 0.3.0 wrote none.
+    /// The [checksum](crate::mesh::Mesh::checksum) of each instance's mesh, as it was read, in hexadecimal digits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub meshes: Vec<String>,
     /// Number of millimeters in a unit of its meshes, if it was touched at its true size.
@@ -184,10 +183,8 @@ impl Listing {
             return Ok(ObjectTouches::in_runs(name, touches, runs).of_origin(origin));
         }
         if entry.counts.is_empty() {
-            let meshes = Meshes { checksums: entry.meshes.clone(), millimeters: entry.millimeters };
-            let object =
-                ObjectTouches::in_turn(name, touches, &entry.sources(), origin.samples().start).of_origin(origin);
-            return Ok(object.of_meshes(Some(meshes).filter(|meshes| !meshes.checksums.is_empty())));
+            let first = origin.samples().start;
+            return Ok(ObjectTouches::in_turn(name, touches, &entry.sources(), first).of_origin(origin));
         }
         let stated = entry.counts.iter().try_fold(0_u64, |sum, &count| sum.checked_add(count));
         let sources = entry.sources();

@@ -31,7 +31,6 @@
 //! # }
 //! ```
 
-mod captured;
 pub mod check;
 mod checksum;
 mod dataset;
@@ -56,8 +55,6 @@ mod surroundings;
 pub mod text;
 mod warning;
 
-pub(crate) use captured::short;
-pub use captured::{Captured, Meshes};
 pub(crate) use checksum::{CRC, checksum};
 pub use dataset::Dataset;
 pub(crate) use dataset::logs;

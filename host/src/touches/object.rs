@@ -1,6 +1,6 @@
 //! The touches of one object, and what each of them is of.
 
-use super::{Meshes, Origin, Recorded};
+use super::{Origin, Recorded};
 use crate::probe::hand;
 use crate::probe::noise::{Noise, Stream};
 use palpate_shared::Touch;
@@ -60,8 +60,6 @@ pub struct ObjectTouches {
     source_of: Vec<u32>,
     /// For each touch the number of the robot that made it; empty if robots do not differ.
     robot_of: Vec<u32>,
-    /// Meshes that were touched, if known.
-    meshes: Option<Meshes>,
     /// The stroke of the probe that made them as a time in microseconds: also with noise that is added, a later contact is
     /// missing.
     window: Option<u32>,
@@ -89,7 +87,6 @@ impl ObjectTouches {
             sources,
             source_of: Vec::new(),
             robot_of: Vec::new(),
-            meshes: None,
             window: None,
             speed: None,
         }
@@ -112,17 +109,8 @@ impl ObjectTouches {
         }
         // Below the number of the instances.
         let source_of = (0..touches.len() as u64).map(|touch| ((first % count + touch) % count) as u32).collect();
-        Self {
-            name: name.into(),
-            touches,
-            sources,
-            source_of,
-            robot_of: Vec::new(),
-            meshes: None,
-            window: None,
-            speed: None,
-        }
-        .tidied()
+        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), window: None, speed: None }
+            .tidied()
     }
 
     /// Touches in any order, each with the number of its instance.
@@ -138,16 +126,7 @@ impl ObjectTouches {
         let place = |(_, number): &(Touch, i64)| numbers.partition_point(|other| other < number) as u32;
         let source_of = touches.iter().map(place).collect();
         let sources = numbers.iter().map(|number| Source::Instance(number.to_string())).collect();
-        Self {
-            name: name.into(),
-            touches: all,
-            sources,
-            source_of,
-            robot_of: Vec::new(),
-            meshes: None,
-            window: None,
-            speed: None,
-        }
+        Self { name: name.into(), touches: all, sources, source_of, robot_of: Vec::new(), window: None, speed: None }
     }
 
     /// Touches of one source after the other: of each as many as are stated, of the last one all the rest.
@@ -165,17 +144,8 @@ impl ObjectTouches {
             sources.push(Source::Object);
             source_of = vec![0; touches.len()];
         }
-        Self {
-            name: name.into(),
-            touches,
-            sources,
-            source_of,
-            robot_of: Vec::new(),
-            meshes: None,
-            window: None,
-            speed: None,
-        }
-        .tidied()
+        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), window: None, speed: None }
+            .tidied()
     }
 
     /// The touches of several objects, one after the other, as those of one whose sources are all of theirs.
@@ -207,9 +177,6 @@ impl ObjectTouches {
     }
 
     fn extend(&mut self, more: &Self, may_share: bool) {
-        if self.is_empty() || self.meshes != more.meshes {
-            self.meshes = more.meshes.clone().filter(|_| self.is_empty() && may_share);
-        }
         if self.is_empty() {
             (self.window, self.speed) = (more.window, more.speed);
         }
@@ -257,12 +224,6 @@ impl ObjectTouches {
         self
     }
 
-    /// These touches, with the meshes that were touched.
-    #[must_use]
-    pub(crate) fn of_meshes(self, meshes: Option<Meshes>) -> Self {
-        Self { meshes, ..self }
-    }
-
     /// These touches as of a probe with this stroke, a time in microseconds ([`Probe::window`](crate::probe::Probe::window)).
     #[must_use]
     pub(crate) fn of_stroke(self, window: Option<u32>) -> Self {
@@ -287,11 +248,6 @@ impl ObjectTouches {
             touches.iter_mut().for_each(|touch| *touch = hand::within(touch, self.window));
         }
         touches
-    }
-
-    /// The meshes that were touched, if they are known.
-    pub(crate) fn meshes(&self) -> Option<&Meshes> {
-        self.meshes.as_ref()
     }
 
     /// The touches, in the order of the file.
@@ -467,7 +423,6 @@ impl ObjectTouches {
             sources: self.sources.clone(),
             source_of: of(&self.source_of),
             robot_of: of(&self.robot_of),
-            meshes: self.meshes.clone(),
             window: self.window,
             speed: self.speed,
         };

@@ -55,14 +55,6 @@ impl Dataset {
                 }
                 Ok(())
             })?;
-            // A part is not told from the rest of its capture.
-            let is_whole = origin.as_ref().is_some_and(|origin| {
-                let samples = origin.samples();
-                samples.end - samples.start == object.len() as u64
-            });
-            if let Some(meshes) = object.meshes().filter(|_| is_whole) {
-                (entry.meshes, entry.millimeters) = (meshes.checksums.clone(), meshes.millimeters);
-            }
             entry.touches = object.len() as u64;
             entry.bytes = std::fs::metadata(&path).map_err(|error| Error::io(&path, "read the touches", error))?.len();
             entry.crc32 = Some(checksum(&path)?);

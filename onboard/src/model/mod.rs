@@ -23,9 +23,9 @@ pub use refused::Refused;
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
-    Counted, EarlyExit, Feature, Guard, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, Outputs,
-    PatternShares, Plan, Position, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature,
-    TrainedCapture, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
+    Counted, EarlyExit, Feature, Fingerprints, Guard, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject,
+    Outputs, PatternShares, Plan, Position, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag,
+    Temperature, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
 };
 use palpate_shared::{Descriptor, MISSING_FEATURE, Patterns};
 
@@ -437,9 +437,9 @@ impl<'a> Model<'a> {
         PatternShares::from_bytes(optional::find(self.optional(), Tag::PatternShares))
     }
 
-    /// Kind of touches that the model was trained on, if it states it.
-    pub fn trained_capture(&self) -> Option<TrainedCapture<'a>> {
-        TrainedCapture::from_bytes(optional::find(self.optional(), Tag::Capture), self.object_count())
+    /// Fingerprints of the touches that the model was trained on, if it states them.
+    pub fn fingerprints(&self) -> Option<Fingerprints<'a>> {
+        Fingerprints::from_bytes(optional::find(self.optional(), Tag::Fingerprints), self.object_count())
     }
 
     /// Places in the walk where a class may be known: see [`Model::class_of`].

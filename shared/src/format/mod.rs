@@ -37,8 +37,8 @@ pub use sequences::{Fault, Guard, Limits, Position};
 pub use signature::{SIGNATURE_LENGTH, SignedModel};
 pub use strangers::{MisfitTerms, MisfitTest, ObjectMisfit, Strangers};
 pub use trained::{
-    Feature, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedCapture,
-    TrainedNoise, TrainedProbe, TrainedTouches, take_feature, take_section, write_section,
+    Feature, Fingerprints, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise,
+    TrainedProbe, TrainedTouches, take_feature, take_section, write_section,
 };
 
 /// Bytes of the checksum at the end.

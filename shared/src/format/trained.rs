@@ -2,7 +2,6 @@
 
 use super::codes::{Counted, Length};
 use crate::pattern::Patterns;
-use core::ops::Range;
 
 /// An optional section's tag. The tag in the model also has [`MUST_UNDERSTAND`] set if a reader that does not know the
 /// section has to refuse the model.
@@ -37,8 +36,8 @@ pub enum Tag {
     Prediction,
     /// Features that stand for a missing value: [`Sentinel`](super::Sentinel).
     Sentinel,
-    /// [`TrainedCapture`].
-    Capture,
+    /// [`Fingerprints`].
+    Fingerprints,
     /// Evidence of a row by its margins: [`RowEvidence`](super::RowEvidence).
     RowEvidence,
     /// Bounds with which a class is known before all trees are walked: [`EarlyExit`](super::EarlyExit).
@@ -73,7 +72,7 @@ impl Tag {
             Self::SharedLeaves => 12,
             Self::Prediction => 13,
             Self::Sentinel => 14,
-            Self::Capture => 15,
+            Self::Fingerprints => 15,
             Self::RowEvidence => 16,
             Self::EarlyExit => 17,
             Self::Outputs => 18,
@@ -279,47 +278,23 @@ impl PatternShares {
     }
 }
 
-/// Kind of touches that a model was trained on, to test it on others: 12 bytes, and 2 for each object.
+/// Fingerprints of the touches that a model was trained on, so that a host knows them again: 2 bytes for each object.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TrainedCapture<'a> {
-    /// 16 bits of a checksum of the capture's seed and settings; 0 if no capture is known.
-    pub settings: u16,
-    /// The samples of each object; an end of `u32::MAX` stands for that or more.
-    pub samples: Range<u32>,
-    objects: &'a [[u8; 2]],
-}
+pub struct Fingerprints<'a>(&'a [[u8; 2]]);
 
-/// Bytes of [`TrainedCapture`] before the objects.
-const CAPTURE: usize = 12;
-
-impl<'a> TrainedCapture<'a> {
-    /// Bytes of the section before the objects.
-    pub const LENGTH: usize = CAPTURE;
-
-    /// The section's content before the objects; a `u16` for each object follows.
-    pub fn head(settings: u16, samples: Range<u32>) -> [u8; CAPTURE] {
-        let ([a, b], [c, d, e, f]) = (settings.to_le_bytes(), samples.start.to_le_bytes());
-        let [g, h, i, j] = samples.end.to_le_bytes();
-        [a, b, 0, 0, c, d, e, f, g, h, i, j]
-    }
-
+impl<'a> Fingerprints<'a> {
     /// Reads a section; `None` if it is too short for this many objects. Bytes after the known ones are ignored.
     ///
     /// Cost: a few instructions.
     pub fn from_bytes(bytes: &'a [u8], objects: usize) -> Option<Self> {
-        let (&[a, b, _, _, c, d, e, f, g, h, i, j], rest) = bytes.split_first_chunk::<CAPTURE>()?;
-        let (objects, _) = rest.as_chunks().0.split_at_checked(objects)?;
-        Some(Self {
-            settings: u16::from_le_bytes([a, b]),
-            samples: u32::from_le_bytes([c, d, e, f])..u32::from_le_bytes([g, h, i, j]),
-            objects,
-        })
+        bytes.as_chunks().0.get(..objects).map(Self)
     }
 
-    /// 16 bits of a checksum of an object's meshes, or of its first touches where no capture is known; none if nothing is
-    /// known.
+    /// 16 bits of a checksum of an object's first touches; none if nothing is known.
+    ///
+    /// Cost: a few instructions. Cannot fail.
     pub fn object(&self, object: usize) -> Option<u16> {
-        self.objects.get(object).map(|bytes| u16::from_le_bytes(*bytes)).filter(|&object| object != 0)
+        self.0.get(object).map(|bytes| u16::from_le_bytes(*bytes)).filter(|&object| object != 0)
     }
 }
 
@@ -517,13 +492,12 @@ mod tests {
     }
 
     #[test]
-    fn a_capture_is_read_back_as_written_and_only_whole() {
-        let bytes = [&TrainedCapture::head(7, 3..u32::MAX)[..], &[0, 0, 0x34, 0x12, 9]].concat();
-        let read = TrainedCapture::from_bytes(&bytes, 2).unwrap();
-        assert_eq!((read.settings, read.samples.clone()), (7, 3..u32::MAX));
+    fn fingerprints_are_read_back_as_written_and_only_whole() {
+        let bytes = [0, 0, 0x34, 0x12, 9];
+        let read = Fingerprints::from_bytes(&bytes, 2).unwrap();
         assert_eq!([0, 1, 2].map(|object| read.object(object)), [None, Some(0x1234), None]);
-        assert_eq!(TrainedCapture::from_bytes(&bytes, 3), None);
-        assert_eq!(TrainedCapture::from_bytes(&bytes[..11], 0), None);
+        assert_eq!(Fingerprints::from_bytes(&bytes, 3), None);
+        assert_eq!(Fingerprints::from_bytes(&[], 1), None);
     }
 
     #[test]

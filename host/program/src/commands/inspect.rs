@@ -2,7 +2,7 @@ use super::Global;
 use super::chips::{core, instructions};
 use palpate::chip::inspect::{
     Defaults, Feature, Inspected, Limited, Noise, OnChip, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested,
-    Touches, TrainedOn, inspect, on_chip,
+    Touches, inspect, on_chip,
 };
 use palpate::compile::{CompiledModel, Core, Memory};
 use palpate::locate::MapsFile;
@@ -260,15 +260,6 @@ fn training_lines(lines: &mut Lines, inspected: &Inspected<'_>) {
     if let Some(pattern) = &inspected.pattern {
         let shares = pattern.iter().map(|(name, share)| format!("{name} {:.1} %", 100.0 * share));
         lines.line("approaches", shares.collect::<Vec<_>>().join(", "));
-    }
-    if let Some(TrainedOn { capture, samples: [first, end] }) = &inspected.trained_on {
-        let last = end.saturating_sub(1);
-        match capture {
-            Some(capture) => {
-                lines.line("trained on", format!("capture {capture}, samples {first} to {last} of each object"));
-            }
-            None => lines.line("trained on", "touches that are known again by the first ones"),
-        }
     }
     if let Some(PlanOf { rolls, poses, left_out }) = &inspected.plan {
         let rolls = counted(usize::from(*rolls), "roll", "rolls");

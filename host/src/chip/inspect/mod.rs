@@ -2,17 +2,13 @@
 
 mod stated;
 
-pub use stated::{
-    Defaults, Feature, Limited, Noise, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches, TrainedOn,
-};
+pub use stated::{Defaults, Feature, Limited, Noise, PlanOf, Predicts, Probe, Promised, SomeColumns, Tested, Touches};
 
 use crate::compile::{self, Core, Instructions, Memory};
 use crate::evaluate;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH};
-use stated::{
-    evidence, features, guard, noise, pattern, plan, position, predicts, priors, probe, promised, tested, trained_on,
-};
+use stated::{evidence, features, guard, noise, pattern, plan, position, predicts, priors, probe, promised, tested};
 use std::collections::BTreeMap;
 
 /// Contents and statements of a compiled model.
@@ -88,8 +84,6 @@ pub struct Inspected<'a> {
     pub noise: Option<Noise>,
     /// Share of each contact pattern among the approaches of the training; null if the model does not state it.
     pub pattern: Option<BTreeMap<&'static str, f64>>,
-    /// The touches that it was trained on; null if the model does not state it.
-    pub trained_on: Option<TrainedOn>,
     /// The plan of approaches; null if the model has none.
     pub plan: Option<PlanOf>,
     /// Per touch, estimated.
@@ -158,7 +152,6 @@ pub fn inspect<'a>(model: &Model<'a>) -> Inspected<'a> {
         touches: evidence(model),
         noise: noise(model),
         pattern: pattern(model),
-        trained_on: trained_on(model),
         plan: plan(model),
         instructions: Instructions::of_model(model),
         chip: None,

@@ -334,21 +334,6 @@ pub(super) fn pattern(model: &Model<'_>) -> Option<BTreeMap<&'static str, f64>> 
     Some(ContactPattern::ALL.iter().map(|pattern| pattern.name()).zip(shares).collect())
 }
 
-/// The touches that a model was trained on.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct TrainedOn {
-    /// 16 bits of a checksum of the capture's seed and settings, in hexadecimal digits; null if no capture is known.
-    pub capture: Option<String>,
-    /// The first sample of each object, and the one after the last.
-    pub samples: [u32; 2],
-}
-
-pub(super) fn trained_on(model: &Model<'_>) -> Option<TrainedOn> {
-    let stated = model.trained_capture()?;
-    let capture = (stated.settings != 0).then(|| format!("{:04x}", stated.settings));
-    Some(TrainedOn { capture, samples: [stated.samples.start, stated.samples.end] })
-}
-
 /// The plan of approaches.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct PlanOf {

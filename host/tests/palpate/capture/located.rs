@@ -4,7 +4,6 @@ use crate::fixtures::*;
 use glam::DVec3;
 use palpate::capture::{Settings, capture, in_memory, scenes};
 use palpate::probe::approach::FINGERS;
-use palpate::touches::Captured;
 
 /// A brick of 60 by 40 by 30 mm.
 fn brick() -> Object {
@@ -125,16 +124,6 @@ fn noise_and_lost_contacts_are_added_and_the_same_seed_gives_the_same_bytes_on_a
         let deviation = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         assert!((1.0..1.25).contains(&deviation), "{deviation}");
     }
-}
-
-#[test]
-fn captures_with_a_position_share_no_touches_with_others() {
-    let of = |origin: Origin| Captured::of(&captured(origin)).unwrap();
-    let located = of(origin(20));
-    assert_eq!(located.shared(&of(Origin { real: Noise::gaussian(5_000.0), ..origin(10) })), ["brick"]);
-    assert!(located.shared(&of(Origin { within: Some(20.0), ..origin(20) })).is_empty());
-    let floating = Origin { scene: Surroundings::Table { cone: 0.001 }, position: false, ..origin(20) };
-    assert!(located.shared(&of(floating)).is_empty());
 }
 
 #[test]
