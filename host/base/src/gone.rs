@@ -23,10 +23,10 @@ const GONE: &[(&str, &str)] = &[
     ("--false-per-hour", "rates per hour went with --events; begin again after each verdict (docs/guide/streams.md)"),
     ("--hold-off", "begin again after each verdict (docs/guide/streams.md)"),
     ("--grace", "begin again after each verdict (docs/guide/streams.md)"),
-    ("--strangers certain", "give an error rate, such as --strangers 5%"),
+    ("--strangers certain", "use --strangers likely"),
     ("--varied", "capture objects of your own with --instances"),
     ("--picture", "draw objects with palpate view"),
-    ("--trace", "compare a page with the program by the binary `page` of palpate-tests"),
+    ("--trace", "Palpate's own tests compare the page with the program"),
     (
         "--watch",
         "palpate link PORT prints a line for each touch of the chip's own fingers; palpate view --port shows a page",

@@ -40,6 +40,44 @@ fn the_program_without_a_command_prints_its_help_and_a_misspelled_one_is_answere
 }
 
 #[test]
+fn what_was_removed_is_refused_with_what_to_use_instead() {
+    let at = &Folder::new();
+    for words in [
+        "tune data",
+        "probe design meshes",
+        "data cast mesh casts",
+        "data check a b",
+        "report builtin --resume",
+        "report builtin --recorded a",
+        "capture builtin --add",
+        "capture builtin --shard 1/2",
+        "capture builtin --format text",
+        "evaluate a b --switch 5",
+        "evaluate a b --confusion 3",
+        "evaluate a b --config c",
+        "calibrate a b --events 0",
+        "calibrate a b --rows-per-second 9",
+        "calibrate a b --strangers certain",
+        "view fork --trace t",
+        "view fork --misses 3",
+        "data objects builtin --picture a",
+        "data objects builtin --varied 2",
+        "link a --watch",
+        "link a --journal j",
+        "link a --against b",
+        "link a --per-object 4",
+        "link a --bad-line 1",
+        "link a --firmware b",
+        "inspect a --mhz 64",
+    ] {
+        fails(at, words, 2, "was removed: ");
+    }
+    // It is not taken for a similar word.
+    let message = stderr(palpate(at, "tune data"), 2);
+    assert!(message.contains("--preset small") && !message.contains("similar"), "{message}");
+}
+
+#[test]
 fn completions_know_every_command_in_every_shell() {
     let commands = commands();
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
