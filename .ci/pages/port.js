@@ -267,7 +267,7 @@ const TRIES = {
     expect(text("warning").startsWith("The chip speaks version 2 of the link, this page version 3"), "another version is not told");
     await say({ is: "fault", finger: 1, what: "stuck closed" });
     expect(newest().trim() === "fault: middle finger: stuck closed", `a fault is "${newest()}"`);
-    await say({ is: "started" }, { is: "not-stored" }, { is: "model", checksum: 7, length: 100, objects: ["<b>cup</b>", "bowl"] }, { is: "missed", count: 1 });
+    await say({ is: "started" }, { is: "model", checksum: 7, length: 100, objects: ["<b>cup</b>", "bowl"] }, { is: "missed", count: 1 });
     expect(text("verdict") === "Nothing has been touched yet." && text("warning") === "", "a chip that was started has verdicts");
     expect(text("line") === "The line: 1 report of the chip was lost on the way.", `the line is "${text("line")}"`);
     expect(cells("bars")[0][0] === "<b>cup</b>", "a name is markup");

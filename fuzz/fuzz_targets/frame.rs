@@ -5,7 +5,7 @@
 use libfuzzer_sys::fuzz_target;
 use palpate_onboard::Model;
 use palpate_onboard::station::Station;
-use palpate_shared::link::{Decoder, DeviceEnd, HostEnd, HostSettings, Progress, VERSION, checksum};
+use palpate_shared::link::{Decoder, DeviceEnd, HostEnd, HostSettings, VERSION, checksum};
 
 static MODEL: &[u8] = include_bytes!("../../models/household.palpate");
 
@@ -40,11 +40,11 @@ fn ends(bytes: &[u8]) {
     let mut decoder = Decoder::new();
     let whole = bytes.iter().filter(|&&byte| matches!(decoder.feed(byte), Some(Ok(_)))).count();
     let model = Model::new(MODEL).expect("the model of the repository");
-    let (mut station, mut end) = (Station::<16>::new(&model), DeviceEnd::new(Progress::NONE, 1));
+    let (mut station, mut end) = (Station::<16>::new(&model), DeviceEnd::new(1));
     let mut sent = Vec::new();
     end.receive(bytes, &mut station, |frame| sent.extend_from_slice(frame));
     assert_eq!(end.statistics().frames as usize, whole);
-    assert!(end.progress().executed() as usize <= whole);
+    assert!(end.executed() as usize <= whole);
     let mut host = HostEnd::new(HostSettings::default());
     host.connect(1, 0, |_| ());
     for bytes in [bytes, &sent] {

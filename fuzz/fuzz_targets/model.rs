@@ -47,6 +47,4 @@ fn walk(model: &Model<'_>) {
         model.margins_of(row, &mut margins);
         recognizer.push_margins(&margins);
     }
-    let snapshot = recognizer.snapshot(&mut buffer).expect("the buffer is long enough").to_vec();
-    recognizer.restore(&snapshot).expect("its own snapshot");
 }

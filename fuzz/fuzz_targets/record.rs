@@ -1,14 +1,13 @@
-//! Any bytes where a chip keeps records and models, in RAM and in flash: it starts, and stores the next records.
+//! Any bytes where a chip keeps records and models, in RAM and in flash: it starts, and keeps the next load.
 #![no_main]
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use libfuzzer_sys::fuzz_target;
-use palpate_onboard::station::{FlashStorage, MappedFlash, Memory, Station, Storage, record_length};
+use palpate_onboard::station::{FlashStorage, Loaded, MappedFlash, Memory, Place, RECORD_LENGTH, Station, Storage};
 use palpate_shared::Touch;
-use palpate_shared::link::{Device, checksum};
+use palpate_shared::link::checksum;
 
 static MODEL: &[u8] = include_bytes!("../../models/household.palpate");
-const RECORD: usize = record_length(16);
 const SECTOR: usize = 1024;
 
 /// A flash in RAM.
@@ -54,30 +53,31 @@ impl MappedFlash for Flash {
 }
 
 fuzz_target!(|bytes: &[u8]| {
-    // As they are, and as the body of a record with a right checksum.
-    let mut whole = u16::try_from(bytes.len()).unwrap_or(0).to_le_bytes().to_vec();
-    whole.extend((checksum(bytes) ^ 3).to_le_bytes());
-    whole.extend(bytes);
+    // As they are, and as records with a right checksum.
+    let mut whole = bytes.to_vec();
+    for record in whole.chunks_exact_mut(RECORD_LENGTH) {
+        let (stated, sum) = record.split_at_mut(RECORD_LENGTH - 4);
+        sum.copy_from_slice(&(checksum(stated) ^ 4).to_le_bytes());
+    }
     for bytes in [bytes, &whole] {
-        let mut places = [vec![0; RECORD.max(bytes.len())], vec![0; RECORD]];
-        places[0][..bytes.len()].copy_from_slice(bytes);
+        let mut places = [[0; RECORD_LENGTH]; 2];
+        places.as_flattened_mut().iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
         let [first, second] = &mut places;
         let (mut a, mut b) = ([0; 256], [0; 256]);
         start(Memory { models: [&mut a, &mut b], records: [first, second] });
         let mut cells = vec![0xff; 6 * SECTOR];
         let length = bytes.len().min(cells.len());
         cells[..length].copy_from_slice(&bytes[..length]);
-        start(FlashStorage::<_, RECORD>::new(Flash(cells), 2 * SECTOR).expect("a flash as it should be"));
+        start(FlashStorage::new(Flash(cells)).expect("a flash as it should be"));
     }
 });
 
-/// Starts, touches, stores; stored records are there.
+/// Starts, touches, and keeps a load, which is there then.
 fn start(storage: impl Storage) {
-    let Ok((mut station, progress, starts)) = Station::<16, _>::open(MODEL, storage) else {
-        panic!("records are long enough")
-    };
+    let mut station = Station::<16, _>::open(MODEL, storage);
     let _ = station.push(&Touch::from_micros([30_000, 0, 50_000]), true);
-    station.store(&progress).expect("nothing is worn out");
-    let counter = station.into_storage().newest().map(|(counter, _)| counter);
-    assert_eq!(counter, Some(starts.wrapping_add(1)));
+    let mut storage = station.into_storage();
+    let loaded = Loaded { place: Place::Second, length: 4, checksum: checksum(&storage.model(Place::Second)[..4]) };
+    storage.keep(loaded).expect("nothing is worn out");
+    assert_eq!(storage.loaded(), Some(loaded));
 }

@@ -2,7 +2,7 @@
  *
  * One header in C99, also C++11 where unions are read as GCC, Clang and MSVC define it. No allocation, no library, no
  * floating point unless a model has f32 leaves, no undefined behavior for any bytes. It reads shared/FORMAT.md of Palpate,
- * and gives the same margins, evidence, verdicts, posteriors and snapshots as the crate palpate-onboard, bit for bit.
+ * and gives the same margins, evidence, verdicts and posteriors as the crate palpate-onboard, bit for bit.
  * Licensed as Palpate: MIT or Apache-2.0.
  *
  *     palpate_model model;
@@ -136,8 +136,6 @@
 #define PALPATE_TOUCH_FEATURES 10
 /* 1 as a posterior. */
 #define PALPATE_ONE (PALPATE_AS_(uint64_t, 1) << 56)
-/* Largest length of a snapshot in bytes. */
-#define PALPATE_SNAPSHOT_LENGTH(objects) (21 + 10 * (objects))
 
 /* Reasons to reject bytes or a model. `wrong` of the model is the place of the error. */
 typedef enum {
@@ -172,9 +170,6 @@ typedef enum {
     PALPATE_UNKNOWN,    /* the touches fit no object that the model knows, until the reset: by a misfit test */
     PALPATE_GAVE_UP     /* the limit of touches was reached, until the reset */
 } palpate_verdict;
-
-/* Results of restoring a snapshot. */
-typedef enum { PALPATE_RESTORED = 0, PALPATE_DAMAGED, PALPATE_OTHER_MODEL } palpate_restored;
 
 /* An approach: when each finger touched, in microseconds on any common clock, or PALPATE_MISSING; and the probe's pose if
  * `has_pose` is not 0: direction of motion, and from the first to the third finger, as cosines in Q15. */
@@ -234,7 +229,6 @@ typedef struct {
     uint8_t by_object;    /* 1: the model's thresholds by object come before `odds` */
     uint8_t verdict;      /* a palpate_verdict */
     uint8_t object;       /* the one that was recognized */
-    uint32_t forgotten;   /* of the touches, the first ones that are no longer part of the evidence: of some snapshots */
 #if PALPATE_ROW_EVIDENCE
     uint32_t unit_, from_, span_; /* bits in a unit of evidence of this number of touches, and of this many numbers */
 #endif
@@ -1574,7 +1568,7 @@ static inline uint32_t palpate_bits_(const palpate_model *model, uint32_t touche
 static inline uint32_t palpate_unit_(palpate_recognizer *recognizer)
 {
 #if PALPATE_ROW_EVIDENCE
-    const uint32_t touches = recognizer->touches - recognizer->forgotten;
+    const uint32_t touches = recognizer->touches;
     if (touches - recognizer->from_ >= recognizer->span_) {
         recognizer->unit_ = palpate_bits_(recognizer->model, touches, &recognizer->from_, &recognizer->span_);
     }
@@ -1629,7 +1623,6 @@ PALPATE_API void palpate_reset(palpate_recognizer *recognizer)
     const palpate_model *model = recognizer->model;
     uint_fast16_t i;
     recognizer->touches = 0;
-    recognizer->forgotten = 0;
     recognizer->verdict = PALPATE_UNDECIDED;
     recognizer->object = 0;
     for (i = 0; i < model->objects; i++) {
@@ -1705,7 +1698,7 @@ static inline int64_t palpate_own_(const palpate_recognizer *recognizer, uint_fa
 static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
 {
     const uint8_t *test = recognizer->model->strangers_;
-    const uint32_t touches = recognizer->touches - recognizer->forgotten;
+    const uint32_t touches = recognizer->touches;
     const uint_fast8_t rivals = PALPATE_BYTE(test + 5);
     const uint8_t *record = test + 44 + PALPATE_AS_(size_t, palpate_record_(rivals) * leader);
     const uint8_t *means = record + 8 + rivals + (rivals & 1), *slopes = means + 2 * rivals, *weights = slopes + 2 * rivals;
@@ -1749,7 +1742,7 @@ static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recog
 {
     const palpate_model *model = recognizer->model;
     const uint8_t *test = model->strangers_;
-    const uint32_t touches = recognizer->touches - recognizer->forgotten;
+    const uint32_t touches = recognizer->touches;
     uint64_t left;
     int64_t misfit;
     if (test == NULL) {
@@ -1927,7 +1920,7 @@ PALPATE_API uint64_t palpate_posterior_together(const palpate_recognizer *recogn
 {
     const palpate_model *model = recognizer->model;
     uint32_t from, span;
-    const uint32_t bits = palpate_bits_(model, recognizer->touches - recognizer->forgotten, &from, &span);
+    const uint32_t bits = palpate_bits_(model, recognizer->touches, &from, &span);
     const uint_fast16_t best = palpate_leader_(recognizer, model->objects);
     const uint32_t sharpness = palpate_sharpness_(model);
     uint64_t own = 0, object = 0, all = 0, rest;
@@ -1956,7 +1949,7 @@ PALPATE_API uint16_t palpate_best(const palpate_recognizer *recognizer)
     if (recognizer->model->outputs_ != NULL) {
         uint32_t from, span;
         uint64_t rivals;
-        const uint32_t bits = palpate_bits_(recognizer->model, recognizer->touches - recognizer->forgotten, &from, &span);
+        const uint32_t bits = palpate_bits_(recognizer->model, recognizer->touches, &from, &span);
         return PALPATE_AS_(uint16_t, palpate_together_(recognizer, bits, &rivals));
     }
 #endif
@@ -2129,7 +2122,7 @@ PALPATE_API uint64_t palpate_posterior(const palpate_recognizer *recognizer, uin
     const palpate_model *model = recognizer->model;
     const uint_fast16_t best = palpate_leader_(recognizer, model->objects);
     uint32_t from, span;
-    const uint32_t unit = palpate_bits_(model, recognizer->touches - recognizer->forgotten, &from, &span);
+    const uint32_t unit = palpate_bits_(model, recognizer->touches, &from, &span);
     const uint32_t sharpness = palpate_sharpness_(model);
     uint64_t own = 0, others = 0, all;
     uint_fast16_t i;
@@ -2412,159 +2405,6 @@ static inline palpate_error palpate_check_(const palpate_model *model)
         sum = palpate_crc_(sum, PALPATE_BYTE(p));
     }
     return ~sum == palpate_u32_(p) ? PALPATE_OK : PALPATE_CHECKSUM;
-}
-
-/* ---- Snapshots ---- */
-
-/* Seven bits a byte, the low ones first. Returns the length with them; bytes beyond `room` are counted only. */
-static inline size_t palpate_put_(uint8_t *buffer, size_t length, size_t room, uint64_t number)
-{
-    for (;; length++) {
-        if (length < room) {
-            buffer[length] = PALPATE_AS_(uint8_t, (number & 127) | (number > 127 ? 128 : 0));
-        }
-        number >>= 7;
-        if (number == 0) {
-            return length + 1;
-        }
-    }
-}
-
-/* The number that `palpate_put_` wrote, of at most `most` bytes, the last of which is at most `last`; `*at` is moved past
- * it, or becomes more than `length`. */
-static inline uint64_t palpate_take_(const uint8_t *buffer, size_t *at, size_t length, uint8_t most, uint8_t last)
-{
-    uint64_t number = 0;
-    uint_fast8_t i;
-    for (i = 0; i < most && *at < length; i++) {
-        const uint8_t byte = buffer[*at];
-        *at += 1;
-        number |= PALPATE_AS_(uint64_t, byte & 127) << 7 * i;
-        if (byte < 128) {
-            if (i + 1u == most && byte > last) {
-                break;
-            }
-            return number;
-        }
-    }
-    *at = length + 1;
-    return 0;
-}
-
-/* Writes the state to the start of `buffer`, and returns its length: at most
- * PALPATE_SNAPSHOT_LENGTH(objects). Returns 0 if there is less room. */
-PALPATE_API size_t palpate_snapshot(const palpate_recognizer *recognizer, uint8_t *buffer, size_t room)
-{
-    const palpate_model *model = recognizer->model;
-    size_t length, at;
-    uint32_t sum = 0xffffffffu;
-    uint_fast16_t i;
-    length = palpate_put_(buffer, 0, room, palpate_u32_(model->part_[PALPATE_END_]));
-    length = palpate_put_(buffer, length, room, recognizer->touches);
-    if (length + 2 > room) {
-        return 0;
-    }
-    buffer[length++] = PALPATE_AS_(uint8_t, recognizer->verdict | (recognizer->forgotten != 0 ? 4 : 0));
-    buffer[length++] = recognizer->verdict == PALPATE_RECOGNIZED ? recognizer->object : 0;
-    if (recognizer->forgotten != 0) {
-        length = palpate_put_(buffer, length, room, recognizer->forgotten);
-    }
-    for (i = 0; i < model->objects; i++) {
-        const uint64_t evidence = PALPATE_AS_(uint64_t, recognizer->evidence[i]);
-        length = palpate_put_(buffer, length, room, evidence << 1 ^ (0u - (evidence >> 63)));
-    }
-    if (length + 4 > room) {
-        return 0;
-    }
-    for (at = 0; at < length; at++) {
-        sum = palpate_crc_(sum, buffer[at]);
-    }
-    for (i = 0; i < 4; i++) {
-        buffer[length++] = PALPATE_AS_(uint8_t, ~sum >> 8 * i);
-    }
-    return length;
-}
-
-/* Takes over a snapshot, and forgets earlier touches. Unless the answer is PALPATE_RESTORED, nothing changes. */
-PALPATE_API palpate_restored palpate_restore(palpate_recognizer *recognizer, const uint8_t *snapshot, size_t length)
-{
-    const palpate_model *model = recognizer->model;
-    int64_t most = 0;
-    size_t at = 0, start;
-    uint32_t sum = 0, found = 0xffffffffu, checksum, touches, forgotten = 0;
-    uint_fast16_t i, best = 0;
-    uint8_t verdict, object;
-    if (length < 4) {
-        return PALPATE_DAMAGED;
-    }
-    length -= 4;
-    for (i = 0; i < 4; i++) {
-        sum |= PALPATE_AS_(uint32_t, snapshot[length + i]) << 8 * i;
-    }
-    sum = ~sum;
-    for (at = 0; at < length; at++) {
-        found = palpate_crc_(found, snapshot[at]);
-    }
-    at = 0;
-    if (found != sum) {
-        return PALPATE_DAMAGED;
-    }
-    checksum = PALPATE_AS_(uint32_t, palpate_take_(snapshot, &at, length, 5, 15));
-    touches = PALPATE_AS_(uint32_t, palpate_take_(snapshot, &at, length, 5, 15));
-    if (at + 2 > length) {
-        return PALPATE_DAMAGED;
-    }
-    verdict = snapshot[at++];
-    object = snapshot[at++];
-    if (checksum != palpate_u32_(model->part_[PALPATE_END_])) {
-        return PALPATE_OTHER_MODEL;
-    }
-    if ((verdict & 4) != 0) {
-        /* The last touch is part of the evidence. */
-        verdict &= 251;
-        forgotten = PALPATE_AS_(uint32_t, palpate_take_(snapshot, &at, length, 5, 15));
-        if (forgotten == 0 || forgotten >= touches) {
-            return PALPATE_DAMAGED;
-        }
-    }
-    start = at;
-    for (i = 0; i < model->objects; i++) {
-        const uint64_t number = palpate_take_(snapshot, &at, length, 10, 1);
-        const int64_t evidence = PALPATE_AS_(int64_t, number >> 1 ^ (0u - (number & 1)));
-        if (i == 0 || (evidence > most && i < model->known)) {
-            most = evidence;
-            best = i;
-        }
-    }
-    if (at != length || verdict > PALPATE_GAVE_UP || (verdict != PALPATE_UNDECIDED && touches == 0) ||
-        (verdict == PALPATE_RECOGNIZED && object != best && !PALPATE_HAS_OUTPUTS_(model))) {
-        return PALPATE_DAMAGED;
-    }
-#if PALPATE_OUTPUTS
-    if (verdict == PALPATE_RECOGNIZED && model->outputs_ != NULL) {
-        palpate_recognizer tried = *recognizer;
-        uint64_t rivals;
-        uint32_t from, span;
-        size_t place = start;
-        for (i = 0; i < model->objects; i++) {
-            const uint64_t number = palpate_take_(snapshot, &place, length, 10, 1);
-            tried.evidence[i] = PALPATE_AS_(int64_t, number >> 1 ^ (0u - (number & 1)));
-        }
-        if (palpate_together_(&tried, palpate_bits_(model, touches - forgotten, &from, &span), &rivals) != object || rivals == UINT64_MAX) {
-            return PALPATE_DAMAGED;
-        }
-    }
-#endif
-    palpate_reset(recognizer);
-    recognizer->touches = touches;
-    recognizer->forgotten = forgotten;
-    recognizer->verdict = verdict;
-    recognizer->object = object;
-    for (i = 0; i < model->objects; i++) {
-        const uint64_t number = palpate_take_(snapshot, &start, length, 10, 1);
-        recognizer->evidence[i] = PALPATE_AS_(int64_t, number >> 1 ^ (0u - (number & 1)));
-    }
-    return PALPATE_RESTORED;
 }
 
 #endif

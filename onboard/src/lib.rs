@@ -56,12 +56,12 @@
 //! | [`effector`] | edges of three switches to touches |
 //! | [`Model`], [`Recognizer`] | touches to verdicts |
 //! | [`locate`] | touches with positions to an object, its pose, and where to touch next |
-//! | [`station`] | touches, verdicts and models to and from a host, and what lasts through a power cut |
+//! | [`station`] | touches, verdicts and models to and from a host, and models that last through a power cut |
 //!
 //! | feature | what |
 //! |---|---|
 //! | `effector` | [`effector`]; off by default |
-//! | `link` | [`shared`]`::link`, and snapshots of a recognizer; off by default |
+//! | `link` | [`shared`]`::link`; off by default |
 //! | `station` | [`station`], with both of these; off by default |
 //! | `compact`, `complete`, `wide` | layouts of trees that can be read |
 //! | `grid`, `patterns` | layouts of tables that can be read |
@@ -105,8 +105,6 @@ pub use bytes::{Aligned, ModelError};
 pub use decide::{
     CapacityError, Familiarity, NothingExpected, Posterior, Proposal, Recognizer, Rivals, RowsSeen, Stopping, Verdict,
 };
-#[cfg(feature = "link")]
-pub use decide::{SNAPSHOT_LENGTH, SnapshotError};
 pub use exponential::exp2_negative;
 #[cfg(feature = "rows")]
 pub use layouts::batch::Batch;

@@ -1,4 +1,4 @@
-//! The one checksum of models, frames, snapshots and records: CRC-32 as in ISO-HDLC, zip and Ethernet.
+//! The one checksum of models, frames and records: CRC-32 as in ISO-HDLC, zip and Ethernet.
 
 /// The reflected polynomial.
 const POLYNOMIAL: u32 = 0xedb8_8320;

@@ -25,10 +25,10 @@ static void replay_put(char byte)
     UDR0 = (uint8_t)byte;
 }
 
-static uint8_t *replay_room(int which, size_t length)
+static uint8_t *replay_room(size_t length)
 {
-    static uint8_t model[3200], other[200];
-    return which == 0 ? (length <= sizeof model ? model : NULL) : length <= sizeof other ? other : NULL;
+    static uint8_t model[3200];
+    return length <= sizeof model ? model : NULL;
 }
 
 int main(void)

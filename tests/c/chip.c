@@ -33,10 +33,10 @@ static void replay_put(char byte)
 }
 
 /* At an odd address: a Cortex-M0+ must not load more than a byte at once from it. */
-static uint8_t *replay_room(int which, size_t length)
+static uint8_t *replay_room(size_t length)
 {
-    static uint32_t rooms[2][50000];
-    return length < sizeof rooms[0] ? (uint8_t *)rooms[which] + 1 : NULL;
+    static uint32_t room[50000];
+    return length < sizeof room ? (uint8_t *)room + 1 : NULL;
 }
 
 static int bare_main(void)

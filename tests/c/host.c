@@ -14,15 +14,15 @@ static void replay_put(char byte)
 }
 
 /* At an odd address, so that a load of more than a byte which some machines forbid is found. */
-static uint8_t *replay_room(int which, size_t length)
+static uint8_t *replay_room(size_t length)
 {
-    static void *rooms[2];
-    free(rooms[which]);
-    rooms[which] = malloc(length + 1);
-    if (rooms[which] == NULL) {
+    static void *room;
+    free(room);
+    room = malloc(length + 1);
+    if (room == NULL) {
         exit(2);
     }
-    return (uint8_t *)rooms[which] + 1;
+    return (uint8_t *)room + 1;
 }
 
 int main(void)

@@ -1,4 +1,4 @@
-/* Commands on models, touches, rows and snapshots, played through palpate.h; what comes out is text, which
+/* Commands on models, touches and rows, played through palpate.h; what comes out is text, which
  * tests/tests/whole/c_header.rs compares with what the crate gives; numbers in hexadecimal digits. No library: the same
  * for this machine and for bare chips.
  *
@@ -10,8 +10,6 @@
  *   E u16 count, i32 each    pushes margins
  *   P                        the posterior of every object
  *   N                        the name of every object
- *   S                        a snapshot
- *   L u32 length, bytes      takes over a snapshot
  *   X                        forgets all touches
  * After a model that was refused, everything up to the next M is skipped. */
 #ifndef PALPATE_REPLAY_H
@@ -38,8 +36,8 @@
 /* One byte of the commands; -1 at their end. */
 static int replay_get(void);
 static void replay_put(char byte);
-/* Room for the bytes of a model (0) or others (1), instead of the last one; exactly `length` of them may be touched. */
-static uint8_t *replay_room(int which, size_t length);
+/* Room for the bytes of a model, instead of the last one; exactly `length` of them may be touched. */
+static uint8_t *replay_room(size_t length);
 
 static palpate_model replay_model;
 static palpate_recognizer replay_recognizer;
@@ -256,38 +254,31 @@ static void replay_touch(int is_open)
 /* All commands. Returns 0 unless one is not known. */
 static int replay(void)
 {
-    static uint8_t snapshot[PALPATE_SNAPSHOT_LENGTH(PALPATE_MAX_OBJECTS)];
     int is_open = 0, command;
     uint16_t i, count;
     size_t length, at;
     uint8_t *bytes;
+    palpate_error error;
     while ((command = replay_get()) >= 0) {
         switch (command) {
         case 'M':
-        case 'L':
             length = (size_t)replay_number(4);
-            bytes = replay_room(command != 'M', length);
+            bytes = replay_room(length);
             for (at = 0; at < length; at++) {
                 bytes[at] = (uint8_t)replay_get();
             }
-            if (command == 'M') {
-                palpate_error error = palpate_open(&replay_model, bytes, length);
-                if (error == PALPATE_OK) {
-                    error = palpate_start(&replay_recognizer, &replay_model);
-                }
-                is_open = error == PALPATE_OK;
-#if PALPATE_SEQUENCES
-                replay_rows = 0;
-#endif
-                replay_text("open");
-                replay_i64((int64_t)error);
-                replay_i64(is_open ? 0 : (int64_t)replay_model.wrong);
-                replay_put('\n');
-            } else if (is_open) {
-                replay_text("restore");
-                replay_i64((int64_t)palpate_restore(&replay_recognizer, bytes, length));
-                replay_put('\n');
+            error = palpate_open(&replay_model, bytes, length);
+            if (error == PALPATE_OK) {
+                error = palpate_start(&replay_recognizer, &replay_model);
             }
+            is_open = error == PALPATE_OK;
+#if PALPATE_SEQUENCES
+            replay_rows = 0;
+#endif
+            replay_text("open");
+            replay_i64((int64_t)error);
+            replay_i64(is_open ? 0 : (int64_t)replay_model.wrong);
+            replay_put('\n');
             break;
         case 'T':
             replay_touch(is_open);
@@ -344,17 +335,6 @@ static int replay(void)
             }
             if (is_open) {
                 replay_name(UINT16_MAX);
-            }
-            break;
-        case 'S':
-            if (is_open) {
-                size_t whole = palpate_snapshot(&replay_recognizer, snapshot, sizeof snapshot);
-                replay_text("snapshot");
-                replay_hex(snapshot, whole);
-                /* In as many bytes as it takes, and in one less. */
-                replay_i64((int64_t)palpate_snapshot(&replay_recognizer, replay_room(1, whole), whole));
-                replay_i64((int64_t)palpate_snapshot(&replay_recognizer, replay_room(1, whole - 1), whole - 1));
-                replay_put('\n');
             }
             break;
         case 'X':

@@ -1,5 +1,5 @@
 /* Calls of a program that recognizes: its size is what recognition takes. -DROWS: rows of features instead of touches;
- * -DEVERYTHING: posteriors, snapshots and names as well. */
+ * -DEVERYTHING: posteriors and names as well. */
 #include "palpate.h"
 
 extern palpate_model model;
@@ -33,18 +33,6 @@ uint64_t posterior(uint16_t object);
 uint64_t posterior(uint16_t object)
 {
     return palpate_posterior(&recognizer, object);
-}
-
-size_t snapshot(uint8_t *buffer, size_t room);
-size_t snapshot(uint8_t *buffer, size_t room)
-{
-    return palpate_snapshot(&recognizer, buffer, room);
-}
-
-palpate_restored restore(const uint8_t *buffer, size_t length);
-palpate_restored restore(const uint8_t *buffer, size_t length)
-{
-    return palpate_restore(&recognizer, buffer, length);
 }
 
 size_t name(char *text, size_t room);

@@ -136,30 +136,6 @@ pub fn section(tag: u16, content: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A snapshot with this content, valid or not.
-pub fn snapshot(model: &Model<'_>, touches: u32, verdict: u8, object: u8, evidence: &[i64]) -> Vec<u8> {
-    let head =
-        postcard::to_slice(&(model.checksum(), touches, verdict, object), &mut [0; 32]).map(|head| head.to_vec());
-    snapshot_of(head.expect("a long buffer"), evidence)
-}
-
-/// A snapshot, undecided, that the first touches are forgotten in.
-///
-/// # Panics
-/// Never.
-pub fn forgetful(model: &Model<'_>, touches: u32, forgotten: u32, evidence: &[i64]) -> Vec<u8> {
-    let head = (model.checksum(), touches, 4_u8, 0_u8, forgotten);
-    snapshot_of(postcard::to_slice(&head, &mut [0; 32]).expect("a long buffer").to_vec(), evidence)
-}
-
-fn snapshot_of(mut bytes: Vec<u8>, evidence: &[i64]) -> Vec<u8> {
-    for evidence in evidence {
-        bytes.extend_from_slice(postcard::to_slice(evidence, &mut [0; 10]).expect("a long buffer"));
-    }
-    bytes.extend(checksum(&bytes).to_le_bytes());
-    bytes
-}
-
 /// All of them, in the order of the table in `FORMAT.md`.
 pub fn cases() -> Vec<Abuse> {
     let mut cases = Vec::new();

@@ -4,8 +4,8 @@ use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::link::{
-    CHUNK, Command, Decision, Decoder, Detail, HostEnd, HostSettings, Incoming, LinkError, Message, Outcome, Payload,
-    Query, Refusal, VerdictMessage, checksum,
+    CHUNK, Command, Decision, Detail, HostEnd, HostSettings, Incoming, LinkError, Outcome, Query, Refusal,
+    VerdictMessage, checksum,
 };
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
@@ -64,10 +64,6 @@ pub struct Desk {
     pub rng: ChaCha8Rng,
     /// Writes per power cut, on average; 0 for no cuts.
     pub cut_every: u32,
-    /// The outcome of the last executed command had not been sent when the power was cut.
-    pub untold: bool,
-    /// The newest command with an outcome.
-    pub newest: Option<u32>,
     /// The session may end.
     pub may_fail: bool,
     /// Error that ended the session.
@@ -97,8 +93,6 @@ impl Desk {
             now: 0,
             rng: ChaCha8Rng::seed_from_u64(1),
             cut_every,
-            untold: false,
-            newest: None,
             may_fail: false,
             failed: None,
             given: VecDeque::new(),
@@ -206,21 +200,10 @@ impl Read for Desk {
 impl Write for Desk {
     fn write(&mut self, buffer: &[u8]) -> Result<usize, PowerCut> {
         self.alive()?;
-        let mut decoder = Decoder::new();
-        let outcome = buffer.iter().find_map(|&byte| match decoder.feed(byte) {
-            Some(Ok(frame)) => match frame.message {
-                Message::Outcome { sequence, .. } => Some(sequence),
-                _ => None,
-            },
-            _ => None,
-        });
-        let news = outcome.filter(|&sequence| self.newest.is_none_or(|newest| sequence > newest));
         if self.cut_every > 0 && self.rng.random_ratio(1, self.cut_every) {
-            self.untold = news.is_some();
             self.power.set(false);
             return self.alive().map(|()| 0);
         }
-        self.newest = news.or(self.newest);
         let Self { host, to_chip, answers, open, now, .. } = self;
         let mut outcomes = Vec::new();
         host.receive(
@@ -248,9 +231,9 @@ pub fn push(touch: &Touch) -> Step {
     Step::Do(Command::Touch { touch: touch.into(), detail: true })
 }
 
-/// Sends a model or a snapshot.
-pub fn load(bytes: &'static [u8], payload: Payload) -> Vec<Step> {
-    let begin = Command::Begin { payload, length: bytes.len() as u32, checksum: checksum(bytes) };
+/// Sends a model.
+pub fn load(bytes: &'static [u8]) -> Vec<Step> {
+    let begin = Command::Begin { length: bytes.len() as u32, checksum: checksum(bytes) };
     let mut steps = vec![Step::Do(begin)];
     for (i, bytes) in bytes.chunks(CHUNK).enumerate() {
         steps.push(Step::Do(Command::Chunk { offset: (i * CHUNK) as u32, bytes }));

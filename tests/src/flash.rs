@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNo
 use palpate_onboard::station::MappedFlash;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use std::cell::{Cell, OnceCell, RefCell};
+use std::cell::{Cell, OnceCell};
 use std::rc::Rc;
 
 /// Bytes that are written at once.
@@ -62,8 +62,6 @@ pub struct Cells {
     pub bytes: Vec<u8>,
     /// The value of erased bytes.
     pub erased_to: u8,
-    /// A copy of `bytes`, to look at while a driver has them.
-    pub mirror: Rc<RefCell<Vec<u8>>>,
     /// Erases of each sector.
     pub erases: Vec<u32>,
     /// Erases of each sector after which it keeps some of its bits.
@@ -72,10 +70,6 @@ pub struct Cells {
     pub steps: u64,
     /// Faults to come.
     pub faults: Vec<(u64, Fault)>,
-    /// True if words can be written; if not, they stay as they are, and nothing errs.
-    pub programs: Rc<Cell<bool>>,
-    /// Erases of all sectors, to look at while a driver has the cells.
-    pub erased: Rc<Cell<u32>>,
     /// Reads so far.
     pub reads: Cell<u64>,
     /// The read that goes wrong, if one does.
@@ -93,9 +87,9 @@ impl Cells {
         Self::holding((0..sectors * SECTOR).map(|_| rng.random()).collect(), rng)
     }
 
-    /// Cells as others are at this moment.
-    pub fn like(mirror: &RefCell<Vec<u8>>) -> Self {
-        Self::holding(mirror.borrow().clone(), ChaCha8Rng::seed_from_u64(0))
+    /// Cells that hold this.
+    pub fn of(bytes: Vec<u8>) -> Self {
+        Self::holding(bytes, ChaCha8Rng::seed_from_u64(0))
     }
 
     /// Cells that are erased to this value.
@@ -107,15 +101,12 @@ impl Cells {
         let sectors = bytes.len() / SECTOR;
         let power = Rc::new(Cell::new(true));
         Self {
-            mirror: Rc::new(RefCell::new(bytes.clone())),
             bytes,
             erased_to: 0xff,
             erases: vec![0; sectors],
             endurance: vec![u32::MAX; sectors],
             steps: 0,
             faults: Vec::new(),
-            programs: Rc::new(Cell::new(true)),
-            erased: Rc::default(),
             reads: Cell::new(0),
             misread: None,
             misread_as: OnceCell::new(),
@@ -144,7 +135,6 @@ impl Cells {
             }
             *cell = *cell & !changed | wanted & changed;
         }
-        self.mirror.borrow_mut()[at..at + wanted.len()].copy_from_slice(&self.bytes[at..at + wanted.len()]);
         match fault {
             None | Some(Fault::Nothing | Fault::Half) => Ok(()),
             Some(Fault::Refused | Fault::Torn | Fault::RefusedThoughDone) => Err(NorFlashErrorKind::Other),
@@ -192,7 +182,6 @@ impl NorFlash for Driver<'_> {
                 }
             }
             self.0.erases[sector] += 1;
-            self.0.erased.set(self.0.erased.get() + 1);
             self.0.step(sector * SECTOR, &wanted)?;
         }
         Ok(())
@@ -209,7 +198,6 @@ impl NorFlash for Driver<'_> {
             let worn = self.0.erases[at / SECTOR] > self.0.endurance[at / SECTOR];
             let erased = self.0.erased_to;
             assert!(worn || cells == [erased; WORD], "the word at {at} is not erased");
-            let word = if self.0.programs.get() { *word } else { cells };
             // A bit that is programmed does not come back.
             let programmed = |i: usize| if erased == 0xff { word[i] & cells[i] } else { word[i] | cells[i] };
             self.0.step(at, &std::array::from_fn::<u8, WORD, _>(programmed))?;

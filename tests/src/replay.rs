@@ -1,9 +1,7 @@
 //! Commands for the C header's test program (`tests/c/replay.h`), and its required answer to each: the crate's.
 
 use crate::abuse::places;
-use palpate_onboard::{
-    Model, ModelError, Recognizer, Refused, RowsSeen, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict,
-};
+use palpate_onboard::{Model, ModelError, Recognizer, Refused, RowsSeen, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::format::{Group, HEADER_LENGTH, Layout};
 use std::fmt::Write;
@@ -148,28 +146,6 @@ impl<'m> Script<'m> {
             let name: String = model.object_name(object).bytes().map(|byte| format!("{byte:02x}")).collect();
             self.say(&format!("name {name} {:x}", name.len() / 2));
         }
-    }
-
-    /// A snapshot, which is handed back.
-    pub fn snapshot(&mut self) -> Vec<u8> {
-        self.commands.push(b'S');
-        let mut buffer = [0; SNAPSHOT_LENGTH + 2_560];
-        let snapshot = self.recognizer().snapshot(&mut buffer).expect("a long buffer").to_vec();
-        let mut line = "snapshot ".to_string();
-        snapshot.iter().for_each(|byte| write!(line, "{byte:02x}").expect("a string"));
-        self.say(&format!("{line} {:x} 0", snapshot.len()));
-        snapshot
-    }
-
-    /// Takes over a snapshot.
-    pub fn restore(&mut self, bytes: &[u8]) {
-        self.block(b'L', bytes);
-        let answer = match self.known().restore(bytes) {
-            Ok(()) => 0,
-            Err(SnapshotError::OtherModel) => 2,
-            Err(_) => 1,
-        };
-        self.say(&format!("restore {answer}"));
     }
 
     fn row_known(&mut self, features: &[i32]) {

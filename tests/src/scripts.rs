@@ -236,7 +236,7 @@ pub fn play(script: &mut Script<'_>, count: usize, rng: &mut SmallRng) {
     // Of a model that says nothing about sequences, rows in them are the same.
     let in_sequences = if model.position().is_some() || model.guard().is_some() { 0.8 } else { 0.1 };
     let mut measured = Vec::new();
-    for index in 0..count {
+    for _ in 0..count {
         if model.descriptor().is_some() {
             script.touch(&touch(rng));
         } else if rng.random_bool(in_sequences) {
@@ -256,30 +256,9 @@ pub fn play(script: &mut Script<'_>, count: usize, rng: &mut SmallRng) {
                 (0..rng.random_range(0..=objects)).map(|_| rng.random_range(-(1 << 30)..=1 << 30)).collect();
             script.margins(&margins);
         }
-        if index == 2 || rng.random_bool(0.1 / objects as f64) {
-            let mut snapshot = script.snapshot();
-            if rng.random_bool(0.5) {
-                script.reset();
-            }
-            if rng.random_bool(0.5) {
-                let at = rng.random_range(0..snapshot.len());
-                snapshot[at] ^= 1 << rng.random_range(0..8);
-                if rng.random_bool(0.7) {
-                    sealed(&mut snapshot);
-                }
-            }
-            script.restore(&snapshot);
-        }
         if rng.random_bool(0.05) {
             script.reset();
         }
-    }
-}
-
-/// Puts the checksum at the end right.
-pub fn sealed(bytes: &mut [u8]) {
-    if let Some((body, sum)) = bytes.split_last_chunk_mut() {
-        *sum = palpate_shared::format::checksum(body).to_le_bytes();
     }
 }
 
@@ -295,7 +274,6 @@ pub fn script<'m>(models: &'m [Vec<u8>], touches: usize, rows: usize, rng: &mut 
         assert!(script.open(bytes));
         script.names();
         script.posteriors();
-        script.snapshot();
         // What the other kind of model takes is refused.
         script.touch(&touch(rng));
         script.row(&[1, 2, 3]);

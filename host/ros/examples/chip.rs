@@ -23,9 +23,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("give a model, and an address such as 127.0.0.1:4000".into());
     };
     let model = std::fs::read(model)?;
-    let (mut station, progress, boot) =
-        Station::<256, NoStorage>::open(&model, NoStorage).map_err(|error| error.to_string())?;
-    let mut end = DeviceEnd::new(progress, boot);
+    let mut station = Station::<256, NoStorage>::open(&model, NoStorage);
+    let mut end = DeviceEnd::new(std::process::id());
     let typed = typed();
     for stream in TcpListener::bind(address)?.incoming() {
         let mut stream = stream?;
@@ -44,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 if matches!(event, Event::Touch { verdict, .. } if verdict.decision != Decision::Undecided) {
                     Device::reset(&mut station);
                 }
-                end.report(event, &mut station, &mut send);
+                end.tell(event, &mut send);
             }
             match stream.read(&mut buffer) {
                 Ok(0) => break,

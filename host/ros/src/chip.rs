@@ -181,8 +181,6 @@ impl Line {
                 }
                 self.take_event(connection, names, event)?;
             }
-            // Of before the node was there: another object, for all that it knows.
-            Received::Earlier(_) => {}
         }
         Ok(())
     }
@@ -203,7 +201,6 @@ impl Line {
                 let finger = ["first finger", "middle finger", "last finger"].get(finger).copied().unwrap_or("probe");
                 self.tell(ChipEvent::Fault(format!("{finger}: {kind}")));
             }
-            Event::NotStored => self.tell(ChipEvent::Fault("the chip cannot store what it has touched".into())),
             _ => {}
         }
         Ok(())

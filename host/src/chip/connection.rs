@@ -6,7 +6,7 @@ use crate::progress::{self, Progress};
 use palpate_onboard::locate::{Approach, Pose};
 use palpate_shared::link::{
     Answer, ApproachMessage, CHUNK, Command, Event, HostEnd, HostSettings, HostStatistics, Incoming, ModelInfo,
-    Outcome, POSE_BYTES, Payload, Query, Refusal, Statistics, checksum,
+    Outcome, POSE_BYTES, Query, Refusal, Statistics, checksum,
 };
 use std::collections::VecDeque;
 use std::hash::{BuildHasher, Hasher, RandomState};
@@ -22,9 +22,6 @@ pub enum Received {
     Outcome(Outcome),
     /// Something that happened on the chip by itself, and how many events before it were lost.
     Event(Event, u32),
-    /// Something that happened before this host listened: the power went before the chip had told it, and it does so now
-    /// that it has started again.
-    Earlier(Event),
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -82,13 +79,8 @@ impl Connection {
         };
         connection.connect()?;
         let boot = connection.end.boot();
-        for (received, of) in &mut connection.heard {
-            if let Received::Event(event, _) = received
-                && *of != boot
-            {
-                *received = Received::Earlier(*event);
-            }
-        }
+        // What the line still held of an earlier start is nobody's.
+        connection.heard.retain(|(received, of)| !matches!(received, Received::Event(..)) || *of == boot);
         Ok(connection)
     }
 
@@ -365,7 +357,7 @@ impl Connection {
         progress.begin("loading", Some(bytes.len() as u64));
         self.model = None;
         let length = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
-        let begin = Command::Begin { payload: Payload::Model, length, checksum: checksum(bytes) };
+        let begin = Command::Begin { length, checksum: checksum(bytes) };
         let command = |at: usize| match bytes.get(at..).unwrap_or_default() {
             [] => (Command::Commit, usize::MAX),
             rest => {

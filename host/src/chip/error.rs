@@ -45,7 +45,7 @@ pub enum ChipProblem {
         /// Commands that may have been executed or not.
         uncertain: u32,
     },
-    /// The chip was reset and has no stored state.
+    /// The chip was reset.
     #[error("the chip was reset and kept nothing: {answered} commands are lost, and up to {uncertain} more")]
     Forgotten {
         /// Commands whose outcome was known, and whose effect is lost.
@@ -150,7 +150,7 @@ impl Problem for ChipProblem {
                     palpate_shared::link::VERSION
                 );
             }
-            Self::Forgotten { .. } => "Start again, or use a program on the chip that stores its progress.",
+            Self::Forgotten { .. } => "Start again.",
             Self::Replaced => {
                 "Load the model again. The chip's flash may be worn, or its program may have been replaced by one without \
                  the model's features."

@@ -35,8 +35,6 @@ pub enum RecordEvent<'a> {
         /// The chip's verdict; a touch that it does not count is recorded all the same.
         verdict: Result<VerdictMessage, Refusal>,
     },
-    /// A touch was not recorded, because it was made before the recording began: the chip tells it again since it started.
-    Earlier(Touch),
     /// A touch was not recorded, because it lacks the pose.
     NoPose(Touch),
     /// A finger is faulty.
@@ -153,9 +151,6 @@ fn listen(
     }
     let (event, missed) = match connection.hear(Duration::from_millis(50))? {
         Some(Received::Event(event, missed)) => (event, missed),
-        Some(Received::Earlier(Event::Touch { touch, .. } | Event::Refused { touch, .. })) => {
-            return each(&RecordEvent::Earlier(Touch::from(&touch)));
-        }
         _ => return each(&RecordEvent::Idle),
     };
     if missed > 0 {

@@ -168,9 +168,7 @@ pub fn stream(
         return Err(connection.wrong(ChipProblem::OtherModel { chip: chip.info.checksum, expected }));
     }
     let mut table = Box::new(Table::new());
-    // Without storage no record is too short.
-    let mirror = mirror.and_then(|model| Mirror::open_with(model, NoStorage, &mut *table).ok());
-    let mut mirror = mirror.map(|(mirror, ..)| mirror);
+    let mut mirror = mirror.map(|model| Mirror::open_with(model, NoStorage, &mut *table));
     // A person who types lines wants each verdict before typing the next line.
     let one_by_one = asks != Asks::Nothing || matches!(steps, Steps::Lines { .. });
     let mut run = Run { summary: Summary::default(), under_way: VecDeque::new(), truth: None, decided: false };
@@ -207,7 +205,6 @@ pub fn stream(
         let update = match connection.hear(Duration::from_millis(50))? {
             None => Update::Idle,
             Some(Received::Event(event, missed)) => Update::Event(event, missed),
-            Some(Received::Earlier(event)) => Update::Event(event, 0),
             Some(Received::Outcome(outcome)) => run.take(outcome, chip).map_err(|problem| connection.wrong(problem))?,
         };
         busy.set(!run.under_way.is_empty(), Instant::now());

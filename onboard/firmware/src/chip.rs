@@ -3,7 +3,7 @@
 
 use core::ptr::{addr_of, addr_of_mut, read_volatile, write_volatile};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use palpate_onboard::station::Memory;
+use palpate_onboard::station::{Memory, RECORD_LENGTH};
 
 // Symbols that cortex-m-rt's linker script defines; only their addresses mean anything.
 unsafe extern "C" {
@@ -87,17 +87,29 @@ fn take_retained() -> &'static mut [u8] {
     unsafe { core::slice::from_raw_parts_mut(addr_of_mut!(_retained_start), length) }
 }
 
-/// The memory that keeps its content through a reset, once, with places for two models and two records of these bytes.
+/// The memory that keeps its content through a reset, once, with places for two models and two records.
 ///
 /// # Panics
 /// The second time.
-pub fn take_memory(record: usize) -> Memory<'static> {
+pub fn take_memory() -> Memory<'static> {
+    let retained = take_retained();
+    let Some((first_record, rest)) = retained.split_first_chunk_mut::<RECORD_LENGTH>() else { crate::fail() };
+    let Some((second_record, rest)) = rest.split_first_chunk_mut::<RECORD_LENGTH>() else { crate::fail() };
     // Aligned, as models are read fastest.
-    let record = record.next_multiple_of(4);
-    let (first_record, rest) = take_retained().split_at_mut(record);
-    let (second_record, rest) = rest.split_at_mut(record);
     let (first_model, second_model) = rest.split_at_mut(rest.len() / 8 * 4);
     Memory { models: [first_model, second_model], records: [first_record, second_record] }
+}
+
+/// Starts so far, from any number on. It outlasts a reset: nothing initializes it.
+#[unsafe(link_section = ".uninit.starts")]
+static STARTS: AtomicU32 = AtomicU32::new(0);
+
+/// Another number after each start. Call it once.
+pub fn count_start() -> u32 {
+    // A load and a store, as thumbv6m has no sum in place.
+    let starts = STARTS.load(Ordering::Relaxed).wrapping_add(1);
+    STARTS.store(starts, Ordering::Relaxed);
+    starts
 }
 
 /// The levels of three switches, a bit each. They outlast a reset, as switches do: nothing initializes them.

@@ -1,12 +1,10 @@
-//! Margins to a verdict: evidence, when to stop, what fits no object, and the state as bytes.
+//! Margins to a verdict: evidence, when to stop, and what fits no object.
 
 mod approach;
 mod evidence;
 mod expected;
 mod recognizer;
 mod seen;
-#[cfg(feature = "link")]
-mod snapshot;
 mod stopping;
 mod strangers;
 mod together;
@@ -18,7 +16,5 @@ pub use expected::NothingExpected;
 pub(crate) use recognizer::State;
 pub use recognizer::{CapacityError, Recognizer, Verdict};
 pub use seen::RowsSeen;
-#[cfg(feature = "link")]
-pub use snapshot::{SNAPSHOT_LENGTH, SnapshotError};
 pub use stopping::Stopping;
 pub use strangers::Familiarity;

@@ -85,8 +85,6 @@ pub(crate) struct State<const N: usize> {
     /// Rivals of the object that was recognized.
     rivals: Rivals,
     touches: u32,
-    /// Number of the first touches that are no longer part of the evidence.
-    forgotten: u32,
     decided: Decided,
 }
 
@@ -120,7 +118,6 @@ impl<'m, const N: usize> Recognizer<'m, N> {
                 stopping,
                 rivals: Rivals::from_q56(0),
                 touches: 0,
-                forgotten: 0,
                 decided: Decided::Fresh,
             },
         })
@@ -222,7 +219,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     ///
     /// Cost: as the test in [`push`](Self::push).
     pub fn familiarity(&self) -> Familiarity {
-        match self.state.covered() {
+        match self.state.touches {
             0 => Familiarity::Known,
             touches => {
                 let leader = strangers::leader(&self.model, self.evidence()).0;
@@ -239,7 +236,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     pub fn rivals(&self) -> u64 {
         let mut priors = [0; N];
         let evidence = self.state.evidence_or_priors(&self.model, &mut priors);
-        let unit = unit_of(&self.model, self.state.covered());
+        let unit = unit_of(&self.model, self.state.touches);
         if let Some(outputs) = self.model.outputs() {
             let leading = Leading::of(evidence, self.model.known_count(), outputs, unit);
             return leading.rivals().map_or(u64::MAX, Rivals::q56);
@@ -278,7 +275,6 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// Forgets all touches, for the next object.
     pub fn reset(&mut self) {
         self.state.touches = 0;
-        self.state.forgotten = 0;
         self.state.decided = Decided::Fresh;
     }
 
@@ -330,10 +326,6 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         &self.state
     }
 
-    pub(crate) const fn state_mut(&mut self) -> &mut State<N> {
-        &mut self.state
-    }
-
     /// Takes in a touch by its evidence: its margins, or their evidence by the model's table.
     pub(super) fn add(&mut self, margins: &[i32]) -> Verdict {
         if matches!(self.state.decided, Decided::Object(_) | Decided::Unknown | Decided::GaveUp) {
@@ -345,7 +337,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         }
         self.state.touches = self.state.touches.saturating_add(1);
         let best = strangers::leader(&self.model, self.evidence());
-        let familiarity = strangers::familiarity(&self.model, self.evidence(), best.0, self.state.covered());
+        let familiarity = strangers::familiarity(&self.model, self.evidence(), best.0, self.state.touches);
         if let Some(outputs) = self.model.outputs() {
             let named = if familiarity == Familiarity::Known { self.named_together(outputs) } else { None };
             return self.decide(familiarity, named);
@@ -353,7 +345,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
         let odds = self.state.stopping.odds_of(best.0, &self.model);
         let may_be_named =
             familiarity == Familiarity::Known && !strangers::is_background(&self.model, self.evidence(), best.1);
-        let unit = unit_of(&self.model, self.state.covered());
+        let unit = unit_of(&self.model, self.state.touches);
         let rivals = if may_be_named { evidence::rivals(self.evidence(), best, odds, unit) } else { None };
         self.decide(familiarity, rivals.map(|rivals| (best.0, rivals)))
     }
@@ -361,7 +353,7 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// The object that may be named by the sums over its outputs: its output with the most evidence, and its rivals.
     fn named_together(&self, outputs: Outputs<'_>) -> Option<(usize, Rivals)> {
         let (model, evidence) = (&self.model, self.evidence());
-        let (unit, known) = (unit_of(model, self.state.covered()), model.known_count());
+        let (unit, known) = (unit_of(model, self.state.touches), model.known_count());
         if together::is_undecided(evidence, known, outputs, self.state.stopping.loosest(model), unit) {
             return None;
         }
@@ -403,13 +395,13 @@ impl<const N: usize> State<N> {
         let mut priors = [0; N];
         let evidence = self.evidence_or_priors(model, &mut priors);
         match model.outputs() {
-            Some(outputs) => Leading::of(evidence, model.known_count(), outputs, unit_of(model, self.covered())).output,
+            Some(outputs) => Leading::of(evidence, model.known_count(), outputs, unit_of(model, self.touches)).output,
             None => strangers::leader(model, evidence).0,
         }
     }
 
     pub(crate) fn posterior(&self, model: &Model<'_>, object: usize) -> Posterior {
-        let unit = Unit { sharpness: model.temperature().sharpness(), ..unit_of(model, self.covered()) };
+        let unit = Unit { sharpness: model.temperature().sharpness(), ..unit_of(model, self.touches) };
         evidence::posterior(self.evidence_or_priors(model, &mut [0; N]), object, unit)
     }
 
@@ -418,7 +410,7 @@ impl<const N: usize> State<N> {
             let posterior = self.posterior(model, output);
             return (posterior, Posterior::of(output < model.object_count()));
         };
-        let unit = Unit { sharpness: model.temperature().sharpness(), ..unit_of(model, self.covered()) };
+        let unit = Unit { sharpness: model.temperature().sharpness(), ..unit_of(model, self.touches) };
         let mut priors = [0; N];
         let evidence = self.evidence_or_priors(model, &mut priors);
         together::posterior(evidence, model.known_count(), output, outputs, unit)
@@ -434,21 +426,6 @@ impl<const N: usize> State<N> {
         evidence.get(..model.object_count()).unwrap_or_default()
     }
 
-    pub(crate) const fn touches(&self) -> u32 {
-        self.touches
-    }
-
-    /// The first touches that are no longer part of the evidence.
-    #[cfg(feature = "link")]
-    pub(crate) const fn forgotten(&self) -> u32 {
-        self.forgotten
-    }
-
-    /// The touches that the evidence is the sum of.
-    const fn covered(&self) -> u32 {
-        self.touches.saturating_sub(self.forgotten)
-    }
-
     pub(crate) const fn verdict(&self) -> Verdict {
         match self.decided {
             Decided::Fresh | Decided::Nothing => Verdict::Undecided,
@@ -456,33 +433,6 @@ impl<const N: usize> State<N> {
             Decided::Unknown => Verdict::Unknown,
             Decided::GaveUp => Verdict::GaveUp,
         }
-    }
-
-    /// Weights of all other objects, relative to one that was recognized with this evidence of this many touches.
-    pub(crate) fn rivals(model: &Model<'_>, evidence: &[i64; N], object: usize, covered: u32) -> Option<Rivals> {
-        let evidence = evidence.get(..model.object_count())?;
-        if let Some(outputs) = model.outputs() {
-            let leading = Leading::of(evidence, model.known_count(), outputs, unit_of(model, covered));
-            return leading.rivals().filter(|_| leading.output == object);
-        }
-        let best = strangers::leader(model, evidence);
-        if best.0 == object { evidence::rivals(evidence, best, u64::MAX, unit_of(model, covered)) } else { None }
-    }
-
-    /// Takes over a state: evidence, touches so far, how many of these are no longer part of the evidence, and the verdict.
-    pub(crate) const fn set(&mut self, evidence: [i64; N], touches: u32, forgotten: u32, verdict: Verdict) {
-        self.evidence = evidence;
-        self.touches = touches;
-        self.forgotten = forgotten;
-        self.decided = match verdict {
-            Verdict::Undecided => Decided::Nothing,
-            Verdict::Recognized { object, rivals, .. } => {
-                self.rivals = rivals;
-                Decided::Object(object)
-            }
-            Verdict::Unknown => Decided::Unknown,
-            Verdict::GaveUp => Decided::GaveUp,
-        };
     }
 }
 

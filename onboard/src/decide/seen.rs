@@ -7,7 +7,7 @@ use palpate_shared::MISSING_FEATURE;
 /// Rows of a sequence so far, for a model that states which rows it [takes](Model::guard): it refuses those of a sensor that is
 /// dead, stuck or out of its range. Has room for up to `F` features.
 ///
-/// State: two numbers of 32 bits for each feature, and one more; not part of a snapshot.
+/// State: two numbers of 32 bits for each feature, and one more.
 #[derive(Clone, Debug)]
 pub struct RowsSeen<const F: usize> {
     rows: u32,

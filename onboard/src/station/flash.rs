@@ -1,22 +1,20 @@
-//! NOR flash: records in a log that goes round its sectors, and two areas of whole sectors for models.
+//! NOR flash: two sectors of records, and two areas of whole sectors for models.
 //!
 //! ```text
-//! │ log: sector │ sector │ … │ first model: whole sectors │ second model: as many │
+//! │ records │ records │ first model: whole sectors │ second model: as many │
 //! ```
 //!
-//! The log is appended to. Where a record does not fit into a sector any more, the next sector is erased and goes on, so
-//! all sectors wear alike. A record counts once it has been read back; one that cannot be written, or a sector that does
-//! not erase any more, is passed over. The sector with the newest record is never erased. Each attempt to write a record
-//! has a number of its own, so that of two that are whole the newer one counts, whatever the flash said of the other.
+//! Records are appended. Where a sector is full, or does not take a record, the other one is erased and goes on; that with the
+//! newest record is never erased. A record counts once it has been read back. Each attempt to write one has a number of its own, so
+//! that of two that are whole the newer one counts, whatever the flash said of the other.
 //!
 //! Erased bytes are 0xff or, as on an STM32L0 or L1, 0. A start without a record erases a sector and looks; after that the
 //! records say it.
 
-use super::record::{self, ERASED, Found};
-use super::storage::{Place, Storage};
+use super::record::{ERASED, Newest, RECORD_LENGTH, Record};
+use super::storage::{Loaded, NotStored, Place, Storage};
 use core::fmt;
 use embedded_storage::nor_flash::NorFlash;
-use palpate_shared::link::NotStored;
 
 /// Flash that the chip's bus also reads as memory.
 ///
@@ -29,17 +27,15 @@ pub trait MappedFlash: NorFlash {
     /// All of it, as it is now.
     fn bytes(&self) -> &[u8];
 
-    /// Called before each erase, of up to eight in one [`Storage::store`]: each may take seconds where sectors are large, so
-    /// this is the place to feed a watchdog.
+    /// Called before each erase: each may take seconds where sectors are large, so this is the place to feed a watchdog.
     fn before_erase(&mut self) {}
 }
 
 /// Attempts to erase a sector, or to read a record.
 const ATTEMPTS: usize = 2;
 
-/// Sectors that are tried for a record. Where all of them fail, one is tried for each record that follows, until one
-/// succeeds, or until the log was gone through as many times in vain: then none any more.
-const SECTORS_TRIED: usize = 4;
+/// Sectors of the log.
+const SECTORS: usize = 2;
 
 /// Values that erased bytes may have.
 const VALUES: [u8; 2] = [ERASED, 0];
@@ -51,8 +47,8 @@ const MAX_WRITE_SIZE: usize = 64;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FlashError {
-    /// The log has to be at least two whole sectors, and within the flash; see [`FlashStorage::SECTOR`].
-    Log,
+    /// The flash is shorter than two sectors of records; see [`FlashStorage::SECTOR`].
+    Short,
     /// The flash reads as memory of another length than its driver says.
     Mapping,
     /// Bytes of a sector that was just erased are neither all 0xff nor all 0.
@@ -62,7 +58,7 @@ pub enum FlashError {
 impl fmt::Display for FlashError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Log => "the log is not at least two whole sectors of the flash: see FlashStorage::SECTOR",
+            Self::Short => "the flash is shorter than two sectors of records: see FlashStorage::SECTOR",
             Self::Mapping => "the flash reads as memory of another length than its driver says",
             Self::Erased => "erased bytes of the flash read neither as 0xff nor as 0: use another flash, or Memory",
         })
@@ -71,59 +67,55 @@ impl fmt::Display for FlashError {
 
 impl core::error::Error for FlashError {}
 
-/// Records and models in NOR flash; `RECORD` is [`record_length`](super::record_length) of the most objects, or more.
+/// Records of loads and models in NOR flash.
 ///
 /// A flash whose words do not divide 64 bytes, or whose sectors are no whole words, does not compile.
 ///
-/// Wear: records are appended, so a sector is erased once it is full of them, and each sector of the log is in turn; the
-/// README of the firmware states for how many touches. RAM: `RECORD` bytes, and a few numbers.
+/// Wear: each load erases the sectors of its model, and once a sector is full of records the other one.
 #[derive(Debug)]
-pub struct FlashStorage<F, const RECORD: usize> {
+pub struct FlashStorage<F> {
     flash: F,
-    /// Bytes of the log.
-    log: usize,
     /// The value of erased bytes.
     erased: u8,
-    /// Offset of the newest record.
-    newest: Option<usize>,
+    /// Number of the last record that was written, or tried.
     counter: u32,
-    /// Offset of the next record, after the newest.
+    /// The sector with the newest record; none without one.
+    current: Option<usize>,
+    /// Offset of the next record.
     next: usize,
-    /// The sector that was tried last.
-    tried: usize,
-    /// Sectors that failed since one succeeded.
-    failed: usize,
-    buffer: [u8; RECORD],
 }
 
-impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
-    /// Bytes of a sector of the log: as many of the flash's own as a record takes, one unless they are as small as the 256
-    /// bytes of a SAMD21.
+impl<F: MappedFlash> FlashStorage<F> {
+    /// Bytes that a record takes: whole words.
+    const SLOT: usize = RECORD_LENGTH.next_multiple_of(F::WRITE_SIZE);
+
+    /// Bytes of a sector of records: one of the flash's own, or as many as a record takes. Two of them come before the models.
     pub const SECTOR: usize = {
         let divides = F::WRITE_SIZE > 0 && MAX_WRITE_SIZE.is_multiple_of(F::WRITE_SIZE);
         assert!(divides, "the words that the flash writes at once do not divide 64 bytes");
         let is_whole = F::ERASE_SIZE > 0 && F::ERASE_SIZE.is_multiple_of(F::WRITE_SIZE);
         assert!(is_whole, "a sector of the flash is not a whole number of the words that it writes at once");
-        assert!(RECORD > 0, "records have no bytes: see record_length");
-        RECORD.next_multiple_of(F::ERASE_SIZE)
+        Self::SLOT.next_multiple_of(F::ERASE_SIZE)
     };
 
-    /// Uses a flash: the first `log` bytes for records, the rest for two models. Finds the newest record.
+    /// Bytes of both sectors.
+    const LOG: usize = SECTORS * Self::SECTOR;
+
+    /// Uses a flash: two sectors for records, the rest for two models. Finds the newest record.
     ///
-    /// Cost: the checksums of the first record in each sector and of all in two, byte by byte. No erased
-    /// flash is needed: bytes that are not a record, read twice, are ignored. Without a record in the log a sector is erased.
+    /// Cost: the checksums of all records, byte by byte. No erased flash is needed: bytes that are not a record, read twice, are
+    /// ignored. Without a record a sector is erased.
     ///
     /// # Errors
     /// [`FlashError`].
-    pub fn new(flash: F, log: usize) -> Result<Self, FlashError> {
+    pub fn new(flash: F) -> Result<Self, FlashError> {
         if flash.bytes().len() != flash.capacity() || u32::try_from(flash.capacity()).is_err() {
             return Err(FlashError::Mapping);
         }
-        if !log.is_multiple_of(Self::SECTOR) || log / Self::SECTOR < 2 || log > flash.capacity() {
-            return Err(FlashError::Log);
+        if flash.capacity() < Self::LOG {
+            return Err(FlashError::Short);
         }
-        let (erased, buffer) = (ERASED, [0; RECORD]);
-        let mut storage = Self { flash, log, erased, newest: None, counter: 0, next: 0, tried: 0, failed: 0, buffer };
+        let mut storage = Self { flash, erased: ERASED, counter: 0, current: None, next: 0 };
         for value in VALUES {
             storage.erased = value;
             if storage.find() {
@@ -139,52 +131,29 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
         self.flash
     }
 
-    /// The sector behind another one.
-    const fn following(&self, sector: usize) -> usize {
-        if sector + 1 < self.log / Self::SECTOR { sector + 1 } else { 0 }
+    /// The records, with their offsets.
+    fn records(&self) -> impl Iterator<Item = (usize, Record)> {
+        let slots = Self::SECTOR / Self::SLOT;
+        let offsets = (0..SECTORS * slots).map(move |slot| slot / slots * Self::SECTOR + slot % slots * Self::SLOT);
+        offsets.filter_map(|at| {
+            let record = (0..ATTEMPTS).find_map(|_| Record::read(self.flash.bytes().get(at..)?, self.erased))?;
+            Some((at, record))
+        })
     }
 
     /// Finds the newest record, if there is one.
     fn find(&mut self) -> bool {
-        let mut best: Option<(u32, usize)> = None;
-        // A sector that has records has one at its start.
-        for sector in 0..self.log / Self::SECTOR {
-            let start = sector * Self::SECTOR;
-            if let Some(found) = self.record(start, start + Self::SECTOR)
-                && best.is_none_or(|(counter, _)| found.is_newer_than(counter))
-            {
-                best = Some((found.counter, sector));
-            }
+        let newest = self.records().reduce(|best, next| if next.1.is_newer_than(best.1.counter) { next } else { best });
+        if let Some((at, record)) = newest {
+            (self.counter, self.current, self.next) = (record.counter, Some(at / Self::SECTOR), at + Self::SLOT);
         }
-        // The first record of the sector that was written last may be unreadable now.
-        let mut sector = best.map_or(0, |(_, sector)| sector);
-        for _ in 0..if best.is_some() { 2 } else { SECTORS_TRIED } {
-            self.scan(sector);
-            sector = self.following(sector);
-        }
-        self.newest.is_some()
+        newest.is_some()
     }
 
-    /// Looks through a sector for records that are newer than the newest so far, also behind some that cannot be read.
-    fn scan(&mut self, sector: usize) {
-        let (mut at, end) = (sector * Self::SECTOR, (sector + 1) * Self::SECTOR);
-        while at < end {
-            let Some(found) = self.record(at, end) else {
-                at += F::WRITE_SIZE;
-                continue;
-            };
-            let (counter, behind) = (found.counter, at + found.length.next_multiple_of(F::WRITE_SIZE));
-            if self.newest.is_none() || found.is_newer_than(self.counter) {
-                (self.newest, self.counter, self.next, self.tried) = (Some(at), counter, behind, sector);
-            }
-            at = behind;
-        }
-    }
-
-    /// Finds the value of erased bytes, in a log that has no records; the first one goes into the sector that was erased.
+    /// Finds the value of erased bytes, where there are no records; the first one goes into the sector that was erased.
     fn probe(&mut self) -> Result<(), FlashError> {
         let mut result = Err(FlashError::Erased);
-        for sector in (0..self.log / Self::SECTOR).take(SECTORS_TRIED) {
+        for sector in 0..SECTORS {
             for _ in 0..ATTEMPTS {
                 let (start, end) = (sector * Self::SECTOR, (sector + 1) * Self::SECTOR);
                 if !self.erase_once(start, end) {
@@ -195,7 +164,7 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
                 for value in VALUES {
                     self.erased = value;
                     if self.is_erased(start, end) {
-                        (self.tried, self.next) = (sector, start);
+                        self.next = start;
                         return Ok(());
                     }
                 }
@@ -203,10 +172,6 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
         }
         self.erased = ERASED;
         result
-    }
-
-    fn record(&self, at: usize, end: usize) -> Option<Found<'_>> {
-        (0..ATTEMPTS).find_map(|_| record::read(self.flash.bytes().get(at..end)?, self.erased))
     }
 
     #[inline(never)] // It has many callers.
@@ -227,23 +192,23 @@ impl<F: MappedFlash, const RECORD: usize> FlashStorage<F, RECORD> {
         (0..ATTEMPTS).any(|_| self.erase_once(start, end) && self.is_erased(start, end))
     }
 
-    /// Writes the record in the buffer into erased flash, under another number than any before, and says whether it is
-    /// there: then it is the newest.
-    fn write_record(&mut self, at: usize, length: usize) -> bool {
+    /// Writes a record into erased flash, under another number than any before, and says whether it is there: then it is the
+    /// newest.
+    fn write_record(&mut self, at: usize, loaded: Loaded) -> bool {
         self.counter = self.counter.wrapping_add(1);
-        let numbered = record::number(&mut self.buffer, self.counter, self.erased);
-        let written = numbered.and_then(|()| write(&mut self.flash, at, self.buffer.get(..length)?));
-        if written.is_some() {
-            (self.newest, self.next, self.failed) = (Some(at), at + length.next_multiple_of(F::WRITE_SIZE), 0);
+        let record = Record { loaded, counter: self.counter }.to_bytes(self.erased);
+        let written = write(&mut self.flash, at, &record).is_some();
+        if written {
+            (self.current, self.next) = (Some(at / Self::SECTOR), at + Self::SLOT);
         }
-        written.is_some()
+        written
     }
 
     /// Offset of a place for models.
     fn start(&self, place: Place) -> usize {
         match place {
-            Place::First => self.log,
-            Place::Second => self.log + self.room(),
+            Place::First => Self::LOG,
+            Place::Second => Self::LOG + self.room(),
         }
     }
 }
@@ -260,9 +225,9 @@ fn write<F: MappedFlash>(flash: &mut F, at: usize, bytes: &[u8]) -> Option<()> {
     (flash.bytes().get(at..at + bytes.len()) == Some(bytes)).then_some(())
 }
 
-impl<F: MappedFlash, const RECORD: usize> Storage for FlashStorage<F, RECORD> {
+impl<F: MappedFlash> Storage for FlashStorage<F> {
     fn room(&self) -> usize {
-        let sectors = self.flash.capacity().saturating_sub(self.log) / F::ERASE_SIZE;
+        let sectors = self.flash.capacity().saturating_sub(Self::LOG) / F::ERASE_SIZE;
         sectors / 2 * F::ERASE_SIZE
     }
 
@@ -281,7 +246,7 @@ impl<F: MappedFlash, const RECORD: usize> Storage for FlashStorage<F, RECORD> {
         // What stands behind it in the sector, if the sector is the part's own, may be an earlier load's.
         let end = if from == fresh { to.next_multiple_of(F::ERASE_SIZE) } else { to };
         if self.flash.bytes().get(from..to) == Some(bytes) && self.is_erased(to, end) {
-            // The power went after it was written.
+            // It was written before, as where the power went after it.
             return Ok(());
         }
         if !self.is_erased(from, fresh.min(to)) {
@@ -301,42 +266,28 @@ impl<F: MappedFlash, const RECORD: usize> Storage for FlashStorage<F, RECORD> {
         F::ERASE_SIZE
     }
 
-    fn record_length(&self) -> usize {
-        RECORD
+    fn loaded(&self) -> Option<Loaded> {
+        let mut newest = Newest::default();
+        self.records().for_each(|(_, record)| newest.see(record));
+        newest.whole(self)
     }
 
-    fn newest(&self) -> Option<(u32, &[u8])> {
-        let found = self.record(self.newest?, self.log)?;
-        Some((found.counter, found.record))
-    }
-
-    /// Cost: a record written and read back; where that fails, up to 4 sectors erased, twice each if they have to, and then
-    /// one for each further record, until none is tried any more before the next start.
-    fn store(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), NotStored> {
-        if self.failed >= SECTORS_TRIED * (self.log / Self::SECTOR) {
-            return Err(NotStored);
-        }
-        let length = record::write(&mut self.buffer, fill).ok_or(NotStored)?;
-        let current = self.newest.map(|newest| newest / Self::SECTOR);
-        let at = self.next;
+    /// Cost: a record written and read back; where the sector is full or does not take it, the other one erased, twice if it has
+    /// to be.
+    fn keep(&mut self, loaded: Loaded) -> Result<(), NotStored> {
+        let (at, end) = (self.next, self.next + Self::SLOT);
         // A sector is erased as a whole before its first record: what is erased here can be written.
-        let fits = at + length <= (current.unwrap_or(self.tried) + 1) * Self::SECTOR;
-        let end = at + length.next_multiple_of(F::WRITE_SIZE);
-        if fits && self.is_erased(at, end) && self.write_record(at, length) {
+        let fits = end <= (self.current.unwrap_or(at / Self::SECTOR) + 1) * Self::SECTOR;
+        if fits && self.is_erased(at, end) && self.write_record(at, loaded) {
             return Ok(());
         }
-        for _ in 0..if self.failed == 0 { SECTORS_TRIED } else { 1 } {
-            let next = self.following(self.tried);
-            self.tried = if Some(next) == current { self.following(next) } else { next };
-            let at = self.tried * Self::SECTOR;
-            if self.erase(at, at + Self::SECTOR) && self.write_record(at, length) {
+        let current = self.current;
+        for sector in (0..SECTORS).filter(|sector| Some(*sector) != current) {
+            let at = sector * Self::SECTOR;
+            if self.erase(at, at + Self::SECTOR) && self.write_record(at, loaded) {
                 return Ok(());
             }
-            self.failed += 1;
         }
-        // One of them may hold the record although it says that it does not, and sectors go by their first record: nothing
-        // newer may follow in the one before.
-        self.next = current.map_or(0, |sector| (sector + 1) * Self::SECTOR);
         Err(NotStored)
     }
 }

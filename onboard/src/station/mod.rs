@@ -3,7 +3,7 @@
 //! ```text
 //! transport ──► DeviceEnd ──► Station ──► Recognizer
 //!                               │
-//!                               └──► Storage: two places for models, and records
+//!                               └──► Storage: two places for models
 //! ```
 //!
 //! | program | what |
@@ -14,20 +14,19 @@
 //!
 //! # Power cuts
 //!
-//! After every command, and every touch of its own, the [`Station`] stores a record (evidence, progress of the link, the
-//! model in use), and only then reports the outcome. After a power cut the chip continues from the newest record: the host
-//! repeats all that it lacks, and the link ensures that nothing is counted twice. Commands that cannot be stored are
-//! executed and reported. The record also holds the last touch of its own, which is sent again at each start until another
-//! record follows; a host recognizes the copy.
+//! A model that was loaded stays, through resets and power cuts; evidence and the session of the link do not. They are of one
+//! object and seconds old: after a reset another boot number says that they are gone, and a host that repeats a command counts
+//! nothing twice.
 //!
 //! | storage | where |
 //! |---|---|
-//! | [`FlashStorage`] | NOR flash: a log that goes round its sectors, and two areas for models, read in place |
+//! | [`FlashStorage`] | NOR flash: two sectors of records, and two areas for models, read in place |
 //! | [`Memory`] | battery-backed RAM or FRAM, or RAM where it must survive resets but no power cuts |
 //! | [`NoStorage`] | nothing is kept, no model can be loaded |
 //!
-//! A loaded model is written to the place that is not in use and checked there; the record that follows switches to it. A load
-//! that was cut goes on at the sector of the cut. [`Signed`] takes signed models alone.
+//! A loaded model is written to the place that is not in use and checked there; a record of it switches to it. A load that was cut
+//! leaves the model from before, and begins again. [`Storage::admit`] is the place for a check of your own, such as that of a
+//! signature.
 
 mod flash;
 mod memory;
@@ -36,7 +35,6 @@ mod probe;
 mod record;
 mod serve;
 mod session;
-mod signed;
 mod storage;
 mod table;
 #[cfg(all(test, feature = "locate"))]
@@ -45,11 +43,10 @@ mod tests;
 pub use flash::{FlashError, FlashStorage, MappedFlash};
 pub use memory::Memory;
 pub use probe::{Board, Happened, LONGEST_WAIT, LinkFailed, ProbeSettings, ProbeStation};
-pub use record::record_length;
-pub use serve::{ERRORS_IN_A_ROW, ServeError, serve, serve_with};
-pub use session::{PROGRAM, RecordsTooShort, Station};
-pub use signed::Signed;
-pub use storage::{NoStorage, Place, Storage};
+pub use record::RECORD_LENGTH;
+pub use serve::{ERRORS_IN_A_ROW, serve, serve_with};
+pub use session::{PROGRAM, Station};
+pub use storage::{Loaded, NoStorage, NotStored, Place, Storage};
 pub use table::Locates;
 #[cfg(feature = "locate")]
 pub use table::Table;

@@ -1,6 +1,6 @@
 //! A probe of three switches that recognizes, at the end of a link: the whole program of a board but the board.
 
-use super::session::{PROGRAM, RecordsTooShort, Station};
+use super::session::{PROGRAM, Station};
 use super::storage::{NoStorage, Storage};
 use crate::Model;
 use crate::effector::{Effector, Fault, Scale, Sensed, Settings, State, drain};
@@ -113,8 +113,7 @@ pub struct ProbeSettings {
     pub pose_lasts: u32,
     /// True if verdicts carry the numbers needed to compare them with another recognizer's: 12 bytes, and a posterior.
     pub detail: bool,
-    /// Another number after each start, counted or random: see [`DeviceEnd::new`]. A station that keeps records counts by
-    /// itself and may be given 0.
+    /// Another number after each start, counted or random: see [`DeviceEnd::new`].
     pub boot: u32,
     /// Name and version of the program on the link.
     pub program: &'static str,
@@ -213,10 +212,9 @@ impl<B: Board> Line<'_, B> {
 /// Effector, recognizer, link and storage: call [`ProbeStation::step`] until nothing has happened, then sleep until an
 /// interrupt or for [`ProbeStation::wait`].
 ///
-/// Touches of its own fingers and touches from the host go into the same evidence. After each, the state is stored, then
-/// reported: a verdict that the host has heard survives a power cut, and one that was stored is reported after it.
+/// Touches of its own fingers and touches from the host go into the same evidence.
 ///
-/// RAM: effector, link, recognition and the storage's. Stack: a few buffers for frames and records more than
+/// RAM: effector, link, recognition and the storage's. Stack: a few buffers for frames more than
 /// [`Recognizer::push`](crate::Recognizer::push). The README of the firmware states the size of both.
 #[derive(Debug)]
 pub struct ProbeStation<'m, const N: usize, S = NoStorage> {
@@ -234,14 +232,12 @@ pub struct ProbeStation<'m, const N: usize, S = NoStorage> {
 }
 
 impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
-    /// A station that continues from what `storage` holds; `built_in` is a model in flash, in use until another is loaded.
-    ///
-    /// # Errors
-    /// [`RecordsTooShort`].
-    pub fn open(built_in: &'m [u8], storage: S, settings: ProbeSettings) -> Result<Self, RecordsTooShort> {
-        let (mut station, progress, starts) = Station::open(built_in, storage)?;
+    /// A station that begins with the model that was loaded last into `storage`; `built_in` is a model in flash, in use until
+    /// another is loaded.
+    pub fn open(built_in: &'m [u8], storage: S, settings: ProbeSettings) -> Self {
+        let mut station = Station::open(built_in, storage);
         station.set_program(settings.program);
-        let end = DeviceEnd::new(progress, settings.boot.wrapping_add(starts));
+        let end = DeviceEnd::new(settings.boot);
         let effector = Effector::new(settings.effector);
         let mut probe = Self {
             effector,
@@ -254,7 +250,7 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
             started: false,
         };
         probe.follow_model();
-        Ok(probe)
+        probe
     }
 
     /// The model in use; `None` if there is none that this program can read.
@@ -282,8 +278,6 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
     pub fn step<B: Board>(&mut self, board: &mut B) -> Result<Option<Happened>, LinkFailed<B::Error>> {
         let mut line = Line { board, failed: None, sends: true };
         if !core::mem::replace(&mut self.started, true) {
-            // Boot numbers count records, so without one a start before the first touch would have that of the next start.
-            self.end.store(&mut self.station, |frame| line.send(frame));
             self.end.start(|frame| line.send(frame));
         }
         let mut buffer = [0; 32];
@@ -354,7 +348,7 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
             Ok(verdict) => Event::Touch { touch: TouchMessage::from(&touch), pose_age, verdict },
             Err(refusal) => Event::Refused { touch: TouchMessage::from(&touch), refusal },
         };
-        self.end.report(event, &mut self.station, |frame| line.send(frame));
+        self.end.tell(event, |frame| line.send(frame));
         Happened::Touched { touch, pose_age, outcome }
     }
 

@@ -1,44 +1,17 @@
-//! State that a chip keeps through a power cut, and how a record is recognized among other bytes.
+//! A record of a load, and how it is recognized among other bytes.
 
-use super::storage::Place;
-use palpate_shared::link::{Payload, Progress, checksum};
-use serde::{Deserialize, Serialize};
+use super::storage::{Loaded, Place, Storage};
+use palpate_shared::link::checksum;
 
-/// Model in use; bytes of it where it was loaded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum Source {
-    BuiltIn,
-    First(u32),
-    Second(u32),
-}
+/// Bytes of a record of a load: length and place, the model's checksum, a counter, and a checksum of these.
+pub const RECORD_LENGTH: usize = 16;
 
-impl Source {
-    /// A loaded model.
-    pub(super) const fn loaded(place: Place, length: u32) -> Self {
-        match place {
-            Place::First => Self::First(length),
-            Place::Second => Self::Second(length),
-        }
-    }
-
-    /// True if the model is in this place.
-    pub(super) const fn is_in(self, place: Place) -> bool {
-        matches!((self, place), (Self::First(_), Place::First) | (Self::Second(_), Place::Second))
-    }
-}
-
-/// Data that arrives in chunks, and the length that has arrived.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Staged {
-    pub(super) payload: Payload,
-    pub(super) length: u32,
-    pub(super) checksum: u32,
-    pub(super) received: u32,
-}
+/// Set in the length of a model that is in the second place.
+const SECOND: u32 = 1 << 31;
 
 /// Version of the meaning of a record's bytes; part of its checksum, so that records of other versions count as
 /// damaged.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// The value of erased bytes of most flash. Records in memory of other kinds say this too.
 pub(super) const ERASED: u8 = 0xff;
@@ -49,74 +22,81 @@ fn version(erased: u8) -> u32 {
 }
 
 /// A record.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Record<'a> {
-    /// The checksum of the model that it is of; 0 for none.
-    pub(super) model: u32,
-    pub(super) source: Source,
-    pub(super) staged: Option<Staged>,
-    pub(super) progress: Progress,
-    /// The recognizer's snapshot.
-    pub(super) evidence: &'a [u8],
-}
-
-/// Length and checksum stand before the counter and the record; the length is of both.
-const HEADER: usize = 6;
-const COUNTER: usize = 4;
-
-/// The most bytes that a record takes for models of up to `objects` objects.
-pub const fn record_length(objects: usize) -> usize {
-    // Model, source, staging and the snapshot's length; session; an outcome takes up to 26 bytes; the event; the snapshot.
-    let session = 18 + 26 * palpate_shared::link::WINDOW + 67;
-    HEADER + COUNTER + 31 + session + crate::SNAPSHOT_LENGTH + 10 * objects
-}
-
-/// A record among other bytes.
-pub(super) struct Found<'p> {
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Record {
+    pub(super) loaded: Loaded,
     pub(super) counter: u32,
-    pub(super) record: &'p [u8],
-    /// Bytes in all.
-    pub(super) length: usize,
 }
 
-impl Found<'_> {
-    /// True if this record was written after `other`.
-    pub(super) const fn is_newer_than(&self, other: u32) -> bool {
-        let ahead = self.counter.wrapping_sub(other);
+impl Record {
+    /// True if this record was written after that of this number.
+    pub(super) const fn is_newer_than(self, counter: u32) -> bool {
+        let ahead = self.counter.wrapping_sub(counter);
         ahead != 0 && ahead >> 31 == 0
     }
-}
 
-/// The record at the start of `bytes`, whose erased value is `erased`, if there is a whole one.
-pub(super) fn read(bytes: &[u8], erased: u8) -> Option<Found<'_>> {
-    let (&[l0, l1, c0, c1, c2, c3], body) = bytes.split_first_chunk::<HEADER>()?;
-    let length = usize::from(u16::from_le_bytes([l0, l1]));
-    let written = body.get(..length)?;
-    if checksum(written) ^ version(erased) != u32::from_le_bytes([c0, c1, c2, c3]) {
-        return None;
+    /// The record at the start of `bytes`, whose erased value is `erased`, if there is a whole one.
+    pub(super) fn read(bytes: &[u8], erased: u8) -> Option<Self> {
+        let (stated, _) = bytes.first_chunk::<RECORD_LENGTH>()?.as_chunks::<4>();
+        let &[length, of_model, counter, of_record] = stated.first_chunk()?;
+        let is_whole = checksum([length, of_model, counter].as_flattened()) ^ version(erased);
+        if is_whole != u32::from_le_bytes(of_record) {
+            return None;
+        }
+        let length = u32::from_le_bytes(length);
+        let place = if length & SECOND == 0 { Place::First } else { Place::Second };
+        let loaded = Loaded { place, length: length & !SECOND, checksum: u32::from_le_bytes(of_model) };
+        Some(Self { loaded, counter: u32::from_le_bytes(counter) })
     }
-    let (counter, record) = written.split_first_chunk::<COUNTER>()?;
-    Some(Found { counter: u32::from_le_bytes(*counter), record, length: HEADER + length })
+
+    /// The record's bytes, for memory whose erased value is `erased`.
+    pub(super) fn to_bytes(self, erased: u8) -> [u8; RECORD_LENGTH] {
+        let Loaded { place, length, checksum: of_model } = self.loaded;
+        let mark = if place == Place::Second { SECOND } else { 0 };
+        let stated = [length & !SECOND | mark, of_model, self.counter].map(u32::to_le_bytes);
+        let of_record = checksum(stated.as_flattened()) ^ version(erased);
+        let mut bytes = [0; RECORD_LENGTH];
+        let words = stated.into_iter().chain([of_record.to_le_bytes()]).flatten();
+        bytes.iter_mut().zip(words).for_each(|(to, from)| *to = from);
+        bytes
+    }
 }
 
-/// Writes the record that `fill` gives to the start of `bytes`, without its number; its length in all, or `None` if there is
-/// no room.
-pub(super) fn write(bytes: &mut [u8], fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Option<usize> {
-    let (header, body) = bytes.split_first_chunk_mut::<HEADER>()?;
-    let length = COUNTER + fill(body.get_mut(COUNTER..)?)?;
-    let [l0, l1] = u16::try_from(length).ok()?.to_le_bytes();
-    *header = [l0, l1, 0, 0, 0, 0];
-    Some(HEADER + length)
+/// The newest record of each place, of all that are found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Newest([Option<Record>; 2]);
+
+impl Newest {
+    /// Takes in a record.
+    pub(super) fn see(&mut self, record: Record) {
+        let [first, second] = &mut self.0;
+        let own = if record.loaded.place == Place::First { first } else { second };
+        if own.is_none_or(|own| record.is_newer_than(own.counter)) {
+            *own = Some(record);
+        }
+    }
+
+    /// The newest of all.
+    pub(super) fn of_all(&self) -> Option<Record> {
+        let [first, second] = self.0;
+        match (first, second) {
+            (Some(first), Some(second)) if second.is_newer_than(first.counter) => Some(second),
+            (first, second) => first.or(second),
+        }
+    }
+
+    /// The newest whose model is whole: that of the newest record of all, or else of the newest one of the other place.
+    pub(super) fn whole(&self, storage: &impl Storage) -> Option<Loaded> {
+        let newest = self.of_all()?.loaded;
+        let [first, second] = self.0;
+        let other = if newest.place == Place::First { second } else { first };
+        [Some(newest), other.map(|other| other.loaded)].into_iter().flatten().find(|loaded| is_whole(storage, *loaded))
+    }
 }
 
-/// Numbers the record that was written into `bytes`, for memory whose erased value is `erased`. It is whole then, and may be
-/// numbered again.
-pub(super) fn number(bytes: &mut [u8], counter: u32, erased: u8) -> Option<()> {
-    let (header, body) = bytes.split_first_chunk_mut::<HEADER>()?;
-    let [l0, l1, ..] = *header;
-    *body.first_chunk_mut::<COUNTER>()? = counter.to_le_bytes();
-    let written = body.get(..usize::from(u16::from_le_bytes([l0, l1])))?;
-    let [c0, c1, c2, c3] = (checksum(written) ^ version(erased)).to_le_bytes();
-    *header = [l0, l1, c0, c1, c2, c3];
-    Some(())
+/// True if the model of a record is in its place.
+fn is_whole(storage: &impl Storage, loaded: Loaded) -> bool {
+    let length = usize::try_from(loaded.length).unwrap_or(usize::MAX);
+    // What is read wrong once is read again.
+    (0..2).any(|_| storage.model(loaded.place).get(..length).is_some_and(|bytes| checksum(bytes) == loaded.checksum))
 }

@@ -1,9 +1,8 @@
 //! The whole program of a chip that recognizes touches from a host.
 
-use super::session::{RecordsTooShort, Station};
+use super::session::Station;
 use super::storage::Storage;
 use super::table::Locates;
-use core::fmt;
 use embedded_io::{Read, Write};
 use palpate_shared::link::DeviceEnd;
 
@@ -11,39 +10,12 @@ use palpate_shared::link::DeviceEnd;
 /// UART reports each garbled byte as an error, and has one or two of them whenever a cable is plugged in.
 pub const ERRORS_IN_A_ROW: u16 = 1_000;
 
-/// Reason why a chip's program has ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ServeError<E> {
-    /// The last of [`ERRORS_IN_A_ROW`] errors of the transport.
-    Transport(E),
-    /// Records are too short: nothing could be stored.
-    Records(RecordsTooShort),
-}
-
-impl<E: fmt::Display> fmt::Display for ServeError<E> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Transport(error) => error.fmt(f),
-            Self::Records(error) => error.fmt(f),
-        }
-    }
-}
-
-impl<E: fmt::Debug + fmt::Display> core::error::Error for ServeError<E> {}
-
-impl<E> From<RecordsTooShort> for ServeError<E> {
-    fn from(error: RecordsTooShort) -> Self {
-        Self::Records(error)
-    }
-}
-
 /// Errors of one direction of a transport, in a row.
 struct Failures(u16);
 
 impl Failures {
     /// The result of a call; `None` for an error that is one of few.
-    fn pass<T, E>(&mut self, result: Result<T, E>) -> Result<Option<T>, ServeError<E>> {
+    fn pass<T, E>(&mut self, result: Result<T, E>) -> Result<Option<T>, E> {
         match result {
             Ok(done) => {
                 self.0 = 0;
@@ -51,7 +23,7 @@ impl Failures {
             }
             Err(error) => {
                 self.0 = self.0.saturating_add(1);
-                if self.0 < ERRORS_IN_A_ROW { Ok(None) } else { Err(ServeError::Transport(error)) }
+                if self.0 < ERRORS_IN_A_ROW { Ok(None) } else { Err(error) }
             }
         }
     }
@@ -60,25 +32,22 @@ impl Failures {
 /// Serves a host at the other end of `transport`, with room for models of `N` objects, until the transport ends or has failed
 /// [`ERRORS_IN_A_ROW`] times in a row. Fewer errors lose bytes or frames, which the host sends or asks for again.
 ///
-/// Continues from the newest record in `storage`; a loaded model is used again if it is still intact. `built_in` is a model
-/// in flash, in use until another is loaded; it may be empty. Once the transport works again, call this again with the same
-/// storage.
+/// Begins with the model that was loaded last into `storage`, if it is still whole. `built_in` is a model in flash, in use until
+/// another is loaded; it may be empty. Once the transport works again, call this again with the same storage.
 ///
-/// Stack: a few buffers for frames and records more than [`Recognizer::push`](crate::Recognizer::push); the README of the
+/// Stack: a few buffers for frames more than [`Recognizer::push`](crate::Recognizer::push); the README of the
 /// firmware states it.
 ///
-/// `boot` should be another number after each start: see [`DeviceEnd::new`]. Records count starts by themselves, so a
-/// chip that has them may give 0.
+/// `boot` has to be another number after each start: see [`DeviceEnd::new`].
 ///
 /// # Errors
-/// [`ServeError::Transport`], the transport's own; a transport that ends (reads nothing) returns `Ok`.
-/// [`ServeError::Records`] at once if the storage keeps records and they are too short for models of `N` objects.
+/// The last of [`ERRORS_IN_A_ROW`] errors of the transport; a transport that ends (reads nothing) returns `Ok`.
 pub fn serve<const N: usize, S: Storage, T: Read + Write>(
     built_in: &[u8],
     storage: &mut S,
     boot: u32,
     transport: &mut T,
-) -> Result<(), ServeError<T::Error>> {
+) -> Result<(), T::Error> {
     serve_with::<N, _, _, _>(built_in, storage, (), boot, transport)
 }
 
@@ -92,10 +61,9 @@ pub fn serve_with<const N: usize, S: Storage, L: Locates, T: Read + Write>(
     located: L,
     boot: u32,
     transport: &mut T,
-) -> Result<(), ServeError<T::Error>> {
-    let (mut station, progress, starts) = Station::<N, &mut S, L>::open_with(built_in, storage, located)?;
-    // Each start writes a record at its first command, so the counter is another one after each that mattered.
-    let mut end = DeviceEnd::new(progress, boot.wrapping_add(starts));
+) -> Result<(), T::Error> {
+    let mut station = Station::<N, &mut S, L>::open_with(built_in, storage, located);
+    let mut end = DeviceEnd::new(boot);
     let (mut reads, mut writes) = (Failures(0), Failures(0));
     let mut send = |frame: &[u8], transport: &mut T| {
         let written = transport.write_all(frame).and_then(|()| transport.flush());

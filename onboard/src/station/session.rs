@@ -1,45 +1,42 @@
 //! A model in use, and the commands it can be given.
 
 use super::message::{decision, refusal};
-use super::record::{Record, Source, Staged, record_length};
-use super::storage::{NoStorage, Place, Storage};
+use super::storage::{Loaded, NoStorage, Place, Storage};
 use super::table::Locates;
 use crate::decide::State;
 use crate::model::Opened;
-use crate::{Model, Recognizer, SNAPSHOT_LENGTH, Stopping, Verdict};
-use core::fmt;
+use crate::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::link::{
-    ApproachMessage, Detail, Device, ModelInfo, NotStored, Outcome, POSE_BYTES, Payload, Progress, Refusal,
-    VerdictMessage, checksum,
+    ApproachMessage, Detail, Device, ModelInfo, Outcome, POSE_BYTES, Refusal, VerdictMessage, checksum,
 };
 #[cfg(feature = "locate")]
 use palpate_shared::{Approach, TablePose};
 
-/// Room for a snapshot of `N` objects, where an array's length cannot be computed from `N`: room for a snapshot of
-/// one object, `N` times.
-type SnapshotBuffer<const N: usize> = [[u8; SNAPSHOT_LENGTH + 10]; N];
-
 /// Default name of programs on the link: this crate and its version.
 pub const PROGRAM: &str = concat!("palpate-onboard ", env!("CARGO_PKG_VERSION"));
 
-/// A storage whose records are too short for a station.
+/// Model in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RecordsTooShort {
-    /// Bytes that a record needs: [`record_length`].
-    pub needed: usize,
-    /// Bytes that it can have.
-    pub found: usize,
+enum Source {
+    BuiltIn,
+    Loaded(Loaded),
 }
 
-impl fmt::Display for RecordsTooShort {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { needed, found } = self;
-        write!(f, "a record may have {found} bytes and needs {needed}: see station::record_length")
+impl Source {
+    /// True if the model is in this place.
+    fn is_in(self, place: Place) -> bool {
+        matches!(self, Self::Loaded(loaded) if loaded.place == place)
     }
 }
 
-impl core::error::Error for RecordsTooShort {}
+/// A model that arrives in chunks, and the length that has arrived.
+#[derive(Clone, Copy, Debug)]
+struct Staged {
+    length: u32,
+    checksum: u32,
+    received: u32,
+}
 
 /// A recognizer with room for `N` objects, as a [`Device`] at the end of a link, and what it keeps in `S`. A model of maps is
 /// used instead of trees where `L` has room for one.
@@ -52,8 +49,6 @@ pub struct Station<'m, const N: usize, S = NoStorage, L = ()> {
     state: Option<State<N>>,
     located: L,
     source: Source,
-    /// The model of the newest record: it must not be written over.
-    kept: Source,
     staged: Option<Staged>,
     /// Touches that were not counted.
     refused: u32,
@@ -73,65 +68,27 @@ impl<'m, const N: usize> Station<'m, N> {
 impl<'m, const N: usize, S, L> Station<'m, N, S, L> {
     const fn empty(built_in: &'m [u8], storage: S, located: L) -> Self {
         let (opened, state, staged, refused, program) = (None, None, None, 0, PROGRAM);
-        let (source, kept) = (Source::BuiltIn, Source::BuiltIn);
-        Self { built_in, storage, opened, state, located, source, kept, staged, refused, program }
+        Self { built_in, storage, opened, state, located, source: Source::BuiltIn, staged, refused, program }
     }
 }
 
 impl<'m, const N: usize, S: Storage> Station<'m, N, S> {
-    /// A station that continues from the newest record in `storage`, if it is of a model that is still there; also the
-    /// progress of the link, and how many records have been written. `built_in` is a model in flash, in use until
-    /// another is loaded; it may be empty.
-    ///
-    /// # Errors
-    /// [`RecordsTooShort`].
-    pub fn open(built_in: &'m [u8], storage: S) -> Result<(Self, Progress, u32), RecordsTooShort> {
+    /// A station that begins with the model that was loaded last into `storage`, if it is still whole. `built_in` is a model in
+    /// flash, in use until another is loaded; it may be empty.
+    pub fn open(built_in: &'m [u8], storage: S) -> Self {
         Self::open_with(built_in, storage, ())
     }
 }
 
 impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
-    /// A station as of [`open`](Self::open), with room for a model of maps. Touches under maps are not kept: after a reset a host
-    /// hears that they are forgotten.
-    ///
-    /// # Errors
-    /// [`RecordsTooShort`].
-    pub fn open_with(built_in: &'m [u8], storage: S, located: L) -> Result<(Self, Progress, u32), RecordsTooShort> {
-        let (needed, found) = (record_length(N), storage.record_length());
-        if found < needed && found > 0 {
-            return Err(RecordsTooShort { needed, found });
-        }
+    /// A station as of [`open`](Self::open), with room for a model of maps.
+    pub fn open_with(built_in: &'m [u8], storage: S, located: L) -> Self {
         let mut station = Self::empty(built_in, storage, located);
-        let newest = station.storage.newest();
-        let starts = newest.map_or(0, |(counter, _)| counter);
-        let record = newest.and_then(|(_, record)| postcard::from_bytes::<Record<'_>>(record).ok());
-        let Some(record) = record else {
-            station.use_built_in();
-            return Ok((station, Progress::NONE, starts));
-        };
-        let (bytes, source) = (bytes_at(station.built_in, &station.storage, record.source), record.source);
-        let is_of_record = bytes.last_chunk().is_some_and(|stated| u32::from_le_bytes(*stated) == record.model);
-        if is_of_record && station.located.open(bytes).is_ok() {
-            (station.source, station.kept) = (source, source);
-            return Ok((station, Progress::NONE, starts));
+        let loaded = station.storage.loaded().map(Source::Loaded);
+        if !loaded.is_some_and(|source| station.use_source(source)) {
+            station.use_source(Source::BuiltIn);
         }
-        let model = station.model_at(record.source);
-        // A record of a model that is not there any more is not of this program: neither its evidence nor its progress.
-        if model.map_or(0, |model| model.checksum()) != record.model {
-            station.use_built_in();
-            return Ok((station, Progress::NONE, starts));
-        }
-        let (staged, progress) = (record.staged, record.progress.clone());
-        let opened = model.map(|model| model.opened());
-        let state = model.and_then(|model| {
-            let mut recognizer = Recognizer::new(&model, Stopping::from_model(&model)).ok()?;
-            // A record without evidence is from the moment of a switch.
-            let _ = recognizer.restore(record.evidence);
-            Some(recognizer.into_state())
-        });
-        (station.opened, station.state) = (opened, state);
-        (station.source, station.kept, station.staged) = (source, source, staged);
-        Ok((station, progress, starts))
+        station
     }
 
     /// The model that a source names, if it is one with no more objects than there is room for.
@@ -143,18 +100,23 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
         bytes_at(self.built_in, &self.storage, source)
     }
 
-    /// Puts the built-in model into use, if it is one.
-    fn use_built_in(&mut self) {
-        let opened = self.model_at(Source::BuiltIn).map(|model| model.opened());
-        if opened.is_none() {
-            // Other bytes are no model either.
-            let _ = self.located.open(self.built_in);
-        }
+    /// Puts the model that a source names into use, and says whether it is one.
+    fn use_source(&mut self, source: Source) -> bool {
+        self.source = source;
+        let opened = self.model_at(source).map(|model| model.opened());
+        let is_one = opened.is_some() || {
+            let bytes = bytes_at(self.built_in, &self.storage, source);
+            self.located.open(bytes).is_ok()
+        };
         self.use_model(opened);
+        is_one
     }
 
     /// Puts a model into use, with nothing touched.
     fn use_model(&mut self, opened: Option<Opened>) {
+        if opened.is_some() {
+            self.located.close();
+        }
         self.opened = opened;
         self.state = self.model().and_then(|model| {
             let recognizer = Recognizer::new(&model, Stopping::from_model(&model)).ok()?;
@@ -260,60 +222,53 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
         self.storage
     }
 
-    /// Place of the next model: neither the one in use, nor the one that a power cut would bring back.
-    fn next_place(&self) -> Option<Place> {
-        let free = |place: &Place| !self.source.is_in(*place) && !self.kept.is_in(*place);
-        [Place::First, Place::Second].into_iter().find(free)
+    /// Place of the next model: not the one in use.
+    fn next_place(&self) -> Place {
+        if self.source.is_in(Place::First) { Place::Second } else { Place::First }
     }
 
-    /// Puts the arrived data into use.
+    /// Checks the model that has arrived, keeps that it was loaded, and puts it into use.
     fn accept(&mut self, staged: Staged) -> Result<(), Refusal> {
-        let place = self.next_place().ok_or(Refusal::Unwritable)?;
+        let place = self.next_place();
         let length = usize::try_from(staged.length).unwrap_or(usize::MAX);
         let bytes = self.storage.model(place).get(..length).ok_or(Refusal::TooLong)?;
         if checksum(bytes) != staged.checksum {
             return Err(Refusal::Checksum);
         }
-        match staged.payload {
-            Payload::Model => {
-                let current = match self.source {
-                    Source::BuiltIn => self.built_in,
-                    Source::First(_) => self.storage.model(Place::First),
-                    Source::Second(_) => self.storage.model(Place::Second),
-                };
-                let length = self.storage.admit(bytes, current)?;
-                let bytes = bytes.get(..length).ok_or(Refusal::TooLong)?;
-                let opened = match Model::new(bytes) {
-                    Ok(model) if model.object_count() > N => return Err(Refusal::TooLong),
-                    Ok(model) => Some(model.opened()),
-                    Err(_) => None,
-                };
-                match opened {
-                    Some(_) => self.located.close(),
-                    None => self.located.open(bytes)?,
-                }
-                self.source = Source::loaded(place, u32::try_from(length).map_err(|_| Refusal::TooLong)?);
-                self.use_model(opened);
-                Ok(())
-            }
-            Payload::Snapshot => {
-                let (model, state) = (self.model().ok_or_else(|| self.no_trees())?, self.state.clone());
-                let mut recognizer = Recognizer::continued(model, state.ok_or(Refusal::NoModel)?);
-                recognizer.restore(bytes).map_err(|_| Refusal::Invalid)?;
-                self.state = Some(recognizer.into_state());
-                Ok(())
-            }
-            _ => Err(Refusal::Unsupported),
+        let current = match self.source {
+            Source::BuiltIn => self.built_in,
+            Source::Loaded(loaded) => self.storage.model(loaded.place),
+        };
+        let length = self.storage.admit(bytes, current)?;
+        let bytes = bytes.get(..length).ok_or(Refusal::TooLong)?;
+        let opened = match Model::new(bytes) {
+            Ok(model) if model.object_count() > N => return Err(Refusal::TooLong),
+            Ok(model) => Some(model.opened()),
+            Err(_) => None,
+        };
+        if opened.is_none() {
+            self.located.open(bytes)?;
         }
+        let length = u32::try_from(length).map_err(|_| Refusal::TooLong)?;
+        let loaded = Loaded { place, length, checksum: checksum(bytes) };
+        if self.storage.keep(loaded).is_err() {
+            if opened.is_none() {
+                self.use_source(self.source);
+            }
+            return Err(Refusal::Unwritable);
+        }
+        self.source = Source::Loaded(loaded);
+        self.use_model(opened);
+        Ok(())
     }
 
-    /// Takes the next part of the arriving data.
+    /// Takes the next part of the arriving model.
     fn take(&mut self, offset: u32, bytes: &[u8]) -> Result<Outcome, Refusal> {
         let staged = self.staged.filter(|staged| staged.received == offset).ok_or(Refusal::OutOfOrder)?;
         let start = usize::try_from(offset).map_err(|_| Refusal::TooLong)?;
         let end = start.checked_add(bytes.len()).and_then(|end| u32::try_from(end).ok());
         let received = end.filter(|&end| end <= staged.length).ok_or(Refusal::TooLong)?;
-        let place = self.next_place().ok_or(Refusal::Unwritable)?;
+        let place = self.next_place();
         if self.storage.write_model(place, start, bytes).is_ok() {
             self.staged = Some(Staged { received, ..staged });
             return Ok(Outcome::Done);
@@ -328,14 +283,12 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
 
 /// Bytes of the model that a source names.
 fn bytes_at<'b>(built_in: &'b [u8], storage: &'b impl Storage, source: Source) -> &'b [u8] {
-    let prefix = |place, length| {
-        let length = usize::try_from(length).unwrap_or(usize::MAX);
-        storage.model(place).get(..length).unwrap_or_default()
-    };
     match source {
         Source::BuiltIn => built_in,
-        Source::First(length) => prefix(Place::First, length),
-        Source::Second(length) => prefix(Place::Second, length),
+        Source::Loaded(Loaded { place, length, .. }) => {
+            let length = usize::try_from(length).unwrap_or(usize::MAX);
+            storage.model(place).get(..length).unwrap_or_default()
+        }
     }
 }
 
@@ -358,9 +311,9 @@ impl<const N: usize, S: Storage, L: Locates> Device for Station<'_, N, S, L> {
         outcome(reset.or_else(|_| self.with(|recognizer| recognizer.reset())))
     }
 
-    fn begin(&mut self, payload: Payload, length: u32, checksum: u32) -> Outcome {
+    fn begin(&mut self, length: u32, checksum: u32) -> Outcome {
         if let Some(staged) = self.staged.take()
-            && (staged.payload, staged.length, staged.checksum) == (payload, length, checksum)
+            && (staged.length, staged.checksum) == (length, checksum)
             && staged.received > 0
         {
             self.staged = Some(staged);
@@ -371,7 +324,7 @@ impl<const N: usize, S: Storage, L: Locates> Device for Station<'_, N, S, L> {
             // No smaller model would fit either.
             Err(Refusal::Unsupported)
         } else if usize::try_from(length).is_ok_and(|length| length <= room) {
-            self.staged = Some(Staged { payload, length, checksum, received: 0 });
+            self.staged = Some(Staged { length, checksum, received: 0 });
             Ok(())
         } else {
             Err(Refusal::TooLong)
@@ -419,16 +372,6 @@ impl<const N: usize, S: Storage, L: Locates> Device for Station<'_, N, S, L> {
         self.ask(known).ok()?
     }
 
-    fn snapshot(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(u32, usize), Refusal> {
-        let mut whole: SnapshotBuffer<N> = [[0; _]; N];
-        let whole = self.ask(|model, state| state.snapshot(model, whole.as_flattened_mut()))?;
-        let whole = whole.map_err(|_| Refusal::TooLong)?;
-        let rest = usize::try_from(offset).ok().and_then(|offset| whole.get(offset..)).ok_or(Refusal::OutOfOrder)?;
-        let count = rest.len().min(buffer.len());
-        buffer.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
-        Ok((u32::try_from(whole.len()).unwrap_or(u32::MAX), count))
-    }
-
     fn next_approach(&self, without: &[u8; POSE_BYTES]) -> Result<ApproachMessage, Refusal> {
         let within = |pose: &u16| {
             let byte = without.get(usize::from(*pose / 8)).copied().unwrap_or(0);
@@ -463,20 +406,5 @@ impl<const N: usize, S: Storage, L: Locates> Device for Station<'_, N, S, L> {
 
     fn refused(&self) -> u32 {
         self.refused
-    }
-
-    fn store(&mut self, progress: &Progress) -> Result<(), NotStored> {
-        if self.storage.record_length() == 0 {
-            return Ok(());
-        }
-        let mut buffer: SnapshotBuffer<N> = [[0; _]; N];
-        let evidence = self.ask(|model, state| state.snapshot(model, buffer.as_flattened_mut()).ok());
-        let evidence = evidence.ok().flatten().unwrap_or_default();
-        let model = Device::model(self).map_or(0, |model| model.checksum);
-        let (source, staged) = (self.source, self.staged);
-        let record = Record { model, source, staged, progress: progress.clone(), evidence };
-        self.storage.store(|bytes| postcard::to_slice(&record, bytes).ok().map(|written| written.len()))?;
-        self.kept = source;
-        Ok(())
     }
 }

@@ -1,6 +1,6 @@
-//! State that a station keeps through resets and power cuts, in any kind of memory.
+//! Models that a station keeps through resets and power cuts, in any kind of memory.
 
-use palpate_shared::link::{NotStored, Refusal};
+use palpate_shared::link::Refusal;
 
 /// One of the two places for models: one in use, the other being filled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,7 +11,22 @@ pub enum Place {
     Second,
 }
 
-/// State that a station keeps through resets and power cuts: [`Memory`](super::Memory) in RAM or FRAM,
+/// A model that was loaded and checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Loaded {
+    /// Place of the model.
+    pub place: Place,
+    /// Its bytes.
+    pub length: u32,
+    /// Their CRC-32.
+    pub checksum: u32,
+}
+
+/// Memory could not be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotStored;
+
+/// Models that a station keeps through resets and power cuts: [`Memory`](super::Memory) in RAM or FRAM,
 /// [`FlashStorage`](super::FlashStorage) in flash, or [`NoStorage`].
 ///
 /// The power may go at any moment of any call; what was there before the call has to be there after it, or what the call
@@ -24,7 +39,7 @@ pub trait Storage {
     fn model(&self, place: Place) -> &[u8];
 
     /// Writes part of a model. Parts come in order from 0 on, each at a multiple of [`CHUNK`](palpate_shared::link::CHUNK)
-    /// bytes; the last part that came may come again after a power cut.
+    /// bytes.
     ///
     /// # Errors
     /// [`NotStored`]: the sector then holds something else, which nobody asks for.
@@ -36,27 +51,25 @@ pub trait Storage {
     }
 
     /// Decides about a model that has arrived, before it is used: the length of the model at the start of `loaded`. `current`
-    /// starts with the model in use. [`Signed`](super::Signed) checks signatures; by default everything is a model.
+    /// starts with the model in use. This is the place for a check of your own, such as that of a signature behind the model; by
+    /// default everything is a model.
     ///
     /// # Errors
-    /// A [`Refusal`] to send.
+    /// A [`Refusal`] to send, such as [`Refusal::NotAdmitted`].
     fn admit(&self, loaded: &[u8], current: &[u8]) -> Result<usize, Refusal> {
         let _ = current;
         Ok(loaded.len())
     }
 
-    /// The most bytes of a record, see [`record_length`](super::record_length); 0 where nothing is kept.
-    fn record_length(&self) -> usize;
+    /// The model that was loaded last, of those that are still whole.
+    fn loaded(&self) -> Option<Loaded>;
 
-    /// The newest whole record, and how many were written up to it.
-    fn newest(&self) -> Option<(u32, &[u8])>;
-
-    /// Keeps another record: `fill` writes it and returns its length, or `None` where it does not fit. Once this has
-    /// returned, [`Storage::newest`] returns the record, also after a power cut.
+    /// Keeps that a model was loaded, which is whole. Once this has returned, [`Storage::loaded`] returns it, also after a power
+    /// cut.
     ///
     /// # Errors
-    /// [`NotStored`]: the newest record is the one from before.
-    fn store(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), NotStored>;
+    /// [`NotStored`]: the one from before is kept.
+    fn keep(&mut self, loaded: Loaded) -> Result<(), NotStored>;
 }
 
 /// Storage that its owner keeps, as after [`serve`](super::serve) has ended.
@@ -81,16 +94,12 @@ impl<S: Storage> Storage for &mut S {
         (**self).admit(loaded, current)
     }
 
-    fn record_length(&self) -> usize {
-        (**self).record_length()
+    fn loaded(&self) -> Option<Loaded> {
+        (**self).loaded()
     }
 
-    fn newest(&self) -> Option<(u32, &[u8])> {
-        (**self).newest()
-    }
-
-    fn store(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), NotStored> {
-        (**self).store(fill)
+    fn keep(&mut self, loaded: Loaded) -> Result<(), NotStored> {
+        (**self).keep(loaded)
     }
 }
 
@@ -111,15 +120,11 @@ impl Storage for NoStorage {
         Err(NotStored)
     }
 
-    fn record_length(&self) -> usize {
-        0
-    }
-
-    fn newest(&self) -> Option<(u32, &[u8])> {
+    fn loaded(&self) -> Option<Loaded> {
         None
     }
 
-    fn store(&mut self, _: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), NotStored> {
-        Ok(())
+    fn keep(&mut self, _: Loaded) -> Result<(), NotStored> {
+        Err(NotStored)
     }
 }

@@ -17,7 +17,6 @@ mod prediction;
 mod promise;
 mod records;
 mod sequences;
-mod signature;
 mod strangers;
 mod trained;
 
@@ -34,7 +33,6 @@ pub use prediction::{Link, Prediction, Sentinel};
 pub use promise::{OddsByObject, Promise, PromisedNoise, Temperature};
 pub use records::{Axis, Columns, Group};
 pub use sequences::{Fault, Guard, Limits, Position};
-pub use signature::{SIGNATURE_LENGTH, SignedModel};
 pub use strangers::{MisfitTerms, MisfitTest, ObjectMisfit, Strangers};
 pub use trained::{
     Feature, Fingerprints, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise,

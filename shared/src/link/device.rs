@@ -2,15 +2,13 @@
 
 use super::frame::{Decoder, FRAME_MAX, Frame, encode};
 use super::message::{
-    Answer, ApproachMessage, Command, Event, Message, ModelInfo, Outcome, Payload, Query, Refusal, Statistics,
-    micrometers,
+    Answer, ApproachMessage, Command, Event, Message, ModelInfo, Outcome, Query, Refusal, Statistics, micrometers,
 };
 use super::{CHUNK, POSE_BYTES, POSTERIORS, WINDOW};
 use crate::Touch;
 #[cfg(any(test, feature = "position"))]
 use crate::{Approach, TablePose};
 use embedded_io::{Read, Write};
-use serde::{Deserialize, Serialize};
 
 /// Target of the link: a recognizer, and a place for models.
 pub trait Device {
@@ -20,8 +18,8 @@ pub trait Device {
     /// Forgets all touches.
     fn reset(&mut self) -> Outcome;
 
-    /// A model or snapshot of `length` bytes is about to come.
-    fn begin(&mut self, payload: Payload, length: u32, checksum: u32) -> Outcome;
+    /// A model of `length` bytes is about to come.
+    fn begin(&mut self, length: u32, checksum: u32) -> Outcome;
 
     /// A part of it.
     fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Outcome;
@@ -37,12 +35,6 @@ pub trait Device {
 
     /// An object's posterior in Q56.
     fn posterior(&self, object: u8) -> Option<u64>;
-
-    /// Writes the state of recognition from byte `offset` on into `buffer`, and returns (bytes in all, bytes written).
-    ///
-    /// # Errors
-    /// A [`Refusal`] to send instead.
-    fn snapshot(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(u32, usize), Refusal>;
 
     /// The approach that helps most among those whose poses are not in `without`: see [`Query::NextApproach`].
     ///
@@ -95,52 +87,22 @@ pub trait Device {
     fn refused(&self) -> u32 {
         0
     }
-
-    /// Called after a command was executed and before its outcome is sent: a device that is to survive power cuts
-    /// stores its evidence and this, at once or not at all.
-    ///
-    /// # Errors
-    /// [`NotStored`], which the host is told; the command counts as executed.
-    fn store(&mut self, progress: &Progress) -> Result<(), NotStored> {
-        let _ = progress;
-        Ok(())
-    }
 }
 
-/// A chip that is to survive resets could not store its state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NotStored;
-
-/// The state of a session: together with the evidence, all that a chip has to keep through a power cut.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Progress {
+/// The state of a session.
+#[derive(Clone, Debug)]
+struct Progress {
+    /// 0 before the first.
     session: u32,
+    /// Number of the next command.
     next: u32,
     outcomes: [Option<Outcome>; WINDOW],
-    /// The chip's own event that is stored with this, to be sent once this is stored.
-    untold: Option<Untold>,
-}
-
-/// An event with the numbers by which a host knows whether it has heard it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-struct Untold {
-    boot: u32,
-    sequence: u32,
-    event: Event,
 }
 
 impl Progress {
-    /// No session, nothing executed.
-    pub const NONE: Self = Self { session: 0, next: 0, outcomes: [None; WINDOW], untold: None };
-
-    /// The current session; 0 before the first.
-    pub const fn session(&self) -> u32 {
-        self.session
-    }
-
-    /// Number of commands of this session that have been executed.
-    pub const fn executed(&self) -> u32 {
-        self.next
+    /// Nothing of this session executed.
+    const fn of(session: u32) -> Self {
+        Self { session, next: 0, outcomes: [None; WINDOW] }
     }
 
     /// Slot of a command's outcome.
@@ -164,21 +126,13 @@ pub struct DeviceEnd {
 }
 
 impl DeviceEnd {
-    /// An end that continues from `progress`; [`Progress::NONE`] at first. `boot` should be another number after each
-    /// start, counted or random: it is how a host notices a start whose announcement was lost.
-    pub const fn new(progress: Progress, boot: u32) -> Self {
+    /// An end without a session. `boot` has to be another number after each start, counted or random: it says to a host that
+    /// evidence and session are gone.
+    pub const fn new(boot: u32) -> Self {
         Self {
             decoder: Decoder::new(),
-            progress,
-            statistics: Statistics {
-                frames: 0,
-                garbled: 0,
-                repeated: 0,
-                early: 0,
-                foreign: 0,
-                refused: 0,
-                unstored: 0,
-            },
+            progress: Progress::of(0),
+            statistics: Statistics { frames: 0, garbled: 0, repeated: 0, early: 0, foreign: 0, refused: 0 },
             boot,
             events: 0,
         }
@@ -189,68 +143,38 @@ impl DeviceEnd {
         self.statistics
     }
 
-    /// The state of the session.
-    pub const fn progress(&self) -> &Progress {
-        &self.progress
+    /// Number of commands of the current session that have been executed.
+    pub const fn executed(&self) -> u32 {
+        self.progress.next
     }
 
     /// Takes bytes from the line, in any portions, does what they say, and hands every frame to be sent to `send`.
     ///
     /// Cannot fail or panic with any bytes.
     pub fn receive(&mut self, bytes: &[u8], device: &mut impl Device, mut send: impl FnMut(&[u8])) {
-        let Self { decoder, progress, statistics, boot, events } = self;
+        let Self { decoder, progress, statistics, boot, .. } = self;
         for &byte in bytes {
             match decoder.feed(byte) {
                 None => {}
                 Some(Err(_)) => statistics.garbled = statistics.garbled.saturating_add(1),
                 Some(Ok(frame)) => {
                     statistics.frames = statistics.frames.saturating_add(1);
-                    let unstored = statistics.unstored;
                     respond(frame, progress, statistics, *boot, device, &mut send);
-                    if unstored == 0 && statistics.unstored > 0 {
-                        announce(Event::NotStored, progress, *boot, events, &mut send);
-                    }
                 }
             }
         }
     }
 
-    /// Tells the host that the chip has started. Before it, with the numbers that it had then, the event of the last
-    /// [`DeviceEnd::report`] if nothing was stored since: the power may have gone before it was told. A host that has heard
-    /// it takes it for a copy.
-    pub fn start(&mut self, mut send: impl FnMut(&[u8])) {
-        if let Some(Untold { boot, sequence, event }) = self.progress.untold {
-            let message = Message::Event { boot, sequence, event };
-            send(encode(&Frame { session: self.progress.session, message }, &mut [0; FRAME_MAX]));
-        }
+    /// Tells the host that the chip has started.
+    pub fn start(&mut self, send: impl FnMut(&[u8])) {
         self.tell(Event::Started, send);
-    }
-
-    /// Lets a device store its state and this event, then sends the event to the host: it is sent, now or by
-    /// [`DeviceEnd::start`] after a power cut, if its content is stored. The host is told if storing fails, once per start.
-    pub fn report(&mut self, event: Event, device: &mut impl Device, mut send: impl FnMut(&[u8])) {
-        self.progress.untold = Some(Untold { boot: self.boot, sequence: self.events, event });
-        let unstored = self.statistics.unstored;
-        store(&self.progress, &mut self.statistics, device);
-        self.tell(event, &mut send);
-        if unstored == 0 && self.statistics.unstored > 0 {
-            self.tell(Event::NotStored, &mut send);
-        }
     }
 
     /// Sends an event to the host.
     pub fn tell(&mut self, event: Event, mut send: impl FnMut(&[u8])) {
-        announce(event, &self.progress, self.boot, &mut self.events, &mut send);
-    }
-
-    /// Lets a device store its state, as after every command: for changes without a command. The host is told if
-    /// that fails, once per start.
-    pub fn store(&mut self, device: &mut impl Device, mut send: impl FnMut(&[u8])) {
-        let unstored = self.statistics.unstored;
-        store(&self.progress, &mut self.statistics, device);
-        if unstored == 0 && self.statistics.unstored > 0 {
-            self.tell(Event::NotStored, &mut send);
-        }
+        let message = Message::Event { boot: self.boot, sequence: self.events, event };
+        self.events = self.events.wrapping_add(1);
+        send(encode(&Frame { session: self.progress.session, message }, &mut [0; FRAME_MAX]));
     }
 
     /// Waits for bytes on `transport`, and answers them there. Call it in a loop, also after an error: a UART reports each
@@ -272,19 +196,6 @@ impl DeviceEnd {
     }
 }
 
-fn announce(event: Event, progress: &Progress, boot: u32, events: &mut u32, send: &mut impl FnMut(&[u8])) {
-    let message = Message::Event { boot, sequence: *events, event };
-    *events = events.wrapping_add(1);
-    send(encode(&Frame { session: progress.session, message }, &mut [0; FRAME_MAX]));
-}
-
-/// Stores the progress, and counts it if that failed.
-fn store(progress: &Progress, statistics: &mut Statistics, device: &mut impl Device) {
-    if device.store(progress).is_err() {
-        statistics.unstored = statistics.unstored.saturating_add(1);
-    }
-}
-
 fn respond(
     frame: Frame<'_>,
     progress: &mut Progress,
@@ -300,8 +211,7 @@ fn respond(
                 && known == boot
                 && frame.session != progress.session
             {
-                *progress = Progress { session: frame.session, ..Progress::NONE };
-                store(progress, statistics, device);
+                *progress = Progress::of(frame.session);
             }
             let mut buffer = [0; CHUNK];
             let answer = answer(query, progress, statistics, boot, device, &mut buffer);
@@ -344,7 +254,7 @@ fn execute<'a>(
     let outcome = match *command {
         Command::Touch { touch, detail } => device.touch(&Touch::from(&touch), detail),
         Command::Reset => device.reset(),
-        Command::Begin { payload, length, checksum } => device.begin(payload, length, checksum),
+        Command::Begin { length, checksum } => device.begin(length, checksum),
         Command::Chunk { offset, bytes } => device.chunk(offset, bytes),
         Command::Commit => device.commit(),
         Command::Press { touch, position, detail } => device.press(&Touch::from(&touch), micrometers(position), detail),
@@ -353,8 +263,6 @@ fn execute<'a>(
         *slot = Some(outcome);
     }
     progress.next = sequence.wrapping_add(1);
-    progress.untold = None;
-    store(progress, statistics, device);
     Message::Outcome { sequence, outcome }
 }
 
@@ -396,10 +304,6 @@ fn answer<'b>(
         #[cfg(any(test, feature = "position"))]
         Query::NextPress { within } => match device.next_press(within) {
             Ok(press) => Answer::NextPress(press),
-            Err(refusal) => Answer::Refused(refusal),
-        },
-        Query::Snapshot { offset } => match device.snapshot(offset, buffer) {
-            Ok((length, written)) => Answer::Snapshot { length, bytes: buffer.get(..written).unwrap_or_default() },
             Err(refusal) => Answer::Refused(refusal),
         },
     }

@@ -61,8 +61,7 @@ pub enum Incoming<'a> {
         event: Event,
         /// Number of events before it that were lost on the way.
         missed: u32,
-        /// The boot number of the start in which it happened: another one than [`HostEnd::boot`] if a start before the
-        /// current one was cut off in telling it.
+        /// The boot number of the start in which it happened.
         boot: u32,
     },
 }
@@ -78,7 +77,7 @@ pub enum LinkError {
         /// Commands that may have been executed or not.
         uncertain: u32,
     },
-    /// The chip has forgotten the session, and everything it was told in it: it was reset and had no stored state.
+    /// The chip has forgotten the session, and everything it was told in it: it was reset.
     Forgotten {
         /// Commands whose outcome is known, and whose effect is lost.
         answered: u32,
@@ -180,8 +179,7 @@ pub struct HostEnd {
     /// newest first.
     boots: [Option<(u32, u32)>; BOOTS],
     last_rush: Option<(u32, u64)>,
-    /// Commands answered when we asked whether the chip has forgotten them.
-    doubted: u32,
+    /// True once the chip has said that it is in another session.
     forgotten: bool,
     statistics: HostStatistics,
 }
@@ -202,7 +200,6 @@ impl HostEnd {
             boot: 0,
             boots: [None; BOOTS],
             last_rush: None,
-            doubted: 0,
             forgotten: false,
             statistics: HostStatistics {
                 sent: 0,
@@ -348,7 +345,7 @@ impl HostEnd {
                 if self.is_under_way(sequence) {
                     self.rush(sequence, now, send);
                 } else if sequence.wrapping_sub(self.oldest) >> 31 == 1 && self.can_ask() {
-                    // Late, or the chip is in an earlier state than it was: ask.
+                    // Late, or the chip has forgotten what it answered: ask.
                     self.doubt(now, send);
                 }
             }
@@ -368,10 +365,6 @@ impl HostEnd {
                 let missed = sequence.wrapping_sub(expected);
                 if missed >> 31 == 1 {
                     self.statistics.repeated += 1;
-                    // A chip tells its last event again at each start: it must not be forgotten after as many.
-                    if let Some(upto) = known.and_then(|place| self.boots.get_mut(..=place)) {
-                        upto.rotate_right(1);
-                    }
                     return;
                 }
                 // A late event of a start before does not make that the newest.
@@ -399,7 +392,6 @@ impl HostEnd {
     /// Asks whether the chip still knows of our session.
     fn doubt(&mut self, now: u64, send: &mut impl FnMut(&[u8])) {
         self.phase = Phase::Doubting;
-        self.doubted = self.oldest;
         self.put_question(Query::Hello, now, send);
     }
 
@@ -439,9 +431,8 @@ impl HostEnd {
                 self.phase = Phase::Opening;
                 self.put_question(Query::Open { previous: session, boot }, now, send);
             }
-            (Phase::Doubting, Answer::Session { next, .. }) => {
-                // Another session, or an earlier state of ours, in which it does not know what it has answered.
-                self.forgotten = session != self.session || next.wrapping_sub(self.doubted) >> 31 == 1;
+            (Phase::Doubting, Answer::Session { .. }) => {
+                self.forgotten = session != self.session;
                 self.phase = Phase::Open;
             }
             (Phase::Open, answer) => incoming(Incoming::Answer(answer)),

@@ -51,8 +51,7 @@ pub enum Message<'a> {
     },
     /// Chip: something happened without a command.
     Event {
-        /// The chip's boot number, another one after each start; of an event that was stored and perhaps not told before
-        /// the power went, that of the start in which it happened.
+        /// The chip's boot number, another one after each start.
         boot: u32,
         /// Counts events from 0 since that start.
         sequence: u32,
@@ -87,11 +86,6 @@ pub enum Query {
     Posteriors {
         /// From this object on.
         first: u8,
-    },
-    /// The state of recognition as bytes, up to [`CHUNK`](super::CHUNK) of them.
-    Snapshot {
-        /// From this byte on.
-        offset: u32,
     },
     /// Asks for the pose of the next approach. A chip whose program is older than this question does not answer it.
     NextApproach {
@@ -141,13 +135,6 @@ pub enum Answer<'a> {
     Statistics(Statistics),
     /// To [`Query::Posteriors`]: u64 in Q56, little endian, one after another.
     Posteriors(&'a [u8]),
-    /// To [`Query::Snapshot`].
-    Snapshot {
-        /// Bytes in all.
-        length: u32,
-        /// From the offset that was asked for.
-        bytes: &'a [u8],
-    },
     /// There is no answer.
     Refused(Refusal),
     /// To [`Query::NextApproach`].
@@ -180,10 +167,8 @@ pub enum Command<'a> {
     },
     /// Forget all touches: another object comes.
     Reset,
-    /// A model or a snapshot is about to come, in chunks.
+    /// A model is about to come, in chunks.
     Begin {
-        /// The kind of data that follows.
-        payload: Payload,
         /// Its bytes in all.
         length: u32,
         /// Its CRC-32 (ISO-HDLC).
@@ -222,16 +207,6 @@ impl Command<'_> {
     }
 }
 
-/// Kind of data that arrives in chunks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[non_exhaustive]
-pub enum Payload {
-    /// A compiled model.
-    Model,
-    /// The state of recognition, from [`Answer::Snapshot`].
-    Snapshot,
-}
-
 /// The result of a [`Command`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -244,8 +219,7 @@ pub enum Outcome {
     Refused(Refusal),
     /// To [`Command::Begin`] and [`Command::Chunk`]: all before this offset has arrived. Chunks from it on are to come, once those
     /// under way were refused; so no chunk goes out before the outcome of its beginning. A chip answers so when a load that was
-    /// interrupted begins again, and when a chunk could not be written, as after a power cut: flash is written again from the
-    /// start of a sector.
+    /// interrupted begins again, and when a chunk could not be written: flash is written again from the start of a sector.
     Continue {
         /// Offset of the next chunk.
         offset: u32,
@@ -265,7 +239,7 @@ pub enum Refusal {
     OutOfOrder,
     /// The data that arrived differ from the announcement.
     Checksum,
-    /// The data that arrived are no model or snapshot that this chip can use.
+    /// The data that arrived are no model that this chip can use.
     Invalid,
     /// The chip's program does not do that.
     Unsupported,
@@ -289,10 +263,8 @@ pub enum Refusal {
     Position,
     /// The model is of maps, and the hand does not come straight down: not counted.
     NotDown,
-    /// The chip takes signed models alone, and this one is not signed with its key.
-    Signature,
-    /// The model's signature has a lower counter than that of the model in use.
-    Older,
+    /// A check of the chip's own does not admit the model.
+    NotAdmitted,
 }
 
 impl Refusal {
@@ -330,8 +302,7 @@ impl core::fmt::Display for Refusal {
             Self::NoPosition => "the chip's model is of maps, and the touch has no position",
             Self::Position => "the touch has a position, and the chip has no model of maps",
             Self::NotDown => "it does not come straight down",
-            Self::Signature => "the model is not signed with the key that the chip trusts: sign it",
-            Self::Older => "the model is older than the chip's: sign it with a higher counter",
+            Self::NotAdmitted => "a check of the chip's own does not admit the model",
         })
     }
 }
@@ -358,8 +329,6 @@ pub enum Event {
         /// 0, 1 or 2 along the row; 255 if it is not the fault of one finger.
         finger: u8,
     },
-    /// The chip cannot store its state any more: what follows is lost if it is reset. Sent once per start.
-    NotStored,
     /// The chip's own fingers touched, and the touch was not counted.
     Refused {
         /// The touch.
@@ -569,6 +538,4 @@ pub struct Statistics {
     pub foreign: u32,
     /// Touches that were not counted because the model was not trained for them.
     pub refused: u32,
-    /// Commands whose effect could not be stored: a reset forgets it.
-    pub unstored: u32,
 }

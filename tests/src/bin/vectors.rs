@@ -7,7 +7,7 @@
 use palpate::compile::{EarlyExit, Layout, Leaf, Settings, compile};
 use palpate::ensemble::Node;
 use palpate::with;
-use palpate_onboard::{Model, Recognizer, Refused, RowsSeen, SNAPSHOT_LENGTH, Stopping, Verdict, exp2_negative};
+use palpate_onboard::{Model, Recognizer, Refused, RowsSeen, Stopping, Verdict, exp2_negative};
 use palpate_shared::format::{
     Counted, Limits, Outputs, PatternShares, Position, Sentinel, Trained, TrainedTouches, checksum, f32_key,
 };
@@ -108,9 +108,7 @@ fn play(text: &mut String, name: &str, bytes: &[u8], touches: &[Touch]) {
                 known(text, &model, &recognizer, features.as_slice(), verdict);
             }
         }
-        if index == 1 || decided {
-            snapshot(text, &recognizer);
-        }
+        if index == 1 || decided {}
         if decided {
             recognizer.reset();
             *text += "reset\n";
@@ -146,11 +144,6 @@ fn known(text: &mut String, model: &Model<'_>, recognizer: &Recognizer<'_, 256>,
             *text += &format!("posterior {object} {}\n", recognizer.posterior(object).q56());
         }
     }
-}
-
-fn snapshot(text: &mut String, recognizer: &Recognizer<'_, 256>) {
-    let mut buffer = [0; SNAPSHOT_LENGTH + 2_560];
-    *text += &format!("snapshot {}\n", hex(recognizer.snapshot(&mut buffer).expect("a long buffer")));
 }
 
 /// Every layout, with every type of leaf.
@@ -409,37 +402,9 @@ fn together(text: &mut String) {
         let sections = [&all[..], between, after, &outputs(objects)].concat();
         play(text, &format!("outputs together: {name}"), &with_sections(&bytes, &sections), &random::touches(8, 28));
     }
-    // Evidence that is level, and evidence far behind.
-    let sections = [&all[..], &outputs([0, 0, 0, 1, 1])].concat();
-    let bytes = with_sections(&compile(&ensemble, &Settings::default()).expect("it fits").bytes, &sections);
-    let model = Model::new(&bytes).expect("a model");
-    let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model)).expect("at most 256 objects");
-    *text += &format!("model {} outputs together: evidence that is level\n", hex(&bytes));
-    for evidence in [[0; 5], [9, 9, 9, 2_000, 2_000], [i64::MIN, i64::MIN, 0, i64::MIN, 0]] {
-        touch_after(text, &model, &mut recognizer, &evidence, &random::touches(2, 29));
-    }
 }
 
-/// Evidence that a snapshot brings about, and touches after it.
-fn touch_after(
-    text: &mut String,
-    model: &Model<'_>,
-    recognizer: &mut Recognizer<'_, 256>,
-    evidence: &[i64],
-    touches: &[Touch],
-) {
-    let bytes = abuse::snapshot(model, 7, 0, 0, evidence);
-    recognizer.restore(&bytes).expect("a snapshot");
-    *text += &format!("restore {} ok\n", hex(&bytes));
-    for touch in touches {
-        *text += &format!("touch {}\n", touch_words(touch));
-        let verdict = recognizer.push(touch).expect("every approach counts");
-        let features = Descriptor::Curvature.features(touch);
-        known(text, model, recognizer, features.as_slice(), verdict);
-    }
-}
-
-/// Evidence, ties, thresholds, limits.
+/// Ties, thresholds, limits.
 fn decisions(text: &mut String) {
     let ensemble = random::ensemble(Shape { leaf: 0.6, ..SHAPE }, 16);
     for (error_rate, max_touches) in [(0.3, 3), (0.01, 200), (1e-9, 200), (1e-15, 6)] {
@@ -467,38 +432,6 @@ fn decisions(text: &mut String) {
         value.copy_from_slice(&bytes.to_le_bytes());
     }
     play(text, "f32 leaves beyond reason", &abuse::sealed(wild), &touches(16, 20));
-    limits(text);
-}
-
-/// Evidence at the limits of 64 bits, which only a snapshot can bring about.
-fn limits(text: &mut String) {
-    let bytes = stated(&compiled(SHAPE, 21, Leaf::I16, Layout::Compact), ALL);
-    let model = Model::new(&bytes).expect("a model");
-    let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model)).expect("at most 256 objects");
-    *text += &format!("model {} evidence at its limits\n", hex(&bytes));
-    for evidence in [[i64::MAX - 5; 3], [i64::MIN + 5; 3], [i64::MAX, 0, i64::MIN], [1 << 40, 0, 5]] {
-        touch_after(text, &model, &mut recognizer, &evidence, &random::touches(3, 22));
-    }
-    let own = abuse::snapshot(&model, 7, 0, 0, &[1, 2, 3]);
-    let mut changed = own.clone();
-    changed[6] ^= 1;
-    let other = Model::new(palpate_tests::unaligned::model().leak()).expect("a model");
-    for (bytes, answer) in [
-        (own[..own.len() - 1].to_vec(), "damaged"),
-        (changed, "damaged"),
-        (abuse::snapshot(&model, 7, 4, 0, &[1, 2, 3]), "damaged"),
-        (abuse::snapshot(&model, 7, 1, 0, &[1, 2, 3]), "damaged"),
-        (abuse::snapshot(&model, 7, 1, 3, &[1, 2, 3]), "damaged"),
-        (abuse::snapshot(&model, 0, 2, 0, &[1, 2, 3]), "damaged"),
-        (abuse::snapshot(&model, 7, 0, 0, &[1, 2]), "damaged"),
-        (abuse::snapshot(&model, 7, 0, 0, &[1, 2, 3, 4]), "damaged"),
-        (abuse::snapshot(&other, 7, 0, 0, &[1, 2, 3]), "other"),
-        (abuse::snapshot(&model, 7, 1, 2, &[1, 2, 30_000]), "ok"),
-        (abuse::snapshot(&model, 0, 0, 0, &[1, 2, 3]), "ok"),
-    ] {
-        assert_eq!(recognizer.restore(&bytes).is_ok(), answer == "ok");
-        *text += &format!("restore {} {answer}\n", hex(&bytes));
-    }
 }
 
 /// Leaves that are numbers of a table: of one byte and of two, with a value for each object and for one.

@@ -3,9 +3,8 @@
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
 use palpate::with;
-use palpate_onboard::{Model, Recognizer, Refused, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict};
+use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::{Descriptor, Touch};
-use palpate_tests::abuse::snapshot;
 use palpate_tests::random;
 
 /// A touch with this curvature.
@@ -158,44 +157,7 @@ fn thousands_of_touches_pulling_back_and_forth_leave_nothing_behind() {
 }
 
 #[test]
-fn evidence_at_its_limits_saturates_towards_undecided_and_never_wraps() {
-    let bytes = compiled(&steps(&[500.0], &[&[5.0, 5.0, 4.9], &[-5.0, -5.0, -5.0]]), Leaf::I16);
-    let model = Model::new(&bytes).unwrap();
-    let mut recognizer: Recognizer<3> = Recognizer::new(&model, stopping(0.01, u32::MAX)).unwrap();
-    for (curvature, limit) in [(0, i64::MAX), (1000, i64::MIN)] {
-        let near = limit - limit.signum() * 10;
-        recognizer.restore(&snapshot(&model, 7, 0, 0, &[near, near, near])).unwrap();
-        for _ in 0..100 {
-            assert_eq!(recognizer.push(&touch(curvature)), Ok(Verdict::Undecided));
-        }
-        assert_eq!(recognizer.evidence(), [limit, limit, limit]);
-    }
-}
-
-#[test]
-fn a_snapshot_goes_on_where_it_was_taken() {
-    let bytes =
-        compiled(&steps(&[300.0, 600.0], &[&[0.9, 0.2, -0.3], &[0.31, 0.5, 0.2], &[-0.1, 0.6, -1.0]]), Leaf::I16);
-    let model = Model::new(&bytes).unwrap();
-    let limit = stopping(0.001, 60);
-    let mut whole: Recognizer<8> = Recognizer::new(&model, limit).unwrap();
-    for (index, touch) in random::touches(500, 9).into_iter().enumerate() {
-        let mut buffer = [0; SNAPSHOT_LENGTH + 80];
-        let snapshot = whole.snapshot(&mut buffer).unwrap().to_vec();
-        let mut resumed: Recognizer<4> = Recognizer::new(&model, limit).unwrap();
-        let _ = resumed.push(&touch);
-        resumed.restore(&snapshot).unwrap();
-        assert_eq!(resumed.verdict(), whole.verdict());
-        assert_eq!(whole.push(&touch), resumed.push(&touch), "at touch {index}");
-        assert_eq!((whole.evidence(), whole.touches()), (resumed.evidence(), resumed.touches()));
-        if index % 50 == 49 {
-            whole.reset();
-        }
-    }
-}
-
-#[test]
-fn a_verdicts_posterior_is_the_recognizers_bit_for_bit_also_after_a_snapshot() {
+fn a_verdicts_posterior_is_the_recognizers_bit_for_bit() {
     let bytes =
         compiled(&steps(&[300.0, 600.0], &[&[0.9, 0.2, -0.3], &[0.31, 0.5, 0.2], &[-0.1, 0.6, -1.0]]), Leaf::I16);
     let model = Model::new(&bytes).unwrap();
@@ -209,9 +171,6 @@ fn a_verdicts_posterior_is_the_recognizers_bit_for_bit_also_after_a_snapshot() {
                 recognitions += 1;
                 assert_eq!(verdict.posterior(), Some(recognizer.posterior(object.into())));
                 assert!(verdict.posterior().unwrap().complement() <= error_rate);
-                let mut resumed: Recognizer<3> = Recognizer::new(&model, stopping(error_rate, 200)).unwrap();
-                resumed.restore(recognizer.snapshot(&mut [0; 64]).unwrap()).unwrap();
-                assert_eq!(resumed.verdict(), verdict);
             } else {
                 assert_eq!(verdict.posterior(), None);
             }
@@ -221,34 +180,6 @@ fn a_verdicts_posterior_is_the_recognizers_bit_for_bit_also_after_a_snapshot() {
         }
         assert!(recognitions >= 3, "{recognitions} at {error_rate}");
     }
-}
-
-#[test]
-fn snapshots_of_other_models_and_damaged_ones_are_refused_and_change_nothing() {
-    let bytes = compiled(&steps(&[300.0], &[&[0.9, 0.2], &[0.31, 0.5]]), Leaf::I16);
-    let other = compiled(&steps(&[301.0], &[&[0.9, 0.2], &[0.31, 0.5]]), Leaf::I16);
-    let (model, other) = (Model::new(&bytes).unwrap(), Model::new(&other).unwrap());
-    let limit = stopping(0.01, 60);
-    let mut recognizer: Recognizer<2> = Recognizer::new(&model, limit).unwrap();
-    recognizer.push(&touch(5)).unwrap();
-    let evidence = recognizer.evidence().to_vec();
-    let mut buffer = [0; 64];
-    let mut other_recognizer: Recognizer<2> = Recognizer::new(&other, limit).unwrap();
-    other_recognizer.push(&touch(900)).unwrap();
-    let foreign = other_recognizer.snapshot(&mut buffer).unwrap().to_vec();
-    assert_eq!(recognizer.restore(&foreign), Err(SnapshotError::OtherModel));
-    let own = recognizer.snapshot(&mut buffer).unwrap().to_vec();
-    for length in 0..own.len() {
-        assert_eq!(recognizer.restore(&own[..length]), Err(SnapshotError::Damaged));
-        assert_eq!(recognizer.snapshot(&mut vec![0; length]), Err(SnapshotError::Short));
-    }
-    for position in 0..own.len() {
-        let mut changed = own.clone();
-        changed[position] ^= 0x10;
-        assert_eq!(recognizer.restore(&changed), Err(SnapshotError::Damaged));
-    }
-    assert_eq!(recognizer.restore(&snapshot(&model, 7, 0, 0, &[1, 2, 3])), Err(SnapshotError::Damaged));
-    assert_eq!((recognizer.evidence(), recognizer.touches()), (&evidence[..], 1));
 }
 
 #[test]

@@ -23,7 +23,7 @@ const IMAGES: [(&str, &str, &str); 8] = [
     ),
     ("`effector`: three switches to touches", "effector", "compact,i8-leaves"),
     ("`link`: touches in, verdicts and posteriors out", "link", "compact,i8-leaves"),
-    ("`station`: a `ProbeStation` with both, models and records in flash", "station", "compact,i8-leaves"),
+    ("`station`: a `ProbeStation` with both, models in flash", "station", "compact,i8-leaves"),
     (
         "`locate`: touches with a position and maps over the link, instead of trees too",
         "table",

@@ -2,7 +2,7 @@
 
 use palpate_onboard::effector::{Edge, Finger, Sensed};
 use palpate_onboard::station::{
-    Board, Happened, LONGEST_WAIT, LinkFailed, Memory, NoStorage, ProbeSettings, ProbeStation, Storage, record_length,
+    Board, Happened, LONGEST_WAIT, LinkFailed, NoStorage, ProbeSettings, ProbeStation, Storage,
 };
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::link::{
@@ -122,7 +122,7 @@ fn run<S: Storage>(station: &mut Station<S>, bench: &mut Bench, end: u32) -> Vec
 }
 
 fn started() -> (Station<NoStorage>, Bench) {
-    let mut station = ProbeStation::open(MODEL, NoStorage, ProbeSettings::default()).unwrap();
+    let mut station = ProbeStation::open(MODEL, NoStorage, ProbeSettings::default());
     let mut bench = Bench::default();
     assert_eq!(run(&mut station, &mut bench, APPROACH), []);
     bench.told();
@@ -419,52 +419,6 @@ fn no_approach_without_a_contact_is_told_where_there_may_have_been_one() {
     let happened = run(&mut station, &mut bench, at + 6 * APPROACH);
     assert!(touches(&happened).iter().all(|(touch, _)| !touch.is_empty()), "{happened:?}");
     assert!(happened.iter().any(|happened| matches!(happened, Happened::Faulty(_))), "{happened:?}");
-}
-
-#[test]
-fn a_verdict_that_was_stored_and_not_told_when_the_power_went_is_told_at_the_next_start() {
-    let (times, count) = deciding();
-    let record = vec![0xff; record_length(OBJECTS)];
-    let mut records = [record.clone(), record];
-    let mut start = |bench: &mut Bench, act: &mut dyn FnMut(&mut Station<Memory<'_>>, &mut Bench)| {
-        let [even, odd] = &mut records;
-        let memory = Memory { models: [&mut [], &mut []], records: [even, odd] };
-        let mut station = Station::open(MODEL, memory, ProbeSettings::default()).unwrap();
-        bench.now = 0;
-        bench.edges.clear();
-        run(&mut station, bench, APPROACH);
-        act(&mut station, bench);
-    };
-    let mut bench = Bench::default();
-    let mut said = Vec::new();
-    start(&mut bench, &mut |station, bench| {
-        for _ in 0..count {
-            bench.said.clear();
-            bench.approach(bench.now, times.map(Some), 300_000);
-            let end = bench.now + APPROACH;
-            run(station, bench, end);
-        }
-        said = bench.told();
-    });
-    let [verdict @ Event::Touch { verdict: VerdictMessage { decision: Decision::Recognized(_), .. }, .. }] = said[..]
-    else {
-        panic!("{said:?}")
-    };
-    // The frame was lost with the power; whether it was is not known to the chip.
-    start(&mut bench, &mut |_, bench| assert_eq!(bench.told(), [verdict, Event::Started]));
-    start(&mut bench, &mut |station, bench| {
-        assert_eq!(bench.told(), [verdict, Event::Started]);
-        bench.approach(bench.now, times.map(Some), 300_000);
-        let end = bench.now + APPROACH;
-        run(station, bench, end);
-        assert!(matches!(bench.told()[..], [Event::Touch { verdict, .. }] if verdict.touches == 1));
-    });
-    // A host that opens a session hears of what follows.
-    start(&mut bench, &mut |station, bench| {
-        assert_eq!(bench.told().len(), 2);
-        Desk::connected(station, bench);
-    });
-    start(&mut bench, &mut |_, bench| assert_eq!(bench.told(), [Event::Started]));
 }
 
 #[test]

@@ -5,7 +5,7 @@
 use palpate::chip::{Asks, Connection, Emulator, Port, Steps, Update, stream};
 use palpate::compile::Leaf;
 use palpate::touches::{Dataset, ObjectTouches, Source};
-use palpate_onboard::station::{Memory, record_length, serve};
+use palpate_onboard::station::{Memory, RECORD_LENGTH, serve};
 use palpate_shared::Descriptor;
 use palpate_shared::link::HostSettings;
 use palpate_tests::random::{self, Shape};
@@ -36,7 +36,7 @@ fn the_chips_process() {
     let mut wire = Wire(TcpStream::connect(host).unwrap());
     wire.0.set_nodelay(true).unwrap();
     let [mut a, mut b] = [(); 2].map(|()| vec![0; 100_000]);
-    let [mut c, mut d] = [(); 2].map(|()| vec![0; record_length(OBJECTS)]);
+    let [mut c, mut d] = [[0; RECORD_LENGTH]; 2];
     let mut memory = Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] };
     serve::<OBJECTS, _, _>(&[], &mut memory, 0, &mut wire).unwrap();
 }

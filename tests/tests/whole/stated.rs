@@ -33,15 +33,13 @@ fn numbers(lines: &[Vec<String>], label: &str, index: usize) -> Vec<u64> {
 
 /// Rows of the table of instructions and stack in the firmware's README: the row, the benchmark's label, and which of
 /// the lines with it.
-const BENCHMARK: [(&str, &str, usize); 8] = [
+const BENCHMARK: [(&str, &str, usize); 6] = [
     ("margins of a touch", "recognizer: margins", 0),
     ("a touch with its verdict", "recognizer: a touch with its verdict", 0),
     ("a posterior", "recognizer: a posterior", 0),
-    ("a snapshot", "recognizer: a snapshot", 0),
     ("effector: six edges of a touch", "effector: a touch, six edges", 0),
     ("a touch's frame in, its outcome out", "link: a touch, there and back", 0),
     ("… and posteriors and evidence for parity", "link: a touch, there and back", 1),
-    ("the whole program: that, and a record of the state", "serve: a touch with detail, and its record", 0),
 ];
 
 #[test]
@@ -147,7 +145,7 @@ const C_ROWS: [(&str, &str); 5] = [
     ),
     ("touches, all layouts and leaves", "-DPALPATE_STRANGERS=0"),
     ("… and a misfit test", "-DPALPATE_STRANGERS=1"),
-    ("everything: also posteriors, snapshots, names", "-DEVERYTHING"),
+    ("everything: also posteriors, names", "-DEVERYTHING"),
 ];
 
 /// Macros of all of these rows.

@@ -1,15 +1,12 @@
-//! A chip's whole program at the end of a link: its verdicts are those of a recognizer, through loading,
-//! power cuts and torn records.
+//! A chip's whole program at the end of a link: its verdicts are those of a recognizer, also under a model that was loaded.
 
 use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate::compile::{Leaf, Settings, compile};
-use palpate_onboard::station::{
-    ERRORS_IN_A_ROW, Memory, NoStorage, RecordsTooShort, ServeError, Station, record_length, serve,
-};
+use palpate_onboard::station::{ERRORS_IN_A_ROW, Memory, NoStorage, RECORD_LENGTH, Station, serve};
 use palpate_shared::format::{Counted, Trained, TrainedTouches};
 use palpate_shared::link::{
-    Command, DeviceEnd, FRAME_MAX, Frame, HostEnd, HostSettings, Incoming, LinkError, Message, Outcome, Payload,
-    Progress, Query, Refusal, encode,
+    Command, DeviceEnd, FRAME_MAX, Frame, HostEnd, HostSettings, Incoming, LinkError, Message, Outcome, Query, Refusal,
+    encode,
 };
 use palpate_shared::{ContactTime, Patterns, Pose, Touch};
 use palpate_tests::desk::{Desk, OBJECTS, PowerCut, Step, answers_to_touches, expected, load, push};
@@ -39,23 +36,22 @@ fn model(seed: u64) -> Vec<u8> {
 struct Chip {
     built_in: Vec<u8>,
     models: [Vec<u8>; 2],
-    records: [Vec<u8>; 2],
+    records: [[u8; RECORD_LENGTH]; 2],
+    /// Starts so far.
+    starts: u32,
 }
 
 impl Chip {
     fn new(built_in: Vec<u8>) -> Self {
-        let record = vec![0xff; record_length(OBJECTS)];
-        Self { built_in, models: [vec![0; 20_000], vec![0; 20_000]], records: [record.clone(), record] }
+        let (models, records) = ([vec![0; 20_000], vec![0; 20_000]], [[0xff; RECORD_LENGTH]; 2]);
+        Self { built_in, models, records, starts: 0 }
     }
 
     fn run(&mut self, desk: &mut Desk) -> Result<(), PowerCut> {
-        let Self { built_in, models: [a, b], records: [c, d] } = self;
+        let Self { built_in, models: [a, b], records: [c, d], starts } = self;
         desk.power.set(true);
-        match serve::<OBJECTS, _, _>(built_in, &mut Memory { models: [a, b], records: [c, d] }, 0, desk) {
-            Ok(()) => Ok(()),
-            Err(ServeError::Transport(cut)) => Err(cut),
-            Err(error) => panic!("{error}"),
-        }
+        *starts += 1;
+        serve::<OBJECTS, _, _>(built_in, &mut Memory { models: [a, b], records: [c, d] }, *starts, desk)
     }
 }
 
@@ -95,9 +91,9 @@ fn a_loaded_model_is_used_from_its_commit_on_and_after_a_restart() {
     let (first, second): (&[u8], &[u8]) = (model(1).leak(), model(2).leak());
     let touches = touches(40);
     let (before, after) = touches.split_at(20);
-    let mut script: Vec<Step> = load(first, Payload::Model);
+    let mut script: Vec<Step> = load(first);
     script.extend(before.iter().map(push));
-    script.extend(load(second, Payload::Model));
+    script.extend(load(second));
     script.extend(after.iter().map(push));
     let mut chip = Chip::new(Vec::new());
     let mut desk = Desk::new(script, 0);
@@ -113,16 +109,16 @@ fn a_loaded_model_is_used_from_its_commit_on_and_after_a_restart() {
 fn a_model_that_arrives_wrong_is_refused_and_the_old_one_stays() {
     let (good, bad): (Vec<u8>, &[u8]) = (model(1), model(2).leak());
     let touches = touches(20);
-    let wrong_checksum = Command::Begin { payload: Payload::Model, length: bad.len() as u32, checksum: 1 };
-    let mut script = load(bad, Payload::Model);
+    let wrong_checksum = Command::Begin { length: bad.len() as u32, checksum: 1 };
+    let mut script = load(bad);
     script[0] = Step::Do(wrong_checksum);
     // No model at all, a chunk missing, a chunk without a beginning, too long, nothing.
-    script.extend(load(&[7; 400], Payload::Model));
-    let mut holed = load(bad, Payload::Model);
+    script.extend(load(&[7; 400]));
+    let mut holed = load(bad);
     holed.remove(2);
     script.extend(holed);
     script.push(Step::Do(Command::Chunk { offset: 0, bytes: &[1] }));
-    script.push(Step::Do(Command::Begin { payload: Payload::Model, length: 30_000, checksum: 0 }));
+    script.push(Step::Do(Command::Begin { length: 30_000, checksum: 0 }));
     script.push(Step::Do(Command::Commit));
     script.extend(touches.iter().map(push));
     let mut desk = Desk::new(script, 0);
@@ -140,113 +136,69 @@ fn a_model_that_arrives_wrong_is_refused_and_the_old_one_stays() {
 }
 
 #[test]
-fn a_snapshot_taken_over_the_link_goes_on_in_another_chip_and_not_under_another_model() {
-    let bytes = model(1);
-    let touches = touches(30);
-    let mut script: Vec<Step> = touches[..10].iter().map(push).collect();
-    script.push(Step::Ask(Query::Snapshot { offset: 0 }));
-    let mut desk = Desk::new(script, 0);
-    Chip::new(bytes.clone()).run(&mut desk).unwrap();
-    let (_, list) = desk.answers[0].split_once('[').unwrap();
-    let snapshot: Vec<u8> = list.trim_end_matches([' ', ']', '}']).split(", ").map(|b| b.parse().unwrap()).collect();
-    let snapshot: &[u8] = snapshot.leak();
-    let mut script = load(snapshot, Payload::Snapshot);
-    script.extend(touches[10..].iter().map(push));
-    let mut desk = Desk::new(script.clone(), 0);
-    Chip::new(bytes.clone()).run(&mut desk).unwrap();
-    assert!(desk.outcomes.ends_with(&expected(&bytes, &touches)[10..]));
-    let mut desk = Desk::new(script, 0);
-    let other = model(2);
-    Chip::new(other.clone()).run(&mut desk).unwrap();
-    assert!(desk.outcomes.contains(&Outcome::Refused(Refusal::Invalid)));
-    assert!(desk.outcomes.ends_with(&expected(&other, &touches[10..])));
-}
-
-#[test]
-fn places_for_records_that_are_too_short_are_refused_at_once() {
-    let mut chip = Chip::new(model(1));
-    chip.records[1].truncate(record_length(8));
-    let mut desk = Desk::new(touches(3).iter().map(push), 0);
-    let Chip { built_in, models: [a, b], records: [c, d] } = &mut chip;
-    let mut memory = Memory { models: [a, b], records: [c, d] };
-    let (needed, found) = (record_length(OBJECTS), record_length(8));
-    let too_short = ServeError::Records(RecordsTooShort { needed, found });
-    assert_eq!(serve::<OBJECTS, _, _>(built_in, &mut memory, 0, &mut desk), Err(too_short));
-    assert!(desk.outcomes.is_empty());
-}
-
-#[test]
-fn a_record_of_another_model_is_dropped_with_its_evidence_and_its_session() {
+fn a_chip_that_was_reset_has_its_model_and_tells_the_host_that_evidence_and_session_are_gone() {
     let touches = touches(10);
     let (before, after) = touches.split_at(5);
-    let mut chip = Chip::new(model(1));
-    let mut desk = Desk::new(before.iter().map(push), 0);
+    let (built_in, loaded): (Vec<u8>, &[u8]) = (model(1), model(2).leak());
+    let mut chip = Chip::new(built_in);
+    let mut desk = Desk::new(load(loaded).into_iter().chain(before.iter().map(push)), 0);
     chip.run(&mut desk).unwrap();
-    // Another model was flashed. The host goes on, and has to be told that the chip does not.
-    chip.built_in = model(2);
+    let given = desk.outcomes.len();
+    // The host goes on, and nothing of its session counts.
     desk.may_fail = true;
     desk.script.extend(after.iter().map(push));
     chip.run(&mut desk).unwrap();
-    assert!(matches!(desk.failed, Some(LinkError::Forgotten { answered: 5, .. })), "{:?}", desk.failed);
+    assert_eq!(desk.outcomes.len(), given);
+    let Some(LinkError::Forgotten { answered, .. }) = desk.failed else { panic!("{:?}", desk.failed) };
+    assert_eq!(answered as usize, given);
     let mut desk = Desk::new(after.iter().map(push), 0);
     chip.run(&mut desk).unwrap();
-    assert_eq!(desk.outcomes, expected(&model(2), after));
+    assert_eq!(desk.outcomes, expected(loaded, after));
 }
 
 #[test]
 fn a_chip_without_room_for_models_does_not_ask_for_a_smaller_one() {
     let mut chip = Chip::new(model(1));
     chip.models = [Vec::new(), Vec::new()];
-    let begin = Command::Begin { payload: Payload::Model, length: 100, checksum: 0 };
+    let begin = Command::Begin { length: 100, checksum: 0 };
     let mut desk = Desk::new([Step::Do(begin)], 0);
     chip.run(&mut desk).unwrap();
     assert_eq!(desk.outcomes, [Outcome::Refused(Refusal::Unsupported)]);
 }
 
 #[test]
-fn through_power_cuts_and_torn_records_no_touch_is_lost_or_doubled() {
-    let loaded: &[u8] = model(1).leak();
-    let touches = touches(2_000);
-    // A fresh start for the recognizer now and then, so that it does not rest on its first verdict.
-    let mut script = load(loaded, Payload::Model);
-    let mut verdicts = Vec::new();
-    for touches in touches.chunks(17) {
-        script.push(Step::Do(Command::Reset));
-        script.extend(touches.iter().map(push));
-        verdicts.extend(expected(loaded, touches));
-    }
-    let mut chip = Chip::new(Vec::new());
-    let mut desk = Desk::new(script, 12);
-    let (mut cuts, mut torn) = (0, 0);
-    while let Err(PowerCut) = chip.run(&mut desk) {
-        cuts += 1;
-        // The power may have gone while the newest record was being written.
-        if std::mem::take(&mut desk.untold) && desk.rng.random_bool(0.5) {
-            torn += 1;
-            let newest = newest(&chip.records);
-            let length = usize::from(u16::from_le_bytes([chip.records[newest][0], chip.records[newest][1]]));
-            let from = desk.rng.random_range(0..length);
-            chip.records[newest][from] ^= 0x55;
-            let rest = from + 1..6 + length;
-            desk.rng.fill_bytes(&mut chip.records[newest][rest]);
-        }
-    }
-    assert!(cuts > 100 && torn > 30, "{cuts} {torn}");
-    assert_eq!(answers_to_touches(&desk), verdicts);
-    let is_refused = |outcome: &Outcome| matches!(outcome, Outcome::Refused(refusal) if !refusal.is_of_a_touch());
-    assert!(!desk.outcomes.iter().any(is_refused), "loading continues after a power cut");
-}
-
-/// The place of the newest record, by its counter: postcard's first number.
-fn newest(records: &[Vec<u8>; 2]) -> usize {
-    let counter = |record: &Vec<u8>| {
-        record[6..].iter().take(5).enumerate().try_fold(0_u64, |sum, (i, &byte)| {
-            let sum = sum | u64::from(byte & 0x7f) << (7 * i);
-            if byte & 0x80 == 0 { Err(sum) } else { Ok(sum) }
-        })
+fn a_load_that_the_power_cuts_anywhere_leaves_the_old_model_or_the_new_one() {
+    let (old, new): (&[u8], &[u8]) = (model(1).leak(), model(2).leak());
+    let is = |chip: &mut Chip, expected: &[u8]| {
+        let mut desk = Desk::new([Step::Ask(Query::Model)], 0);
+        chip.run(&mut desk).unwrap();
+        let checksum = u32::from_le_bytes(*expected.last_chunk().unwrap());
+        desk.answers[0].contains(&format!("checksum: {checksum},"))
     };
-    let [even, odd] = records.each_ref().map(|record| counter(record).unwrap_err());
-    usize::from(odd > even)
+    let (mut cuts, mut olds) = (0, 0);
+    for seed in 0..300 {
+        let mut chip = Chip::new(Vec::new());
+        chip.run(&mut Desk::new(load(old), 0)).unwrap();
+        let mut desk = Desk::new(load(new), 30);
+        desk.rng = rand::SeedableRng::seed_from_u64(seed);
+        if chip.run(&mut desk).is_ok() {
+            assert!(is(&mut chip, new));
+            continue;
+        }
+        cuts += 1;
+        // It may have gone in the midst of the newest record.
+        if is(&mut chip, new) && desk.rng.random_bool(0.5) {
+            let newest = chip.records.iter_mut().max_by_key(|record| record[8]).unwrap();
+            desk.rng.fill_bytes(&mut newest[seed as usize % RECORD_LENGTH..]);
+        }
+        let is_old = is(&mut chip, old);
+        olds += u32::from(is_old);
+        assert!(is_old || is(&mut chip, new), "seed {seed}");
+        // The load begins again.
+        chip.run(&mut Desk::new(load(new), 0)).unwrap();
+        assert!(is(&mut chip, new), "seed {seed}");
+    }
+    assert!(cuts > 50 && olds > 20, "{cuts} cuts, {olds} with the old model");
 }
 
 /// The error of a UART that lost or garbled a byte.
@@ -310,7 +262,7 @@ impl<F: FnMut(Call) -> bool> Write for Uart<'_, F> {
 fn served(touches: &[Touch], loses: bool, errs: impl FnMut(Call) -> bool) -> [u32; 2] {
     let bytes = model(1);
     let mut chip = Chip::new(bytes.clone());
-    let Chip { built_in, models: [a, b], records: [c, d] } = &mut chip;
+    let Chip { built_in, models: [a, b], records: [c, d], .. } = &mut chip;
     let mut desk = Desk::new(touches.iter().map(push), 0);
     let mut uart = Uart::new(&mut desk, loses, errs);
     serve::<OBJECTS, _, _>(built_in, &mut Memory { models: [a, b], records: [c, d] }, 0, &mut uart).unwrap();
@@ -342,19 +294,23 @@ fn a_uart_that_errs_before_every_byte_serves_all_touches() {
 }
 
 #[test]
-fn a_uart_that_only_errs_ends_the_program_and_its_storage_serves_on_over_another() {
+fn a_uart_that_only_errs_ends_the_program_which_begins_again_with_the_same_storage() {
     let (bytes, touches) = (model(1), touches(20));
     let mut chip = Chip::new(bytes.clone());
-    let Chip { built_in, models: [a, b], records: [c, d] } = &mut chip;
+    let Chip { built_in, models: [a, b], records: [c, d], .. } = &mut chip;
     let mut storage = Memory { models: [a, b], records: [c, d] };
     let mut desk = Desk::new(touches.iter().map(push), 0);
     let mut uart = Uart::new(&mut desk, true, |call| matches!(call, Call::Read(number) if number >= 500));
     let ended = serve::<OBJECTS, _, _>(built_in, &mut storage, 0, &mut uart);
-    assert_eq!((ended, uart.reads), (Err(ServeError::Transport(GARBLED)), 500 + u32::from(ERRORS_IN_A_ROW)));
+    assert_eq!((ended, uart.reads), (Err(GARBLED), 500 + u32::from(ERRORS_IN_A_ROW)));
     let before = desk.outcomes.len();
     assert!((1..touches.len()).contains(&before), "{before}");
     let mut uart = Uart::new(&mut desk, true, |_| false);
-    assert_eq!(serve::<OBJECTS, _, _>(built_in, &mut storage, 0, &mut uart), Ok(()));
+    uart.desk.may_fail = true;
+    assert_eq!(serve::<OBJECTS, _, _>(built_in, &mut storage, 1, &mut uart), Ok(()));
+    assert!(matches!(desk.failed, Some(LinkError::Forgotten { .. })), "{:?}", desk.failed);
+    let mut desk = Desk::new(touches.iter().map(push), 0);
+    assert_eq!(serve::<OBJECTS, _, _>(built_in, &mut storage, 2, &mut desk), Ok(()));
     assert_eq!(desk.outcomes, expected(&bytes, &touches));
 }
 
@@ -393,7 +349,7 @@ fn a_uart_on_which_nothing_can_be_sent_ends_the_program_although_bytes_come() {
     let frame = encode(&Frame { session: 1, message }, &mut [0; FRAME_MAX]).to_vec();
     let mut uart = Mute { frame, writes: 0 };
     let ended = serve::<OBJECTS, _, _>(&[], &mut NoStorage, 0, &mut uart);
-    assert_eq!((ended, uart.writes), (Err(ServeError::Transport(GARBLED)), u32::from(ERRORS_IN_A_ROW)));
+    assert_eq!((ended, uart.writes), (Err(GARBLED), u32::from(ERRORS_IN_A_ROW)));
 }
 
 /// A wire whose read is an error before every byte, and that is ready.
@@ -439,7 +395,7 @@ impl Write for Wire {
 
 #[test]
 fn both_ends_of_the_link_go_on_after_an_error_before_every_byte() {
-    let (mut host, mut end) = (HostEnd::new(HostSettings::default()), DeviceEnd::new(Progress::NONE, 1));
+    let (mut host, mut end) = (HostEnd::new(HostSettings::default()), DeviceEnd::new(1));
     let bytes = model(1);
     let model = palpate_onboard::Model::new(&bytes).unwrap();
     let mut station = Station::<OBJECTS>::new(&model);
@@ -465,11 +421,11 @@ fn a_loaded_model_of_more_objects_than_the_next_program_has_room_for_falls_back_
     let shape = Shape { thresholds: 40, leaf: 0.3, ..Shape::SMALL };
     let small = compile(&random::ensemble(shape, 1), &Settings::default()).unwrap().bytes;
     let mut chip = Chip::new(small.clone());
-    let mut desk = Desk::new(load(model(1).leak(), Payload::Model), 0);
+    let mut desk = Desk::new(load(model(1).leak()), 0);
     chip.run(&mut desk).unwrap();
     assert_eq!(desk.outcomes.last(), Some(&Outcome::Done));
     let touches = touches(3);
-    let Chip { built_in, models: [a, b], records: [c, d] } = &mut chip;
+    let Chip { built_in, models: [a, b], records: [c, d], .. } = &mut chip;
     let mut desk = Desk::new(touches.iter().map(push), 0);
     serve::<4, _, _>(built_in, &mut Memory { models: [a, b], records: [c, d] }, 0, &mut desk).unwrap();
     assert_eq!(desk.outcomes, expected(&small, &touches));

@@ -1,12 +1,10 @@
 //! The test vectors of the model format: the chip's recognizer gives what they say. `c_header` holds the C header to the
 //! recognizer on all of their models.
 
-use palpate_onboard::{
-    Model, Recognizer, Refused, RowsSeen, SNAPSHOT_LENGTH, SnapshotError, Stopping, Verdict, exp2_negative,
-};
+use palpate_onboard::{Model, Recognizer, Refused, RowsSeen, Stopping, Verdict, exp2_negative};
 use palpate_shared::format::{HEADER_LENGTH, MUST_UNDERSTAND, Temperature, checksum, f32_key};
 use palpate_tests::abuse;
-use palpate_tests::vectors::{Cut, bytes, hex, numbers, read_numbers, read_touch, refusal};
+use palpate_tests::vectors::{Cut, bytes, numbers, read_numbers, read_touch, refusal};
 use std::collections::BTreeSet;
 
 const VECTORS: &str = include_str!("../../../shared/vectors/vectors.txt");
@@ -61,16 +59,6 @@ impl<'m> Known<'m> {
             Err(Refused::Guarded(feature, _)) => self.guarded = Some(feature.into()),
             Err(refused) => panic!("{refused}"),
         }
-    }
-
-    fn restore(&mut self, words: &str) {
-        let (digits, answer) = words.split_once(' ').unwrap();
-        let found = match self.recognizer.restore(&bytes(digits)) {
-            Ok(()) => "ok",
-            Err(SnapshotError::OtherModel) => "other",
-            Err(_) => "damaged",
-        };
-        assert_eq!(found, answer);
     }
 
     /// Cuts a part of the model at every length, and returns how many there are.
@@ -131,10 +119,6 @@ impl<'m> Known<'m> {
                 let [output, posterior, share] = numbers[..] else { panic!("three numbers") };
                 let found = self.recognizer.posterior_together(output as usize);
                 assert_eq!((found.0.q56(), found.1.q56()), (posterior, share));
-            }
-            "snapshot" => {
-                let mut buffer = [0; SNAPSHOT_LENGTH + 2_560];
-                assert_eq!(hex(self.recognizer.snapshot(&mut buffer).unwrap()), words);
             }
             _ => panic!("an unknown word"),
         }
@@ -213,7 +197,6 @@ fn the_recognizer_gives_what_the_vectors_say() {
                     counts[1] += 1;
                     known.next(words);
                 }
-                "restore" => known.restore(words),
                 "reset" => {
                     known.recognizer.reset();
                     known.seen.reset();

@@ -5,9 +5,9 @@ use crate::fixtures::{LOCATED, ONE_SPLIT};
 use crate::locate::{of_one_placement, recognized};
 use crate::{command, complains, fails, figures, json, lines, listen, piped, run, says, stderr, stdout, succeeds};
 use palpate_onboard::Model;
-use palpate_onboard::station::{Memory, NoStorage, Station, Table, record_length, serve, serve_with};
+use palpate_onboard::station::{Memory, NoStorage, RECORD_LENGTH, Station, Table, serve, serve_with};
 use palpate_shared::Touch;
-use palpate_shared::link::{DeviceEnd, Event, FaultKind, Progress, Refusal, TouchMessage};
+use palpate_shared::link::{DeviceEnd, Event, FaultKind, Refusal, TouchMessage};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
@@ -25,7 +25,7 @@ fn chip_of(room: usize, serve: impl FnOnce(&mut Memory<'_>, &mut Wire) + Send + 
     port(move |stream| {
         stream.set_nodelay(true).unwrap();
         let [mut a, mut b] = [(); 2].map(|()| vec![0; room]);
-        let [mut c, mut d] = [(); 2].map(|()| vec![0; record_length(OBJECTS)]);
+        let [mut c, mut d] = [[0; RECORD_LENGTH]; 2];
         // It ends with an error where the host hangs up in the middle of something.
         serve(&mut Memory { models: [&mut a, &mut b], records: [&mut c, &mut d] }, &mut Wire(stream));
     })
@@ -156,7 +156,7 @@ fn bad_arguments_of_link_exit_with_2() {
 fn chip_with_fingers(bytes: Vec<u8>) -> String {
     port(move |mut stream| {
         let mut station = Station::<OBJECTS>::new(&Model::new(&bytes).unwrap());
-        let mut end = DeviceEnd::new(Progress::NONE, 1);
+        let mut end = DeviceEnd::new(1);
         let mut buffer = [0; 256];
         stream.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
         while let Ok(count @ 1..) = stream.read(&mut buffer) {

@@ -5,8 +5,7 @@ use crate::{
 };
 use palpate::touches::Dataset;
 use palpate_shared::link::{
-    Decision, Device, DeviceEnd, Event, FaultKind, ModelInfo, Outcome, Payload, Progress, Refusal, TouchMessage,
-    VerdictMessage,
+    Decision, Device, DeviceEnd, Event, FaultKind, ModelInfo, Outcome, Refusal, TouchMessage, VerdictMessage,
 };
 use palpate_shared::{ContactTime, Touch};
 use serde_json::json as value;
@@ -129,7 +128,7 @@ impl Device for Fingers {
         Outcome::Refused(Refusal::NoModel)
     }
 
-    fn begin(&mut self, _: Payload, _: u32, _: u32) -> Outcome {
+    fn begin(&mut self, _: u32, _: u32) -> Outcome {
         Outcome::Refused(Refusal::Unsupported)
     }
 
@@ -152,10 +151,6 @@ impl Device for Fingers {
 
     fn posterior(&self, _: u8) -> Option<u64> {
         None
-    }
-
-    fn snapshot(&mut self, _: u32, _: &mut [u8]) -> Result<(u32, usize), Refusal> {
-        Err(Refusal::Unsupported)
     }
 
     fn program(&self) -> &str {
@@ -214,7 +209,7 @@ fn record_chip(at: &Path, chip: impl FnOnce(&TcpListener) + Send + 'static, more
 fn chip(events: Vec<Event>) -> impl FnOnce(&TcpListener) + Send + 'static {
     move |listener: &TcpListener| {
         let (mut stream, _) = listener.accept().unwrap();
-        serve(&mut stream, &mut DeviceEnd::new(Progress::NONE, 1), &events);
+        serve(&mut stream, &mut DeviceEnd::new(1), &events);
         wait(&mut stream);
     }
 }
@@ -223,7 +218,7 @@ fn chip(events: Vec<Event>) -> impl FnOnce(&TcpListener) + Send + 'static {
 fn a_pulled_cable_neither_loses_a_reported_touch_nor_doubles_one() {
     let at = &Folder::new();
     let chip = |listener: &TcpListener| {
-        let mut end = DeviceEnd::new(Progress::NONE, 5);
+        let mut end = DeviceEnd::new(5);
         let (mut stream, _) = listener.accept().unwrap();
         let before: Vec<Event> = (1..=5).map(event).collect();
         serve(&mut stream, &mut end, &before);
@@ -272,24 +267,6 @@ fn each_touch_is_printed_and_a_second_recording_of_the_object_is_added() {
         assert_eq!(stdout(output), expected);
     }
     assert_eq!(Dataset::read_any(&at.join("recorded")).unwrap().len(), 6);
-}
-
-#[test]
-fn a_touch_that_the_chip_tells_again_from_before_the_recording_is_said_and_not_recorded() {
-    let at = &Folder::new();
-    let chip = |listener: &TcpListener| {
-        let (mut stream, _) = listener.accept().unwrap();
-        // Another object was touched, and the chip switched off. It starts while the host asks who is there.
-        let mut before = DeviceEnd::new(Progress::NONE, 1);
-        before.report(event(1), &mut Fingers { greeted: Cell::new(false) }, |_| ());
-        let mut end = DeviceEnd::new(before.progress().clone(), 2);
-        end.start(|frame| stream.write_all(frame).unwrap());
-        serve(&mut stream, &mut end, &[event(4)]);
-        wait(&mut stream);
-    };
-    let (_, said, _) = record_chip(at, chip, "--stop-after 1");
-    assert!(said.contains("warning: a touch from before this recording was told again, and not recorded"), "{said}");
-    assert_eq!(Dataset::read_any(&at.join("recorded")).unwrap().objects[0].touches(), [touch(4)]);
 }
 
 #[test]

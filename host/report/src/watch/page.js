@@ -151,7 +151,6 @@
       if (!earlier) draw(times);
     },
     fault: ({ finger, what }) => enter("", dashes, `fault: ${finger === null ? "" : `${FINGERS[finger]}: `}${what}`, "fault"),
-    "not-stored": () => enter("", dashes, "the chip cannot store its state any more: a reset forgets what follows", "fault"),
     started: () => {
       last = null;
       enter("", dashes, "the chip was started", "fault");

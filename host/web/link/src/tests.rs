@@ -1,6 +1,6 @@
 use super::*;
 use palpate_shared::ContactTime;
-use palpate_shared::link::{Device, DeviceEnd, FaultKind, Payload, Progress, VERSION};
+use palpate_shared::link::{Device, DeviceEnd, FaultKind, VERSION};
 
 const NAMES: [&str; 18] = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l", "m", "n", "o", "p", "q", "r"];
 
@@ -21,7 +21,7 @@ impl Device for Chip {
         Outcome::Done
     }
 
-    fn begin(&mut self, _: Payload, _: u32, _: u32) -> Outcome {
+    fn begin(&mut self, _: u32, _: u32) -> Outcome {
         Outcome::Refused(Refusal::Unsupported)
     }
 
@@ -48,10 +48,6 @@ impl Device for Chip {
     fn posterior(&self, object: u8) -> Option<u64> {
         (object < 18).then_some(u64::from(object) << 51)
     }
-
-    fn snapshot(&mut self, _: u32, _: &mut [u8]) -> Result<(u32, usize), Refusal> {
-        Err(Refusal::Unsupported)
-    }
 }
 
 /// A watch and a chip with a line between them.
@@ -65,7 +61,7 @@ struct Desk {
 impl Desk {
     fn new(has_model: bool) -> Self {
         let chip = Chip { has_model, resets: 0 };
-        Self { watch: Watch::default(), end: DeviceEnd::new(Progress::NONE, 1), chip, now: 0 }
+        Self { watch: Watch::default(), end: DeviceEnd::new(1), chip, now: 0 }
     }
 
     /// Has the watch do something, and both ends talk until they have nothing more to say.
@@ -179,12 +175,12 @@ fn reports_that_are_lost_are_counted_also_those_while_the_line_was_gone() {
 fn a_chip_that_was_started_is_asked_for_its_model_again_and_tells_what_was_before() {
     let mut desk = Desk::new(true);
     desk.connect();
-    desk.end = DeviceEnd::new(Progress::NONE, 2);
+    desk.end = DeviceEnd::new(2);
     let heard = desk.tell(Event::Started);
     assert_eq!(heard[0], Happening::Started);
     assert!(heard.contains(&posteriors()) && heard.iter().any(|heard| matches!(heard, Happening::Model { .. })));
     // A late one of the start before.
-    let mut late = DeviceEnd::new(Progress::NONE, 1);
+    let mut late = DeviceEnd::new(1);
     let mut told = Vec::new();
     late.tell(touch(Decision::Undecided), |frame| told.extend(frame));
     let heard = desk.act(|watch, now, line| watch.receive(&told, now, line));

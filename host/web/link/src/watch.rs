@@ -40,8 +40,6 @@ pub(crate) enum Happening {
     Refused { times: Times, why: String, earlier: bool },
     /// A finger is faulty: 0, 1 or 2; none if it is not the fault of one finger.
     Fault { finger: Option<u8>, what: String },
-    /// The chip cannot store its state any more.
-    NotStored,
     /// The chip was started.
     Started,
     /// The chip has forgotten its touches, as it was told.
@@ -281,7 +279,6 @@ fn told(event: &Event, earlier: bool) -> Happening {
         Event::Fault { kind, finger } => {
             Happening::Fault { finger: (*finger < 3).then_some(*finger), what: kind.to_string() }
         }
-        Event::NotStored => Happening::NotStored,
         Event::Started => Happening::Started,
         _ => Happening::Fault { finger: None, what: "the chip reports something that this page does not know".into() },
     }

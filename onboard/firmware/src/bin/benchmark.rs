@@ -9,10 +9,10 @@ use cortex_m_rt::entry;
 use palpate_firmware::meter::{self, Meter};
 use palpate_firmware::{exit, fail, println, sections::Sections};
 use palpate_onboard::effector::{Edge, Effector, Finger, Geometry, Scale, Settings};
-use palpate_onboard::station::{Memory, Station, record_length, serve};
+use palpate_onboard::station::{NoStorage, Station, serve};
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::link::{
-    Command, Decoder, Detail, Device, DeviceEnd, FRAME_MAX, Frame, Message, Progress, TouchMessage, encode,
+    Command, Decoder, Detail, Device, DeviceEnd, FRAME_MAX, Frame, Message, TouchMessage, encode,
 };
 use palpate_shared::{Descriptor, Pose, Touch};
 
@@ -111,13 +111,12 @@ fn recognizer(meter: &mut Meter, model: &Model<'_>, touch: &Touch) {
         recognizer.push(black_box(touch))
     });
     cost!(meter, "recognizer: a posterior", || recognizer.posterior(black_box(3)));
-    cost!(meter, "recognizer: a snapshot", || recognizer.snapshot(&mut [0; 256]).map(<[u8]>::len));
 
     let mut station = Station::<OBJECTS>::new(model);
     let evidence = [1_i64; 10];
     cost!(meter, "station: detail for parity", || Detail::new(black_box(5), black_box(&evidence)));
     cost!(meter, "station: a touch", || station.touch(black_box(touch), false));
-    let mut end = DeviceEnd::new(Progress::NONE, 0);
+    let mut end = DeviceEnd::new(0);
     let mut sequence = 0;
     for (name, detail) in [("without detail", false), ("with detail", true)] {
         let mut by_link = || {
@@ -136,16 +135,11 @@ fn recognizer(meter: &mut Meter, model: &Model<'_>, touch: &Touch) {
     whole(meter, touch);
 }
 
-/// The whole program, with records.
+/// The whole program.
 fn whole(meter: &mut Meter, touch: &Touch) {
-    let mut records = [[0_u8; record_length(OBJECTS)]; 2];
-    let [first, second] = &mut records;
-    let mut run = |touches: u32| {
-        first.fill(0);
-        second.fill(0);
-        let mut memory = Memory { models: [&mut [], &mut []], records: [first, second] };
+    let run = |touches: u32| {
         let mut wire = Wire { touch, touches, sequence: 0, frame: [0; FRAME_MAX], at: 0, length: 0 };
-        match serve::<OBJECTS, _, _>(MODEL, &mut memory, 0, &mut wire) {
+        match serve::<OBJECTS, _, _>(MODEL, &mut NoStorage, 0, &mut wire) {
             Ok(()) => wire.sequence,
             Err(_) => fail(),
         }
@@ -154,7 +148,7 @@ fn whole(meter: &mut Meter, touch: &Touch) {
     let [few, many] = [100, 300].map(|touches| meter.measure(|| run(touches)));
     let touch = (many - few) / 200;
     println!("{:44} {:8} {:6}", "serve: start, the model checked", few.saturating_sub(100 * touch), stack);
-    println!("{:44} {:8} {:6}", "serve: a touch with detail, and its record", touch, stack);
+    println!("{:44} {:8} {:6}", "serve: a touch with detail", touch, stack);
 
     /// A host that sends touches, each once.
     struct Wire<'t> {

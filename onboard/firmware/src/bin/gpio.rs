@@ -1,5 +1,5 @@
 //! Recognizes from three switches on three pins, and reports every touch and fault to a host over the UART
-//! (`palpate link PORT`). A verdict ends an object; the next touch begins another. What was touched is kept through resets.
+//! (`palpate link PORT`). A verdict ends an object; the next touch begins another.
 //!
 //! A model is built in; another: `PALPATE_MODEL=/path/to/model.palpate cargo build --release --bin gpio`, or over the
 //! link: `palpate link PORT --load model.palpate`.
@@ -13,7 +13,7 @@ use palpate_firmware::chip::{self, Interrupt};
 use palpate_firmware::pins;
 use palpate_firmware::uart::{Port, Uart};
 use palpate_onboard::effector::Sensed;
-use palpate_onboard::station::{Board, ProbeSettings, ProbeStation, record_length};
+use palpate_onboard::station::{Board, ProbeSettings, ProbeStation};
 
 static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
 /// Name of the program on the link.
@@ -47,9 +47,9 @@ impl Board for Chip {
 #[entry]
 fn main() -> ! {
     let mut chip = Chip(Uart::take(Port::Link));
-    let memory = chip::take_memory(record_length(OBJECTS));
-    let settings = ProbeSettings { program: PROGRAM, ..ProbeSettings::default() };
-    let Ok(mut station) = ProbeStation::<OBJECTS, _>::open(MODEL, memory, settings) else { palpate_firmware::fail() };
+    let memory = chip::take_memory();
+    let settings = ProbeSettings { boot: chip::count_start(), program: PROGRAM, ..ProbeSettings::default() };
+    let mut station = ProbeStation::<OBJECTS, _>::open(MODEL, memory, settings);
     if station.model().is_none() {
         palpate_firmware::println!("no model is built in: build with PALPATE_MODEL=/path/to/model.palpate");
         palpate_firmware::fail()

@@ -5,9 +5,7 @@
 
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use palpate_onboard::shared::link::{
-    Decision, Device, DeviceEnd, ModelInfo, Outcome, Payload, Progress, Refusal, VerdictMessage,
-};
+use palpate_onboard::shared::link::{Decision, Device, DeviceEnd, ModelInfo, Outcome, Refusal, VerdictMessage};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
 
@@ -34,7 +32,7 @@ impl Device for Chip<'_> {
         Outcome::Done
     }
 
-    fn begin(&mut self, _: Payload, _: u32, _: u32) -> Outcome {
+    fn begin(&mut self, _: u32, _: u32) -> Outcome {
         Outcome::Refused(Refusal::Unsupported)
     }
 
@@ -57,10 +55,6 @@ impl Device for Chip<'_> {
     fn posterior(&self, object: u8) -> Option<u64> {
         Some(self.0.posterior(object.into()).q56())
     }
-
-    fn snapshot(&mut self, _: u32, _: &mut [u8]) -> Result<(u32, usize), Refusal> {
-        Err(Refusal::Unsupported)
-    }
 }
 
 #[entry]
@@ -70,7 +64,7 @@ fn main() -> ! {
         && let Ok(recognizer) = Recognizer::<10>::new(model, Stopping::from_model(model))
     {
         let mut chip = Chip(recognizer);
-        let mut end = DeviceEnd::new(Progress::NONE, 0);
+        let mut end = DeviceEnd::new(0);
         loop {
             end.receive(black_box(&[0; 32]), &mut chip, |frame| {
                 black_box(frame);

@@ -1,4 +1,4 @@
-//! A [`ProbeStation`] with effector and link, models and records in flash: links only if nothing in it can panic; its size is
+//! A [`ProbeStation`] with effector and link, and models in flash: links only if nothing in it can panic; its size is
 //! what all that takes.
 #![no_std]
 #![no_main]
@@ -8,7 +8,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use palpate_onboard::effector::Sensed;
-use palpate_onboard::station::{Board, FlashStorage, MappedFlash, ProbeSettings, ProbeStation, record_length};
+use palpate_onboard::station::{Board, FlashStorage, MappedFlash, ProbeSettings, ProbeStation};
 
 #[path = "../no_panic.rs"]
 mod no_panic;
@@ -77,9 +77,8 @@ impl MappedFlash for Anything {
 #[entry]
 fn main() -> ! {
     let bytes: &'static [u8] = black_box(&[]);
-    if let Ok(storage) = FlashStorage::<_, { record_length(10) }>::new(Anything, black_box(8192))
-        && let Ok(mut station) = ProbeStation::<10, _>::open(bytes, storage, ProbeSettings::default())
-    {
+    if let Ok(storage) = FlashStorage::new(Anything) {
+        let mut station = ProbeStation::<10, _>::open(bytes, storage, ProbeSettings::default());
         loop {
             let _ = black_box(station.step(&mut Anything));
             black_box(station.wait(0));

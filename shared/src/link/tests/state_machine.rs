@@ -1,4 +1,4 @@
-//! Two hosts and three chips against a simple specification, through everything that a line, resets and power cuts can do:
+//! Two hosts and three chips against a simple specification, through everything that a line and resets can do:
 //! each touch counts at most once; every touch that a host believes to be counted is counted, or the host is told; no host
 //! hears of a chip's own touch twice.
 //!
@@ -10,7 +10,7 @@ use crate::link::*;
 use crate::{Approach, Pose, TablePose, Touch};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
-use std::{vec, vec::Vec};
+use std::vec::Vec;
 
 const HOSTS: usize = 2;
 const CHIPS: usize = 3;
@@ -35,11 +35,8 @@ enum Action {
     DeliverOldest,
     /// The frame in this place is lost.
     Lose(u16),
-    /// A chip is reset and has kept nothing.
+    /// A chip is reset.
     Reset(usize),
-    /// The power goes and comes back, and a chip goes on from its record. Before that its own fingers may have touched: then
-    /// it goes after the record was stored and before anything was told.
-    Cut(usize, bool),
     /// A chip's own fingers touch.
     Touch(usize),
     /// Time passes: due messages are sent again.
@@ -56,8 +53,7 @@ fn action() -> impl Strategy<Value = Action> {
         14 => (any::<u16>(), proptest::bool::weighted(0.2)).prop_map(|(place, again)| Action::Deliver(place, again)),
         24 => Just(Action::DeliverOldest),
         4 => any::<u16>().prop_map(Action::Lose),
-        1 => chip.clone().prop_map(Action::Reset),
-        1 => (chip.clone(), any::<bool>()).prop_map(|(chip, touches)| Action::Cut(chip, touches)),
+        2 => chip.clone().prop_map(Action::Reset),
         4 => chip.prop_map(Action::Touch),
         8 => (1..60_000_u32).prop_map(Action::Wait),
     ]
@@ -69,8 +65,6 @@ struct Chip {
     notebook: Notebook,
     life: u32,
     touches: u32,
-    /// Resets of all chips when its own fingers touched last.
-    touched: u32,
 }
 
 /// The place of this rank.
@@ -137,8 +131,8 @@ fn scatter(number: u32) -> u32 {
 impl World {
     fn new() -> Self {
         let chip = |number: u32| {
-            let end = DeviceEnd::new(Progress::NONE, scatter(number));
-            Chip { end, notebook: Notebook::default(), life: number, touches: 0, touched: 0 }
+            let end = DeviceEnd::new(scatter(number));
+            Chip { end, notebook: Notebook::default(), life: number, touches: 0 }
         };
         let host = |chip| Host {
             end: HostEnd::new(HostSettings { retry: 20_000, attempts: 12 }),
@@ -232,16 +226,7 @@ impl World {
             Action::Lose(place) => {
                 self.under_way.swap_remove(usize::from(place) % self.under_way.len());
             }
-            Action::Reset(chip) => self.start(chip, Progress::NONE, Notebook::default()),
-            Action::Cut(chip, touches) => {
-                // A host does not remember starts for ever, and takes for news what was told before all that it remembers.
-                if touches || self.resets - self.chips[chip].touched >= LATEST {
-                    self.touch(chip);
-                }
-                let Chip { end, notebook, .. } = &mut self.chips[chip];
-                let (progress, notebook) = (end.progress().clone(), std::mem::take(notebook));
-                self.start(chip, progress, notebook);
-            }
+            Action::Reset(chip) => self.start(chip),
             Action::Touch(chip) => {
                 let frames = self.touch(chip);
                 self.up(chip, frames);
@@ -255,30 +240,29 @@ impl World {
         }
     }
 
-    /// A chip starts, with its stored state.
-    fn start(&mut self, chip: usize, progress: Progress, notebook: Notebook) {
+    /// A chip starts.
+    fn start(&mut self, chip: usize) {
         self.resets += 1;
         // No line holds frames for longer than that.
         let resets = self.resets;
         self.under_way.retain(|frame| resets - frame.resets < LATEST);
         let life = u32::try_from(CHIPS).unwrap() + resets;
-        let mut end = DeviceEnd::new(progress, scatter(life));
+        let mut end = DeviceEnd::new(scatter(life));
         let mut frames = Vec::new();
         end.start(|frame| frames.push(frame.to_vec()));
-        let touched = self.chips[chip].touched;
-        self.chips[chip] = Chip { end, notebook, life, touches: 0, touched };
+        self.chips[chip] = Chip { end, notebook: Notebook::default(), life, touches: 0 };
         self.up(chip, frames);
     }
 
     /// A chip's own fingers touch; returns its report.
     fn touch(&mut self, chip: usize) -> Vec<Vec<u8>> {
-        let Chip { end, notebook, life, touches, touched, .. } = &mut self.chips[chip];
-        (*touches, *touched) = (*touches + 1, self.resets);
+        let Chip { end, life, touches, .. } = &mut self.chips[chip];
+        *touches += 1;
         // The event says which life it is from.
         let touch = TouchMessage::from(&Touch::from_micros([0, *life, *touches]));
         let verdict = VerdictMessage { decision: Decision::Undecided, best: 0, touches: *touches, detail: None };
         let mut frames = Vec::new();
-        end.report(Event::Touch { touch, pose_age: None, verdict }, notebook, |frame| frames.push(frame.to_vec()));
+        end.tell(Event::Touch { touch, pose_age: None, verdict }, |frame| frames.push(frame.to_vec()));
         frames
     }
 

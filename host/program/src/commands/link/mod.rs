@@ -17,7 +17,6 @@ use palpate::output::{print, print_json};
 use palpate::progress::Progress;
 use palpate::touches::{Log, is_log};
 use palpate::{Error, Result};
-use palpate_shared::format::SignedModel;
 use palpate_shared::link::{Decision, Event, HostSettings, Refusal, VerdictMessage};
 use std::io::BufReader;
 use std::ops::ControlFlow;
@@ -89,12 +88,12 @@ pub(crate) struct Arguments {
 impl Arguments {
     /// Opens a session, and loads the model if there is one to load.
     fn open(&self) -> Result<(Connection, Option<Vec<u8>>)> {
-        let loaded = self.load.as_deref().map(with_signature).transpose()?;
+        let loaded = self.load.as_deref().map(model_of_touches).transpose()?;
         let mut connection = self.line.open(&self.port)?;
-        if let Some((bytes, _)) = &loaded {
+        if let Some(bytes) = &loaded {
             connection.load(bytes, &Bar::new())?;
         }
-        Ok((connection, loaded.map(|(_, model)| model)))
+        Ok((connection, loaded))
     }
 
     /// The question to a chip with this model after each touch.
@@ -141,17 +140,6 @@ fn model_of_touches(path: &Path) -> Result<Vec<u8>> {
         Some(_) => Ok(compiled.bytes().to_vec()),
         None => Err(Error::at(Place::file(path), ChipProblem::Rows)),
     }
-}
-
-/// Bytes to load, and the model in them, which a signature may follow.
-fn with_signature(path: &Path) -> Result<(Vec<u8>, Vec<u8>)> {
-    let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read the model", error))?;
-    let model = match SignedModel::read(&bytes) {
-        // The chip checks it.
-        Some(signed) => signed.model.to_vec(),
-        None => return model_of_touches(path).map(|model| (model.clone(), model)),
-    };
-    Ok((bytes, model))
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
@@ -207,7 +195,6 @@ fn own_fingers(connection: &mut Connection, chip: &ChipModel, arguments: &Argume
     while arguments.stop_after != Some(touches) {
         let (event, missed) = match connection.hear(Duration::from_millis(50))? {
             Some(Received::Event(event, missed)) => (event, missed),
-            Some(Received::Earlier(event)) => (event, 0),
             _ => continue,
         };
         if missed > 0 {

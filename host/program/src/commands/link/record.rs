@@ -84,9 +84,6 @@ pub(crate) fn from_chip(
             RecordEvent::Touch { touch, number, verdict } => {
                 say(json, &format!("{}\n", line(*number, touch, said(verdict, &names).as_deref())))?;
             }
-            RecordEvent::Earlier(_) => {
-                remark("palpate: warning: a touch from before this recording was told again, and not recorded");
-            }
             RecordEvent::NoPose(_) => remark("palpate: warning: a touch without a pose was not recorded"),
             RecordEvent::Fault { kind, finger } => remark(&format!("palpate: warning: {}", fault(*kind, *finger))),
             RecordEvent::Missed(missed) => {

@@ -162,7 +162,7 @@ async fn main(_spawner: Spawner) {
     ABOVE.start(interrupt::SWI_IRQ_1).spawn(watch);
     let mut pico = Pico { over, was_over: false, uart, received: [0; 32], count: 0 };
     let settings = ProbeSettings { boot: RoscRng.next_u32(), program: PROGRAM, ..ProbeSettings::default() };
-    let Ok(mut station) = ProbeStation::<OBJECTS>::open(MODEL, NoStorage, settings) else { return };
+    let mut station = ProbeStation::<OBJECTS>::open(MODEL, NoStorage, settings);
     loop {
         // What could not be sent the host asks for again.
         let happened = station.step(&mut pico).unwrap_or_else(|failed| failed.happened);

@@ -7,8 +7,8 @@
 //! | GP0, GP1 | UART to the host, 115,200 baud: `palpate link /dev/ttyUSB0` |
 //! | GP25 | the Pico's LED: lit from a recognition to the next touch |
 //!
-//! The host may load another model (`palpate link /dev/ttyUSB0 --load model.palpate`), which is kept in flash, as is what
-//! was touched. For another probe than the model's: its measures in [`PROBE`] and [`MODEL_PROBE`].
+//! The host may load another model (`palpate link /dev/ttyUSB0 --load model.palpate`), which is kept in flash.
+//! For another probe than the model's: its measures in [`PROBE`] and [`MODEL_PROBE`].
 #![no_std]
 #![no_main]
 
@@ -24,7 +24,7 @@ use hal::uart::{DataBits, StopBits, UartConfig, UartPeripheral};
 use hal::{Clock as _, Timer, fugit::RateExtU32, pac};
 use line::Sender;
 use palpate_onboard::effector::{Geometry, Scale, Sensed};
-use palpate_onboard::station::{Board, FlashStorage, Happened, ProbeSettings, ProbeStation, record_length};
+use palpate_onboard::station::{Board, FlashStorage, Happened, ProbeSettings, ProbeStation};
 use panic_halt as _;
 use rp2040_hal as hal;
 
@@ -33,8 +33,6 @@ static MODEL: &[u8] = palpate_onboard::include_model!(env!("PALPATE_MODEL"));
 const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 /// Objects that the model may have.
 const OBJECTS: usize = 16;
-/// Bytes of flash for records: more wear longer.
-const LOG: usize = 1 << 20;
 /// The crystal on a Pico.
 const CRYSTAL_HZ: u32 = 12_000_000;
 
@@ -100,10 +98,10 @@ fn run() -> Option<Infallible> {
     let uart = UartPeripheral::new(pac.UART0, wires, resets).enable(config, clocks.peripheral_clock.freq()).ok()?;
     let mut led = pins.gpio25.into_push_pull_output();
 
-    let storage = FlashStorage::<_, { record_length(OBJECTS) }>::new(flash::Flash::take()?, LOG).ok()?;
+    let storage = FlashStorage::new(flash::Flash::take()?).ok()?;
     let settings =
         ProbeSettings { scale: Scale::new(MODEL_PROBE, PROBE)?, boot, program: PROGRAM, ..ProbeSettings::default() };
-    let mut station = ProbeStation::<OBJECTS, _>::open(MODEL, storage, settings).ok()?;
+    let mut station = ProbeStation::<OBJECTS, _>::open(MODEL, storage, settings);
     let switches = (pins.gpio2.reconfigure(), pins.gpio3.reconfigure(), pins.gpio4.reconfigure());
     let (line, sender) = line::open(uart, pac.DMA, resets);
     shared::start(switches, pins.gpio5.reconfigure(), line, timer.alarm_0()?, timer);
