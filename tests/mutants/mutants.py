@@ -59,7 +59,7 @@ LEFT_OUT = [
     r"^host/src/capture/(admission|store)\.rs",
     r"resume|shard|checkpoint",
     r"^host/src/touches/(captured|checksum|shard|save|format|no_mcap|files|parquet/.*|mcap/write)",
-    r"^host/simulator/src/mesh/(builtin/|scan/|no_builtin|facts/mod|facts/gaps)",
+    r"^host/simulator/src/mesh/(builtin/|no_builtin|facts/mod|facts/gaps)",
     r"/sweep/(precision|budget)|probe/cast",
     r"Cloud|instances|complaints|::verdict.*mesh|guess",
 ]

@@ -34,7 +34,7 @@ Examples:
                                                    and where the hand was
   palpate capture meshes/ -o part2 --shard 2/8     the second of eight parts")]
 pub(crate) struct Arguments {
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), directories of them
     #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
     /// Output; a directory for the touches

@@ -41,7 +41,7 @@ Examples:
                                                 ten objects on a table
   palpate view --port -o chip.html              a chip, without a program")]
 pub(crate) struct Arguments {
-    /// A built-in object's name, a mesh (OBJ, STL, PLY, glTF, COLLADA) or scan (PLY, PCD, XYZ); touches with a position (TXT), one or two; with --play several, or directories
+    /// A built-in object's name, a mesh (OBJ, STL, PLY, glTF, COLLADA); touches with a position (TXT), one or two; with --play several, or directories
     #[arg(value_name = "SOURCE", required_unless_present_any = ["play", "port"])]
     sources: Vec<String>,
     /// Output; the page
@@ -119,8 +119,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     )?;
     output::write_bytes(output, page.as_bytes())?;
     let facts = Facts::of(object.mesh());
-    let complaints = object.complaints(&facts);
-    let verdict = view::verdict(&object, &facts, length, &probe);
+    let complaints = facts.complaints(object.millimeters);
+    let verdict = view::verdict(&facts, length, &probe);
     if global.json {
         return output::print_json_about(output, &Shown { page: output, object: &object.name, complaints, verdict });
     }

@@ -24,7 +24,6 @@ mod probe;
 mod record;
 mod reports;
 mod rows;
-mod scan;
 mod sequences;
 mod shards;
 mod strangers;

@@ -36,8 +36,6 @@ mod precision;
 mod probe_file;
 mod random;
 mod samples;
-#[cfg(feature = "scans")]
-mod scan;
 mod scene;
 mod source;
 mod stl;

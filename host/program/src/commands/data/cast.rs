@@ -23,7 +23,7 @@ Examples:
   palpate data cast cup.obj casts.csv -o ours.csv  write them, compare the times
   palpate data cast cup.obj casts.csv --as-is      a mesh in units of the probe")]
 pub(super) struct Arguments {
-    /// The mesh (OBJ, STL, PLY, glTF, COLLADA) or scan (PLY, PCD, XYZ)
+    /// The mesh (OBJ, STL, PLY, glTF, COLLADA)
     #[arg(value_name = "MESH")]
     mesh: PathBuf,
     /// The casts

@@ -22,7 +22,7 @@ enum Command {
     Check(check::Arguments),
     /// Record touches of a real probe: from lines, a log, or a chip
     Record(Box<record::Arguments>),
-    /// Write built-in objects, meshes or surfaces of scans as OBJ files
+    /// Write built-in objects, meshes or maps of touched objects as OBJ files
     Objects(Box<objects::Arguments>),
     /// Move spheres against a mesh as a file says, to compare the simulator with another engine
     #[command(hide = true)]

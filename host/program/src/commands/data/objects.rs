@@ -21,13 +21,12 @@ Examples:
   palpate data objects fork -o meshes               one of them
   palpate data objects -o meshes --picture all.png  and a picture of them
   palpate data objects -o meshes --varied 7         other proportions
-  palpate data objects mug.pcd -o meshes            the surface of a scan
   palpate data objects pot.txt -o meshes --probe hand.toml
                                                     of touches on a table
 
 The built-in meshes are closed, in centimeters, with z up; others keep the unit of their file. The same command always writes the same bytes.")]
 pub(super) struct Arguments {
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), files of touches with a position (TXT), directories of meshes
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), files of touches with a position (TXT), directories of meshes
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
     /// Output; a directory for NAME.obj of each object, NAME/INSTANCE.obj of several instances

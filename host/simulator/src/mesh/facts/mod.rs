@@ -9,8 +9,6 @@ mod parts;
 mod stray;
 
 pub use parts::Part;
-#[cfg(feature = "scans")]
-pub(super) use parts::Sets;
 pub use stray::Piece;
 
 use crate::mesh::Mesh;

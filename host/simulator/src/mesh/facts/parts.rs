@@ -173,10 +173,10 @@ fn is_inside(point: DVec3, part: usize, numbers: &[usize], mesh: &Mesh) -> bool 
 }
 
 /// Sets of triangles that hang together.
-pub(in crate::mesh) struct Sets(Vec<u32>);
+pub(super) struct Sets(Vec<u32>);
 
 impl Sets {
-    pub(in crate::mesh) fn new(count: usize) -> Self {
+    pub(super) fn new(count: usize) -> Self {
         Self((0..count as u32).collect())
     }
 
@@ -189,14 +189,14 @@ impl Sets {
         of
     }
 
-    pub(in crate::mesh) fn join(&mut self, one: u32, other: u32) {
+    pub(super) fn join(&mut self, one: u32, other: u32) {
         let (one, other) = (self.first(one), self.first(other));
         // To the lower one, so that numbers follow the order of the triangles.
         self.0[one.max(other) as usize] = one.min(other);
     }
 
     /// The number of each one's set, and how many sets there are.
-    pub(in crate::mesh) fn numbers(mut self) -> (Vec<usize>, usize) {
+    pub(super) fn numbers(mut self) -> (Vec<usize>, usize) {
         let mut numbers = vec![0; self.0.len()];
         let mut count = 0;
         for index in 0..numbers.len() {
