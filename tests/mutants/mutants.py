@@ -60,7 +60,7 @@ LEFT_OUT = [
     r"resume|shard|checkpoint",
     r"^host/src/touches/(captured|checksum|shard|save|format|no_mcap|files|parquet/.*|mcap/write)",
     r"^host/simulator/src/mesh/(builtin/|no_builtin|facts/mod|facts/gaps)",
-    r"/sweep/(precision|budget)|probe/cast",
+    r"/sweep/budget",
     r"Cloud|instances|complaints|::verdict.*mesh|guess",
 ]
 # Mutants that the seed has chosen as well, and why the next one takes their place.

@@ -54,15 +54,12 @@ pub(crate) struct Arguments {
     #[arg(long)]
     play: bool,
     /// Make a page that watches a chip at a serial port
-    #[arg(long, conflicts_with_all = ["play", "sources", "touches", "trace"])]
+    #[arg(long, conflicts_with_all = ["play", "sources", "touches"])]
     #[arg(conflicts_with_all = ["ProbeArguments", "UnitArguments", "SceneArguments", "RealArguments"])]
     port: bool,
     /// A compiled model for the page; may be given several times, with --port once
     #[arg(long, value_name = "FILE", requires = "recognizes", conflicts_with = "touches")]
     model: Vec<PathBuf>,
-    /// For tests of the page: also what it has to compute
-    #[arg(long, value_name = "FILE", requires = "play")]
-    trace: Option<PathBuf>,
     #[command(flatten)]
     size: SizeArguments,
     #[command(flatten)]
@@ -88,8 +85,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     }
     let scene = arguments.scene.scene(Surroundings::Floating)?;
     if arguments.play {
-        let Arguments { sources, model, output, touches, trace, size, real, scene: on, .. } = arguments;
-        let wanted = play::Wanted { sources, model, output, touches, trace, size, real };
+        let Arguments { sources, model, output, touches, size, real, scene: on, .. } = arguments;
+        let wanted = play::Wanted { sources, model, output, touches, size, real };
         return if scene.is_floating() { play::run(wanted, global) } else { play::on_table(wanted, &on, global) };
     }
     let Arguments { sources, output, touches, size, real, .. } = &arguments;

@@ -1,7 +1,6 @@
 //! The program as its user sees it: one module per group of commands.
 
 mod capture;
-mod cast;
 mod chip;
 mod compiled;
 mod data;

@@ -94,14 +94,7 @@ impl Object {
     pub fn new(name: impl Into<String>, mesh: Mesh) -> Self {
         let name = name.into();
         let first = Instance { name: name.clone(), mesh };
-        Self {
-            name,
-            millimeters: None,
-            placement_weights: Vec::new(),
-            notes: Vec::new(),
-            first,
-            others: Vec::new(),
-        }
+        Self { name, millimeters: None, placement_weights: Vec::new(), notes: Vec::new(), first, others: Vec::new() }
     }
 
     /// An object with several meshes of unknown units; none if there is no instance.

@@ -32,7 +32,6 @@ mod partial_noise;
 mod placements;
 mod ply;
 mod polygon;
-mod precision;
 mod probe_file;
 mod random;
 mod samples;
