@@ -26,18 +26,6 @@ pub struct Part {
 }
 
 impl Part {
-    /// Location in words.
-    pub(super) fn place(&self) -> String {
-        Self::place_of(self.triangles, self.low, self.high)
-    }
-
-    /// Number and location of triangles in a box, in words: "96 triangles around (1.20, 0, -3.00)".
-    pub(super) fn place_of(triangles: usize, low: Vec3, high: Vec3) -> String {
-        let plural = if triangles == 1 { "" } else { "s" };
-        let [x, y, z] = ((low.as_dvec3() + high.as_dvec3()) / 2.0).to_array().map(super::short);
-        format!("{triangles} triangle{plural} around ({x}, {y}, {z})")
-    }
-
     /// True if it encloses something, its triangles all facing one side.
     fn is_solid(&self) -> bool {
         // Less is a sheet with two sides, or the rounding of one.
