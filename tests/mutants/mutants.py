@@ -59,8 +59,8 @@ LEFT_OUT = [
     r"^host/src/capture/(admission|store)\.rs",
     r"resume|shard|checkpoint",
     r"^host/src/touches/(captured|checksum|shard|save|format|no_mcap|files)",
-    r"^host/simulator/src/mesh/(builtin/|scan/|no_builtin|facts/mod|facts/gaps)",
-    r"/sweep/(precision|budget)|probe/cast",
+    r"^host/simulator/src/mesh/(builtin/|no_builtin|facts/mod|facts/gaps)",
+    r"/sweep/budget",
     r"Cloud|instances|complaints|::verdict.*mesh|guess",
 ]
 # Mutants that the seed has chosen as well, and why the next one takes their place.

@@ -2,6 +2,7 @@
 
 pub mod abuse;
 pub mod bad_line;
+pub mod casts;
 pub mod chips;
 pub mod desk;
 pub mod flash;
@@ -10,7 +11,9 @@ pub mod identity;
 #[path = "../../onboard/firmware/src/located.rs"]
 pub mod located;
 pub mod mutants;
+pub mod page;
 pub mod pins;
+pub mod precision;
 pub mod random;
 pub mod replay;
 pub mod scripts;

@@ -47,19 +47,10 @@ def test_arrays_are_meshes() -> None:
         palpate.capture({"square": (SQUARE[0], [[0.5, 1.0, 2.0]])}, touches=50)
 
 
-def test_a_scan_is_touched_like_a_mesh(tmp_path: Path) -> None:
-    z = 1 - (2 * np.arange(2_000) + 1) / 2_000
-    angle = 2.399963 * np.arange(2_000)
-    normals = np.column_stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z])
-    np.savetxt(tmp_path / "ball.xyz", np.hstack([50 * normals, normals]))
-    data = palpate.capture([tmp_path / "ball.xyz"], touches=50)
-    assert data.names == ["ball"] and len(data) == 50
-    # Without normals, neighbors say which side is outside.
-    np.savetxt(tmp_path / "bare.xyz", 50 * normals)
-    assert len(palpate.capture([tmp_path / "bare.xyz"], touches=50)) == 50
-    np.savetxt(tmp_path / "few.xyz", 50 * normals[:3])
-    with pytest.raises(palpate.InputError, match="points"):
-        palpate.capture([tmp_path / "few.xyz"])
+def test_points_are_refused_with_what_makes_a_mesh_of_them(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "ball.xyz", np.eye(3))
+    with pytest.raises(palpate.InputError, match="make a mesh of the points first"):
+        palpate.capture([tmp_path / "ball.xyz"])
 
 
 def test_the_probe_is_the_one_that_was_given() -> None:

@@ -35,13 +35,13 @@ pub(super) fn section(context: &Context) -> Result<Section> {
     for object in context.objects {
         for instance in object.instances() {
             let facts = Facts::of(&instance.mesh);
-            let complaints = object.complaints(&facts);
+            let complaints = facts.complaints(object.millimeters);
             if complaints.is_empty() {
                 continue;
             }
             let length =
                 context.settings.capture.length_of(object, instance).unwrap_or(context.settings.capture.length);
-            let verdict = view::verdict(object, &facts, length, &context.settings.capture.probe);
+            let verdict = view::verdict(&facts, length, &context.settings.capture.probe);
             section.warning(format!("{}: {} As it is: {verdict}.", instance.name, complaints.join(" ")));
         }
     }
@@ -104,7 +104,7 @@ pub(super) fn to_repair(context: &Context) -> Vec<String> {
     let is_broken = |object: &Object, instance: &Instance| {
         let facts = Facts::of(&instance.mesh);
         let length = capture.length_of(object, instance).unwrap_or(capture.length);
-        view::verdict(object, &facts, length, &capture.probe).starts_with("repair")
+        view::verdict(&facts, length, &capture.probe).starts_with("repair")
     };
     let objects = context.objects.iter();
     objects

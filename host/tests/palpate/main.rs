@@ -11,7 +11,6 @@ mod invariants;
 mod locate;
 mod mcap;
 mod play;
-mod reference;
 mod several_meshes;
 mod strangers;
 mod stream;

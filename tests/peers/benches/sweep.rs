@@ -17,16 +17,19 @@ use obvhs::bvh2::builder::build_bvh2;
 use palpate::capture::{self, Settings};
 use palpate::mesh::Mesh;
 use palpate::probe::approach::{Approach, Probe};
-use palpate::probe::cast;
 use palpate::probe::scene::Scene;
 use palpate::probe::sweep::narrow::{self, Motion, Triangle};
-use palpate::probe::sweep::precision::{self, DoubleWithoutReject, SingleAfterReject};
-use palpate::probe::sweep::{Surface, budget};
+use palpate::probe::sweep::Surface;
 use palpate::touches::Origin;
 use palpate_peers::{QUICK, clock, paired};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
+
+#[path = "../../src/casts.rs"]
+mod known;
+#[path = "../../src/precision.rs"]
+mod precision;
 
 const RADIUS: f64 = 0.15;
 
@@ -46,7 +49,6 @@ fn main() {
     speed_against_error();
     growth();
     real_objects();
-    error_budget();
 }
 
 fn mesh_of(triangles: f64) -> Mesh {
@@ -279,33 +281,26 @@ fn speed_against_error() {
     }
     for (directory, name) in meshes {
         let mesh = palpate::mesh::obj::read(&directory.join(format!("{name}.obj"))).unwrap();
-        let lines = cast::read(&directory.join(format!("{name}.casts.csv"))).unwrap();
+        let casts = known::read(&directory.join(format!("{name}.casts.csv")));
         let scene = Scene::as_is(&mesh).unwrap();
         let surface = scene.surface();
-        row(name, "f32 after f32 reject", &lines, precision::first_contact::<SingleAfterReject>, surface);
-        row(name, "f64", &lines, precision::first_contact::<DoubleWithoutReject>, surface);
-        row(name, "f64 after f32 reject", &lines, Surface::first_contact, surface);
+        row(name, "f32 after f32 reject", &casts, precision::single_after_reject, surface);
+        row(name, "f64", &casts, precision::double_without_reject, surface);
+        row(name, "f64 after f32 reject", &casts, Surface::first_contact, surface);
     }
     println!();
 
     fn row(
         name: &str,
         phase: &str,
-        lines: &[cast::Line],
+        casts: &[known::Cast],
         first_contact: impl Fn(&Surface, DVec3, DVec3, f64) -> Option<f64>,
         surface: &Surface,
     ) {
-        let casts: Vec<&cast::Cast> = lines
-            .iter()
-            .filter_map(|line| match line {
-                cast::Line::Cast(cast) => Some(cast),
-                cast::Line::Other(_) => None,
-            })
-            .collect();
         let radius = f64::from(0.15_f32);
-        let contact = |cast: &&cast::Cast| first_contact(surface, cast.origin, cast.direction, radius);
-        let (rate, times) = measure(&casts, 3, contact);
-        let sets = cast::agreement(lines, &times);
+        let contact = |cast: &known::Cast| first_contact(surface, cast.origin, cast.direction, radius);
+        let (rate, times) = measure(casts, 3, contact);
+        let sets = known::agreement(casts, &times);
         let missed: usize = sets.iter().map(|set| set.missed).sum();
         let false_contacts: usize = sets.iter().map(|set| set.false_contacts).sum();
         let error = sets.iter().map(|set| set.largest_error).fold(0.0, f64::max);
@@ -355,11 +350,4 @@ fn real_objects() {
         );
     }
     println!("{:12} {:>11} in {:.2} s\n", "all", summary.approaches(), summary.seconds);
-}
-
-fn error_budget() {
-    println!("What each step may be wrong by\n");
-    for budget::Allowance { step, error, of, reason } in budget::BUDGET {
-        println!("{error:8.0e} of {of}: {step}\n         {reason}");
-    }
 }

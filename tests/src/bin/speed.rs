@@ -18,14 +18,13 @@ use palpate::evaluate::{
     together::{Together, TouchesTogether},
 };
 use palpate::mesh::{obj, source};
-use palpate::probe::cast;
 use palpate::probe::scene::Scene;
 use palpate::probe::sweep::Surface;
-use palpate::probe::sweep::precision::{self, DoubleWithoutReject, SingleAfterReject};
 use palpate::touches::{Dataset, Origin};
 use palpate::with;
 use palpate_onboard::{Model, exp2_negative};
 use palpate_shared::Touch;
+use palpate_tests::{casts, precision};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
@@ -71,15 +70,13 @@ type Contact = fn(&Surface, glam::DVec3, glam::DVec3, f64) -> Option<f64>;
 fn sweep(rounds: usize) -> Result<()> {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
     let mesh = obj::read(&data.join("slivers.obj"))?;
-    let lines = cast::read(&data.join("slivers.casts.csv"))?;
+    let casts = casts::read(&data.join("slivers.casts.csv"));
     let scene = Scene::as_is(&mesh)?;
     let surface = scene.surface();
-    let is_cast = |line: &cast::Line| if let cast::Line::Cast(cast) = line { Some(cast.clone()) } else { None };
-    let casts: Vec<cast::Cast> = lines.iter().filter_map(is_cast).collect();
     let choices: [(&str, Contact); 3] = [
         ("sweep in f64 after f32 (what Palpate does)", Surface::first_contact),
-        ("sweep in f64 only", precision::first_contact::<DoubleWithoutReject>),
-        ("sweep in f32 after f32", precision::first_contact::<SingleAfterReject>),
+        ("sweep in f64 only", precision::double_without_reject),
+        ("sweep in f32 after f32", precision::single_after_reject),
     ];
     let radius = f64::from(0.15_f32);
     let times = |contact: Contact| casts.iter().map(move |cast| contact(surface, cast.origin, cast.direction, radius));
@@ -89,7 +86,7 @@ fn sweep(rounds: usize) -> Result<()> {
     }
     let seconds = in_turns(rounds, &mut turns);
     for ((name, contact), seconds) in choices.into_iter().zip(seconds) {
-        let sets = cast::agreement(&lines, &times(contact).collect::<Vec<_>>());
+        let sets = casts::agreement(&casts, &times(contact).collect::<Vec<_>>());
         let missed: usize = sets.iter().map(|set| set.missed).sum();
         let false_contacts: usize = sets.iter().map(|set| set.false_contacts).sum();
         let error = sets.iter().map(|set| set.largest_error).fold(0.0, f64::max);

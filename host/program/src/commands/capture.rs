@@ -34,7 +34,7 @@ Examples:
   palpate capture meshes/ -o part2 --samples 7000..14000
                                                    the second of three parts")]
 pub(crate) struct Arguments {
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), directories of them
     #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
     /// Output; a directory for the touches

@@ -51,7 +51,7 @@ struct FitArguments {
     /// The recorded touches: a directory with a file for each object; or, without SOURCE, a file of presses on a bare table
     #[arg(value_name = "RECORDED")]
     recorded: PathBuf,
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), directories of them
     #[arg(value_name = "SOURCE")]
     sources: Vec<String>,
     /// Output; the probe, such as probe.toml

@@ -37,7 +37,7 @@ const KEYS: [(&str, &str); 6] = [
 ];
 
 /// The keys alone.
-pub(super) fn keys() -> impl Iterator<Item = &'static str> {
+fn keys() -> impl Iterator<Item = &'static str> {
     KEYS.into_iter().map(|(key, _)| key)
 }
 

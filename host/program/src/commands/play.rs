@@ -21,9 +21,6 @@ use std::path::PathBuf;
 /// Approaches to each object on a table that maps are learned from.
 const PRESSED: u64 = 50_000;
 
-/// Rounds of 100 approaches in a trace.
-const ROUNDS: u64 = 10;
-
 /// A page to be made on which objects are touched.
 pub(super) struct Wanted {
     pub(super) sources: Vec<String>,
@@ -32,13 +29,12 @@ pub(super) struct Wanted {
     pub(super) output: PathBuf,
     /// Approaches to each object on a table that maps are learned from.
     pub(super) touches: Option<u64>,
-    pub(super) trace: Option<PathBuf>,
     pub(super) size: SizeArguments,
     pub(super) real: RealArguments,
 }
 
 pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
-    let Wanted { mut sources, model, output, touches, trace, size, real } = wanted;
+    let Wanted { mut sources, model, output, touches, size, real } = wanted;
     let seed = global.seed();
     if let Some(touches) = touches {
         return Err(Error::setting("touches", touches, "it with --scene table: the page's models are given"));
@@ -75,10 +71,6 @@ pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
     let settings = Settings { origin, noise, command };
     let page = play::page(&objects, &contenders, &settings)?;
     output::write_bytes(&output, page.as_bytes())?;
-    if let Some(trace) = trace {
-        let surfaces = play::surfaces(&objects, &settings.origin)?;
-        output::write_bytes(&trace, play::trace(&surfaces, &contenders, &settings, ROUNDS)?.as_bytes())?;
-    }
     let text = || format!("{}: open it in a browser\n", output.display());
     global.print_about(&output, &serde_json::json!({ "page": output }), text)
 }
@@ -95,13 +87,10 @@ fn contender(path: &PathBuf, origin: &Origin) -> Result<Contender> {
 
 /// Makes the page of a table.
 pub(super) fn on_table(wanted: Wanted, scene: &SceneArguments, global: &Global) -> Result<()> {
-    let Wanted { mut sources, model, output, touches, trace, mut size, real } = wanted;
+    let Wanted { mut sources, model, output, touches, mut size, real } = wanted;
     scene.straight_down(Surroundings::Table { cone: 0.0 })?;
     if !model.is_empty() {
         return Err(Error::setting("model", "given", "it without --scene table: the page's maps are learned for it"));
-    }
-    if trace.is_some() {
-        return Err(Error::setting("trace", "given", "it without --scene table"));
     }
     let (touches, seed) = (touches.unwrap_or(PRESSED), global.seed());
     if touches < 100 {

@@ -336,7 +336,7 @@ pub(crate) fn refuse_unstated(size: &SizeArguments) -> Result<()> {
     }
 }
 
-/// Reads objects, and shows meanwhile that it goes on: surfaces of large scans take seconds.
+/// Reads objects, and shows meanwhile that it goes on.
 pub(super) fn reading<T>(read: impl FnOnce() -> T) -> T {
     let bar = Bar::new();
     bar.begin("reading objects", None);

@@ -23,7 +23,7 @@ Examples:
                                        two sections
   palpate report --real noise=0..10ms  our robust model trained for this noise")]
 pub(crate) struct Arguments {
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), directories of them
     #[arg(default_value = "builtin", value_name = "SOURCE")]
     sources: Vec<String>,
     /// Output; a directory for the page, its figures and tables

@@ -26,7 +26,7 @@ Three methods are trained and compared: the published one, on the times of full 
 
 Touches are disturbed as by a usual switch that is polled every millisecond, unless --real or the probe file says otherwise; --real none adds nothing. docs/reference/options.md lists the files that are written.")]
 pub(crate) struct Arguments {
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), directories of them
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), directories of them
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
     /// Output; a directory for the results

@@ -31,7 +31,7 @@ const KEYS: [(&str, &str); 8] = [
 ];
 
 /// The keys alone.
-pub(super) fn keys() -> impl Iterator<Item = &'static str> {
+fn keys() -> impl Iterator<Item = &'static str> {
     KEYS.into_iter().map(|(key, _)| key)
 }
 

@@ -41,7 +41,7 @@ Examples:
                                                 ten objects on a table
   palpate view --port -o chip.html              a chip, without a program")]
 pub(crate) struct Arguments {
-    /// A built-in object's name, a mesh (OBJ, STL, PLY, glTF, COLLADA) or scan (PLY, PCD, XYZ); touches with a position (TXT), one or two; with --play several, or directories
+    /// A built-in object's name, a mesh (OBJ, STL, PLY, glTF, COLLADA); touches with a position (TXT), one or two; with --play several, or directories
     #[arg(value_name = "SOURCE", required_unless_present_any = ["play", "port"])]
     sources: Vec<String>,
     /// Output; the page
@@ -54,15 +54,12 @@ pub(crate) struct Arguments {
     #[arg(long)]
     play: bool,
     /// Make a page that watches a chip at a serial port
-    #[arg(long, conflicts_with_all = ["play", "sources", "touches", "trace"])]
+    #[arg(long, conflicts_with_all = ["play", "sources", "touches"])]
     #[arg(conflicts_with_all = ["ProbeArguments", "UnitArguments", "SceneArguments", "RealArguments"])]
     port: bool,
     /// A compiled model for the page; may be given several times, with --port once
     #[arg(long, value_name = "FILE", requires = "recognizes", conflicts_with = "touches")]
     model: Vec<PathBuf>,
-    /// For tests of the page: also what it has to compute
-    #[arg(long, value_name = "FILE", requires = "play")]
-    trace: Option<PathBuf>,
     #[command(flatten)]
     size: SizeArguments,
     #[command(flatten)]
@@ -88,8 +85,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     }
     let scene = arguments.scene.scene(Surroundings::Floating)?;
     if arguments.play {
-        let Arguments { sources, model, output, touches, trace, size, real, scene: on, .. } = arguments;
-        let wanted = play::Wanted { sources, model, output, touches, trace, size, real };
+        let Arguments { sources, model, output, touches, size, real, scene: on, .. } = arguments;
+        let wanted = play::Wanted { sources, model, output, touches, size, real };
         return if scene.is_floating() { play::run(wanted, global) } else { play::on_table(wanted, &on, global) };
     }
     let Arguments { sources, output, touches, size, real, .. } = &arguments;
@@ -119,8 +116,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     )?;
     output::write_bytes(output, page.as_bytes())?;
     let facts = Facts::of(object.mesh());
-    let complaints = object.complaints(&facts);
-    let verdict = view::verdict(&object, &facts, length, &probe);
+    let complaints = facts.complaints(object.millimeters);
+    let verdict = view::verdict(&facts, length, &probe);
     if global.json {
         return output::print_json_about(output, &Shown { page: output, object: &object.name, complaints, verdict });
     }

@@ -41,9 +41,8 @@ fn view_says_in_words_what_is_wrong_with_a_mesh_on_the_page_and_in_the_terminal(
     bad.vertices.iter_mut().flatten().for_each(|x| *x *= 1e6);
     let (said, shown) = view(&bad);
     for expected in [
-        "The mesh is open: 3 edges belong to one triangle only, in 1 of 2 parts",
-        "The mesh is partly inside out: 1 of 2 parts is (120 triangles around (9.00e6, -7949, 0))",
-        "The mesh has stray parts: 1 piece floats apart from the rest",
+        "The mesh is open: 3 edges belong to one triangle only",
+        "The mesh is partly inside out: 1 of 2 parts",
         "The mesh has an implausible size, in meters as well as in millimeters",
     ] {
         assert!(said.contains(expected), "{said}");
@@ -51,14 +50,13 @@ fn view_says_in_words_what_is_wrong_with_a_mesh_on_the_page_and_in_the_terminal(
     }
     let error = capture(at, "cup.stl");
     let line = error.lines().find(|line| line.starts_with("cup: The mesh is open")).unwrap_or_default();
-    holds(line, &["partly inside out", "stray parts", "an implausible size"]);
+    holds(line, &["partly inside out", "an implausible size"]);
 }
 
 #[test]
 fn a_damaged_mesh_of_any_format_is_refused_with_its_place_and_a_cure() {
     let at = &Folder::new();
     let cut = stl(&Mesh::globe(4));
-    std::fs::write(at.join("casts.csv"), "a,0,0,9,0,0,-1\n").unwrap();
     for (name, bytes, expected) in [
         ("cup.obj", &b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"[..], "cup.obj:4: vertex 4 of a face is out of range"),
         ("cup.stl", &cut[..cut.len() - 50], "cup.stl: byte 80: the STL file is damaged: it states 48 triangles"),
@@ -71,7 +69,6 @@ fn a_damaged_mesh_of_any_format_is_refused_with_its_place_and_a_cure() {
             let error = stderr(palpate(at, &format!("{command} {name} -o out")), 1);
             assert!(error.contains(expected) && error.contains("xport the mesh again"), "{error}");
         }
-        fails(at, &format!("data cast {name} casts.csv"), 1, expected);
     }
     assert!(!at.join("out").exists());
 }

@@ -1,6 +1,6 @@
 //! The program's own texts: help and completions.
 
-use crate::{Folder, command, fails, holds, palpate, run, says, stderr, stdout, succeeds};
+use crate::{Folder, command, fails, palpate, run, says, stderr, stdout, succeeds};
 use std::process::Stdio;
 
 /// The program's commands, as its help lists them in groups: what stands before two blanks.
@@ -91,43 +91,6 @@ fn completions_know_every_command_in_every_shell() {
 }
 
 #[test]
-fn keys_of_options_are_completed_after_a_comma_too_where_the_shell_is_there() {
-    let at = &Folder::new();
-    let script = |shell: &str| {
-        let path = at.join(shell);
-        std::fs::write(&path, stdout(run(["completions", shell]))).unwrap();
-        path
-    };
-    // Bash calls the function with the words as it breaks them, at `=` too.
-    let bash = |line: &str, word: &str| {
-        let ask = format!(
-            "source {}; COMP_LINE='{line}' COMP_POINT={}; _palpate_keys palpate '{word}' ''; echo \"${{COMPREPLY[@]}}\"",
-            script("bash").display(),
-            line.len()
-        );
-        stdout(std::process::Command::new("bash").args(["-c", &ask]).output().unwrap())
-    };
-    assert_eq!(bash("palpate train data --trees leaf", "leaf"), "leaf_bits=\n");
-    assert_eq!(bash("palpate train data --trees rounds=3,d", "3,d"), "3,depth=\n");
-    assert_eq!(bash("palpate run --real timer=1ms,missed=2%,b", "2%,b"), "2%,bent=\n");
-    assert_eq!(bash("palpate run --real noise=", ""), "\n");
-    assert_eq!(bash("palpate export e.json --layout comp", "comp"), "compact complete\n");
-    assert_eq!(bash("palpate export e.json --emit c,thumb-", "c,thumb-"), "c,thumb-m4f\n");
-    assert!(bash("palpate capture cup b", "b").contains("builtin"), "names of objects, where a command takes some");
-    assert!(!bash("palpate export b", "b").contains("builtin"));
-    let fish = std::process::Command::new("fish")
-        .args(["-c", "source $argv[1]; complete -C 'palpate train data --trees rounds=3,dep'"])
-        .arg(script("fish"))
-        .output();
-    match fish {
-        Ok(output) => assert!(stdout(output).starts_with("rounds=3,depth=")),
-        Err(_) => println!("SKIPPED: no fish"),
-    }
-    let zsh = std::fs::read_to_string(script("zsh")).unwrap();
-    holds(&zsh, &[":_palpate_trees'", "_values -s , key 'i8' 'i16' 'f32'", "_values -s , key 'rounds:value: '"]);
-}
-
-#[test]
 #[cfg(unix)]
 fn ctrl_c_leaves_nothing_of_a_capture() {
     let at = &Folder::new();
@@ -141,12 +104,6 @@ fn ctrl_c_leaves_nothing_of_a_capture() {
     let output = capture.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert_eq!(crate::listing(at), [""; 0]);
-}
-
-#[test]
-fn fish_does_not_complete_what_help_does_not_list() {
-    let script = stdout(run(["completions", "fish"]));
-    assert!(script.contains("-a \"check\"") && !script.contains("-a \"cast\""), "{script}");
 }
 
 #[test]

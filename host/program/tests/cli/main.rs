@@ -1,7 +1,6 @@
 //! The program as its user sees it: one module per group of commands.
 
 mod capture;
-mod cast;
 mod chip;
 mod chip_wire;
 mod compiled;
@@ -26,7 +25,6 @@ mod probe;
 mod record;
 mod reports;
 mod rows;
-mod scan;
 mod sequences;
 mod strangers;
 mod support;

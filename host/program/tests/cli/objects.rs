@@ -20,19 +20,15 @@ fn an_object_is_written_as_a_closed_mesh_and_the_same_each_time() {
 }
 
 #[test]
-fn varied_objects_and_a_picture_are_written_and_listed_as_json() {
+fn objects_are_written_and_listed_as_json() {
     let at = &Folder::new();
-    let written = figures(at, "data objects spoon bowl --varied 7 --picture sheet.png -o .");
-    // In the order in which the built-in objects are listed, whatever the order of the arguments.
+    let written = figures(at, "data objects spoon bowl -o .");
     for (index, name) in ["bowl", "spoon"].into_iter().enumerate() {
         let mesh = obj::read(&at.join(format!("{name}.obj"))).unwrap();
         assert_eq!(written[index]["name"], name);
         assert_eq!(written[index]["triangles"], mesh.triangles.len());
-        assert!(corners(&mesh) == corners(builtin::varied(name, 7).unwrap().mesh()), "the file holds another {name}");
-        assert!(!mesh.triangles.is_empty());
     }
-    assert!(std::fs::read(at.join("sheet.png")).unwrap().starts_with(b"\x89PNG"));
-    assert_eq!(listing(at), ["bowl.obj", "sheet.png", "spoon.obj"]);
+    assert_eq!(listing(at), ["bowl.obj", "spoon.obj"]);
 }
 
 #[test]
@@ -43,7 +39,6 @@ fn objects_that_cannot_be_written_are_refused_and_the_names_of_all_are_listed() 
     for (words, code, expected) in [
         ("data objects -o nowhere teapot", 1, names.as_str()),
         ("data objects", 2, ""),
-        ("data objects -o nowhere --varied seven", 2, ""),
         ("data objects bowl -o file", 1, "bowl.obj: cannot write"),
     ] {
         fails(at, words, code, expected);
@@ -53,19 +48,13 @@ fn objects_that_cannot_be_written_are_refused_and_the_names_of_all_are_listed() 
 }
 
 #[test]
-fn a_mesh_is_written_but_neither_varied_nor_written_onto_itself() {
+fn a_mesh_is_written_but_not_onto_itself() {
     let at = &Folder::new();
     let bowl = globe(at, "bowl", 6);
     let before = std::fs::read(&bowl).unwrap();
     says(at, "data objects bowl.obj -o again", &["bowl.obj: "]);
     assert_eq!(listing(&at.join("again")), ["bowl.obj"]);
     assert!(corners(&obj::read(&at.join("again/bowl.obj")).unwrap()) == corners(&obj::read(&bowl).unwrap()));
-    for (words, expected) in [
-        ("data objects --varied 1 bowl.obj -o again", "only they can be varied"),
-        ("data objects bowl.obj -o .", "another file than what is read"),
-        ("data objects bowl.obj -o again --picture bowl.obj", "another file than what is read"),
-    ] {
-        fails(at, words, 2, expected);
-        assert!(std::fs::read(&bowl).unwrap() == before);
-    }
+    fails(at, "data objects bowl.obj -o .", 2, "another file than what is read");
+    assert!(std::fs::read(&bowl).unwrap() == before);
 }

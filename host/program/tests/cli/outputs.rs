@@ -17,8 +17,7 @@ const WRITERS: &[(&str, &[&str])] = &[
     ("view ball.obj -o out/ball.html", &["ball.html"]),
     ("view --play ball.obj --model model.palpate -o out/play.html", &["play.html"]),
     ("view --port -o out/port.html", &["port.html"]),
-    ("data objects ball.obj -o out --picture out/all.png", &["ball.obj", "all.png"]),
-    ("data cast ball.obj casts.csv -o out/times.csv", &["times.csv"]),
+    ("data objects ball.obj -o out", &["ball.obj"]),
 ];
 
 /// Commands that fill a directory, with what it must not hold.
@@ -46,7 +45,6 @@ fn set_up() -> Folder {
     let at = ONE_SPLIT.folder();
     globe(&at, "ball", 8);
     std::fs::write(at.join("touches.txt"), "0 0 0.08\n0 0 0.01\n").unwrap();
-    std::fs::write(at.join("casts.csv"), "a,-9,0,0,1,0,0\n").unwrap();
     at
 }
 

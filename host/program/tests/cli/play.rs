@@ -5,19 +5,17 @@ use std::fs;
 const HOUSEHOLD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
 
 #[test]
-fn a_page_is_made_of_a_model_and_objects_with_a_trace_of_a_thousand_approaches_to_each() {
+fn a_page_is_made_of_a_model_and_objects() {
     let at = &Folder::new();
     globe(at, "my_globe", 8);
-    let words =
-        format!("view --play mouse my_globe.obj --model {HOUSEHOLD} -o pages/play.html --trace pages/trace.txt");
+    let words = format!("view --play mouse my_globe.obj --model {HOUSEHOLD} -o pages/play.html");
     let play = || {
         says(at, &words, &["play.html"]);
         fs::read_to_string(at.join("pages/play.html")).unwrap()
     };
     let text = play();
     assert!(text.contains("my_globe") && text.contains("curvature, every contact"));
-    assert_eq!(listing(&at.join("pages")), ["play.html", "trace.txt"]);
-    assert_eq!(fs::read_to_string(at.join("pages/trace.txt")).unwrap().lines().count(), 2_000);
+    assert_eq!(listing(&at.join("pages")), ["play.html"]);
     // The same seed gives the same page.
     assert_eq!(play(), text);
 }
@@ -56,7 +54,6 @@ fn what_cannot_be_played_with_writes_no_page() {
         ("bowl --real noise=much", 2, "5ms"),
         ("bowl --scene table --touches 4000", 2, "2 to 16 objects"),
         (&format!("{table} --model {HOUSEHOLD}"), 2, "model"),
-        (&format!("{table} --trace trace.txt"), 2, "trace"),
         (&format!("{table} --cone 30"), 2, "cone"),
         (&format!("{table} --real debounce=1ms"), 1, "noise"),
     ] {

@@ -47,7 +47,6 @@ fn wrong_arguments_write_no_page() {
         ("--port -o page.html --true-size mm", 2, "cannot be used"),
         ("--port -o page.html --scene table", 2, "cannot be used"),
         ("--port -o page.html --real noise=1ms", 2, "cannot be used"),
-        ("--port -o page.html --trace trace.txt", 2, "cannot be used"),
         (&format!("--port -o page.html --model {model} --model {model}"), 2, "one with --port"),
     ] {
         fails(at, &format!("view {wrong}"), code, expected);

@@ -2,15 +2,13 @@
 //!
 //! The page is self-contained and asks the network for nothing: the objects' surfaces, the compiled models, and the
 //! lines of Rust that touch the one and read the other ([`palpate::play`], compiled to WebAssembly by `host/web`). What a
-//! page says is what the program says; [`trace()`] writes that down, to compare.
+//! page says is what the program says.
 
 mod surfaces;
 mod table;
-mod trace;
 
 pub use surfaces::{Surface, surfaces};
 pub use table::{MOST_OBJECTS, table};
-pub use trace::trace;
 
 use crate::page::PageProblem;
 use crate::page::html;

@@ -1,9 +1,7 @@
 use super::*;
 use crate::small::model;
 use palpate::mesh::Mesh;
-use palpate::play::Game;
 use palpate::probe::scene::Scene;
-use palpate_onboard::Verdict;
 
 /// The sections of a WebAssembly module: each one's number and content.
 fn sections(module: &[u8]) -> Vec<(u8, &[u8])> {
@@ -83,7 +81,7 @@ fn a_page_says_how_large_its_models_are_what_they_need_and_where_random_approach
 
 #[test]
 fn a_page_of_ten_large_objects_stays_below_three_megabytes_and_says_what_it_simplified() {
-    // Rough surfaces, as scans are: smooth ones are packed too well to be simplified.
+    // Rough surfaces: smooth ones are packed too well to be simplified.
     let rough = |i: u32| {
         let mut mesh = Mesh::globe(180 + i).stretched([1.0, 1.0, 0.1 * (i + 1) as f32]);
         for (index, vertex) in mesh.vertices.iter_mut().enumerate() {
@@ -125,43 +123,6 @@ fn a_small_object_is_touched_as_it_is_but_for_a_rounding_of_its_corners() {
             assert!(own.abs_diff(page) < 200, "{own} {page}");
         }
     }
-}
-
-#[test]
-fn a_trace_is_what_the_game_computes() {
-    let objects = [object("disc", 12, 0.1), object("globe", 12, 1.0)];
-    let surfaces = surfaces(&objects, &Origin::default()).unwrap();
-    let contender = contender(["disc", "globe"]);
-    let trace = trace(&surfaces, std::slice::from_ref(&contender), &settings(), 2).unwrap();
-    assert_eq!(trace.lines().count(), 400);
-    let mut game = Game::new(&Origin::default());
-    game.set_noise(Noise::switch()).unwrap();
-    for surface in &surfaces {
-        game.add_object(&surface.name, &surface.mesh(), surface.length).unwrap();
-    }
-    game.add_model(contender.model.model()).unwrap();
-    let mut lines = trace.lines();
-    for (object, seed) in [(0, 1), (0, 2), (1, 1), (1, 2)] {
-        let mut round = game.round(object, seed).unwrap();
-        for index in 0..100 {
-            let touch = game.touch_at_random(&mut round).touch;
-            let times = touch.times().map(|time| time.micros().map_or("-".into(), |micros| micros.to_string()));
-            let recognizer = &round.players[0].recognizer;
-            let verdict = u8::from(recognizer.verdict() != Verdict::Undecided);
-            let evidence = match recognizer.evidence() {
-                [a, b] => format!("{a},{b}"),
-                _ => "0,0".into(),
-            };
-            let line = format!(
-                "{object} {seed} {index} {} {verdict} {} {} {evidence}",
-                times.join(" "),
-                recognizer.best(),
-                recognizer.touches()
-            );
-            assert_eq!(lines.next(), Some(line.as_str()));
-        }
-    }
-    assert!(trace.lines().any(|line| line.contains(" 1 ")));
 }
 
 #[test]

@@ -12,9 +12,9 @@ use base64::engine::general_purpose::STANDARD;
 use glam::DVec3;
 use maud::html;
 use palpate::error::Result;
+use palpate::mesh::Object;
 use palpate::mesh::facts::Facts;
 use palpate::mesh::placements::{self, Placement, Placements};
-use palpate::mesh::{Mesh, Object};
 use palpate::probe::approach::{Approach, CLEARANCE, FINGERS, Probe};
 use palpate::probe::scene::{Scene, Table};
 use palpate::random::{self, Purpose};
@@ -47,11 +47,11 @@ impl Default for Settings {
     }
 }
 
-/// Says in words if a mesh of an object can be touched as it is, if its longest side has this length and the probe these
+/// Says in words if a mesh can be touched as it is, if its longest side has this length and the probe these
 /// fingers.
-pub fn verdict(object: &Object, facts: &Facts, length: f64, probe: &Probe) -> String {
+pub fn verdict(facts: &Facts, length: f64, probe: &Probe) -> String {
     let unit = f64::from((facts.high - facts.low).max_element()) / length;
-    object.verdict(facts, 2.0 * probe.radius * unit)
+    facts.verdict(2.0 * probe.radius * unit)
 }
 
 /// Largest number of approaches drawn to find the touches.
@@ -67,7 +67,6 @@ pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     let facts = Facts::of(object.mesh());
     let lying = settings.cone.map(|cone| Lying::new(object, cone)).transpose()?;
     let first = lying.as_ref().and_then(Lying::first);
-    let points = shown_points(object, first.as_ref().map(|(placement, _)| *placement), settings.length);
     let (scene, mesh) = match first {
         None => (Scene::new(object.mesh(), settings.length)?, SimplifiedMesh::new(object.mesh(), settings.length)),
         Some((placement, table)) => {
@@ -82,7 +81,6 @@ pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     let own = serde_json::json!({
         "length": settings.length,
         "table": lying.is_some(),
-        "points": STANDARD.encode(&points),
         "full": drawn.approaches.iter().map(Drawn::is_full).collect::<Vec<_>>(),
         "approaches": drawn.approaches,
     });
@@ -91,24 +89,6 @@ pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     let scene = scene::Scene { mesh, low, high, radius: settings.probe.radius, lines: lines.collect() };
     let json = scene.json(own.as_object().cloned().unwrap_or_default())?;
     Ok(html(object, settings, &facts, lying.as_ref(), shown_triangles, &drawn, &json))
-}
-
-/// Largest number of points of a scan that are shown.
-const MOST_POINTS: usize = 10_000;
-
-/// Points of a scan, evenly thinned out, in units, as its mesh is shown: three `f32` each, as bytes.
-fn shown_points(object: &Object, placement: Option<&Placement>, length: f64) -> Vec<u8> {
-    let [low, high] = object.mesh().bounds().map(|corner| corner.as_dvec3());
-    let scale = length / (high - low).max_element();
-    let points = object.points.iter().step_by(object.points.len().div_ceil(MOST_POINTS).max(1)).copied().collect();
-    let points = Mesh { vertices: points, triangles: Vec::new() };
-    let (points, [low, high]) = match placement {
-        Some(placement) => (placement.placed(&points), placement.placed(object.mesh()).bounds()),
-        None => (points, object.mesh().bounds()),
-    };
-    let center = low.as_dvec3().midpoint(high.as_dvec3());
-    let place = |point: &[f32; 3]| ((glam::Vec3::from(*point).as_dvec3() - center) * scale).as_vec3().to_array();
-    points.vertices.iter().flat_map(place).flat_map(f32::to_le_bytes).collect()
 }
 
 /// An object on a table: its placements.
@@ -264,9 +244,6 @@ fn html(
                     } }
                     div { dt { "Closed" } dd.warning[!facts.is_closed()] { (facts.closed()) } }
                     div { dt { "Right side out" } dd.warning[!facts.is_right_side_out()] { (facts.side()) } }
-                    @if !object.points.is_empty() { div { dt { "Points" } dd {
-                        (count(object.points.len())) ", which the surface was made from"
-                    } } }
                     @if facts.parts.len() > 1 { div { dt { "Parts" } dd { (count(facts.parts.len())) } } }
                     div { dt { "Size in the file" } dd {
                         (three_digits(side.x.into())) " × " (three_digits(side.y.into())) " × " (three_digits(side.z.into()))
@@ -277,18 +254,15 @@ fn html(
                     } }
                     div { dt { "Full touches" } dd { (format!("{} of {} approaches", percent(share, 1), count(drawn.tried))) } }
                 }
-                @for complaint in object.complaints(facts) { p.warning { (complaint) } }
-                p { (object.name) ": " (verdict(object, facts, settings.length, &settings.probe)) "." }
-                @if !object.points.is_empty() {
-                    ul.note { @for note in &object.notes { li { (note) } } }
-                }
+                @for complaint in facts.complaints(object.millimeters) { p.warning { (complaint) } }
+                p { (object.name) ": " (verdict(facts, settings.length, &settings.probe)) "." }
                 @if let Some(lying) = lying { (lying.html()) }
                 fieldset {
                     legend { "Show" }
                     @for (id, label, on) in [
                         ("touches", "touches", true), ("misses", "misses", false), ("box", "bounding box", true),
-                        ("edges", "edges of triangles", false), ("smooth", "smooth shading", facts.triangles > 5000), ("points", "points", true),
-                    ].into_iter().filter(|(id, ..)| *id != "points" || !object.points.is_empty()) {
+                        ("edges", "edges of triangles", false), ("smooth", "smooth shading", facts.triangles > 5000),
+                    ] {
                         label { input type="checkbox" id=(id) checked[on]; " " (label) }
                     }
                 }

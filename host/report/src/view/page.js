@@ -21,7 +21,7 @@
       const wanted = chosen === null ? checked(data.full[group] ? "touches" : "misses") : group === chosen;
       return { visible: wanted || group === hovered, lit };
     });
-    show({ box: checked("box"), edges: checked("edges"), smooth: checked("smooth"), points: !data.points || checked("points"), lines });
+    show({ box: checked("box"), edges: checked("edges"), smooth: checked("smooth"), lines });
     rows.forEach((row, index) => {
       row.classList.toggle("chosen", index === chosen);
       row.classList.toggle("hovered", index === hovered);

@@ -14,9 +14,7 @@ pub enum MeshProblem {
         builtin: Vec<&'static str>,
     },
     /// A directory holds no mesh.
-    #[error(
-        "no mesh here: no file ends in .obj, .stl, .ply, .gltf, .glb, .dae, .pcd or .xyz, and none is called scene_camera.json"
-    )]
+    #[error("no mesh here: no file ends in .obj, .stl, .ply, .gltf, .glb or .dae")]
     NoMeshes,
     /// A directory holds no mesh, but files of formats that are not read.
     #[error("no mesh that is read here: {files}")]
@@ -117,6 +115,14 @@ pub enum MeshProblem {
         /// Remedy, as a sentence without its full stop.
         instead: &'static str,
     },
+    /// A file holds points or depth images, which are not read any more.
+    #[error("{what} are not read")]
+    Points {
+        /// Contents of the file: "points in PCD".
+        what: &'static str,
+        /// Remedy, as the rest of a sentence that begins with "Instead".
+        instead: &'static str,
+    },
     /// The meshes of a file, placed as often as it says, are too large for a file of its length; or a pipe does not end.
     #[error("the mesh would take more than {limit} bytes")]
     TooLarge {
@@ -151,51 +157,6 @@ pub enum MeshProblem {
     VertexNotFinite {
         /// The index, counted from 0.
         index: u32,
-    },
-    /// A file holds points, and this program was built without what makes surfaces of them.
-    #[error("the file holds points and no triangles, and this program was built without scans")]
-    NeedsScans,
-    /// Points say nothing about which side of them is outside, or contradict each other, and do not enclose anything.
-    #[error(
-        "it is unknown which side of the surface is outside: the points have neither viewpoints nor normals that agree with each \
-         other, and their neighbors do not tell"
-    )]
-    NoSide,
-    /// Depth images contradict each other, which a usual mistake explains.
-    #[error(
-        "the depth images contradict each other: {now:.0} % of their points are where another image sees them, and {then:.0} % \
-         would be if {cause}"
-    )]
-    Cameras {
-        /// Percentage of points that another image sees.
-        now: f64,
-        /// This percentage if the mistake is undone.
-        then: f64,
-        /// The mistake.
-        cause: String,
-        /// Correction of the mistake.
-        remedy: String,
-    },
-    /// Masks of depth images do not match the images, or each other.
-    #[error("{what}")]
-    Masks {
-        /// Description of what does not match.
-        what: String,
-        /// Remedy, as a sentence without its full stop.
-        instead: String,
-    },
-    /// All points of a scan are at one place.
-    #[error("no surface fits the points: all of them are at one place")]
-    OnePlace,
-    /// Too few points for a surface, or too many.
-    #[error("{count} point{} with coordinates, where a surface needs {fewest} to {most}", if *count == 1 { "" } else { "s" })]
-    PointCount {
-        /// Number of points.
-        count: usize,
-        /// The fewest that are enough.
-        fewest: usize,
-        /// The most that are taken.
-        most: usize,
     },
     /// An object has no placement of a name.
     #[error("{object} has no placement {name}: it has {}", known.join(", "))]
@@ -254,11 +215,11 @@ impl Problem for MeshProblem {
             | Self::NotAnIndex { .. }
             | Self::IndexBeforeFirst { .. }
             | Self::IndexAfterLast { .. } => "Correct the line, or export the mesh again.".into(),
-            Self::Damaged { format: "scan" | "PCD" | "XYZ", .. } => "Correct the file, or write it again.".into(),
             Self::NoSuchVertex { .. } | Self::Damaged { .. } => {
                 "Export the mesh again, or convert it to another of OBJ, STL, PLY, GLB and COLLADA.".into()
             }
             Self::Unsupported { instead, .. } => format!("{instead}."),
+            Self::Points { instead, .. } => format!("Instead, {instead}."),
             Self::TooLarge { .. } => "Simplify the mesh, or export it without instances or in parts.".into(),
             Self::TooManyVertices => "Simplify the mesh, or export it in parts.".into(),
             Self::Unreadable { .. } | Self::NoFaces | Self::NoExtent => {
@@ -267,13 +228,6 @@ impl Problem for MeshProblem {
             Self::MissingVertex { .. } | Self::VertexNotFinite { .. } => {
                 "Give a mesh whose faces have finite vertices.".into()
             }
-            Self::NeedsScans => "Build it with --features scans, or give a mesh.".into(),
-            Self::NoSide => {
-                "Add normals (nx ny nz, in PCD normal_x normal_y normal_z) or the place of the sensor (vp_x vp_y vp_z for each point, in PCD also VIEWPOINT).".into()
-            }
-            Self::Cameras { remedy, .. } => format!("Correct scene_camera.json: {remedy}."),
-            Self::Masks { instead, .. } => format!("{instead}."),
-            Self::OnePlace | Self::PointCount { .. } => "Scan the object more closely, or thin the points out.".into(),
             Self::NoSuchPlacement { .. } | Self::NoPlacement { .. } => {
                 "Give the weights of placements that it has; those that are not named are left out.".into()
             }

@@ -44,13 +44,10 @@ pub mod facts;
 pub mod file;
 mod gltf;
 pub mod obj;
-mod parsed;
 mod placed;
 pub mod placements;
 mod ply;
 mod polygon;
-#[cfg(feature = "scans")]
-mod scan;
 pub mod source;
 mod stl;
 mod text;
@@ -59,16 +56,11 @@ mod unread;
 mod weld;
 mod words;
 
-use facts::Facts;
-
 pub use error::MeshProblem;
 pub use triangles::Mesh;
 
 /// The name of the object of many different shapes, and of a model's background column.
 pub const BACKGROUND: &str = "background";
-
-/// Largest share of a surface that may be a guess.
-const MOST_GUESSED: f64 = 0.2;
 
 /// An object to recognize: one class of a model. It has a name and one or more meshes, its instances: the cups that are
 /// all to be recognized as a cup.
@@ -81,13 +73,9 @@ pub struct Object {
     /// Weights of its placements on a table that replace those of their solid angles, by name: a placement that is not among
     /// them is left out. Empty: solid angles.
     pub placement_weights: Vec<(String, f64)>,
-    /// Notes for the user on how it was found and read: other files of its name that were passed over; of a scan, its noise
-    /// and the holes that were closed.
+    /// Notes for the user on how it was found and read: other files of its name that were passed over, a mesh far
+    /// from the origin.
     pub notes: Vec<String>,
-    /// The points that its first mesh was made of, in the mesh's coordinates; none if it is not from a scan.
-    pub points: Vec<[f32; 3]>,
-    /// Share of its surface that is a guess, since it closes holes of a scan; of several instances the largest.
-    pub guessed: f64,
     first: Instance,
     others: Vec<Instance>,
 }
@@ -106,16 +94,7 @@ impl Object {
     pub fn new(name: impl Into<String>, mesh: Mesh) -> Self {
         let name = name.into();
         let first = Instance { name: name.clone(), mesh };
-        Self {
-            name,
-            millimeters: None,
-            placement_weights: Vec::new(),
-            notes: Vec::new(),
-            points: Vec::new(),
-            guessed: 0.0,
-            first,
-            others: Vec::new(),
-        }
+        Self { name, millimeters: None, placement_weights: Vec::new(), notes: Vec::new(), first, others: Vec::new() }
     }
 
     /// An object with several meshes of unknown units; none if there is no instance.
@@ -127,8 +106,6 @@ impl Object {
             millimeters: None,
             placement_weights: Vec::new(),
             notes: Vec::new(),
-            points: Vec::new(),
-            guessed: 0.0,
             first,
             others: instances.collect(),
         })
@@ -143,30 +120,6 @@ impl Object {
     pub fn instances(&self) -> impl ExactSizeIterator<Item = &Instance> + Clone {
         let count = 1 + self.others.len();
         (0..count).map(|index| if index == 0 { &self.first } else { &self.others[index - 1] })
-    }
-
-    /// Warnings before touching it: those about a mesh of it, as sentences, and one if more than a fifth of its surface is a
-    /// guess.
-    pub fn complaints(&self, facts: &Facts) -> Vec<String> {
-        let guess = self.guess().map(|guess| format!("A scan misses much: {guess}."));
-        facts.complaints(self.millimeters).into_iter().chain(guess).collect()
-    }
-
-    /// Says if a mesh of it can be touched as it is by fingers of a diameter (in the units of its file), in words: as
-    /// [`Facts::verdict`], or "scan again" if more than a fifth of its surface is a guess.
-    pub fn verdict(&self, facts: &Facts, diameter: f64) -> String {
-        let verdict = facts.verdict(diameter);
-        match (self.guess(), verdict.strip_prefix("repair first: ")) {
-            (None, _) => verdict,
-            (Some(guess), None) => format!("scan again: {guess}"),
-            (Some(guess), Some(reasons)) => format!("scan again: {guess}; {reasons}"),
-        }
-    }
-
-    fn guess(&self) -> Option<String> {
-        let share = 100.0 * self.guessed;
-        (self.guessed > MOST_GUESSED)
-            .then(|| format!("{share:.1} % of the surface is a guess, since no point was measured there"))
     }
 
     /// The longest side of an instance's bounding box in millimeters, where its units are known.

@@ -1,6 +1,7 @@
 //! Files that are not read although they may hold a mesh, and what reads them.
 
 use crate::error::MeshProblem;
+use palpate_base::gone;
 use std::path::Path;
 
 /// A format that is not read.
@@ -79,6 +80,23 @@ const OTHERS: [(&[u8], &str, &str); 5] = [
     (b"%PDF", "a PDF document", "Give a mesh"),
 ];
 
+/// Content of a file of points or depth images, by its name, and what to use instead.
+fn points(path: &Path) -> Option<(&'static str, &'static str)> {
+    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+    let (what, word) = match extension.as_deref() {
+        Some("pcd") => ("points in PCD", ".pcd"),
+        Some("xyz") => ("points in XYZ", ".xyz"),
+        _ if path.file_name()? == "scene_camera.json" => ("depth images", "depth image"),
+        _ => return None,
+    };
+    Some((what, gone::instead(word)?))
+}
+
+/// The problem of a PLY file without faces.
+pub(super) fn cloud() -> MeshProblem {
+    MeshProblem::Points { what: "points in PLY", instead: gone::instead("points").unwrap_or_default() }
+}
+
 fn by_extension(path: &Path) -> Option<&'static Unread> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     FORMATS.iter().find(|format| format.extensions.contains(&extension.as_str()))
@@ -86,7 +104,7 @@ fn by_extension(path: &Path) -> Option<&'static Unread> {
 
 /// The format of a file that is not read, by its extension, with what to do.
 pub(super) fn of_name(path: &Path) -> Option<(&'static str, &'static str)> {
-    by_extension(path).map(|format| (format.name, format.instead))
+    by_extension(path).map(|format| (format.name, format.instead)).or_else(|| points(path))
 }
 
 /// True if a file starts as one that Git LFS left in the place of another.
@@ -99,6 +117,9 @@ pub(super) fn is_pointer(head: &[u8]) -> bool {
 pub(super) fn problem(head: &[u8], path: &Path) -> Option<MeshProblem> {
     if is_pointer(head) {
         return Some(MeshProblem::LfsPointer);
+    }
+    if let Some((what, instead)) = points(path) {
+        return Some(MeshProblem::Points { what, instead });
     }
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
     let begins = |begin: &&[u8]| text.get(..begin.len()).is_some_and(|start| start.eq_ignore_ascii_case(begin));

@@ -1,8 +1,8 @@
-//! Problems with scenes, probes and casts.
+//! Problems with scenes and probes.
 
 use crate::error::Problem;
 
-/// Problems with scenes, probes and casts.
+/// Problems with scenes and probes.
 ///
 /// A fault of a scene's mesh is a [`MeshProblem`](crate::mesh::MeshProblem), a probe's measure out of range a
 /// [`Setting`](crate::error::Setting).
@@ -56,24 +56,6 @@ pub enum ProbeProblem {
         /// Text to write, with an example.
         example: &'static str,
     },
-    /// A line of a file of casts has too few or too many fields.
-    #[error("{fields} fields where a cast has 7, or 8 with a time")]
-    CastFields {
-        /// Number of fields of the line.
-        fields: usize,
-    },
-    /// A coordinate of a cast is not a finite number.
-    #[error("{text:?} is not a finite number")]
-    CastCoordinate {
-        /// Text that is there instead.
-        text: String,
-    },
-    /// The known time of a cast is neither a number that is at least 0 nor `miss`.
-    #[error("{text:?} is neither a time nor `miss`")]
-    CastTime {
-        /// Text that is there instead.
-        text: String,
-    },
 }
 
 impl Problem for ProbeProblem {
@@ -90,9 +72,6 @@ impl Problem for ProbeProblem {
                 "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and optionally tilt, stroke, travel, timer and [real].".into()
             }
             Self::BadQuantity { example, .. } => format!("Give {example}."),
-            Self::CastFields { .. } | Self::CastCoordinate { .. } | Self::CastTime { .. } => {
-                "Give set,ox,oy,oz,dx,dy,dz and, if known, t.".into()
-            }
         }
     }
 }

@@ -8,7 +8,6 @@
 //! - [`Approach::locate`] gives a touch with the hand's position, of an approach straight down to an object on a table.
 //! - [`hand`] says how far the hand goes, and which contacts it therefore never makes.
 //! - [`mod@file`] reads a probe from a TOML file, with what a real one adds; [`noise`] adds it to touches.
-//! - [`cast`] reads spheres and known contact times from a file, to compare this simulator with another.
 //!
 //! Contact is rigid and motion straight: no forces, no friction. From here `palpate::capture` draws
 //! approaches and keeps their touches.
@@ -38,7 +37,6 @@
 //! ```
 
 pub mod approach;
-pub mod cast;
 mod error;
 pub mod file;
 pub mod hand;

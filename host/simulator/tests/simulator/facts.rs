@@ -101,8 +101,7 @@ fn a_pot_of_which_handle_and_spout_alone_are_inside_out_is_not_right_side_out() 
     assert!(!facts.is_right_side_out());
     assert_eq!(facts.side(), "no: 2 of 3 parts are inside out");
     let said = facts.complaints(None);
-    assert_eq!(said.len(), 1, "{said:?}");
-    assert!(said[0].starts_with("The mesh is partly inside out: 2 of 3 parts are (224 triangles around ("), "{said:?}");
+    assert_eq!(said, ["The mesh is partly inside out: 2 of 3 parts. Reverse the vertices of those faces."]);
     assert!(Facts::of(&pot(true, false)).side() == "no: 1 of 3 parts are inside out");
 }
 
@@ -118,39 +117,6 @@ fn a_cavity_faces_inward_and_a_solid_inside_another_may_face_outward() {
 }
 
 #[test]
-fn an_open_part_is_named_among_the_others() {
-    let mut mesh = pot(false, false);
-    mesh.triangles.pop();
-    let said = Facts::of(&mesh).complaints(None);
-    assert_eq!(said.len(), 1, "{said:?}");
-    assert!(
-        said[0].contains("3 edges belong to one triangle only, in 1 of 3 parts (223 triangles around ("),
-        "{said:?}"
-    );
-}
-
-#[test]
-fn a_speck_beside_an_object_is_a_stray_part_and_what_touches_it_is_not() {
-    let facts = Facts::of(&globes(&[([0.0; 3], 1.0, false), ([3.0, 0.0, 0.0], 0.05, false)]));
-    assert_eq!((facts.stray.len(), facts.stray[0].triangles), (1, 224));
-    let said = facts.complaints(None);
-    assert!(
-        said[0].starts_with("The mesh has stray parts: 1 piece floats apart from the rest (224 triangles around (")
-    );
-    assert!(said[0].ends_with(", and makes its box larger."), "{said:?}");
-    let inside = Facts::of(&globes(&[([0.0; 3], 1.0, false), ([0.0; 3], 0.05, false)])).complaints(None);
-    assert!(inside.iter().any(|said| said.contains("1 piece floats apart") && !said.contains("larger")), "{inside:?}");
-    let two = Facts::of(&globes(&[([0.0; 3], 1.0, false), ([0.0; 3], 0.05, false), ([3.0, 0.0, 0.0], 0.05, false)]));
-    let two = two.complaints(None);
-    assert!(
-        two.iter().any(|said| said.contains("2 pieces float") && said.contains("; 1 makes its box larger.")),
-        "{two:?}"
-    );
-    assert!(Facts::of(&pot(false, true)).stray.is_empty());
-    assert!(Facts::of(&cube().stretched([1.0, 100.0, 0.001])).stray.is_empty());
-}
-
-#[test]
 fn a_size_that_is_neither_one_in_meters_nor_in_millimeters_is_said() {
     let said = |size: f32, millimeters| Facts::of(&cube().stretched([size; 3])).complaints(millimeters);
     for (size, millimeters) in [(0.001, None), (1.0, None), (9_999.0, None), (0.2, Some(1_000.0)), (50.0, Some(10.0))] {
@@ -163,23 +129,6 @@ fn a_size_that_is_neither_one_in_meters_nor_in_millimeters_is_said() {
 }
 
 #[test]
-fn coordinates_whose_squares_are_too_large_and_corners_on_edges_of_cells_are_in_a_piece() {
-    // Found by the fuzzer: f32 holds the coordinates and not their squares.
-    let vertices = vec![[20.0, 0.0, 0.0], [4.0, 7.8e22, 1.0], [2.0, 1.0, 0.0], [0.0, 3.0e23, 0.0], [3.0, 0.0, 0.0]];
-    let mesh = Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3], [0, 2, 4]] };
-    assert_eq!(Facts::of(&mesh).triangles, 3);
-    // A long thin triangle, whose far corner is rounded when it is reached along its side.
-    for index in 0..200_u16 {
-        let far = 1.0 + f32::from(index) * 1e-3;
-        let mesh = Mesh {
-            vertices: vec![[0.1, 0.3, 0.7], [far, 0.9, -far], [0.2, far, 0.0]],
-            triangles: vec![[0, 1, 2], [2, 1, 0]],
-        };
-        assert!(Facts::of(&mesh).stray.is_empty());
-    }
-}
-
-#[test]
 fn sides_have_three_digits_and_no_zeros_after_them() {
     assert_eq!(sides(glam::DVec3::new(90.0, 80.0001, 0.5)), "90 × 80 × 0.5");
     assert_eq!(sides(glam::DVec3::new(100.0, 1234.4, 7.256)), "100 × 1234 × 7.26");
@@ -187,7 +136,7 @@ fn sides_have_three_digits_and_no_zeros_after_them() {
 }
 
 #[test]
-fn a_mesh_is_usable_unless_a_finger_fits_through_a_gap_or_pieces_float_apart() {
+fn a_mesh_is_usable_unless_a_finger_fits_through_a_gap() {
     let verdict = |mesh: &Mesh, diameter| Facts::of(mesh).verdict(diameter);
     let mut mesh = cube();
     assert_eq!(verdict(&mesh, 0.03), "usable");

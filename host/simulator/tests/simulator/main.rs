@@ -32,12 +32,9 @@ mod partial_noise;
 mod placements;
 mod ply;
 mod polygon;
-mod precision;
 mod probe_file;
 mod random;
 mod samples;
-#[cfg(feature = "scans")]
-mod scan;
 mod scene;
 mod source;
 mod stl;

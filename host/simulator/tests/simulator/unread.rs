@@ -28,6 +28,14 @@ fn a_format_that_is_not_read_is_named_with_what_converts_it() {
         (b"12\n0 0 0 1\n", "mug.pts", "PTS or PTX is not read"),
         (b"\n<!DOCTYPE html>\n<html>", "mug.obj", "a web page is not read. Download the file itself"),
         (b"", "mug.fbx", "FBX is not read"),
+        (
+            b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n",
+            "mug.ply",
+            "mug.ply: points in PLY are not read. Instead, make a mesh of the points first (docs/guide/scenes.md).",
+        ),
+        (b"# .PCD v0.7\n", "mug.PCD", "points in PCD are not read. Instead, make a mesh of the points first"),
+        (b"0 0 0\n1 0 0\n", "mug.xyz", "points in XYZ are not read. Instead, make a mesh of the points first"),
+        (b"{}", "mug/scene_camera.json", "depth images are not read. Instead, make a mesh of the depth images first"),
     ] {
         assert_says(said(bytes, name), &[expected]);
     }

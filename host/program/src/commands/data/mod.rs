@@ -1,6 +1,5 @@
 //! `palpate data`: data sets of touches, and built-in objects.
 
-mod cast;
 mod check;
 mod objects;
 mod record;
@@ -21,11 +20,8 @@ enum Command {
     Check(check::Arguments),
     /// Record touches of a real probe: from lines, a log, or a chip
     Record(Box<record::Arguments>),
-    /// Write built-in objects, meshes or surfaces of scans as OBJ files
+    /// Write built-in objects, meshes or maps of touched objects as OBJ files
     Objects(Box<objects::Arguments>),
-    /// Move spheres against a mesh as a file says, to compare the simulator with another engine
-    #[command(hide = true)]
-    Cast(cast::Arguments),
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
@@ -33,6 +29,5 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         Command::Check(arguments) => check::run(&arguments, global),
         Command::Record(arguments) => record::run(&arguments, global),
         Command::Objects(arguments) => objects::run(&arguments, global),
-        Command::Cast(arguments) => cast::run(&arguments, global),
     }
 }

@@ -3,14 +3,12 @@
 use crate::commands::probe::{ProbeArguments, reading, tell};
 use crate::commands::shape;
 use crate::commands::{Global, remark};
-use palpate::mesh::builtin;
 use palpate::mesh::obj;
 use palpate::mesh::source::{self, Search, Source};
 use palpate::mesh::{Instance, Object};
 use palpate::output;
 use palpate::with;
 use palpate::{Error, Result};
-use palpate_report::page::render;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -19,26 +17,17 @@ use std::path::{Path, PathBuf};
 Examples:
   palpate data objects -o meshes                    ten files: bowl.obj, ...
   palpate data objects fork -o meshes               one of them
-  palpate data objects -o meshes --picture all.png  and a picture of them
-  palpate data objects -o meshes --varied 7         other proportions
-  palpate data objects mug.pcd -o meshes            the surface of a scan
   palpate data objects pot.txt -o meshes --probe hand.toml
                                                     of touches on a table
 
 The built-in meshes are closed, in centimeters, with z up; others keep the unit of their file. The same command always writes the same bytes.")]
 pub(super) struct Arguments {
-    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), scans (PLY, PCD, XYZ), files of touches with a position (TXT), directories of meshes
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), files of touches with a position (TXT), directories of meshes
     #[arg(value_name = "SOURCE", default_value = "builtin")]
     sources: Vec<String>,
     /// Output; a directory for NAME.obj of each object, NAME/INSTANCE.obj of several instances
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// Vary the proportions of built-in objects by up to about a fifth, with this seed
-    #[arg(long, value_name = "SEED")]
-    varied: Option<u64>,
-    /// Also draw a contact sheet of the objects into this PNG file
-    #[arg(long, value_name = "FILE")]
-    picture: Option<PathBuf>,
     /// Leave out bad meshes
     #[arg(long)]
     skip_bad: bool,
@@ -60,22 +49,16 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     let (made, files) = made(arguments)?;
     tell(&made);
     let meshes: Vec<_> = made.iter().flat_map(|object| meshes(object, &arguments.output)).collect();
-    for file in meshes.iter().map(|(file, _)| file).chain(&arguments.picture) {
+    for (file, _) in &meshes {
         output::admit(file, &files)?;
     }
     let written = meshes.into_iter().map(|(file, instance)| write(file, instance)).collect::<Result<Vec<_>>>()?;
-    if let Some(picture) = &arguments.picture {
-        output::write_bytes(picture, &render::sheet(&made, 1200))?;
-    }
     if global.json {
         return output::print_json(&written);
     }
     let mut text = String::new();
     for Written { file, vertices, triangles, .. } in &written {
         let _ = writeln!(text, "{}: {vertices} vertices, {triangles} triangles", file.display());
-    }
-    if let Some(picture) = &arguments.picture {
-        let _ = writeln!(text, "{}: a picture of them", picture.display());
     }
     output::print(&text)
 }
@@ -101,29 +84,15 @@ fn made(arguments: &Arguments) -> Result<(Vec<Object>, Vec<PathBuf>)> {
 }
 
 fn of_meshes(arguments: &Arguments, given: &[String]) -> Result<(Vec<Object>, Vec<PathBuf>)> {
-    let sources = source::files(given)?;
-    let (mut names, mut files) = (Vec::new(), Vec::new());
-    for source in &sources {
-        match source {
-            Source::BuiltIn(name) => names.push(*name),
-            Source::File { path, .. } => files.push(path.clone()),
-            Source::Background | Source::Instances { .. } => {}
-        }
-    }
-    let objects = match arguments.varied {
-        None => {
-            let search = Search { skips_bad: arguments.skip_bad, ..Search::default() };
-            let loaded = reading(|| source::load(given, search))?;
-            loaded.notes.iter().for_each(|note| remark(&format!("palpate: {note}")));
-            loaded.objects
-        }
-        Some(seed) if names.len() == sources.len() => builtin::make(&names, Some(seed))?,
-        Some(_) => {
-            let instead = "it with built-in objects: only they can be varied";
-            return Err(Error::setting("varied", "given for a mesh", instead));
-        }
-    };
-    Ok((objects, files))
+    let files = source::files(given)?.into_iter().filter_map(|source| match source {
+        Source::File { path, .. } => Some(path),
+        Source::BuiltIn(_) | Source::Background | Source::Instances { .. } => None,
+    });
+    let files = files.collect();
+    let search = Search { skips_bad: arguments.skip_bad, ..Search::default() };
+    let loaded = reading(|| source::load(given, search))?;
+    loaded.notes.iter().for_each(|note| remark(&format!("palpate: {note}")));
+    Ok((loaded.objects, files))
 }
 
 /// The files of an object: `NAME.obj`, or `NAME/INSTANCE.obj` if it has several instances.

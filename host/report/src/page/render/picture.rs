@@ -4,8 +4,6 @@ use super::raster::Raster;
 
 /// The colors of a surface in shadow, half lit and in full light, in sRGB: a bluish clay.
 const TONES: [[f32; 3]; 3] = [[28.0, 38.0, 56.0], [118.0, 142.0, 170.0], [244.0, 248.0, 252.0]];
-const GROUND: [f32; 3] = [250.0, 249.0, 246.0];
-const INK: [u8; 3] = [50, 54, 62];
 
 /// A picture being composed: sRGB with coverage.
 pub(super) struct Picture {
@@ -39,42 +37,18 @@ impl Picture {
         }
     }
 
-    /// Darkens a pixel by `ink` out of 255.
-    pub(super) fn ink(&mut self, x: u32, y: u32, ink: u8) {
-        if ink > 0
-            && let Some(pixel) = self.at(x, y)
-        {
-            let [r, g, b] = INK;
-            *pixel = [r, g, b, ink];
-        }
-    }
-
-    /// Lays everything on a light, opaque ground.
-    pub(super) fn on_light_ground(&mut self) {
-        for [r, g, b, coverage] in &mut self.pixels {
-            let alpha = f32::from(*coverage) / 255.0;
-            for (channel, ground) in [r, g, b].into_iter().zip(GROUND) {
-                *channel = (f32::from(*channel) * alpha + ground * (1.0 - alpha)).round() as u8;
-            }
-            *coverage = 255;
-        }
-    }
-
-    /// The picture as a PNG file: three channels if it is opaque, else four.
+    /// The picture as a PNG file.
     pub(super) fn png(&self) -> Vec<u8> {
-        let opaque = self.pixels.iter().all(|pixel| pixel[3] == 255);
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
-        encoder.set_color(if opaque { png::ColorType::Rgb } else { png::ColorType::Rgba });
+        encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(png::Compression::High);
-        let channels = if opaque { 3 } else { 4 };
-        let data: Vec<u8> = self.pixels.iter().flat_map(|pixel| pixel.iter().copied().take(channels)).collect();
         // By this, a picture is recognized as one that may be replaced. Latin letters are always taken.
         let _ = encoder.add_text_chunk("Software".into(), "Palpate".into());
         // Writing to memory fails only if the picture is empty or its data has another size, and then it stays empty.
         if let Ok(mut writer) = encoder.write_header() {
-            let _ = writer.write_image_data(&data);
+            let _ = writer.write_image_data(self.pixels.as_flattened());
         }
         bytes
     }

@@ -1,6 +1,6 @@
 "use strict";
 // Draws data's mesh, bounding box and lines, and calls hover and choose with the group of the line under the pointer.
-// Returns show, which takes { box, edges, smooth, points } as booleans and lines, one { visible, lit } for each line of data;
+// Returns show, which takes { box, edges, smooth } as booleans and lines, one { visible, lit } for each line of data;
 // nothing is shown where WebGL is missing.
 function drawScene(data, { hover, choose }) {
   const view = openStage();
@@ -18,18 +18,6 @@ function drawScene(data, { hover, choose }) {
   geometry.computeVertexNormals();
   const wires = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ color: 0x20242a, wireframe: true, transparent: true, opacity: 0.35 }));
   scene.add(view.body(geometry), wires);
-
-  // The points that a scan's surface was made from, as small cubes.
-  const cloud = decode(data.points || "", Float32Array);
-  const grain = 0.003 * high.clone().sub(low).length();
-  const points = new THREE.InstancedMesh(
-    new THREE.BoxGeometry(grain, grain, grain), new THREE.MeshBasicMaterial({ color: color("first") }), Math.max(cloud.length / 3, 1));
-  points.count = cloud.length / 3;
-  for (let i = 0; i < points.count; i++) {
-    points.setMatrixAt(i, new THREE.Matrix4().makeTranslation(cloud[3 * i], cloud[3 * i + 1], cloud[3 * i + 2]));
-  }
-  points.frustumCulled = false;
-  scene.add(points);
 
   // The bounding box, with the lengths of three sides that meet.
   const size = high.clone().sub(low);
@@ -84,7 +72,7 @@ function drawScene(data, { hover, choose }) {
   scene.add(paths, balls);
 
   const nowhere = new THREE.Matrix4().makeScale(0, 0, 0);
-  const show = ({ box, edges, smooth, points: seen = true, lines: states }) => {
+  const show = ({ box, edges, smooth, lines: states }) => {
     const place = paths.geometry.attributes.position, tint = paths.geometry.attributes.color;
     lines.forEach((line, i) => {
       const { visible, lit } = states[i];
@@ -100,7 +88,6 @@ function drawScene(data, { hover, choose }) {
     balls.computeBoundingSphere();
     frame.visible = box;
     wires.visible = edges;
-    points.visible = seen;
     if (outside.flatShading === smooth) {
       outside.flatShading = !smooth;
       outside.needsUpdate = true;

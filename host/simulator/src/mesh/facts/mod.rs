@@ -1,17 +1,12 @@
-//! Facts about a mesh: is it closed, is it right side out, do its parts hang together, how large is it.
+//! Facts about a mesh: is it closed, is it right side out, how large is it.
 //!
-//! The simulator touches any mesh, from both sides. But through a hole, a finger gets where no real one could, an
-//! inside-out mesh is often a sign of a broken export, and a speck that floats beside an object makes its box larger:
-//! whoever captures from such a mesh should know.
+//! The simulator touches any mesh, from both sides. But through a hole, a finger gets where no real one could, and an
+//! inside-out mesh is often a sign of a broken export: whoever captures from such a mesh should know.
 
 mod gaps;
 mod parts;
-mod stray;
 
 pub use parts::Part;
-#[cfg(feature = "scans")]
-pub(super) use parts::Sets;
-pub use stray::Piece;
 
 use crate::mesh::Mesh;
 use glam::Vec3;
@@ -38,8 +33,6 @@ pub struct Facts {
     pub volume: f64,
     /// Its parts, the one with most triangles first.
     pub parts: Vec<Part>,
-    /// The pieces that float apart from the rest, which is not among them; the largest first.
-    pub stray: Vec<Piece>,
 }
 
 /// The sizes in millimeters that an object for a finger may have: a grain of rice to a car.
@@ -64,7 +57,6 @@ impl Facts {
             widest_gap: gaps::widest(&welded),
             volume: parts.iter().map(|part| part.volume).sum(),
             parts,
-            stray: stray::pieces(&welded),
         }
     }
 
@@ -114,33 +106,24 @@ impl Facts {
     }
 
     /// Warnings before touching the mesh, as sentences: that it is open, inside out in all or some of its parts, not a
-    /// manifold, in pieces, or of a size that cannot be. `millimeters` is how many its unit is, if that is known. None
+    /// manifold, or of a size that cannot be. `millimeters` is how many its unit is, if that is known. None
     /// if nothing is wrong.
     pub fn complaints(&self, millimeters: Option<f64>) -> Vec<String> {
-        let sentences =
-            [self.open(), self.turned(), self.contrary(), self.branching(), self.apart(), self.size(millimeters)];
+        let sentences = [self.open(), self.turned(), self.contrary(), self.branching(), self.size(millimeters)];
         sentences.into_iter().flatten().collect()
     }
 
     /// Says if the mesh can be touched as it is by fingers of a diameter (in the units of its file), in words:
     /// "usable", or "repair first" and why. What is wrong and makes no difference to touches is no reason.
     pub fn verdict(&self, diameter: f64) -> String {
-        let gap = (self.widest_gap >= diameter).then(|| {
-            format!(
-                "a gap is {} wide and a finger {}, so it reaches inside where a real one may find a surface",
+        match (self.widest_gap >= diameter, self.is_right_side_out()) {
+            (true, _) => format!(
+                "repair first: a gap is {} wide and a finger {}, so it reaches inside where a real one may find a surface",
                 short(self.widest_gap),
                 short(diameter)
-            )
-        });
-        let apart = (!self.stray.is_empty()).then(|| {
-            "pieces that float apart count as parts of the object, which makes the rest smaller compared with the probe"
-                .to_owned()
-        });
-        let reasons: Vec<String> = gap.into_iter().chain(apart).collect();
-        match (reasons.is_empty(), self.is_right_side_out()) {
-            (false, _) => format!("repair first: {}", reasons.join("; ")),
-            (true, true) => "usable".into(),
-            (true, false) => {
+            ),
+            (false, true) => "usable".into(),
+            (false, false) => {
                 "usable: fingers feel a surface from both sides, and there is no gap that one of them fits through"
                     .into()
             }
@@ -153,56 +136,31 @@ impl Facts {
             1 => "1 edge belongs".to_owned(),
             open => format!("{open} edges belong"),
         };
-        let open: Vec<&Part> = self.parts.iter().filter(|part| part.open_edges > 0).collect();
-        let of = self.among(&open);
-        Some(format!("The mesh is open: {belong} to one triangle only{of}, so fingers may reach through the gaps."))
+        Some(format!("The mesh is open: {belong} to one triangle only, so fingers may reach through the gaps."))
     }
 
     fn turned(&self) -> Option<String> {
-        let turned: Vec<&Part> = self.inside_out().collect();
-        if turned.is_empty() {
-            return None;
+        match (self.inside_out().count(), self.parts.len()) {
+            (0, _) => None,
+            (count, all) if count == all => {
+                Some("The mesh is inside out: reverse the order of the vertices in its faces.".into())
+            }
+            (count, all) => Some(format!(
+                "The mesh is partly inside out: {count} of {all} parts. Reverse the vertices of those faces."
+            )),
         }
-        if turned.len() == self.parts.len() {
-            return Some("The mesh is inside out: reverse the order of the vertices in its faces.".into());
-        }
-        let are = if turned.len() == 1 { "is" } else { "are" };
-        let (count, all) = (turned.len(), self.parts.len());
-        let places = places(turned.iter().map(|part| part.place()), count);
-        Some(format!(
-            "The mesh is partly inside out: {count} of {all} parts {are} ({places}). Reverse the vertices of those faces."
-        ))
     }
 
     fn contrary(&self) -> Option<String> {
-        let contrary: Vec<&Part> = self.parts.iter().filter(|part| part.contrary_edges > 0).collect();
-        let of = self.among(&contrary);
         let edges = edges(self.contrary_edges);
         (self.contrary_edges > 0)
-            .then(|| format!("The mesh is partly inside out: at {edges}{of}, the two triangles face opposite sides."))
+            .then(|| format!("The mesh is partly inside out: at {edges}, the two triangles face opposite sides."))
     }
 
     fn branching(&self) -> Option<String> {
         let edges = edges(self.branching_edges);
         (self.branching_edges > 0)
             .then(|| format!("The mesh is not a manifold: more than two triangles meet at {edges}."))
-    }
-
-    fn apart(&self) -> Option<String> {
-        let count = self.stray.len();
-        let floats = if count == 1 { "piece floats" } else { "pieces float" };
-        let places = places(self.stray.iter().map(Piece::place), count);
-        // A piece that reaches the end of the box made it as large as it is.
-        let reaches = |piece: &&Piece| piece.low.cmple(self.low).any() || piece.high.cmpge(self.high).any();
-        let larger = match self.stray.iter().filter(reaches).count() {
-            0 => String::new(),
-            1 if count == 1 => ", and makes its box larger".to_owned(),
-            all if all == count => ", and make its box larger".to_owned(),
-            1 => "; 1 makes its box larger".to_owned(),
-            some => format!("; {some} make its box larger"),
-        };
-        (count > 0)
-            .then(|| format!("The mesh has stray parts: {count} {floats} apart from the rest ({places}){larger}."))
     }
 
     fn size(&self, millimeters: Option<f64>) -> Option<String> {
@@ -220,25 +178,6 @@ impl Facts {
             )),
         }
     }
-
-    /// Names the parts, in words, where there are several; nothing where there is one, or where it is all of them.
-    fn among(&self, some: &[&Part]) -> String {
-        if self.parts.len() < 2 || some.len() == self.parts.len() {
-            return String::new();
-        }
-        let places = places(some.iter().map(|part| part.place()), some.len());
-        format!(", in {} of {} parts ({places})", some.len(), self.parts.len())
-    }
-}
-
-/// The first three of `count` places, and a remark if there are more.
-fn places(places: impl Iterator<Item = String>, count: usize) -> String {
-    const SHOWN: usize = 3;
-    let mut text = places.take(SHOWN).collect::<Vec<_>>().join("; ");
-    if count > SHOWN {
-        text += &format!("; and {} more", count - SHOWN);
-    }
-    text
 }
 
 fn edges(count: usize) -> String {

@@ -26,18 +26,6 @@ pub struct Part {
 }
 
 impl Part {
-    /// Location in words.
-    pub(super) fn place(&self) -> String {
-        Self::place_of(self.triangles, self.low, self.high)
-    }
-
-    /// Number and location of triangles in a box, in words: "96 triangles around (1.20, 0, -3.00)".
-    pub(super) fn place_of(triangles: usize, low: Vec3, high: Vec3) -> String {
-        let plural = if triangles == 1 { "" } else { "s" };
-        let [x, y, z] = ((low.as_dvec3() + high.as_dvec3()) / 2.0).to_array().map(super::short);
-        format!("{triangles} triangle{plural} around ({x}, {y}, {z})")
-    }
-
     /// True if it encloses something, its triangles all facing one side.
     fn is_solid(&self) -> bool {
         // Less is a sheet with two sides, or the rounding of one.
@@ -173,10 +161,10 @@ fn is_inside(point: DVec3, part: usize, numbers: &[usize], mesh: &Mesh) -> bool 
 }
 
 /// Sets of triangles that hang together.
-pub(in crate::mesh) struct Sets(Vec<u32>);
+pub(super) struct Sets(Vec<u32>);
 
 impl Sets {
-    pub(in crate::mesh) fn new(count: usize) -> Self {
+    pub(super) fn new(count: usize) -> Self {
         Self((0..count as u32).collect())
     }
 
@@ -189,14 +177,14 @@ impl Sets {
         of
     }
 
-    pub(in crate::mesh) fn join(&mut self, one: u32, other: u32) {
+    pub(super) fn join(&mut self, one: u32, other: u32) {
         let (one, other) = (self.first(one), self.first(other));
         // To the lower one, so that numbers follow the order of the triangles.
         self.0[one.max(other) as usize] = one.min(other);
     }
 
     /// The number of each one's set, and how many sets there are.
-    pub(in crate::mesh) fn numbers(mut self) -> (Vec<usize>, usize) {
+    pub(super) fn numbers(mut self) -> (Vec<usize>, usize) {
         let mut numbers = vec![0; self.0.len()];
         let mut count = 0;
         for index in 0..numbers.len() {

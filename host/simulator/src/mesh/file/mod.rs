@@ -1,14 +1,11 @@
 //! Mesh files of every kind: which kind a file is, by its content, and its mesh.
 
-use super::parsed::Parsed;
-#[cfg(feature = "scans")]
-use super::scan;
 use super::text::Written;
 use super::{Mesh, collada, gltf, obj, ply, stl, unread};
 use crate::error::{Error, MeshProblem, Place, Result};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The kinds of mesh files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,19 +21,10 @@ pub enum Format {
     Gltf,
     /// COLLADA.
     Collada,
-    /// PCD: points, as text, binary or compressed.
-    Pcd,
-    /// XYZ: points, as text.
-    Xyz,
-    /// Depth images with poses, listed by `scene_camera.json`, as in the BOP benchmark.
-    Depth,
 }
 
-/// The name of the list of a scan's depth images.
-pub(crate) const DEPTH_LIST: &str = "scene_camera.json";
-
 /// The extensions of mesh files, in the order in which they are preferred where a folder holds one name with several.
-pub const EXTENSIONS: [&str; 8] = ["obj", "stl", "ply", "gltf", "glb", "dae", "pcd", "xyz"];
+pub const EXTENSIONS: [&str; 6] = ["obj", "stl", "ply", "gltf", "glb", "dae"];
 
 impl Format {
     /// The kind of file that starts with `head` (a few hundred bytes or more, or all of it) and has `length` bytes. Its
@@ -58,16 +46,12 @@ impl Format {
         let rest = text.get(first.len()..).unwrap_or_default();
         if head.starts_with(b"glTF") || text.first() == Some(&b'{') {
             Self::Gltf
-        } else if first == b"VERSION" || text.starts_with(b"# .PCD") {
-            Self::Pcd
         } else if first == b"ply" {
             Self::Ply
         } else if text.first() == Some(&b'<') {
             Self::Collada
         } else if first.eq_ignore_ascii_case(b"solid") {
             Self::Stl
-        } else if extension.is_some_and(|extension| extension.eq_ignore_ascii_case("xyz")) {
-            Self::Xyz
         } else if !rest.is_empty() && (obj::KEYWORDS.contains(&first) || first.starts_with(b"#")) {
             Self::Obj
         } else {
@@ -76,7 +60,6 @@ impl Format {
                 Some("ply") => Self::Ply,
                 Some("gltf" | "glb") => Self::Gltf,
                 Some("dae") => Self::Collada,
-                Some("pcd") => Self::Pcd,
                 _ => Self::Obj,
             }
         }
@@ -96,13 +79,8 @@ pub struct Contents {
     pub millimeters: Option<f64>,
     /// Format of the file.
     pub format: Format,
-    /// The points that the mesh was made of, in its coordinates; none if the file holds triangles.
-    pub points: Vec<[f32; 3]>,
-    /// Remarks on the file. For points: those left out, their noise, and the sizes of closed holes.
+    /// Remarks on the file.
     pub notes: Vec<String>,
-    /// For points, the share of the surface that is a guess, since it closes holes; without the flat underside of an object on
-    /// a table.
-    pub guessed: f64,
 }
 
 /// Read limit for pipes and other files that are not regular: 1 GiB.
@@ -111,15 +89,14 @@ const MOST_OF_A_PIPE: u64 = 1 << 30;
 /// Reads a mesh file of any kind: all its meshes together, polygons cut into triangles, without faces that are a single
 /// point.
 ///
-/// Memory: at most 256 bytes for each byte of the file (and of those that a glTF file names), and 1 MB. The surface of a scan
-/// is made on a grid, which takes some 100 MB regardless of the file's size.
+/// Memory: at most 256 bytes for each byte of the file (and of those that a glTF file names), and 1 MB.
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; a [`MeshProblem`] with its line or byte where the file is damaged, or uses
 /// unsupported features, and with the file when there is no face or each is a single point.
 pub fn read(path: &Path) -> Result<Contents> {
     let io = |source| Error::io(path, "read the mesh", source);
-    let file = File::open(opened(path)).map_err(io)?;
+    let file = File::open(path).map_err(io)?;
     let metadata = file.metadata().map_err(io)?;
     if metadata.is_file() {
         return parse_buffered(BufReader::with_capacity(1 << 18, file), metadata.len(), path, path.parent());
@@ -130,17 +107,6 @@ pub fn read(path: &Path) -> Result<Contents> {
         return Err(Error::at(Place::file(path), MeshProblem::TooLarge { limit: MOST_OF_A_PIPE }));
     }
     parse_buffered(bytes.as_slice(), bytes.len() as u64, path, path.parent())
-}
-
-/// The file that is opened for a path: of an object of a scene, its list of images.
-fn opened(path: &Path) -> PathBuf {
-    chosen(path).map_or_else(|| path.to_owned(), |(list, _)| list)
-}
-
-/// The list of a scene's depth images, and which of its objects is chosen: `scene_camera.json@3`.
-pub(super) fn chosen(path: &Path) -> Option<(PathBuf, u32)> {
-    let (name, number) = path.file_name()?.to_str()?.rsplit_once('@')?;
-    (name == DEPTH_LIST).then(|| Some((path.with_file_name(name), number.parse().ok()?)))?
 }
 
 /// Reads the bytes of a mesh file of any kind; errors name `path`, and its extension serves where the bytes do not say
@@ -172,33 +138,15 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
         return Err(Error::at(Place::file(path), problem));
     }
     let mut notes = Vec::new();
-    let format = match path.file_name() {
-        Some(name) if name == DEPTH_LIST || chosen(path).is_some() => Format::Depth,
-        _ => Format::of_usual(head, length, path.extension().and_then(|extension| extension.to_str())),
-    };
-    let (parsed, millimeters) = match format {
-        Format::Obj => (Parsed::Mesh(obj::parse_moved(reader, path)?), None),
+    let format = Format::of_usual(head, length, path.extension().and_then(|extension| extension.to_str()));
+    let ((mesh, moved), millimeters) = match format {
+        Format::Obj => (obj::parse_moved(reader, path)?, None),
         Format::Stl => {
             let (moved, odd) = stl::parse(reader, length, path)?;
             notes = odd;
-            (Parsed::Mesh(moved), None)
+            (moved, None)
         }
         Format::Ply => (ply::parse(reader, path)?, None),
-        #[cfg(feature = "scans")]
-        Format::Pcd => (Parsed::Points(scan::pcd::parse(reader, length, path)?), None),
-        #[cfg(feature = "scans")]
-        Format::Xyz => (Parsed::Points(scan::xyz::parse(reader, path)?), None),
-        #[cfg(not(feature = "scans"))]
-        Format::Pcd | Format::Xyz | Format::Depth => return Err(Error::at(Place::file(path), MeshProblem::NeedsScans)),
-        #[cfg(feature = "scans")]
-        Format::Depth => {
-            let mut bytes = Vec::new();
-            reader.take(length).read_to_end(&mut bytes).map_err(io)?;
-            (
-                Parsed::Points(scan::depth::parse(&bytes, path, folder, chosen(path).map(|(_, number)| number))?),
-                Some(1.0),
-            )
-        }
         Format::Gltf | Format::Collada => {
             let mut bytes = Vec::new();
             // A file that grows while it is read is cut: its end is missing, as its parser says.
@@ -207,17 +155,8 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
                 Format::Gltf => (gltf::parse(&bytes, path, folder)?, Some(1_000.0)),
                 _ => collada::parse(&bytes, path)?,
             };
-            (Parsed::Mesh(mesh), millimeters)
+            (mesh, millimeters)
         }
     };
-    Ok(match parsed {
-        Parsed::Mesh((mesh, moved)) => {
-            Contents { mesh, moved, millimeters, format, points: Vec::new(), notes, guessed: 0.0 }
-        }
-        #[cfg(feature = "scans")]
-        Parsed::Points(points) => {
-            let scan::Scanned { mesh, points, moved, notes, guessed } = scan::surface(points, path)?;
-            Contents { mesh, moved, millimeters, format, points, notes, guessed }
-        }
-    })
+    Ok(Contents { mesh, moved, millimeters, format, notes })
 }

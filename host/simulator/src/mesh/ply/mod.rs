@@ -8,11 +8,9 @@ mod counted;
 mod header;
 
 use super::Mesh;
-use super::exact::{Bounds, rounded};
-use super::parsed::Parsed;
+use super::exact::{Bounds, Moved, rounded};
 use super::polygon::Cutter;
-#[cfg(feature = "scans")]
-use super::scan;
+use super::unread;
 use crate::error::{Error, MeshProblem, Place, Result};
 use counted::{Counted, Counts};
 use header::Header;
@@ -29,10 +27,10 @@ use std::path::Path;
 /// # Errors
 /// If the header is invalid, the file ends too early or too late, a number is damaged or not finite, a face names a vertex
 /// that is not there, or no face is left.
-pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Parsed> {
+pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Moved> {
     let Header { format, text, bytes, lines, is_cloud } = Header::read(&mut reader, path)?;
-    if is_cloud && cfg!(not(feature = "scans")) {
-        return Err(Error::at(Place::file(path), MeshProblem::NeedsScans));
+    if is_cloud {
+        return Err(Error::at(Place::file(path), unread::cloud()));
     }
     let is_text = format == PlyFormat::Ascii;
     let counts = Counts::starting_at(bytes, lines);
@@ -45,13 +43,9 @@ pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Parsed> {
     let mut reader = text.as_bytes().chain(Counted::new(reader.chain(end), &counts));
     let mut ply = PlyReader::from_reader(&mut reader).map_err(|error| damaged(error.0.to_string()))?;
     let (mut vertices, mut faces, mut strips) = (Vertices::default(), Corners::default(), Corners::default());
-    #[cfg(feature = "scans")]
-    let mut cloud = Cloud::default();
     while let Some(element) = ply.current_element() {
         let (name, rows) = (element.name.clone(), element.count);
         let read = match name.as_str() {
-            #[cfg(feature = "scans")]
-            "vertex" if is_cloud => ply.next_element().map(|Rows(read, _)| cloud = read),
             "vertex" => ply.next_element().map(|Rows(read, _)| vertices = read),
             "face" => ply.next_element().map(|Rows(read, _)| faces = read),
             "tristrips" => ply.next_element().map(|Rows(read, _)| strips = read),
@@ -73,16 +67,12 @@ pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Parsed> {
             length => reader.consume(length),
         }
     }
-    #[cfg(feature = "scans")]
-    if is_cloud {
-        return Ok(Parsed::Points(cloud.0));
-    }
     let here = |problem| Error::at(Place::file(path), problem);
     let offset = Bounds::of(faces.used(&vertices.0).chain(strips.used(&vertices.0))).offset();
     let rounded = vertices.0.into_iter().map(|vertex| rounded(vertex, offset)).collect();
     let mut mesh = Mesh { vertices: rounded, triangles: Vec::new() };
     faces.cut(&mut mesh).and_then(|()| strips.cut_strips(&mut mesh)).map_err(here)?;
-    Ok(Parsed::Mesh((mesh.usable().map_err(here)?, offset)))
+    Ok((mesh.usable().map_err(here)?, offset))
 }
 
 /// Receiver of the rows of an element, one by one.
@@ -144,48 +134,6 @@ impl Collect for Vertices {
             return Err(MeshProblem::TooManyVertices.to_string());
         }
         self.0.push([x, y, z]);
-        Ok(())
-    }
-}
-
-/// Points of a surface, with normals or the places of sensors where the file has them.
-#[cfg(feature = "scans")]
-#[derive(Default)]
-struct Cloud(scan::Points);
-
-#[cfg(feature = "scans")]
-#[derive(Deserialize)]
-struct CloudRow {
-    x: f64,
-    y: f64,
-    z: f64,
-    #[serde(default = "missing", alias = "normal_x")]
-    nx: f64,
-    #[serde(default = "missing", alias = "normal_y")]
-    ny: f64,
-    #[serde(default = "missing", alias = "normal_z")]
-    nz: f64,
-    #[serde(default = "missing")]
-    vp_x: f64,
-    #[serde(default = "missing")]
-    vp_y: f64,
-    #[serde(default = "missing")]
-    vp_z: f64,
-}
-
-#[cfg(feature = "scans")]
-fn missing() -> f64 {
-    f64::NAN
-}
-
-#[cfg(feature = "scans")]
-impl Collect for Cloud {
-    type Row = CloudRow;
-
-    fn take(&mut self, row: CloudRow) -> Result<(), String> {
-        let CloudRow { x, y, z, nx, ny, nz, vp_x, vp_y, vp_z } = row;
-        let whole = |values: [f64; 3]| values.iter().all(|value| value.is_finite()).then_some(values);
-        self.0.add(scan::Point { place: [x, y, z], normal: whole([nx, ny, nz]), viewpoint: whole([vp_x, vp_y, vp_z]) });
         Ok(())
     }
 }

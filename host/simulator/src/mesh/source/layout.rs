@@ -1,7 +1,6 @@
 //! Layouts of the folders of mesh data sets.
 
 use super::search::{Found, lossy, rank};
-use crate::mesh::file::{self, DEPTH_LIST};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -22,34 +21,30 @@ pub(super) fn shapenet(path: &Path) -> Option<(String, String)> {
 }
 
 /// The folder after which an object is named: in YCB's layout `NNN_name/google_16k/textured.obj`, in that of Google Scanned
-/// Objects `Name/meshes/model.obj`, and of depth images `Name/scene_camera.json`.
+/// Objects `Name/meshes/model.obj`.
 pub(super) fn folder(path: &Path) -> Option<String> {
     let inner = path.parent()?;
     let is_scanned = path.file_stem()? == "model" && inner.file_name()? == "meshes";
-    if let Some((_, number)) = file::chosen(path) {
-        return Some(format!("{}@{number}", lossy(Some(inner.file_name()?))));
-    }
     match ycb(path) {
-        None if path.file_name()? == DEPTH_LIST => Some(lossy(Some(inner.file_name()?))),
         Some((folder, _)) => Some(lossy(folder.file_name())),
         None if is_scanned => Some(lossy(Some(inner.parent()?.file_name()?))),
         None => None,
     }
 }
 
-/// The folders of meshes and scans in YCB's layout, the one that is taken first.
-const SCANS: [&str; 6] = ["google_16k", "google_64k", "google_512k", "tsdf", "poisson", "clouds"];
+/// The folders of meshes in YCB's layout, the one that is taken first.
+const FOLDERS: [&str; 6] = ["google_16k", "google_64k", "google_512k", "tsdf", "poisson", "clouds"];
 
 /// In YCB's layout, an object's folder, and how early this file is taken.
 fn ycb(path: &Path) -> Option<(PathBuf, [usize; 3])> {
-    let scan = path.parent()?;
-    let scan_rank = SCANS.iter().position(|known| scan.file_name().is_some_and(|name| name == *known))?;
-    let folder = scan.parent()?;
+    let inner = path.parent()?;
+    let folder_rank = FOLDERS.iter().position(|known| inner.file_name().is_some_and(|name| name == *known))?;
+    let folder = inner.parent()?;
     let name = lossy(Some(folder.file_name()?));
     let (number, rest) = name.split_at_checked(3)?;
     let is_numbered = number.bytes().all(|byte| byte.is_ascii_digit()) && rest.starts_with(['_', '-']);
     let stem = ["textured", "nontextured"].iter().position(|known| path.file_stem().is_some_and(|stem| stem == *known));
-    is_numbered.then(|| (folder.to_owned(), [scan_rank, stem.unwrap_or(2), rank(path).unwrap_or_default()]))
+    is_numbered.then(|| (folder.to_owned(), [folder_rank, stem.unwrap_or(2), rank(path).unwrap_or_default()]))
 }
 
 /// Keeps one file of each object that a layout gives several: the others are passed over.

@@ -19,7 +19,6 @@ use std::path::{Path, PathBuf};
 /// - a mesh file of any of the kinds that [`mod@file`] reads, or a directory, which is searched for files with one of the
 ///   extensions of [`file::EXTENSIONS`], subdirectories included; where a folder holds a name with several extensions, the
 ///   first of them is taken, and the object's notes say so;
-/// - a scene of depth images with the number of the object that is chosen: `scene@3`;
 /// - the name of a built-in object, unless a file has that name.
 ///
 /// An object is named after its file, except in the layouts of
@@ -200,17 +199,16 @@ impl Source {
             Self::BuiltIn(name) => whole(builtin::one(name)),
             Self::Background => whole(builtin::background(builtin::BACKGROUND_SHAPES, 1)),
             Self::File { name, path, notes } => whole(file::read(&path).map(|contents| {
-                let file::Contents { mesh, millimeters, moved: by, notes: read, points, guessed, .. } = contents;
+                let file::Contents { mesh, millimeters, moved: by, notes: read, .. } = contents;
                 let notes = notes.into_iter().chain(moved(&path, by)).chain(read).collect();
                 let object = Object::new(name, mesh);
-                Object { millimeters, notes, points, guessed, ..object }
+                Object { millimeters, notes, ..object }
             })),
             Self::Instances { name, files, notes } => {
                 let read = |(name, path): (String, PathBuf)| {
-                    let file::Contents { mesh, millimeters, moved: by, notes, points, guessed, .. } =
-                        file::read(&path)?;
+                    let file::Contents { mesh, millimeters, moved: by, notes, .. } = file::read(&path)?;
                     let notes: Vec<String> = moved(&path, by).into_iter().chain(notes).collect();
-                    Ok((Instance { name, mesh }, (millimeters, (notes, points, guessed))))
+                    Ok((Instance { name, mesh }, (millimeters, notes)))
                 };
                 let read: Vec<Result<_>> = files.into_par_iter().map(read).collect();
                 let (mut good, mut errors) = (Vec::new(), Vec::new());
@@ -220,15 +218,10 @@ impl Source {
                 });
                 let (mut instances, stated): (Vec<_>, Vec<_>) = good.into_iter().unzip();
                 let (units, read): (Vec<_>, Vec<_>) = stated.into_iter().unzip();
-                let guessed = read.iter().map(|(.., guessed)| *guessed).fold(0.0, f64::max);
-                let (read, points): (Vec<_>, Vec<_>) =
-                    read.into_iter().map(|(notes, points, _)| (notes, points)).unzip();
                 let (millimeters, note) = one_unit(&mut instances, &units);
                 let object = Object::of_instances(name, instances).map(|object| Object {
                     millimeters,
                     notes: notes.into_iter().chain(read.into_iter().flatten()).chain(note).collect(),
-                    points: points.into_iter().next().unwrap_or_default(),
-                    guessed,
                     ..object
                 });
                 (object, errors)
@@ -299,8 +292,6 @@ fn found(sources: &[String], search: Search) -> Result<(Vec<Source>, Option<Stri
             && !Path::new(source).exists()
         {
             insert(&mut found, name.into(), Source::BuiltIn(name))?;
-        } else if let Some(path) = search::chosen(source) {
-            finder.found.push(Found { path, passed: Vec::new() });
         } else {
             let path = Path::new(source);
             let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {

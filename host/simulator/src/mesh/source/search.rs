@@ -1,7 +1,7 @@
 //! Mesh files in directories.
 
 use crate::error::{Error, Result};
-use crate::mesh::file::{DEPTH_LIST, EXTENSIONS};
+use crate::mesh::file::EXTENSIONS;
 use crate::mesh::unread;
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -31,21 +31,8 @@ pub(super) const LEVELS: usize = 8;
 
 /// Position of a file's extension among those of meshes; none for other files.
 pub(super) fn rank(path: &Path) -> Option<usize> {
-    if path.file_name().is_some_and(|name| name == DEPTH_LIST) {
-        return Some(EXTENSIONS.len());
-    }
     let extension = path.extension()?;
     EXTENSIONS.iter().position(|known| extension.eq_ignore_ascii_case(known))
-}
-
-/// The object of a scene of depth images that a source chooses: `scene@3`, or `scene/scene_camera.json@3`.
-pub(super) fn chosen(source: &str) -> Option<PathBuf> {
-    let (scene, number) = source.rsplit_once('@')?;
-    let number: u32 = number.parse().ok()?;
-    let scene = Path::new(scene);
-    let list = if scene.is_dir() { scene.join(DEPTH_LIST) } else { scene.to_owned() };
-    let is_list = list.file_name().is_some_and(|name| name == DEPTH_LIST) && list.is_file();
-    (is_list && !Path::new(source).exists()).then(|| list.with_file_name(format!("{DEPTH_LIST}@{number}")))
 }
 
 /// A search of directories.

@@ -1,40 +1,34 @@
 //! The error budget: by how much each step of a cast may be wrong, and why that is good enough.
 //!
-//! Lengths are in the frame of the casts, where the mesh's longest side is between 1 and 2. The steps take their
-//! constants from here, so the table and the code cannot disagree.
+//! Lengths are in the frame of the casts, where the mesh's longest side is between 1 and 2. Times of contact are whole
+//! microseconds in a touch, so that an error of 5e-7 s is always there.
 
 /// The precision in which contacts are decided.
-pub type Real = f64;
+pub(super) type Real = f64;
 
 /// A vector of that precision.
-pub type Vector = glam::DVec3;
+pub(super) type Vector = glam::DVec3;
 
-/// By how much one step may be wrong.
-#[derive(Clone, Copy, Debug)]
-pub struct Allowance {
-    /// The step.
-    pub step: &'static str,
-    /// The most that it may be off by.
-    pub error: f64,
-    /// In what unit, or as a share of what.
-    pub of: &'static str,
-    /// Reason why it is not larger, and why it does no harm.
-    pub reason: &'static str,
-}
-
-/// Boxes, and the eight-wide reject: rounding in f32, as a share of 1 + radius + distance of the start.
+/// Boxes, and the eight-wide reject: rounding in f32, as a share of 1 + radius + distance of the start. A few
+/// roundings of 6e-8 each; they let more triangles through, never fewer.
 pub(crate) const BOX: f64 = 4e-6;
-/// Moving the start up to the mesh's box, where the start is near.
+/// Moving the start up to the mesh's box, where the start is near: more than the six roundings of 1e-16 that
+/// this costs.
 pub(crate) const ENTRY: f64 = 1e-9;
-/// Moving a start that is far away up to the box, as a share of its distance.
+/// Moving a start that is far away up to the box, as a share of its distance. The start itself has no more digits; a path
+/// that grazes by d magnifies it to 1/sqrt(d) of it in time.
 pub(crate) const ENTRY_FAR: f64 = 1e-15;
-/// A triangle narrower than this share of its length is treated as having no face.
+/// A triangle narrower than this share of its length is treated as having no face: between edges w apart the surface
+/// lies at most w²/8r outside the cylinders about them.
 pub(crate) const FLAT: f64 = 1e-8;
-/// An edge closer to the direction of motion than this angle, in radians, is treated as having no cylinder.
+/// An edge closer to the direction of motion than this angle, in radians, is treated as having no cylinder:
+/// the most by which the sphere drifts away from the edge between its ends.
 pub(crate) const PARALLEL: f64 = 1e-12;
-/// A contact up to this much before the start counts as one at the start.
+/// A contact up to this much before the start counts as one at the start, so that a start within rounding of contact is
+/// neither lost nor found late.
 pub(crate) const EARLY: f64 = 1e-12;
-/// The time of contact with a triangle's plane, when it is used to skip the triangle.
+/// The time of contact with a triangle's plane, when it is used to skip the triangle. The plane's rounding is
+/// below 1e-14 / FLAT of the triangle's size times FLAT, far below this.
 pub(crate) const PLANE: f64 = 1e-9;
 
 /// A triangle narrower than this share of its length has all its edges tested; one that is wider, only those that the
@@ -44,55 +38,3 @@ pub(crate) const NARROW: f64 = 1e-6;
 pub(crate) const STEEP: f64 = 1e-6;
 /// A squared distance of this many times the squared radius is a miss, regardless of rounding.
 pub(crate) const CLEAR: f64 = 1.0 + 1e-12;
-
-/// Every step of a cast that is not exact up to the last bits of an f64.
-pub const BUDGET: [Allowance; 8] = [
-    Allowance {
-        step: "boxes of the tree, eight-wide reject (f32)",
-        error: BOX,
-        of: "1 + radius + start, added to the radius",
-        reason: "a few roundings of 6e-8 each; they let more triangles through, never fewer",
-    },
-    Allowance {
-        step: "moving the start up to the box",
-        error: ENTRY,
-        of: "length, added to the box",
-        reason: "stops short of the box by more than the six roundings of 1e-16 that the move costs",
-    },
-    Allowance {
-        step: "the same from far away",
-        error: ENTRY_FAR,
-        of: "the start's distance, sideways",
-        reason: "the start itself has no more digits; a path that grazes by d magnifies it to 1/sqrt(d) of it in time",
-    },
-    Allowance {
-        step: "needles count as their edges",
-        error: FLAT * FLAT,
-        of: "length",
-        reason: "between edges w apart the surface lies at most w²/8r outside the cylinders about them",
-    },
-    Allowance {
-        step: "edges along the motion count as their corners",
-        error: PARALLEL,
-        of: "the edge's length",
-        reason: "the most by which the sphere drifts away from the edge between its ends",
-    },
-    Allowance {
-        step: "contacts just before the start",
-        error: EARLY,
-        of: "length",
-        reason: "a start within rounding of contact is neither lost nor found late",
-    },
-    Allowance {
-        step: "skipping a triangle by the time of its plane",
-        error: PLANE,
-        of: "length, subtracted from the time",
-        reason: "the plane's rounding is below 1e-14 / FLAT of the triangle's size times FLAT, far below this",
-    },
-    Allowance {
-        step: "contact times in a touch",
-        error: 5e-7,
-        of: "seconds",
-        reason: "times are whole microseconds, on the host as on the chip",
-    },
-];

@@ -2,14 +2,13 @@
 //!
 //! Boxes in f32 with slack find the leaves that the sphere may reach (`tree`; in fine meshes with the help of `disc`), a
 //! test on eight triangles at once in f32 rejects those that it cannot touch (`pack`), and the rest is decided in f64
-//! ([`narrow`]). [`budget`] says by how much each step may be wrong.
+//! ([`narrow`]). `budget` says by how much each step may be wrong.
 
-pub mod budget;
+mod budget;
 mod disc;
 pub mod narrow;
 mod nearest;
 mod pack;
-pub mod precision;
 mod tree;
 
 use glam::DVec3;
@@ -85,6 +84,21 @@ impl Surface {
         let start = self.start(origin, direction, radius)?;
         let distance = start.skipped + self.tree.first_contact(&self.triangles, &start.motion)?;
         Some(distance * self.unit / start.length)
+    }
+
+    /// The [first contact](Self::first_contact) by another test of a single triangle, with the reject before it or without:
+    /// for the comparison of precisions.
+    pub fn first_contact_by<const REJECT: bool>(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        radius: f64,
+        test: impl Fn(&Motion, &Triangle, f64) -> Option<f64>,
+    ) -> Option<f64> {
+        let Start { motion, skipped, length } = self.start(origin, direction, radius)?;
+        let search = Search::new(&self.tree, &motion);
+        let distance = skipped + search.first_by::<REJECT>(&self.tree, &self.triangles, &motion, test)?;
+        Some(distance * self.unit / length)
     }
 
     /// The [first contact](Self::first_contact), and how the surface is oriented there.

@@ -2,7 +2,7 @@
 
 use super::disc::Discs;
 use super::narrow::{self, Motion, Triangle};
-use super::pack::{LANES, Pack, Ray, WIDTH};
+use super::pack::{Earliest, LANES, Pack, Ray, WIDTH};
 use glam::{BVec4A, DVec3, Vec3A, Vec4};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -214,7 +214,7 @@ impl Search {
 
     /// True if the sphere touches a triangle, early or late: much is left to search then.
     pub(super) fn touches(&mut self, tree: &Tree, triangles: &[Triangle], motion: &Motion) -> bool {
-        self.go_on::<true>(tree, triangles, motion);
+        self.go_on::<true, true>(tree, triangles, motion, narrow::first_contact);
         self.first < farthest(motion)
     }
 
@@ -230,34 +230,58 @@ impl Search {
         triangles: &[Triangle],
         motion: &Motion,
     ) -> Option<(f64, usize)> {
-        self.go_on::<false>(tree, triangles, motion);
+        self.go_on::<false, true>(tree, triangles, motion, narrow::first_contact);
         (self.first < farthest(motion)).then_some((self.first, self.touched))
     }
 
+    /// The distance of the first contact by another test of a triangle, with the reject before it or without.
+    pub(super) fn first_by<const REJECT: bool>(
+        mut self,
+        tree: &Tree,
+        triangles: &[Triangle],
+        motion: &Motion,
+        test: impl Fn(&Motion, &Triangle, f64) -> Option<f64>,
+    ) -> Option<f64> {
+        self.go_on::<false, REJECT>(tree, triangles, motion, test);
+        (self.first < farthest(motion)).then_some(self.first)
+    }
+
     #[inline]
-    fn go_on<const PAUSES: bool>(&mut self, tree: &Tree, triangles: &[Triangle], motion: &Motion) {
+    fn go_on<const PAUSES: bool, const REJECT: bool>(
+        &mut self,
+        tree: &Tree,
+        triangles: &[Triangle],
+        motion: &Motion,
+        test: impl Fn(&Motion, &Triangle, f64) -> Option<f64>,
+    ) {
         match self.scale {
-            scale::COARSE => self.go_on_at::<PAUSES, { scale::COARSE }>(tree, triangles, motion),
-            scale::MIDDLE => self.go_on_at::<PAUSES, { scale::MIDDLE }>(tree, triangles, motion),
-            _ => self.go_on_at::<PAUSES, { scale::FINE }>(tree, triangles, motion),
+            scale::COARSE => self.go_on_at::<PAUSES, REJECT, { scale::COARSE }>(tree, triangles, motion, test),
+            scale::MIDDLE => self.go_on_at::<PAUSES, REJECT, { scale::MIDDLE }>(tree, triangles, motion, test),
+            _ => self.go_on_at::<PAUSES, REJECT, { scale::FINE }>(tree, triangles, motion, test),
         }
     }
 
     /// Searches all candidates that are left, or those up to the first pack with a contact.
-    fn go_on_at<const PAUSES: bool, const SCALE: u8>(&mut self, tree: &Tree, triangles: &[Triangle], motion: &Motion) {
+    fn go_on_at<const PAUSES: bool, const REJECT: bool, const SCALE: u8>(
+        &mut self,
+        tree: &Tree,
+        triangles: &[Triangle],
+        motion: &Motion,
+        test: impl Fn(&Motion, &Triangle, f64) -> Option<f64>,
+    ) {
         let Self { ray, stack, first, limit, touched, .. } = self;
         while let Some(candidate) = stack.pop() {
             let Some(pack) = tree.resolve::<SCALE>(&candidate, ray, *limit, stack) else { continue };
-            let mut earliest = pack.earliest(ray, *limit);
+            let mut earliest = if REJECT { pack.earliest(ray, *limit) } else { Earliest::at_once(pack.count) };
             let mut touches = false;
             while let Some(lane) = earliest.pop(*limit) {
                 let triangle = &triangles[pack.first as usize + lane];
-                if let Some(distance) = narrow::first_contact(motion, triangle, *first) {
+                if let Some(distance) = test(motion, triangle, *first) {
                     *first = distance;
                     *touched = pack.first as usize + lane;
                     *limit = limit_after(*first, motion, ray);
                     touches = true;
-                    if earliest.has_some() {
+                    if REJECT && earliest.has_some() {
                         earliest.retain(&pack.earliest(ray, *limit));
                     }
                 }

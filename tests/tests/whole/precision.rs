@@ -1,7 +1,7 @@
-use palpate_simulator::mesh::Mesh;
-use palpate_simulator::probe::approach::Approach;
-use palpate_simulator::probe::scene::Scene;
-use palpate_simulator::probe::sweep::precision::{DoubleWithoutReject, SingleAfterReject, first_contact};
+use palpate::mesh::Mesh;
+use palpate::probe::approach::Approach;
+use palpate::probe::scene::Scene;
+use palpate_tests::precision::{double_without_reject, single_after_reject};
 use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 
 #[test]
@@ -15,8 +15,8 @@ fn the_experiments_search_as_the_production_search_does() {
             let Approach { start, direction, .. } = Approach::draw(&mut rng, scene.bounds(), 10.0);
             let used = scene.first_contact(start, direction, radius);
             let surface = scene.surface();
-            assert_eq!(first_contact::<DoubleWithoutReject>(surface, start, direction, radius), used);
-            let single = first_contact::<SingleAfterReject>(surface, start, direction, radius);
+            assert_eq!(double_without_reject(surface, start, direction, radius), used);
+            let single = single_after_reject(surface, start, direction, radius);
             if let Some((single, used)) = single.zip(used) {
                 assert!((single - used).abs() < 0.01, "{single} {used}");
                 contacts += 1;

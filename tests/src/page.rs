@@ -1,12 +1,14 @@
-//! Expected results of the page's computations, computed by the program.
+//! The trace of a page of `palpate view --play`: all that it must compute, computed by the program.
 
-use super::{Contender, Settings, Surface};
 use palpate::capture::touches;
+use palpate::compile::CompiledModel;
 use palpate::error::{EvaluateProblem, Result};
 use palpate::probe::hand::within;
+use palpate::probe::noise::Noise;
 use palpate::probe::scene::Scene;
 use palpate::touches::Origin;
 use palpate_onboard::{CapacityError, Recognizer, Stopping, Verdict};
+use palpate_report::play::Surface;
 use palpate_shared::Touch;
 use std::fmt::Write;
 
@@ -20,25 +22,25 @@ const ROUND: u64 = 100;
 ///
 /// # Errors
 /// Errors of [`Scene::new`] and [`touches`]; [`EvaluateProblem::TooManyObjects`].
-pub fn trace(surfaces: &[Surface], contenders: &[Contender], settings: &Settings, rounds: u64) -> Result<String> {
+pub fn trace(surfaces: &[Surface], models: &[CompiledModel], noise: &Noise, rounds: u64) -> Result<String> {
     let mut text = String::new();
     for (number, surface) in surfaces.iter().enumerate() {
         let scene = [Scene::new(&surface.mesh(), surface.length)?];
         for seed in 1..=rounds {
-            let origin = Origin { approaches: true, pose: true, seed, ..settings.origin.clone() };
+            let origin = Origin { approaches: true, pose: true, seed, ..Origin::default() };
             let captured = touches(&scene, &surface.name, &origin, 0..ROUND)?;
             let noisy = |(index, touch): (u64, &Touch)| {
-                let noisy = settings.noise.add(&surface.name, std::slice::from_ref(touch), (seed << 32) + index).pop();
+                let noisy = noise.add(&surface.name, std::slice::from_ref(touch), (seed << 32) + index).pop();
                 noisy.map(|touch| within(&touch, origin.probe.window()))
             };
             let sensed: Vec<Touch> = (0..).zip(captured.touches()).filter_map(noisy).collect();
-            let models: Vec<_> = contenders.iter().map(|contender| contender.model.model()).collect();
+            let opened: Vec<_> = models.iter().map(CompiledModel::model).collect();
             let recognizer = |model| Recognizer::<256>::new(model, Stopping::from_model(model));
             let too_many = |error: CapacityError| EvaluateProblem::TooManyObjects {
                 objects: error.objects,
                 capacity: error.capacity,
             };
-            let mut recognizers: Vec<_> = models.iter().map(recognizer).collect::<Result<_, _>>().map_err(too_many)?;
+            let mut recognizers: Vec<_> = opened.iter().map(recognizer).collect::<Result<_, _>>().map_err(too_many)?;
             for (index, touch) in sensed.iter().enumerate() {
                 let times = touch.times().map(|time| time.micros().map_or("-".into(), |micros| micros.to_string()));
                 // Writing to a string cannot fail.
@@ -46,7 +48,7 @@ pub fn trace(surfaces: &[Surface], contenders: &[Contender], settings: &Settings
                 for recognizer in &mut recognizers {
                     // Refused or not: what it knows is compared.
                     _ = recognizer.push(touch);
-                    line(&mut text, recognizer);
+                    text += &line(recognizer);
                 }
                 text.push('\n');
             }
@@ -55,7 +57,9 @@ pub fn trace(surfaces: &[Surface], contenders: &[Contender], settings: &Settings
     Ok(text)
 }
 
-fn line(text: &mut String, recognizer: &Recognizer<'_, 256>) {
+/// Knowledge of a recognizer, as part of a line.
+#[must_use]
+pub fn line(recognizer: &Recognizer<'_, 256>) -> String {
     let verdict = match recognizer.verdict() {
         Verdict::Undecided => 0,
         Verdict::Recognized { .. } => 1,
@@ -65,5 +69,5 @@ fn line(text: &mut String, recognizer: &Recognizer<'_, 256>) {
     let model = recognizer.model();
     let of = |object| recognizer.evidence().get(object).copied().unwrap_or_else(|| model.prior(object).into());
     let evidence: Vec<String> = (0..model.object_count()).map(|object| of(object).to_string()).collect();
-    _ = write!(text, " {verdict} {} {} {}", recognizer.best(), recognizer.touches(), evidence.join(","));
+    format!(" {verdict} {} {} {}", recognizer.best(), recognizer.touches(), evidence.join(","))
 }

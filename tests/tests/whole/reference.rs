@@ -1,7 +1,7 @@
 //! Our contact times against those computed in quad precision.
 
-use palpate::probe::cast::{self, Agreement};
 use palpate::probe::scene::Scene;
+use palpate_tests::casts::{self, Agreement};
 use std::path::{Path, PathBuf};
 
 /// The radius of the reference casts, the nearest f32.
@@ -14,8 +14,9 @@ fn tolerance(set: &str) -> f64 {
 
 fn agreement(directory: &Path, name: &str) -> Vec<Agreement> {
     let scene = Scene::as_is(&palpate::mesh::obj::read(&directory.join(format!("{name}.obj"))).unwrap()).unwrap();
-    let casts = cast::read(&directory.join(format!("{name}.casts.csv"))).unwrap();
-    cast::agreement(&casts, &cast::times(&scene, &casts, RADIUS.into()))
+    let casts = casts::read(&directory.join(format!("{name}.casts.csv")));
+    let time = |cast: &casts::Cast| scene.first_contact(cast.origin, cast.direction, RADIUS.into());
+    casts::agreement(&casts, &casts.iter().map(time).collect::<Vec<_>>())
 }
 
 fn check(directory: &Path, name: &str) {
@@ -29,13 +30,13 @@ fn check(directory: &Path, name: &str) {
 
 #[test]
 fn slivers_are_touched_when_and_where_the_reference_says() {
-    check(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data"), "slivers");
+    check(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data"), "slivers");
 }
 
 #[test]
 fn real_objects_are_touched_when_and_where_the_reference_says() {
     let shared = std::env::var_os("PALPATE_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"), PathBuf::from);
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
     let directory = shared.join("reference");
     if !directory.is_dir() {
         eprintln!("SKIPPED: no reference casts in {} (set PALPATE_SHARED)", directory.display());

@@ -1,0 +1,22 @@
+//! Prints all that a page of the built-in objects and these models must compute in ten rounds with each object:
+//! `.ci/pages/play.js` compares each of the 10,000 approaches with the page's own.
+//!
+//! ```text
+//! palpate view --play --model MODEL -o game.html
+//! cargo run --release -p palpate-tests --bin page -- MODEL >trace.txt
+//! ```
+
+use palpate::compile::CompiledModel;
+use palpate::error::Result;
+use palpate::mesh::builtin;
+use palpate::probe::noise::Noise;
+use palpate::touches::Origin;
+use palpate_report::play;
+use palpate_tests::page::trace;
+
+fn main() -> Result<()> {
+    let models = std::env::args().skip(1).map(CompiledModel::read).collect::<Result<Vec<_>>>()?;
+    let surfaces = play::surfaces(&builtin::all()?, &Origin::default())?;
+    print!("{}", trace(&surfaces, &models, &Noise::switch(), 10)?);
+    Ok(())
+}
