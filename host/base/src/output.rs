@@ -97,12 +97,11 @@ pub fn replace_foreign(replaces: bool) {
 }
 
 /// Beginnings of files that Palpate writes.
-const BEGINNINGS: [&[u8]; 10] = [
+const BEGINNINGS: [&[u8]; 9] = [
     // A compiled model, and the header that reads it in C.
     &MAGIC,
     b"/* palpate.h: recognize objects by touch",
-    // A certificate, a probe file, a mesh.
-    b"palpate certificate ",
+    // A probe file, a mesh.
     b"# Found by `palpate probe ",
     b"# Written by Palpate.",
     // A page; those of versions up to 0.3.

@@ -3,7 +3,6 @@
 use super::{Global, maps, trees};
 use clap_complete::Shell;
 use palpate::Result;
-use palpate::compile::code::Form;
 use palpate::compile::{Language, Layout, Leaf};
 use palpate::mesh::builtin;
 use palpate::output::print;
@@ -47,7 +46,7 @@ fn options() -> Vec<(&'static str, Vec<String>)> {
     let keys = |keys: Vec<&str>| keys.iter().map(|key| format!("{key}=")).collect();
     let values = |values: Vec<&str>| values.into_iter().map(String::from).collect();
     let goals = ["balanced", "speed", "size", "m4f", "m0+"];
-    let sources = Language::ALL.map(Language::name).into_iter().chain(Form::ALL.map(Form::name));
+    let sources = Language::ALL.map(Language::name).into_iter().chain(["c-code", "rust-code"]);
     vec![
         ("maps", keys(maps::keys().collect())),
         ("real", keys(PartialNoise::KEYS.into())),

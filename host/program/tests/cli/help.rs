@@ -74,7 +74,7 @@ fn keys_of_options_are_completed_after_a_comma_too_where_the_shell_is_there() {
     assert_eq!(bash("palpate run --real timer=1ms,missed=2%,b", "2%,b"), "2%,bent=\n");
     assert_eq!(bash("palpate run --real noise=", ""), "\n");
     assert_eq!(bash("palpate export e.json --layout comp", "comp"), "compact complete\n");
-    assert_eq!(bash("palpate export e.json --emit c,thumb-", "c,thumb-"), "c,thumb-m4f\n");
+    assert_eq!(bash("palpate export e.json --emit c,rust-", "c,rust-"), "c,rust-code\n");
     assert!(bash("palpate capture cup b", "b").contains("builtin"), "names of objects, where a command takes some");
     assert!(!bash("palpate export b", "b").contains("builtin"));
     let fish = std::process::Command::new("fish")
