@@ -7,7 +7,7 @@
 use super::columns::Kind;
 use super::program::{CodeNode, CodeTree, Program};
 use crate::compile::cost::Instructions;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashSet};
 
 /// Instructions of the parts of a program on one processor.
 struct Costs {
@@ -69,7 +69,7 @@ struct Work {
 }
 
 /// Comparisons of a function, each with how often a row makes it.
-type Comparisons = HashMap<(usize, u8), f64>;
+type Comparisons = BTreeMap<(usize, u8), f64>;
 
 impl Program {
     /// Bytes of code and tables on a Cortex-M4F.
@@ -91,7 +91,7 @@ impl Program {
                 .map(|own| own.cuts.len())
                 .sum(),
         };
-        let mut leaves = std::collections::HashSet::new();
+        let mut leaves = HashSet::new();
         for tree in self.trees.iter().filter(|tree| tree.object.is_none()) {
             tree.root.leaves(&mut |values| _ = leaves.insert(values));
         }
@@ -155,7 +155,7 @@ impl Program {
 
     /// The trees of each function.
     fn functions(&self) -> impl Iterator<Item = Vec<&CodeTree>> {
-        let ones = (0..self.objects()).flat_map(|object| self.chunks(object));
+        let ones = (0..self.objects()).flat_map(move |object| self.chunks(object));
         ones.chain(self.trees.iter().filter(|tree| tree.object.is_none()).map(|tree| vec![tree]))
     }
 
