@@ -2179,6 +2179,23 @@ static inline const uint8_t *palpate_prediction_(const palpate_model *model)
     return NULL;
 }
 
+/* The class with the largest of the sums. */
+static inline uint16_t palpate_best_of_(const palpate_model *model, const int32_t *sums)
+{
+    const uint8_t *prediction = palpate_prediction_(model);
+    const int last_of_ties = prediction != NULL && PALPATE_BYTE(prediction + 1) != 0;
+    int32_t most = INT32_MIN;
+    uint_fast16_t best = 0, i;
+    for (i = 0; i < model->known; i++) {
+        const int32_t sum = PALPATE_IS_F32_(model) ? palpate_key(PALPATE_AS_(uint32_t, sums[i])) : sums[i];
+        if (sum > most || (last_of_ties && sum == most)) {
+            best = i;
+            most = sum;
+        }
+    }
+    return PALPATE_AS_(uint16_t, best);
+}
+
 /* The class of a row of `count` features (see palpate_margins_of): that with the largest margin, and of several the first,
  * or the last where the model says so. With f32 leaves their sums are compared as they are. `margins` has room for
  * `room` of them, and then holds the row's. PALPATE_NO_CLASS, and nothing written, if there are more objects than room. */
