@@ -26,7 +26,6 @@
  *   PALPATE_SENTINEL     0: rejects models over rows in which a number stands for a missing value
  *   PALPATE_ROW_EVIDENCE 0: rejects models that state what a row adds to the evidence, or how much rows count together
  *   PALPATE_SEQUENCES    1: reads models that number the rows of a sequence, or state which of them they take; rejected by default
- *   PALPATE_EARLY        1: adds palpate_class_of, which gives a class without walking all trees
  *   PALPATE_OUTPUTS      1: reads models in which several outputs belong to one object; rejected by default
  *   PALPATE_STRANGERS    0: rejects models with a test for unknown objects, or with a background
  *   PALPATE_MAX_OBJECTS  room of a recognizer, 1 to 256; 32 by default; each object takes state and stack
@@ -68,9 +67,6 @@
 #endif
 #ifndef PALPATE_SEQUENCES
 #define PALPATE_SEQUENCES 0
-#endif
-#ifndef PALPATE_EARLY
-#define PALPATE_EARLY 0
 #endif
 #ifndef PALPATE_OUTPUTS
 #define PALPATE_OUTPUTS 0
@@ -199,10 +195,6 @@ typedef struct {
 #endif
 #if PALPATE_OUTPUTS
     const uint8_t *outputs_; /* the objects that outputs belong to; NULL if each is an object */
-#endif
-#if PALPATE_EARLY
-    const uint8_t *exits_; /* places in the walk where a class may be known, 8 bytes each, up to `exits_end_` */
-    const uint8_t *exits_end_;
 #endif
     uint32_t wrong;          /* the place of the error, in bytes from the start */
     uint32_t largest_spread; /* of touches that count, in microseconds */
@@ -593,11 +585,6 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 }
                 model->outputs_ = content;
 #endif
-#if PALPATE_EARLY
-            } else if (tag == 17) {
-                model->exits_ = content;
-                model->exits_end_ = content + (length & ~PALPATE_AS_(uint32_t, 7));
-#endif
             } else if (tag != last) {
                 return PALPATE_NOT_UNDERSTOOD;
             }
@@ -895,10 +882,6 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
 #endif
 #if PALPATE_OUTPUTS
     model->outputs_ = NULL;
-#endif
-#if PALPATE_EARLY
-    model->exits_ = NULL;
-    model->exits_end_ = NULL;
 #endif
     model->known = model->objects;
     model->patterns = 0x20;
@@ -1253,32 +1236,8 @@ PALPATE_APART_ void palpate_call_(const palpate_model *model, const int32_t *fea
 }
 #endif
 
-#if PALPATE_EARLY
-/* The object whose sum, shifted and with its base, is larger than each other one by more than what the place allows; else PALPATE_NONE_. */
-static inline uint_fast16_t palpate_leader_of_(const palpate_model *model, const uint32_t *sums, uint_fast8_t shift, const uint8_t *place)
-{
-    const uint8_t *base = model->part_[PALPATE_MARGINS_];
-    int32_t most = INT32_MIN, second = INT32_MIN;
-    uint_fast16_t best = PALPATE_NONE_, i;
-    for (i = 0; i < model->known; i++) {
-        const int32_t sum = PALPATE_AS_(int32_t, (sums[i] << shift) + palpate_u32_(base + 4 * PALPATE_AS_(size_t, i)));
-        if (sum > most) {
-            second = most;
-            most = sum;
-            best = i;
-        } else if (sum > second) {
-            second = sum;
-        }
-    }
-    /* Sums are within 2^30. */
-    return PALPATE_AS_(uint32_t, most) - PALPATE_AS_(uint32_t, second) > palpate_u32_(place + 4) ? best : PALPATE_NONE_;
-}
-#endif
-
-/* The sums of a row of features, in units or as the bits of f32 values. If it may end early, and does, the object that leads,
- * and what is summed up so far; else PALPATE_NONE_. */
-static inline uint_fast16_t palpate_sum_until_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums,
-                                              int early)
+/* The sums of a row of features, in units or as the bits of f32 values. */
+static inline void palpate_sum_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums)
 {
     const uint8_t *group = model->part_[PALPATE_GROUPS_], *splits = model->part_[PALPATE_SPLITS_];
     const uint8_t *leaves = model->part_[PALPATE_LEAVES_], *cuts = model->cuts_, *axis = model->part_[PALPATE_AXES_];
@@ -1289,16 +1248,10 @@ static inline uint_fast16_t palpate_sum_until_(const palpate_model *model, const
     uint8_t *ranks = PALPATE_AT_(uint8_t *, words);
     uint_fast16_t i;
     uint_fast8_t last;
-#if PALPATE_EARLY
-    const uint8_t *place = early && !PALPATE_IS_F32_(model) ? model->exits_ : model->exits_end_;
-    uint16_t walked = 0;
-#else
-    (void)early;
-#endif
 #if PALPATE_LAYOUTS & PALPATE_CODE
     if (PALPATE_IS_CODE_(model)) {
         palpate_call_(model, features, count, PALPATE_AT_(int32_t *, sums));
-        return PALPATE_NONE_;
+        return;
     }
 #endif
     for (i = 0; i < model->objects; i++) {
@@ -1362,7 +1315,7 @@ static inline uint_fast16_t palpate_sum_until_(const palpate_model *model, const
         for (i = 0; PALPATE_IS_I8_(model) && i < model->objects; i++) {
             sums[i] -= 128;
         }
-        return PALPATE_NONE_;
+        return;
     }
     last = group != splits ? PALPATE_BYTE(group + 1) : 0;
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
@@ -1406,16 +1359,6 @@ static inline uint_fast16_t palpate_sum_until_(const palpate_model *model, const
                 leaves += PALPATE_AS_(size_t, all + 1) * stored;
             }
         }
-#if PALPATE_EARLY
-        walked++;
-        if (place != model->exits_end_ && walked == palpate_u16_(place)) {
-            const uint_fast16_t leader = palpate_leader_of_(model, sums, last, place);
-            if (leader != PALPATE_NONE_) {
-                return leader;
-            }
-            place += 8;
-        }
-#endif
     }
     if (!PALPATE_IS_F32_(model)) {
         palpate_shift_(model, sums, last);
@@ -1423,12 +1366,6 @@ static inline uint_fast16_t palpate_sum_until_(const palpate_model *model, const
             sums[i] += palpate_u32_(base + 4 * PALPATE_AS_(size_t, i));
         }
     }
-    return PALPATE_NONE_;
-}
-
-static inline void palpate_sum_(const palpate_model *model, const int32_t *features, uint16_t count, uint32_t *sums)
-{
-    (void)palpate_sum_until_(model, features, count, sums, 0);
 }
 
 /* An f32 value, given by its bits, in units of 2^-16, rounded half away from zero, within 2^30. */
@@ -2173,21 +2110,6 @@ static inline uint16_t palpate_best_of_(const palpate_model *model, const int32_
     }
     return PALPATE_AS_(uint16_t, best);
 }
-
-#if PALPATE_EARLY
-/* The class that palpate_predict_class gives, ties and all, from as few trees as possible, if `palpate export --early-exit`
- * wrote the model. `numbers` has room for `room` of them, and holds no margins afterwards. PALPATE_NO_CLASS, and nothing written,
- * if there are more objects than room. */
-PALPATE_API uint16_t palpate_class_of(const palpate_model *model, const int32_t *features, uint16_t count, int32_t *numbers, size_t room)
-{
-    uint_fast16_t leader;
-    if (model->objects > room) {
-        return PALPATE_NO_CLASS;
-    }
-    leader = palpate_sum_until_(model, features, count, PALPATE_AT_(uint32_t *, numbers), 1);
-    return leader != PALPATE_NONE_ ? PALPATE_AS_(uint16_t, leader) : palpate_best_of_(model, numbers);
-}
-#endif
 
 /* The class of a row of `count` features (see palpate_margins_of): that with the largest margin, and of several the first,
  * or the last where the model says so. With f32 leaves their sums are compared as they are. `margins` has room for

@@ -18,9 +18,6 @@
 #ifndef PALPATE_MAX_OBJECTS
 #define PALPATE_MAX_OBJECTS 256
 #endif
-#ifndef PALPATE_EARLY
-#define PALPATE_EARLY 1
-#endif
 /* The most features of a model with a guard. */
 #ifndef REPLAY_GUARDED
 #define REPLAY_GUARDED 256
@@ -193,9 +190,6 @@ static void replay_known(palpate_answer answer, uint16_t count)
         replay_float(has_value ? palpate_predict_value(&replay_model, replay_features, count) : 0);
         replay_put('\n');
         replay_numbers("margins", replay_margins, objects);
-        replay_text("class");
-        replay_i64((int64_t)palpate_class_of(&replay_model, replay_features, count, replay_margins, REPLAY_ROOM));
-        replay_put('\n');
     }
     replay_evidence();
 }

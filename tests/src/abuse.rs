@@ -8,7 +8,7 @@ use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::with;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
-    Axis, Counted, EarlyExit, Group, HEADER_LENGTH, Header, Held, Length, Limits, Link, MUST_UNDERSTAND, MisfitTerms,
+    Axis, Counted, Group, HEADER_LENGTH, Header, Held, Length, Limits, Link, MUST_UNDERSTAND, MisfitTerms,
     ObjectMisfit, Outputs, Plan, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, TrainedNoise,
     TrainedProbe, TrainedTouches, checksum, write_section,
 };
@@ -635,7 +635,6 @@ fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
     Outputs::write((0..objects as u8).map(|output| (output / 2, 0.5)), &mut |part| outputs.extend_from_slice(part));
     let names = [0, 0, 0x80, 0x3f, 1, b'a', 0, 0, 0x80, 0x3f, 2, b'b', b'c'];
     let table = [0, 0, 0, 0, 4, 3, 0, 4, 0, 1, 1, 2, 9];
-    let exits = EarlyExit { groups: 1, bound: 1 << 20 }.to_bytes();
     let limits = Limits { low: -9, high: 1 << 20, may_miss: true, most_equal: 5 };
     let guard = limits.to_bytes().repeat(usize::from(plain[15]) + 1);
     let mut prediction = Vec::new();
@@ -646,7 +645,6 @@ fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
         (must(Tag::Prediction), prediction.clone(), prediction.len()),
         (must(Tag::Sentinel), Sentinel { low: -1, high: 1 }.to_bytes().to_vec(), 8),
         (must(Tag::RowEvidence), table.to_vec(), table.len()),
-        (Tag::EarlyExit.code(), exits.to_vec(), 0),
         (must(Tag::Outputs), outputs.clone(), outputs.len()),
         (must(Tag::Position), Position { feature: 0, step: 3 }.to_bytes().to_vec(), Position::LENGTH),
         (must(Tag::Guard), guard.clone(), guard.len()),

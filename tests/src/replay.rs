@@ -165,8 +165,6 @@ impl<'m> Script<'m> {
         let values = [bits(model.predict_raw(features)), bits(model.predict_value(features))];
         self.numbers("predicted", &[class as i64, values[0], values[1]]);
         self.numbers("margins", &margins);
-        let class = model.class_of(features, &mut margins).expect("as much room as classes");
-        self.numbers("class", &[class as i64]);
         self.evidence();
     }
 

@@ -6,8 +6,8 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-    EarlyExit, Held, Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Position, Prediction,
-    RowEvidence, Section, Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
+    Held, Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence,
+    Section, Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;
@@ -86,14 +86,6 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
     }
     if model.descriptor().is_none() && rng.random_bool(0.7) {
         write_section(Tag::RowEvidence, true, &row_evidence(rng), &mut put);
-    }
-    if rng.random_bool(0.5) {
-        // Of any leads, so that not all belong to the largest sum.
-        let groups = model.header().groups();
-        let exits = (1..groups.max(1)).filter(|_| rng.random_bool(0.5)).collect::<Vec<u16>>();
-        let exits = exits.into_iter().map(|groups| EarlyExit { groups, bound: 1 << rng.random_range(0..24) });
-        let content: Vec<u8> = exits.flat_map(EarlyExit::to_bytes).collect();
-        write_section(Tag::EarlyExit, false, &content, &mut put);
     }
     if rng.random_bool(0.5) {
         write_section(Tag::Outputs, true, &outputs(objects, rng), &mut put);

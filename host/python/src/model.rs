@@ -6,7 +6,6 @@ use crate::data::DataSet;
 use crate::ensemble::Ensemble;
 use crate::failure::Failure;
 use numpy::ndarray::{Ix1, Ix2};
-use palpate::compile::code::Form;
 use palpate::compile::{self as library, Compiled, CompiledModel, Core, Goal, Language, Layout, Leaf, Settings};
 use palpate::ensemble::Probability;
 use palpate::error::{CompileProblem, Error, EvaluateProblem, TouchesProblem};
@@ -15,7 +14,6 @@ use palpate::evaluate::predict::{Predicted, predict};
 use palpate::evaluate::together::{AT_ONCE, Together, TouchesTogether};
 use palpate::onboard;
 use palpate::output;
-use palpate::prove::sources;
 use palpate::rows::{Encoder, Features, feature_names, notes};
 use palpate::shared::{Descriptor, Touch};
 use palpate::touches::touch_of_seconds;
@@ -197,44 +195,40 @@ impl Model {
         Ok(py.detach(|| output::write_bytes(&path, self.model().bytes()))?)
     }
 
-    /// Writes the model as source code, and returns the files. `form` is "c" (an array), "rust", "c-code" (trees as C),
-    /// "thumb" or "thumb-m4f" (trees as assembly, for C and Rust); without it a name that ends in ".h" means "c", ".rs" "rust"
-    /// and ".s" "thumb". What has to be built with it, such as palpate.h, is written beside it, and for assembly the model.
+    /// Writes the model as source code, and returns the files. `form` is "c" (an array), "rust", "c-code" (trees as C) or
+    /// "rust-code" (trees as Rust); without it a name that ends in ".h" means "c", and ".rs" "rust". What has to be built with it,
+    /// such as palpate.h, is written beside it, and for trees as Rust the model.
     #[pyo3(signature = (path, *, form=None))]
     fn emit(&self, py: Python<'_>, path: PathBuf, form: Option<&str>) -> Result<Vec<PathBuf>, Failure> {
         let of_suffix = path.extension().and_then(|extension| match extension.to_str() {
             Some("h") => Some("c"),
             Some("rs") => Some("rust"),
-            Some("s") => Some("thumb"),
             _ => None,
         });
         let refuse = |form: &str, allowed: &str| Err(Error::setting("form", form, allowed).into());
-        let all = "c, rust, c-code, thumb or thumb-m4f, or a path that ends in .h, .rs or .s";
+        let all = "c, rust, c-code or rust-code, or a path that ends in .h or .rs";
         let Some(name) = form.or(of_suffix) else { return refuse("not given", all) };
-        let language = Language::ALL.into_iter().find(|language| language.name() == name);
-        let code = Form::ALL.into_iter().find(|form| form.name() == name);
-        if language.is_none() && code.is_none() {
+        let (plain, is_code) = name.strip_suffix("-code").map_or((name, false), |plain| (plain, true));
+        let Some(language) = Language::ALL.into_iter().find(|language| language.name() == plain) else {
             return refuse(name, all);
-        }
+        };
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let languages = [language.unwrap_or(Language::C)];
         Ok(py.detach(|| {
             let Some((ensemble, settings, compiled)) = &self.source else {
-                let Some(language) = language else {
-                    return Err(Error::setting(
-                        "form",
-                        name,
-                        "c or rust for a model that was loaded: it has bytes, not trees",
-                    ));
-                };
+                if is_code {
+                    let allowed = "c or rust for a model that was loaded: it has bytes, not trees";
+                    return Err(Error::setting("form", name, allowed));
+                }
                 let text = library::emit(self.model(), &stem, language);
                 return library::write_sources(&path, &[(language.extension(), text)]);
             };
-            let Some(form) = code else { return library::write_sources(&path, &sources(compiled, &stem, &languages)?) };
-            let settings = with!(settings.clone(), layout = Some(Layout::Code), forms = vec![form]);
+            if !is_code {
+                return library::write_sources(&path, &compiled.sources(&stem, &[language])?);
+            }
+            let settings = with!(settings.clone(), layout = None, code = true);
             let compiled = library::compile(ensemble, &settings)?;
-            let mut written = library::write_sources(&path, &sources(&compiled, &stem, &languages)?)?;
-            if let Form::Thumb(_) = form {
+            let mut written = library::write_sources(&path, &compiled.sources(&stem, &[language])?)?;
+            if language == Language::Rust {
                 written.push(path.with_extension("palpate"));
                 output::write_bytes(&path.with_extension("palpate"), &compiled.bytes)?;
             }

@@ -10,7 +10,7 @@
 //! | [`rows`] | rows of features | [`rows::Rows`] |
 //! | [`compile`] | an ensemble to the bytes that a chip reads | [`compile::compile`](fn@compile::compile) |
 //! | [`verify`] | margins, predictions and scores over rows; a model compared with its ensemble | [`verify::verify`](fn@verify::verify) |
-//! | [`prove`] | a model means what its ensemble means, for every row: proofs and certificates | [`prove::prove`](fn@prove::prove) |
+//! | [`prove`] | a model means what its ensemble means, for every row: proofs | [`prove::prove`](fn@prove::prove) |
 //! | [`train`] | grows boosted trees on rows of classes | [`train::train`] |
 //! | [`output`], [`progress`] | files that appear whole or not at all; progress of long calls | |
 //! | [`wording`] | numbers as people read them | [`wording::decimal`] |

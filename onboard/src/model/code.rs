@@ -6,7 +6,7 @@ use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Key, Layout};
 
 /// A function that adds up trees: from a row of all features to margins in units, one for each object. `palpate export
-/// --emit thumb` writes one, in `model.rs`.
+/// --emit rust-code` writes one, in `model.rs`.
 ///
 /// Features are whole numbers, [`MISSING_FEATURE`] where one is missing; or the bits of f32 values, of NaN where one is
 /// missing, if the model's [`key`](Model::key) says so.
@@ -18,7 +18,7 @@ const NAN: i32 = 0x7fc0_0000;
 impl<'a> Model<'a> {
     /// Opens a model of the layout code, as [`Model::new`] does others, with the function that was written with it.
     /// Margins are what that function makes of features: nothing here says whether it is of this model. `model.rs` has the
-    /// [`checksum`](Model::checksum) of its model as `CHECKSUM`, and links with the assembly of that model alone.
+    /// [`checksum`](Model::checksum) of its model as `CHECKSUM`.
     ///
     /// Cost: in proportion to the bytes, which are few. Cannot fail where the function is another one: margins are then
     /// wrong.

@@ -135,22 +135,17 @@ impl Model<'_> {
             // Added in this order: the base, then the trees.
             margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = base);
             let sum = &mut Sum { margins, leaf: self.sections.leaf, object: None, shared };
-            self.add_trees(features, sum, never);
+            self.add_trees(features, sum);
             return;
         }
         let sum = &mut Sum { margins, leaf: self.sections.leaf, object: None, shared };
-        let bias = self.add_trees(features, sum, never);
+        let bias = self.add_trees(features, sum);
         margins.iter_mut().zip(bases).for_each(|(margin, base)| *margin = margin.wrapping_add(base).wrapping_sub(bias));
     }
 
     /// Adds the leaves of all groups, and says how far every margin is too large. Groups come with the largest shift
-    /// first, so that all that was added before is shifted on the way. After each group `is_known` may end the walk.
-    pub(super) fn add_trees(
-        &self,
-        features: &[i32],
-        sum: &mut Sum<'_>,
-        mut is_known: impl FnMut(Partial<'_>) -> bool,
-    ) -> i32 {
+    /// first, so that all that was added before is shifted on the way.
+    fn add_trees(&self, features: &[i32], sum: &mut Sum<'_>) -> i32 {
         let mut ranks = AlignedTo8([0; 256]);
         let ranks = &mut ranks.0;
         ranks::rank(&self.sections, features, ranks);
@@ -183,25 +178,10 @@ impl Model<'_> {
                 _ => {}
             }
             bias = bias.wrapping_add(sum.settle(group.trees));
-            if is_known(Partial { margins: sum.margins, bias, shift }) {
-                break;
-            }
         }
         shift_all(sum.margins, &mut bias, shift);
         bias
     }
-}
-
-/// A walk through all trees.
-fn never(_: Partial<'_>) -> bool {
-    false
-}
-
-/// Margins of the groups so far, without the base: each less `bias`, times 2^`shift`, in units.
-pub(super) struct Partial<'a> {
-    pub(super) margins: &'a [i32],
-    pub(super) bias: i32,
-    pub(super) shift: u8,
 }
 
 /// Hands a touch's features to `then`. The two of a descriptor for tables are put together apart:

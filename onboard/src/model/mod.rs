@@ -3,7 +3,6 @@
 mod check;
 #[cfg(feature = "code")]
 mod code;
-mod early;
 mod fixed;
 mod header;
 mod margins;
@@ -23,9 +22,9 @@ pub use refused::Refused;
 use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
-    Counted, EarlyExit, Feature, Fingerprints, Guard, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject,
-    Outputs, PatternShares, Plan, Position, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag,
-    Temperature, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
+    Counted, Feature, Fingerprints, Guard, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, Outputs,
+    PatternShares, Plan, Position, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature,
+    TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
 };
 use palpate_shared::{Descriptor, MISSING_FEATURE, Patterns};
 
@@ -440,13 +439,6 @@ impl<'a> Model<'a> {
     /// Fingerprints of the touches that the model was trained on, if it states them.
     pub fn fingerprints(&self) -> Option<Fingerprints<'a>> {
         Fingerprints::from_bytes(optional::find(self.optional(), Tag::Fingerprints), self.object_count())
-    }
-
-    /// Places in the walk where a class may be known: see [`Model::class_of`].
-    ///
-    /// Cost: a few instructions for each optional section.
-    pub fn early_exits(&self) -> impl Iterator<Item = EarlyExit> {
-        EarlyExit::all(optional::find(self.optional(), Tag::EarlyExit))
     }
 
     /// The plan of approaches, if the model has one: what [`Recognizer::next_approach`](crate::Recognizer::next_approach)

@@ -6,7 +6,6 @@
 
 #[macro_use]
 mod codes;
-mod early;
 mod evidence;
 mod header;
 mod key;
@@ -22,7 +21,6 @@ mod trained;
 
 pub use crate::checksum::checksum;
 pub use codes::{Counted, Held, Key, Layout, LeafType, Length, MAPS_LAYOUT, Per, RAW_FEATURES};
-pub use early::EarlyExit;
 pub use evidence::{RowEvidence, Shifts, Weights};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION};
 pub use key::f32_key;

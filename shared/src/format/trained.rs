@@ -40,8 +40,6 @@ pub enum Tag {
     Fingerprints,
     /// Evidence of a row by its margins: [`RowEvidence`](super::RowEvidence).
     RowEvidence,
-    /// Bounds with which a class is known before all trees are walked: [`EarlyExit`](super::EarlyExit).
-    EarlyExit,
     /// Outputs that belong to one object: [`Outputs`](super::Outputs).
     Outputs,
     /// Columns of the library's rows that a model over some of them has: how many there were, and the number of each, as u32.
@@ -74,7 +72,6 @@ impl Tag {
             Self::Sentinel => 14,
             Self::Fingerprints => 15,
             Self::RowEvidence => 16,
-            Self::EarlyExit => 17,
             Self::Outputs => 18,
             Self::Columns => 19,
             Self::Maps => 20,

@@ -11,7 +11,7 @@ Prints a table in Markdown: about ten minutes.
 compiler's routines (such as comparisons of floats on a chip without a float unit), all for size (-Os). The empty image is linked
 without libraries, so that it holds no such routine. *Instructions* are of a row: class and all, f32 values in. *Wrong* are
 classes that differ from the library's own among 200 plain rows, 200 whose values equal thresholds, 200 with missing values. No
-row is of the training; early exit is chosen on others again. *Seconds* are those that compiling and assembling an image's own files
+row is of the training. *Seconds* are those that compiling and assembling an image's own files
 take, of processor time, on both chips together.
 """
 
@@ -48,7 +48,7 @@ def image(chip, directory, source, libraries=LIBRARIES):
     common = ["-mthumb", *flags, "-Os", "-ffunction-sections", "-fdata-sections", "-DNDEBUG", "-w", *source.flags]
     common += ["-I", directory, "-I", ROOT / "onboard/c"]
     objects, seconds = [], []
-    for path in [*source.files, *source.by_chip.get(chip[0], []), HERE / "harness.c"]:
+    for path in [*source.files, HERE / "harness.c"]:
         objects.append(directory / f"{target}-{path.name}.o")
         is_cpp = path.suffix == ".cc"
         compiler = ["arm-none-eabi-g++", "-std=c++17", "-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics"]
@@ -74,7 +74,7 @@ def on_risc_v(ensemble, directory, source):
     compiler = ["riscv64-unknown-elf-gcc", "-march=rv32imc_zicsr", "-mabi=ilp32", "-ffreestanding", "-nostdlib", "-static"]
     flags = ["-std=gnu99", "-Os", "-w", "-I", directory, "-I", ROOT / "onboard/c", "-I", ROOT / "tests/c"]
     flags += ["-T", ROOT / "tests/c/virt.ld", "-Wl,--no-warn-rwx-segments"]
-    files = [*source.by_chip["M0+"], HERE / "harness.c"]
+    files = [*source.files, HERE / "harness.c"]
     subprocess.run([*compiler, *flags, *files, "-lgcc", "-o", program], check=True)
     command = ["qemu-system-riscv32", "-machine", "virt", "-bios", "none", "-nographic", "-icount", "shift=0"]
     command += ["-semihosting-config", "enable=on,target=native", "-kernel", program]
@@ -93,7 +93,7 @@ def clang(chip, directory, source):
     """Seconds that clang takes for the files."""
     _, target, _, flags = chip
     began = processor()
-    for path in source.by_chip[chip[0]]:
+    for path in source.files:
         command = ["clang", f"--target={target}", *flags, "-Os", "-w", "-ffreestanding", "-I", directory, "-I", ROOT / "onboard/c"]
         subprocess.run([*command, "-c", path, "-o", directory / "clang.o"], check=True)
     return processor() - began
@@ -168,14 +168,7 @@ def main():
         for leaf, goal in [("i16", "speed"), ("i16", "size"), ("i8", "balanced"), ("f32", "balanced")]
         for language, function in [("Rust", exporters.ours_rust), ("C", exporters.ours_c)]
     }
-    for goal in ("speed", "size"):
-        for language, function in [("Rust", exporters.ours_rust), ("C", exporters.ours_c)]:
-            name = f"ours i16, for {goal}, early exit ({language})"
-            ours[name] = partial(function, palpate=palpate, leaf="i16", goal=goal, early=True)
-    for early in (False, True):
-        for language in ("assembly", "C"):
-            name = f"ours i16, code{', early exit' if early else ''} ({language})"
-            ours[name] = partial(exporters.ours_code, palpate=palpate, is_assembly=language == "assembly", early=early)
+    ours["ours i16, code (C)"] = partial(exporters.ours_code, palpate=palpate)
     peers = {
         "TL2cgen": partial(exporters.tl2cgen, quantize=False),
         "TL2cgen, quantized": partial(exporters.tl2cgen, quantize=True),

@@ -33,12 +33,10 @@ class Refused(Exception):
 class Source:
     """Input of the compiler: files, flags, and a static library to link; the rows' classes if the ensemble is the exporter's own."""
 
-    def __init__(self, files, flags=(), library=None, expected=None, by_chip=None, clang=False):
+    def __init__(self, files, flags=(), library=None, expected=None, clang=False):
         self.files, self.flags, self.library, self.expected = files, list(flags), library, expected
         # True to see how long clang takes, too.
         self.clang = clang
-        # Files that only one chip's image has, by the chip's name.
-        self.by_chip = by_chip or {}
 
 
 def write(directory, name, text):
@@ -234,24 +232,20 @@ def irithyll(ensemble, directory):
     return rust(ensemble, directory, directory / "model.bin", ["irithyll"])
 
 
-def run_export(ensemble, command, early):
-    command = [*command, "--json", *(["--early-exit", ensemble.choosing] if early else [])]
-    done = subprocess.run(command, capture_output=True, text=True)
+def run_export(command):
+    done = subprocess.run([*command, "--json"], capture_output=True, text=True)
     if done.returncode != 0:
         raise Refused(done.stderr.strip().splitlines()[-1])
-    exported = json.loads(done.stdout)
-    if early and not exported["early_exit"]["ends"]:
-        raise Refused("early exit does not pay")
-    return exported
+    return json.loads(done.stdout)
 
 
-def export(palpate, ensemble, directory, leaf, goal, early):
+def export(palpate, ensemble, directory, leaf, goal):
     command = [palpate, "export", ensemble.path, "-o", directory / "model.palpate", "--leaf", leaf, "--layout", goal]
-    return run_export(ensemble, [*command, "--emit", "c"], early)
+    return run_export([*command, "--emit", "c"])
 
 
-def ours_c(ensemble, directory, palpate, leaf, goal, early=False):
-    exported = export(palpate, ensemble, directory, leaf, goal, early)
+def ours_c(ensemble, directory, palpate, leaf, goal):
+    exported = export(palpate, ensemble, directory, leaf, goal)
     features = ensemble.rows.shape[1]
     answer = f"""    palpate_margins_of(&model, features, {features}, margins, {ensemble.outputs});
     for (i = 1; i < {ensemble.outputs}; i++) {{
@@ -261,8 +255,6 @@ def ours_c(ensemble, directory, palpate, leaf, goal, early=False):
     }}
     return best;
 """
-    if early:
-        answer = f"    (void)best;\n    return palpate_class_of(&model, features, {features}, margins, {ensemble.outputs});\n"
     # Rows of f32, or whole numbers.
     key = "palpate_f32_key(row[i])" if "features" in exported else "row[i] == row[i] ? (int32_t)row[i] : INT32_MIN"
     wrapper = f"""#include "model.h"
@@ -283,20 +275,15 @@ int peer_class(const float *row)
     return Source([write(directory, "peer.c", wrapper)])
 
 
-def ours_code(ensemble, directory, palpate, is_assembly, early=False):
-    by_chip, emits = {}, {"model": "c-code"}
-    if is_assembly:
-        emits = {"model": "thumb,c", "model4": "thumb-m4f,c"}
-    for name, emit in emits.items():
-        path = directory / f"{name}.palpate"
-        command = [palpate, "export", ensemble.path, "-o", path, "--layout", "code", "--emit", emit]
-        exported = run_export(ensemble, command, early)
-        features = ensemble.rows.shape[1]
-        call = f"    {name}_margins(row, margins);\n"
-        if "features" not in exported:  # whole numbers
-            call = f"    int32_t whole[{features}];\n    for (i = 0; i < {features}; i++) {{\n        "
-            call += f"whole[i] = row[i] == row[i] ? (int32_t)row[i] : INT32_MIN;\n    }}\n    {name}_margins(whole, margins);\n"
-        wrapper = f"""#include "{name}.h"
+def ours_code(ensemble, directory, palpate):
+    command = [palpate, "export", ensemble.path, "-o", directory / "model.palpate", "--emit", "c-code"]
+    exported = run_export(command)
+    features = ensemble.rows.shape[1]
+    call = "    model_margins(row, margins);\n"
+    if "features" not in exported:  # whole numbers
+        call = f"    int32_t whole[{features}];\n    for (i = 0; i < {features}; i++) {{\n        "
+        call += "whole[i] = row[i] == row[i] ? (int32_t)row[i] : INT32_MIN;\n    }\n    model_margins(whole, margins);\n"
+    wrapper = f"""#include "model.h"
 {START}
 int peer_class(const float *row)
 {{
@@ -310,22 +297,13 @@ int peer_class(const float *row)
     return best;
 }}
 """
-        if early:
-            wrapper = f'#include "{name}.h"\n{START}int peer_class(const float *row)\n{{\n    return {name}_class(row);\n}}\n'
-        files = [write(directory, f"{name}.c", wrapper)]
-        if is_assembly:
-            files.append(directory / f"{name}.s")
-        by_chip["M4F" if name == "model4" else "M0+"] = files
-    if not is_assembly:
-        by_chip["M4F"] = by_chip["M0+"]
-    return Source([], by_chip=by_chip, clang=True)
+    return Source([write(directory, "peer.c", wrapper)], clang=True)
 
 
-def ours_rust(ensemble, directory, palpate, leaf, goal, early=False):
-    exported = export(palpate, ensemble, directory, leaf, goal, early)
+def ours_rust(ensemble, directory, palpate, leaf, goal):
+    exported = export(palpate, ensemble, directory, leaf, goal)
     features = ["palpate", exported["layout"], f"{leaf}-leaves"]
     features += [feature for feature, key in [("shared-leaves", "shared_leaves"), ("real", "features")] if key in exported]
-    features += ["early"] if early else []
     return rust(ensemble, directory, directory / "model.palpate", features)
 
 

@@ -4,7 +4,7 @@
 //! They are committed, and stay as they are: models that earlier releases made have to give the same. Write them again
 //! only where something must be added.
 
-use palpate::compile::{EarlyExit, Layout, Leaf, Settings, compile};
+use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::ensemble::Node;
 use palpate::with;
 use palpate_onboard::{Model, Recognizer, Refused, RowsSeen, Stopping, Verdict, exp2_negative};
@@ -29,7 +29,6 @@ fn main() {
     sequences(&mut text);
     decisions(&mut text);
     shared_leaves(&mut text);
-    early_exits(&mut text);
     together(&mut text);
     refused(&mut text);
     cut(&mut text);
@@ -295,10 +294,6 @@ fn play_rows(text: &mut String, name: &str, bytes: &[u8], real: bool) {
         *text += &format!("row {}\n", numbers(&row));
         let verdict = recognizer.push_features(&row).expect("it takes rows");
         known(text, &model, &recognizer, &row, verdict);
-        if model.early_exits().next().is_some() {
-            let class = model.class_of(&row, &mut vec![0; model.object_count()]).expect("as much room as classes");
-            *text += &format!("class {class}\n");
-        }
     }
 }
 
@@ -360,22 +355,6 @@ fn play_sequences(text: &mut String, name: &str, bytes: &[u8]) {
             (_, Err(Refused::Guarded(feature, _))) => *text += &format!("guarded {feature}\n"),
             (_, refused) => panic!("{refused:?}"),
         }
-    }
-}
-
-/// Walks for a class alone that may end early.
-fn early_exits(text: &mut String) {
-    for (layout, leaf, each) in [
-        (Layout::Compact, Leaf::I16, false),
-        (Layout::Wide, Leaf::I8, false),
-        (Layout::Complete, Leaf::I8, true),
-        (Layout::Complete, Leaf::I16, false),
-    ] {
-        let ensemble = random::over_rows(random::ensemble(Shape { trees: 24, each, ..SHAPE }, 26), 5, 1.000_001e-3);
-        let early_exit = Some(EarlyExit::Always);
-        let settings = with!(Settings::default(), leaf, layout = Some(layout), early_exit);
-        let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
-        play_rows(text, &format!("early exit, {} {}", layout.name(), leaf.name()), &bytes, true);
     }
 }
 

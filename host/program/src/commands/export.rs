@@ -4,10 +4,8 @@ use super::expected::PriorArguments;
 use super::numbers::error_rate;
 use super::unstated::UnstatedArguments;
 use palpate::Result;
-use palpate::compile::code::Form;
 use palpate::compile::{
-    self, Candidate, Compiled, CompiledModel, EarlyExit, EarlyExitFound, Goal, Instructions, Language, Layout, Leaf,
-    Settings,
+    self, Candidate, Compiled, CompiledModel, Goal, Instructions, Language, Layout, Leaf, Settings,
 };
 use palpate::ensemble::{self, Ensemble, Inputs, TouchOrigin, train};
 use palpate::error::Error;
@@ -27,12 +25,12 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 ENSEMBLE is what `palpate train` saved, or a model of another library: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx).
 
-A --layout is compact, complete, grid, wide, patterns or code, or a goal: speed, size, balanced (half the bytes are worth a fifth more instructions), m4f or m0+ (balanced for that processor). With --emit thumb, thumb-m4f or c-code the trees are code (docs/guide/code.md).
+A --layout is compact, complete, grid, wide or patterns, or a goal: speed, size, balanced (half the bytes are worth a fifth more instructions), m4f or m0+ (balanced for that processor). With --emit c-code or rust-code the trees are code (docs/guide/code.md).
 
 Examples:
   palpate export ensemble.json -o model.palpate
   palpate export sure.palpate -o sure.palpate --emit c  # sure.h alone
-  palpate export forest.onnx -o forest.palpate --emit thumb")]
+  palpate export forest.onnx -o forest.palpate --emit c-code")]
 pub(crate) struct Arguments {
     /// An ensemble that `palpate train` or another library saved, or a compiled model to be written as source code
     ensemble: PathBuf,
@@ -60,15 +58,12 @@ pub(crate) struct Arguments {
     /// Give up after this many touches
     #[arg(long, default_value = "200", value_name = "N")]
     max_touches: u32,
-    /// Write beside it: c, rust (source code), thumb, thumb-m4f, c-code (trees as code) or json (the trees, as XGBoost's)
+    /// Write beside it: c, rust (source code), c-code, rust-code (trees as code) or json (the trees, as XGBoost's)
     #[arg(long, value_name = "KIND,…", value_delimiter = ',', value_parser = emitted)]
     emit: Vec<Emitted>,
     /// From a regression's margin to its value: identity, logistic, exponential, square or softplus [default: the file's]
     #[arg(long, value_parser = link, value_name = "LINK")]
     link: Option<Link>,
-    /// Classes without walking all trees: yes, or a CSV file of rows not trained on, for where that takes fewer instructions
-    #[arg(long, value_name = "ROWS")]
-    early_exit: Option<PathBuf>,
     /// Feature that is a row's number in its sequence, from 1; recognizers count it
     #[arg(long, value_name = "FEATURE")]
     row_number: Option<String>,
@@ -123,19 +118,17 @@ enum Emitted {
     /// The compiled model as source code.
     Source(Language),
     /// Its trees as code.
-    Code(Form),
+    Code(Language),
     /// The ensemble that it was compiled from.
     Ensemble,
 }
 
 impl Emitted {
-    /// Extensions of its files.
-    fn extensions(self) -> &'static [&'static str] {
+    /// Extension of its file.
+    fn extension(self) -> &'static str {
         match self {
-            Self::Source(Language::C) | Self::Code(Form::C) => &["h"],
-            Self::Source(Language::Rust) => &["rs"],
-            Self::Code(Form::Thumb(_)) => &["s", "rs"],
-            Self::Ensemble => &["json"],
+            Self::Source(language) | Self::Code(language) => language.extension(),
+            Self::Ensemble => "json",
         }
     }
 }
@@ -144,9 +137,6 @@ impl Emitted {
 struct Exported {
     bytes: usize,
     layout: &'static str,
-    /// The form of code, of the layout code.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    form: Option<&'static str>,
     leaf: &'static str,
     /// Number of different leaves, if equal ones are stored once.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -180,9 +170,6 @@ struct Exported {
     /// Effects of whole numbers on each feature.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     scales: Vec<Effect>,
-    /// Early ends of walks for a class alone.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    early_exit: Option<EarlyExitFound>,
     /// Files with source code.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     sources: Vec<PathBuf>,
@@ -214,7 +201,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let mut ensemble = ensemble::load_with(&arguments.ensemble, &arguments.unstated.options(names.as_deref()))?;
     set_link(&mut ensemble, arguments.link)?;
     let (scales, fitted) = scales(&arguments, &ensemble)?;
-    let (layout, forms) = arguments.code()?;
+    let code = arguments.is_code()?;
     let usual = match ensemble.inputs {
         // Where leaves were rounded to one byte, two hold nothing more.
         Inputs::Computed(_) if train::is_rounded(&ensemble, 8) => with!(Settings::default(), leaf = Leaf::I8),
@@ -224,15 +211,14 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let settings = with!(
         Settings::default(),
         leaf = arguments.leaf.unwrap_or(usual.leaf),
-        layout,
-        forms,
+        layout = arguments.layout.layout(),
+        code,
         goal = arguments.layout.goal(),
         shared_leaves = arguments.shared_leaves.0,
         error_rate = arguments.error_rate,
         max_touches = arguments.max_touches,
         scales,
         priors = arguments.prior.of(&ensemble.objects, &shares_of(&ensemble)?)?,
-        early_exit = early_exit(&arguments, &ensemble)?,
         position = arguments.row_number.clone()
     );
     let compiled = compile::compile(&ensemble, &settings).map_err(|error| match error.exit_code() {
@@ -252,7 +238,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         leaves: compiled.leaves,
         margin_error: compiled.margin_error,
         instructions: compiled.instructions,
-        early_exit: compiled.early_exit,
         candidates: compiled.candidates,
         features: match &ensemble.inputs {
             Inputs::Rows(names) => Some(names.clone()),
@@ -269,7 +254,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             .as_ref()
             .map(|scales| scales::effects(&ensemble, scales, fitted.as_ref()))
             .unwrap_or_default(),
-        form: compiled.code.as_ref().map(|(_, form)| form.name()),
         sources: written,
         ensemble: emitted.into_iter().find(|(kind, _)| *kind == Emitted::Ensemble).map(|(_, path)| path),
     };
@@ -280,39 +264,28 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return output::print_about(&arguments.output, &summary(&arguments.output, &exported));
     }
     // Trees that are code are built with the model.
-    let features = if exported.form.is_some() { String::new() } else { features(&compile::open(&compiled.bytes)?) };
+    let features = if code { String::new() } else { features(&compile::open(&compiled.bytes)?) };
     output::print_about(&arguments.output, &text(&arguments.output, &exported, &features))
 }
 
 impl Arguments {
-    /// The layout that is asked for, and the forms of code that may be chosen.
-    fn code(&self) -> Result<(Option<Layout>, Vec<Form>)> {
-        let form = |emitted: &Emitted| if let Emitted::Code(form) = emitted { Some(*form) } else { None };
-        let forms: Vec<Form> = self.emit.iter().filter_map(form).collect();
-        let layout = self.layout.layout();
-        if layout == Some(Layout::Code) && forms.is_empty() {
-            return Err(Error::setting(
-                "layout",
-                "code",
-                "it with --emit thumb, thumb-m4f or c-code: code is not in a model",
-            ));
+    /// True if the trees become code.
+    fn is_code(&self) -> Result<bool> {
+        let is_code = self.emit.iter().any(|emitted| matches!(emitted, Emitted::Code(_)));
+        if is_code && self.emit.iter().any(|emitted| matches!(emitted, Emitted::Source(_))) {
+            let allowed =
+                "c or rust for a model of data, or c-code or rust-code for trees as code, each in a run of its own";
+            return Err(Error::setting("emit", "both", allowed));
         }
-        if let Some(layout) = layout.filter(|layout| *layout != Layout::Code && !forms.is_empty()) {
-            return Err(Error::setting(
-                "layout",
-                layout.name(),
-                "code, or a goal, with trees that are written as code",
-            ));
+        if let Some(layout) = self.layout.layout().filter(|_| is_code) {
+            return Err(Error::setting("layout", layout.name(), "none with trees that are written as code"));
         }
-        let has_data = self.emit.iter().any(|emitted| matches!(emitted, Emitted::Source(_)));
-        let is_code = !forms.is_empty() && !has_data;
-        Ok((if is_code { Some(Layout::Code) } else { layout }, forms))
+        Ok(is_code)
     }
 
     /// The files that are read, none of which may be written.
     fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
-        let held_out = self.early_exit.iter().filter(|path| path.as_os_str() != "yes");
-        std::iter::once(&self.ensemble).chain(self.rows()).chain(held_out)
+        std::iter::once(&self.ensemble).chain(self.rows())
     }
 
     /// The rows that scales are fitted to.
@@ -346,7 +319,6 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
         ("layout", arguments.layout.layout().is_some() || arguments.layout.goal() != usual.goal),
         ("shared_leaves", arguments.shared_leaves.0.is_some()),
         ("scale", !arguments.scale.is_empty()),
-        ("early_exit", arguments.early_exit.is_some()),
         ("row_number", arguments.row_number.is_some()),
         ("error_rate", arguments.error_rate != usual.error_rate),
         ("max_touches", arguments.max_touches != usual.max_touches),
@@ -405,13 +377,11 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
 fn places(arguments: &Arguments) -> Result<Vec<(Emitted, PathBuf)>> {
     let (output, mut places) = (&arguments.output, Vec::new());
     for &emitted in &arguments.emit {
-        for extension in emitted.extensions() {
-            let path = output.with_extension(extension);
-            let taken = output::is_stdout(output) || path == *output;
-            compile::check_place(output, if taken { Path::new(compile::HEADER) } else { &path })?;
-            output::admit(&path, arguments.inputs())?;
-            places.push((emitted, path));
-        }
+        let path = output.with_extension(emitted.extension());
+        let taken = output::is_stdout(output) || path == *output;
+        compile::check_place(output, if taken { Path::new(compile::HEADER) } else { &path })?;
+        output::admit(&path, arguments.inputs())?;
+        places.push((emitted, path));
     }
     Ok(places)
 }
@@ -425,22 +395,28 @@ fn write_emitted(
     ensemble: &Ensemble,
     output: &Path,
 ) -> Result<Vec<PathBuf>> {
-    let language = |emitted: &Emitted| if let Emitted::Source(language) = emitted { Some(*language) } else { None };
+    let language = |emitted: &Emitted| match emitted {
+        Emitted::Source(language) | Emitted::Code(language) => Some(*language),
+        Emitted::Ensemble => None,
+    };
     let languages: Vec<Language> = emitted.iter().filter_map(|(emitted, _)| language(emitted)).collect();
     for (_, path) in emitted.iter().filter(|(emitted, _)| *emitted == Emitted::Ensemble) {
         ensemble.save(path)?;
     }
     let name = output.file_stem().unwrap_or_default().to_string_lossy();
-    compile::write_sources(output, &palpate::prove::sources(compiled, &name, &languages)?)
+    compile::write_sources(output, &compiled.sources(&name, &languages)?)
 }
 
 fn emitted(name: &str) -> Result<Emitted, String> {
     if name == "json" {
         return Ok(Emitted::Ensemble);
     }
-    let language = Language::ALL.into_iter().find(|language| language.name() == name).map(Emitted::Source);
-    let form = || Form::ALL.into_iter().find(|form| form.name() == name).map(Emitted::Code);
-    language.or_else(form).ok_or_else(|| "use c, rust, thumb, thumb-m4f, c-code or json".to_owned())
+    let language = |name: &str| Language::ALL.into_iter().find(|language| language.name() == name);
+    let found = match name.strip_suffix("-code") {
+        Some(name) => language(name).map(Emitted::Code),
+        None => language(name).map(Emitted::Source),
+    };
+    found.ok_or_else(|| "use c, rust, c-code, rust-code or json".to_owned())
 }
 
 /// Names from the command line: a file's lines, if there is such a file, else what commas separate.
@@ -541,29 +517,10 @@ fn link(name: &str) -> Result<Link, String> {
     found.ok_or_else(|| "use one of identity, logistic, exponential, square, softplus".to_owned())
 }
 
-/// Classes from fewer trees, if they are asked for.
 /// The share that each output has of its object.
 fn shares_of(ensemble: &Ensemble) -> Result<Vec<f64>> {
     let placements = TouchOrigin::of(&ensemble.origin)?.placements;
     Ok(ensemble.objects.iter().map(|output| placements.get(output).copied().unwrap_or(1.0)).collect())
-}
-
-fn early_exit(arguments: &Arguments, ensemble: &Ensemble) -> Result<Option<EarlyExit>> {
-    let Some(path) = &arguments.early_exit else { return Ok(None) };
-    if path.as_os_str() == "yes" {
-        return Ok(Some(EarlyExit::Always));
-    }
-    super::rows::read_rows(path, ensemble, None).map(|rows| Some(EarlyExit::IfItPays(rows)))
-}
-
-fn early_exit_text(found: &EarlyExitFound) -> String {
-    let trees = found.trees;
-    let ends: Vec<String> = found.ends.iter().map(ToString::to_string).collect();
-    let walked = found.walked.map_or(String::new(), |walked| format!(", on these rows after {walked:.1} on average"));
-    match ends.as_slice() {
-        [] => "Early exit: left out, since it would take more instructions\n".into(),
-        ends => format!("A class is known after at most {trees} trees{walked}; looked for after {}\n", ends.join(", ")),
-    }
 }
 
 /// The scale of each feature, if whole numbers are asked for, and the rows that they were fitted to.
@@ -622,9 +579,6 @@ fn summary(path: &Path, exported: &Exported) -> String {
         (None, Some(source)) => format!("Source code: {}. More: --verbose\n", source.display()),
         (None, None) => "A header for C: --emit c. More: --verbose\n".into(),
     };
-    if exported.sources.iter().any(|source| source.extension().is_some_and(|extension| extension == "s")) {
-        text += &format!("Note: build {} too; see {GUIDE}\n", path.with_extension("s").display());
-    }
     text + &exported.warnings.iter().map(|warning| format!("Note: {warning}\n")).collect::<String>()
 }
 
@@ -651,19 +605,18 @@ fn text(path: &Path, exported: &Exported, features: &str) -> String {
     if exported.candidates.len() > 1 {
         _ = writeln!(text, "{:16} {:>9} {:>12} {:>12}", "layout", "bytes", "Cortex-M4F", "Cortex-M0+");
         for candidate in &exported.candidates {
-            let Candidate { layout, form, shared_leaves, bytes, instructions, .. } = candidate;
+            let Candidate { layout, shared_leaves, bytes, instructions, .. } = candidate;
             let m0_plus = instructions.m0_plus.map_or_else(|| "unknown".into(), |number| number.to_string());
-            let is_layout = layout.name() == exported.layout && *form == exported.form;
+            let is_layout = layout.name() == exported.layout;
             let is_chosen = is_layout && *shared_leaves == exported.shared_leaves.is_some();
             let mark = if is_chosen { " *" } else { "" };
             let shared = if *shared_leaves { ", shared" } else { "" };
-            let name = format!("{}{shared}{}", layout.name(), form.map_or(String::new(), |form| format!(", {form}")));
+            let name = format!("{}{shared}", layout.name());
             _ = writeln!(text, "{name:16} {bytes:>9} {:>12} {m0_plus:>12}{mark}", instructions.m4f);
         }
     }
     let each = if exported.features.is_some() { "row" } else { "touch" };
     _ = writeln!(text, "Instructions per {each}, estimated: {}", instructions(exported.instructions));
-    text += &exported.early_exit.as_ref().map_or(String::new(), early_exit_text);
     text += &exported.predicts.as_ref().map_or(String::new(), Predicts::text);
     text += &effects(&exported.scales);
     for source in &exported.sources {
@@ -675,8 +628,8 @@ fn text(path: &Path, exported: &Exported, features: &str) -> String {
     for note in &exported.notes {
         _ = writeln!(text, "Note: {note}");
     }
-    if let Some(form) = exported.form {
-        _ = writeln!(text, "The trees are code ({form}), which the model has to be built with; see {}", GUIDE);
+    if exported.layout == Layout::Code.name() {
+        _ = writeln!(text, "The trees are code, which the model has to be built with; see {GUIDE}");
         return text;
     }
     text + features
@@ -714,7 +667,7 @@ fn leaf(name: &str) -> Result<Leaf, String> {
 }
 
 fn layout(name: &str) -> Result<LayoutChoice, String> {
-    if let Some(layout) = Layout::ALL.iter().copied().find(|layout| layout.name() == name) {
+    if let Some(layout) = Layout::OF_DATA.iter().copied().find(|layout| layout.name() == name) {
         return Ok(LayoutChoice::Layout(layout));
     }
     let goal = match name {

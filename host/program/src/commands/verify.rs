@@ -1,6 +1,5 @@
 use super::Global;
 use super::progress::Bar;
-use super::prove::Asked;
 use super::unstated::UnstatedArguments;
 use palpate::Result;
 use palpate::compile::CompiledModel;
@@ -18,7 +17,7 @@ For a model of touches, DATA is a directory: every touch goes through the model 
 
 For a model of another library, DATA is a CSV file: every row goes through the model and the file's own trees, and so do rows made at every split: at the threshold, one step to each side, missing. Columns are matched by name, or by position where one side has no names. With --library-margins the model is also compared with the library's own raw scores: no header, one row per line, one column per output; with --library-values with what its `predict` says: a class, or a value.
 
---prove needs no data: each tree of the model is compared with its trees in ENSEMBLE on every possible row, and a certificate is written. With a CSV file of rows it also says how far one feature can move before the class changes. --certificate checks a certificate with an independent reader of the model. If the model's trees are assembly, they are read back from the .s file beside it.
+--prove needs no data: an independent reader of the model compares each tree with its trees in ENSEMBLE on every possible row, and a row of each of their leaves goes through the chip's own code. With DATA both are done.
 
 The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class, or predicts another value, where the stated rounding does not explain it.
 
@@ -26,22 +25,18 @@ Examples:
   palpate verify model.palpate ensemble.json data
   palpate verify model.palpate lightgbm.txt rows.csv --json
   palpate verify model.palpate m.json rows.csv --library-margins margins.csv
-  palpate verify model.palpate m.json --prove proof.txt
-  palpate verify model.palpate m.json --certificate proof.txt")]
+  palpate verify model.palpate m.json --prove")]
 pub(crate) struct Arguments {
     /// Model that `palpate export` wrote
     model: PathBuf,
     /// The file that it was exported from
     ensemble: PathBuf,
     /// Touches (a directory), or rows of features (a CSV file)
-    #[arg(value_name = "DATA", required_unless_present_any = ["prove", "certificate"])]
+    #[arg(value_name = "DATA", required_unless_present = "prove")]
     data: Option<PathBuf>,
-    /// Prove that both match on every possible row, and write a certificate
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["certificate", "sequences"])]
-    prove: Option<PathBuf>,
-    /// Check a certificate that --prove wrote
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["data", "library_margins", "library_values", "sequences"])]
-    certificate: Option<PathBuf>,
+    /// Prove that both match on every possible row
+    #[arg(long, conflicts_with = "sequences")]
+    prove: bool,
     /// Sequences of touches to draw; of all objects together
     #[arg(long, value_name = "N", default_value = "10000", value_parser = super::numbers::sequences)]
     sequences: usize,
@@ -57,14 +52,15 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let options = arguments.unstated.options(None);
-    let has_library = arguments.library_margins.is_some() || arguments.library_values.is_some();
-    let data = match &arguments.data {
-        Some(data) if arguments.prove.is_none() || has_library => data,
-        _ => return super::prove::run(&arguments.proof(), None, &options, global),
+    let Some(data) = &arguments.data else {
+        return super::prove::run(&arguments.model, &arguments.ensemble, None, &options, global);
     };
     let compiled = CompiledModel::read(&arguments.model)?;
     let ensemble = ensemble::load_with(&arguments.ensemble, &options)?;
     if ensemble.descriptor().is_some() {
+        if arguments.prove {
+            return Err(Error::setting("prove", "given", "it without touches: every row is compared"));
+        }
         let names = [("library_margins", &arguments.library_margins), ("library_values", &arguments.library_values)];
         if let Some((name, Some(path))) = names.into_iter().find(|(_, path)| path.is_some()) {
             return Err(Error::setting(name, path.display(), "it with a model of another library"));
@@ -90,24 +86,12 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let library = Library { margins: margins.as_deref(), values: values.as_deref() };
     let verified = verify(&compiled.model(), &ensemble, &rows, library, &Bar::new()).map_err(place)?;
     let checked = verified.check().map_err(|problem| Error::at(Place::file(&arguments.model), problem));
-    if arguments.prove.is_some() && checked.is_ok() {
-        return super::prove::run(&arguments.proof(), Some((&verified, text(&verified))), &options, global);
+    if arguments.prove && checked.is_ok() {
+        let verified = Some((&verified, text(&verified)));
+        return super::prove::run(&arguments.model, &arguments.ensemble, verified, &options, global);
     }
     global.print(&verified, || text(&verified))?;
     checked
-}
-
-impl Arguments {
-    /// The proof or the certificate that is asked for.
-    fn proof(&self) -> Asked<'_> {
-        Asked {
-            model: &self.model,
-            ensemble: &self.ensemble,
-            rows: self.data.as_deref(),
-            written: self.prove.as_deref(),
-            certificate: self.certificate.as_deref(),
-        }
-    }
 }
 
 fn text(verified: &Verified) -> String {

@@ -9,10 +9,9 @@ const FOREIGN: &str = "// Recognizes with palpate_onboard.\nfn main() {}\n";
 /// Commands that write and take little time, with the files that they write.
 const WRITERS: &[(&str, &[&str])] = &[
     ("export ensemble.json -o out/m.palpate --emit c,rust,json", &["m.palpate", "m.h", "palpate.h", "m.rs", "m.json"]),
-    ("export ensemble.json -o out/t.palpate --emit thumb", &["t.palpate", "t.s", "t.rs"]),
+    ("export ensemble.json -o out/t.palpate --emit rust-code", &["t.palpate", "t.rs"]),
     ("export ensemble.json -o out/c.palpate --emit c-code", &["c.palpate", "c.h", "palpate.h"]),
     ("export model.palpate -o out/copy.palpate --emit rust,c", &["copy.palpate", "copy.rs", "copy.h", "palpate.h"]),
-    ("verify model.palpate ensemble.json --prove out/proof.txt", &["proof.txt"]),
     ("train data -o out/trained.json --trees rounds=2", &["trained.json"]),
     ("view ball.obj -o out/ball.html", &["ball.html"]),
     ("view --play ball.obj --model model.palpate -o out/play.html", &["play.html"]),

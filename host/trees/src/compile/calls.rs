@@ -1,7 +1,6 @@
 //! Functions in C that a program calls: a row to its class, value or probabilities, and steps to a verdict, from a model that
 //! is a constant.
 
-use super::code::Program;
 use super::cost::has_sequences;
 use crate::ensemble::Probability;
 use palpate_onboard::Model;
@@ -14,8 +13,8 @@ pub(super) struct Calls<'a> {
     /// Prefix of all names.
     pub(super) name: &'a str,
     pub(super) probability: Probability,
-    /// The trees, where they are code.
-    pub(super) code: Option<&'a Program>,
+    /// True if its trees are code.
+    pub(super) is_code: bool,
 }
 
 /// Start of the header's parts, and of its pieces with an address of their own.
@@ -69,7 +68,7 @@ impl Calls<'_> {
         let Places { parts, cuts } = Places::of(bytes);
         let at = |place: usize| format!("{name}_model + {place}");
         let mut found: [Option<usize>; 24] = [None; 24];
-        let (mut place, mut exits_end, mut row, mut known) = (parts[1], 0, (0, 0), self.model.object_count());
+        let (mut place, mut row, mut known) = (parts[1], (0, 0), self.model.object_count());
         // Without a section of what was trained: all times, of any spread, and directions if the descriptor has them.
         let mut trained = (0x20, u8::from(self.is_oriented()), u32::MAX);
         while place < parts[2] {
@@ -84,19 +83,18 @@ impl Calls<'_> {
                     let most = (u32::from(bytes[content + 7]) << bytes[content + 5]) - 1;
                     row = (long(bytes, content).cast_signed(), most);
                 }
-                17 => exits_end = content + (length & !7),
                 _ => {}
             }
             place = content + length.next_multiple_of(4);
         }
         let pointer = |tag: usize, offset: usize| found[tag].map_or_else(|| "NULL".into(), |place| at(place + offset));
-        let code = if self.code.is_some() { format!("{name}_code_") } else { "NULL".into() };
+        let code = if self.is_code { format!("{name}_code_") } else { "NULL".into() };
         format!(
             "/* The model as palpate_open leaves it: its bytes were checked when it was exported. */\n\
              static const palpate_model {name}_opened_ = {{\n    {name}_model,\n    {{{parts}}},\n    \
              {cuts}, {odds}, {strangers}, {table}, {sentinel}, {weights}, {rows}, {start}, {most}u,\n\
              #if PALPATE_SEQUENCES\n    {position}, {guard},\n#endif\n\
-             #if PALPATE_OUTPUTS\n    {outputs},\n#endif\n#if PALPATE_EARLY\n    {exits}, {ends},\n#endif\n    \
+             #if PALPATE_OUTPUTS\n    {outputs},\n#endif\n    \
              0, {spread}u, {objects}, {known}, {features}, {layout}, {leaf}, {descriptor}, {real}, {patterns}, {oriented}\n\
              #if PALPATE_LAYOUTS & PALPATE_CODE\n    , {code}\n#endif\n}};\n\n",
             parts = parts.iter().map(|&place| at(place)).collect::<Vec<_>>().join(", "),
@@ -112,8 +110,6 @@ impl Calls<'_> {
             position = pointer(21, 0),
             guard = pointer(22, 0),
             outputs = pointer(18, 0),
-            exits = pointer(17, 0),
-            ends = found[17].map_or_else(|| "NULL".into(), |_| at(exits_end)),
             spread = trained.2,
             objects = self.model.object_count(),
             features = self.model.feature_count(),
@@ -148,7 +144,7 @@ impl Calls<'_> {
     /// Lines that add up the trees for a row.
     fn sums(&self) -> String {
         let (name, objects, features) = (self.name, self.model.object_count(), self.model.feature_count());
-        if self.code.is_some() {
+        if self.is_code {
             return format!("    uint32_t sums[{objects}];\n    {name}_margins(row, PALPATE_AT_(int32_t *, sums));\n");
         }
         let (lines, keys) = self.keys();
@@ -159,7 +155,7 @@ impl Calls<'_> {
         let (name, objects, features) = (self.name, self.model.object_count(), self.model.feature_count());
         let (row, missing) = self.row();
         let mut text = String::new();
-        if (self.code.is_none(), row) == (true, "float") {
+        if (self.is_code, row) == (false, "float") {
             text += &format!(
                 "static inline void {name}_keys_(const float *row, int32_t *keys)\n{{\n    int i;\n    \
                  for (i = 0; i < {features}; i++) {{\n        keys[i] = palpate_f32_key(row[i]);\n    }}\n}}\n\n"
@@ -182,20 +178,16 @@ impl Calls<'_> {
             let body = format!("{sums}    palpate_values_of_(&{name}_opened_, sums, values);\n");
             call(&format!("The {objects} values"), "void", "values", ", float *values", &body);
         } else {
-            let exits = self.model.early_exits().next().is_some();
-            let body = match self.code {
-                Some(program) if program.has_exits() => format!("    return {name}_class(row);\n"),
-                Some(_) => format!(
+            let body = if self.is_code {
+                format!(
                     "    int32_t margins[{objects}];\n    {name}_margins(row, margins);\n    return {name}_best_(margins);\n"
-                ),
-                None => {
-                    let (lines, keys) = self.keys();
-                    let function = if exits { "class_of" } else { "predict_class" };
-                    format!(
-                        "    int32_t margins[{objects}];\n{lines}    \
-                         return palpate_{function}(&{name}_opened_, {keys}, {features}, margins, {objects});\n"
-                    )
-                }
+                )
+            } else {
+                let (lines, keys) = self.keys();
+                format!(
+                    "    int32_t margins[{objects}];\n{lines}    \
+                     return palpate_predict_class(&{name}_opened_, {keys}, {features}, margins, {objects});\n"
+                )
             };
             call("The class", "int", "predict", "", &body);
             let body = match self.probability {
@@ -230,7 +222,7 @@ impl Calls<'_> {
             return self.of_sequences();
         }
         let (step, parameter, body) = if self.model.descriptor().is_none() {
-            let body = if self.code.is_some() {
+            let body = if self.is_code {
                 format!(
                     "    int32_t margins[{objects}];\n    {name}_margins(row, margins);\n    \
                      palpate_push_margins(state, margins, {objects});\n"

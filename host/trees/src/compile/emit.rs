@@ -2,12 +2,13 @@
 
 use super::Compiled;
 use super::calls::Calls;
-use super::code::{Form, Program};
-use super::cost::has_sequences;
+use super::code::Program;
+use super::cost::{Instructions, has_sequences};
 use super::model::open_any;
 use crate::ensemble::Probability;
 use crate::error::{Error, Result};
 use palpate_base::output;
+use palpate_base::wording::count;
 use palpate_onboard::Model;
 use palpate_shared::format::Tag;
 use std::fmt::Write as _;
@@ -47,30 +48,23 @@ impl Compiled {
     /// The model's files of source code: their extensions and texts. `name`, the files' own without an extension, is what the
     /// array and the functions are called after; characters that an identifier cannot have become `_`.
     ///
-    /// `languages` are the ones that the model is written in. Where its trees are code, their files are written in any case, and for
-    /// C what of them C needs to know.
+    /// In Rust, code stands for itself, beside a model; in C the model's array is with it.
     ///
     /// # Errors
     /// None for what [`compile`](super::compile) returned.
     pub fn sources(&self, name: &str, languages: &[Language]) -> Result<Vec<(&'static str, String)>> {
         let model = open_any(&self.bytes)?;
-        let (file, name) = (name, identifier(name));
-        let Some((program, form)) = &self.code else {
-            let source = |&language: &Language| match language {
-                Language::C => ("h", c(&model, &name, self.probability, None)),
-                Language::Rust => ("rs", rust(&model, &name)),
+        let name = identifier(name);
+        let source = |language: &Language| {
+            let text = match (language, &self.code) {
+                // With the model's array.
+                (Language::C, code) => c(&model, &name, self.probability, code.as_ref()),
+                (Language::Rust, None) => rust(&model, &name),
+                (Language::Rust, Some(program)) => program.rust(&about(&model), model.checksum()),
             };
-            return Ok(languages.iter().map(source).collect());
+            (language.extension(), text)
         };
-        let mut files = match form {
-            // C is one file with the model's array.
-            Form::C => Vec::new(),
-            Form::Thumb(_) => program.sources(&name, file, model.checksum(), *form),
-        };
-        if *form == Form::C || languages.contains(&Language::C) {
-            files.push(("h", c(&model, &name, self.probability, Some((program, *form)))));
-        }
-        Ok(files)
+        Ok(languages.iter().map(source).collect())
     }
 }
 
@@ -139,12 +133,9 @@ fn avr_error(name: &str, length: usize) -> String {
     )
 }
 
-fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<(&Program, Form)>) -> String {
-    let functions = code.map_or_else(String::new, |(program, form)| match form {
-        Form::C => program.c_functions(name) + &program.c_opening(name),
-        Form::Thumb(_) => program.c_declaration(name, model.checksum()) + &program.c_opening(name),
-    });
-    let calls = Calls { model, name, probability, code: code.map(|(program, _)| program) }.text();
+fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<&Program>) -> String {
+    let functions = code.map_or_else(String::new, |program| program.c_functions(name) + &program.c_opening(name));
+    let calls = Calls { model, name, probability, is_code: code.is_some() }.text();
     let guard = format!("{}_MODEL_H", name.to_uppercase());
     let layout = model.layout().name().to_uppercase();
     let leaf = model.leaf_type().name().to_uppercase();
@@ -152,8 +143,6 @@ fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<(&Pro
     let shared = u8::from(model.shared_leaves().is_some());
     let sentinel = u8::from(model.sentinel().is_some());
     let row_evidence = u8::from(has_row_evidence(model));
-    let has_exits = model.early_exits().next().is_some();
-    let early = if has_exits { "#ifndef PALPATE_EARLY\n#define PALPATE_EARLY 1\n#endif\n" } else { "" };
     let has_outputs = model.outputs().is_some();
     let outputs = if has_outputs { "#ifndef PALPATE_OUTPUTS\n#define PALPATE_OUTPUTS 1\n#endif\n" } else { "" };
     let has_sequences = has_sequences(model);
@@ -164,14 +153,13 @@ fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<(&Pro
         ("PALPATE_SENTINEL", sentinel),
         ("PALPATE_ROW_EVIDENCE", row_evidence),
         ("PALPATE_SEQUENCES", u8::from(has_sequences)),
-        ("PALPATE_EARLY", u8::from(has_exits)),
         ("PALPATE_OUTPUTS", u8::from(has_outputs)),
     ];
     let (objects, length) = (model.object_count(), model.bytes().len());
     let too_long = if length > LONGEST_ON_AVR { avr_error(name, length) } else { String::new() };
     format!(
         "/* {about}\n * Written by `palpate export`; not to be edited. */\n\
-         #ifndef {guard}\n#define {guard}\n\n\
+         {cost}#ifndef {guard}\n#define {guard}\n\n\
          /* Parts of palpate.h that this model needs. For several models in one file: define these before including the first. */\n\
          #ifndef PALPATE_LAYOUTS\n#define PALPATE_LAYOUTS PALPATE_{layout}\n#endif\n\
          #ifndef PALPATE_LEAVES\n#define PALPATE_LEAVES PALPATE_{leaf}\n#endif\n\
@@ -179,7 +167,7 @@ fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<(&Pro
          #ifndef PALPATE_SHARED\n#define PALPATE_SHARED {shared}\n#endif\n\
          #ifndef PALPATE_SENTINEL\n#define PALPATE_SENTINEL {sentinel}\n#endif\n\
          #ifndef PALPATE_ROW_EVIDENCE\n#define PALPATE_ROW_EVIDENCE {row_evidence}\n#endif\n\
-         {sequences}{early}{outputs}{too_long}\
+         {sequences}{outputs}{too_long}\
          #ifndef PALPATE_MAX_OBJECTS\n#define PALPATE_MAX_OBJECTS {objects}\n#endif\n\
          #if defined(__AVR__) && !defined(PALPATE_BYTE)\n#include <avr/pgmspace.h>\n#define PALPATE_BYTE(p) pgm_read_byte(p)\n#endif\n\
          #include \"palpate.h\"\n\n\
@@ -188,6 +176,7 @@ fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<(&Pro
          static const uint8_t {name}_model[{length}]\n\
          #if defined(__AVR__)\n    PROGMEM\n#elif defined(__GNUC__)\n    __attribute__((aligned(4)))\n#endif\n    = {{\n\
          {array}}};\n\n{functions}{calls}#endif\n",
+        cost = cost(model, code),
         // Neither ends the comment nor seems to begin another.
         about = about(model).replace("*/", "* /").replace("/*", "/ *"),
         checks = checks(&name.to_uppercase(), &layout, &leaf, &needed, objects),
@@ -196,6 +185,20 @@ fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<(&Pro
             "" => format!("palpate_open(&model, {name}_model, sizeof {name}_model)"),
             _ => format!("{name}_open(&model)"),
         },
+    )
+}
+
+/// A comment on what a row costs at most.
+fn cost(model: &Model<'_>, code: Option<&Program>) -> String {
+    let Instructions { m4f, m0_plus } =
+        code.map_or_else(|| Instructions::of_longest_ways(model), Program::instructions_of_longest_ways);
+    let m0_plus = m0_plus.map_or_else(String::new, |most| format!(", {} on a Cortex-M0+", count(most)));
+    format!(
+        "/* From features to margins: at most {} instructions on a Cortex-M4F{m0_plus}, estimated.\n * \
+         Flash: {} bytes for the model's array, and the functions that are called. RAM: the stack, and a palpate_recognizer for\n \
+         * each stream; nothing is static. */\n",
+        count(m4f),
+        count(model.bytes().len()),
     )
 }
 

@@ -128,7 +128,7 @@ impl Problem for CompileProblem {
                 "Copy the model again, or export it again."
             }
             Self::Model(ModelError::NeedsCode) => {
-                "Assembly is proved with the .s file beside the model; trees as C code can be neither proved nor inspected: export the model without --emit for that."
+                "Trees as code can be neither proved nor inspected: export the model without --emit c-code or rust-code for that."
             }
             Self::Model(_) => "Export the model again with `palpate export`.",
             Self::Objects { .. } => "Give 1 to 256 objects, and one base margin for each.",

@@ -1,8 +1,7 @@
 //! The layouts that a forest may take: each is costed, and one is written.
 
 use super::cells::Cells;
-use super::code::{Form, Program, Statements};
-use super::early::{self, EarlyExit, EarlyExitFound};
+use super::code::{Program, Statements};
 use super::forest::Forest;
 use super::lowered::Lowered;
 use super::parts::Parts;
@@ -11,7 +10,7 @@ use super::share::Sharing;
 use super::table::Table;
 use super::{Candidate, Settings};
 use crate::error::{CompileProblem, Result};
-use palpate_shared::format::{HEADER_LENGTH, Layout, LeafType, Sentinel};
+use palpate_shared::format::{HEADER_LENGTH, Layout, LeafType};
 
 /// A forest as it may be written.
 pub(super) struct Layouts<'f> {
@@ -33,7 +32,7 @@ impl<'f> Layouts<'f> {
         let (objects, leaf) = (forest.objects(), settings.leaf);
         let cells = Cells::new(forest);
         let lowered = Lowered::new(forest, leaf);
-        let wants_table = matches!(settings.layout, None | Some(Layout::Grid | Layout::Patterns));
+        let wants_table = !settings.code && matches!(settings.layout, None | Some(Layout::Grid | Layout::Patterns));
         let wants_trees = !matches!(settings.layout, Some(Layout::Grid | Layout::Patterns));
         let in_table = cells.as_ref().filter(|cells| wants_table && Table::fits(cells, objects, leaf));
         let (margin_error, sums) = match lowered.as_ref().filter(|_| wants_trees) {
@@ -43,8 +42,7 @@ impl<'f> Layouts<'f> {
             }
         };
         let table = in_table.zip(sums).and_then(|(cells, sums)| Table::new(cells, sums, leaf));
-        let may_be_code = !settings.forms.is_empty() && matches!(settings.layout, None | Some(Layout::Code));
-        let in_code = lowered.as_ref().filter(|_| may_be_code && leaf != LeafType::F32);
+        let in_code = lowered.as_ref().filter(|_| settings.code && leaf != LeafType::F32);
         let program = in_code.and_then(|lowered| Program::new(lowered, stated));
         let is_shared = wants_trees && settings.shared_leaves != Some(false);
         let sharing = lowered.as_ref().filter(|_| is_shared).and_then(Lowered::sharing);
@@ -56,6 +54,17 @@ impl<'f> Layouts<'f> {
     pub(super) fn candidates(&self, settings: &Settings) -> Result<Vec<Candidate>> {
         let all = || vec![Layout::Complete, Layout::Compact, Layout::Grid, Layout::Patterns];
         let mut candidates = Vec::new();
+        if settings.code {
+            let layout = Layout::Code;
+            let program = self.program.as_ref().ok_or(CompileProblem::DoesNotFit { layout })?;
+            return Ok(vec![Candidate {
+                layout,
+                shared_leaves: false,
+                bytes: HEADER_LENGTH + 8 * self.objects + program.flash(),
+                instructions: program.instructions(),
+                margin_error: self.margin_error,
+            }]);
+        }
         for layout in settings.layout.map_or_else(all, |layout| vec![layout]) {
             let is_wide =
                 layout == Layout::Compact && self.lowered.as_ref().is_some_and(|lowered| !lowered.is_narrow());
@@ -63,22 +72,9 @@ impl<'f> Layouts<'f> {
             let before = candidates.len();
             candidates.extend(self.trees_in(layout, settings.shared_leaves));
             candidates.extend(self.table_in(layout));
-            if settings.layout.is_some() && layout != Layout::Code && candidates.len() == before {
+            if settings.layout.is_some() && candidates.len() == before {
                 return Err(CompileProblem::DoesNotFit { layout }.into());
             }
-        }
-        if let Some(program) = &self.program {
-            candidates.extend(settings.forms.iter().map(|&form| {
-                let (cost, model) = (program.cost(form), HEADER_LENGTH + 8 * self.objects);
-                Candidate {
-                    layout: Layout::Code,
-                    form: Some(form.name()),
-                    shared_leaves: false,
-                    bytes: model + cost.bytes,
-                    instructions: cost.instructions,
-                    margin_error: self.margin_error,
-                }
-            }));
         }
         Ok(candidates)
     }
@@ -88,7 +84,6 @@ impl<'f> Layouts<'f> {
         let lowered = self.lowered.as_ref().filter(|lowered| lowered.fits(layout));
         let candidate = move |lowered: &Lowered<'_>, sharing: Option<Sharing>| Candidate {
             layout,
-            form: None,
             shared_leaves: sharing.is_some(),
             bytes: lowered.bytes(layout, sharing),
             instructions: lowered.instructions(layout, sharing.is_some()),
@@ -110,34 +105,11 @@ impl<'f> Layouts<'f> {
         let table = self.table.as_ref().filter(|table| table.layout == layout)?;
         Some(Candidate {
             layout,
-            form: None,
             shared_leaves: false,
             bytes: table.bytes(),
             instructions: table.instructions(),
             margin_error: table.margin_error,
         })
-    }
-
-    /// Chooses where walks for a class alone may end in this layout, or form of code. Instructions of the candidate follow.
-    pub(super) fn end_early(
-        &mut self,
-        chosen: &mut Candidate,
-        form: Option<Form>,
-        wanted: &EarlyExit,
-        features: (Option<&[f32]>, Option<Sentinel>),
-    ) -> Option<EarlyExitFound> {
-        let lowered = self.lowered.as_mut().filter(|_| !matches!(chosen.layout, Layout::Grid | Layout::Patterns))?;
-        let early::Plan { order, ends, found } = early::plan(lowered, chosen.layout, wanted, features)?;
-        if let Some(form) = form {
-            let program = self.program.take_if(|program| program.may_exit(form))?.with_exits(&order, ends);
-            chosen.instructions = program.cost(form).instructions;
-            self.program = Some(program);
-        } else if !lowered.end_after(&order, &ends) {
-            return None;
-        } else {
-            chosen.instructions = lowered.instructions(chosen.layout, chosen.shared_leaves);
-        }
-        Some(found)
     }
 
     /// The chosen layout, and the program if it is code; `None` where it has none of these.

@@ -2,15 +2,14 @@
 
 use super::axes::{Axes, visit};
 use super::cost::{Instructions, Shape};
-use super::early;
-use super::forest::{Forest, each_leaf};
+use super::forest::{Branch, Forest, each_leaf};
 use super::lowered::Lowered;
 use super::merge::{Merged, Source, merge};
 use super::parts::Parts;
 use super::quantize::Scale;
 use super::share::{Sharing, share};
 use super::trees::{self, Leaves, Sections};
-use palpate_shared::format::{Axis, EarlyExit, Group, HEADER_LENGTH, Layout, LeafType, MAX_COMPLETE_DEPTH};
+use palpate_shared::format::{Axis, Group, HEADER_LENGTH, Layout, LeafType, MAX_COMPLETE_DEPTH};
 
 impl<'f> Lowered<'f> {
     /// Lowers a forest for leaves of one type; `None` where they do not fit it.
@@ -18,22 +17,8 @@ impl<'f> Lowered<'f> {
         let rounding = Scale::for_trees(forest, leaf)?;
         let Merged { forest, scale, base, sources } = merge(forest, leaf, &rounding);
         let axes = Axes::new(&forest);
-        let runs = trees::runs(&forest, leaf, &scale, &[]);
-        Some(Self { leaf, forest, scale, base, sources, axes, runs, exits: Vec::new(), rounding })
-    }
-
-    /// Orders the trees for a walk that may end after so many of `order`, with a bound on what the others change; false, and
-    /// nothing changes, where that takes more groups than a model can have.
-    pub(super) fn end_after(&mut self, order: &[usize], ends: &[(usize, u32)]) -> bool {
-        let parts = early::parts(order, ends.iter().map(|(end, _)| *end));
-        let runs = trees::runs(&self.forest, self.leaf, &self.scale, &parts);
-        let fits = u16::try_from(runs.len()).is_ok();
-        if fits {
-            let groups = trees::groups_before(&runs, &parts).into_iter().zip(ends);
-            self.exits = groups.map(|(groups, &(_, bound))| EarlyExit { groups, bound }).collect();
-            self.runs = runs;
-        }
-        fits
+        let runs = trees::runs(&forest, leaf, &scale);
+        Some(Self { leaf, forest, scale, base, sources, axes, runs, rounding })
     }
 
     /// Trees of the ensemble that each tree stands for, in the order in which they are written.
@@ -102,7 +87,7 @@ impl<'f> Lowered<'f> {
     pub(super) fn instructions(&self, layout: Layout, is_shared: bool) -> Instructions {
         let steps = || {
             let trees = self.runs.iter().flat_map(|run| &run.trees);
-            trees.map(|&tree| early::steps(&self.forest.trees[tree].root)).collect()
+            trees.map(|&tree| steps(&self.forest.trees[tree].root)).collect()
         };
         Instructions::new(&Shape {
             layout,
@@ -130,11 +115,18 @@ impl<'f> Lowered<'f> {
             nodes,
             leaves: leaves.into_bytes(),
             shared: None,
-            exits: self.exits,
             base: self.base,
             unit: self.scale.unit,
             margin_error,
         };
         if is_shared { share(parts, self.leaf) } else { parts }
+    }
+}
+
+/// Steps to a leaf, if either side of a split is as likely.
+fn steps(branch: &Branch<'_>) -> f64 {
+    match branch {
+        Branch::Leaf(_) => 0.0,
+        Branch::Split(split) => 1.0 + (steps(&split.left) + steps(&split.right)) / 2.0,
     }
 }

@@ -4,7 +4,7 @@ use super::axes::Axes;
 use super::forest::Forest;
 use super::merge::Source;
 use super::quantize::Scale;
-use palpate_shared::format::{EarlyExit, LeafType};
+use palpate_shared::format::LeafType;
 
 /// A lowered forest.
 pub(super) struct Lowered<'f> {
@@ -20,8 +20,6 @@ pub(super) struct Lowered<'f> {
     pub(super) axes: Axes,
     /// The trees in their order, in groups.
     pub(super) runs: Vec<Run>,
-    /// Places where a walk for a class alone may end.
-    pub(super) exits: Vec<EarlyExit>,
     /// Scale of the ensemble's own trees.
     pub(super) rounding: Scale,
 }

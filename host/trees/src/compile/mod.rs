@@ -43,7 +43,6 @@ mod cells;
 pub mod code;
 mod container;
 mod cost;
-mod early;
 mod emit;
 mod error;
 mod forest;
@@ -66,11 +65,9 @@ mod write;
 pub use budget::compile_within;
 pub use container::{OwnedSection, file};
 pub use cost::{Core, FEATURES, Instructions, Memory, code_flash, features};
-pub use early::{EarlyExit, EarlyExitFound};
 pub use emit::{HEADER, Language, check_place, emit, identifier, write_sources};
 pub use error::CompileProblem;
 pub(crate) use merge::Source;
-pub(crate) use model::open_with_code;
 pub use model::{CompiledModel, names, open, thresholds};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
@@ -78,7 +75,7 @@ pub use share::different_leaves;
 
 use crate::ensemble::{Ensemble, Probability};
 use crate::error::{Error, Result};
-use code::{Form, Program, Statements};
+use code::{Program, Statements};
 use forest::Forest;
 use layout::Layouts;
 use lowered::Lowered;
@@ -103,13 +100,11 @@ pub struct Settings {
     pub max_touches: u32,
     /// Prior probability of each object, in any common unit; `None` makes all equal.
     pub priors: Option<Vec<f64>>,
-    /// Forms of code that may be chosen beside the layouts of data; of one that is chosen the model has no trees.
-    pub forms: Vec<Form>,
+    /// True if the trees become code, in C or Rust: the model has no trees then.
+    pub code: bool,
     /// For an ensemble over rows: compares features as whole numbers, each of which is a feature's value times the
     /// feature's scale; `None` compares f32 values.
     pub scales: Option<Vec<f32>>,
-    /// For classes of rows: walks for a class alone end where the class is known. Nothing else changes.
-    pub early_exit: Option<EarlyExit>,
     /// For classes of rows: the feature, by name, that is the number of a row in its sequence, counted from 1. Recognizers
     /// count it themselves.
     pub position: Option<String>,
@@ -145,9 +140,8 @@ impl Default for Settings {
             error_rate: 0.01,
             max_touches: 200,
             priors: None,
-            forms: Vec::new(),
+            code: false,
             scales: None,
-            early_exit: None,
             position: None,
             stated: Stated::default(),
         }
@@ -172,9 +166,6 @@ pub struct Candidate {
     /// The layout.
     #[serde(serialize_with = "name_of")]
     pub layout: Layout,
-    /// The form of code, of the layout code.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub form: Option<&'static str>,
     /// True if equal leaves are stored once.
     pub shared_leaves: bool,
     /// Bytes of the model, and of the code beside it.
@@ -209,10 +200,8 @@ pub struct Compiled {
     pub instructions: Instructions,
     /// All layouts that were tried.
     pub candidates: Vec<Candidate>,
-    /// The trees as code, and its form, if that was chosen: the bytes are a model without trees then.
-    pub code: Option<(Program, Form)>,
-    /// Places where a walk for a class alone may end, if that was asked for.
-    pub early_exit: Option<EarlyExitFound>,
+    /// The trees as code, if that was asked for: the bytes are a model without trees then.
+    pub code: Option<Program>,
     /// Rule that turns margins into the probabilities of the library that trained it.
     pub probability: Probability,
 }
@@ -240,9 +229,8 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let ensemble = &*range::scaled(ensemble);
     let stopping = stopping(settings.error_rate, settings.max_touches)?;
     let forest = Forest::new(ensemble, settings.scales.as_deref())?;
-    check_early_exit(ensemble, settings)?;
     write::check_sentinel(ensemble, settings)?;
-    let mut layouts = Layouts::new(&forest, settings, &stated(ensemble, settings));
+    let layouts = Layouts::new(&forest, settings, &stated(ensemble, settings));
     let mut candidates = layouts.candidates(settings)?;
     let overhead = write::overhead(ensemble, settings, &forest)?;
     let scale = f64::from(ensemble.prediction().scale);
@@ -254,12 +242,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
         Some(layout) => CompileProblem::DoesNotFit { layout },
         None => CompileProblem::FitsNoLayout,
     };
-    let mut chosen = chosen(&candidates, settings.goal).map(|chosen| candidates[chosen]).ok_or_else(does_not_fit)?;
-    let form = settings.forms.iter().copied().find(|form| Some(form.name()) == chosen.form);
-    let features = (settings.scales.as_deref(), write::sentinel(ensemble, settings));
-    let early_exit = settings.early_exit.as_ref();
-    let early_exit =
-        early_exit.map(|wanted| layouts.end_early(&mut chosen, form, wanted, features).unwrap_or_default());
+    let chosen = chosen(&candidates, settings.goal).map(|chosen| candidates[chosen]).ok_or_else(does_not_fit)?;
     let (mut parts, program) = layouts.write(&chosen).ok_or_else(does_not_fit)?;
     let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding);
     parts.margin_error = rounding::round_up(f64::from(parts.margin_error) + rounding / scale);
@@ -276,26 +259,9 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
         shared_leaves,
         instructions: chosen.instructions,
         candidates,
-        code: program.zip(form),
-        early_exit,
+        code: program,
         probability: original.origin.imported.as_ref().map(|imported| imported.probability).unwrap_or_default(),
     })
-}
-
-/// Returns an error where a walk may not end early.
-fn check_early_exit(ensemble: &Ensemble, settings: &Settings) -> Result<()> {
-    let why = if settings.early_exit.is_none() {
-        return Ok(());
-    } else if let Some(schema) = ensemble.schema() {
-        &format!("none with a model of {}, whose recognizer takes all margins", schema.of)
-    } else if ensemble.objects.len() < 2 {
-        "none with a model of one output, which has no class"
-    } else if settings.leaf == Leaf::F32 {
-        "leaves of i8 or i16 with it: sums of f32 depend on their order"
-    } else {
-        return Ok(());
-    };
-    Err(Error::setting("early_exit", "given", why))
 }
 
 /// Statements of the model that code depends on.
@@ -332,34 +298,10 @@ fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
     best.map(|(index, _)| index)
 }
 
-/// Trees of the ensemble that each tree of a model with such leaves stands for, in the model's order, or in that of assembly
-/// for a chip. `scales` are those of features of rows that are whole numbers, `ends` the numbers of trees after which a walk
-/// may end.
-pub(crate) fn order(
-    ensemble: &Ensemble,
-    leaf: Leaf,
-    scales: Option<&[f32]>,
-    ends: &[usize],
-    chip: Option<code::Chip>,
-) -> Result<Vec<Source>> {
+/// Trees of the ensemble that each tree of a model with such leaves stands for, in the model's order. `scales` are those of
+/// features of rows that are whole numbers.
+pub(crate) fn order(ensemble: &Ensemble, leaf: Leaf, scales: Option<&[f32]>) -> Result<Vec<Source>> {
     let ensemble = range::scaled(ensemble);
     let forest = Forest::new(&ensemble, scales.filter(|_| ensemble.schema().is_none()))?;
-    let mut lowered = Lowered::new(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?;
-    let ends: Vec<(usize, u32)> = ends.iter().map(|&end| (end, 0)).collect();
-    let walk = || early::order(&lowered.forest, &lowered.scale);
-    let Some(chip) = chip else {
-        if !ends.is_empty() {
-            let walk = walk();
-            lowered.end_after(&walk, &ends);
-        }
-        return Ok(lowered.order());
-    };
-    let walk = if ends.is_empty() { (0..lowered.sources.len()).collect() } else { walk() };
-    let stated = Statements { sentinel: None, known: ensemble.objects.len(), last_of_ties: false };
-    let program = Program::new(&lowered, &stated).ok_or(CompileProblem::DoesNotFit { layout: Layout::Code })?;
-    let source = |(tree, zero): (usize, i32)| {
-        let source = lowered.sources[walk[tree]].clone();
-        Source { offset: source.offset + (zero >> lowered.scale.shifts[walk[tree]]), ..source }
-    };
-    Ok(program.with_exits(&walk, ends).in_assembly(chip).into_iter().map(source).collect())
+    Ok(Lowered::new(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?.order())
 }

@@ -103,14 +103,6 @@ pub(super) fn open_any(bytes: &[u8]) -> Result<Model<'_>> {
     .map_err(|error| CompileProblem::Model(error).into())
 }
 
-/// Opens a model of the layout code; margins are not to be asked for.
-///
-/// # Errors
-/// Errors of [`open`]; for a model of another layout.
-pub(crate) fn open_with_code(bytes: &[u8]) -> Result<Model<'_>> {
-    Model::with_code(bytes, |_, _| {}).map_err(|error| CompileProblem::Model(error).into())
-}
-
 /// The names of the objects that a model knows, in its order.
 pub fn names(model: &Model<'_>) -> Vec<String> {
     (0..model.object_count()).map(|object| model.object_name(object).to_owned()).collect()

@@ -1,7 +1,7 @@
 //! The parts of a compiled model, before they are written.
 
 use super::container::OwnedSection;
-use palpate_shared::format::{Axis, EarlyExit, Group, Tag};
+use palpate_shared::format::{Axis, Group, Tag};
 
 /// Parts of a layout of a forest.
 #[derive(Default)]
@@ -13,8 +13,6 @@ pub(super) struct Parts {
     pub(super) leaves: Vec<u8>,
     /// The section with the leaves' values, where leaves are numbers.
     pub(super) shared: Option<Vec<u8>>,
-    /// Places where a walk for a class alone may end.
-    pub(super) exits: Vec<EarlyExit>,
     /// Starting values of the margins: in units, or f32 bits.
     pub(super) base: Vec<i32>,
     pub(super) unit: f32,
@@ -22,13 +20,9 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// The optional section with the values of leaves, and that with the places where walks may end.
-    pub(super) fn sections(&self) -> impl Iterator<Item = OwnedSection> {
-        let shared = self.shared.as_ref().map(|content| OwnedSection::new(Tag::SharedLeaves, true, content.clone()));
-        let exits: Vec<u8> = self.exits.iter().flat_map(|exit| exit.to_bytes()).collect();
-        // Whoever does not know it walks on.
-        let exits = (!exits.is_empty()).then(|| OwnedSection::new(Tag::EarlyExit, false, exits));
-        shared.into_iter().chain(exits)
+    /// The optional section with the values of leaves.
+    pub(super) fn sections(&self) -> Option<OwnedSection> {
+        self.shared.as_ref().map(|content| OwnedSection::new(Tag::SharedLeaves, true, content.clone()))
     }
 
     /// Trees or a table, as the chip reads them.

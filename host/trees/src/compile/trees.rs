@@ -47,10 +47,8 @@ pub(super) struct Sections {
 }
 
 /// Groups of trees. Integers add up in any order, so trees are sorted by shift, object and depth; f32 leaves keep the
-/// order in which each object's margin adds them. `parts` are the numbers of the parts of the walk that trees are in: none
-/// if it has one.
-pub(super) fn runs(forest: &Forest<'_>, leaf: LeafType, scale: &Scale, parts: &[usize]) -> Vec<Run> {
-    let part = |tree: usize| parts.get(tree).copied().unwrap_or(0);
+/// order in which each object's margin adds them.
+pub(super) fn runs(forest: &Forest<'_>, leaf: LeafType, scale: &Scale) -> Vec<Run> {
     let object = |tree: usize| match forest.trees[tree].output {
         // There are at most 256 objects.
         Output::One(object) => Some(object as u8),
@@ -59,7 +57,7 @@ pub(super) fn runs(forest: &Forest<'_>, leaf: LeafType, scale: &Scale, parts: &[
     let mut order: Vec<usize> = (0..forest.trees.len()).collect();
     let depth = |tree: usize| if leaf == LeafType::F32 { 0 } else { forest.trees[tree].depth.max(1) };
     if leaf != LeafType::F32 {
-        order.sort_by_key(|&tree| (part(tree), std::cmp::Reverse(scale.shifts[tree]), object(tree), depth(tree)));
+        order.sort_by_key(|&tree| (std::cmp::Reverse(scale.shifts[tree]), object(tree), depth(tree)));
     } else if order.iter().all(|&tree| object(tree).is_some()) {
         order.sort_by_key(|&tree| object(tree));
     }
@@ -67,10 +65,7 @@ pub(super) fn runs(forest: &Forest<'_>, leaf: LeafType, scale: &Scale, parts: &[
     for tree in order {
         let (object, shift) = (object(tree), scale.shifts[tree]);
         match runs.last_mut() {
-            Some(run)
-                if (run.object, run.shift) == (object, shift)
-                    && (depth(run.trees[0]), part(run.trees[0])) == (depth(tree), part(tree)) =>
-            {
+            Some(run) if (run.object, run.shift, depth(run.trees[0])) == (object, shift, depth(tree)) => {
                 run.trees.push(tree);
             }
             _ => runs.push(Run { object, shift, trees: vec![tree] }),
@@ -163,13 +158,6 @@ fn preorder(lowered: &Lowered<'_>, leaves: &mut Leaves<'_>, put: impl Fn(&Split<
         }
     }
     nodes
-}
-
-/// For each part of the walk but the last, the groups up to its end.
-pub(super) fn groups_before(runs: &[Run], parts: &[usize]) -> Vec<u16> {
-    let part = |run: &Run| run.trees.first().and_then(|&tree| parts.get(tree)).copied().unwrap_or(0);
-    let last = runs.last().map_or(0, part);
-    (0..last).map(|number| runs.partition_point(|run| part(run) <= number) as u16).collect()
 }
 
 /// The axes and their thresholds, without splits.

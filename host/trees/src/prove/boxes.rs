@@ -138,6 +138,23 @@ impl Tree {
         }
     }
 
+    /// The values of the leaf that one row reaches.
+    pub(super) fn leaf(&self, row: &Rows) -> &[f64] {
+        let mut at = 0;
+        loop {
+            match &self.nodes[at] {
+                Step::Leaf(values) => return values,
+                Step::Split(rule, children) => {
+                    let is_left = match row.get(rule.feature) {
+                        Some(values) if !values.missing => values.low < rule.cut,
+                        _ => rule.missing_left,
+                    };
+                    at = children[usize::from(!is_left)];
+                }
+            }
+        }
+    }
+
     /// The values of the only leaf, if there is no split.
     pub(super) fn constant(&self) -> Option<&[f64]> {
         if let Step::Leaf(values) = &self.nodes[0] { Some(values) } else { None }

@@ -16,8 +16,9 @@ pub(super) struct Plain {
     pub(super) feature_names: Vec<String>,
     /// Keys that count as missing.
     pub(super) sentinel: Option<[i64; 2]>,
-    /// Size of a unit in the library's margins.
+    /// Size of a unit in the library's margins, and of a margin of the trees.
     pub(super) unit: f64,
+    pub(super) scale: f64,
     /// Code of the link, true if the last of several equal classes is predicted, and the divisor of a margin before the link.
     pub(super) link: (u8, bool, u32),
     /// True if outputs are targets, and none is a class.
@@ -30,21 +31,8 @@ pub(super) struct Plain {
     pub(super) base: Vec<f64>,
     /// Trees, and the size of a step of their leaves.
     pub(super) trees: Vec<(Tree, f64)>,
-    /// Places where walks for a class alone may end.
-    pub(super) exits: Vec<Exit>,
     /// Cells of a table: which rows fall into each, and its margins.
     pub(super) cells: Option<Vec<(Vec<Values>, Vec<f64>)>>,
-}
-
-/// A place where a walk for a class alone may end.
-#[derive(Clone, Debug)]
-pub(super) struct Exit {
-    /// The trees before it.
-    pub(super) trees: usize,
-    /// The most that those after it change the difference between two margins.
-    pub(super) bound: f64,
-    /// Additions to each output, after it and beside trees; empty if there are none.
-    pub(super) later: Vec<f64>,
 }
 
 struct Axis {
@@ -172,8 +160,6 @@ struct Stated<'b> {
     targets: bool,
     scales: Vec<f32>,
     feature_names: Vec<String>,
-    /// Groups before each place where a walk may end, and units.
-    exits: Vec<(usize, f64)>,
 }
 
 impl<'b> Stated<'b> {
@@ -186,7 +172,6 @@ impl<'b> Stated<'b> {
             targets: false,
             scales: vec![1.0; features],
             feature_names: Vec::new(),
-            exits: Vec::new(),
         };
         while !sections.0.is_empty() {
             let tag = sections.number(2)? & 0x7fff;
@@ -215,13 +200,6 @@ impl<'b> Stated<'b> {
                     stated.link = (link & 127, is_last, average);
                 }
                 14 => stated.sentinel = Some([content.signed(4)?, content.signed(4)?]),
-                17 => {
-                    while content.0.len() >= 8 {
-                        let groups = content.number(2)?;
-                        content.take(2)?;
-                        stated.exits.push((groups, content.number(4)? as f64));
-                    }
-                }
                 _ => {}
             }
         }
@@ -260,7 +238,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     text.text()?;
     // A name is empty where the text ends too early.
     let names = (0..objects).map(|_| text.text().unwrap_or_default()).collect();
-    let Stated { shared, sentinel, scale, link, targets, scales, feature_names, mut exits } =
+    let Stated { shared, sentinel, scale, link, targets, scales, feature_names } =
         Stated::read(Bytes(rest.take(sections_length)?), features)?;
     let is_f32 = kind == 2;
     let leaves_of = Leaves { kind, unit: if is_f32 { scale } else { unit * scale }, shared };
@@ -275,12 +253,6 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let mut axis_bytes = Bytes(rest.take(4 * axis_count)?);
     let cuts_bytes = rest.take(cuts_length)?;
     let group_bytes = Bytes(rest.take(8 * group_count)?);
-    for (end, bound) in &mut exits {
-        // The number of trees is at the end of a group's record.
-        let groups = group_bytes.0.chunks(8).take(*end);
-        *end = groups.map(|group| Bytes(&group[4..]).number(4)).sum::<Result<usize, _>>()?;
-        *bound *= unit * scale;
-    }
     let splits = Bytes(rest.take(splits_length)?);
     let mut leaves = Bytes(rest.take(leaves_length)?);
     if rest.0.len() != 4 {
@@ -322,17 +294,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
         feature_names,
         sentinel,
         unit: unit * scale,
+        scale,
         link,
         targets,
         most: [127.0, 32767.0, 0.0].get(usize::from(kind)).copied().unwrap_or(0.0),
         stated: error * scale,
         base: if cells.is_some() { vec![0.0; objects] } else { base },
         trees,
-        // Sums of f32 are not compared before the end.
-        exits: match is_f32 {
-            true => Vec::new(),
-            false => exits.into_iter().map(|(trees, bound)| Exit { trees, bound, later: Vec::new() }).collect(),
-        },
         cells,
     })
 }

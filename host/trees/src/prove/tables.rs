@@ -1,12 +1,10 @@
 //! Tables, cell by cell: the layouts grid and patterns, and trees with few cells between their thresholds.
 
 use super::boxes::{Rows, See, Values, between, cuts_of};
-use super::chip::Chip;
 use super::format::Plain;
 use super::span::{Span, spans};
 use super::{Found, ProofProblem, Subject, output_of};
 use crate::ensemble::Occurring;
-use palpate_shared::MISSING_FEATURE;
 
 /// The sums of the ensemble's leaves that `rows` reach, rounded to f32 at each addition, as libraries do.
 fn sums(subject: Subject<'_>, rows: &mut Rows) -> Vec<Span> {
@@ -56,7 +54,7 @@ fn no_cell(plain: &Plain) -> Found {
 }
 
 /// Cells of a table as its format describes them.
-pub(super) fn of_format(subject: Subject<'_>, cells: &[(Vec<Values>, Vec<f64>)]) -> Result<Found, ProofProblem> {
+pub(super) fn compare(subject: Subject<'_>, cells: &[(Vec<Values>, Vec<f64>)]) -> Result<Found, ProofProblem> {
     let mut found = no_cell(subject.plain);
     for (rows, margins) in cells {
         // Thresholds may be there twice: nothing is between them.
@@ -68,29 +66,20 @@ pub(super) fn of_format(subject: Subject<'_>, cells: &[(Vec<Values>, Vec<f64>)])
     Ok(found)
 }
 
-/// Cells of a table as the chip looks them up: between the ensemble's own thresholds.
-pub(super) fn of_chip(chip: &Chip<'_>, subject: Subject<'_>) -> Result<Found, ProofProblem> {
-    let mut found = no_cell(subject.plain);
-    each_cell(chip, subject.plain, &choices(chip, subject), &mut |margins, rows| {
-        cell(margins, rows, &mut found, subject)
-    })?;
-    Ok(found)
-}
-
 /// The most trees in all cells together that are added up for the error of margins that the trees' worst only bound.
 const MOST: usize = 2_000_000;
 
 /// The largest difference of a margin to the ensemble's f32 sum in any cell between its thresholds; `None` if there are too
 /// many of them.
-pub(super) fn error_in_cells(chip: &Chip<'_>, subject: Subject<'_>) -> Result<Option<f64>, ProofProblem> {
-    let choices = choices(chip, subject);
+pub(super) fn error_in_cells(subject: Subject<'_>) -> Result<Option<f64>, ProofProblem> {
+    let choices = choices(subject);
     let cells = choices.iter().map(|own| own.iter().try_fold(1_usize, |cells, own| cells.checked_mul(own.len())));
     let cells = cells.sum::<Option<usize>>().and_then(|cells| cells.checked_mul(subject.sources.len()));
     if cells.is_none_or(|cells| cells > MOST) {
         return Ok(None);
     }
     let mut worst = 0.0_f64;
-    each_cell(chip, subject.plain, &choices, &mut |margins, rows| {
+    each_cell(subject, &choices, &mut |margins, rows| {
         let sums = sums(subject, rows);
         worst =
             margins.iter().zip(sums).fold(worst, |worst, (&model, sum)| worst.max((model - sum.farthest(model)).abs()));
@@ -100,12 +89,13 @@ pub(super) fn error_in_cells(chip: &Chip<'_>, subject: Subject<'_>) -> Result<Op
 }
 
 /// Values of each feature between thresholds, one list of them for each contact pattern where features depend on it.
-fn choices(chip: &Chip<'_>, subject: Subject<'_>) -> Vec<Vec<Vec<Values>>> {
-    let Subject { plain, sources, ensemble } = subject;
+fn choices(subject: Subject<'_>) -> Vec<Vec<Vec<Values>>> {
+    let Subject { plain, sources, ensemble, .. } = subject;
     let all = plain.keys.all(plain.features);
     // Each feature's intervals between thresholds, without a missing value.
     let intervals = |(feature, values): (usize, &Values)| {
-        let cuts: Vec<i64> = chip.cuts_of(feature).into_iter().chain(cuts_of(sources.iter(), feature)).collect();
+        let trees = plain.trees.iter().map(|(tree, _)| tree).chain(sources);
+        let cuts: Vec<i64> = cuts_of(trees, feature).collect();
         let is_split = !cuts.is_empty();
         // Values that stand for a missing one are no interval of their own, nor in one.
         let ends = plain.sentinel.filter(|_| is_split).map(|[low, high]| [low, high + 1]);
@@ -132,19 +122,13 @@ fn choices(chip: &Chip<'_>, subject: Subject<'_>) -> Vec<Vec<Vec<Values>>> {
 
 /// Calls `see` with the margins of each combination of values, as the chip computes them.
 fn each_cell(
-    chip: &Chip<'_>,
-    plain: &Plain,
+    subject: Subject<'_>,
     choices: &[Vec<Vec<Values>>],
     see: &mut See<'_, ProofProblem>,
 ) -> Result<(), ProofProblem> {
-    let mut rows = plain.keys.all(plain.features);
+    let mut rows = subject.plain.keys.all(subject.plain.features);
     choices.iter().try_for_each(|choices| {
-        each(choices, 0, &mut rows, &mut |rows| {
-            let key = |values: &Values| if values.low > values.high { MISSING_FEATURE } else { values.low as i32 };
-            let row: Vec<i32> = rows.iter().map(key).collect();
-            let margins = chip.margins(&row).ok_or(ProofProblem::Format { what: "it has no margins of a row" })?;
-            see(&margins, rows)
-        })
+        each(choices, 0, &mut rows, &mut |rows| see(&subject.margins(&subject.row(rows)), rows))
     })
 }
 

@@ -1,13 +1,11 @@
 //! Trees of a model beside the trees of the ensemble that they stand for.
 
 use super::boxes::{Rows, Step, Tree, Values, between, cuts_of};
-use super::certificate::CertifiedTree;
-use super::chip::Chip;
-use super::format::Exit;
 use super::span::{Span, spans};
-use super::{Found, ProofProblem, Subject, output_of};
+use super::{Found, Matched, ProofProblem, Subject, output_of};
 use crate::compile::Source;
 use crate::ensemble::Output;
+use rayon::prelude::*;
 
 /// A tree of a model, and the trees that it stands for.
 struct Pair<'p> {
@@ -22,9 +20,6 @@ struct Pair<'p> {
     /// Values of a leaf.
     values: usize,
 }
-
-/// Handler of a leaf of the model, of the ensemble's addition there, and of the rows that reach both.
-type Visit<'v> = dyn FnMut(&[f64], &[Span], &Rows) -> Result<(), ProofProblem> + 'v;
 
 impl Pair<'_> {
     /// Amount that the base has instead of this tree.
@@ -70,7 +65,6 @@ impl Pair<'_> {
         subject: Subject<'_>,
         compared: &mut Compared,
     ) -> Result<(), ProofProblem> {
-        compared.leaf(leaf);
         for (value, (&model, span)) in leaf.iter().zip(spans).enumerate() {
             let farthest = span.farthest(model);
             if !span.is(model, self.step) {
@@ -89,87 +83,18 @@ impl Pair<'_> {
     }
 }
 
-/// Trees as the chip reads them. One that stands for a tree alone is walked from that tree's leaves on, a merged one from its
-/// own.
-pub(super) fn of_chip(chip: &Chip<'_>, subject: Subject<'_>, order: &[Source]) -> Result<Found, ProofProblem> {
-    let trees = chip.trees()?;
-    let heads: Vec<_> = trees.iter().map(|tree| (tree.object, tree.step)).collect();
-    compare_all(subject, &heads, order, &chip.exits(), &mut |pair, rows, visit| match pair.trees.as_slice() {
-        [source] => source.leaves(rows, &mut |_, rows| {
-            let spans = pair.spans(rows);
-            chip.reach(&trees[pair.number], rows, &mut |leaf, rows| visit(leaf, &spans, rows))
-        }),
-        _ => chip.reach(&trees[pair.number], rows, &mut |leaf, rows| {
-            pair.each_part(rows, &mut |rows| visit(leaf, &pair.spans(rows), rows))
-        }),
-    })
-}
-
-/// Trees as the format describes them, from their leaves on to the ensemble's.
-pub(super) fn of_format(subject: Subject<'_>, certified: &[CertifiedTree]) -> Result<Found, ProofProblem> {
-    let trees = &subject.plain.trees;
-    let heads: Vec<_> = trees.iter().map(|(tree, step)| (tree.object, *step)).collect();
-    let order: Vec<Source> =
-        certified.iter().map(|tree| Source { trees: tree.sources.clone(), offset: tree.offset }).collect();
-    compare_all(subject, &heads, &order, &subject.plain.exits, &mut |pair, rows, visit| {
-        trees[pair.number]
-            .0
-            .leaves(rows, &mut |leaf, rows| pair.each_part(rows, &mut |rows| visit(leaf, &pair.spans(rows), rows)))
-    })
-}
-
-/// Trees of assembly: from the ensemble's leaves on to theirs, or the other way.
-pub(super) fn of_code(subject: Subject<'_>, order: &[Source], from_ensemble: bool) -> Result<Found, ProofProblem> {
-    let trees = &subject.plain.trees;
-    // Its leaves are in units; of which steps the compiler made them depends on the largest value.
-    let largest = |source: &Source| -> f64 {
-        let nodes = source.trees.iter().filter_map(|&tree| subject.sources.get(tree)).flat_map(|tree| &tree.nodes);
-        let values = nodes.flat_map(|step| if let Step::Leaf(values) = step { values.as_slice() } else { &[] });
-        values.fold(0.0, |largest: f64, value| largest.max(value.abs()))
-    };
-    let heads: Vec<_> = trees
-        .iter()
-        .zip(order)
-        .map(|((tree, _), source)| (tree.object, subject.plain.step_for(largest(source))))
-        .collect();
-    if trees.len() != order.len() {
-        let what = format!("the assembly has {} trees, and should have {}", trees.len(), order.len());
-        return Err(ProofProblem::Trees { what });
-    }
-    compare_all(subject, &heads, order, &subject.plain.exits, &mut |pair, rows, visit| match pair.trees.as_slice() {
-        [source] if from_ensemble => source.leaves(rows, &mut |_, rows| {
-            let spans = pair.spans(rows);
-            trees[pair.number].0.leaves(rows, &mut |leaf, rows| visit(leaf, &spans, rows))
-        }),
-        _ => trees[pair.number].0.leaves(rows, &mut |leaf, rows| {
-            // Code has its thresholds at the ends of what stands for a missing value, where the ensemble has them within.
-            let mut known: Vec<Values> = rows.iter().map(|values| subject.plain.known(*values)).collect();
-            pair.each_part(&mut known, &mut |rows| visit(leaf, &pair.spans(rows), rows))
-        }),
-    })
-}
-
-/// Walk of a tree of the model and of those that it stands for, over these rows.
-type Walk<'w> = dyn FnMut(&Pair<'_>, &mut Rows, &mut Visit<'_>) -> Result<(), ProofProblem> + 'w;
-
-/// Compares trees, each with its output and the size of a step of its leaves, with those that they stand for.
-fn compare_all(
-    subject: Subject<'_>,
-    heads: &[(Option<usize>, f64)],
-    order: &[Source],
-    exits: &[Exit],
-    walk: &mut Walk<'_>,
-) -> Result<Found, ProofProblem> {
+/// Compares the model's trees with those that they stand for, from their leaves on to the ensemble's.
+pub(super) fn compare(subject: Subject<'_>, order: &[Source]) -> Result<Found, ProofProblem> {
     let Subject { plain, sources, .. } = subject;
-    if order.len() != heads.len() {
-        let what = format!("the model has {} trees, and should have {}", heads.len(), order.len());
+    if order.len() != plain.trees.len() {
+        let what = format!("the model has {} trees, and should have {}", plain.trees.len(), order.len());
         return Err(ProofProblem::Trees { what });
     }
     let alone = alone(sources, order.iter().flat_map(|source| source.trees.iter().copied()))?;
     let mut found = Found { trees: Vec::new(), table: None, boxes: 0, outputs: Vec::new() };
     let mut totals = Totals::new(subject);
-    let mut changes = Vec::new();
-    for (number, (&(object, step), stands_for)) in heads.iter().zip(order).enumerate() {
+    for (number, ((tree, step), stands_for)) in plain.trees.iter().zip(order).enumerate() {
+        let (object, step) = (tree.object, *step);
         let trees: Vec<&Tree> = stands_for.trees.iter().map(|&source| &sources[source]).collect();
         if trees.is_empty() || trees.iter().any(|own| own.object != object) {
             let what = format!("tree {number} adds to other outputs than what it stands for");
@@ -178,22 +103,25 @@ fn compare_all(
         let values = if object.is_some() { 1 } else { plain.names.len() };
         let pair = Pair { number, object, step, stands_for, trees, values };
         let mut compared = Compared::new(values);
-        walk(&pair, &mut plain.keys.all(plain.features), &mut |leaf, spans, rows| {
-            if rows.iter().any(|values| plain.is_sentinel(values)) {
-                return Ok(());
-            }
-            found.boxes += 1;
-            pair.compare(leaf, spans, rows, subject, &mut compared)
+        let mut rows_of_boxes = Vec::new();
+        tree.leaves(&mut plain.keys.all(plain.features), &mut |leaf, rows| {
+            pair.each_part(rows, &mut |rows| {
+                if rows.iter().any(|values| plain.is_sentinel(values)) {
+                    return Ok(());
+                }
+                rows_of_boxes.push(subject.row(rows));
+                let spans = pair.spans(rows);
+                pair.compare(leaf, &spans, rows, subject, &mut compared)
+            })
         })?;
+        found.boxes += rows_of_boxes.len() as u64;
+        rows_of_boxes.par_iter().try_for_each(|row| subject.agrees(row))?;
         totals.add(object, &compared, pair.offset());
-        changes.push(compared.change(object));
-        let Source { trees: sources, offset } = stands_for.clone();
-        found.trees.push(CertifiedTree { error: compared.error, offset, sources });
+        found.trees.push(Matched { error: compared.error, sources: stands_for.trees.clone() });
     }
     totals.alone(&alone)?;
     found.outputs = totals.finish()?;
     in_order(&found, subject)?;
-    exits.iter().try_for_each(|exit| known_after(exit, &changes, plain.names.len()))?;
     Ok(found)
 }
 
@@ -217,32 +145,11 @@ struct Compared {
     ranges: Vec<[f64; 2]>,
     /// For each value, the largest difference.
     errors: Vec<f64>,
-    /// The most by which a leaf changes the difference between two of its values.
-    spread: f64,
 }
 
 impl Compared {
     fn new(values: usize) -> Self {
-        Self {
-            error: 0.0,
-            ranges: vec![[f64::INFINITY, f64::NEG_INFINITY]; values],
-            errors: vec![0.0; values],
-            spread: 0.0,
-        }
-    }
-
-    fn leaf(&mut self, values: &[f64]) {
-        let (least, most) =
-            values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &value| (a.min(value), b.max(value)));
-        self.spread = self.spread.max(most - least);
-    }
-
-    /// Change that a tree of this output, or of all, makes.
-    fn change(&self, object: Option<usize>) -> Change {
-        match object {
-            Some(object) => Change::One(object, self.ranges[0]),
-            None => Change::Each(self.spread),
-        }
+        Self { error: 0.0, ranges: vec![[f64::INFINITY, f64::NEG_INFINITY]; values], errors: vec![0.0; values] }
     }
 
     fn add(&mut self, value: usize, model: f64, error: f64) {
@@ -251,37 +158,6 @@ impl Compared {
         self.ranges[value] = [least.min(model), most.max(model)];
         self.errors[value] = self.errors[value].max(error);
     }
-}
-
-/// Change that a tree makes to margins.
-enum Change {
-    /// To the difference between any two of them, at most.
-    Each(f64),
-    /// To one of them, from the least to the most.
-    One(usize, [f64; 2]),
-}
-
-/// Returns an error if trees after the first ones can change the difference between two margins by more than a bound.
-fn known_after(exit: &Exit, changes: &[Change], outputs: usize) -> Result<(), ProofProblem> {
-    let (trees, bound) = (exit.trees, exit.bound);
-    let later = exit.later.iter().copied().chain(std::iter::repeat(0.0));
-    let (mut each, mut ranges) = (0.0, later.take(outputs).map(|later| [later; 2]).collect::<Vec<_>>());
-    for change in changes.iter().skip(trees) {
-        match change {
-            Change::Each(most) => each += most,
-            Change::One(output, [least, most]) => {
-                ranges[*output][0] += least;
-                ranges[*output][1] += most;
-            }
-        }
-    }
-    let mut found = 0.0_f64;
-    for (output, [_, most]) in ranges.iter().enumerate() {
-        let others = ranges.iter().enumerate().filter(|(other, _)| *other != output);
-        found = others.map(|(_, [least, _])| most - least).fold(found, f64::max);
-    }
-    found += each;
-    if found <= bound * (1.0 + 1e-10) { Ok(()) } else { Err(ProofProblem::Exit { trees, stated: bound, found }) }
 }
 
 /// The sums of trees for each output.

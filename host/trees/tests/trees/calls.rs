@@ -4,10 +4,8 @@ use crate::fixtures::{Fixture, fixture};
 use palpate_base::with;
 use palpate_onboard::{C_HEADER, Model, Recognizer, Refused, RowsSeen, Stopping, Verdict};
 use palpate_shared::format::{Limits, Tag};
-use palpate_trees::compile::code::Form;
-use palpate_trees::compile::{EarlyExit, Language, Layout, Leaf, Restated, Settings, compile, emit, restate};
+use palpate_trees::compile::{Language, Layout, Leaf, Restated, Settings, compile, emit, restate};
 use palpate_trees::ensemble::Probability;
-use palpate_trees::prove::sources;
 use palpate_trees::rows::Encoder;
 use palpate_trees::verify::Candidate;
 use palpate_trees::verify::predict::{Predicted, predict};
@@ -72,8 +70,7 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
     let put = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
     put("palpate.h", C_HEADER);
     let (mut functions, mut calls, mut expected) = (String::new(), String::new(), Vec::new());
-    let forms =
-        [("f32", Leaf::F32), ("i16", Leaf::I16), ("early", Leaf::I16), ("whole", Leaf::I16), ("code", Leaf::I16)];
+    let forms = [("f32", Leaf::F32), ("i16", Leaf::I16), ("whole", Leaf::I16), ("code", Leaf::I16)];
     for (number, file) in CALLED.iter().enumerate() {
         let Fixture { ensemble, rows: table, margins, .. } = fixture(file);
         let rows: Vec<Vec<f64>> = table.iter().map(<[f64]>::to_vec).collect();
@@ -82,21 +79,20 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
         let is_class = ensemble.objects.len() > 1 && !imported.prediction.targets;
         for (form, leaf) in forms {
             // Every kind once, and two with everything.
-            if form == "early" && !is_class || number > 1 && ["f32", "i16"][number % 2] == form {
+            if number > 1 && ["f32", "i16"][number % 2] == form {
                 continue;
             }
             let settings = with!(
                 Settings::default(),
                 leaf,
                 layout = Some(Layout::Compact),
-                scales = (form == "whole").then(|| vec![1000.0; rows[0].len()]),
-                early_exit = (form == "early").then_some(EarlyExit::Always)
+                scales = (form == "whole").then(|| vec![1000.0; rows[0].len()])
             );
             let Ok(plain) = compile(ensemble, &settings) else { continue };
-            let code = with!(settings.clone(), layout = Some(Layout::Code), forms = vec![Form::C]);
+            let code = with!(settings.clone(), layout = None, code = true);
             let code = if form == "code" { compile(ensemble, &code).unwrap() } else { plain.clone() };
             let name = format!("m{number}{form}");
-            let header = &sources(&code, &name, &[Language::C]).unwrap()[0].1;
+            let header = &code.sources(&name, &[Language::C]).unwrap()[0].1;
             put(&format!("{name}.h"), header);
             let model = Model::new(&plain.bytes).unwrap();
             let is_whole = form == "whole";
@@ -146,7 +142,7 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
             }
         }
     }
-    let wide = ["LAYOUTS=127", "LEAVES=7", "EARLY=1", "SENTINEL=1", "SHARED=1", "MAX_OBJECTS=32"];
+    let wide = ["LAYOUTS=127", "LEAVES=7", "SENTINEL=1", "SHARED=1", "MAX_OBJECTS=32"];
     let text = printed(directory.path(), &functions, &calls, &wide);
     assert_eq!(text.lines().count(), expected.len());
     let mut worst = 0.0_f64;
@@ -197,7 +193,7 @@ fn rows_of_a_sequence_are_numbered_and_refused_by_the_same_bits_as_in_rust() {
             position = Some(name_of_position.clone())
         );
         let plain = compile(ensemble, &settings).unwrap();
-        let code = with!(settings.clone(), layout = Some(Layout::Code), forms = vec![Form::C]);
+        let code = with!(settings.clone(), layout = None, code = true);
         let mut bytes = plain.bytes.clone();
         if is_guarded {
             let model = Model::new(&plain.bytes).unwrap();
@@ -207,7 +203,7 @@ fn rows_of_a_sequence_are_numbered_and_refused_by_the_same_bits_as_in_rust() {
         let model = Model::new(&bytes).unwrap();
         let name = format!("s{form}");
         let header = match form {
-            "code" => sources(&compile(ensemble, &code).unwrap(), &name, &[Language::C]).unwrap().remove(0).1,
+            "code" => compile(ensemble, &code).unwrap().sources(&name, &[Language::C]).unwrap().remove(0).1,
             _ => emit(&model, &name, Language::C),
         };
         put(&format!("{name}.h"), &header);

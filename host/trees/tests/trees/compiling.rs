@@ -1,13 +1,14 @@
 //! Compiling by hand-made ensembles: layouts, exactness, what the header says, and what is refused.
 
-use crate::fixtures::{leaf, of_two_objects, split, stump};
+use crate::fixtures::{leaf, of_one_value, of_two_objects, split, stump};
 use palpate_base::with;
 use palpate_onboard::{ModelError, Stopping};
 use palpate_trees::compile::{
     Compiled, CompiledModel, Goal, Layout, Leaf, Restated, Settings, compile, compile_within, names, open, restate,
 };
-use palpate_trees::ensemble::{Ensemble, Inputs, Node};
-use palpate_trees::error::{CompileProblem, Setting, TreeProblem};
+use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Tree};
+use palpate_trees::error::{CompileProblem, Problem, Setting, TreeProblem};
+use palpate_trees::shared::format::f32_key;
 use palpate_trees::shared::{Descriptor, MISSING_FEATURE};
 
 /// A tree that is a chain of splits, one below the other to the right, at whole thresholds.
@@ -100,6 +101,54 @@ fn trees_with_more_left_splits_than_a_byte_counts_take_the_wide_layout() {
         let deep = of_two_objects(Descriptor::Oriented, vec![full(depth)]);
         assert_eq!(compile(&deep, &settings_of(Some(Layout::Compact), Leaf::I16)).unwrap().layout, expected);
     }
+}
+
+#[test]
+fn models_of_300_leaves_300_columns_and_70_000_thresholds_compile_or_say_what_to_do() {
+    /// A tree as shallow as can be, whose leaves are between the thresholds 1000, 2000 and so on.
+    fn shallow(nodes: &mut Vec<Node>, from: usize, to: usize) {
+        let (at, middle) = (nodes.len(), usize::midpoint(from, to));
+        nodes.push(leaf(&[from as f32 / 300.0, -0.5]));
+        if to - from > 1 {
+            shallow(nodes, from, middle);
+            let right = nodes.len();
+            shallow(nodes, middle, to);
+            nodes[at] = split(from % 8, 1_000.0 * middle as f32, at + 1, right);
+        }
+    }
+    // More than 255 splits are to the left of the root; each feature has two columns, one for each side of a missing value.
+    let mut nodes = vec![leaf(&[0.0, 0.0])];
+    shallow(&mut nodes, 0, 300);
+    let right = nodes.len();
+    nodes.push(leaf(&[0.25, 0.75]));
+    nodes[0] = split(0, 400_000.0, 1, right);
+    let leaves = of_two_objects(Descriptor::Oriented, vec![nodes]);
+    let mut columns = of_one_value(150, Vec::new());
+    for feature in 0..150 {
+        for missing_left in [true, false] {
+            let root = Node::Split { feature, threshold: 0.5, missing_left, left: 1, right: 2 };
+            let nodes = vec![root, split((feature + 1) % 150, 2.5, 3, 4), leaf(&[0.5]), leaf(&[0.25]), leaf(&[-0.5])];
+            columns.trees.push(Tree { nodes, output: Output::One(0) });
+        }
+    }
+    for ensemble in [leaves, columns] {
+        let compiled = compile(&ensemble, &Settings::default()).unwrap();
+        let model = open(&compiled.bytes).unwrap();
+        let mut margins = vec![0; model.object_count()];
+        for at in -1..310 {
+            let row: Vec<f32> =
+                (0..model.feature_count()).map(|feature| 1_000.0 * at as f32 + feature as f32).collect();
+            let key = |&value: &f32| if ensemble.schema().is_some() { value as i32 } else { f32_key(value) };
+            assert!(model.margins_of(&row.iter().map(key).collect::<Vec<_>>(), &mut margins));
+            for (margin, own) in margins.iter().zip(ensemble.margins_of_features(&row)) {
+                let error = (f64::from(*margin) * f64::from(model.unit()) - f64::from(own)).abs();
+                assert!(error <= f64::from(model.margin_error()), "{error}");
+            }
+        }
+    }
+    let stumps = (0..70_000).map(|n| vec![split(n % 8, n as f32, 1, 2), leaf(&[0.01, 0.0]), leaf(&[0.0, 0.01])]);
+    let problem = refusal(&of_two_objects(Descriptor::Oriented, stumps.collect()), &Settings::default());
+    assert!(problem.fix().contains("fewer trees"), "{problem}: {}", problem.fix());
 }
 
 #[test]

@@ -4,11 +4,10 @@ use crate::fixtures::{
     FIXTURES, Fixture, assert_says, computed, directory, files, fixture, leaf, of_one_value, parsed, split,
 };
 use palpate_base::with;
-use palpate_trees::compile::code::Form;
 use palpate_trees::compile::{self, Core, Goal, Instructions, Layout, Leaf, Settings};
 use palpate_trees::ensemble::import::Options;
 use palpate_trees::ensemble::{Ensemble, Node, Provenance, Threshold};
-use palpate_trees::prove::{check, prove};
+use palpate_trees::prove::prove;
 use palpate_trees::rows::{self, Encoder, Features, Rows, columns_of, scales};
 use palpate_trees::shared::Descriptor;
 use palpate_trees::shared::format::f32_key;
@@ -559,7 +558,7 @@ fn every_model_is_proved_and_some_with_every_leaf_in_every_layout_each_also_in_w
     let every_way: Vec<(Leaf, Option<Layout>)> = every_way.collect();
     let mut counts = BTreeMap::new();
     for fixture in FIXTURES.iter() {
-        let (name, ensemble, file) = (&fixture.name, &fixture.ensemble, fixture.bytes());
+        let (name, ensemble) = (&fixture.name, &fixture.ensemble);
         let is_every = EVERY_WAY.contains(&name.as_str()) || fixture.is_categorical();
         let mut ways = 0;
         for &(leaf, layout) in if is_every { &every_way[..] } else { &[(Leaf::I16, None)] } {
@@ -578,10 +577,7 @@ fn every_model_is_proved_and_some_with_every_leaf_in_every_layout_each_also_in_w
                     }
                 };
                 let of = || format!("{name}, {leaf:?}, {layout:?}, in whole units: {is_scaled}");
-                let (_, certificate) =
-                    prove(&compiled.bytes, ensemble, &file).unwrap_or_else(|error| panic!("{}: {error}", of()));
-                check(&certificate, &compiled.bytes, ensemble, &file)
-                    .unwrap_or_else(|error| panic!("{}: {error}", of()));
+                prove(&compiled.bytes, ensemble).unwrap_or_else(|error| panic!("{}: {error}", of()));
                 let model = compile::open(&compiled.bytes).unwrap();
                 let verified = verify(&model, ensemble, &fixture.rows, Library::default(), &()).unwrap();
                 verified.check().unwrap_or_else(|problem| panic!("{}: {problem}", of()));
@@ -631,6 +627,74 @@ fn models_stay_in_every_layout() {
     assert_eq!(text.lines().count(), expected.lines().count());
 }
 
+/// A fixture's rows, and for every split one of them at its threshold, one just below, and one without the feature.
+fn rows_at_thresholds(fixture: &Fixture) -> Vec<Vec<f32>> {
+    let mut rows = fixture.singles();
+    let count = rows.len();
+    let nodes = fixture.ensemble.trees.iter().flat_map(|tree| &tree.nodes);
+    for (number, node) in nodes.enumerate() {
+        if let &Node::Split { feature, threshold, .. } = node {
+            for value in [threshold, threshold.next_down(), f32::NAN] {
+                let mut row = rows[number % count].clone();
+                row[feature] = value;
+                rows.push(row);
+            }
+        }
+    }
+    rows
+}
+
+/// The checksum of a model's margins of these rows.
+fn checksum_of_margins(bytes: &[u8], rows: &[Vec<f32>]) -> u32 {
+    let model = compile::open(bytes).unwrap();
+    let mut all = Vec::new();
+    for row in rows {
+        let keys: Vec<i32> = row.iter().map(|&value| f32_key(value)).collect();
+        if model.leaf_type() == Leaf::F32 {
+            let mut margins = vec![0.0; model.object_count()];
+            assert!(model.f32_margins_of(&keys, &mut margins));
+            all.extend(margins.iter().flat_map(|margin| margin.to_le_bytes()));
+        } else {
+            let mut margins = vec![0; model.object_count()];
+            assert!(model.margins_of(&keys, &mut margins));
+            all.extend(margins.iter().flat_map(|margin| margin.to_le_bytes()));
+        }
+    }
+    checksum(&all)
+}
+
+/// Checksums of the margins of every model with leaves of each type, as they were in the layout of complete trees.
+/// `PALPATE_GOLDENS=write` records them again, for a change that is meant to change them.
+#[test]
+fn margins_of_every_model_stay_with_every_type_of_leaf() {
+    let mut text = String::new();
+    for fixture in FIXTURES.iter() {
+        let rows = rows_at_thresholds(fixture);
+        text += &fixture.name;
+        for &leaf in Leaf::ALL {
+            let margins = |layout| {
+                let settings = with!(Settings::default(), leaf, layout = Some(layout));
+                let compiled = compile::compile(&fixture.ensemble, &settings).ok()?;
+                Some(checksum_of_margins(&compiled.bytes, &rows))
+            };
+            let all: Vec<u32> =
+                [Layout::Complete, Layout::Compact, Layout::Wide].into_iter().filter_map(margins).collect();
+            assert!(all.iter().all(|own| *own == all[0]), "{}, {leaf:?}", fixture.name);
+            write!(text, " {:08x}", all[0]).unwrap();
+        }
+        text.push('\n');
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/trees/margins.txt");
+    if std::env::var_os("PALPATE_GOLDENS").is_some_and(|value| value == "write") {
+        std::fs::write(&path, &text).unwrap();
+    }
+    let expected = std::fs::read_to_string(&path).unwrap();
+    for (found, expected) in text.lines().zip(expected.lines()) {
+        assert_eq!(found, expected);
+    }
+    assert_eq!(text.lines().count(), expected.lines().count());
+}
+
 #[test]
 fn trees_of_one_split_whose_thresholds_fall_together_in_whole_units_are_proved() {
     // More thresholds than a merged tree may have, and ten in tenths.
@@ -640,8 +704,7 @@ fn trees_of_one_split_whose_thresholds_fall_together_in_whole_units_are_proved()
     for scales in [None, Some(vec![10.0])] {
         let settings = with!(Settings::default(), layout = Some(Layout::Complete), scales);
         let bytes = compile::compile(&ensemble, &settings).unwrap().bytes;
-        let (_, certificate) = prove(&bytes, &ensemble, b"").unwrap();
-        check(&certificate, &bytes, &ensemble, b"").unwrap();
+        prove(&bytes, &ensemble).unwrap();
     }
 }
 
@@ -702,39 +765,27 @@ fn every_candidate_of_every_model_costs_what_it_takes_once_it_is_written_and_the
     for ((name, ensemble), &leaf) in all.chain([touches]).flat_map(|own| Leaf::ALL.iter().map(move |leaf| (own, leaf)))
     {
         let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding) as f32;
-        let settings = with!(Settings::default(), leaf, forms = Form::ALL.into());
+        let settings = with!(Settings::default(), leaf);
         for goal in [Goal::Size, Goal::Speed, Goal::Balanced(Core::M4F)] {
             let chosen = compile::compile(ensemble, &with!(settings.clone(), goal)).unwrap();
             let best = best_for(goal, &chosen.candidates);
-            let written = chosen.code.as_ref().map_or(0, |(program, form)| program.cost(*form).bytes);
             assert_eq!((chosen.layout, chosen.instructions), (best.layout, best.instructions), "{name}, {leaf:?}");
-            assert_eq!(
-                (chosen.bytes.len() + written, chosen.shared_leaves.is_some()),
-                (best.bytes, best.shared_leaves)
-            );
+            assert_eq!((chosen.bytes.len(), chosen.shared_leaves.is_some()), (best.bytes, best.shared_leaves));
         }
         for candidate in compile::compile(ensemble, &settings).unwrap().candidates {
             let of = format!("{name}, {leaf:?}, {candidate:?}");
-            let form = Form::ALL.into_iter().filter(|form| Some(form.name()) == candidate.form);
-            let own = with!(
-                settings.clone(),
-                layout = Some(candidate.layout),
-                shared_leaves = Some(candidate.shared_leaves),
-                forms = form.collect()
-            );
+            let own =
+                with!(settings.clone(), layout = Some(candidate.layout), shared_leaves = Some(candidate.shared_leaves));
             let written = compile::compile(ensemble, &own).unwrap_or_else(|error| panic!("{of}: {error}"));
-            let (bytes, instructions) = match &written.code {
-                Some((program, form)) => (program.cost(*form).bytes, program.cost(*form).instructions),
-                None => (0, Instructions::of_model(&compile::open(&written.bytes).unwrap())),
-            };
-            assert_eq!((written.bytes.len() + bytes, instructions), (candidate.bytes, candidate.instructions), "{of}");
+            let instructions = Instructions::of_model(&compile::open(&written.bytes).unwrap());
+            assert_eq!((written.bytes.len(), instructions), (candidate.bytes, candidate.instructions), "{of}");
             let error = written.margin_error - candidate.margin_error;
             let ulps = 2.0 * f32::EPSILON * written.margin_error;
             assert!((0.0..=rounding + ulps).contains(&error) && (error == 0.0 || rounding > 0.0), "{of}: {error}");
             *counts.entry((candidate.layout.name(), candidate.shared_leaves)).or_insert(0) += 1;
         }
     }
-    let layouts = ["compact", "complete", "grid", "code"].map(|layout| (layout, false));
+    let layouts = ["compact", "complete", "grid"].map(|layout| (layout, false));
     for kind in layouts.into_iter().chain([("compact", true), ("complete", true)]) {
         assert!(counts.contains_key(&kind), "{counts:?}");
     }
@@ -803,8 +854,7 @@ fn of_more_columns_than_a_model_can_have_those_that_are_used_are_stored_by_numbe
         };
         assert!(error.contains(expected), "{error}");
         // Proved against the same file; and XGBoost's JSON has all columns again.
-        let (_, certificate) = prove(&compiled.bytes, &ensemble, text.as_bytes()).unwrap();
-        check(&certificate, &compiled.bytes, &ensemble, text.as_bytes()).unwrap();
+        prove(&compiled.bytes, &ensemble).unwrap();
         let saved = place.path().join("saved.json");
         ensemble.save(&saved).unwrap();
         let document: serde_json::Value = serde_json::from_slice(&std::fs::read(&saved).unwrap()).unwrap();

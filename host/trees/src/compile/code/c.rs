@@ -2,17 +2,10 @@
 
 use super::columns::{Column, Kind};
 use super::program::{CodeNode, CodeTree, Program};
-use super::thumb::{self, Chip};
-use super::{CodeCost, Form, symbol};
-use crate::compile::cost::Instructions;
 use palpate_shared::format::Key;
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
-/// With more splits than this, ranks of one byte are compared: they take fewer bytes than keys of four.
-const KEYS: usize = 512;
-/// Splits of a function: compilers take long for more.
-const FUNCTION: usize = 800;
 /// With more columns than this, few comparisons come again, and compilers do not write out paths for each result.
 const FEW_COLUMNS: usize = 16;
 
@@ -34,52 +27,15 @@ pub(super) fn text(program: &Program, name: &str) -> String {
     let calls = writer.functions();
     writer.line(&format!("{}\n{{", signature(program, name)));
     writer.start();
-    writer.line(&calls.concat());
+    writer.line(&calls);
     writer.line("}");
     writer.best();
-    if !program.exits.is_empty() {
-        writer.class(&calls);
-    }
-    writer.text
-}
-
-/// The function that gives a class, of functions that are elsewhere.
-fn class_elsewhere(program: &Program, name: &str) -> String {
-    let mut writer = Writer::new(program, name);
-    writer.class_head();
-    writer.line(&format!("    {name}_early(row, margins);\n    return {name}_best_(margins);\n}}"));
     writer.text
 }
 
 /// Base margins, for an array.
 pub(super) fn base(program: &Program) -> String {
     program.base.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
-}
-
-/// The declaration of functions that are elsewhere, and functions with plain names that call them.
-pub(super) fn declaration(program: &Program, name: &str, checksum: u32) -> String {
-    let row = row(program);
-    let mut functions = vec!["margins"];
-    if !program.exits.is_empty() {
-        functions.push("early");
-    }
-    let mut text = "/* The names in assembly carry the model's checksum: that of another export does not link. */\n\
-                    #if defined(__cplusplus)\nextern \"C\" {\n#endif\n"
-        .to_owned();
-    for function in &functions {
-        text += &format!("void {}(const {row} *row, int32_t *margins);\n", symbol(name, function, checksum));
-    }
-    text += "#if defined(__cplusplus)\n}\n#endif\n\n";
-    for function in &functions {
-        text += &format!(
-            "static inline void {name}_{function}(const {row} *row, int32_t *margins)\n{{\n    {}(row, margins);\n}}\n\n",
-            symbol(name, function, checksum)
-        );
-    }
-    let mut best = Writer::new(program, name);
-    best.best();
-    text += &best.text;
-    if program.exits.is_empty() { text } else { text + &class_elsewhere(program, name) }
 }
 
 /// The function that opens the model and gives it the function that adds up its trees.
@@ -117,22 +73,9 @@ fn signature(program: &Program, name: &str) -> String {
     )
 }
 
-/// Size and speed on a Cortex-M4F and a Cortex-M0+.
-pub(super) fn cost(program: &Program) -> CodeCost {
-    // A compiler's code against assembly of the same trees, by what tests/peers measures of both.
-    let [(bytes, m4f), (_, m0_plus)] = [Chip::M4F, Chip::M0Plus].map(|chip| thumb::cost(program, chip));
-    let scaled = |number: u64| number + number / 10;
-    CodeCost {
-        form: Form::C.name(),
-        bytes: bytes + bytes / 8,
-        instructions: Instructions { m4f: scaled(m4f), m0_plus: Some(scaled(m0_plus)) },
-    }
-}
-
 impl<'p> Writer<'p> {
     fn new(program: &'p Program, name: &'p str) -> Self {
-        let splits: usize = program.trees.iter().map(|tree| splits(&tree.root)).sum();
-        let keys = splits <= KEYS;
+        let keys = program.has_keys();
         let barrier = !keys && program.columns.len() <= FEW_COLUMNS;
         Self { program, name, text: String::new(), keys, barrier }
     }
@@ -174,11 +117,9 @@ impl<'p> Writer<'p> {
         if program.columns.is_empty() {
             return;
         }
-        let keys = self.keys;
-        let is_one_run = |a: &Column, b: &Column| a.missing_left == b.missing_left && (keys || a.kind == b.kind);
         let mut body = String::new();
         let mut first = 0;
-        for (number, columns) in program.columns.chunk_by(is_one_run).enumerate() {
+        for (number, columns) in program.runs().enumerate() {
             let features = columns.iter().map(|column| column.feature.to_string()).collect::<Vec<_>>().join(", ");
             self.line(&format!("static const uint8_t {name}_which{number}[{}] = {{{features}}};", columns.len()));
             let last = first + columns.len();
@@ -300,85 +241,28 @@ impl<'p> Writer<'p> {
         ));
     }
 
-    fn class_head(&mut self) {
-        let (name, objects, row) = (self.name, self.program.objects(), row(self.program));
-        self.line(&format!(
-            "/* The class of a row, from no more trees than it takes: that with the largest of its margins. */\n\
-             static inline int {name}_class(const {row} *row)\n{{\n    int32_t margins[{objects}];"
-        ));
-    }
-
-    /// The function that gives a class, from the calls of each part of the walk.
-    fn class(&mut self, calls: &[String]) {
-        let (name, known) = (self.name, self.program.known);
-        self.line(&format!(
-            "PALPATE_APART_CODE_ int {name}_leads(const int32_t *margins, uint32_t bound)\n{{\n    \
-             int32_t most = INT32_MIN, second = INT32_MIN;\n    int i;\n    for (i = 0; i < {known}; i++) {{\n        \
-             if (margins[i] > most) {{\n            second = most;\n            most = margins[i];\n        \
-             }} else if (margins[i] > second) {{\n            second = margins[i];\n        }}\n    }}\n    \
-             return (uint32_t)most - (uint32_t)second > bound;\n}}"
-        ));
-        self.class_head();
-        self.start();
-        let bounds: Vec<Option<u32>> = self.program.parts().map(|(_, bound)| bound).collect();
-        for (calls, bound) in calls.iter().zip(bounds) {
-            self.text += calls;
-            if let Some(bound) = bound {
-                self.line(&format!(
-                    "    if ({name}_leads(margins, {bound}u)) {{\n        return {name}_best_(margins);\n    }}"
-                ));
-            }
+    /// Writes functions for all trees, and gives the statements that call them, for margins that are there.
+    fn functions(&mut self) -> String {
+        let mut calls = String::from("    (void)made;\n");
+        if self.program.columns.is_empty() {
+            return calls;
         }
-        self.line(&format!("    return {name}_best_(margins);\n}}"));
-    }
-
-    /// Writes functions for all trees, and gives for each part of the walk the statements that call its own, for margins that
-    /// are there.
-    fn functions(&mut self) -> Vec<String> {
-        let parts: Vec<Vec<&CodeTree>> = self.program.parts().map(|(trees, _)| trees.iter().collect()).collect();
-        let mut calls = Vec::new();
-        for (number, trees) in parts.iter().enumerate() {
-            let part = if parts.len() == 1 { String::new() } else { format!("{number}_") };
-            let start = if number == 0 { "    (void)made;\n" } else { "" };
-            calls.push(String::from(start));
-            if !self.program.columns.is_empty() || trees.is_empty() {
-                calls[number] += &self.ones(trees, &part);
-            }
-        }
-        let vectors = |trees: &[&'p CodeTree]| -> Vec<&'p CodeTree> {
-            trees.iter().copied().filter(|tree| tree.object.is_none()).collect()
-        };
-        let all = vectors(&parts.concat());
-        if !all.is_empty() && !self.program.columns.is_empty() {
-            let numbers = self.leaves(&all);
-            for (number, trees) in parts.iter().enumerate() {
-                let part = if parts.len() == 1 { String::new() } else { format!("{number}_") };
-                calls[number] += &self.vectors(&vectors(trees), &part, &numbers);
-            }
+        calls += &self.ones();
+        let vectors: Vec<&CodeTree> = self.program.trees.iter().filter(|tree| tree.object.is_none()).collect();
+        if !vectors.is_empty() {
+            let numbers = self.leaves(&vectors);
+            calls += &self.vectors(&vectors, &numbers);
         }
         calls
     }
 
     /// Functions for trees of one object each.
-    fn ones(&mut self, trees: &[&CodeTree], part: &str) -> String {
+    fn ones(&mut self) -> String {
+        let program = self.program;
         let mut calls = String::new();
-        for object in 0..self.program.objects() {
-            let own: Vec<&&CodeTree> = trees.iter().filter(|tree| tree.object == Some(object)).collect();
-            let mut chunks: Vec<Vec<&CodeTree>> = Vec::new();
-            let mut room = 0;
-            for tree in own {
-                let size = splits(&tree.root);
-                if room < size {
-                    chunks.push(Vec::new());
-                    room = FUNCTION.max(size);
-                }
-                room -= size;
-                if let Some(chunk) = chunks.last_mut() {
-                    chunk.push(tree);
-                }
-            }
-            for (index, chunk) in chunks.iter().enumerate() {
-                let function = format!("{}_object{object}_{part}{index}", self.name);
+        for object in 0..program.objects() {
+            for (index, chunk) in program.chunks(object).into_iter().enumerate() {
+                let function = format!("{}_object{object}_{index}", self.name);
                 self.line(&format!(
                     "PALPATE_APART_CODE_ int32_t {function}(const {} *x)\n{{\n    int32_t high = 0, low = 0;",
                     self.number()
@@ -412,7 +296,7 @@ impl<'p> Writer<'p> {
             }
         }
         for tree in trees {
-            tree.root.leaves(1.0, &mut |values, _| {
+            tree.root.leaves(&mut |values| {
                 numbers.entry(values.to_vec()).or_insert_with(|| {
                     rows.push(values.to_vec());
                     rows.len() - 1
@@ -424,11 +308,11 @@ impl<'p> Writer<'p> {
     }
 
     /// Functions that give the number of a leaf, and the calls.
-    fn vectors(&mut self, trees: &[&CodeTree], part: &str, numbers: &HashMap<Vec<i32>, usize>) -> String {
+    fn vectors(&mut self, trees: &[&CodeTree], numbers: &HashMap<Vec<i32>, usize>) -> String {
         let name = self.name;
         let mut calls = String::new();
         for (index, tree) in trees.iter().enumerate() {
-            let function = format!("{name}_tree{part}{index}");
+            let function = format!("{name}_tree{index}");
             self.line(&format!("PALPATE_APART_CODE_ uint16_t {function}(const {} *x)\n{{", self.number()));
             self.ifs(&tree.root, 1, &|leaf| format!("return {};", numbers[leaf]));
             self.line("}");
@@ -510,12 +394,6 @@ impl<'p> Writer<'p> {
 /// The place of the first of some columns.
 fn first_of(program: &Program, columns: &[Column]) -> usize {
     program.columns.iter().position(|column| std::ptr::eq(column, &raw const columns[0])).unwrap_or(0)
-}
-
-fn splits(node: &CodeNode) -> usize {
-    let mut count = 0;
-    node.splits(1.0, &mut |_, _| count += 1);
-    count
 }
 
 /// Text that adds a value to 256 · high + low.

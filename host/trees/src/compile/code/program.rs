@@ -4,10 +4,14 @@ use super::super::axes::Axes;
 use super::super::forest::Branch;
 use super::super::lowered::Lowered;
 use super::super::quantize::Scale;
-use super::Form;
 use super::columns::{Column, Columns};
 use crate::ensemble::Output;
 use palpate_shared::format::{Key, Sentinel};
+
+/// With more splits than this, C compares ranks of one byte: they take fewer bytes than keys of four.
+const KEYS: usize = 512;
+/// Splits of a function: compilers take long for more.
+const FUNCTION: usize = 800;
 
 /// A program that adds up trees: from a row of features to margins in units.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,11 +30,8 @@ pub struct Program {
     pub(super) last_of_ties: bool,
     /// Columns that splits compare, in the order in which it is stored.
     pub(super) columns: Vec<Column>,
-    /// The trees, in the order of the walk.
+    /// The trees.
     pub(super) trees: Vec<CodeTree>,
-    /// After so many trees the following change a difference between two margins by at most so many units: where a walk for a
-    /// class alone may end.
-    pub(super) exits: Vec<(usize, u32)>,
 }
 
 /// A tree.
@@ -82,7 +83,7 @@ impl Program {
         // Values of a vector are stored in two bytes.
         let mut fits = true;
         for tree in trees.iter().filter(|tree| tree.object.is_none()) {
-            tree.root.leaves(1.0, &mut |values, _| fits &= values.iter().all(|value| i16::try_from(*value).is_ok()));
+            tree.root.leaves(&mut |values| fits &= values.iter().all(|value| i16::try_from(*value).is_ok()));
         }
         fits.then_some(Self {
             features: forest.features,
@@ -93,60 +94,7 @@ impl Program {
             last_of_ties: stated.last_of_ties,
             columns: columns.columns,
             trees,
-            exits: Vec::new(),
         })
-    }
-
-    /// The program with its trees in this order, and with places where a walk for a class alone may end.
-    pub(in super::super) fn with_exits(mut self, order: &[usize], exits: Vec<(usize, u32)>) -> Self {
-        if !exits.is_empty() {
-            self.trees = order.iter().map(|&tree| self.trees[tree].clone()).collect();
-            self.exits = exits;
-        }
-        self
-    }
-
-    /// True if a walk for a class alone may end early.
-    pub(in super::super) fn has_exits(&self) -> bool {
-        !self.exits.is_empty()
-    }
-
-    /// True if a walk may end early in this form: in assembly, sums of leaves with a value for each object are two to a register
-    /// until the end, unless they are votes.
-    pub(in super::super) fn may_exit(&self, form: Form) -> bool {
-        let is_each = |tree: &CodeTree| tree.object.is_none();
-        form == Form::C || !self.trees.iter().any(is_each) || self.trees.iter().all(is_each) && self.vote().is_some()
-    }
-
-    /// The trees between the places where a walk may end, each part with what the following may change after it, if any do.
-    pub(super) fn parts(&self) -> impl Iterator<Item = (&[CodeTree], Option<u32>)> {
-        let ends = self.exits.iter().map(|&(end, bound)| (end, Some(bound))).chain([(self.trees.len(), None)]);
-        ends.scan(0, |start, (end, bound)| {
-            let part = &self.trees[*start..end];
-            *start = end;
-            Some((part, bound))
-        })
-    }
-
-    /// The class of a row of keys, as the code finds it: from no more trees than it takes.
-    #[cfg(test)]
-    pub(super) fn class(&self, keys: &[i32]) -> usize {
-        let ranks = self.ranks(keys);
-        let mut margins = self.base.clone();
-        for (trees, bound) in self.parts() {
-            trees.iter().for_each(|tree| tree.add(&ranks, &mut margins));
-            let mut sorted = margins[..self.known].to_vec();
-            sorted.sort_unstable_by_key(|&margin| std::cmp::Reverse(margin));
-            let lead = sorted.first().zip(sorted.get(1)).map_or(u32::MAX, |(most, second)| most.abs_diff(*second));
-            if bound.is_some_and(|bound| lead > bound) {
-                break;
-            }
-        }
-        let known = margins[..self.known].iter();
-        let best = known
-            .enumerate()
-            .max_by_key(|&(class, &margin)| (margin, if self.last_of_ties { class } else { usize::MAX - class }));
-        best.map_or(0, |(class, _)| class)
     }
 
     /// Number of objects.
@@ -154,9 +102,33 @@ impl Program {
         self.base.len()
     }
 
-    /// The trees of one object, and those with a value for each.
-    pub(super) fn has_vectors(&self) -> bool {
-        self.trees.iter().any(|tree| tree.object.is_none())
+    /// True if C compares keys, otherwise ranks.
+    pub(super) fn has_keys(&self) -> bool {
+        self.trees.iter().map(|tree| tree.root.count()).sum::<usize>() <= KEYS
+    }
+
+    /// Columns that C makes in one loop, one group after the other.
+    pub(super) fn runs(&self) -> impl Iterator<Item = &[Column]> {
+        let has_keys = self.has_keys();
+        self.columns.chunk_by(move |a, b| a.missing_left == b.missing_left && (has_keys || a.kind == b.kind))
+    }
+
+    /// Trees of one object, those of a function together.
+    pub(super) fn chunks(&self, object: usize) -> Vec<Vec<&CodeTree>> {
+        let mut chunks: Vec<Vec<&CodeTree>> = Vec::new();
+        let mut room = 0;
+        for tree in self.trees.iter().filter(|tree| tree.object == Some(object)) {
+            let size = tree.root.count();
+            if room < size {
+                chunks.push(Vec::new());
+                room = FUNCTION.max(size);
+            }
+            room -= size;
+            if let Some(chunk) = chunks.last_mut() {
+                chunk.push(tree);
+            }
+        }
+        chunks
     }
 
     /// The value of leaves that are one class's, if most leaves with a value for each object are such: votes. All others
@@ -168,7 +140,7 @@ impl Program {
         let (mut of_one, mut all): (std::collections::BTreeMap<i32, usize>, usize) = Default::default();
         let mut fits = true;
         for tree in self.trees.iter().filter(|tree| tree.object.is_none()) {
-            tree.root.leaves(1.0, &mut |values, _| {
+            tree.root.leaves(&mut |values| {
                 all += 1;
                 fits &= values.iter().all(|value| (0..1 << 16).contains(value));
                 let mut others = values.iter().filter(|value| **value != 0);
@@ -223,23 +195,31 @@ impl CodeTree {
 }
 
 impl CodeNode {
-    /// Calls `see` on every leaf, from left to right, with its chance where either side of a split is as likely.
-    pub(super) fn leaves<'n>(&'n self, chance: f64, see: &mut impl FnMut(&'n [i32], f64)) {
+    /// Calls `see` on every leaf, from left to right.
+    pub(super) fn leaves<'n>(&'n self, see: &mut impl FnMut(&'n [i32])) {
         match self {
-            Self::Leaf(values) => see(values, chance),
+            Self::Leaf(values) => see(values),
             Self::Split(split) => {
-                split.left.leaves(chance / 2.0, see);
-                split.right.leaves(chance / 2.0, see);
+                split.left.leaves(see);
+                split.right.leaves(see);
             }
         }
     }
 
-    /// Calls `see` on every split with its chance.
-    pub(super) fn splits<'n>(&'n self, chance: f64, see: &mut impl FnMut(&'n CodeSplit, f64)) {
-        if let Self::Split(split) = self {
-            see(split, chance);
-            split.left.splits(chance / 2.0, see);
-            split.right.splits(chance / 2.0, see);
+    /// Its splits.
+    pub(super) fn count(&self) -> usize {
+        match self {
+            Self::Leaf(_) => 0,
+            Self::Split(split) => 1 + split.left.count() + split.right.count(),
+        }
+    }
+
+    /// A sum along the way to a leaf, of `split` for each split and of the leaf's own, where `below` joins those of a split's
+    /// sides.
+    pub(super) fn sum(&self, split: f64, leaf: &dyn Fn(&[i32]) -> f64, below: &dyn Fn(f64, f64) -> f64) -> f64 {
+        match self {
+            Self::Leaf(values) => leaf(values),
+            Self::Split(own) => split + below(own.left.sum(split, leaf, below), own.right.sum(split, leaf, below)),
         }
     }
 }

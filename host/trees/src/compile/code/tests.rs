@@ -1,11 +1,10 @@
-//! Code against the layouts of data: to the bit, on this machine and on emulated chips.
+//! Code against the layouts of data: to the bit, on this machine and on emulated chips; and its cost.
 
-use super::super::groups::groups_and_splits;
 use super::super::{Leaf, Settings, compile, open};
-use super::{Chip, Form, Program};
-use crate::compile::{Compiled, EarlyExit, Language, Layout};
+use super::Program;
+use crate::compile::{Compiled, Core, Language, Layout};
 use crate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree, computed};
-use crate::rows::Rows;
+use palpate_onboard::Model;
 use palpate_shared::Descriptor;
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Key, f32_key};
@@ -169,45 +168,25 @@ fn imported() -> Vec<Case> {
 }
 
 impl Case {
-    fn compiled(&self, form: Option<Form>) -> Compiled {
-        self.compiled_with(form, None)
+    /// Its trees as code.
+    fn code(&self) -> Compiled {
+        let settings = Settings { code: true, leaf: self.leaf, ..Settings::default() };
+        compile(&self.ensemble, &settings).unwrap_or_else(|error| panic!("{}: {error}", self.name))
     }
 
-    /// True if it has classes of rows.
-    pub(crate) fn has_classes(&self) -> bool {
-        self.ensemble.schema().is_none() && self.ensemble.objects.len() > 1
-    }
-
-    /// True if assembly of it has leaves that are added two to a register, or row by row.
-    pub(crate) fn has_packed_leaves(&self) -> bool {
-        let compiled = self.compiled(Some(Form::C));
-        let program = program(&compiled);
-        program.has_vectors() && program.vote().is_none()
-    }
-
-    /// Its model and assembly.
-    pub(crate) fn assembly(&self, chip: Chip, early_exit: bool) -> (Vec<u8>, String) {
-        let wanted = early_exit.then_some(EarlyExit::Always);
-        let compiled = self.compiled_with(Some(Form::Thumb(chip)), wanted);
-        let files = compiled.sources("m", &[]).unwrap();
-        let text = files.into_iter().find(|file| file.0 == "s").unwrap().1;
-        (compiled.bytes, text)
-    }
-
-    fn compiled_with(&self, form: Option<Form>, early_exit: Option<EarlyExit>) -> Compiled {
-        let layout = if form.is_some() { Some(Layout::Code) } else { None };
-        let forms = form.into_iter().collect();
-        let settings = Settings { layout, forms, leaf: self.leaf, early_exit, ..Settings::default() };
-        let compiled = compile(&self.ensemble, &settings);
-        if form.is_some() || self.ensemble.trees.is_empty() {
-            return compiled.unwrap_or_else(|error| panic!("{}: {error}", self.name));
-        }
+    /// Its trees as data.
+    fn data(&self) -> Compiled {
         // Tables have other leaves.
         let walked = [Layout::Complete, Layout::Compact, Layout::Wide].into_iter().find_map(|layout| {
             let settings = Settings { layout: Some(layout), leaf: self.leaf, ..Settings::default() };
             compile(&self.ensemble, &settings).ok()
         });
         walked.unwrap_or_else(|| panic!("{} fits no layout", self.name))
+    }
+
+    /// True if it has classes of rows.
+    fn has_classes(&self) -> bool {
+        self.ensemble.schema().is_none() && self.ensemble.objects.len() > 1
     }
 
     /// Rows on and beside thresholds, with missing values, infinities, zeros of both signs and denormals: as f32 values.
@@ -265,168 +244,19 @@ fn expected(compiled: &Compiled, rows: &[Vec<i32>]) -> Vec<Vec<i32>> {
 }
 
 fn program(compiled: &Compiled) -> &Program {
-    &compiled.code.as_ref().unwrap().0
+    compiled.code.as_ref().unwrap()
 }
 
 #[test]
 fn programs_give_the_margins_of_the_layouts_of_data_at_every_threshold() {
     for case in CASES.iter() {
-        let compiled = case.compiled(Some(Form::C));
+        let compiled = case.code();
         let program = program(&compiled);
         let rows: Vec<Vec<i32>> = case.rows(150).iter().map(|row| keys(row, program.key)).collect();
-        let expected = expected(&case.compiled(None), &rows);
+        let expected = expected(&case.data(), &rows);
         for (row, expected) in rows.iter().zip(expected) {
             assert_eq!(program.margins(row), expected, "{}: {row:?}", case.name);
         }
-    }
-}
-
-/// Cases whose margins are often equal, and the others that have classes.
-fn with_ties() -> Vec<Case> {
-    let coarse: fn(&mut Numbers) -> f32 = |numbers| numbers.below(5) as f32;
-    let random = |each: bool, objects: usize, seed: u64| {
-        let inputs = Inputs::unnamed(4);
-        let random = Random { inputs, objects, trees: 30, depth: 3, each, votes: 40, largest: 0.5, threshold: coarse };
-        Ensemble { base_margins: vec![0.0; objects], ..random.ensemble(seed) }
-    };
-    let mut cases: Vec<Case> = [(true, 2), (true, 5), (false, 2), (false, 3), (false, 12)]
-        .into_iter()
-        .zip(50..)
-        .map(|((each, objects), seed)| Case {
-            name: format!("ties of {objects}, {each}"),
-            ensemble: random(each, objects, seed),
-            leaf: Leaf::I16,
-        })
-        .collect();
-    cases.extend(CASES.iter().cloned());
-    cases.retain(Case::has_classes);
-    cases
-}
-
-/// The largest margin less the second largest.
-fn lead(margins: &[i32]) -> u32 {
-    let mut sorted = margins.to_vec();
-    sorted.sort_unstable();
-    sorted[sorted.len() - 1].abs_diff(sorted[sorted.len() - 2])
-}
-
-/// Rows that are changed, feature by feature, until their largest margins are close to each other.
-fn close_rows(case: &Case, program: &Program, count: usize) -> Vec<Vec<i32>> {
-    let rows: Vec<Vec<i32>> = case.rows(40).iter().map(|row| keys(row, program.key)).collect();
-    let mut numbers = Numbers(11);
-    let close = |start: &Vec<i32>| {
-        let mut row = start.clone();
-        for _ in 0..60 {
-            let feature = numbers.below(row.len() as u64) as usize;
-            let before = row[feature];
-            let was = lead(&program.margins(&row));
-            row[feature] = rows[numbers.below(rows.len() as u64) as usize][feature];
-            if lead(&program.margins(&row)) > was {
-                row[feature] = before;
-            }
-        }
-        row
-    };
-    rows.iter().take(count).map(close).collect()
-}
-
-#[test]
-fn walks_that_end_early_give_the_class_of_all_trees_and_the_others_change_no_difference_by_more_than_their_bound() {
-    let (mut ended, mut ties, mut walked) = (0, 0, 0);
-    for case in with_ties() {
-        let compiled = case.compiled_with(Some(Form::C), Some(EarlyExit::Always));
-        let program = program(&compiled);
-        let plain = case.compiled(None);
-        let last_of_ties = open(&plain.bytes).unwrap().prediction().last_of_ties;
-        let mut rows: Vec<Vec<i32>> = case.rows(60).iter().map(|row| keys(row, program.key)).collect();
-        rows.extend(close_rows(&case, program, 20));
-        let data: Vec<Compiled> = [Layout::Complete, Layout::Compact, Layout::Wide]
-            .into_iter()
-            .flat_map(|layout| [false, true].map(|shared| (layout, shared)))
-            .filter_map(|(layout, shared)| {
-                let early_exit = Some(EarlyExit::Always);
-                let (layout, shared_leaves) = (Some(layout), Some(shared));
-                let settings = Settings { layout, shared_leaves, leaf: case.leaf, early_exit, ..Settings::default() };
-                compile(&case.ensemble, &settings).ok()
-            })
-            .collect();
-        for (row, expected) in rows.iter().zip(expected(&plain, &rows)) {
-            let most = expected.iter().max().unwrap();
-            let mut best = (0..expected.len()).filter(|&class| expected[class] == *most);
-            let class = if last_of_ties { best.next_back() } else { best.next() }.unwrap();
-            ties += usize::from(lead(&expected) == 0);
-            assert_eq!(program.class(row), class, "{}: {row:?}", case.name);
-            assert_eq!(program.margins(row), expected, "{}: {row:?}", case.name);
-            let ranks = program.ranks(row);
-            let mut margins = program.base.clone();
-            for (trees, bound) in program.parts() {
-                trees.iter().for_each(|tree| tree.add(&ranks, &mut margins));
-                walked += 1;
-                let Some(bound) = bound else { break };
-                ended += usize::from(lead(&margins) > bound);
-                let changes: Vec<i32> = expected.iter().zip(&margins).map(|(all, so_far)| all - so_far).collect();
-                let most = changes.iter().max().unwrap().abs_diff(*changes.iter().min().unwrap());
-                assert!(most <= bound, "{}: {most} of {bound}, {row:?}", case.name);
-            }
-            for compiled in &data {
-                let model = open(&compiled.bytes).unwrap();
-                let mut margins = vec![0; model.object_count()];
-                assert_eq!(model.class_of(row, &mut margins), Some(class), "{}: {row:?}", case.name);
-                model.margins_of(row, &mut margins);
-                assert_eq!(margins, expected, "{}: {row:?}", case.name);
-            }
-        }
-    }
-    println!("{walked} parts, {ended} ends of which a class was known at, {ties} rows with a tie");
-    assert!(ended > walked / 40 && ties > 100, "{walked} {ended} {ties}");
-}
-
-#[test]
-fn rows_decide_where_walks_may_end_and_models_without_a_place_are_as_before() {
-    let mut case = CASES[0].clone();
-    // As of a boosted ensemble: later trees change less.
-    for (number, tree) in case.ensemble.trees.iter_mut().enumerate() {
-        for node in &mut tree.nodes {
-            if let Node::Leaf(values) = node {
-                values.iter_mut().for_each(|value| *value *= 0.8_f32.powi(number as i32));
-            }
-        }
-    }
-    let rows = |values: Vec<Vec<f32>>| Rows {
-        features: values[0].len(),
-        values: values.into_iter().flatten().map(f64::from).collect(),
-        labels: Vec::new(),
-        by_position: false,
-    };
-    let some = rows(case.rows(100));
-    let of = |ensemble: &Ensemble, early_exit| {
-        let settings = Settings { layout: Some(Layout::Compact), early_exit, ..Settings::default() };
-        compile(ensemble, &settings).unwrap()
-    };
-    let with = of(&case.ensemble, Some(EarlyExit::IfItPays(some.clone())));
-    let found = with.early_exit.clone().unwrap();
-    assert!(!found.ends.is_empty() && found.walked.unwrap() < 0.95 * found.trees as f64, "{found:?}");
-    let model = open(&with.bytes).unwrap();
-    let groups = groups_and_splits(&model).0;
-    let trees = |exit: palpate_shared::format::EarlyExit| {
-        groups[..exit.groups.into()].iter().map(|group| group.trees as usize).sum()
-    };
-    assert_eq!(model.early_exits().map(trees).collect::<Vec<usize>>(), found.ends);
-    // Two classes with the same trees: nothing is ever known.
-    let mut level =
-        Ensemble { objects: vec!["a".into(), "b".into()], base_margins: vec![0.0; 2], ..case.ensemble.clone() };
-    level.trees = (level.trees.iter())
-        .flat_map(|tree| [0, 1].map(|object| Tree { output: Output::One(object), ..tree.clone() }))
-        .collect();
-    let tried = of(&level, Some(EarlyExit::IfItPays(some)));
-    let found = tried.early_exit.clone().unwrap();
-    assert_eq!((found.ends, found.walked), (Vec::new(), Some(found.trees as f64)));
-    assert_eq!(tried.bytes, of(&level, None).bytes);
-    for (leaf, outputs) in [(Leaf::F32, 3), (Leaf::I16, 1)] {
-        let random = Random { objects: outputs, ..random_of(outputs) };
-        let settings = Settings { leaf, early_exit: Some(EarlyExit::Always), ..Settings::default() };
-        let error = compile(&random.ensemble(1), &settings).unwrap_err().to_string();
-        assert!(error.contains("early_exit"), "{error}");
     }
 }
 
@@ -440,8 +270,7 @@ fn random_of(objects: usize) -> Random {
 fn columns_are_made_by_conversion_where_thresholds_are_on_a_grid() {
     let kinds = |name: &str| {
         let case = CASES.iter().find(|case| case.name == name).unwrap();
-        let compiled = case.compiled(Some(Form::C));
-        program(&compiled).columns.iter().map(|column| format!("{:?}", column.kind)).collect::<Vec<_>>()
+        program(&case.code()).columns.iter().map(|column| format!("{:?}", column.kind)).collect::<Vec<_>>()
     };
     let all = |name: &str, start: &str| kinds(name).iter().all(|kind| kind.starts_with(start));
     assert!(all("halves, i16", "Grid { bits: 1, before: false }"));
@@ -453,115 +282,25 @@ fn columns_are_made_by_conversion_where_thresholds_are_on_a_grid() {
 #[test]
 fn f32_leaves_are_no_code() {
     let case = Case { leaf: Leaf::F32, ..CASES[0].clone() };
-    let settings =
-        Settings { layout: Some(Layout::Code), forms: vec![Form::C], leaf: Leaf::F32, ..Settings::default() };
+    let settings = Settings { code: true, leaf: Leaf::F32, ..Settings::default() };
     let error = compile(&case.ensemble, &settings).unwrap_err().to_string();
     assert!(error.contains("its leaves are f32"), "{error}");
 }
 
-#[test]
-fn the_firmware_has_the_code_that_is_exported_now() {
-    let root = Path::new(ROOT);
-    let path = root.join("tests/data/import/xgboost-3.4-softmax.json");
-    let ensemble = Ensemble::load_with(&path, &Default::default()).unwrap();
-    let case = Case { name: "softmax".into(), ensemble, leaf: Leaf::I16 };
-    let compiled = case.compiled(Some(Form::Thumb(Chip::M0Plus)));
-    let place = |file: &str| root.join("onboard/firmware/src/code").join(file);
-    assert_eq!(std::fs::read(place("softmax.palpate")).unwrap(), compiled.bytes);
-    for (extension, text) in compiled.sources("softmax", &[]).unwrap() {
-        let path = place(&format!("softmax.{extension}"));
-        if std::env::var_os("PALPATE_RESTATE").is_some() {
-            std::fs::write(&path, &text).unwrap();
-        }
-        assert_eq!(std::fs::read_to_string(path).unwrap(), text);
-    }
-}
-
-/// Files of one ensemble in assembly, with the header for C.
-fn exported(seed: u64, early_exit: bool) -> Vec<(&'static str, String)> {
-    let ensemble = random_of(3).ensemble(seed);
-    let case = Case { name: String::new(), ensemble, leaf: Leaf::I16 };
-    let form = Form::Thumb(Chip::M0Plus);
-    let compiled = case.compiled_with(Some(form), early_exit.then_some(EarlyExit::Always));
-    compiled.sources("same", &[Language::C]).unwrap()
-}
-
-/// The symbols of a text.
-fn symbols(text: &str) -> Vec<&str> {
-    let words = text.split(|character: char| !character.is_alphanumeric() && character != '_');
-    let is_symbol = |word: &&str| {
-        ["same_margins_", "same_early_"].iter().any(|start| word.strip_prefix(start).is_some_and(|end| end.len() == 8))
-    };
-    let mut found: Vec<&str> = words.filter(is_symbol).collect();
-    found.sort_unstable();
-    found.dedup();
-    found
-}
-
-#[test]
-fn symbols_of_assembly_are_those_of_the_files_that_were_exported_with_it_and_of_no_others() {
-    for early_exit in [false, true] {
-        let (one, other) = (exported(1, early_exit), exported(2, early_exit));
-        let [assembly, rust, header] = &one[..] else { panic!("three files") };
-        let own = symbols(&assembly.1);
-        assert_eq!(own.len(), 1 + usize::from(early_exit), "{own:?}");
-        assert_eq!((symbols(&rust.1), symbols(&header.1)), (own.clone(), own.clone()));
-        assert!(other.iter().all(|(_, text)| symbols(text).iter().all(|symbol| !own.contains(symbol))));
-        // Every symbol has its size, and no stack of code is asked for.
-        assert_eq!(assembly.1.matches("\t.size same_").count(), own.len());
-        assert!(assembly.1.contains(".note.GNU-stack"));
-    }
-}
-
-#[test]
-#[ignore = "needs a compiler for chips"]
-fn assembly_of_another_export_does_not_link() {
-    let directory = tempfile::tempdir().unwrap();
-    let put = |file: &str, text: &str| std::fs::write(directory.path().join(file), text).unwrap();
-    let source = "#include \"same.h\"\nint main(void)\n{\n    palpate_model model;\n    return same_open(&model);\n}\n\
-                  void reset(void);\nvoid reset(void) { main(); }\n";
-    put("program.c", source);
-    let link = |one: u64, other: u64| {
-        for (file, seed) in [("same.h", one), ("same.s", other)] {
-            let files = exported(seed, false);
-            put(file, &files.iter().find(|own| file.ends_with(own.0)).unwrap().1);
-        }
-        let mut command = Command::new("arm-none-eabi-gcc");
-        command.args(["-mcpu=cortex-m0plus", "-mthumb", "-ffreestanding", "-nostdlib", "-e", "reset"]);
-        command.arg("-I").arg(Path::new(ROOT).join("onboard/c")).args([
-            "program.c",
-            "same.s",
-            "-lgcc",
-            "-o",
-            "program",
-        ]);
-        let output = command.current_dir(directory.path()).output().unwrap();
-        if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
-    };
-    assert_eq!(link(1, 1), Ok(()));
-    let error = link(1, 2).unwrap_err();
-    assert!(error.contains("undefined reference to `same_margins_"), "{error}");
-}
-
-/// The files of a test program: `models.h`, and assembly of every model if the form is assembly.
-fn write(directory: &Path, cases: &[Case], form: Form, rows: usize, early_exit: bool) -> Vec<PathBuf> {
-    let (mut head, mut body, mut table, mut sources) = (String::new(), String::new(), String::new(), Vec::new());
+/// The files of a test program: `models.h`, and a header for each model.
+fn write(directory: &Path, cases: &[Case], rows: usize) {
+    let (mut head, mut body, mut table) = (String::new(), String::new(), String::new());
     head += "#include \"palpate.h\"\nstruct code_test {\n    palpate_error (*open)(palpate_model *);\n    \
              void (*margins)(const void *, int32_t *);\n    int (*class_of)(const void *);\n    \
              const int32_t *keys, *values, *expected, *classes;\n    \
              unsigned rows, features, objects;\n};\n";
     for (index, case) in cases.iter().enumerate() {
-        let wanted = (early_exit && case.has_classes()).then_some(EarlyExit::Always);
-        let compiled = case.compiled_with(Some(form), wanted);
+        let compiled = case.code();
         let (program, name) = (program(&compiled), format!("m{index}"));
         let values = case.rows(rows);
         let rows: Vec<Vec<i32>> = values.iter().map(|row| keys(row, program.key)).collect();
         for (extension, text) in compiled.sources(&name, &[Language::C]).unwrap() {
-            let path = directory.join(&name).with_extension(extension);
-            std::fs::write(&path, text).unwrap();
-            if extension == "s" {
-                sources.push(path);
-            }
+            std::fs::write(directory.join(&name).with_extension(extension), text).unwrap();
         }
         // The same bits, whatever the type.
         let bits: Vec<Vec<i32>> = match program.key {
@@ -572,7 +311,7 @@ fn write(directory: &Path, cases: &[Case], form: Form, rows: usize, early_exit: 
         };
         let kind = if program.key == Key::Real { "float" } else { "int32_t" };
         _ = writeln!(body, "#include \"{name}.h\"");
-        let plain = case.compiled(None);
+        let plain = case.data();
         let class = |row: &Vec<i32>| {
             let model = open(&plain.bytes).unwrap();
             vec![model.predict_class(row, &mut vec![0; model.object_count()]).unwrap() as i32]
@@ -593,12 +332,10 @@ fn write(directory: &Path, cases: &[Case], form: Form, rows: usize, early_exit: 
             body,
             "static void {name}_call(const void *row, int32_t *margins) {{ {name}_margins((const {kind} *)row, margins); }}"
         );
-        let targets = case.ensemble.prediction().targets;
-        let class_of = if case.has_classes() && (!targets || !program.exits.is_empty()) {
-            let function = if targets { "class" } else { "predict" };
+        let class_of = if case.has_classes() && !case.ensemble.prediction().targets {
             _ = writeln!(
                 body,
-                "static int {name}_known(const void *row) {{ return {name}_{function}((const {kind} *)row); }}"
+                "static int {name}_known(const void *row) {{ return {name}_predict((const {kind} *)row); }}"
             );
             format!("{name}_known")
         } else {
@@ -614,32 +351,18 @@ fn write(directory: &Path, cases: &[Case], form: Form, rows: usize, early_exit: 
     }
     let text = format!("{head}{body}static const struct code_test tests[] = {{\n{table}}};\n");
     std::fs::write(directory.join("models.h"), text).unwrap();
-    sources
 }
 
 const CHOICES: [&str; 3] =
     ["-DPALPATE_LAYOUTS=PALPATE_CODE", "-DPALPATE_LEAVES=(PALPATE_I8|PALPATE_I16)", "-DPALPATE_MAX_OBJECTS=256"];
 
 /// Compiles the program; what a compiler says is an error.
-fn build(
-    compiler: &str,
-    flags: &[&str],
-    directory: &Path,
-    sources: &[PathBuf],
-    libraries: &[&str],
-) -> Result<PathBuf, String> {
+fn build(compiler: &str, flags: &[&str], directory: &Path, libraries: &[&str]) -> Result<PathBuf, String> {
     let program = directory.join("program");
     let root = Path::new(ROOT);
     let mut command = Command::new(compiler);
     command.args(flags).args(CHOICES).arg("-I").arg(root.join("onboard/c")).arg("-I").arg(root.join("tests/c"));
-    command
-        .arg("-I")
-        .arg(directory)
-        .arg("-o")
-        .arg(&program)
-        .arg(root.join("tests/c/code.c"))
-        .args(sources)
-        .args(libraries);
+    command.arg("-I").arg(directory).arg("-o").arg(&program).arg(root.join("tests/c/code.c")).args(libraries);
     let output = command.output().map_err(|error| format!("{compiler}: {error}"))?;
     if output.status.success() { Ok(program) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
 }
@@ -659,12 +382,119 @@ fn c_gives_the_margins_of_the_layouts_of_data_on_this_machine_without_a_warning(
     let cases = few();
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
     let flags = ["-std=c99", "-O0", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-Wno-unused-function"];
-    for early_exit in [false, true] {
-        write(directory.path(), &cases, Form::C, 20, early_exit);
-        let program = build(&compiler, &flags, directory.path(), &[], &[]).unwrap();
-        let output = Command::new(program).output().unwrap();
-        check(&String::from_utf8(output.stdout).unwrap(), &cases);
+    write(directory.path(), &cases, 20);
+    let program = build(&compiler, &flags, directory.path(), &[]).unwrap();
+    let output = Command::new(program).output().unwrap();
+    check(&String::from_utf8(output.stdout).unwrap(), &cases);
+}
+
+#[test]
+#[ignore = "needs compilers for chips and emulators"]
+fn c_gives_the_margins_of_the_layouts_of_data_on_emulated_chips() {
+    let few = few();
+    let root = Path::new(ROOT);
+    let (mps2, virt) = (root.join("tests/c/mps2.ld"), root.join("tests/c/virt.ld"));
+    let (mps2, virt) = (mps2.to_str().unwrap(), virt.to_str().unwrap());
+    let arm = |machine: &'static str| ["qemu-system-arm", "-machine", machine].to_vec();
+    for (chip, compiler, flags, script, emulator) in [
+        ("Cortex-M0+", "arm-none-eabi-gcc", &M0_PLUS[..], mps2, arm("mps2-an385")),
+        ("Cortex-M4F", "arm-none-eabi-gcc", &M4F, mps2, arm("mps2-an386")),
+        (
+            "rv32imc",
+            "riscv64-unknown-elf-gcc",
+            &["-march=rv32imc", "-mabi=ilp32"],
+            virt,
+            ["qemu-system-riscv32", "-machine", "virt", "-bios", "none"].to_vec(),
+        ),
+    ] {
+        println!("{chip}");
+        let directory = tempfile::tempdir().unwrap();
+        write(directory.path(), &few, 15);
+        let flags = [flags, &BARE, &[script]].concat();
+        let program = build(compiler, &flags, directory.path(), &["-lgcc"]).unwrap();
+        check(&emulate(emulator[0], &emulator[1..], &program), &few);
     }
+}
+
+const M0_PLUS: [&str; 2] = ["-mcpu=cortex-m0plus", "-mthumb"];
+const M4F: [&str; 4] = ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"];
+const BARE: [&str; 9] =
+    ["-std=c99", "-w", "-Os", "-DBARE", "-ffreestanding", "-nostdlib", "-static", "-Wl,--no-warn-rwx-segments", "-T"];
+
+#[test]
+#[ignore = "needs compilers for chips and emulators"]
+fn instructions_of_c_are_within_15_percent_of_what_emulated_chips_count() {
+    let script = Path::new(ROOT).join("tests/c/mps2.ld");
+    let mut off = Vec::new();
+    for (core, flags, machine) in [(Core::M0Plus, &M0_PLUS[..], "mps2-an385"), (Core::M4F, &M4F, "mps2-an386")] {
+        for case in few() {
+            let directory = tempfile::tempdir().unwrap();
+            write(directory.path(), std::slice::from_ref(&case), 40);
+            let flags = [flags, &["-DCOUNT"], &BARE, &[script.to_str().unwrap()]].concat();
+            let program_file = build("arm-none-eabi-gcc", &flags, directory.path(), &["-lgcc"]).unwrap();
+            let emulator = ["-machine", machine, "-icount", "shift=0"];
+            let output = emulate("qemu-system-arm", &emulator, &program_file);
+            let counted: f64 = output.split_whitespace().next().unwrap().parse().unwrap();
+            let compiled = case.code();
+            let program = program(&compiled);
+            let rows = case.rows(40);
+            let each = rows.iter().map(|row| program.instructions_of_row(&keys(row, program.key)).on(core).unwrap());
+            let stated = each.sum::<u64>() as f64 / rows.len() as f64;
+            println!("{core:?} {}: {counted} counted, {stated:.0} stated", case.name);
+            if (stated - counted).abs() > 0.15 * counted {
+                off.push(format!("{core:?} {}: {counted} counted, {stated:.0} stated", case.name));
+            }
+        }
+    }
+    assert!(off.is_empty(), "{off:#?}");
+}
+
+/// A program in Rust that compares the margins of every model with those of data.
+fn write_rust(directory: &Path, cases: &[Case], rows: usize) {
+    let mut text = String::new();
+    let mut main = String::from("fn main() {\n");
+    for (index, case) in cases.iter().enumerate() {
+        let compiled = case.code();
+        let program = program(&compiled);
+        let rows: Vec<Vec<f32>> = case.rows(rows);
+        let keys: Vec<Vec<i32>> = rows.iter().map(|row| keys(row, program.key)).collect();
+        let (_, source) = compiled.sources("m", &[Language::Rust]).unwrap().remove(0);
+        std::fs::write(directory.join(format!("m{index}.rs")), source).unwrap();
+        // As the function for models takes them: whole numbers, or the bits of f32 values.
+        let bits = |(row, keys): (&Vec<f32>, &Vec<i32>)| match program.key {
+            Key::Whole => keys.clone(),
+            Key::Real => row.iter().map(|value| value.to_bits().cast_signed()).collect(),
+        };
+        let given: Vec<Vec<i32>> = rows.iter().zip(&keys).map(bits).collect();
+        let expected = expected(&case.data(), &keys);
+        _ = writeln!(text, "mod m{index};");
+        _ = writeln!(
+            main,
+            "    let given: &[&[i32]] = &{given:?}.each_ref().map(|row| &row[..]);\n    \
+             let expected: &[&[i32]] = &{expected:?}.each_ref().map(|row| &row[..]);\n    \
+             for (row, expected) in given.iter().zip(expected) {{\n        \
+             let mut margins = [0; {objects}];\n        m{index}::margins(row, &mut margins);\n        \
+             assert_eq!(&margins[..], *expected, \"{name}: {{row:?}}\");\n    }}\n    \
+             assert_eq!(m{index}::CHECKSUM, {checksum});",
+            objects = program.objects(),
+            name = case.name,
+            checksum = Model::with_code(&compiled.bytes, |_, _| {}).unwrap().checksum(),
+        );
+    }
+    std::fs::write(directory.join("main.rs"), format!("{text}{main}}}\n")).unwrap();
+}
+
+#[test]
+fn rust_gives_the_margins_of_the_layouts_of_data_without_a_warning() {
+    let directory = tempfile::tempdir().unwrap();
+    write_rust(directory.path(), &few(), 20);
+    let compiler = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".into());
+    let mut command = Command::new(compiler);
+    command.args(["--edition", "2024", "-D", "warnings", "-F", "unsafe_code", "-C", "opt-level=0", "main.rs"]);
+    let output = command.current_dir(directory.path()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = Command::new(directory.path().join("main")).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 /// Runs an image of Cortex-M or RISC-V.
@@ -676,50 +506,4 @@ fn emulate(emulator: &str, machine: &[&str], program: &Path) -> String {
         .arg(program);
     let output = command.stdin(Stdio::null()).output().unwrap();
     String::from_utf8([output.stdout, output.stderr].concat()).unwrap()
-}
-
-#[test]
-#[ignore = "needs compilers for chips and emulators"]
-fn assembly_and_c_give_the_margins_of_the_layouts_of_data_on_emulated_chips() {
-    let few = few();
-    let root = Path::new(ROOT);
-    let (mps2, virt) = (root.join("tests/c/mps2.ld"), root.join("tests/c/virt.ld"));
-    let (mps2, virt) = (mps2.to_str().unwrap(), virt.to_str().unwrap());
-    let bare = [
-        "-std=c99",
-        "-w",
-        "-Os",
-        "-DBARE",
-        "-ffreestanding",
-        "-nostdlib",
-        "-static",
-        "-Wl,--no-warn-rwx-segments",
-        "-T",
-    ];
-    let m0_plus = ["-mcpu=cortex-m0plus", "-mthumb"];
-    let m4f = ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"];
-    for (chip, flags, machine, form, early_exit) in [
-        ("Cortex-M0+", &m0_plus[..], "mps2-an385", Form::Thumb(Chip::M0Plus), false),
-        ("Cortex-M0+, early exit", &m0_plus[..], "mps2-an385", Form::Thumb(Chip::M0Plus), true),
-        ("Cortex-M4F", &m4f, "mps2-an386", Form::Thumb(Chip::M4F), false),
-        ("Cortex-M4F, early exit", &m4f, "mps2-an386", Form::Thumb(Chip::M4F), true),
-        ("Cortex-M4F, the subset", &m4f, "mps2-an386", Form::Thumb(Chip::M0Plus), false),
-        ("Cortex-M0+, C", &m0_plus, "mps2-an385", Form::C, false),
-        ("Cortex-M4F, C, early exit", &m4f, "mps2-an386", Form::C, true),
-    ] {
-        println!("{chip}");
-        let directory = tempfile::tempdir().unwrap();
-        // An assembler takes less time.
-        let cases = if form == Form::C { &few } else { &*CASES };
-        let sources = write(directory.path(), cases, form, 15, early_exit);
-        let flags = [flags, &bare, &[mps2]].concat();
-        let program = build("arm-none-eabi-gcc", &flags, directory.path(), &sources, &["-lgcc"]).unwrap();
-        check(&emulate("qemu-system-arm", &["-machine", machine], &program), cases);
-    }
-    println!("rv32imc");
-    let directory = tempfile::tempdir().unwrap();
-    write(directory.path(), &few, Form::C, 15, false);
-    let flags = [&["-march=rv32imc", "-mabi=ilp32"][..], &bare, &[virt]].concat();
-    let program = build("riscv64-unknown-elf-gcc", &flags, directory.path(), &[], &["-lgcc"]).unwrap();
-    check(&emulate("qemu-system-riscv32", &["-machine", "virt", "-bios", "none"], &program), &few);
 }

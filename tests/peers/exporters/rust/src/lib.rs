@@ -65,9 +65,6 @@ mod peer {
         let mut features = [0; FEATURES];
         features.iter_mut().zip(row).for_each(|(feature, &value)| *feature = key(value));
         let mut margins = [0; CLASSES];
-        if cfg!(feature = "early") {
-            return model.class_of(&features, &mut margins).map_or(-1, |class| class as i32);
-        }
         model.margins_of(&features, &mut margins);
         best(&margins)
     }
