@@ -254,6 +254,13 @@ pub fn play(script: &mut Script<'_>, count: usize, rng: &mut SmallRng) {
     }
 }
 
+/// Puts the checksum at the end right.
+pub fn sealed(bytes: &mut [u8]) {
+    if let Some((body, sum)) = bytes.split_last_chunk_mut() {
+        *sum = palpate_shared::format::checksum(body).to_le_bytes();
+    }
+}
+
 /// Models, and this many touches and rows in all.
 ///
 /// # Panics

@@ -97,7 +97,7 @@ fn play(text: &mut String, name: &str, bytes: &[u8], touches: &[Touch]) {
         }
     }
     let mut recognizer = Recognizer::<256>::new(&model, Stopping::from_model(&model)).expect("at most 256 objects");
-    for (index, touch) in touches.iter().enumerate() {
+    for touch in touches {
         let decided = recognizer.verdict() != Verdict::Undecided;
         *text += &format!("touch {}\n", touch_words(touch));
         match recognizer.push(touch) {
@@ -107,7 +107,6 @@ fn play(text: &mut String, name: &str, bytes: &[u8], touches: &[Touch]) {
                 known(text, &model, &recognizer, features.as_slice(), verdict);
             }
         }
-        if index == 1 || decided {}
         if decided {
             recognizer.reset();
             *text += "reset\n";

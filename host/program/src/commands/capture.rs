@@ -90,7 +90,7 @@ pub(crate) fn run(mut arguments: Arguments, global: &Global) -> Result<()> {
         arguments.sources.iter().any(|source| source == BACKGROUND) && !std::path::Path::new(BACKGROUND).exists();
     for object in objects.iter().filter(|object| !has_background || object.name != BACKGROUND) {
         for instance in object.instances() {
-            let complaints = object.complaints(&Facts::of(&instance.mesh));
+            let complaints = Facts::of(&instance.mesh).complaints(object.millimeters);
             if !complaints.is_empty() {
                 let name = if instance.name == object.name { String::new() } else { format!(", {}", instance.name) };
                 remark(&format!("{}{name}: {}", object.name, complaints.join(" ")));

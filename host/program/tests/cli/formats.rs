@@ -1,6 +1,6 @@
 //! Meshes in other formats than OBJ, wherever a mesh is read.
 
-use crate::{Folder, fails, holds, palpate, stderr, succeeds};
+use crate::{Folder, holds, palpate, stderr, succeeds};
 use palpate::mesh::Mesh;
 use std::path::Path;
 
