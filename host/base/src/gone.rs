@@ -23,7 +23,7 @@ const GONE: &[(&str, &str)] = &[
     ("--false-per-hour", "rates per hour went with --events; begin again after each verdict (docs/guide/streams.md)"),
     ("--hold-off", "begin again after each verdict (docs/guide/streams.md)"),
     ("--grace", "begin again after each verdict (docs/guide/streams.md)"),
-    ("--strangers certain", "give an error rate, such as --strangers 5%"),
+    ("--strangers certain", "use --strangers likely"),
     ("--varied", "capture objects of your own with --instances"),
     ("--picture", "draw objects with palpate view"),
     ("--trace", "compare a page with the program by the binary `page` of palpate-tests"),
