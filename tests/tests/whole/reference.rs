@@ -36,7 +36,7 @@ fn slivers_are_touched_when_and_where_the_reference_says() {
 #[test]
 fn real_objects_are_touched_when_and_where_the_reference_says() {
     let shared = std::env::var_os("PALPATE_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"), PathBuf::from);
     let directory = shared.join("reference");
     if !directory.is_dir() {
         eprintln!("SKIPPED: no reference casts in {} (set PALPATE_SHARED)", directory.display());
