@@ -17,6 +17,7 @@ const GONE: &[(&str, &str)] = &[
     ("--add", "capture all touches at once, or parts of them with --samples A..B"),
     ("--shard", "capture parts on several machines with --samples A..B"),
     ("--format", "data sets are text; DataSet.to_pandas() in Python leads to every other format"),
+    ("--mcap", "verdicts are text; touches of logs are read"),
     ("--switch", "call reset() where another object begins"),
     ("--events", "begin again after each verdict (docs/guide/streams.md)"),
     ("--rows-per-second", "rates per hour went with --events; begin again after each verdict (docs/guide/streams.md)"),
