@@ -17,6 +17,7 @@ pub(super) fn text(program: &Program, about: &str, checksum: u32) -> String {
     let base = list(&program.base);
     let (calls, trees) = trees(program);
     let x = if count == 0 { "_row" } else { "row" };
+    let is_changed = if calls.is_empty() { "" } else { "mut " };
     let keys = if count == 0 { String::new() } else { columns(program) };
     let bits = if is_real { "row.map(|bits| f32::from_bits(bits.cast_unsigned()))" } else { "*row" };
     format!(
@@ -28,7 +29,7 @@ pub(super) fn text(program: &Program, about: &str, checksum: u32) -> String {
          pub const CHECKSUM: u32 = 0x{checksum:08x};\n\n\
          /// The margins of a row of {what}, in units.\n\
          pub fn margins_of({x}: &[{kind}; {features}]) -> [i32; {objects}] {{\n    \
-         let mut margins = [{base}];\n{keys}{calls}    margins\n}}\n\n\
+         let {is_changed}margins = [{base}];\n{keys}{calls}    margins\n}}\n\n\
          /// The function that [`Model::with_code`](palpate_onboard::Model::with_code) takes.\n\
          pub fn margins(row: &[i32], margins: &mut [i32]) {{\n    \
          if let (Some(row), Some(margins)) = (row.first_chunk::<{features}>(), margins.first_chunk_mut()) {{\n        \
