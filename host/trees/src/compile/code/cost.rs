@@ -44,7 +44,7 @@ const M4F: Costs = Costs {
     step: 2.5,
     addition: 1.8,
     value: 7.4,
-    vote: 16.0,
+    vote: 32.0,
 };
 
 const M0_PLUS: Costs = Costs {
@@ -58,7 +58,7 @@ const M0_PLUS: Costs = Costs {
     step: 3.0,
     addition: 1.0,
     value: 9.2,
-    vote: 18.0,
+    vote: 36.0,
 };
 
 /// Comparisons and additions of one walk through all trees.
