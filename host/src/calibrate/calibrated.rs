@@ -3,7 +3,7 @@
 use super::choose::Chosen;
 use super::found::Found;
 use super::terms::Terms;
-use super::{OfRecorded, Per, Tally, binomial_tail};
+use super::{Per, Tally, binomial_tail};
 use crate::compile::{Restated, restate};
 use crate::error::Result;
 use crate::evidence::{Odds, margin_of};
@@ -14,6 +14,18 @@ use std::collections::BTreeMap;
 
 /// The share of rows that a table or weights must save to be kept.
 const SAVED: f64 = 0.05;
+
+/// Facts about a promise that was tested on recordings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct OfRecorded {
+    /// Approaches that were recorded to the object with the fewest.
+    pub approaches: usize,
+    /// Recordings that the sequences are of, where the data set lists any: sequences of one are not independent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recordings: Option<usize>,
+    /// Share of wrong names on simulated sequences at the thresholds that were kept.
+    pub simulated_error: f64,
+}
 
 /// A calibrated model, and what its calibration found.
 #[derive(Clone, Debug, Serialize)]

@@ -56,7 +56,7 @@ mod walk;
 pub use crate::evidence::{Lead, Limit, Odds, Sequence, margin_of, odds_of};
 pub(crate) use begin::Begin;
 pub(crate) use calibrated::Stated;
-pub use calibrated::{Calibrated, Gain, Guarded, OfObject, OfRows, Used, Worse};
+pub use calibrated::{Calibrated, Gain, Guarded, OfObject, OfRecorded, OfRows, Used, Worse};
 pub(crate) use choose::share_tested;
 pub use choose::{Chosen, choose};
 pub(crate) use choose::{Way, choose_independent};
@@ -66,8 +66,7 @@ pub use draw::{TouchSupply, follow};
 pub use found::Found;
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
 pub(crate) use groups::choose_groups;
-#[cfg(feature = "train")]
-pub use model::{OfRecorded, Settings, calibrate};
+pub use model::{Settings, calibrate};
 #[cfg(feature = "train")]
 pub(crate) use model::{Start, add_noise, begin, calibrate_from};
 pub use palpate_shared::format::Per;

@@ -20,7 +20,6 @@ use crate::progress::Progress;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Refused, Stopping};
 use palpate_shared::format::{Tag, Temperature};
-use serde::Serialize;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 
@@ -64,18 +63,6 @@ impl Default for Settings {
             seed: 1,
         }
     }
-}
-
-/// Facts about a promise that was tested on recordings.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct OfRecorded {
-    /// Approaches that were recorded to the object with the fewest.
-    pub approaches: usize,
-    /// Recordings that the sequences are of, where the data set lists any: sequences of one are not independent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub recordings: Option<usize>,
-    /// Share of wrong names on simulated sequences at the thresholds that were kept.
-    pub simulated_error: f64,
 }
 
 /// Sets a model's thresholds so that it keeps a promised error rate and uses it up, on touches that nothing was trained

@@ -14,9 +14,10 @@
 //! that is valid by itself. If the simulation is wrong, a promise that could have been made is missed, and none is broken.
 
 use super::calibrated::Calibrated;
+use super::calibrated::OfRecorded;
 use super::choose::{By, steps, summary, tallies};
 use super::error::{Enough, Forecast, GROWN, GROWTH, LIKELY};
-use super::model::{Material, OfRecorded, STRICTEST, Settings, add_noise, finished, noise_seed};
+use super::model::{Material, STRICTEST, Settings, add_noise, finished, noise_seed};
 use super::temperature::temperature;
 use super::terms::Terms;
 use super::walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};

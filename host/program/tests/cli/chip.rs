@@ -236,7 +236,7 @@ fn a_chip_that_is_reset_and_has_another_model_then_is_not_shown_with_the_names_o
     let own = std::fs::read(ONE_SPLIT.folder().join("model.palpate")).unwrap();
     for after in [own, Vec::new()] {
         let output = run(["link", &chip_that_is_reset(household.clone(), after)]);
-        assert!(String::from_utf8_lossy(&output.stdout).starts_with("model of 44336 bytes"));
+        assert!(String::from_utf8_lossy(&output.stdout).starts_with("model of 44324 bytes"));
         let error = stderr(output, 1);
         assert!(
             error.contains("the chip was reset and has another model than before. Load the model again"),
