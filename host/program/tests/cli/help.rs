@@ -89,7 +89,7 @@ fn completions_know_every_command_in_every_shell() {
         for command in commands.iter().flat_map(|path| path.split(' ')) {
             assert!(script.contains(command), "{shell}: {command}");
         }
-        assert!(script.contains("bad-line"), "{shell}");
+        assert!(script.contains("error-rate"), "{shell}");
     }
     fails(&Folder::new(), "completions tcsh", 2, "bash");
 }

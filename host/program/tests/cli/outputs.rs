@@ -1,7 +1,7 @@
 //! Output of commands: a file is replaced as by any tool, a directory that holds anything else only with `--force`.
 
 use crate::fixtures::ONE_SPLIT;
-use crate::{Folder, command, fails, globe, listing, read, stderr, succeeds};
+use crate::{Folder, command, complains, fails, globe, listing, palpate, read, stderr, succeeds};
 
 /// A file that a user might have where a command writes.
 const FOREIGN: &str = "// Recognizes with palpate_onboard.\nfn main() {}\n";
@@ -70,7 +70,7 @@ fn a_directory_that_holds_anything_else_is_refused() {
         for file in *files {
             std::fs::create_dir(&out).unwrap();
             std::fs::write(out.join(file), FOREIGN).unwrap();
-            fails(at, words, 1, file);
+            complains(palpate(at, words), words, 1, file);
             assert_eq!(std::fs::read_to_string(out.join(file)).unwrap(), FOREIGN, "{words}, {file}");
             let others: Vec<String> =
                 listing(&out).into_iter().filter(|other| other != file && other != ".lock").collect();

@@ -20,7 +20,7 @@ enum Command {
     Check(check::Arguments),
     /// Record touches of a real probe: from lines, a log, or a chip
     Record(Box<record::Arguments>),
-    /// Write built-in objects, meshes or maps of touched objects as OBJ files
+    /// Write built-in objects, meshes or maps of touched objects as OBJ
     Objects(Box<objects::Arguments>),
 }
 
