@@ -249,12 +249,10 @@ fn damaged_models_of_a_minute_are_taken_or_refused_alike_and_give_the_same_answe
 /// the same.
 fn damaged(most: u64, seconds: Option<u64>) {
     let seed = set("PALPATE_FUZZ_SEED").unwrap_or(1);
-    let code = std::fs::read(Path::new(ROOT).join("onboard/firmware/src/code/softmax.palpate")).unwrap();
     let mut models = all_models(&mut SmallRng::seed_from_u64(2));
     models.extend(cuts().into_iter().map(|(_, base, _)| base));
     // Of small ones a change often hits what is checked; one large model is there for lengths beyond two bytes.
     models.retain(|bytes| bytes.len() < 3_000);
-    models.push(code);
     let parts: Vec<Parts> = models.iter().map(Vec::as_slice).chain([HOUSEHOLD]).map(Parts::of).collect();
     let (next, began) = (AtomicU64::new(0), Instant::now());
     let is_over = |number: u64| {
