@@ -199,7 +199,10 @@ pub(crate) fn capture(
         within,
         approaches: approaches || position,
         scene: cone.or(position.then_some(0.0)).map_or(Surroundings::Floating, |cone| Surroundings::Table { cone }),
-        samples: samples.map(|(first, end)| format!("{first}..{end}").parse::<Samples>()).transpose().map_err(Error::from)?,
+        samples: samples
+            .map(|(first, end)| format!("{first}..{end}").parse::<Samples>())
+            .transpose()
+            .map_err(Error::from)?,
         ..Origin::default()
     };
     let settings = with!(Settings::default(), origin, force, threads);

@@ -11,9 +11,7 @@ use palpate::ensemble::feature_row;
 use palpate::error::Error;
 use palpate::shared::format::Length;
 use palpate::shared::{Q15_ONE, Touch};
-use palpate::touches::{
-    Dataset, Listing, ObjectTouches, Origin, Surroundings, folds, located, touch_of_seconds,
-};
+use palpate::touches::{Dataset, Listing, ObjectTouches, Origin, Surroundings, folds, located, touch_of_seconds};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use std::path::PathBuf;
@@ -294,7 +292,8 @@ impl DataSet {
     /// Number of the robot that made each touch: all touches of a sequence are from one; `None` if robots do not differ.
     #[getter]
     fn robots<'py>(&self, py: Python<'py>) -> PyResult<Option<Output<'py, i64, Ix1>>> {
-        let of = |object: &ObjectTouches| (0..object.len()).filter_map(|touch| object.robot_of(touch)).collect::<Vec<_>>();
+        let of =
+            |object: &ObjectTouches| (0..object.len()).filter_map(|touch| object.robot_of(touch)).collect::<Vec<_>>();
         let all: Vec<i64> = self.dataset.objects.iter().flat_map(of).map(i64::from).collect();
         if all.len() < self.dataset.len() {
             return Ok(None);

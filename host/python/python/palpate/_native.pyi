@@ -441,8 +441,8 @@ class Model:
     def emit(self, /, path: str | PathLike[str], *, form: str | None = None) -> list[Path]:
         """
         Writes the model as source code, and returns the files. `form` is "c" (an array), "rust", "c-code" (trees as C) or
-        "rust-code" (trees as Rust); without it a name that ends in ".h" means "c", and ".rs" "rust". What has to be built with
-        it, such as palpate.h, is written beside it, and for trees as Rust the model.
+        "rust-code" (trees as Rust); without it a name that ends in ".h" means "c", and ".rs" "rust". What has to be built with it,
+        such as palpate.h, is written beside it, and for trees as Rust the model.
         """
     @property
     def features(self, /) -> list[str]:
