@@ -101,4 +101,4 @@ def test_every_form_is_written_and_what_there_is_no_form_for_is_refused_by_name(
             emitted.emit(tmp_path / path, form=form)
     (tmp_path / "own.h").write_text("int own;\n")
     model.emit(tmp_path / "own.h")
-    assert "int own" not in (tmp_path / "own.h").read_text()
+    assert not (tmp_path / "own.h").read_text().startswith("int own;")
