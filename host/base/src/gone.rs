@@ -49,8 +49,8 @@ const GONE: &[(&str, &str)] = &[
     ("depth image", "make a mesh of the depth images first (docs/guide/scenes.md)"),
 ];
 
-/// What to use instead of `word`, if it went: the line of a command (`probe design`), an option (`--layout`), an option with
-/// a value (`--emit thumb`), or the ending of a file name (`.pcd`).
+/// Advice for a word that was removed: a command (`probe design`), an option (`--layout`), an option with a value
+/// (`--emit thumb`), or the ending of a file name (`.pcd`). `None` for any other word.
 pub fn instead(word: &str) -> Option<&'static str> {
     GONE.iter().find(|(gone, _)| *gone == word).map(|(_, instead)| *instead)
 }

@@ -111,7 +111,7 @@ def test_a_table_comes_back_as_the_same_touches_also_through_parquet(tmp_path: P
         table.to_parquet(tmp_path / f"{number}.parquet")
         read = pandas.read_parquet(tmp_path / f"{number}.parquet")
         same(palpate.DataSet.from_pandas(read), data)
-        # As other programs write it: names as text, and nulls.
+        # Other programs write names as text, and nulls.
         plain = table.astype({"object": str}).convert_dtypes()
         same(palpate.DataSet.from_pandas(plain), data)
     assert {"instance", "robot", "position_z", "alignment_x"} <= set(table.columns)

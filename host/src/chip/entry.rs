@@ -1,4 +1,4 @@
-//! What happens on a link, as lines of JSON for programs and lines of text for people.
+//! Events of a link, as lines of JSON for programs and lines of text for people.
 
 use super::{ChipModel, Update};
 use palpate_shared::Pose;

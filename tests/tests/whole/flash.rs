@@ -48,7 +48,7 @@ fn model_in<'m>(cells: &mut Cells, built_in: &[u8], models: &[&'m [u8]]) -> Opti
     models.iter().find(is).copied()
 }
 
-/// What a chip's flash holds after a load, in words that are erased to this value.
+/// Content of a chip's flash after a load, in words that are erased to this value.
 fn after_a_load(erased: u8) -> Vec<u8> {
     let mut cells = cells().erased_to(erased);
     run(&mut cells, model(1), &mut Desk::new(load(model(2)), 0)).unwrap();

@@ -1,4 +1,4 @@
-//! What a chip's program reads and writes in tests.
+//! Stream of a chip's program in tests.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;

@@ -457,7 +457,7 @@ def _features(table: Any, descriptor: str) -> Any:
     if len(table) == 0:
         features = DataSet.from_arrays([[0.0, 0.0, 0.0]], [0], ["x"]).features(descriptor)[:0]
     else:
-        # As those of one object, whose rows keep their order.
+        # Rows of an object keep their order.
         features = DataSet.from_pandas(table.assign(object="x")).features(descriptor)
     return pd.DataFrame(features, columns=[f"f{i}" for i in range(features.shape[1])], index=table.index)
 

@@ -169,7 +169,7 @@ impl Plain {
 /// A model's meaning, and the ensemble that it is compared with.
 #[derive(Clone, Copy)]
 struct Subject<'s> {
-    /// As the chip reads it.
+    /// Model that the chip reads.
     model: Model<'s>,
     plain: &'s Plain,
     /// The ensemble's trees, over the model's keys.

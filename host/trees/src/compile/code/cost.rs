@@ -131,7 +131,7 @@ impl Program {
         self.instructions_of(work)
     }
 
-    /// Those of a row of keys.
+    /// Instructions for a row of keys.
     #[cfg(test)]
     pub(super) fn instructions_of_row(&self, keys: &[i32]) -> Instructions {
         let ranks = self.ranks(keys);
