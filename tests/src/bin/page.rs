@@ -16,7 +16,10 @@ use palpate_tests::page::trace;
 
 fn main() -> Result<()> {
     let models = std::env::args().skip(1).map(CompiledModel::read).collect::<Result<Vec<_>>>()?;
-    let surfaces = play::surfaces(&builtin::all()?, &Origin::default())?;
+    let mut objects = builtin::all()?;
+    // The page has them in the order of their names.
+    objects.sort_by(|one, other| one.name.cmp(&other.name));
+    let surfaces = play::surfaces(&objects, &Origin::default())?;
     print!("{}", trace(&surfaces, &models, &Noise::switch(), 10)?);
     Ok(())
 }
