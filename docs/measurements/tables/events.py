@@ -83,7 +83,7 @@ def debounced(logs, count):
 
 
 def begun_again(logs, nats, most):
-    """The class that leads all others together by so many nats; after it, or after so many rows, sums begin again."""
+    """The class whose lead over all others reaches a number of nats; after it, or after a number of rows, sums begin again."""
     said, sums, count = np.full(len(logs), -1), np.zeros(logs.shape[1]), 0
     for row, own in enumerate(logs):
         sums, count = sums + own, count + 1

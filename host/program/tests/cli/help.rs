@@ -76,7 +76,7 @@ fn what_was_removed_is_refused_with_what_to_use_instead() {
     ] {
         fails(at, words, 2, "was removed: ");
     }
-    // It is not taken for a similar word.
+    // No similar word is suggested.
     let message = stderr(palpate(at, "tune data"), 2);
     assert!(message.contains("--preset small") && !message.contains("similar"), "{message}");
 }
