@@ -14,11 +14,9 @@
 //! | `weight=5` | the least sum of second derivatives in a leaf; 30 |
 //! | `bins=48` | the most bins of a feature |
 //! | `i8` | leaves of one byte instead of two |
-//! | `size` | the smallest layout instead of the balanced one |
-//! | `patterns` | tables instead of trees |
 
 use palpate::capture;
-use palpate::compile::{self, Goal, Layout, Leaf};
+use palpate::compile::{self, Leaf};
 use palpate::ensemble::Ensemble;
 use palpate::ensemble::train::{self, train};
 use palpate::evaluate::{Candidate, Margins, SequentialSettings};
@@ -120,8 +118,6 @@ impl Way {
                 ("weight", value) => settings.min_child_weight = value.parse()?,
                 ("bins", value) => settings.bins = value.parse()?,
                 ("i8", "") => compile.leaf = Leaf::I8,
-                ("size", "") => compile.goal = Goal::Size,
-                ("patterns", "") => compile.layout = Some(Layout::Patterns),
                 _ => return Err(format!("{part}: not a part of a way").into()),
             }
         }

@@ -20,7 +20,7 @@
  * Every function is `static inline`: include it in the one file that recognizes; only called functions take flash.
  *
  * Macros that may be defined before the #include:
- *   PALPATE_LAYOUTS      layouts to read, such as PALPATE_COMPACT | PALPATE_COMPLETE; all by default
+ *   PALPATE_LAYOUTS      layouts to read, such as PALPATE_COMPACT; all of data by default
  *   PALPATE_LEAVES       types of leaves to read, such as PALPATE_I8; all by default
  *   PALPATE_SHARED       0: rejects models that store equal leaves once, in a table
  *   PALPATE_SENTINEL     0: rejects models over rows in which a number stands for a missing value
@@ -40,18 +40,15 @@
 
 /* Layouts. `palpate export` and `palpate inspect` say which one a model has. */
 #define PALPATE_COMPACT 1
-#define PALPATE_COMPLETE 2
-#define PALPATE_GRID 4
-#define PALPATE_WIDE 8
-#define PALPATE_PATTERNS 16
-#define PALPATE_CODE 64 /* trees that are a function, which `palpate export` wrote too: not among the layouts by default */
+#define PALPATE_WIDE 2
+#define PALPATE_CODE 4 /* trees that are a function, which `palpate export` wrote too: not among the layouts by default */
 /* Types of leaves. */
 #define PALPATE_I8 1
 #define PALPATE_I16 2
 #define PALPATE_F32 4
 
 #ifndef PALPATE_LAYOUTS
-#define PALPATE_LAYOUTS 31
+#define PALPATE_LAYOUTS 3
 #endif
 #ifndef PALPATE_LEAVES
 #define PALPATE_LEAVES 7
@@ -244,14 +241,10 @@ enum { PALPATE_TEXT_, PALPATE_OPTIONAL_, PALPATE_MARGINS_, PALPATE_AXES_, PALPAT
     (PALPATE_LAYOUTS == (bit) || ((PALPATE_LAYOUTS & (bit)) != 0 && (model)->layout_ == (code)))
 #define PALPATE_IS_LEAF_(model, bit, code) \
     (PALPATE_LEAVES == (bit) || ((PALPATE_LEAVES & (bit)) != 0 && (model)->leaf_ == (code)))
-#define PALPATE_IS_COMPACT_(model) PALPATE_IS_LAYOUT_(model, PALPATE_COMPACT, 0)
-#define PALPATE_IS_COMPLETE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_COMPLETE, 1)
-#define PALPATE_IS_GRID_(model) PALPATE_IS_LAYOUT_(model, PALPATE_GRID, 2)
-#define PALPATE_IS_WIDE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_WIDE, 3)
-#define PALPATE_IS_PATTERNS_(model) PALPATE_IS_LAYOUT_(model, PALPATE_PATTERNS, 4)
-#define PALPATE_IS_CODE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_CODE, 6)
+#define PALPATE_IS_WIDE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_WIDE, 1)
+#define PALPATE_IS_CODE_(model) PALPATE_IS_LAYOUT_(model, PALPATE_CODE, 2)
 /* True if leaves are indices into a table. */
-#define PALPATE_IS_SHARED_(model) (PALPATE_SHARED && (PALPATE_LAYOUTS & 11) != 0 && (model)->table_ != NULL)
+#define PALPATE_IS_SHARED_(model) (PALPATE_SHARED && (PALPATE_LAYOUTS & 3) != 0 && (model)->table_ != NULL)
 #define PALPATE_IS_I8_(model) PALPATE_IS_LEAF_(model, PALPATE_I8, 0)
 #define PALPATE_IS_I16_(model) PALPATE_IS_LEAF_(model, PALPATE_I16, 1)
 #define PALPATE_IS_F32_(model) PALPATE_IS_LEAF_(model, PALPATE_F32, 2)
@@ -530,8 +523,7 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 }
             } else if (PALPATE_SHARED && (PALPATE_LAYOUTS & 11) != 0 && last == 12) {
                 /* Tables of margins have no leaves to share. */
-                if (!palpate_holds_(length, 4, 0, 0) || PALPATE_BYTE(content) - 1u > 1 || PALPATE_IS_GRID_(model) ||
-                    PALPATE_IS_PATTERNS_(model)) {
+                if (!palpate_holds_(length, 4, 0, 0) || PALPATE_BYTE(content) - 1u > 1) {
                     return PALPATE_FIELD;
                 }
                 model->table_ = content + 4;
@@ -630,26 +622,6 @@ static inline palpate_error palpate_check_axes_(palpate_model *model)
     return PALPATE_OK;
 }
 
-/* The cells of a table; 0 if the model does not have its axes. */
-static inline uint32_t palpate_cells_(const palpate_model *model)
-{
-    const uint8_t *axis = model->part_[PALPATE_AXES_];
-    uint32_t axes = palpate_between_(axis, model->cuts_) / 4, first, second;
-    if (axes < 2) {
-        return 0;
-    }
-    first = PALPATE_BYTE(axis + 3);
-    second = PALPATE_BYTE(axis + 7);
-    if (PALPATE_IS_GRID_(model)) {
-        return axes != 2 ? 0 : (first + 2) * (second + 2);
-    }
-    if (axes != 3 || PALPATE_BYTE(axis) != 1 || PALPATE_BYTE(axis + 4) != 2 || PALPATE_BYTE(axis + 8) != 3 ||
-        model->descriptor != 4) {
-        return 0;
-    }
-    return 5 + PALPATE_AS_(uint32_t, PALPATE_BYTE(axis + 11)) + second + (first + 1) * (second + 1);
-}
-
 /* Groups whose splits and leaves fill their parts exactly, and whose margins stay within 2^30. */
 static inline palpate_error palpate_check_groups_(palpate_model *model)
 {
@@ -660,27 +632,13 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
     uint32_t range = PALPATE_AS_(uint32_t, 1) << 20, most = 0;
     uint_fast16_t object;
     uint_fast8_t shift = 24;
-    if (PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model)) {
-        const uint32_t cells = palpate_cells_(model);
-        const uint32_t size = model->objects * PALPATE_AS_(uint32_t, palpate_leaf_size_(model));
-        if (cells == 0) {
-            return palpate_wrong_(model, PALPATE_SECTION, model->part_[PALPATE_AXES_]);
-        }
-        if (!palpate_holds_(palpate_between_(leaves, end), 0, cells, size)) {
-            return palpate_wrong_(model, PALPATE_SECTION, leaves);
-        }
-        leaves += cells * size;
-        if (group != splits) {
-            return palpate_wrong_(model, PALPATE_SECTION, group);
-        }
-    }
     if (PALPATE_IS_CODE_(model) && group != splits) {
         return palpate_wrong_(model, PALPATE_SECTION, group);
     }
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
         uint32_t trees = palpate_u32_(group + 4), leaf = PALPATE_AS_(uint32_t, palpate_leaf_size_(model)), length, table = 0;
         const uint8_t *number = leaves;
-        uint8_t depth = PALPATE_BYTE(group), one = PALPATE_BYTE(group + 2);
+        uint8_t one = PALPATE_BYTE(group + 2);
         int fits = 1;
         if (PALPATE_BYTE(group + 1) > shift || one > 1 || (one != 0 && PALPATE_BYTE(group + 3) >= model->objects) ||
             (PALPATE_IS_F32_(model) && PALPATE_BYTE(group + 1) != 0)) {
@@ -703,23 +661,14 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
             leaf = PALPATE_BYTE(model->table_ - 4);
             table = palpate_u32_(model->table_ - 8);
         }
-        if (PALPATE_IS_COMPLETE_(model) ? depth - 1u > 7 : depth != 0) {
-            return palpate_wrong_(model, PALPATE_FIELD, group);
-        }
         for (; trees != 0 && fits; trees--) {
-            const uint32_t rest = palpate_between_(splits, model->part_[PALPATE_LEAVES_]);
-            /* A complete tree has two bytes for each leaf, others a head and their splits. */
-            uint32_t head = 0, node = 2, nodes = PALPATE_AS_(uint32_t, 1) << depth, own = nodes;
-            if (!PALPATE_IS_COMPLETE_(model)) {
-                head = 2;
-                node = PALPATE_IS_WIDE_(model) ? 6 : 3;
-                nodes = palpate_holds_(rest, head, 0, 0) ? palpate_u16_(splits) : 0;
-                own = nodes + 1;
-            }
-            fits = palpate_holds_(rest, head, nodes, node) && palpate_holds_(palpate_between_(leaves, end), 0, own, leaf);
+            /* A number of splits, and the splits. */
+            const uint32_t rest = palpate_between_(splits, model->part_[PALPATE_LEAVES_]), node = PALPATE_IS_WIDE_(model) ? 6 : 3;
+            const uint32_t nodes = palpate_holds_(rest, 2, 0, 0) ? palpate_u16_(splits) : 0;
+            fits = palpate_holds_(rest, 2, nodes, node) && palpate_holds_(palpate_between_(leaves, end), 0, nodes + 1, leaf);
             if (fits) {
-                splits += PALPATE_AS_(size_t, head + nodes * node);
-                leaves += PALPATE_AS_(size_t, own * leaf);
+                splits += PALPATE_AS_(size_t, 2 + nodes * node);
+                leaves += PALPATE_AS_(size_t, (nodes + 1) * leaf);
             }
         }
         if (!fits) {
@@ -769,7 +718,7 @@ static inline uint8_t palpate_wrong_number_(const uint8_t *bytes)
 static inline uint8_t palpate_wrong_header_(palpate_model *model)
 {
     const uint8_t *bytes = model->bytes;
-    if (model->layout_ > 4 && model->layout_ != 6) {
+    if (model->layout_ > 2) {
         return 6;
     }
     if (model->leaf_ > 2) {
@@ -805,8 +754,7 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
     if (length < 96) {
         return palpate_wrong_(model, PALPATE_LENGTH, bytes + length);
     }
-    i = palpate_u16_(bytes + 4);
-    if (i - 1 > 1) {
+    if (palpate_u16_(bytes + 4) != 3) {
         return palpate_wrong_(model, PALPATE_VERSION, bytes + 4);
     }
     rest = palpate_u32_(bytes + 8);
@@ -830,7 +778,7 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
     model->features = PALPATE_AS_(uint16_t, PALPATE_BYTE(bytes + 15) + 1);
     /* The parts follow each other. */
     lengths[PALPATE_TEXT_] = palpate_u32_(bytes + 68);
-    lengths[PALPATE_OPTIONAL_] = i == 1 ? 0 : palpate_u32_(bytes + 92);
+    lengths[PALPATE_OPTIONAL_] = palpate_u32_(bytes + 92);
     lengths[PALPATE_MARGINS_] = 8 * PALPATE_AS_(uint32_t, model->objects);
     i = 4 * palpate_u16_(bytes + 16);
     rest = palpate_u32_(bytes + 80);
@@ -855,7 +803,7 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
     if (model->wrong != 0) {
         return PALPATE_FIELD;
     }
-    if ((PALPATE_LAYOUTS & PALPATE_CODE) != 0 && model->layout_ == 6 && model->leaf_ == 2) {
+    if ((PALPATE_LAYOUTS & PALPATE_CODE) != 0 && model->layout_ == 2 && model->leaf_ == 2) {
         return palpate_wrong_(model, PALPATE_FIELD, bytes + 7);
     }
     if ((PALPATE_LAYOUTS >> model->layout_ & 1) == 0) {
@@ -1147,16 +1095,6 @@ PALPATE_APART_ void palpate_add_leaf_(const palpate_model *model, uint32_t *sums
     }
 }
 
-/* The number of the leaf that is reached in a complete tree of this many slots. */
-PALPATE_APART_ size_t palpate_walk_complete_(const uint8_t *ranks, const uint8_t *columns, const uint8_t *thresholds, size_t slots)
-{
-    size_t slot = 1;
-    do {
-        slot = 2 * slot + (ranks[PALPATE_BYTE(columns + slot)] > PALPATE_BYTE(thresholds + slot));
-    } while (slot < slots);
-    return slot - slots;
-}
-
 /* The number of the leaf that is reached in a compact tree of `below` splits. */
 PALPATE_APART_ uint32_t palpate_walk_compact_(const uint8_t *ranks, const uint8_t *split, uint32_t below)
 {
@@ -1242,9 +1180,8 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     const uint8_t *group = model->part_[PALPATE_GROUPS_], *splits = model->part_[PALPATE_SPLITS_];
     const uint8_t *leaves = model->part_[PALPATE_LEAVES_], *cuts = model->cuts_, *axis = model->part_[PALPATE_AXES_];
     const uint8_t *base = model->part_[PALPATE_MARGINS_];
-    const int table = PALPATE_IS_GRID_(model) || PALPATE_IS_PATTERNS_(model);
     const size_t size = palpate_leaf_size_(model);
-    uint32_t words[64], cell = 0;
+    uint32_t words[64];
     uint8_t *ranks = PALPATE_AT_(uint8_t *, words);
     uint_fast16_t i;
     uint_fast8_t last;
@@ -1255,8 +1192,8 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
     }
 #endif
     for (i = 0; i < model->objects; i++) {
-        /* f32 values are added from the base on; to a table's nothing is, which -0 does not change. */
-        sums[i] = !PALPATE_IS_F32_(model) ? 0 : table ? 0x80000000u : palpate_u32_(base + 4 * PALPATE_AS_(size_t, i));
+        /* f32 values are added from the base on. */
+        sums[i] = PALPATE_IS_F32_(model) ? palpate_u32_(base + 4 * PALPATE_AS_(size_t, i)) : 0;
     }
     /* Columns beyond the last have rank 0. */
     for (i = 0; i < 64; i += 4) {
@@ -1274,52 +1211,17 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
             right = left;
         }
         cuts += PALPATE_AS_(size_t, width) * most;
-        if (PALPATE_IS_GRID_(model)) {
-            cell = cell * (most + 2u) + (value == PALPATE_MISSING_FEATURE ? most + 1u : left);
-        } else if (PALPATE_IS_PATTERNS_(model)) {
+        if ((columns & 1) != 0) {
             *ranks++ = left;
-        } else {
-            if ((columns & 1) != 0) {
-                *ranks++ = left;
-            }
-            if ((columns & 2) != 0) {
-                *ranks++ = right;
-            }
+        }
+        if ((columns & 2) != 0) {
+            *ranks++ = right;
         }
     }
     ranks = PALPATE_AT_(uint8_t *, words);
-    if (table) {
-        if (PALPATE_IS_PATTERNS_(model)) {
-            const uint32_t m = PALPATE_BYTE(model->part_[PALPATE_AXES_] + 7), l = PALPATE_BYTE(model->part_[PALPATE_AXES_] + 11);
-            switch (palpate_value_(model, features, count, 0)) {
-            case 1:
-                cell = 1;
-                break;
-            case 2:
-                cell = 2;
-                break;
-            case 3:
-                cell = 3 + PALPATE_AS_(uint32_t, ranks[2]);
-                break;
-            case 4:
-                cell = 4 + l + ranks[1];
-                break;
-            case 5:
-                cell = 5 + l + m + ranks[0] * (m + 1) + ranks[1];
-                break;
-            default:
-                cell = 0;
-            }
-        }
-        palpate_add_leaf_(model, sums, model->objects, leaves + PALPATE_AS_(size_t, cell) * model->objects * size);
-        for (i = 0; PALPATE_IS_I8_(model) && i < model->objects; i++) {
-            sums[i] -= 128;
-        }
-        return;
-    }
     last = group != splits ? PALPATE_BYTE(group + 1) : 0;
     for (; group != model->part_[PALPATE_SPLITS_]; group += 8) {
-        const uint8_t depth = PALPATE_BYTE(group), shift = PALPATE_BYTE(group + 1);
+        const uint8_t shift = PALPATE_BYTE(group + 1);
         const int one = PALPATE_BYTE(group + 2) != 0;
         const uint16_t values = one ? 1 : model->objects;
         const size_t length = size * values;
@@ -1332,32 +1234,19 @@ static inline void palpate_sum_(const palpate_model *model, const int32_t *featu
         for (i = 0; PALPATE_IS_I8_(model) && i < values; i++) {
             first[i] -= trees << 7;
         }
-        if (PALPATE_IS_COMPLETE_(model)) {
-            const size_t slots = PALPATE_AS_(size_t, 1) << depth;
-            const uint8_t *thresholds = splits + PALPATE_AS_(size_t, trees << depth);
-            for (; trees != 0; trees--) {
-                const size_t leaf = palpate_walk_complete_(ranks, splits, thresholds, slots);
-                palpate_add_leaf_(model, first, values, palpate_values_(model, leaves + leaf * stored, length));
-                splits += slots;
-                thresholds += slots;
-                leaves += slots * stored;
+        for (; trees != 0; trees--) {
+            const uint32_t all = palpate_u16_(splits);
+            uint32_t leaf;
+            splits += 2;
+            if (PALPATE_IS_WIDE_(model)) {
+                leaf = palpate_walk_wide_(model, features, count, splits, all);
+                splits += PALPATE_AS_(size_t, all * 6);
+            } else {
+                leaf = palpate_walk_compact_(ranks, splits, all);
+                splits += PALPATE_AS_(size_t, all * 3);
             }
-            splits = thresholds;
-        } else {
-            for (; trees != 0; trees--) {
-                const uint32_t all = palpate_u16_(splits);
-                uint32_t leaf;
-                splits += 2;
-                if (PALPATE_IS_WIDE_(model)) {
-                    leaf = palpate_walk_wide_(model, features, count, splits, all);
-                    splits += PALPATE_AS_(size_t, all * 6);
-                } else {
-                    leaf = palpate_walk_compact_(ranks, splits, all);
-                    splits += PALPATE_AS_(size_t, all * 3);
-                }
-                palpate_add_leaf_(model, first, values, palpate_values_(model, leaves + PALPATE_AS_(size_t, leaf) * stored, length));
-                leaves += PALPATE_AS_(size_t, all + 1) * stored;
-            }
+            palpate_add_leaf_(model, first, values, palpate_values_(model, leaves + PALPATE_AS_(size_t, leaf) * stored, length));
+            leaves += PALPATE_AS_(size_t, all + 1) * stored;
         }
     }
     if (!PALPATE_IS_F32_(model)) {

@@ -63,8 +63,7 @@
 //! | `effector` | [`effector`]; off by default |
 //! | `link` | [`shared`]`::link`; off by default |
 //! | `station` | [`station`], with both of these; off by default |
-//! | `compact`, `complete`, `wide` | layouts of trees that can be read |
-//! | `grid`, `patterns` | layouts of tables that can be read |
+//! | `compact`, `wide` | splits of three bytes, and of six |
 //! | `code` | models whose trees are a function of the program (`Model::with_code`); off by default |
 //! | `i8-leaves`, `i16-leaves`, `f32-leaves` | types of leaves that can be read |
 //! | `shared-leaves` | trees whose equal leaves are stored once |

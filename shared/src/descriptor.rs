@@ -246,23 +246,6 @@ impl Descriptor {
         Features { values, len: self.length() }
     }
 
-    /// The features of [`Descriptor::Curvature`] of a full touch that is over within four seconds, as nearly all are; `None`
-    /// for others; [`Descriptor::features`] has those.
-    ///
-    /// Cost: less than that of [`Descriptor::features`], since nothing can be missing or reach a limit.
-    #[inline]
-    pub fn short_curvature(touch: &Touch) -> Option<[i32; 2]> {
-        let [first, middle, last] = touch.times();
-        // One by one: as an array they would go through memory. A missing contact is the largest number.
-        let number = |time: ContactTime| time.micros().unwrap_or(u32::MAX);
-        let (first, middle, last) = (number(first), number(middle), number(last));
-        if (first | middle | last) >> 22 != 0 {
-            return None;
-        }
-        let (first, middle, last) = (first.cast_signed(), middle.cast_signed(), last.cast_signed());
-        Some([first - 2 * middle + last, (last - first).abs()])
-    }
-
     /// Adds what the pose gives: after the first four features; without a pattern, already where the last two of them are.
     fn put_pose(self, pose: &Pose, ends: [i32; 2], values: &mut [i32; MAX_FEATURES]) {
         const NONE: i32 = MISSING_FEATURE;
@@ -329,25 +312,6 @@ mod tests {
         let mut times = [ContactTime::MISSING; 3];
         times[finger] = ContactTime::FIRST;
         Touch::new(times)
-    }
-
-    #[test]
-    fn short_full_touches_have_the_same_curvature_without_the_way_through_features() {
-        let longest = (1 << 22) - 1;
-        let times = [0, 1, 7, 30_000, 50_000, longest, longest + 1, 1 << 28, u32::MAX - 1, u32::MAX];
-        for first in times {
-            for middle in times {
-                for last in times {
-                    let touch = Touch::new([first, middle, last].map(ContactTime::from_micros));
-                    let is_short = touch.is_full() && touch.spread() <= longest;
-                    let short = Descriptor::short_curvature(&touch);
-                    assert_eq!(short.is_some(), is_short);
-                    if let Some(short) = short {
-                        assert_eq!(Descriptor::Curvature.features(&touch).as_slice(), short);
-                    }
-                }
-            }
-        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Every way to abuse a model file: bytes that a reader must refuse, and why. `shared/FORMAT.md` lists them by name.
 
 use crate::random::{self, Shape};
+use crate::wide::widened;
 use crate::replay::groups_and_splits;
 use crate::sections::{trained, with_sections};
 use crate::vectors::{Cut, Run};
@@ -44,22 +45,21 @@ pub fn kind(error: &ModelError) -> &'static str {
 
 /// A small model.
 pub fn model(layout: Layout, leaf: Leaf, each: bool) -> Vec<u8> {
-    // Tables by contact pattern have no other descriptor.
-    let descriptor = if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { Descriptor::Curvature };
-    let shape = Shape { descriptor, objects: 3, trees: 4, depth: 2, each, thresholds: 6, leaf: 1.0 };
-    let settings = with!(Settings::default(), leaf, layout = Some(layout));
-    compile(&random::ensemble(shape, 5), &settings).expect("a small ensemble").bytes
+    let shape =
+        Shape { descriptor: Descriptor::Curvature, objects: 3, trees: 4, depth: 2, each, thresholds: 6, leaf: 1.0 };
+    let settings = with!(Settings::default(), leaf);
+    let bytes = compile(&random::ensemble(shape, 5), &settings).expect("a small ensemble").bytes;
+    if layout == Layout::Wide { widened(&bytes) } else { bytes }
 }
 
 /// A small model whose leaves are shared: numbers of one byte, or of two.
 pub fn shared(layout: Layout, is_wide: bool) -> Vec<u8> {
-    let trees = if is_wide { 80 } else { 4 };
+    let (trees, different) = if is_wide { (800, 300) } else { (16, 5) };
     let shape =
         Shape { descriptor: Descriptor::Curvature, objects: 3, trees, depth: 2, each: true, thresholds: 6, leaf: 1.0 };
-    let settings = with!(Settings::default(), leaf = Leaf::I8, layout = Some(layout), shared_leaves = Some(true));
-    let ensemble = random::ensemble(shape, 5);
-    let ensemble = if is_wide { ensemble } else { random::with_few_leaves(ensemble, 5) };
-    compile(&ensemble, &settings).expect("a small ensemble").bytes
+    let ensemble = random::with_few_leaves(random::ensemble(shape, 5), different);
+    let bytes = compile(&ensemble, &with!(Settings::default(), leaf = Leaf::I8)).expect("a small ensemble").bytes;
+    if layout == Layout::Wide { widened(&bytes) } else { bytes }
 }
 
 /// Puts the checksum right.
@@ -146,7 +146,6 @@ pub fn cases() -> Vec<Abuse> {
     sections(&mut put);
     axes(&mut put);
     groups(&mut put);
-    tables(&mut put);
     predictions(&mut put);
     sequences(&mut put);
     shared_leaves(&mut put);
@@ -328,13 +327,9 @@ fn axes(put: Put<'_>) {
 
 /// Groups and their contributions.
 fn groups(put: Put<'_>) {
-    for (layout, name) in [(Layout::Compact, "compact"), (Layout::Complete, "complete"), (Layout::Wide, "wide")] {
+    for (layout, name) in [(Layout::Compact, "compact"), (Layout::Wide, "wide")] {
         let good = model(layout, Leaf::I8, true);
         let [.., groups, splits, _, _] = places(&good);
-        let depth = if layout == Layout::Complete { [0, 9] } else { [1, 255] };
-        for depth in depth {
-            put(&format!("{name} trees of depth {depth}"), "field", groups, changed(&good, groups, &[depth]));
-        }
         let few = [0, 0, 1, 0];
         put(&format!("65,536 {name} trees"), "section", splits, changed(&good, groups + 4, &few));
     }
@@ -351,40 +346,6 @@ fn groups(put: Put<'_>) {
     let good = model(Layout::Compact, Leaf::F32, true);
     let [.., groups, _, _, _] = places(&good);
     put("a shift of f32 leaves", "field", groups, changed(&good, groups + 1, &[1]));
-}
-
-/// Tables.
-fn tables(put: Put<'_>) {
-    let good = model(Layout::Grid, Leaf::I8, true);
-    let [_, _, axes, _, groups, _, leaves, end] = places(&good);
-    let table = |bytes: &mut Vec<u8>| {
-        bytes.splice(groups..groups, [0; 8]);
-        bytes[18] = 1;
-    };
-    let mut grouped = good.clone();
-    table(&mut grouped);
-    put("a grid with a group", "section", groups, longer(&grouped, &[]));
-    let mut split = good.clone();
-    split.splice(leaves..leaves, [0; 4]);
-    split[84] = 4;
-    put("a grid with splits", "section", leaves, longer(&split, &[]));
-    let mut cells = good.clone();
-    cells.remove(end - 1);
-    cells[88..92].copy_from_slice(&((end - leaves - 1) as u32).to_le_bytes());
-    put("a grid with a value too few", "section", leaves, longer(&cells, &[]));
-    put("a grid of another kind of trees", "section", axes, changed(&model(Layout::Compact, Leaf::I8, true), 6, &[4]));
-    let mut one = good.clone();
-    let gone = usize::from(one[axes + 6]) * usize::from(one[axes + 7]);
-    let last = groups - gone..groups;
-    one.drain(last);
-    one.drain(axes + 4..axes + 8);
-    one[16] = 1;
-    one[80..84].copy_from_slice(&((groups - axes - 8 - gone) as u32).to_le_bytes());
-    put("a grid over one axis", "section", axes, longer(&one, &[]));
-    let good = model(Layout::Patterns, Leaf::I8, true);
-    let [_, _, axes, ..] = places(&good);
-    put("tables by pattern with axes in another order", "section", axes, changed(&good, axes, &[2]));
-    put("tables by pattern of another descriptor", "section", axes, changed(&good, 12, &[Descriptor::Gravity.code()]));
 }
 
 /// Damage to a model's prediction and its missing values.
@@ -494,15 +455,9 @@ fn shared_leaves(put: Put<'_>) {
     let [.., first, _] = places(&cut);
     put("a leaf that is cut", "field", first, cut);
     put("numbers of leaves that are twice as long", "section", splits_of(&good), changed(&good, content, &[2]));
-    let wide = shared(Layout::Complete, true);
+    let wide = shared(Layout::Compact, true);
     let [.., end] = places(&wide);
     put("a long number of a leaf that does not exist", "field", end - 2, changed(&wide, end - 1, &[0xff]));
-    for layout in [Layout::Grid, Layout::Patterns] {
-        let table = model(layout, Leaf::I8, true);
-        let [at, ..] = places(&table);
-        let bytes = with_sections(&table, &section(tag, &[&[1, 0, 0, 0][..], &[128; 9]].concat()));
-        put(&format!("shared leaves of {}", layout.name()), "field", at, bytes);
-    }
 }
 
 /// Offset of a model's splits.
@@ -517,7 +472,7 @@ fn splits_of(model: &[u8]) -> usize {
 /// Never.
 pub fn cuts() -> Vec<(String, Vec<u8>, Vec<Cut>)> {
     let mut all = vec![touches_with_all_sections(), rows_with_all_sections()];
-    for layout in [Layout::Compact, Layout::Complete, Layout::Wide, Layout::Grid, Layout::Patterns] {
+    for layout in [Layout::Compact, Layout::Wide] {
         let base = model(layout, Leaf::I8, true);
         let cuts = cuts_of_parts(&base);
         all.push((format!("cut, {}", layout.name()), base, cuts));
@@ -628,7 +583,7 @@ fn touches_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
 }
 
 fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
-    let plain = changed_to_rows(&model(Layout::Complete, Leaf::I8, true));
+    let plain = changed_to_rows(&model(Layout::Compact, Leaf::I8, true));
     let objects = usize::from(plain[14]) + 1;
     let must = |tag: Tag| tag.code() | MUST_UNDERSTAND;
     let mut outputs = Vec::new();
@@ -673,15 +628,14 @@ fn cuts_of_parts(base: &[u8]) -> Vec<Cut> {
         // Of wide trees they have four bytes.
         None => (left % 4 != 0).then(|| error(left, cuts)),
     });
-    let is_table = matches!(model.layout(), Layout::Grid | Layout::Patterns);
-    // Splits, or leaves of none, that belong to no group.
+    // Splits that belong to no group.
     let own: Vec<usize> = groups_and_splits(&model).iter().map(|(_, splits)| splits.len()).collect();
     let groups_count = own.len();
     let of_groups = (0..groups_count).map(|left| {
         let first = splits - Group::LENGTH * (groups_count - left);
         error(left, first + own.iter().take(left).sum::<usize>())
     });
-    let trees = |length: usize| (0..length).map(|left| error(left, if is_table { leaves } else { splits })).collect();
+    let trees = |length: usize| (0..length).map(|left| error(left, splits)).collect();
     vec![
         cut(68, HEADER_LENGTH, text - HEADER_LENGTH, Vec::new()),
         cut(16, axes, axes_count, of_axes),

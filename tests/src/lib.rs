@@ -22,6 +22,7 @@ pub mod stated;
 pub mod streams;
 pub mod unaligned;
 pub mod vectors;
+pub mod wide;
 
 /// The project's root.
 pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");

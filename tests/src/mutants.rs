@@ -77,9 +77,6 @@ impl Parts {
         sections.extend(&self.tail);
         let [text, margins, axes, cuts, groups, splits, leaves] = &self.parts;
         let mut bytes = self.header.clone();
-        if !sections.is_empty() {
-            bytes[4..6].copy_from_slice(&VERSION.to_le_bytes());
-        }
         bytes[14] = (margins.len() / 8).saturating_sub(1) as u8;
         for (at, count) in [(16, axes.len() / 4), (18, groups.len() / 8)] {
             bytes[at..at + 2].copy_from_slice(&(count as u16).to_le_bytes());
@@ -310,8 +307,7 @@ pub fn sweep(models: &[Parts], rng: &mut SmallRng) -> Vec<(Vec<u8>, String)> {
         }
         for shift in 0..=32 {
             let mut parts = model.clone();
-            let depth = u8::from(parts.header[6] == Layout::Complete.code());
-            parts.parts[4].splice(..0, [depth, shift, 0, 0, 0, 0, 0, 0]);
+            parts.parts[4].splice(..0, [0, shift, 0, 0, 0, 0, 0, 0]);
             all.push((parts.bytes(), format!("model {number}; no trees with a shift of {shift}")));
         }
         for section in 0..model.sections.len() {

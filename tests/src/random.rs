@@ -1,6 +1,7 @@
 //! Random ensembles and the touches that could distinguish them.
 
-use palpate::compile::{Layout, Leaf, Settings, compile};
+use crate::wide::widened;
+use palpate::compile::{Compiled, Layout, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree, inputs};
 use palpate::with;
 use palpate_shared::{ContactTime, Descriptor, Pose, Touch};
@@ -64,15 +65,15 @@ pub fn model(shape: Shape, seed: u64, leaf: Leaf) -> Vec<u8> {
     compile(&ensemble(shape, seed), &with!(Settings::default(), leaf)).expect("it fits").bytes
 }
 
-/// Its models in every layout of data and type of leaves that it fits, and in the layouts that are chosen for it; with these scales of
-/// features.
+/// Its models with each type of leaves that it fits, those with splits of three bytes also with splits of six; with these
+/// scales of features.
 pub fn models(ensemble: &Ensemble, scales: Option<Vec<f32>>) -> Vec<Vec<u8>> {
-    let layouts = || std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
-    let all = Leaf::ALL.iter().flat_map(|&leaf| layouts().map(move |layout| (leaf, layout)));
-    let compiled = all.filter_map(|(leaf, layout)| {
-        compile(ensemble, &with!(Settings::default(), leaf, layout, scales = scales.clone())).ok()
-    });
-    compiled.map(|compiled| compiled.bytes).collect()
+    let compiled = |&leaf: &Leaf| compile(ensemble, &with!(Settings::default(), leaf, scales = scales.clone())).ok();
+    let with_wide = |compiled: Compiled| {
+        let wide = (compiled.layout == Layout::Compact).then(|| widened(&compiled.bytes));
+        std::iter::once(compiled.bytes).chain(wide)
+    };
+    Leaf::ALL.iter().filter_map(compiled).flat_map(with_wide).collect()
 }
 
 /// The trees over this many features of rows, their thresholds scaled.

@@ -235,7 +235,6 @@ pub type LeftOpen = (&'static str, fn(&Model<'_>) -> bool);
 /// Models whose margins `FORMAT.md` leaves open. Two implementations may differ in these, in what follows from them, and in
 /// [names](NAMES_LEFT_OPEN); in nothing else.
 pub const MARGINS_LEFT_OPEN: [LeftOpen; 2] = [
-    ("a column or threshold of slot 0 other than stated gives wrong steps", has_another_slot_0),
     ("subtrees of compact and wide trees whose sizes contradict each other must end the", has_contradictions),
 ];
 
@@ -259,12 +258,8 @@ pub fn groups_and_splits<'m>(model: &Model<'m>) -> Vec<(Group, &'m [u8])> {
     let group = |group: &[u8; Group::LENGTH]| {
         let group = Group::from_bytes(*group).expect("a group");
         let start = splits;
-        if model.layout() == Layout::Complete {
-            splits += 2 * ((group.trees as usize) << group.depth);
-        } else {
-            for _ in 0..group.trees {
-                splits += 2 + size_of_split(model) * number(&bytes[splits..]);
-            }
+        for _ in 0..group.trees {
+            splits += 2 + size_of_split(model) * number(&bytes[splits..]);
         }
         (group, &bytes[start..splits])
     };
@@ -277,15 +272,6 @@ fn size_of_split(model: &Model<'_>) -> usize {
 
 fn number(bytes: &[u8]) -> usize {
     usize::from(u16::from_le_bytes([bytes[0], bytes[1]]))
-}
-
-fn has_another_slot_0(model: &Model<'_>) -> bool {
-    model.layout() == Layout::Complete
-        && groups_and_splits(model).iter().any(|(group, splits)| {
-            let (columns, thresholds) = splits.split_at(splits.len() / 2);
-            let first = |part: &[u8], expected| part.iter().step_by(1 << group.depth).any(|&byte| byte != expected);
-            first(columns, 1) || first(thresholds, 0)
-        })
 }
 
 fn has_contradictions(model: &Model<'_>) -> bool {
@@ -305,7 +291,7 @@ fn has_contradictions(model: &Model<'_>) -> bool {
         }
         false
     };
-    model.layout() != Layout::Complete && groups_and_splits(model).iter().any(|(_, splits)| contradicts(splits))
+    groups_and_splits(model).iter().any(|(_, splits)| contradicts(splits))
 }
 
 /// True if subtrees stay within those that they are part of.

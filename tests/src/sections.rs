@@ -11,7 +11,6 @@ pub fn with_sections(model: &[u8], sections: &[u8]) -> Vec<u8> {
     let start = HEADER_LENGTH + header.text_length() as usize;
     let rest = &model[start + header.optional_length() as usize..model.len() - 4];
     let mut bytes = [&model[..start], sections, rest].concat();
-    bytes[4..6].copy_from_slice(&VERSION.to_le_bytes());
     let length = u32::try_from(bytes.len() + 4).expect("a small model");
     bytes[8..12].copy_from_slice(&length.to_le_bytes());
     bytes[92..96].copy_from_slice(&(sections.len() as u32).to_le_bytes());

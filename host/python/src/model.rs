@@ -6,7 +6,7 @@ use crate::data::DataSet;
 use crate::ensemble::Ensemble;
 use crate::failure::Failure;
 use numpy::ndarray::{Ix1, Ix2};
-use palpate::compile::{self as library, Compiled, CompiledModel, Core, Goal, Language, Layout, Leaf, Settings};
+use palpate::compile::{self as library, Compiled, CompiledModel, Language, Leaf, Settings};
 use palpate::ensemble::Probability;
 use palpate::error::{CompileProblem, Error, EvaluateProblem, TouchesProblem};
 use palpate::evaluate::Candidate;
@@ -225,7 +225,7 @@ impl Model {
             if !is_code {
                 return library::write_sources(&path, &compiled.sources(&stem, &[language])?);
             }
-            let settings = with!(settings.clone(), layout = None, code = true);
+            let settings = with!(settings.clone(), code = true);
             let compiled = library::compile(ensemble, &settings)?;
             let mut written = library::write_sources(&path, &compiled.sources(&stem, &[language])?)?;
             if language == Language::Rust {
@@ -416,10 +416,8 @@ pub(crate) fn touch(numbers: &[f64]) -> Result<Touch, TouchesProblem> {
 /// Compiles an ensemble to the bytes that a microcontroller reads. (`palpate.compile` also takes models of other
 /// libraries.)
 ///
-/// `leaf` is "i8", "i16" or "f32": what leaves are stored as. `layout` is "compact", "complete", "grid", "wide" or
-/// "patterns"; without one, the best for the `goal` is taken, which is "balanced", "speed" or "size". With `max_bytes` the
-/// layout is chosen for size and leaves are stored in fewer bits where the model would be larger; if it still is, that is an
-/// error. `error_rate` and `max_touches` are where recognizers stop; `priors` say how likely each object is. `scales` say how
+/// `leaf` is "i8", "i16" or "f32": what leaves are stored as. With `max_bytes` leaves are stored in fewer bits where the model
+/// would be larger; if it still is, that is an error. `error_rate` and `max_touches` are where recognizers stop; `priors` say how likely each object is. `scales` say how
 /// many units make up 1 of each feature, for a chip that measures in whole numbers. `row_number` names the feature that is a row's
 /// number in its sequence, counted from 1.
 ///
@@ -429,16 +427,14 @@ pub(crate) fn touch(numbers: &[f64]) -> Result<Touch, TouchesProblem> {
 /// >>> model.size <= 4000
 /// True
 #[pyo3::pyfunction]
-#[pyo3(signature = (ensemble, *, max_bytes=None, leaf="i16", layout=None, goal="balanced", error_rate=0.01,
-    max_touches=200, priors=None, scales=None, row_number=None))]
+#[pyo3(signature = (ensemble, *, max_bytes=None, leaf="i16", error_rate=0.01, max_touches=200,
+    priors=None, scales=None, row_number=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn compile(
     py: Python<'_>,
     ensemble: Bound<'_, Ensemble>,
     max_bytes: Option<usize>,
     leaf: &str,
-    layout: Option<&str>,
-    goal: &str,
     error_rate: f64,
     max_touches: u32,
     priors: Option<Vec<f64>>,
@@ -446,11 +442,6 @@ pub(crate) fn compile(
     row_number: Option<String>,
 ) -> Result<Model, Failure> {
     let ensemble = &ensemble.get().ensemble;
-    let layouts = "compact, complete, grid, wide or patterns";
-    let layout = layout.map(|name| {
-        let found = Layout::OF_DATA.iter().copied().find(|layout| layout.name() == name);
-        found.ok_or_else(|| Error::setting("layout", name, layouts))
-    });
     let counts = [
         ("priors", priors.as_ref().map(Vec::len), ensemble.objects.len()),
         ("scales", scales.as_ref().map(Vec::len), ensemble.inputs.count()),
@@ -467,13 +458,6 @@ pub(crate) fn compile(
             leaf,
             "i8, i16 or f32"
         ))?,
-        layout = layout.transpose()?,
-        goal = match goal {
-            "balanced" => Goal::Balanced(Core::M4F),
-            "speed" => Goal::Speed,
-            "size" => Goal::Size,
-            other => return Err(Error::setting("goal", other, "balanced, speed or size").into()),
-        },
         error_rate,
         max_touches,
         priors,

@@ -91,13 +91,13 @@ def test_files_and_pickles_hold_the_same_model(model: palpate.Model, ensemble: p
 
 
 def test_a_model_fits_where_there_is_room(ensemble: palpate.Ensemble) -> None:
-    large = palpate.compile(ensemble, leaf="f32", layout="compact")
+    large = palpate.compile(ensemble, leaf="f32")
     for most in (large.size - 1, large.size // 2):
-        small = palpate.compile(ensemble, leaf="f32", layout="compact", max_bytes=most)
+        small = palpate.compile(ensemble, leaf="f32", max_bytes=most)
         assert small.size <= most and small.leaf != "f32"
     with pytest.raises(palpate.InputError, match="more than the 100 that fit"):
         palpate.compile(ensemble, max_bytes=100)
-    for option, value in [("leaf", "f64"), ("layout", "tree"), ("goal", "best"), ("priors", [1.0]), ("error_rate", 0.9)]:
+    for option, value in [("leaf", "f64"), ("priors", [1.0]), ("error_rate", 0.9)]:
         with pytest.raises(palpate.SettingError, match=option):
             palpate.compile(ensemble, **{option: value})
 

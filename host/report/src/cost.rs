@@ -58,8 +58,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Vec<Member>> {
     let mut add = |name: &str, ensemble: &Ensemble, leaves: &[Leaf]| -> Result<()> {
         for &leaf in leaves {
             context.check()?;
-            let how = with!(compile::Settings::default(), leaf, shared_leaves = Some(false));
-            let compiled = compile::compile(ensemble, &how)?;
+            let compiled = compile::compile(ensemble, &with!(compile::Settings::default(), leaf))?;
             members.push(member(context, large, &touches, name, ensemble, leaf, &compiled)?);
         }
         Ok(())

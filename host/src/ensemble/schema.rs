@@ -29,7 +29,7 @@ pub const fn schema(descriptor: Descriptor) -> Schema {
             Descriptor::ContactsCurvature => OF_PATTERNS,
             _ => &[],
         },
-        is_tabled: matches!(descriptor, Descriptor::ContactsCurvature),
+        has_all_planes: matches!(descriptor, Descriptor::ContactsCurvature),
     }
 }
 
@@ -132,7 +132,7 @@ mod tests {
                     let own: Vec<usize> =
                         (0..planes.len()).filter(|&plane| lies(planes[plane], features.as_slice())).collect();
                     assert!(planes.is_empty() || !own.is_empty(), "{descriptor:?} {touch:?}");
-                    if schema(descriptor).is_tabled {
+                    if schema(descriptor).has_all_planes {
                         assert_eq!(own, [usize::from(touch.pattern().code())]);
                     }
                 }

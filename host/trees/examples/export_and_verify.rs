@@ -9,7 +9,7 @@
 //! XGBoost's that is used in tests is exported.
 
 use palpate_base::with;
-use palpate_trees::compile::{self, Goal, Settings, compile};
+use palpate_trees::compile::{self, Settings, compile};
 use palpate_trees::ensemble::Ensemble;
 use palpate_trees::onboard::Model;
 use palpate_trees::output;
@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let ensemble = Ensemble::load(model)?;
     println!("{}: {} trees over {} features", model.display(), ensemble.trees.len(), ensemble.inputs.count());
 
-    let compiled = compile(&ensemble, &with!(Settings::default(), goal = Goal::Size))?;
+    let compiled = compile(&ensemble, &Settings::default())?;
     println!("{} bytes, margins within {:.2e}", compiled.bytes.len(), compiled.margin_error);
     if let Some(output) = arguments.get(2) {
         output::write_bytes(output, &compiled.bytes)?;

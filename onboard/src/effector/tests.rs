@@ -561,7 +561,7 @@ fn model_of(trained: &Trained) -> Vec<u8> {
         .with_max_touches(60)
         .with_text_length(4)
         .with_length(length as u32)
-        .with_sections(sections.len() as u32);
+        .with_optional_length(sections.len() as u32);
     let mut bytes = [&header.bytes()[..], &[0, 1, b'a', 0], &sections, &[0; 8]].concat();
     bytes.extend(checksum(&bytes).to_le_bytes());
     bytes

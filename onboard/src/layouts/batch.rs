@@ -116,9 +116,6 @@ impl Batch {
             let masks = masks.as_deref_mut();
             let mut sums = Sums { sums, values, leaf, shift, block, masks, reached, words, waiting: 0, masked: 0 };
             match model.layout {
-                Layout::Complete if built_in::layout(Layout::Complete) => {
-                    complete(&group, &mut nodes, &mut leaves, &mut sums);
-                }
                 Layout::Compact if built_in::layout(Layout::Compact) => {
                     compact(&group, &mut nodes, &mut leaves, &mut sums);
                 }
@@ -141,58 +138,6 @@ impl Batch {
 fn columns_of(model: &Sections<'_>) -> usize {
     let axes = model.axes_and_cuts().0.iter();
     axes.map(|&[_, columns, ..]| usize::from(columns & 1) + usize::from(columns >> 1 & 1)).sum()
-}
-
-/// True if all trees start as the exporter starts them: other bytes in place of a root's number lead a row's walk
-/// astray, the same way every time, but not this one.
-pub(crate) fn is_regular(model: &Sections<'_>) -> bool {
-    let mut nodes = model.nodes;
-    model.layout != Layout::Complete
-        || model.groups.as_chunks().0.iter().all(|&bytes| {
-            let Some(group) = Group::from_bytes(bytes) else { return true };
-            let slots = usize::try_from(group.trees).unwrap_or(0) << (group.depth & 15);
-            let Some((columns, rest)) = nodes.split_at_checked(slots) else { return false };
-            nodes = rest.get(slots..).unwrap_or_default();
-            columns.iter().step_by(1 << (group.depth & 15)).all(|root| *root == 1)
-        })
-}
-
-fn complete(group: &Group, nodes: &mut &[u8], leaves: &mut &[u8], sums: &mut Sums<'_>) {
-    let slots = 1_usize << (group.depth & 15);
-    let all = slots * usize::try_from(group.trees).unwrap_or(0);
-    let Some((columns, rest)) = nodes.split_at_checked(all) else { return };
-    let Some((thresholds, rest)) = rest.split_at_checked(all) else { return };
-    *nodes = rest;
-    let Some((group_leaves, rest)) = leaves.split_at_checked(all * sums.leaf_length()) else { return };
-    *leaves = rest;
-    let trees = columns.chunks_exact(slots).zip(thresholds.chunks_exact(slots));
-    for ((columns, thresholds), leaves) in trees.zip(group_leaves.chunks_exact(slots * sums.leaf_length())) {
-        if !sums.look_up(|masks, block| masks.take_complete(columns, thresholds, block)) {
-            let block = sums.block;
-            walk(columns, thresholds, block, sums.next());
-        }
-        sums.push(leaves);
-    }
-}
-
-/// Walks a complete tree with several rows in step, so that none waits for its own loads.
-fn walk(columns: &[u8], thresholds: &[u8], block: &Block<'_>, leaves: &mut Leaves) {
-    const ABREAST: usize = 8;
-    let slots = columns.len();
-    let rows = leaves.as_chunks_mut::<ABREAST>().0.iter_mut().take(block.stride / ABREAST).enumerate();
-    for (index, leaves) in rows {
-        let mut abreast = [1; ABREAST];
-        for _ in 0..slots.checked_ilog2().unwrap_or(0) {
-            for (lane, slot) in abreast.iter_mut().enumerate() {
-                let rank = block.rank(at(columns, *slot), ABREAST * index + lane);
-                *slot = 2 * *slot + usize::from(rank > at(thresholds, *slot));
-            }
-        }
-        for (leaf, slot) in leaves.iter_mut().zip(abreast) {
-            // Up to 255.
-            [*leaf, ..] = slot.wrapping_sub(slots).to_le_bytes();
-        }
-    }
 }
 
 fn compact(group: &Group, nodes: &mut &[u8], leaves: &mut &[u8], sums: &mut Sums<'_>) {

@@ -7,19 +7,13 @@ use palpate_shared::format::{Layout, LeafType};
 pub(crate) const fn layout(layout: Layout) -> bool {
     match layout {
         Layout::Compact => cfg!(feature = "compact"),
-        Layout::Complete => cfg!(feature = "complete"),
-        Layout::Grid => cfg!(feature = "grid"),
         Layout::Wide => cfg!(feature = "wide"),
-        Layout::Patterns => cfg!(feature = "patterns"),
         Layout::Code => cfg!(feature = "code"),
     }
 }
 
-/// True if models with trees are read, and not only tables.
-pub(crate) const TREES: bool = layout(Layout::Compact) || layout(Layout::Complete) || layout(Layout::Wide);
-
-/// True if tables are read, where a search for a rank takes a large part of the time: it is written out then.
-pub(crate) const TABLES: bool = layout(Layout::Grid) || layout(Layout::Patterns);
+/// True if models with trees are read, and not only those whose trees are code.
+pub(crate) const TREES: bool = layout(Layout::Compact) || layout(Layout::Wide);
 
 /// True if trees with leaves in a table are read.
 pub(crate) const SHARED_LEAVES: bool = TREES && cfg!(feature = "shared-leaves");

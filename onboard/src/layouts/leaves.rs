@@ -4,7 +4,7 @@ use super::built_in;
 use core::sync::atomic::{Ordering, compiler_fence};
 use palpate_shared::format::{LeafType, SharedLeaves};
 
-/// Trees walked before their leaves are added: a few, so that code for walking is not repeated forevery type of leaf.
+/// Leaves of a table that are kept before they are added together.
 pub(crate) const BLOCK: usize = 64;
 
 /// Margins under construction, in units (integer leaves) or as the bits of f32 values.

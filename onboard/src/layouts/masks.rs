@@ -37,27 +37,6 @@ impl Masks {
         Self { left: [[0; 256]; COLUMNS], columns: [0; COLUMNS], used: 0, places: [UNUSED; 256] }
     }
 
-    /// Takes a tree of the complete layout, all of its slots. `None` if it has to be walked.
-    pub(super) fn take_complete(&mut self, columns: &[u8], thresholds: &[u8], block: &Block<'_>) -> Option<()> {
-        if columns.len() > LEAVES {
-            return None;
-        }
-        self.begin(block)?;
-        // A level's slots start at a power of two, and share the leaves.
-        let (mut level, mut below) = (1, columns.len());
-        while below > 1 {
-            let mut left = ones(below / 2);
-            let splits = columns.get(level..2 * level)?.iter().zip(thresholds.get(level..2 * level)?);
-            for (&column, &threshold) in splits {
-                self.split(column, threshold, left, block)?;
-                left = left.wrapping_shl(low(below));
-            }
-            (level, below) = (2 * level, below / 2);
-        }
-        self.finish();
-        Some(())
-    }
-
     /// Takes a tree of the compact layout. `None` if it has to be walked.
     pub(super) fn take_compact(&mut self, splits: &[[u8; 3]], block: &Block<'_>) -> Option<()> {
         if splits.len() >= LEAVES {

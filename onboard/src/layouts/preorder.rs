@@ -4,12 +4,14 @@
 //! are in order, so going right skips as many leaves as splits, plus one.
 
 use super::built_in;
-use super::complete::Reached;
-use super::leaves::Sum;
+use super::leaves::{BLOCK, Sum};
 use super::ranks::{Ranks, at_or_missing};
 use crate::bytes::{at, take};
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::Group;
+
+/// Numbers of leaves that are kept.
+pub(crate) type Reached = [u16; BLOCK];
 
 /// Checks that a group's splits, of `node` bytes each, and leaves are there, and moves `nodes` and `leaves` past them.
 pub(crate) fn check(group: &Group, nodes: &mut &[u8], leaves: &mut &[u8], leaf: usize, node: usize) -> Option<()> {

@@ -1,6 +1,6 @@
 //! Features to ranks: where each value stands among the thresholds, looked up once per touch.
 
-use super::{Sections, built_in};
+use super::Sections;
 #[cfg(feature = "rows")]
 use crate::bytes::at;
 use crate::bytes::{Wrong, take};
@@ -49,8 +49,7 @@ fn ascends(mut cuts: &[u8], width: usize) -> bool {
 
 /// Ranks of a row of features in all of the model's columns.
 ///
-/// Cost: a binary search in each axis's thresholds; with tables built in, half as much where an axis has 63 thresholds or
-/// more, of four bytes each; three times as much where thresholds are not aligned.
+/// Cost: a binary search in each axis's thresholds; three times as much where thresholds are not aligned.
 pub(crate) fn rank(model: &Sections<'_>, features: &[i32], ranks: &mut Ranks) {
     let mut column = 0_u8;
     let mut put = |rank: u8| {
@@ -149,27 +148,21 @@ pub(crate) fn at_or_missing(features: &[i32], feature: u8) -> i32 {
 }
 
 /// The thresholds of a model's axes, one after the other.
-pub(crate) struct Cuts<'m>(pub(crate) &'m [u8]);
+struct Cuts<'m>(&'m [u8]);
 
 impl<'m> Cuts<'m> {
     /// The rank of a row's feature among the thresholds of the next axis; `None` if the feature is missing.
     #[inline(always)]
-    pub(crate) fn rank(&mut self, axis: &[u8; Axis::LENGTH], features: &[i32]) -> Option<u8> {
-        let value = at_or_missing(features, axis[0]);
-        let rank = self.rank_of(axis, value);
+    fn rank(&mut self, axis: &[u8; Axis::LENGTH], features: &[i32]) -> Option<u8> {
+        let &[feature, _, width, _] = axis;
+        let value = at_or_missing(features, feature);
+        let rank = rank_in(self.of(axis), width, value);
         (value != MISSING_FEATURE).then_some(rank)
-    }
-
-    /// The rank of a value among the thresholds of the next axis; a missing one is the least number.
-    #[inline(always)]
-    pub(crate) fn rank_of(&mut self, axis: &[u8; Axis::LENGTH], value: i32) -> u8 {
-        let &[_, _, width, _] = axis;
-        rank_in(self.of(axis), width, value)
     }
 
     /// The thresholds of the next axis.
     #[inline(always)]
-    pub(crate) fn of(&mut self, &[_, _, width, count]: &[u8; Axis::LENGTH]) -> &'m [u8] {
+    fn of(&mut self, &[_, _, width, count]: &[u8; Axis::LENGTH]) -> &'m [u8] {
         let length = usize::from(width) * usize::from(count);
         let Some((cuts, rest)) = self.0.split_at_checked(length) else { return &[] };
         self.0 = rest;
@@ -182,7 +175,7 @@ impl<'m> Cuts<'m> {
 /// Thresholds of two or four bytes are loaded at once where they are aligned, which the exporter ensures if the model is aligned.
 // By itself, so that all that it needs is in registers on a Cortex-M0+.
 #[inline(never)]
-pub(crate) fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {
+fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {
     if width == 2
         && let Ok(cuts) = bytemuck::try_cast_slice(cuts)
     {
@@ -190,10 +183,7 @@ pub(crate) fn rank_in(cuts: &[u8], width: u8, value: i32) -> u8 {
     } else if width == 4
         && let Ok(cuts) = bytemuck::try_cast_slice(cuts)
     {
-        let number = |cut: i32| i32::from_le(cut);
-        // Where there are many, they nearly always have four bytes.
-        let rank = if built_in::TABLES { search_many(cuts, value, number) } else { None };
-        rank.unwrap_or_else(|| search(cuts, value, number))
+        search(cuts, value, i32::from_le)
     } else {
         search_bytes(cuts, width.into(), value)
     }
@@ -218,37 +208,6 @@ fn search<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32 + Copy) -> 
     }
     let [rank, ..] = passed.wrapping_add(1).to_le_bytes();
     rank
-}
-
-/// Search among 63 to 255 thresholds, written out: a load, a comparison and an addition for each step. `None` for fewer.
-#[inline(always)]
-fn search_many<T: Copy>(cuts: &[T], value: i32, number: impl Fn(T) -> i32 + Copy) -> Option<u8> {
-    // The 63 thresholds that the rank is among, or at an end of: after each 64 that are passed.
-    let last = cuts.len().checked_sub(63)?;
-    let mut start = 0;
-    while cuts.get(start + 63).is_some_and(|cut| number(*cut) <= value) {
-        start += 64;
-    }
-    let few: &[T; 63] = cuts.get(start.min(last)..)?.first_chunk()?;
-    let few: &[T; 31] = half(few, value, number)?;
-    let few: &[T; 15] = half(few, value, number)?;
-    let few: &[T; 7] = half(few, value, number)?;
-    let few: &[T; 3] = half(few, value, number)?;
-    let [last]: &[T; 1] = half(few, value, number)?;
-    let before = core::ptr::from_ref(last).addr().wrapping_sub(cuts.as_ptr().addr()) / size_of::<T>();
-    let [rank, ..] = (before + usize::from(number(*last) <= value)).to_le_bytes();
-    Some(rank)
-}
-
-/// The half of 2`HALF` + 1 thresholds that a value's rank is in, or at an end of.
-#[inline(always)]
-fn half<T: Copy, const N: usize, const HALF: usize>(
-    cuts: &[T; N],
-    value: i32,
-    number: impl Fn(T) -> i32,
-) -> Option<&[T; HALF]> {
-    const { assert!(N == 2 * HALF + 1) };
-    if number(*cuts.get(HALF)?) <= value { cuts.last_chunk() } else { cuts.first_chunk() }
 }
 
 /// Searches thresholds of any width and alignment.
@@ -294,8 +253,6 @@ mod tests {
             for value in (-5..10 * (count + count / 2) + 10).step_by(5) {
                 let expected = cuts.iter().filter(|&&cut| cut <= value).count();
                 assert_eq!(usize::from(rank(bytemuck::cast_slice(&cuts), 4, value)), expected, "{value} of {count}");
-                let many = search_many(&cuts, value, |cut| cut);
-                assert_eq!(many.map(usize::from), (count >= 63).then_some(expected));
             }
         }
     }

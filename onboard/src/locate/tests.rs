@@ -135,7 +135,7 @@ pub(crate) fn model(placed: &[Placed], misfit: i16) -> Vec<u8> {
         .with_odds((1 << 56) / 99)
         .with_max_touches(25)
         .with_text_length(text.len() as u32)
-        .with_sections(sections.len() as u32)
+        .with_optional_length(sections.len() as u32)
         .with_length((HEADER_LENGTH + text.len() + sections.len() + 4) as u32);
     let mut bytes = [&header.bytes()[..], &text, &sections, &[0; 4]].concat();
     make_right(&mut bytes);

@@ -1,11 +1,9 @@
 //! Checks made when a model is opened, so that no later step can fail.
 
 use super::{HAS_SHARED_LEAVES, Stated, optional};
-use crate::bytes::{Wrong, take};
-use crate::layouts::{Sections, built_in, complete, grid, patterns, preorder, ranks};
-use palpate_shared::format::{
-    Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, MAX_COMPLETE_DEPTH, SharedLeaves, Tag,
-};
+use crate::bytes::Wrong;
+use crate::layouts::{Sections, built_in, preorder, ranks};
+use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT, SharedLeaves, Tag};
 
 /// The largest shift of a group.
 const MAX_SHIFT: u8 = 24;
@@ -40,16 +38,6 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
     }
     let mut nodes = model.nodes;
     let mut leaves = model.leaves;
-    if built_in::layout(Layout::Grid) && model.layout == Layout::Grid {
-        let cells = grid::cells(model).ok_or(Wrong::Section(model.offset(model.ranked)))?;
-        section(take(&mut leaves, cells * values * model.leaf.size()).is_some(), model.leaves)?;
-        section(model.groups.is_empty(), model.groups)?;
-    }
-    if built_in::layout(Layout::Patterns) && model.layout == Layout::Patterns {
-        let cells = patterns::cells(model).ok_or(Wrong::Section(model.offset(model.ranked)))?;
-        section(take(&mut leaves, cells * values * model.leaf.size()).is_some(), model.leaves)?;
-        section(model.groups.is_empty(), model.groups)?;
-    }
     if is_code {
         section(model.ranked.is_empty(), model.ranked)?;
         section(model.groups.is_empty(), model.groups)?;
@@ -83,15 +71,10 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
         let leaf = shared.map_or(length, |shared| shared.number_length());
         let before = leaves;
         let fits = match model.layout {
-            Layout::Complete
-                if built_in::layout(Layout::Complete) && (1..=MAX_COMPLETE_DEPTH).contains(&group.depth) =>
-            {
-                complete::check(&group, &mut nodes, &mut leaves, leaf)
-            }
-            Layout::Compact if built_in::layout(Layout::Compact) && group.depth == 0 => {
+            Layout::Compact if built_in::layout(Layout::Compact) => {
                 preorder::check(&group, &mut nodes, &mut leaves, leaf, 3)
             }
-            Layout::Wide if built_in::layout(Layout::Wide) && group.depth == 0 => {
+            Layout::Wide if built_in::layout(Layout::Wide) => {
                 preorder::check(&group, &mut nodes, &mut leaves, leaf, 6)
             }
             _ => return Err(wrong),

@@ -21,7 +21,7 @@ pub(crate) fn whole(bytes: &[u8]) -> Result<(), ModelError> {
         let expected = u32::try_from(HEADER_LENGTH).unwrap_or_default();
         return Err(ModelError::Length { expected, found });
     };
-    if header.version() == 0 || header.version() > VERSION {
+    if header.version() != VERSION {
         return Err(ModelError::Version(header.version()));
     }
     let expected = header.length();

@@ -3,9 +3,9 @@
 use super::{Model, fixed};
 use crate::bytes::AlignedTo8;
 use crate::layouts::leaves::{BLOCK, Sum};
-use crate::layouts::{built_in, complete, grid, patterns, preorder, ranks};
+use crate::layouts::{built_in, preorder, ranks};
 use palpate_shared::format::{Group, Layout, Sentinel};
-use palpate_shared::{Descriptor, MISSING_FEATURE, Touch};
+use palpate_shared::{MISSING_FEATURE, Touch};
 
 impl Model<'_> {
     /// The margins of a touch, in [units](Model::unit): one for each object, within ±2^30. `margins` beyond the model's
@@ -15,7 +15,7 @@ impl Model<'_> {
     /// of a touch as missing.
     pub fn margins(&self, touch: &Touch, margins: &mut [i32]) -> bool {
         match self.descriptor() {
-            Some(descriptor) => with_features(descriptor, touch, |features| self.margins_of(features, margins)),
+            Some(descriptor) => self.margins_of(descriptor.features(touch).as_slice(), margins),
             None => self.margins_of(&[], margins),
         }
     }
@@ -25,9 +25,7 @@ impl Model<'_> {
     /// [`MISSING_FEATURE`](palpate_shared::MISSING_FEATURE) where one is missing, as it is for all features beyond the end of a short row.
     pub fn margins_of(&self, features: &[i32], margins: &mut [i32]) -> bool {
         let Some(margins) = margins.get_mut(..self.object_count()) else { return false };
-        if self.has_trees() {
-            margins.fill(0);
-        }
+        margins.fill(0);
         self.margins_in_zeros(features, margins);
         true
     }
@@ -35,7 +33,7 @@ impl Model<'_> {
     /// [`Model::margins`] where zeros are already, of a model over touches.
     pub(crate) fn touch_in_zeros(&self, touch: &Touch, zeros: &mut [i32]) {
         if let Some(descriptor) = self.descriptor() {
-            with_features(descriptor, touch, |features| self.margins_in_zeros(features, zeros));
+            self.margins_in_zeros(descriptor.features(touch).as_slice(), zeros);
         }
     }
 
@@ -45,11 +43,6 @@ impl Model<'_> {
             self.sum(features, zeros);
             self.make_fixed(zeros);
         }
-    }
-
-    /// True if margins are added up; those of a table are read.
-    pub(super) fn has_trees(&self) -> bool {
-        built_in::TREES && !matches!(self.layout(), Layout::Grid | Layout::Patterns)
     }
 
     /// Makes Q16 of f32 values' bits.
@@ -77,8 +70,7 @@ impl Model<'_> {
         true
     }
 
-    /// Adds up all trees, in what has to be zeros, or reads from a table: in units, or in f32 values' bits. There are as
-    /// many margins as objects.
+    /// Adds up all trees, in what has to be zeros: in units, or in f32 values' bits. There are as many margins as objects.
     pub(super) fn sum(&self, features: &[i32], margins: &mut [i32]) {
         match self.sentinel() {
             Some(sentinel) => self.sum_without(sentinel, features, margins),
@@ -100,21 +92,7 @@ impl Model<'_> {
         if self.layout() == Layout::Code {
             return self.call(features, margins);
         }
-        if !self.read_table(features, margins) {
-            self.sum_trees(features, margins);
-        }
-    }
-
-    /// Reads margins from a table, in the same way; `false` if the model has none.
-    #[inline(always)]
-    fn read_table(&self, features: &[i32], margins: &mut [i32]) -> bool {
-        let cell = match self.layout() {
-            Layout::Grid if built_in::layout(Layout::Grid) => grid::cell(&self.sections, features),
-            Layout::Patterns if built_in::layout(Layout::Patterns) => patterns::cell(&self.sections, features),
-            _ => return false,
-        };
-        grid::read(&self.sections, cell, margins);
-        true
+        self.sum_trees(features, margins);
     }
 
     /// The margins before any tree, in units or as f32 values' bits.
@@ -164,9 +142,6 @@ impl Model<'_> {
             shift = group.shift;
             sum.object = group.object;
             match self.sections.layout {
-                Layout::Complete if built_in::layout(Layout::Complete) => {
-                    complete::add(&group, ranks, &mut reached.0, &mut nodes, &mut leaves, sum);
-                }
                 Layout::Wide if built_in::layout(Layout::Wide) => {
                     let cuts = self.sections.axes_and_cuts().1;
                     preorder::add_wide(cuts, &group, features, &mut reached.0, &mut nodes, &mut leaves, sum);
@@ -184,15 +159,3 @@ impl Model<'_> {
     }
 }
 
-/// Hands a touch's features to `then`. The two of a descriptor for tables are put together apart:
-/// [`Descriptor::features`] writes all ten that there can be.
-#[inline(always)]
-fn with_features<T>(descriptor: Descriptor, touch: &Touch, then: impl FnOnce(&[i32]) -> T) -> T {
-    if built_in::layout(Layout::Grid)
-        && descriptor == Descriptor::Curvature
-        && let Some(features) = Descriptor::short_curvature(touch)
-    {
-        return then(&features);
-    }
-    then(descriptor.features(touch).as_slice())
-}

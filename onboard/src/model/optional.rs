@@ -48,7 +48,7 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
             // Tables have no leaves to share.
             _ if built_in::SHARED_LEAVES && tag == Tag::SharedLeaves.code() => {
                 stated.by_object |= HAS_SHARED_LEAVES;
-                SharedLeaves::from_bytes(content).is_some() && !matches!(model.layout, Layout::Grid | Layout::Patterns)
+                SharedLeaves::from_bytes(content).is_some()
             }
             _ if tag == Tag::Prediction.code() => Prediction::from_bytes(content).is_some(),
             _ if cfg!(feature = "sentinel") && tag == Tag::Sentinel.code() => {

@@ -43,8 +43,7 @@ impl Model<'_> {
         }
         // Leaves that are numbers are not made ready, nor rows in which numbers stand for missing values.
         let is_special = self.shared_leaves().is_some() || self.sentinel().is_some();
-        let is_special = is_special || self.layout() == Layout::Code;
-        if rows < FEW || !self.has_trees() || is_special || !batch::is_regular(&self.sections) {
+        if rows < FEW || is_special || self.layout() == Layout::Code {
             for (row, margins) in features.chunks_exact(width).zip(margins.chunks_exact_mut(objects)) {
                 margins.fill(0);
                 self.sum(row, margins);

@@ -6,7 +6,7 @@ use crate::pattern::Patterns;
 pub const RAW_FEATURES: u8 = 255;
 
 /// The header's layout of a model that has maps instead of trees; no [`Layout`], since readers of trees refuse it.
-pub const MAPS_LAYOUT: u8 = 7;
+pub const MAPS_LAYOUT: u8 = 3;
 
 macro_rules! codes {
     ($(#[$meta:meta])* $enum:ident { $($(#[$variant_meta:meta])* $variant:ident = $code:literal, $name:literal;)* }) => {
@@ -39,24 +39,13 @@ macro_rules! codes {
 codes! {
     /// Layout of the trees.
     Layout {
-        /// Splits in preorder, three bytes each, leaves in order: the smallest for lopsided trees.
+        /// Splits in preorder, three bytes each, leaves in order.
         Compact = 0, "compact";
-        /// Every tree filled up to its depth: the fastest walk.
-        Complete = 1, "complete";
-        /// A table of margins over the thresholds of at most two features: no walk at all.
-        Grid = 2, "grid";
         /// Splits in preorder, six bytes each: for what [`Layout::Compact`] cannot number.
-        Wide = 3, "wide";
-        /// A table of margins for each contact pattern, over the features that it has: no walk at all.
-        Patterns = 4, "patterns";
+        Wide = 1, "wide";
         /// No trees: they are a function of the program that reads the model.
-        Code = 6, "code";
+        Code = 2, "code";
     }
-}
-
-impl Layout {
-    /// Layouts whose trees are in the model.
-    pub const OF_DATA: &'static [Self] = &[Self::Compact, Self::Complete, Self::Grid, Self::Wide, Self::Patterns];
 }
 
 codes! {
@@ -156,6 +145,6 @@ mod tests {
         assert!(Key::ALL.iter().all(|&x| Key::from_code(x.code()) == Some(x)));
         assert!(Counted::ALL.iter().all(|&x| Counted::from_code(x.code()) == Some(x)));
         assert!(Length::ALL.iter().all(|&x| Length::from_code(x.code()) == Some(x)));
-        assert_eq!(Layout::from_code(5), None);
+        assert_eq!(Layout::from_code(MAPS_LAYOUT), None);
     }
 }

@@ -4,10 +4,8 @@
 pub const HEADER_LENGTH: usize = 96;
 /// The first four bytes of every model.
 pub const MAGIC: [u8; 4] = *b"PLPT";
-/// The newest version of the format, with optional sections; this crate reads all versions up to it.
-pub const VERSION: u16 = 2;
-/// The version without optional sections, which is what a model without any is still written as.
-pub(crate) const VERSION_WITHOUT_SECTIONS: u16 = 1;
+/// The version of the format that this crate reads.
+pub const VERSION: u16 = 3;
 
 /// The header's bytes, at any address; every field is read from its place when asked for.
 ///
@@ -16,7 +14,7 @@ pub(crate) const VERSION_WITHOUT_SECTIONS: u16 = 1;
 #[derive(Clone, Copy, Debug)]
 pub struct Header<'a>(&'a [u8]);
 
-/// A header under construction, of version 1 until it has [sections](HeaderBuilder::with_sections).
+/// A header under construction.
 #[derive(Clone, Debug)]
 pub struct HeaderBuilder([u8; HEADER_LENGTH]);
 
@@ -134,15 +132,8 @@ fields! {
     nodes_length, with_nodes_length: u32 = 84;
     /// Bytes of the leaves.
     leaves_length, with_leaves_length: u32 = 88;
-    /// Bytes of the optional sections, in version 2: see [`Header::optional_length`].
-    sections_length, with_sections_length: u32 = 92;
-}
-
-impl Header<'_> {
-    /// Bytes of the optional sections; 0 in version 1, which has none.
-    pub fn optional_length(&self) -> u32 {
-        if self.version() == VERSION_WITHOUT_SECTIONS { 0 } else { self.sections_length() }
-    }
+    /// Bytes of the optional sections.
+    optional_length, with_optional_length: u32 = 92;
 }
 
 impl<'a> Header<'a> {
@@ -159,7 +150,7 @@ impl<'a> Header<'a> {
 
 impl Default for HeaderBuilder {
     fn default() -> Self {
-        Self([0; HEADER_LENGTH]).with_magic(u32::from_le_bytes(MAGIC)).with_version(VERSION_WITHOUT_SECTIONS)
+        Self([0; HEADER_LENGTH]).with_magic(u32::from_le_bytes(MAGIC)).with_version(VERSION)
     }
 }
 
@@ -173,12 +164,6 @@ impl From<Header<'_>> for HeaderBuilder {
 }
 
 impl HeaderBuilder {
-    /// A model with optional sections of `length` bytes together; without any it stays one of version 1.
-    pub fn with_sections(self, length: u32) -> Self {
-        let version = if length == 0 { VERSION_WITHOUT_SECTIONS } else { VERSION };
-        self.with_version(version).with_sections_length(length)
-    }
-
     /// The header's bytes.
     pub const fn bytes(&self) -> &[u8; HEADER_LENGTH] {
         &self.0
@@ -205,18 +190,7 @@ mod tests {
         let (header, rest) = Header::split(built.bytes()).unwrap();
         assert!(rest.is_empty());
         assert_eq!((header.odds(), header.last_object(), header.unit()), (u64::MAX - 1, 9, 0.25));
-        assert_eq!((header.magic().to_le_bytes(), header.version(), header.max_touches()), (MAGIC, 1, 0));
+        assert_eq!((header.magic().to_le_bytes(), header.version(), header.max_touches()), (MAGIC, VERSION, 0));
     }
 
-    #[test]
-    fn only_a_model_with_optional_sections_is_of_version_2() {
-        for (length, version) in [(0, 1), (16, 2)] {
-            let built = HeaderBuilder::default().with_sections(length);
-            let (header, _) = Header::split(built.bytes()).unwrap();
-            assert_eq!((header.version(), header.optional_length()), (version, length));
-        }
-        // Version 1 has no meaning for these bytes.
-        let built = HeaderBuilder::default().with_sections_length(16);
-        assert_eq!(Header::split(built.bytes()).unwrap().0.optional_length(), 0);
-    }
 }

@@ -43,9 +43,6 @@ pub const CHECKSUM_LENGTH: usize = 4;
 /// Margins stay within ± this many units, by the export's choice of unit and the validation of a model.
 pub const MARGIN_LIMIT: i32 = 1 << 30;
 
-/// The largest depth of trees in [`Layout::Complete`].
-pub const MAX_COMPLETE_DEPTH: u8 = 8;
-
 #[cfg(test)]
 mod tests {
     use std::vec::Vec;

@@ -72,8 +72,6 @@ impl Axis {
 /// Trees whose leaves are scaled in the same way: eight bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Group {
-    /// Depth of the trees in [`Layout::Complete`](super::Layout::Complete), 1 to 8; 0 in other layouts.
-    pub depth: u8,
     /// Integer leaves count for their value times 2^shift.
     pub shift: u8,
     /// The object that a leaf's only value is for; `None` when a leaf has a value for each object.
@@ -87,13 +85,13 @@ impl Group {
     pub const LENGTH: usize = 8;
 
     /// Reads a group; `None` when the flag for one-valued leaves is neither 0 nor 1.
-    pub const fn from_bytes([depth, shift, one, object, a, b, c, d]: [u8; Self::LENGTH]) -> Option<Self> {
+    pub const fn from_bytes([_, shift, one, object, a, b, c, d]: [u8; Self::LENGTH]) -> Option<Self> {
         let object = match one {
             0 => None,
             1 => Some(object),
             _ => return None,
         };
-        Some(Self { depth, shift, object, trees: u32::from_le_bytes([a, b, c, d]) })
+        Some(Self { shift, object, trees: u32::from_le_bytes([a, b, c, d]) })
     }
 
     /// The group's bytes.
@@ -103,7 +101,7 @@ impl Group {
             None => (0, 0),
         };
         let [a, b, c, d] = self.trees.to_le_bytes();
-        [self.depth, self.shift, one, object, a, b, c, d]
+        [0, self.shift, one, object, a, b, c, d]
     }
 }
 
@@ -118,7 +116,7 @@ mod tests {
             assert_eq!(Axis::from_bytes(axis.to_bytes()), Some(axis));
         }
         for object in [None, Some(0), Some(255)] {
-            let group = Group { depth: 6, shift: 2, object, trees: 70_000 };
+            let group = Group { shift: 2, object, trees: 70_000 };
             assert_eq!(Group::from_bytes(group.to_bytes()), Some(group));
         }
         assert_eq!(Axis::from_bytes([0, 0, 1, 1]), None);

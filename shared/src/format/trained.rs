@@ -331,7 +331,7 @@ pub fn take_feature<'a>(bytes: &mut &'a [u8]) -> Option<Feature<'a>> {
 /// let trained = Trained { touches: Some(touches), ..Trained::default() };
 /// let mut sections = Vec::new();
 /// trained.write(|bytes| sections.extend_from_slice(bytes));
-/// let header = HeaderBuilder::default().with_sections(sections.len() as u32);
+/// let header = HeaderBuilder::default().with_optional_length(sections.len() as u32);
 /// // Header, text, these sections, base margins, and so on.
 /// # assert_eq!(sections.len(), 16);
 /// ```

@@ -14,7 +14,7 @@
 
 use palpate::Error;
 use palpate::Result;
-use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::compile::{Leaf, Settings, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node, Output};
 use palpate::touches::Dataset;
@@ -43,26 +43,22 @@ fn main() -> Result<()> {
     let deep = ensemble(trained, compact(20, 7, 256), Descriptor::Curvature)?;
     let few = with!(train::Settings::paper(), rounds = 20, depth = 3);
     let shallow = ensemble(trained, few, Descriptor::Times)?;
-    let table = ensemble(trained, compact(60, 6, 64), Descriptor::Curvature)?;
     let models = [
-        ("one-i16", &one, Leaf::I16, Layout::Complete),
-        ("one-compact", &one, Leaf::I16, Layout::Compact),
-        ("one-d3", &shallow, Leaf::I16, Layout::Complete),
-        ("each100-i16", &each100, Leaf::I16, Layout::Complete),
-        ("each100-i8", &each100, Leaf::I8, Layout::Complete),
-        ("each40-i16", &each40, Leaf::I16, Layout::Complete),
-        ("each40-i8", &each40, Leaf::I8, Layout::Complete),
-        ("each40-compact", &each40, Leaf::I8, Layout::Compact),
-        ("each20-d7", &deep, Leaf::I8, Layout::Complete),
-        ("grid-i8", &table, Leaf::I8, Layout::Grid),
-        ("grid-i16", &table, Leaf::I16, Layout::Grid),
-        ("identity", &each40, Leaf::I16, Layout::Complete),
+        ("one-i16", &one, Leaf::I16),
+        ("one-i8", &one, Leaf::I8),
+        ("one-d3", &shallow, Leaf::I16),
+        ("each100-i16", &each100, Leaf::I16),
+        ("each100-i8", &each100, Leaf::I8),
+        ("each40-i16", &each40, Leaf::I16),
+        ("each40-i8", &each40, Leaf::I8),
+        ("each20-d7", &deep, Leaf::I8),
+        ("identity", &each40, Leaf::I16),
     ];
     let touches = touches(data.as_ref().map(|data| &data.test));
     write(&out.join("touches.bin"), &touches.iter().flat_map(times).collect::<Vec<u8>>())?;
     let mut estimates = Vec::new();
-    for (name, ensemble, leaf, layout) in models {
-        let compiled = compile(ensemble, &with!(Settings::default(), leaf, layout = Some(layout)))?;
+    for (name, ensemble, leaf) in models {
+        let compiled = compile(ensemble, &with!(Settings::default(), leaf))?;
         println!(
             "{name:16} {:7} bytes, {:6} splits, {:.2} bytes per split, {} instructions per touch by the stated model",
             compiled.bytes.len(),

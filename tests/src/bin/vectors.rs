@@ -15,6 +15,7 @@ use palpate_shared::{ContactTime, Descriptor, MISSING_FEATURE, Patterns, Pose, T
 use palpate_tests::abuse::{self, changed, section};
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::{trained, with_sections};
+use palpate_tests::wide::widened;
 use palpate_tests::vectors::{hex, numbers, refusal, touch_words};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
@@ -68,10 +69,12 @@ fn stated(model: &[u8], touches: TrainedTouches) -> Vec<u8> {
 }
 
 fn compiled(shape: Shape, seed: u64, leaf: Leaf, layout: Layout) -> Vec<u8> {
-    // Tables by contact pattern have no other descriptor.
-    let descriptor = if layout == Layout::Patterns { Descriptor::ContactsCurvature } else { shape.descriptor };
-    let ensemble = random::ensemble(Shape { descriptor, ..shape }, seed);
-    compile(&ensemble, &with!(Settings::default(), leaf, layout = Some(layout))).expect("it fits").bytes
+    in_layout(compile(&random::ensemble(shape, seed), &with!(Settings::default(), leaf)).expect("it fits").bytes, layout)
+}
+
+/// A compact model with splits of six bytes, if that is the layout.
+fn in_layout(bytes: Vec<u8>, layout: Layout) -> Vec<u8> {
+    if layout == Layout::Wide { widened(&bytes) } else { bytes }
 }
 
 /// Touches that reach all over a model, and those at the limits of features.
@@ -148,7 +151,7 @@ fn known(text: &mut String, model: &Model<'_>, recognizer: &Recognizer<'_, 256>,
 fn layouts(text: &mut String) {
     for each in [true, false] {
         for &leaf in Leaf::ALL {
-            for &layout in Layout::OF_DATA {
+            for layout in [Layout::Compact, Layout::Wide] {
                 let name = format!("{} {} {}", layout.name(), leaf.name(), if each { "each" } else { "one" });
                 let bytes = stated(&compiled(Shape { each, ..SHAPE }, 5, leaf, layout), ALL);
                 play(text, &name, &bytes, &touches(5, 1));
@@ -157,22 +160,15 @@ fn layouts(text: &mut String) {
     }
     for (objects, leaf, layout) in [
         (1, Leaf::I8, Layout::Compact),
-        (11, Leaf::I8, Layout::Complete),
-        (13, Leaf::I16, Layout::Complete),
-        (7, Leaf::F32, Layout::Complete),
-        (12, Leaf::I8, Layout::Patterns),
-        (11, Leaf::I8, Layout::Grid),
+        (11, Leaf::I8, Layout::Compact),
+        (13, Leaf::I16, Layout::Compact),
+        (7, Leaf::F32, Layout::Wide),
     ] {
         let bytes = compiled(Shape { objects, ..SHAPE }, 6, leaf, layout);
         play(text, &format!("{} {} of {objects} objects", layout.name(), leaf.name()), &bytes, &touches(5, 2));
     }
-    for depth in 1..=8 {
-        let shape = Shape { depth, trees: 2, objects: 2, thresholds: 40, ..SHAPE };
-        let bytes = compiled(shape, 7, Leaf::I8, Layout::Complete);
-        play(text, &format!("complete of depth {depth}"), &stated(&bytes, ALL), &touches(6, depth as u64));
-    }
     let many = Shape { trees: 70, depth: 1, ..SHAPE };
-    for &layout in &[Layout::Complete, Layout::Compact, Layout::Wide] {
+    for layout in [Layout::Compact, Layout::Wide] {
         play(text, &format!("{} of 70 trees", layout.name()), &compiled(many, 8, Leaf::I8, layout), &touches(8, 3));
     }
     let axes = Shape { trees: 60, depth: 4, objects: 2, thresholds: 900, ..SHAPE };
@@ -247,12 +243,11 @@ fn rows(text: &mut String) {
     for (layout, leaf) in [
         (Layout::Compact, Leaf::I16),
         (Layout::Wide, Leaf::F32),
-        (Layout::Complete, Leaf::I8),
-        (Layout::Complete, Leaf::F32),
+        (Layout::Compact, Leaf::I8),
     ] {
         let ensemble = random::over_rows(random::ensemble(SHAPE, 14), 5, 1.000_001e-3);
-        let settings = with!(Settings::default(), leaf, layout = Some(layout));
-        let bytes = compile(&ensemble, &settings).expect("it fits").bytes;
+        let bytes = compile(&ensemble, &with!(Settings::default(), leaf)).expect("it fits").bytes;
+        let bytes = in_layout(bytes, layout);
         play_rows(text, &format!("rows of f32 features, {} {}", layout.name(), leaf.name()), &bytes, true);
         play_rows(text, &format!("rows of whole features, {}", layout.name()), &changed(&bytes, 13, &[0]), false);
     }
@@ -260,7 +255,7 @@ fn rows(text: &mut String) {
     let values: Vec<u8> = (0..33).map(|value| 7 * value).collect();
     let table = [&(-(1_i32 << 17)).to_le_bytes()[..], &[3, 10, 2, 32], &values].concat();
     let sections = [section(4 | 1 << 15, &[&[4, 0][..], &weights].concat()), section(16 | 1 << 15, &table)].concat();
-    let settings = with!(Settings::default(), leaf = Leaf::I16, layout = Some(Layout::Compact));
+    let settings = with!(Settings::default(), leaf = Leaf::I16);
     let bytes =
         compile(&random::over_rows(random::ensemble(SHAPE, 14), 5, 1.000_001e-3), &settings).expect("it fits").bytes;
     play_rows(text, "rows whose evidence is weighed, by a table", &with_sections(&bytes, &sections), true);
@@ -298,7 +293,7 @@ fn play_rows(text: &mut String, name: &str, bytes: &[u8], real: bool) {
 
 /// Rows of sequences that are numbered, guarded, or both.
 fn sequences(text: &mut String) {
-    let settings = with!(Settings::default(), leaf = Leaf::I16, layout = Some(Layout::Compact));
+    let settings = with!(Settings::default(), leaf = Leaf::I16);
     let real =
         compile(&random::over_rows(random::ensemble(SHAPE, 14), 5, 1.000_001e-3), &settings).expect("it fits").bytes;
     let whole = changed(&real, 13, &[0]);
@@ -414,20 +409,20 @@ fn decisions(text: &mut String) {
 
 /// Leaves that are numbers of a table: of one byte and of two, with a value for each object and for one.
 fn shared_leaves(text: &mut String) {
-    let compiled = |shape: Shape, different: Option<usize>, leaf, layout| {
-        let ensemble = random::ensemble(shape, 23);
-        let ensemble = different.map_or(ensemble.clone(), |most| random::with_few_leaves(ensemble, most));
-        let settings = with!(Settings::default(), leaf, layout = Some(layout), shared_leaves = Some(true));
-        stated(&compile(&ensemble, &settings).expect("it fits").bytes, ALL)
+    let compiled = |shape: Shape, different: usize, leaf, layout| {
+        let ensemble = random::with_few_leaves(random::ensemble(shape, 23), different);
+        let bytes = compile(&ensemble, &with!(Settings::default(), leaf)).expect("it fits").bytes;
+        assert!(Model::new(&bytes).expect("a model").shared_leaves().is_some());
+        stated(&in_layout(bytes, layout), ALL)
     };
-    for layout in [Layout::Compact, Layout::Complete, Layout::Wide] {
+    for layout in [Layout::Compact, Layout::Wide] {
         for (leaf, each) in [(Leaf::I8, true), (Leaf::I16, true), (Leaf::F32, true), (Leaf::F32, false)] {
-            let bytes = compiled(Shape { trees: 12, each, ..SHAPE }, Some(7), leaf, layout);
+            let bytes = compiled(Shape { trees: 24, each, ..SHAPE }, if each { 7 } else { 5 }, leaf, layout);
             let name = format!("{} {} {}", layout.name(), leaf.name(), if each { "each" } else { "one" });
             play(text, &format!("shared leaves, {name}"), &bytes, &touches(5, 24));
         }
         // More than a block of trees.
-        let bytes = compiled(Shape { trees: 70, objects: 11, ..SHAPE }, None, Leaf::I8, layout);
+        let bytes = compiled(Shape { trees: 170, objects: 11, ..SHAPE }, 300, Leaf::I8, layout);
         play(text, &format!("shared leaves, numbers of two bytes, {}", layout.name()), &bytes, &touches(5, 25));
     }
 }

@@ -7,6 +7,7 @@ use palpate_onboard::Model;
 use palpate_shared::Touch;
 use palpate_shared::format::f32_key;
 use palpate_tests::random;
+use palpate_tests::wide::widened;
 use proptest::prelude::*;
 
 /// The largest difference of a margin, checked against the stated error.
@@ -22,15 +23,12 @@ fn hold(ensemble: &Ensemble, compiled: &Compiled, touches: &[Touch]) {
     }
 }
 
-fn layouts(ensemble: &Ensemble, leaf: Leaf) -> Vec<Compiled> {
-    let layouts = std::iter::once(None).chain(Layout::OF_DATA.iter().copied().map(Some));
-    let settings = |layout| with!(Settings::default(), leaf, layout);
-    let plain = layouts.map(settings);
-    // Of those that walk trees, one with shared leaves.
-    let walked = [Layout::Compact, Layout::Complete, Layout::Wide];
-    let shared = walked.get(ensemble.trees.len() % walked.len()).copied();
-    let shared = shared.map(|layout| with!(settings(Some(layout)), shared_leaves = Some(true)));
-    plain.chain(shared).filter_map(|settings| compile(ensemble, &settings).ok()).collect()
+/// The ensemble's model, with splits of three bytes and of six.
+fn models(ensemble: &Ensemble, settings: &Settings) -> Vec<Compiled> {
+    let compiled = compile(ensemble, settings).unwrap();
+    let wide = (compiled.layout == Layout::Compact)
+        .then(|| Compiled { bytes: widened(&compiled.bytes), layout: Layout::Wide, ..compiled.clone() });
+    std::iter::once(compiled).chain(wide).collect()
 }
 
 /// A row next to some of the thresholds, and with all that is special about f32.
@@ -57,25 +55,21 @@ proptest! {
     fn integer_margins_stay_within_the_stated_error_in_every_layout(shape in crate::shapes(12, 300, 10, 900), seed: u64, wide: bool) {
         let ensemble = random::ensemble(shape, seed);
         let touches = random::touches(200, seed);
-        let models = layouts(&ensemble, if wide { Leaf::I16 } else { Leaf::I8 });
-        prop_assert!(models.len() >= 3, "{} layouts", models.len());
-        for compiled in models {
+        let leaf = if wide { Leaf::I16 } else { Leaf::I8 };
+        for compiled in models(&ensemble, &with!(Settings::default(), leaf)) {
             hold(&ensemble, &compiled, &touches);
         }
     }
 
     #[test]
-    fn integer_margins_are_the_same_in_every_layout_that_walks_trees(shape in crate::shapes(12, 300, 10, 900), seed: u64) {
+    fn integer_margins_are_the_same_with_splits_of_three_bytes_and_of_six(shape in crate::shapes(12, 300, 10, 900), seed: u64) {
         let ensemble = random::ensemble(shape, seed);
-        let models = layouts(&ensemble, Leaf::I16);
-        let mut first = vec![0; shape.objects];
-        let mut other = first.clone();
-        let trees: Vec<Model> = models.iter().map(|compiled| Model::new(&compiled.bytes).unwrap()).collect();
-        let trees: Vec<&Model> = trees.iter().filter(|model| !matches!(model.layout(), Layout::Grid | Layout::Patterns)).collect();
+        let all = models(&ensemble, &Settings::default());
+        let [mut first, mut other] = [vec![0; shape.objects], vec![0; shape.objects]];
         for touch in random::touches(100, seed) {
-            trees[0].margins(&touch, &mut first);
-            for model in &trees {
-                model.margins(&touch, &mut other);
+            Model::new(&all[0].bytes).unwrap().margins(&touch, &mut first);
+            for compiled in &all {
+                Model::new(&compiled.bytes).unwrap().margins(&touch, &mut other);
                 prop_assert_eq!(&first, &other);
             }
         }
@@ -85,7 +79,7 @@ proptest! {
     fn f32_margins_are_the_ensembles_bit_for_bit_in_every_layout(shape in crate::shapes(12, 300, 10, 900), seed: u64) {
         let ensemble = random::ensemble(shape, seed);
         let mut margins = vec![0.0; shape.objects];
-        for compiled in layouts(&ensemble, Leaf::F32) {
+        for compiled in models(&ensemble, &with!(Settings::default(), leaf = Leaf::F32)) {
             let model = Model::new(&compiled.bytes).unwrap();
             for touch in random::touches(100, seed) {
                 let features = shape.descriptor.features(&touch);
@@ -101,11 +95,7 @@ proptest! {
     fn real_features_split_as_f32_does_in_every_layout(shape in crate::shapes(12, 300, 10, 900), features in 1..=256_usize, seed: u64) {
         let ensemble = random::over_rows(random::ensemble(shape, seed), features, 1.000_001e-3);
         let mut margins = vec![0.0; shape.objects];
-        let mut models = 0;
-        for layout in [None, Some(Layout::Compact), Some(Layout::Wide), Some(Layout::Complete), Some(Layout::Grid)] {
-            let settings = with!(Settings::default(), leaf = Leaf::F32, layout);
-            let Ok(compiled) = compile(&ensemble, &settings) else { continue };
-            models += 1;
+        for compiled in models(&ensemble, &with!(Settings::default(), leaf = Leaf::F32)) {
             let model = Model::new(&compiled.bytes).unwrap();
             for index in 0..40 {
                 let row = row(&ensemble, features, index);
@@ -115,6 +105,5 @@ proptest! {
                 prop_assert_eq!(bits(&ensemble.margins_of_features(&row)), bits(&margins));
             }
         }
-        prop_assert!(models >= 2, "{} layouts", models);
     }
 }

@@ -32,7 +32,7 @@ fn steps(steps: &[f32], margins: &[&[f32]]) -> Ensemble {
 }
 
 fn compiled(ensemble: &Ensemble, leaf: Leaf) -> Vec<u8> {
-    compile(ensemble, &with!(Settings::default(), leaf, layout = Some(Layout::Compact))).unwrap().bytes
+    compile(ensemble, &with!(Settings::default(), leaf)).unwrap().bytes
 }
 
 /// The object that was recognized, and after how many touches.

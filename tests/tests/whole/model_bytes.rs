@@ -8,13 +8,14 @@ use palpate_shared::format::{HEADER_LENGTH, MUST_UNDERSTAND, PatternShares, Trai
 use palpate_tests::abuse::{self, cuts, places, sealed, section};
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::{trained, with_sections};
+use palpate_tests::wide::widened;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
 /// A small model in each layout and leaf type, with leaves of every object or of one, and models with every optional section.
 fn models() -> Vec<Vec<u8>> {
-    let of_layout = |&layout| Leaf::ALL.iter().flat_map(move |&leaf| [true, false].map(|each| (layout, leaf, each)));
-    let plain = Layout::OF_DATA.iter().flat_map(of_layout);
+    let of_layout = |layout| Leaf::ALL.iter().flat_map(move |&leaf| [true, false].map(|each| (layout, leaf, each)));
+    let plain = [Layout::Compact, Layout::Wide].into_iter().flat_map(of_layout);
     let plain = plain.map(|(layout, leaf, each)| abuse::model(layout, leaf, each));
     plain.chain(cuts().into_iter().map(|(_, base, _)| base)).collect()
 }
@@ -122,10 +123,8 @@ fn changed_bytes_that_are_accepted_give_the_same_margins_at_every_address_and_al
     // With thresholds of two and of four bytes, and enough of them for every kind of search.
     let mut rng = SmallRng::seed_from_u64(1);
     let shape = Shape { thresholds: 200, trees: 60, ..Shape::SMALL };
-    let many = [Layout::Compact, Layout::Complete, Layout::Grid].map(|layout| {
-        let settings = with!(Settings::default(), leaf = Leaf::I16, layout = Some(layout));
-        compile(&random::ensemble(shape, 6), &settings).unwrap().bytes
-    });
+    let many = compile(&random::ensemble(shape, 6), &Settings::default()).unwrap().bytes;
+    let many = [widened(&many), many];
     let models: Vec<Vec<u8>> = models().into_iter().chain(many).collect();
     let (mut accepted, mut batch) = (0, Batch::new());
     for round in 0..1_500 {

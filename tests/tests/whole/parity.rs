@@ -2,7 +2,7 @@
 //! `PALPATE_REPETITIONS=50 cargo test --release -p palpate-tests --test whole parity::` compares a million touches.
 
 use palpate::capture::capture;
-use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::compile::{Leaf, Settings, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node};
 use palpate::evaluate::parity::{Parity, parity};
@@ -17,8 +17,8 @@ const TOUCHES: usize = 20_000;
 const SEQUENCES: usize = 10_000;
 
 /// Bytes of a compiled model.
-fn size(ensemble: &Ensemble, leaf: Leaf, layout: Layout) -> usize {
-    compile(ensemble, &with!(Settings::default(), leaf, layout = Some(layout))).unwrap().bytes.len()
+fn size(ensemble: &Ensemble, leaf: Leaf) -> usize {
+    compile(ensemble, &with!(Settings::default(), leaf)).unwrap().bytes.len()
 }
 
 /// Touches of the built-in objects, without poses and with them; captured only once, as all tests need them.
@@ -97,8 +97,8 @@ fn a_thousand_one_output_trees_take_six_bytes_a_split_and_forty_multi_output_tre
     let one = &*PUBLISHED;
     let nodes = one.trees.iter().flat_map(|tree| &tree.nodes);
     let splits = nodes.filter(|node| matches!(node, Node::Split { .. })).count();
-    assert!(one.trees.len() == 1000 && size(one, Leaf::I16, Layout::Compact) <= 6 * splits, "{splits} splits");
+    assert!(one.trees.len() == 1000 && size(one, Leaf::I16) <= 6 * splits, "{splits} splits");
     let each = train(dataset, &with!(train::Settings::compact(), rounds = 40, depth = 5), &()).unwrap();
-    let bytes = size(&each, Leaf::I8, Layout::Complete);
+    let bytes = size(&each, Leaf::I8);
     assert!(each.trees.len() == 40 && bytes <= 17_000, "{bytes} bytes");
 }

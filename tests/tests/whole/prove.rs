@@ -1,6 +1,6 @@
 //! Proofs: every model of an ensemble is proved, and no change of a model's meaning is.
 
-use palpate::compile::{Instructions, Layout, Leaf, Settings, compile};
+use palpate::compile::{Instructions, Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Tree};
 use palpate::error::ProofProblem;
 use palpate::prove::prove;
@@ -181,7 +181,7 @@ fn two_thousand_changes_of_splits_skips_leaves_and_shifts_with_a_right_checksum_
     let shape = Shape { objects: 6, trees: 60, depth: 6, thresholds: 90, ..Shape::SMALL };
     for (each, leaf) in [(false, Leaf::I8), (true, Leaf::I16), (true, Leaf::I8), (false, Leaf::I16)] {
         let ensemble = random::ensemble(Shape { each, descriptor: Descriptor::Oriented, ..shape }, 21);
-        let settings = with!(Settings::default(), leaf, layout = Some(Layout::Compact), shared_leaves = Some(false));
+        let settings = with!(Settings::default(), leaf);
         let original = Original::new(compile(&ensemble, &settings).unwrap().bytes, &ensemble);
         for (kind, refused) in &mut refused {
             let places = places(&original.bytes, kind);
@@ -202,7 +202,7 @@ fn two_thousand_changes_of_splits_skips_leaves_and_shifts_with_a_right_checksum_
 #[test]
 fn another_ensemble_is_refused_with_the_tree_and_the_rows() {
     let ensemble = random::ensemble(Shape::SMALL, 1);
-    let bytes = compile(&ensemble, &with!(Settings::default(), layout = Some(Layout::Compact))).unwrap().bytes;
+    let bytes = compile(&ensemble, &Settings::default()).unwrap().bytes;
     let mut other = ensemble.clone();
     let threshold = other.trees[2].nodes.iter_mut().find_map(|node| match node {
         Node::Split { threshold, .. } => Some(threshold),
@@ -220,7 +220,7 @@ fn another_ensemble_is_refused_with_the_tree_and_the_rows() {
 fn trees_deeper_than_any_ensemble_are_refused_and_not_walked() {
     let shape = Shape { descriptor: Descriptor::Oriented, depth: 13, trees: 1, thresholds: 4_000, ..Shape::SMALL };
     let ensemble = random::ensemble(shape, 3);
-    let mut bytes = compile(&ensemble, &with!(Settings::default(), layout = Some(Layout::Wide))).unwrap().bytes;
+    let mut bytes = compile(&ensemble, &Settings::default()).unwrap().bytes;
     let header = Header::of(&bytes);
     let (splits, leaves) = (header.nodes_length() as usize, header.leaves_length() as usize);
     let body = bytes.len() - 4;
@@ -248,7 +248,7 @@ fn thousands_of_merged_trees_are_proved() {
     ensemble.trees.retain(|tree| tree.nodes.len() == 3);
     assert!(ensemble.trees.len() > 2_000, "{}", ensemble.trees.len());
     for leaf in [Leaf::I8, Leaf::I16] {
-        let settings = with!(Settings::default(), leaf, layout = Some(Layout::Compact));
+        let settings = with!(Settings::default(), leaf);
         let bytes = compile(&ensemble, &settings).unwrap().bytes;
         let proof = prove(&bytes, &ensemble).unwrap();
         assert!(20 * proof.trees < ensemble.trees.len(), "{} trees", proof.trees);

@@ -5,7 +5,7 @@ use super::numbers::error_rate;
 use super::unstated::UnstatedArguments;
 use palpate::Result;
 use palpate::compile::{
-    self, Candidate, Compiled, CompiledModel, Goal, Instructions, Language, Layout, Leaf, Settings,
+    self, Compiled, CompiledModel, Instructions, Language, Layout, Leaf, Settings,
 };
 use palpate::ensemble::{self, Ensemble, Inputs, TouchOrigin, train};
 use palpate::error::Error;
@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 ENSEMBLE is what `palpate train` saved, or a model of another library: XGBoost's JSON or UBJSON, LightGBM's text, CatBoost's JSON, or ONNX (scikit-learn through skl2onnx).
 
-A --layout is compact, complete, grid, wide or patterns, or a goal: speed, size, balanced (half the bytes are worth a fifth more instructions), m4f or m0+ (balanced for that processor). With --emit c-code or rust-code the trees are code (docs/guide/code.md).
+With --emit c-code or rust-code the trees are code, which is faster and takes more flash (docs/guide/code.md).
 
 Examples:
   palpate export ensemble.json -o model.palpate
@@ -43,12 +43,6 @@ pub(crate) struct Arguments {
     /// Type of leaves: i8, i16 or f32 [default: i16; i8 for touches of more than 50 objects]
     #[arg(long, value_parser = leaf, value_name = "TYPE")]
     leaf: Option<Leaf>,
-    /// Layout of the trees, or the goal that it is chosen for
-    #[arg(long, value_parser = layout, default_value = "balanced", value_name = "NAME")]
-    layout: LayoutChoice,
-    /// Store equal leaves once: yes, no, or auto where that is better
-    #[arg(long, value_parser = sharing, default_value = "auto", value_name = "WHEN")]
-    shared_leaves: Sharing,
     /// Compare whole numbers: width=100 for hundredths, or a CSV file of rows that says which
     #[arg(long, value_name = "SCALES", value_delimiter = ',', value_parser = scale)]
     scale: Vec<Scale>,
@@ -67,36 +61,13 @@ pub(crate) struct Arguments {
     /// Feature that is a row's number in its sequence, from 1; recognizers count it
     #[arg(long, value_name = "FEATURE")]
     row_number: Option<String>,
-    /// Also print the table of layouts, the features to build in, and all notes
+    /// Also print the features to build in, and all notes
     #[arg(short, long)]
     verbose: bool,
     #[command(flatten)]
     unstated: UnstatedArguments,
     #[command(flatten)]
     prior: PriorArguments,
-}
-
-/// A layout, or what it is chosen for.
-#[derive(Clone, Copy)]
-enum LayoutChoice {
-    Layout(Layout),
-    For(Goal),
-}
-
-impl LayoutChoice {
-    fn layout(self) -> Option<Layout> {
-        match self {
-            Self::Layout(layout) => Some(layout),
-            Self::For(_) => None,
-        }
-    }
-
-    fn goal(self) -> Goal {
-        match self {
-            Self::Layout(_) => Settings::default().goal,
-            Self::For(goal) => goal,
-        }
-    }
 }
 
 /// Measure of a feature in whole numbers.
@@ -107,10 +78,6 @@ enum Scale {
     /// Scales that the values of these rows need.
     Rows(PathBuf),
 }
-
-/// Sharing of equal leaves; `None` leaves it open.
-#[derive(Clone)]
-struct Sharing(Option<bool>);
 
 /// Files written beside the model.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -146,8 +113,6 @@ struct Exported {
     leaves: usize,
     margin_error: f32,
     instructions: Instructions,
-    /// Sizes and costs of the layouts that were tried, in the same order every time.
-    candidates: Vec<Candidate>,
     /// Features, by name, for a model over rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     features: Option<Vec<String>>,
@@ -211,10 +176,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let settings = with!(
         Settings::default(),
         leaf = arguments.leaf.unwrap_or(usual.leaf),
-        layout = arguments.layout.layout(),
         code,
-        goal = arguments.layout.goal(),
-        shared_leaves = arguments.shared_leaves.0,
         error_rate = arguments.error_rate,
         max_touches = arguments.max_touches,
         scales,
@@ -238,7 +200,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         leaves: compiled.leaves,
         margin_error: compiled.margin_error,
         instructions: compiled.instructions,
-        candidates: compiled.candidates,
         features: match &ensemble.inputs {
             Inputs::Rows(names) => Some(names.clone()),
             Inputs::Computed(_) => None,
@@ -277,9 +238,6 @@ impl Arguments {
                 "c or rust for a model of data, or c-code or rust-code for trees as code, each in a run of its own";
             return Err(Error::setting("emit", "both", allowed));
         }
-        if let Some(layout) = self.layout.layout().filter(|_| is_code) {
-            return Err(Error::setting("layout", layout.name(), "none with trees that are written as code"));
-        }
         Ok(is_code)
     }
 
@@ -316,8 +274,6 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
     for (name, is_given) in [
         ("names", arguments.names.is_some()),
         ("leaf", arguments.leaf.is_some()),
-        ("layout", arguments.layout.layout().is_some() || arguments.layout.goal() != usual.goal),
-        ("shared_leaves", arguments.shared_leaves.0.is_some()),
         ("scale", !arguments.scale.is_empty()),
         ("row_number", arguments.row_number.is_some()),
         ("error_rate", arguments.error_rate != usual.error_rate),
@@ -602,19 +558,6 @@ fn text(path: &Path, exported: &Exported, features: &str) -> String {
         exported.margin_error,
         if exported.predicts.is_some() { " of the library's" } else { " nats" },
     );
-    if exported.candidates.len() > 1 {
-        _ = writeln!(text, "{:16} {:>9} {:>12} {:>12}", "layout", "bytes", "Cortex-M4F", "Cortex-M0+");
-        for candidate in &exported.candidates {
-            let Candidate { layout, shared_leaves, bytes, instructions, .. } = candidate;
-            let m0_plus = instructions.m0_plus.map_or_else(|| "unknown".into(), |number| number.to_string());
-            let is_layout = layout.name() == exported.layout;
-            let is_chosen = is_layout && *shared_leaves == exported.shared_leaves.is_some();
-            let mark = if is_chosen { " *" } else { "" };
-            let shared = if *shared_leaves { ", shared" } else { "" };
-            let name = format!("{}{shared}", layout.name());
-            _ = writeln!(text, "{name:16} {bytes:>9} {:>12} {m0_plus:>12}{mark}", instructions.m4f);
-        }
-    }
     let each = if exported.features.is_some() { "row" } else { "touch" };
     _ = writeln!(text, "Instructions per {each}, estimated: {}", instructions(exported.instructions));
     text += &exported.predicts.as_ref().map_or(String::new(), Predicts::text);
@@ -664,30 +607,6 @@ fn classes(names: &[String]) -> String {
 
 fn leaf(name: &str) -> Result<Leaf, String> {
     Leaf::ALL.iter().copied().find(|leaf| leaf.name() == name).ok_or_else(|| "use one of i8, i16, f32".to_owned())
-}
-
-fn layout(name: &str) -> Result<LayoutChoice, String> {
-    if let Some(layout) = Layout::OF_DATA.iter().copied().find(|layout| layout.name() == name) {
-        return Ok(LayoutChoice::Layout(layout));
-    }
-    let goal = match name {
-        "balanced" => Ok(Goal::Balanced(compile::Core::M4F)),
-        "speed" => Ok(Goal::Speed),
-        "size" => Ok(Goal::Size),
-        chip => super::chips::core(chip).map(Goal::Balanced),
-    };
-    goal.map(LayoutChoice::For).map_err(|_| {
-        "use a layout (compact, complete, grid, wide, patterns), or a goal (balanced, speed, size, m4f, m0+)".to_owned()
-    })
-}
-
-fn sharing(name: &str) -> Result<Sharing, String> {
-    match name {
-        "auto" => Ok(Sharing(None)),
-        "yes" => Ok(Sharing(Some(true))),
-        "no" => Ok(Sharing(Some(false))),
-        _ => Err("use one of auto, yes, no".into()),
-    }
 }
 
 fn scale(text: &str) -> Result<Scale, String> {

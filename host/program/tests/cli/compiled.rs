@@ -40,8 +40,8 @@ fn verdict(line: &Value) -> (u64, &str, &str) {
 #[test]
 fn export_and_inspect_say_size_splits_leaves_error_and_cost_of_the_file() {
     let at = &ONE_SPLIT.folder();
-    for (leaf, layout) in [("i8", "balanced"), ("i16", "compact"), ("f32", "complete"), ("i16", "grid")] {
-        let exported = figures(at, &format!("export ensemble.json -o other.palpate --leaf {leaf} --layout {layout}"));
+    for leaf in ["i8", "i16", "f32"] {
+        let exported = figures(at, &format!("export ensemble.json -o other.palpate --leaf {leaf}"));
         assert_eq!(exported["bytes"], fs::metadata(at.join("other.palpate")).unwrap().len());
         let of_each = ["splits", "leaves", "trees"].map(|key| exported[key].as_u64().unwrap());
         assert_eq!(of_each, [1, 2, 1]);
@@ -188,7 +188,6 @@ fn what_cannot_be_exported_or_recognized_is_refused_and_the_old_model_stays() {
     let no_touches = "touches is 0. Use at least 1.";
     for (words, code, expected) in [
         ("export ensemble.json -o model.palpate --leaf i4", 2, "--leaf"),
-        ("export ensemble.json -o model.palpate --layout spiral", 2, "spiral"),
         ("export ensemble.json -o model.palpate --error-rate 0.7", 2, "below one half"),
         ("export ensemble.json -o model.palpate --error-rate five", 2, "0.05, or percent such as 5%"),
         ("export ensemble.json -o model.palpate --max-touches 0", 2, "touches"),

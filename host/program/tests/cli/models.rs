@@ -57,7 +57,7 @@ fn smaller_presets_make_smaller_models_that_are_exact() {
     let at = &BOWL_AND_FORK.folder();
     let bytes = ["compact", "small", "tiny"].map(|preset| {
         succeeds(at, &format!("train data -o e.json --preset {preset} --trees min_child_weight=5"));
-        let exported = figures(at, "export e.json -o m.palpate --layout compact");
+        let exported = figures(at, "export e.json -o m.palpate");
         assert_eq!(exported["margin_error"], 0.0, "{exported:#}");
         exported["bytes"].as_u64().unwrap()
     });

@@ -337,32 +337,16 @@ fn whole_numbers_in_the_users_units_split_as_the_values_do_and_say_what_they_cha
 #[test]
 fn equal_leaves_of_a_forest_stand_once_and_that_is_said_everywhere() {
     let at = &library("sklearn-1.9-forest.onnx");
-    let export = |shared: &str| {
-        figures(at, &format!("export source.onnx -o {shared} --leaf i8 --layout compact --shared-leaves {shared}"))
-    };
-    let (shared, plain) = (export("yes"), export("no"));
+    let shared = figures(at, "export source.onnx -o m --leaf i8");
     let different = shared["shared_leaves"].as_u64().unwrap();
     assert!(different >= 2 && different <= shared["leaves"].as_u64().unwrap(), "{shared}");
-    assert_eq!((&plain["shared_leaves"], &plain["margin_error"]), (&Value::Null, &shared["margin_error"]));
-    // A fault that is not in a tree is found in both.
-    for model in ["yes", "no"] {
-        let verified = figures(at, &format!("verify {model} source.onnx rows.csv"));
-        assert_eq!(verified["class_differs"], 0, "{verified}");
-    }
-    let inspected = figures(at, "inspect yes");
+    let verified = figures(at, "verify m source.onnx rows.csv");
+    assert_eq!(verified["class_differs"], 0, "{verified}");
+    let inspected = figures(at, "inspect m");
     assert_eq!(inspected["shared_leaves"], different);
     parts_are_all_bytes(&inspected);
-    says(at, "inspect yes", &[&format!("{different} different ones, each once")]);
-    let export = "export source.onnx -o m --leaf i8 --shared-leaves yes -v";
-    says(at, export, &[", shared ", "i8-leaves, shared-leaves"]);
-    // All candidates are the same whatever is asked for; sharing is one of them only where it is smaller.
-    let all = figures(at, "export source.onnx -o m --leaf i8");
-    for candidate in all["candidates"].as_array().unwrap() {
-        let of = |other: &&Value| other["layout"] == candidate["layout"] && other["shared_leaves"] == false;
-        let own = all["candidates"].as_array().unwrap().iter().find(of).unwrap();
-        assert!(candidate["shared_leaves"] == false || candidate["bytes"].as_u64() < own["bytes"].as_u64(), "{all}");
-    }
-    fails(at, "export source.onnx -o m --shared-leaves maybe", 2, "use one of auto, yes, no");
+    says(at, "inspect m", &[&format!("{different} different ones, each once")]);
+    says(at, "export source.onnx -o m --leaf i8 -v", &["i8-leaves, shared-leaves"]);
 }
 
 #[test]
@@ -609,28 +593,6 @@ fn place() -> (Folder, impl Fn(&str) -> String) {
     let directory = Folder::new();
     let root = directory.to_path_buf();
     (directory, move |name: &str| root.join(name).to_str().unwrap().to_owned())
-}
-
-#[test]
-fn the_layout_is_chosen_for_what_is_asked_and_all_candidates_are_named() {
-    let (_directory, path) = place();
-    let export = |goal: &str| {
-        json(run(["export", &data("xgboost-1.6-softprob.ubj"), "-o", &path("m"), "--layout", goal, "--json"]))
-    };
-    let (size, speed, balanced) = (export("size"), export("speed"), export("balanced"));
-    let candidates = size["candidates"].as_array().unwrap();
-    assert!(candidates.len() >= 2, "{size}");
-    assert_eq!((&speed["candidates"], &balanced["candidates"]), (&size["candidates"], &size["candidates"]));
-    let least = |key: fn(&Value) -> Option<u64>| candidates.iter().min_by_key(|candidate| key(candidate)).unwrap();
-    assert_eq!(size["layout"], least(|candidate| candidate["bytes"].as_u64())["layout"]);
-    assert_eq!(speed["layout"], least(|candidate| candidate["instructions"]["m4f"].as_u64())["layout"]);
-    assert_eq!(size["bytes"], least(|candidate| candidate["bytes"].as_u64())["bytes"]);
-    let smallest = least(|candidate| candidate["bytes"].as_u64())["bytes"].as_u64().unwrap();
-    let small = candidates.iter().filter(|candidate| candidate["bytes"].as_u64().unwrap() <= 3 * smallest);
-    let fastest = small.min_by_key(|candidate| candidate["instructions"]["m4f"].as_u64()).unwrap();
-    assert_eq!(balanced["layout"], fastest["layout"]);
-    let text = stdout(run(["export", &data("xgboost-1.6-softprob.ubj"), "-o", &path("m"), "--verbose"]));
-    assert!(text.contains("compact") && text.contains("complete") && text.contains(" *"), "{text}");
 }
 
 #[test]

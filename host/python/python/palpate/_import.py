@@ -66,8 +66,6 @@ def compile(
     max_bytes: int | None = None,
     names: Sequence[str] | None = None,
     leaf: str = "i16",
-    layout: str | None = None,
-    goal: str = "balanced",
     error_rate: float = 0.01,
     max_touches: int = 200,
     priors: Sequence[float] | None = None,
@@ -80,11 +78,9 @@ def compile(
 
     `model`, `names`, `all_trees` and `missing` are as for `to_ensemble`. `leaf` is "i8", "i16" or "f32": what leaves are stored
     as; with "f32" the margins of an XGBoost model stay its own, bit for bit. What to know about the model is a `ModelWarning`,
-    and is in its `notes`. `layout` is "compact", "complete", "grid", "wide" or "patterns";
-    without one, the best for the `goal` ("balanced", "speed" or "size") is taken.
+    and is in its `notes`.
 
-    With `max_bytes`, the layout is chosen for size and leaves are stored in fewer bits where the model would be larger; if
-    it still is, that is an error: no tree is left out. `error_rate` and `max_touches` are where recognizers stop, `priors`
+    With `max_bytes`, leaves are stored in fewer bits where the model would be larger; if it still is, that is an error: no tree is left out. `error_rate` and `max_touches` are where recognizers stop, `priors`
     say how likely each object is, `scales` how many units make up 1 of each feature for a chip that measures in whole
     numbers. `row_number` names the feature that is a row's number in its sequence, counted from 1: recognizers count it.
 
@@ -98,8 +94,6 @@ def compile(
         to_ensemble(model, names, all_trees=all_trees, missing=missing),
         max_bytes=max_bytes,
         leaf=leaf,
-        layout=layout,
-        goal=goal,
         error_rate=error_rate,
         max_touches=max_touches,
         priors=None if priors is None else list(priors),

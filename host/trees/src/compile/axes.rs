@@ -76,7 +76,7 @@ pub(super) fn different_splits(forest: &Forest<'_>) -> Vec<Key> {
 
 /// Bytes per threshold: two where every threshold fits them and the next axis's are then aligned like these, else four.
 /// Other widths are read, too, but byte by byte.
-pub(super) fn width(cuts: &[i32]) -> u8 {
+fn width(cuts: &[i32]) -> u8 {
     let narrow = cuts.len().is_multiple_of(2) && cuts.iter().all(|&cut| i16::try_from(cut).is_ok());
     if narrow { 2 } else { 4 }
 }

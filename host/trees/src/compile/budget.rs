@@ -1,11 +1,11 @@
 //! Trees in as many bytes as there is room for.
 
-use super::{Compiled, Goal, Leaf, Settings, compile};
+use super::{Compiled, Leaf, Settings, compile};
 use crate::ensemble::Ensemble;
 use crate::error::{CompileProblem, Result};
 
-/// Compiles an ensemble to at most `most` bytes. No tree is left out: first the layout is chosen for size, then leaves are
-/// stored in fewer bits. Of what fits, the first is taken, so that margins are as exact as there is room for.
+/// Compiles an ensemble to at most `most` bytes. No tree is left out: leaves are stored in fewer bits. Of what fits, the first
+/// is taken, so that margins are as exact as there is room for.
 ///
 /// # Errors
 /// Errors of [`compile`], and [`CompileProblem::OverBudget`] with the fewest bytes that were found.
@@ -17,13 +17,11 @@ pub fn compile_within(ensemble: &Ensemble, settings: &Settings, most: usize) -> 
     };
     let mut fewest = usize::MAX;
     for &leaf in narrower {
-        for goal in [settings.goal, Goal::Size] {
-            let compiled = compile(ensemble, &Settings { leaf, goal, ..settings.clone() })?;
-            if compiled.bytes.len() <= most {
-                return Ok(compiled);
-            }
-            fewest = fewest.min(compiled.bytes.len());
+        let compiled = compile(ensemble, &Settings { leaf, ..settings.clone() })?;
+        if compiled.bytes.len() <= most {
+            return Ok(compiled);
         }
+        fewest = fewest.min(compiled.bytes.len());
     }
     Err(CompileProblem::OverBudget { bytes: fewest, most }.into())
 }

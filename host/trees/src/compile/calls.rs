@@ -28,9 +28,8 @@ impl Places {
     fn of(bytes: &[u8]) -> Self {
         let (short, long) = (|at| usize::from(short(bytes, at)), |at| long(bytes, at) as usize);
         let objects = usize::from(bytes[14]) + 1;
-        let optional = if short(4) == 1 { 0 } else { long(92) };
         let axes = 4 * short(16);
-        let lengths = [long(68), optional, 8 * objects, long(80) + axes, 8 * short(18), long(84), long(88)];
+        let lengths = [long(68), long(92), 8 * objects, long(80) + axes, 8 * short(18), long(84), long(88)];
         let mut parts = vec![96];
         lengths.iter().for_each(|length| parts.push(parts[parts.len() - 1] + length));
         Self { cuts: parts[3] + axes, parts }

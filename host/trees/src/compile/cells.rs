@@ -1,14 +1,12 @@
 //! Every case that an ensemble distinguishes, where they can be counted.
 //!
 //! Between its thresholds an ensemble is constant. Over two features that leaves some ten thousand cells at most, few
-//! enough to compute its margins for all values: the grid layout stores them, and the worst error of a margin is the
-//! largest in any cell. Planes of a schema have fewer dimensions than there are features: the layout patterns stores a table
-//! for each.
+//! enough to compute its margins for all values: the worst error of a margin is the largest in any cell. Planes of a schema
+//! have fewer dimensions than there are features.
 
 use super::axes::different_splits;
 use super::forest::{Branch, Forest};
 use crate::ensemble::Occurring;
-use palpate_shared::format::Layout;
 use std::mem::take;
 use std::ops::{AddAssign, Range};
 
@@ -18,17 +16,15 @@ const MAX_WORK: usize = 2_000_000_000;
 const MAX_CELLS: usize = 4_000_000;
 
 /// A feature and its thresholds.
-pub(super) type Dimension = (u8, Vec<i32>);
+type Dimension = (u8, Vec<i32>);
 
 /// The cells of a forest. A place along a dimension is the number of thresholds at or below the value; a missing value
 /// has the place after the last.
 pub(super) struct Cells {
-    /// Features and their thresholds; at least two.
+    /// Features and their thresholds.
     dimensions: Vec<Dimension>,
     /// Boxes of places; values fall into one of them.
     planes: Vec<Vec<Range<usize>>>,
-    /// True if each plane has a table of its own, and the dimensions are all features.
-    by_pattern: bool,
 }
 
 /// The places along a dimension that lead to a leaf.
@@ -47,8 +43,7 @@ impl Cells {
             cuts.dedup();
             dimensions.push((splits[0].0, cuts));
         }
-        let by_pattern = forest.schema.is_some_and(|schema| schema.is_tabled);
-        if by_pattern {
+        if forest.schema.is_some_and(|schema| schema.has_all_planes) {
             let mut cuts = |feature| dimensions.iter_mut().find(|(of, _)| *of == feature).map(|(_, cuts)| take(cuts));
             dimensions = (0..).zip(0..forest.features).map(|(of, _)| (of, cuts(of).unwrap_or_default())).collect();
         }
@@ -58,32 +53,19 @@ impl Cells {
             true => planes.iter().map(|plane| places(plane, &dimensions)).collect(),
             false => Vec::new(),
         };
-        while dimensions.len() < 2 {
-            dimensions.push((0, Vec::new()));
-        }
         if planes.is_empty() {
             planes.push(dimensions.iter().map(|(_, cuts)| 0..cuts.len() + 2).collect());
         }
-        let cells = Self { dimensions, planes, by_pattern };
+        let cells = Self { dimensions, planes };
         let count = cells.count().filter(|&count| count <= MAX_CELLS)?;
         let trees: usize = (0..forest.objects()).map(|object| forest.trees_of(object).count()).sum();
         (count.checked_mul(trees)? <= MAX_WORK).then_some(cells)
     }
 
     /// Number of cells.
-    pub(super) fn count(&self) -> Option<usize> {
+    fn count(&self) -> Option<usize> {
         let lengths = self.planes.iter().map(|plane| plane.iter().try_fold(1_usize, |n, r| n.checked_mul(r.len())));
         lengths.sum()
-    }
-
-    /// Layout of a table of all cells, and its dimensions, if there is one.
-    pub(super) fn table(&self) -> Option<(Layout, &[Dimension])> {
-        match self.dimensions.as_slice() {
-            // The pattern takes no axis: it says which table it is.
-            [_, differences @ ..] if self.by_pattern => Some((Layout::Patterns, differences)),
-            both @ [_, _] => Some((Layout::Grid, both)),
-            _ => None,
-        }
     }
 
     /// Sums over an object's trees, in their order, in every cell: `start`, and `value` of each leaf that is reached,

@@ -65,7 +65,7 @@ impl Container {
             .header
             .with_length(count(length)?)
             .with_text_length(count(self.text.len())?)
-            .with_sections(count(sections.len())?);
+            .with_optional_length(count(sections.len())?);
         let mut bytes = [&header.bytes()[..], &self.text, &sections, &self.content].concat();
         bytes.extend(checksum(&bytes).to_le_bytes());
         Ok(bytes)

@@ -71,16 +71,16 @@ impl Instructions {
         let axes = usize::from(model.header().axes());
         let (groups, nodes) = groups_and_splits(model);
         let is_shared = model.shared_leaves().is_some();
-        let (layout, leaf) = (model.layout(), model.leaf_type());
-        let steps = match layout {
-            Layout::Compact => steps_to_leaves(nodes, 3, &|node| node[2].into(), below),
-            Layout::Wide => steps_to_leaves(nodes, 6, &|node| u16::from_le_bytes([node[4], node[5]]).into(), below),
-            Layout::Complete | Layout::Grid | Layout::Patterns | Layout::Code => Vec::new(),
+        let leaf = model.leaf_type();
+        let is_wide = model.layout() == Layout::Wide;
+        let steps = match is_wide {
+            false => steps_to_leaves(nodes, 3, &|node| node[2].into(), below),
+            true => steps_to_leaves(nodes, 6, &|node| u16::from_le_bytes([node[4], node[5]]).into(), below),
         };
-        Self::new(&Shape { layout, leaf, objects, axes, groups: &groups, steps: &steps, is_shared })
+        Self::new(&Shape { is_wide, leaf, objects, axes, groups: &groups, steps: &steps, is_shared })
     }
 
-    pub(super) fn new(shape: &Shape<'_>) -> Self {
+    fn new(shape: &Shape<'_>) -> Self {
         let m0_plus = (shape.leaf != LeafType::F32).then(|| M0_PLUS.margins(shape));
         Self { m4f: M4F.margins(shape), m0_plus }
     }
@@ -103,9 +103,7 @@ impl Memory {
         // The most that was seen for ten objects, less their margins.
         let stack = 4 * objects
             + match model.layout() {
-                Layout::Grid => 468,
-                Layout::Patterns => 572,
-                Layout::Complete | Layout::Compact | Layout::Wide => 1_116,
+                Layout::Compact | Layout::Wide => 1_116,
                 // A whole row of features, and the columns' numbers.
                 Layout::Code => 1_500,
             };
@@ -115,12 +113,9 @@ impl Memory {
 
 /// Features of palpate-onboard that models need, and the bytes of flash of each on a Cortex-M4F and a Cortex-M0+, beyond
 /// what all of them have: `verdict` images of the firmware, which the ignored tests of `tests/tests/whole/images.rs` compare.
-pub const FEATURES: [(&str, [usize; 2]); 15] = [
+pub const FEATURES: [(&str, [usize; 2]); 12] = [
     ("compact", [780, 1_012]),
-    ("complete", [2_048, 1_932]),
-    ("grid", [340, 292]),
     ("wide", [900, 1_076]),
-    ("patterns", [468, 456]),
     ("code", [0, 130]),
     ("i8-leaves", [0, 0]),
     ("i16-leaves", [76, 60]),
@@ -164,16 +159,17 @@ pub fn code_flash(core: Core, features: &[&str]) -> usize {
 }
 
 /// Properties of a model that the cost of margins depends on.
-pub(super) struct Shape<'a> {
-    pub(super) layout: Layout,
-    pub(super) leaf: LeafType,
-    pub(super) objects: usize,
-    pub(super) axes: usize,
-    pub(super) groups: &'a [Group],
-    /// Steps to a leaf of each tree in preorder.
-    pub(super) steps: &'a [f64],
+struct Shape<'a> {
+    /// True for splits of six bytes.
+    is_wide: bool,
+    leaf: LeafType,
+    objects: usize,
+    axes: usize,
+    groups: &'a [Group],
+    /// Steps to a leaf of each tree.
+    steps: &'a [f64],
     /// True if leaves are indices into a table.
-    pub(super) is_shared: bool,
+    is_shared: bool,
 }
 
 /// Steps below a split if either side is as likely.
@@ -185,30 +181,16 @@ fn on_average(left: f64, right: f64) -> f64 {
 struct Costs {
     /// Features, clearing, and the base margins; then for each object.
     fixed: (usize, usize),
-    /// Ranking in an axis of trees.
+    /// Ranking in an axis.
     axis: usize,
-    /// A group of complete trees, or what it has beyond a block of 64.
-    block: usize,
-    /// Shifting what was added before.
-    shift: usize,
-    /// A walk through a complete tree: at the start and for each level, for the depths that are written out, 4 to 6;
-    /// then for others, which are a loop with checks.
-    walk: [(usize, usize); 2],
     /// A leaf's values of one byte: of ten together; of two bytes or f32: of five together; one value alone.
     leaf: Leaf,
-    /// Reading a leaf's number in a block of complete trees.
-    number: usize,
-    /// Instructions for a tree in preorder.
+    /// A tree whose leaf is a number.
     shared_tree: usize,
-    /// A tree in preorder; then each value of its leaf.
-    preorder: (f64, usize, usize),
-    /// A step in a compact and in a wide tree.
+    /// A walk, and a tree whose leaf is added by itself; then each value of that.
+    tree: (f64, usize, usize),
+    /// A step by a split of three bytes, and of six.
     step: (f64, f64),
-    /// A table; then for each object. By its thresholds it is 310 to 380 for ten objects on a Cortex-M4F, 346 to 434 on a
-    /// Cortex-M0+: 63 take least, and 31 most.
-    grid: (usize, usize),
-    /// Additional instructions of tables by pattern, for one axis and two features that a grid does not have.
-    patterns: usize,
 }
 
 /// Costs of a leaf's values.
@@ -222,59 +204,28 @@ struct Leaf {
 const M4F: Costs = Costs {
     fixed: (550, 6),
     axis: 90,
-    block: 130,
-    shift: 60,
-    walk: [(12, 6), (17, 8)],
     leaf: Leaf { ten_i8: 24, five_i16: 19, five_f32: 30, alone: 11 },
-    number: 12,
     shared_tree: 45,
-    preorder: (25.0, 57, 5),
+    tree: (25.0, 57, 5),
     step: (17.0, 28.0),
-    grid: (280, 5),
-    patterns: 268,
 };
 
 const M0_PLUS: Costs = Costs {
     fixed: (800, 9),
     axis: 110,
-    block: 189,
-    shift: 87,
-    walk: [(18, 7), (26, 16)],
     // No estimate is made with f32.
     leaf: Leaf { ten_i8: 57, five_i16: 31, five_f32: 0, alone: 14 },
-    number: 16,
     shared_tree: 60,
-    preorder: (35.0, 80, 7),
+    tree: (35.0, 80, 7),
     step: (24.0, 39.0),
-    grid: (325, 5),
-    patterns: 310,
 };
 
 impl Costs {
     /// Instructions of the margins.
     fn margins(&self, shape: &Shape<'_>) -> u64 {
-        let trees = match shape.layout {
-            Layout::Grid => return (self.grid.0 + self.grid.1 * shape.objects) as u64,
-            Layout::Patterns => return (self.grid.0 + self.patterns + self.grid.1 * shape.objects) as u64,
-            // Its instructions are counted where they are written.
-            Layout::Code => return 0,
-            Layout::Complete => {
-                let groups = shape.groups.iter().enumerate();
-                groups.map(|(index, group)| self.complete_group(group, shape, index > 0)).sum()
-            }
-            Layout::Compact => self.preorder_trees(shape, self.step.0),
-            Layout::Wide => self.preorder_trees(shape, self.step.1),
-        };
-        let axes = if shape.layout == Layout::Wide { 0 } else { shape.axes };
-        (self.fixed.0 + self.axis * axes + self.fixed.1 * shape.objects + trees) as u64
-    }
-
-    fn complete_group(&self, group: &Group, shape: &Shape<'_>, shifted: bool) -> usize {
-        let depth = usize::from(group.depth);
-        let trees = usize::try_from(group.trees).unwrap_or(usize::MAX);
-        let (start, level) = self.walk[usize::from(!(4..=6).contains(&depth))];
-        let leaf = self.leaf_together(values(group, shape), shape.leaf) + if shape.is_shared { self.number } else { 0 };
-        trees.div_ceil(64) * self.block + trees * (start + level * depth + leaf) + if shifted { self.shift } else { 0 }
+        let step = if shape.is_wide { self.step.1 } else { self.step.0 };
+        let axes = if shape.is_wide { 0 } else { shape.axes };
+        (self.fixed.0 + self.axis * axes + self.fixed.1 * shape.objects + self.trees(shape, step)) as u64
     }
 
     /// A leaf of those that are added together.
@@ -288,9 +239,9 @@ impl Costs {
         together * (values / few) + self.leaf.alone * (values % few)
     }
 
-    /// Trees in preorder: steps to the leaf that is reached, and its values.
-    fn preorder_trees(&self, shape: &Shape<'_>, step: f64) -> usize {
-        let (start, tree, value) = self.preorder;
+    /// Trees: steps to the leaf that is reached, and its values.
+    fn trees(&self, shape: &Shape<'_>, step: f64) -> usize {
+        let (start, tree, value) = self.tree;
         let mut trees = shape.steps.iter();
         let mut sum = 0;
         for group in shape.groups {
@@ -344,55 +295,18 @@ fn steps_to_leaf(splits: &[u8], length: usize, left: &impl Fn(&[u8]) -> usize, b
 mod tests {
     use super::*;
 
-    /// Trees, their depth, the object of a leaf if it has one value, leaf type, axes, and instructions on each processor.
-    type Counted = (u32, u8, Option<u8>, LeafType, usize, [u64; 2]);
-
-    /// Counts from emulation, as `onboard/README.md` states them.
-    const COUNTED: [Counted; 5] = [
-        (1_000, 6, Some(0), LeafType::I16, 3, [62_372, 80_699]),
-        (100, 6, None, LeafType::I16, 2, [9_461, 13_780]),
-        (100, 6, None, LeafType::I8, 2, [8_475, 13_470]),
-        (40, 5, None, LeafType::I16, 2, [4_023, 5_858]),
-        (40, 5, None, LeafType::I8, 2, [4_010, 6_152]),
-    ];
-
-    /// A model of ten objects without shared leaves.
-    fn shape(layout: Layout, leaf: LeafType, axes: usize, groups: &[Group]) -> Shape<'_> {
-        Shape { layout, leaf, objects: 10, axes, groups, steps: &[], is_shared: false }
-    }
-
-    #[test]
-    fn estimates_are_within_a_tenth_of_what_emulation_counts_on_both_processors() {
-        for (trees, depth, object, leaf, axes, counted) in COUNTED {
-            // One-output trees are in a group for each object, those with i8 leaves in one for each of three scales.
-            let parts = if object.is_some() {
-                10
-            } else if leaf == LeafType::I8 {
-                3
-            } else {
-                1
-            };
-            let group = |part: u32| {
-                let trees = (trees + part) / parts;
-                Group { depth, shift: 0, object, trees }
-            };
-            let groups: Vec<Group> = (0..parts).map(group).collect();
-            let estimate = Instructions::new(&shape(Layout::Complete, leaf, axes, &groups));
-            for (estimate, counted) in [estimate.m4f, estimate.m0_plus.unwrap()].into_iter().zip(counted) {
-                assert!(
-                    estimate.abs_diff(counted) * 10 <= counted,
-                    "{estimate} for {counted}, {trees} trees, {leaf:?}"
-                );
-            }
-        }
-        let table = |layout, axes| Instructions::new(&shape(layout, LeafType::I8, axes, &[]));
-        assert_eq!(table(Layout::Grid, 2), Instructions { m4f: 330, m0_plus: Some(375) });
-        assert_eq!(table(Layout::Patterns, 3), Instructions { m4f: 598, m0_plus: Some(685) });
-    }
-
     #[test]
     fn with_f32_leaves_nothing_is_said_about_a_processor_without_float_unit() {
-        let instructions = Instructions::new(&shape(Layout::Grid, LeafType::F32, 2, &[]));
+        let shape = Shape {
+            is_wide: false,
+            leaf: LeafType::F32,
+            objects: 10,
+            axes: 2,
+            groups: &[],
+            steps: &[],
+            is_shared: false,
+        };
+        let instructions = Instructions::new(&shape);
         assert_eq!(instructions.on(Core::M0Plus), None);
         assert!(instructions.on(Core::M4F).is_some());
     }

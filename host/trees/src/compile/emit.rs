@@ -127,7 +127,7 @@ const LONGEST_ON_AVR: usize = 32_767;
 fn avr_error(name: &str, length: usize) -> String {
     format!(
         "#if defined(__AVR__)\n\
-         #error \"model {name} has {length} bytes, and an array on an AVR at most {LONGEST_ON_AVR}: export it with --layout size and \
+         #error \"model {name} has {length} bytes, and an array on an AVR at most {LONGEST_ON_AVR}: export it with \
          --leaf i8, or from fewer trees, or take a chip with pointers of 32 bits\"\n#endif\n",
         name = name.to_uppercase(),
     )

@@ -3,7 +3,6 @@
 use crate::error::Problem;
 use crate::error::TreeProblem;
 use palpate_onboard::ModelError;
-use palpate_shared::format::Layout;
 
 /// Problems with compiling, and compiled models.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -74,15 +73,15 @@ pub enum CompileProblem {
         /// See `of`.
         units: &'static str,
     },
-    /// The ensemble does not fit the layout that was asked for.
-    #[error("the ensemble does not fit the layout {}: {}", layout.name(), limit(*layout))]
-    DoesNotFit {
-        /// The layout.
-        layout: Layout,
-    },
-    /// The ensemble fits no layout.
-    #[error("the ensemble fits no layout of the model format")]
-    FitsNoLayout,
+    /// Leaves are too large for their type.
+    #[error("the ensemble's leaves are too large for the model format")]
+    LeavesTooLarge,
+    /// There are more thresholds or splits than six bytes number.
+    #[error("the ensemble has more than 65,536 different thresholds, or a tree with more splits than that")]
+    TooManyThresholds,
+    /// No code can be written of the trees.
+    #[error("the ensemble cannot become code: its leaves are f32 or beyond two bytes, or it has more thresholds than 256 columns hold")]
+    NoCode,
     /// A name is too long.
     #[error("the name {name:?} is too long for a model")]
     NameTooLong {
@@ -100,20 +99,6 @@ pub enum CompileProblem {
         /// The most that were asked for.
         most: usize,
     },
-}
-
-fn limit(layout: Layout) -> &'static str {
-    match layout {
-        Layout::Complete => "its trees are deeper than 8 splits, or have more thresholds than 256 columns hold",
-        Layout::Grid => {
-            "it uses more than two features, has more than 255 thresholds of one, or its margins are too large for a byte"
-        }
-        Layout::Patterns => {
-            "its descriptor is not contacts-curvature, it has more than 255 thresholds of a feature, or its margins are too large for a byte"
-        }
-        Layout::Code => "its leaves are f32, it has more thresholds than 256 columns hold, or leaves beyond two bytes",
-        Layout::Compact | Layout::Wide => "it has more thresholds than 65,536, or a tree with more splits than that",
-    }
 }
 
 impl Problem for CompileProblem {
@@ -142,8 +127,12 @@ impl Problem for CompileProblem {
                     "Train on features in whole units: {units}. If it is not a model of {of}, remove its attribute palpate_descriptor: then its features are compared as they are."
                 );
             }
-            Self::DoesNotFit { .. } => "Choose leaves of i16 or i8, or another layout; without one stated, the compiler chooses.",
-            Self::FitsNoLayout | Self::TooLarge | Self::OverBudget { .. } => "Train fewer trees, or trees with fewer splits.",
+            Self::NoCode => "Choose leaves of i16 or i8, or a model with its trees.",
+            Self::TooManyThresholds => {
+                "Train fewer trees, or trees with fewer splits; or compare whole numbers (`export --scale`), which makes thresholds equal."
+            }
+            Self::LeavesTooLarge => "Choose leaves of f32, or scale what was trained on.",
+            Self::TooLarge | Self::OverBudget { .. } => "Train fewer trees, or trees with fewer splits.",
             Self::NameTooLong { .. } => "Use names of at most 255 bytes.",
         }
         .into()

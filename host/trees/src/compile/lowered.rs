@@ -1,4 +1,4 @@
-//! A forest lowered to what all layouts of trees encode: merged trees, their scale, ranks and order.
+//! A forest lowered to what a model and code have: merged trees, their scale, ranks and order.
 
 use super::axes::Axes;
 use super::forest::Forest;
@@ -29,11 +29,4 @@ pub(super) struct Run {
     pub(super) object: Option<u8>,
     pub(super) shift: u8,
     pub(super) trees: Vec<usize>,
-}
-
-impl Run {
-    /// Levels of its trees as complete trees.
-    pub(super) fn depth(&self, forest: &Forest<'_>) -> usize {
-        self.trees.iter().map(|&tree| forest.trees[tree].depth).max().unwrap_or(0).max(1)
-    }
 }

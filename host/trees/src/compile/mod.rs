@@ -1,9 +1,8 @@
 //! From an ensemble to the bytes that the chip reads.
 //!
 //! ```text
-//! Ensemble ──► Forest (checked, whole thresholds) ──► Lowered (merged trees, units, ranks, order) ──► costs of all layouts
-//!                                        └──────────► cells: the worst error of a margin                      │
-//!                                                                                      bytes ◄── the chosen one ┘
+//! Ensemble ──► Forest (checked, whole thresholds) ──► Lowered (merged trees, units, ranks, order) ──► bytes, or code
+//!                                        └──────────► cells: the worst error of a margin
 //! ```
 //!
 //! [`compile`] does all of it; [`CompiledModel`] is a compiled model read from a file.
@@ -47,7 +46,6 @@ mod emit;
 mod error;
 mod forest;
 mod groups;
-mod layout;
 mod lower;
 mod lowered;
 mod merge;
@@ -58,7 +56,6 @@ mod range;
 mod restate;
 mod rounding;
 mod share;
-mod table;
 mod trees;
 mod write;
 
@@ -75,10 +72,11 @@ pub use share::different_leaves;
 
 use crate::ensemble::{Ensemble, Probability};
 use crate::error::{Error, Result};
+use cells::Cells;
 use code::{Program, Statements};
 use forest::Forest;
-use layout::Layouts;
 use lowered::Lowered;
+use parts::Parts;
 use palpate_onboard::Stopping;
 
 /// Settings of compilation.
@@ -87,13 +85,6 @@ use palpate_onboard::Stopping;
 pub struct Settings {
     /// Type that leaves are stored as.
     pub leaf: Leaf,
-    /// Layout of the trees; `None` takes the layout that is best for `goal`.
-    pub layout: Option<Layout>,
-    /// Goal of the choice of a layout, where none is asked for, and of the choice of a table of leaves.
-    pub goal: Goal,
-    /// True to store equal leaves once, in a table: `Some(true)` wherever that is possible, `None` where that makes a
-    /// model smaller, if it is better for `goal`.
-    pub shared_leaves: Option<bool>,
     /// The error rate that recognizers stop at unless told otherwise: above 0, below 0.5.
     pub error_rate: f64,
     /// Steps after which they give up.
@@ -134,9 +125,6 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             leaf: Leaf::I16,
-            layout: None,
-            goal: Goal::Balanced(Core::M4F),
-            shared_leaves: None,
             error_rate: 0.01,
             max_touches: 200,
             priors: None,
@@ -146,38 +134,6 @@ impl Default for Settings {
             stated: Stated::default(),
         }
     }
-}
-
-/// Goal of the choice of a layout.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Goal {
-    /// The least bytes × instructions⁴ of those layouts that have at most three times the bytes of the smallest: half the bytes are
-    /// worth a fifth more instructions.
-    Balanced(Core),
-    /// The fewest instructions.
-    Speed,
-    /// The fewest bytes.
-    Size,
-}
-
-/// Properties of a layout.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Candidate {
-    /// The layout.
-    #[serde(serialize_with = "name_of")]
-    pub layout: Layout,
-    /// True if equal leaves are stored once.
-    pub shared_leaves: bool,
-    /// Bytes of the model, and of the code beside it.
-    pub bytes: usize,
-    /// About how many instructions the margins take.
-    pub instructions: Instructions,
-    /// The farthest that a margin can be from the ensemble's, in nats.
-    pub margin_error: f32,
-}
-
-fn name_of<S: serde::Serializer>(layout: &Layout, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(layout.name())
 }
 
 /// Result of [`compile`].
@@ -198,8 +154,6 @@ pub struct Compiled {
     pub shared_leaves: Option<usize>,
     /// About how many instructions the margins take.
     pub instructions: Instructions,
-    /// All layouts that were tried.
-    pub candidates: Vec<Candidate>,
     /// The trees as code, if that was asked for: the bytes are a model without trees then.
     pub code: Option<Program>,
     /// Rule that turns margins into the probabilities of the library that trained it.
@@ -222,45 +176,41 @@ pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
 ///
 /// # Errors
 /// [`CompileProblem`] for an ensemble that contradicts itself, has leaves that are not finite or too large, thresholds
-/// that fall together when rounded to whole numbers, more of something than the format can count, or that does not fit
-/// the layout asked for; [`Setting`](crate::error::Setting) for settings out of their ranges.
+/// that fall together when rounded to whole numbers, more of something than the format can count, or that no code can be
+/// written of, if that is asked for; [`Setting`](crate::error::Setting) for settings out of their ranges.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let original = ensemble;
     let ensemble = &*range::scaled(ensemble);
     let stopping = stopping(settings.error_rate, settings.max_touches)?;
     let forest = Forest::new(ensemble, settings.scales.as_deref())?;
     write::check_sentinel(ensemble, settings)?;
-    let layouts = Layouts::new(&forest, settings, &stated(ensemble, settings));
-    let mut candidates = layouts.candidates(settings)?;
-    let overhead = write::overhead(ensemble, settings, &forest)?;
-    let scale = f64::from(ensemble.prediction().scale);
-    for candidate in &mut candidates {
-        candidate.bytes += overhead;
-        candidate.margin_error = rounding::round_up(f64::from(candidate.margin_error) * scale);
-    }
-    let does_not_fit = || match settings.layout {
-        Some(layout) => CompileProblem::DoesNotFit { layout },
-        None => CompileProblem::FitsNoLayout,
-    };
-    let chosen = chosen(&candidates, settings.goal).map(|chosen| candidates[chosen]).ok_or_else(does_not_fit)?;
-    let (mut parts, program) = layouts.write(&chosen).ok_or_else(does_not_fit)?;
+    let lowered = Lowered::new(&forest, settings.leaf).ok_or(CompileProblem::LeavesTooLarge)?;
+    let cells = Cells::new(&forest);
+    let trees_error = rounding::margin_error(&forest, cells.as_ref(), settings.leaf, &lowered.rounding);
     let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding);
-    parts.margin_error = rounding::round_up(f64::from(parts.margin_error) + rounding / scale);
-    let bytes = write::write(ensemble, write::hash(original), settings, &forest, stopping, chosen.layout, &parts)?;
-    let (splits, leaves) = (forest.splits(), forest.leaves());
-    let shared_leaves = open(&bytes).ok().and_then(|model| different_leaves(&model));
-    let margin_error = rounding::round_up(f64::from(parts.margin_error) * scale);
+    let scale = f64::from(ensemble.prediction().scale);
+    let margin_error = rounding::round_up(f64::from(trees_error) + rounding / scale);
+    let (layout, parts, code) = if settings.code {
+        let program = Program::new(&lowered, &stated(ensemble, settings)).ok_or(CompileProblem::NoCode)?;
+        let parts = Parts { base: vec![0; forest.objects()], unit: lowered.scale.unit, ..Parts::default() };
+        (Layout::Code, parts, Some(program))
+    } else {
+        let layout = lowered.layout().ok_or(CompileProblem::TooManyThresholds)?;
+        (layout, lowered.write(layout), None)
+    };
+    let parts = Parts { margin_error, ..parts };
+    let bytes = write::write(ensemble, write::hash(original), settings, &forest, stopping, layout, &parts)?;
+    let model = model::open_any(&bytes)?;
     Ok(Compiled {
-        bytes,
-        splits,
-        leaves,
-        margin_error,
-        layout: chosen.layout,
-        shared_leaves,
-        instructions: chosen.instructions,
-        candidates,
-        code: program,
+        splits: forest.splits(),
+        leaves: forest.leaves(),
+        margin_error: rounding::round_up(f64::from(margin_error) * scale),
+        layout,
+        shared_leaves: different_leaves(&model),
+        instructions: code.as_ref().map_or_else(|| Instructions::of_model(&model), Program::instructions),
+        code,
         probability: original.origin.imported.as_ref().map(|imported| imported.probability).unwrap_or_default(),
+        bytes,
     })
 }
 
@@ -273,35 +223,10 @@ fn stated(ensemble: &Ensemble, settings: &Settings) -> Statements {
     }
 }
 
-/// The best of the candidates.
-fn chosen(candidates: &[Candidate], goal: Goal) -> Option<usize> {
-    // Where some layout holds the ensemble's very numbers, none that rounds them is worth a few bytes.
-    let is_exact = candidates.iter().any(|candidate| candidate.margin_error == 0.0);
-    let eligible = || {
-        let all = candidates.iter().enumerate();
-        all.filter(move |(_, candidate)| !is_exact || candidate.margin_error == 0.0)
-    };
-    let instructions =
-        |candidate: &Candidate, core: Core| candidate.instructions.on(core).unwrap_or(candidate.instructions.m4f);
-    let (at_smallest, smallest) =
-        eligible().min_by_key(|(_, candidate)| (candidate.bytes, candidate.instructions.m4f))?;
-    let cost = |candidate: &Candidate, core: Core| {
-        u128::from(instructions(candidate, core)).pow(4).saturating_mul(candidate.bytes as u128)
-    };
-    let best = match goal {
-        Goal::Size => Some((at_smallest, smallest)),
-        Goal::Speed => eligible().min_by_key(|(_, candidate)| (candidate.instructions.m4f, candidate.bytes)),
-        Goal::Balanced(core) => eligible()
-            .filter(|(_, candidate)| candidate.bytes <= 3 * smallest.bytes)
-            .min_by_key(|(_, candidate)| (cost(candidate, core), candidate.bytes)),
-    };
-    best.map(|(index, _)| index)
-}
-
 /// Trees of the ensemble that each tree of a model with such leaves stands for, in the model's order. `scales` are those of
 /// features of rows that are whole numbers.
 pub(crate) fn order(ensemble: &Ensemble, leaf: Leaf, scales: Option<&[f32]>) -> Result<Vec<Source>> {
     let ensemble = range::scaled(ensemble);
     let forest = Forest::new(&ensemble, scales.filter(|_| ensemble.schema().is_none()))?;
-    Ok(Lowered::new(&forest, leaf).ok_or(CompileProblem::FitsNoLayout)?.order())
+    Ok(Lowered::new(&forest, leaf).ok_or(CompileProblem::LeavesTooLarge)?.order())
 }

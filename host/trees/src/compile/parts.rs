@@ -3,7 +3,7 @@
 use super::container::OwnedSection;
 use palpate_shared::format::{Axis, Group, Tag};
 
-/// Parts of a layout of a forest.
+/// Parts of a forest.
 #[derive(Default)]
 pub(super) struct Parts {
     pub(super) axes: Vec<Axis>,
@@ -25,7 +25,7 @@ impl Parts {
         self.shared.as_ref().map(|content| OwnedSection::new(Tag::SharedLeaves, true, content.clone()))
     }
 
-    /// Trees or a table, as the chip reads them.
+    /// Trees, as the chip reads them.
     pub(super) fn content(&self, priors: &[i32]) -> Vec<u8> {
         let mut bytes: Vec<u8> = self.base.iter().chain(priors).flat_map(|number| number.to_le_bytes()).collect();
         bytes.extend(self.axes.iter().flat_map(|axis| axis.to_bytes()));

@@ -59,19 +59,6 @@ impl Scale {
         finest(unit, fits).map(|unit| Self { unit, shifts: vec![0; forest.trees.len()] })
     }
 
-    /// The scale for a table of margins: one without rounding if there is one, else the finest.
-    pub(super) fn for_table(sums: &[Vec<f32>], leaf: LeafType) -> Option<Self> {
-        let values = || sums.iter().flatten().copied();
-        let largest = values().fold(0.0_f64, |most, sum| most.max(f64::from(sum.abs())));
-        let unit = match most(leaf) {
-            None => F32_UNIT,
-            Some(most) => common_unit(values())
-                .and_then(|unit| finest(unit, |unit| largest / f64::from(unit) <= most))
-                .or_else(|| unit_for(largest, most))?,
-        };
-        Some(Self { unit, shifts: Vec::new() })
-    }
-
     /// The nearest integer to a value, in units times 2^`shift`.
     pub(super) fn integer(&self, value: f32, shift: u8) -> i32 {
         (f64::from(value) / (f64::from(self.unit) * f64::from(1_u32 << shift))).round() as i32

@@ -7,43 +7,22 @@ use palpate_shared::format::LeafType;
 use rayon::prelude::*;
 use std::ops::AddAssign;
 
-/// The ensemble's f32 sums in every cell, for each object.
-pub(super) type Sums = Vec<Vec<f32>>;
-
 /// The farthest that a margin can be from the ensemble's f32 sum: the largest error in any cell, where cells can be
-/// counted; otherwise the sum of the trees' largest roundings, and what f32 sums lose. Sums in the cells come with it where
-/// they are asked for.
-pub(super) fn margin_error(
-    forest: &Forest<'_>,
-    cells: Option<&Cells>,
-    leaf: LeafType,
-    scale: &Scale,
-    with_sums: bool,
-) -> (f32, Option<Sums>) {
+/// counted; otherwise the sum of the trees' largest roundings, and what f32 sums lose.
+pub(super) fn margin_error(forest: &Forest<'_>, cells: Option<&Cells>, leaf: LeafType, scale: &Scale) -> f32 {
     let objects = || (0..forest.objects()).into_par_iter();
-    let with_sums = cells.filter(|_| with_sums);
+    let unit = f64::from(scale.unit);
     let error = if leaf == LeafType::F32 {
-        f64::from(scale.unit) / 2.0
+        unit / 2.0
     } else {
         objects().map(|object| bound(forest, object, scale)).reduce(|| 0.0, f64::max)
     };
-    let Some(cells) = cells.filter(|_| leaf != LeafType::F32 && error > 0.0) else {
-        return (round_up(error), with_sums.map(|cells| sums(forest, cells)));
-    };
+    let Some(cells) = cells.filter(|_| leaf != LeafType::F32 && error > 0.0) else { return round_up(error) };
     let in_cells = |object| {
         let margins = in_cells(forest, cells, object, scale);
-        let unit = f64::from(scale.unit);
-        let error = margins.iter().fold(0.0, |worst, margins| f64::max(worst, margins.difference(unit)));
-        (error, with_sums.map(|_| margins.iter().map(|margins| margins.full).collect()))
+        margins.iter().fold(0.0, |worst, margins| f64::max(worst, margins.difference(unit)))
     };
-    let (errors, sums): (Vec<f64>, Vec<Option<Vec<f32>>>) = objects().map(in_cells).unzip();
-    (round_up(errors.into_iter().fold(0.0, f64::max)), sums.into_iter().collect())
-}
-
-/// The ensemble's f32 sums.
-pub(super) fn sums(forest: &Forest<'_>, cells: &Cells) -> Sums {
-    let sums = |object| cells.sums(forest, object, forest.base[object], |_, value| value);
-    (0..forest.objects()).into_par_iter().map(sums).collect()
+    round_up(objects().map(in_cells).reduce(|| 0.0, f64::max))
 }
 
 /// An object's margins in every cell.

@@ -4,7 +4,7 @@ use super::groups::groups_and_splits;
 use super::parts::Parts;
 use palpate_onboard::Model;
 use palpate_shared::format::{Group, LeafType, SECTION_HEADER_LENGTH, SharedLeaves};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 /// The most leaves that two bytes number.
 const MOST: usize = 1 << 16;
@@ -16,28 +16,7 @@ fn leaf_length(groups: &[Group], leaf: LeafType, objects: usize) -> Option<usize
     groups.iter().all(|group| length(group) == first).then_some(first)
 }
 
-/// Lengths of a table of leaves.
-#[derive(Clone, Copy)]
-pub(super) struct Sharing {
-    /// Bytes of the section with the leaves' values.
-    pub(super) section: usize,
-    /// Bytes of a leaf's number.
-    pub(super) number: usize,
-}
-
-impl Sharing {
-    /// The lengths for these leaves, each of which a layout may repeat; `None` where leaves are not all of one length, or too
-    /// many of them differ.
-    pub(super) fn new(groups: &[Group], leaf: LeafType, objects: usize, leaves: &[u8]) -> Option<Self> {
-        let length = leaf_length(groups, leaf, objects)?;
-        let different = leaves.chunks_exact(length).collect::<HashSet<_>>().len();
-        let number = 1 + usize::from(different > 1 << 8);
-        let content = SharedLeaves::header(number == 2).len() + different * length;
-        (different <= MOST).then_some(Self { section: SECTION_HEADER_LENGTH + content.next_multiple_of(4), number })
-    }
-}
-
-/// Parts with each leaf stored once; unchanged without a [`Sharing`].
+/// Parts with each leaf stored once, if they are smaller then.
 pub(super) fn share(mut parts: Parts, leaf: LeafType) -> Parts {
     let Some(length) = leaf_length(&parts.groups, leaf, parts.base.len()) else { return parts };
     let leaves = || parts.leaves.chunks_exact(length);
@@ -61,7 +40,10 @@ pub(super) fn share(mut parts: Parts, leaf: LeafType) -> Parts {
             short.push(high);
         }
     }
-    (parts.leaves, parts.shared) = (short, Some(table));
+    let section = SECTION_HEADER_LENGTH + table.len().next_multiple_of(4);
+    if order.len() <= MOST && section + short.len() < parts.leaves.len() {
+        (parts.leaves, parts.shared) = (short, Some(table));
+    }
     parts
 }
 

@@ -1,7 +1,7 @@
-//! Header and sections of a model of trees or tables.
+//! Header and sections of a model of trees.
 
 use super::Settings;
-use super::container::{Container, OwnedSection, bytes_of, count, too_large};
+use super::container::{Container, OwnedSection, count, too_large};
 use super::forest::Forest;
 use super::parts::Parts;
 use crate::ensemble::{Ensemble, Node, Output};
@@ -9,7 +9,7 @@ use crate::error::{CompileProblem, Error, Result};
 use crate::rows::whole;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{
-    CHECKSUM_LENGTH, HeaderBuilder, Layout, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, f32_key,
+    HeaderBuilder, Layout, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, f32_key,
 };
 
 /// The model's bytes; `hash` is that of the ensemble as it was read.
@@ -52,13 +52,7 @@ pub(super) fn write(
     Container { header, text: text(ensemble)?, sections, content: parts.content(&priors) }.bytes()
 }
 
-/// Bytes that are the same in all layouts, beside those that a layout takes: text, optional sections and checksum.
-pub(super) fn overhead(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<usize> {
-    let sections = bytes_of(&sections(ensemble, settings, forest)?);
-    Ok(text(ensemble)?.len() + sections.len() + CHECKSUM_LENGTH)
-}
-
-/// Sections that are the same in all layouts.
+/// Sections that do not depend on the trees.
 fn sections(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<Vec<OwnedSection>> {
     let mut sections = settings.stated.sections.clone();
     let mut put = |tag, must_understand, content| sections.push(OwnedSection::new(tag, must_understand, content));

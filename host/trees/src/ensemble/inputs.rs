@@ -17,8 +17,8 @@ pub struct Schema {
     pub units: &'static str,
     /// Values of the features that occur together, in planes; none if any may.
     pub planes: &'static [&'static [Occurring]],
-    /// True if the layout of patterns has a table for each plane.
-    pub is_tabled: bool,
+    /// True if each row is in one plane, which leaves few values for each feature.
+    pub has_all_planes: bool,
 }
 
 /// Values of a feature in a plane of a [`Schema`].
@@ -109,6 +109,6 @@ pub(crate) fn computed(descriptor: palpate_shared::Descriptor) -> Schema {
         whole: "whole units",
         units: "units",
         planes: &[],
-        is_tabled: false,
+        has_all_planes: false,
     }
 }

@@ -34,18 +34,6 @@ pub enum ProofProblem {
         /// The rows.
         rows: String,
     },
-    /// A cell of a table holds something else than the ensemble for some rows.
-    #[error("for some rows the model's table has {model:e} for {output} where the ensemble has {ensemble:e}: {rows}")]
-    Cell {
-        /// The output's name.
-        output: String,
-        /// The model's.
-        model: f64,
-        /// The ensemble's.
-        ensemble: f64,
-        /// The rows.
-        rows: String,
-    },
     /// Base margins differ.
     #[error("the model's margin of {output} starts from {model:e}, where the ensemble starts from {ensemble:e}")]
     Base {

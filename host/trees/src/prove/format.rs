@@ -2,7 +2,7 @@
 //! the chip runs, so that a mistake of either shows.
 
 use super::ProofProblem;
-use super::boxes::{Keys, Rows, Rule, Step, Tree, Values};
+use super::boxes::{Keys, Rule, Step, Tree, Values};
 
 /// A model's meaning.
 #[derive(Debug)]
@@ -31,8 +31,6 @@ pub(super) struct Plain {
     pub(super) base: Vec<f64>,
     /// Trees, and the size of a step of their leaves.
     pub(super) trees: Vec<(Tree, f64)>,
-    /// Cells of a table: which rows fall into each, and its margins.
-    pub(super) cells: Option<Vec<(Vec<Values>, Vec<f64>)>>,
 }
 
 struct Axis {
@@ -214,7 +212,9 @@ impl<'b> Stated<'b> {
 pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let mut header = Bytes(bytes);
     header.take(4)?;
-    let version = header.number(2)?;
+    if header.number(2)? != 3 {
+        return Err(ProofProblem::Format { what: "another version" });
+    }
     let (layout, kind) = (header.byte()?, header.byte()?);
     header.take(4)?;
     let (descriptor, key) = (header.byte()?, header.byte()?);
@@ -232,7 +232,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let text_length = header.number(4)?;
     header.take(8)?;
     let (cuts_length, splits_length, leaves_length) = (header.number(4)?, header.number(4)?, header.number(4)?);
-    let sections_length = if version == 2 { header.number(4)? } else { header.take(4).map(|_| 0)? };
+    let sections_length = header.number(4)?;
     let mut rest = header;
     let mut text = Bytes(rest.take(text_length)?);
     text.text()?;
@@ -275,17 +275,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
         _ if descriptor == 255 => Keys::Scaled(scales),
         _ => Keys::Whole,
     };
-    let (mut trees, mut cells) = (Vec::new(), None);
-    if matches!(layout, 2 | 4) {
-        let places =
-            if layout == 2 { grid(&keys.all(features), &axes)? } else { patterns(&keys.all(features), &axes)? };
-        let cell = |rows| Ok((rows, leaves_of.next(&mut leaves, objects, 0)?));
-        let all: Result<Vec<_>, _> = places.into_iter().map(cell).collect();
-        cells = Some(all?);
-    } else {
-        let parts = Parts { layout, objects, groups: group_count, cuts: cuts_bytes, leaves_of };
-        trees = parts.trees(&axes, group_bytes, splits, leaves)?;
-    }
+    let parts = Parts { is_wide: layout == 1, objects, groups: group_count, cuts: cuts_bytes, leaves_of };
+    let trees = parts.trees(&axes, group_bytes, splits, leaves)?;
     Ok(Plain {
         names,
         features,
@@ -299,15 +290,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
         targets,
         most: [127.0, 32767.0, 0.0].get(usize::from(kind)).copied().unwrap_or(0.0),
         stated: error * scale,
-        base: if cells.is_some() { vec![0.0; objects] } else { base },
+        base,
         trees,
-        cells,
     })
 }
 
 /// Facts that trees are read with.
 struct Parts<'b> {
-    layout: u8,
+    is_wide: bool,
     objects: usize,
     groups: usize,
     cuts: &'b [u8],
@@ -338,26 +328,14 @@ impl Parts<'_> {
             }
         };
         for _ in 0..self.groups {
-            let (depth, shift) = (group_bytes.byte()?, u32::from(group_bytes.byte()?));
+            group_bytes.byte()?;
+            let shift = u32::from(group_bytes.byte()?);
             let (is_one, object) = (group_bytes.byte()? == 1, group_bytes.number(1)?);
             let (object, values) = if is_one { (Some(object), 1) } else { (None, self.objects) };
             let count = group_bytes.number(4)?;
             let step = if self.leaves_of.kind == 2 { 0.0 } else { self.leaves_of.unit * f64::from(shift).exp2() };
-            let slots = 1_usize << depth.min(8);
-            let complete = match self.layout {
-                1 => Some((splits.take(slots * count)?, splits.take(slots * count)?)),
-                _ => None,
-            };
-            for tree in 0..count {
-                let nodes = match complete {
-                    Some((columns, ranks)) => (1..slots)
-                        .map(|slot| {
-                            let at = tree * slots + slot;
-                            (ranked(columns[at].into(), ranks[at].into()), [2 * slot - 1, 2 * slot])
-                        })
-                        .collect(),
-                    None => preorder(&mut splits, self.layout == 3, self.cuts, &ranked)?,
-                };
+            for _ in 0..count {
+                let nodes = preorder(&mut splits, self.is_wide, self.cuts, &ranked)?;
                 let mut nodes: Vec<Step> = nodes.into_iter().map(|(rule, to)| Step::Split(rule, to)).collect();
                 for _ in 0..=nodes.len() {
                     nodes.push(Step::Leaf(self.leaves_of.next(&mut leaves, values, shift)?));
@@ -406,61 +384,4 @@ fn preorder(
         open.extend(parts);
     }
     nodes.into_iter().collect::<Option<Vec<_>>>().ok_or(SHORT)
-}
-
-/// Intervals of an axis, and missing if `with_missing`.
-fn ranks(axis: &Axis, all: Values, with_missing: bool) -> Vec<Values> {
-    let mut low = all.low;
-    let mut ranks = Vec::new();
-    for &cut in &axis.cuts {
-        ranks.push(Values::of(low, cut - 1, false));
-        low = cut;
-    }
-    ranks.push(Values::of(low, all.high, false));
-    ranks.extend(with_missing.then_some(Values::MISSING));
-    ranks
-}
-
-fn grid(all: &Rows, axes: &[Axis]) -> Result<Vec<Vec<Values>>, ProofProblem> {
-    let [first, second] = axes else { return Err(ProofProblem::Format { what: "a grid without two axes" }) };
-    let of = |axis: &Axis| all.get(axis.feature).map(|&all| ranks(axis, all, true)).ok_or(SHORT);
-    let (rows, columns) = (of(first)?, of(second)?);
-    let mut cells = Vec::new();
-    for &row in &rows {
-        for &column in &columns {
-            let mut cell = all.to_vec();
-            cell[first.feature] = row;
-            // Both axes may be of one feature.
-            let other = cell[second.feature];
-            let [low, high] = [other.low.max(column.low), other.high.min(column.high)];
-            cell[second.feature] = Values::of(low, high, other.missing && column.missing);
-            cells.push(cell);
-        }
-    }
-    Ok(cells)
-}
-
-fn patterns(all: &Rows, axes: &[Axis]) -> Result<Vec<Vec<Values>>, ProofProblem> {
-    let ([curvature, slope, pair], [_, k, s, p]) = (axes, all) else {
-        return Err(ProofProblem::Format { what: "patterns without three axes and four features" });
-    };
-    let [curvature, slope, pair] = [(curvature, k), (slope, s), (pair, p)].map(|(axis, all)| ranks(axis, *all, false));
-    let missing = || vec![Values::MISSING];
-    let kinds = [
-        (0, missing(), missing(), missing()),
-        (1, missing(), missing(), missing()),
-        (2, missing(), missing(), missing()),
-        (3, missing(), missing(), pair),
-        (4, missing(), slope.clone(), missing()),
-        (5, curvature, slope, missing()),
-    ];
-    let mut cells = Vec::new();
-    for (code, curvatures, slopes, pairs) in kinds {
-        for &curvature in &curvatures {
-            for &slope in &slopes {
-                cells.extend(pairs.iter().map(|&pair| vec![Values::of(code, code, false), curvature, slope, pair]));
-            }
-        }
-    }
-    Ok(cells)
 }

@@ -12,10 +12,10 @@
 //! Not proved: anything outside the ensemble, such as priors and thresholds for stopping; and that the chip executes its code.
 
 mod boxes;
+mod cells;
 mod error;
 mod format;
 mod span;
-mod tables;
 mod trees;
 
 pub use error::ProofProblem;
@@ -33,13 +33,13 @@ use palpate_shared::format::{LeafType, Link, f32_key};
 /// Result of a proof.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Proof {
-    /// The model's trees; 0 for a table.
+    /// The model's trees.
     pub trees: usize,
     /// The ensemble's trees.
     pub ensemble_trees: usize,
     /// Boxes of rows that were compared.
     pub boxes: u64,
-    /// The largest difference of a leaf, or of a table's cell, in the library's margins.
+    /// The largest difference of a leaf, in the library's margins.
     pub largest_difference: f64,
     /// The largest difference of a margin: in any cell between thresholds, where [`prove`] can go through them; otherwise a bound, the sum of the trees' largest differences, without what the library loses by adding in f32.
     pub margin_error: f64,
@@ -47,7 +47,7 @@ pub struct Proof {
     pub stated: f64,
     /// For each output its name, and bounds of its margin.
     pub ranges: Vec<(String, f64, f64)>,
-    /// The most splits that a row passes: the sum of each tree's longest way; 0 for a table.
+    /// The most splits that a row passes: the sum of each tree's longest way.
     pub splits: usize,
     /// The most instructions of a row, estimated: see [`Instructions`].
     pub estimated: Instructions,
@@ -59,7 +59,6 @@ pub struct Proof {
 /// Findings about a model.
 struct Found {
     trees: Vec<Matched>,
-    table: Option<f64>,
     boxes: u64,
     outputs: Vec<[f64; 3]>,
 }
@@ -83,13 +82,10 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble) -> Result<Proof> {
     statements(&plain, ensemble)?;
     let sources = of_ensemble(ensemble, &plain.keys)?;
     let subject = Subject { model, plain: &plain, sources: &sources, ensemble };
-    let found = match &plain.cells {
-        Some(cells) => tables::compare(subject, cells)?,
-        None => trees::compare(subject, &plain.order(ensemble, model.leaf_type())?)?,
-    };
+    let found = trees::compare(subject, &plain.order(ensemble, model.leaf_type())?)?;
     let mut proof = subject.proof(&found);
     if proof.margin_error > proof.stated
-        && let Some(exact) = tables::error_in_cells(subject)?
+        && let Some(exact) = cells::error_in_cells(subject)?
     {
         // Features that a model computes have fewer values than rows of them.
         if exact > proof.stated * (1.0 + 1e-6) && ensemble.schema().is_none() {
@@ -180,7 +176,7 @@ struct Subject<'s> {
 impl Subject<'_> {
     fn proof(self, found: &Found) -> Proof {
         let Self { plain, ensemble, .. } = self;
-        let largest = found.trees.iter().map(|tree| tree.error).fold(found.table.unwrap_or(0.0), f64::max);
+        let largest = found.trees.iter().map(|tree| tree.error).fold(0.0, f64::max);
         Proof {
             trees: found.trees.len(),
             ensemble_trees: ensemble.trees.len(),

@@ -91,7 +91,7 @@ pub(super) fn compare(subject: Subject<'_>, order: &[Source]) -> Result<Found, P
         return Err(ProofProblem::Trees { what });
     }
     let alone = alone(sources, order.iter().flat_map(|source| source.trees.iter().copied()))?;
-    let mut found = Found { trees: Vec::new(), table: None, boxes: 0, outputs: Vec::new() };
+    let mut found = Found { trees: Vec::new(), boxes: 0, outputs: Vec::new() };
     let mut totals = Totals::new(subject);
     for (number, ((tree, step), stands_for)) in plain.trees.iter().zip(order).enumerate() {
         let (object, step) = (tree.object, *step);

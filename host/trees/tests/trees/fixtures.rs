@@ -160,6 +160,6 @@ pub(crate) fn computed(descriptor: Descriptor) -> Schema {
         whole: "whole units",
         units: "units",
         planes: &[],
-        is_tabled: false,
+        has_all_planes: false,
     }
 }

@@ -1,4 +1,4 @@
-//! Cost of the evaluator on this chip, layout by layout: instructions and stack a touch, margins alone, as the exporter
+//! Cost of the evaluator on this chip, model by model: instructions and stack a touch, margins alone, as the exporter
 //! states them (on a Cortex-M4F within 15 %), and with evidence and stopping; and, next to the first model, the same
 //! trees in irithyll-core and as a plain array of eight-byte nodes with f32 compares.
 #![no_std]
@@ -31,16 +31,13 @@ fn main() -> ! {
     let mut meter = Meter::new(peripherals.SYST);
     let models = models![
         "one-i16",
-        "one-compact",
+        "one-i8",
         "one-d3",
         "each100-i16",
         "each100-i8",
         "each40-i16",
         "each40-i8",
-        "each40-compact",
         "each20-d7",
-        "grid-i8",
-        "grid-i16",
     ];
     let bytes = include_bytes!(concat!(env!("OUT_DIR"), "/bench/touches.bin"));
     let mut touches = [Touch::from_micros([0; 3]); TOUCHES];

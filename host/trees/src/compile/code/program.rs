@@ -6,7 +6,7 @@ use super::super::lowered::Lowered;
 use super::super::quantize::Scale;
 use super::columns::{Column, Columns};
 use crate::ensemble::Output;
-use palpate_shared::format::{Key, Sentinel};
+use palpate_shared::format::{Key, LeafType, Sentinel};
 
 /// With more splits than this, C compares ranks of one byte: they take fewer bytes than keys of four.
 const KEYS: usize = 512;
@@ -68,10 +68,10 @@ pub(crate) struct Statements {
 }
 
 impl Program {
-    /// The program of lowered trees with integer leaves; `None` where there are more than 256 columns.
+    /// The program of lowered trees; `None` where leaves are f32 or beyond two bytes, or there are more than 256 columns.
     pub(in super::super) fn new(lowered: &Lowered<'_>, stated: &Statements) -> Option<Self> {
-        let Lowered { forest, scale, axes, .. } = lowered;
-        if axes.columns > 256 {
+        let Lowered { leaf, forest, scale, axes, .. } = lowered;
+        if *leaf == LeafType::F32 || axes.columns > 256 {
             return None;
         }
         let columns = Columns::new(forest, axes, stated.sentinel.is_some());

@@ -1,9 +1,8 @@
-//! Tables, cell by cell: the layouts grid and patterns, and trees with few cells between their thresholds.
+//! Trees with few cells between their thresholds, cell by cell.
 
 use super::boxes::{Rows, See, Values, between, cuts_of};
-use super::format::Plain;
 use super::span::{Span, spans};
-use super::{Found, ProofProblem, Subject, output_of};
+use super::{ProofProblem, Subject, output_of};
 use crate::ensemble::Occurring;
 
 /// The sums of the ensemble's leaves that `rows` reach, rounded to f32 at each addition, as libraries do.
@@ -21,49 +20,6 @@ fn sums(subject: Subject<'_>, rows: &mut Rows) -> Vec<Span> {
         }
     }
     sums
-}
-
-/// Compares the margins of a cell with the ensemble's.
-fn cell(margins: &[f64], rows: &mut Rows, found: &mut Found, subject: Subject<'_>) -> Result<(), ProofProblem> {
-    let Subject { plain, ensemble, .. } = subject;
-    found.boxes += 1;
-    let step = plain.rounded_to();
-    for (object, (&model, span)) in margins.iter().zip(sums(subject, rows)).enumerate() {
-        let farthest = span.farthest(model);
-        let error = (model - farthest).abs();
-        let is_rounded = [span.low, span.high].into_iter().all(|sum| Span::of(sum, step).is(model, step));
-        if !is_rounded || error > plain.stated * (1.0 + 1e-6) {
-            return Err(ProofProblem::Cell {
-                output: ensemble.objects[object].clone(),
-                model,
-                ensemble: farthest,
-                rows: subject.example(rows),
-            });
-        }
-        found.table = found.table.map(|worst| worst.max(error));
-        let output = &mut found.outputs[object];
-        *output = [output[0].max(error), output[1].min(model), output[2].max(model)];
-    }
-    Ok(())
-}
-
-/// Findings before the first cell.
-fn no_cell(plain: &Plain) -> Found {
-    let outputs = vec![[0.0, f64::INFINITY, f64::NEG_INFINITY]; plain.names.len()];
-    Found { trees: Vec::new(), table: Some(0.0), boxes: 0, outputs }
-}
-
-/// Cells of a table as its format describes them.
-pub(super) fn compare(subject: Subject<'_>, cells: &[(Vec<Values>, Vec<f64>)]) -> Result<Found, ProofProblem> {
-    let mut found = no_cell(subject.plain);
-    for (rows, margins) in cells {
-        // Thresholds may be there twice: nothing is between them.
-        let is_empty = rows.iter().any(|values| values.low > values.high && !values.missing);
-        if !is_empty {
-            cell(margins, &mut rows.clone(), &mut found, subject)?;
-        }
-    }
-    Ok(found)
 }
 
 /// The most trees in all cells together that are added up for the error of margins that the trees' worst only bound.
@@ -109,7 +65,7 @@ fn choices(subject: Subject<'_>) -> Vec<Vec<Vec<Values>>> {
         if *is_split { own.iter().copied().chain([Values::MISSING]).collect() } else { vec![all] }
     };
     let whole: Vec<Vec<Values>> = intervals.iter().zip(&is_split).zip(&all).map(with_missing).collect();
-    let Some(schema) = ensemble.schema().filter(|schema| schema.is_tabled) else { return vec![whole] };
+    let Some(schema) = ensemble.schema().filter(|schema| schema.has_all_planes) else { return vec![whole] };
     // A plane fixes which values are there.
     let of_feature = |(feature, occurring): (usize, &Occurring)| match *occurring {
         Occurring::Any => whole[feature].clone(),
