@@ -385,8 +385,8 @@ static inline uint32_t palpate_record_(uint32_t rivals)
 /* A background, and a misfit test; 0 if they make no sense. */
 static inline int palpate_check_strangers_(palpate_model *model, const uint8_t *content, uint32_t length)
 {
-    const uint8_t *record = content + 44;
-    uint32_t rivals, size, first;
+    const uint8_t *record = content + 36;
+    uint32_t rivals, size;
     uint_fast16_t object;
     if (!palpate_holds_(length, 4, 0, 0) || PALPATE_BYTE(content) > 1 || PALPATE_BYTE(content + 1) > 1 ||
         model->objects == PALPATE_BYTE(content)) {
@@ -397,15 +397,13 @@ static inline int palpate_check_strangers_(palpate_model *model, const uint8_t *
     if (PALPATE_BYTE(content + 1) == 0) {
         return 1;
     }
-    if (!palpate_holds_(length, 44, 0, 0)) {
+    if (!palpate_holds_(length, 36, 0, 0)) {
         return 0;
     }
-    rivals = PALPATE_BYTE(content + 5);
+    rivals = PALPATE_BYTE(content + 4);
     size = palpate_record_(rivals);
-    first = palpate_u32_(content + 8);
-    if (PALPATE_BYTE(content + 4) - 1u > 1 || rivals - 1 > 15 || first == 0 || palpate_u32_(content + 12) < first ||
-        palpate_i32_(content + 24) > palpate_i32_(content + 16) || palpate_u32_(content + 20) >> 31 != 0 ||
-        !palpate_holds_(length, 44, model->known, size)) {
+    if (rivals - 1 > 15 || palpate_u32_(content + 8) == 0 || palpate_u32_(content + 16) >> 31 != 0 ||
+        !palpate_holds_(length, 36, model->known, size)) {
         return 0;
     }
     for (object = 0; object < model->known; object++) {
@@ -1524,9 +1522,15 @@ static inline int64_t palpate_own_(const palpate_recognizer *recognizer, uint_fa
 static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
 {
     const uint8_t *test = recognizer->model->strangers_;
+<<<<<<< HEAD
     const uint32_t touches = recognizer->touches;
     const uint_fast8_t rivals = PALPATE_BYTE(test + 5);
     const uint8_t *record = test + 44 + PALPATE_AS_(size_t, palpate_record_(rivals) * leader);
+=======
+    const uint32_t touches = recognizer->touches - recognizer->forgotten;
+    const uint_fast8_t rivals = PALPATE_BYTE(test + 4);
+    const uint8_t *record = test + 36 + PALPATE_AS_(size_t, palpate_record_(rivals) * leader);
+>>>>>>> ddb99abf (A test of strangers states one limit)
     const uint8_t *means = record + 8 + rivals + (rivals & 1), *slopes = means + 2 * rivals, *weights = slopes + 2 * rivals;
     int32_t ahead[16];
     uint64_t squares = 0;
@@ -1578,15 +1582,12 @@ static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recog
         if (touches < palpate_u32_(test + 8)) {
             return PALPATE_UNDECIDED;
         }
-        /* Limits are higher at first. */
-        left = palpate_exp2(PALPATE_AS_(uint64_t, touches) * palpate_u32_(test + 28)) >> 24;
-        misfit = PALPATE_AS_(int64_t, palpate_u32_(test + 20) * left >> 32);
+        /* The limit is higher at first. */
+        left = palpate_exp2(PALPATE_AS_(uint64_t, touches) * palpate_u32_(test + 20)) >> 24;
+        misfit = PALPATE_AS_(int64_t, palpate_u32_(test + 16) * left >> 32);
         misfit = palpate_subtract_(palpate_misfit_(recognizer, leader), misfit);
-        if (misfit > palpate_i32_(test + 16)) {
+        if (misfit > palpate_i32_(test + 12)) {
             return PALPATE_UNKNOWN;
-        }
-        if (touches < palpate_u32_(test + 12) || misfit > palpate_i32_(test + 24)) {
-            return PALPATE_UNDECIDED;
         }
     }
     if (!PALPATE_HAS_OUTPUTS_(model) && model->known != model->objects &&

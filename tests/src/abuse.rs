@@ -9,7 +9,11 @@ use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::with;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
+<<<<<<< HEAD
     Axis, Counted, Group, HEADER_LENGTH, Header, Held, Length, Limits, Link, MUST_UNDERSTAND, MisfitTerms,
+=======
+    Axis, Counted, EarlyExit, Group, HEADER_LENGTH, Header, Length, Limits, Link, MUST_UNDERSTAND, MisfitTerms,
+>>>>>>> ddb99abf (A test of strangers states one limit)
     ObjectMisfit, Outputs, Plan, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, TrainedNoise,
     TrainedProbe, TrainedTouches, checksum, write_section,
 };
@@ -522,13 +526,10 @@ fn touches_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
     let must = |tag: Tag| tag.code() | MUST_UNDERSTAND;
     let mut strangers = Strangers::header(true, true).to_vec();
     let terms = MisfitTerms {
-        held: Held::Likely,
         rivals: 1,
         first: 1,
-        least: 2,
         threshold: 1 << 18,
         early: 1 << 16,
-        doubt: 1 << 16,
         halving: 1 << 28,
         alarms: 10_000,
         sequences: 1_000,

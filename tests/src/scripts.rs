@@ -6,7 +6,11 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
+<<<<<<< HEAD
     Held, Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence,
+=======
+    EarlyExit, Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence,
+>>>>>>> ddb99abf (A test of strangers states one limit)
     Section, Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
@@ -154,16 +158,11 @@ fn strangers(objects: usize, background: bool, rng: &mut SmallRng) -> Vec<u8> {
         return content;
     }
     let rivals: u8 = rng.random_range(1..=16);
-    let first = rng.random_range(1..4);
-    let doubt = rng.random_range(-(1 << 20)..1 << 20);
     let terms = MisfitTerms {
-        held: Held::Likely,
         rivals,
-        first,
-        least: first + rng.random_range(0..3),
-        threshold: doubt + rng.random_range(0..1 << 20),
+        first: rng.random_range(1..4),
+        threshold: rng.random_range(-(1 << 20)..1 << 21),
         early: rng.random_range(0..1 << 20),
-        doubt,
         halving: rng.random_range(0..u32::MAX),
         alarms: 10_000,
         sequences: 1_000,

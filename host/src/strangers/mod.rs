@@ -37,7 +37,7 @@ use follow::{Ending, Sequence};
 use misfit::Moments;
 use palpate_onboard::{Model, Refused};
 use palpate_shared::Touch;
-use palpate_shared::format::{Held, MisfitTerms, Strangers, Tag};
+use palpate_shared::format::{MisfitTerms, Strangers, Tag};
 use rayon::prelude::*;
 
 /// Touches from which on a test is made.
@@ -334,15 +334,11 @@ fn of_shapes(model: &Model<'_>, shapes: &[ObjectTouches]) -> Vec<Vec<f64>> {
 }
 
 fn terms(settings: &Settings, misfits: &[misfit::Misfit], threshold: f64) -> MisfitTerms {
-    let limit = (threshold * NAT).round() as i32;
     MisfitTerms {
-        held: Held::Likely,
         rivals: misfits.first().map_or(0, |misfit| misfit.rivals.len() as u8),
         first: FIRST,
-        least: FIRST,
-        threshold: limit,
+        threshold: (threshold * NAT).round() as i32,
         early: (EARLY * NAT).round() as u32,
-        doubt: limit,
         halving: (4_294_967_296.0 / HALVED_AFTER).round() as u32,
         alarms: millionths(settings.alarms),
         sequences: 0,

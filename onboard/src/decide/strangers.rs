@@ -12,7 +12,7 @@ use palpate_shared::format::{MisfitTerms, MisfitTest, ObjectMisfit};
 pub enum Familiarity {
     /// The object with the most evidence may be named: its touches fit, and enough were made. Always without a test.
     Known,
-    /// No name yet: too few touches, or touches that fit badly.
+    /// No name yet: too few touches.
     Doubtful,
     /// The touches do not fit the object with the most evidence: the model does not know the touched one.
     Stranger,
@@ -39,15 +39,8 @@ pub(crate) fn familiarity(model: &Model<'_>, evidence: &[i64], leader: usize, to
         return Familiarity::Doubtful;
     }
     let Some(misfit) = misfit(&test, model, evidence, leader, touches) else { return Familiarity::Known };
-    let early = early(&test.terms, touches);
-    let above = |limit: i32| misfit > early.saturating_add(limit.into());
-    if above(test.terms.threshold) {
-        Familiarity::Stranger
-    } else if touches < test.terms.least || above(test.terms.doubt) {
-        Familiarity::Doubtful
-    } else {
-        Familiarity::Known
-    }
+    let most = early(&test.terms, touches).saturating_add(test.terms.threshold.into());
+    if misfit > most { Familiarity::Stranger } else { Familiarity::Known }
 }
 
 impl Model<'_> {

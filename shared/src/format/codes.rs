@@ -102,16 +102,6 @@ impl Counted {
 }
 
 codes! {
-    /// Rule for holding a name back from what may be an object that the model does not know.
-    Held {
-        /// Only while the touches do not fit it.
-        Likely = 1, "likely";
-        /// Until an object that the model does not know would very probably have been detected.
-        Certain = 2, "certain";
-    }
-}
-
-codes! {
     /// Names that a promised error rate covers. A name that is given and wrong is an error; no name, at the limit of touches, is
     /// neither right nor wrong.
     Per {

@@ -10,8 +10,6 @@
 //! W, g and the constant are the leader's. They are half of the log-likelihood ratio of two normal distributions of the
 //! mean evidence: that of the leader's touches, and that of touches of many other shapes.
 
-use super::codes::Held;
-
 /// The optional section: whether the last object is a background, and how to test whether touches fit the leading object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Strangers<'a> {
@@ -25,20 +23,14 @@ pub struct Strangers<'a> {
 /// The numbers of a test that are the same for all objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MisfitTerms {
-    /// Rule for holding names back.
-    pub held: Held,
     /// Rivals of each object: 1 to [`MisfitTest::MOST_RIVALS`].
     pub rivals: u8,
     /// First touch with a test; no name is given before.
     pub first: u32,
-    /// First touch with names; at least `first`.
-    pub least: u32,
-    /// The misfit above which an object is a stranger, after many touches; in 2^-16 nats, as the next two.
+    /// The misfit above which an object is a stranger, after many touches; in 2^-16 nats, as the next.
     pub threshold: i32,
     /// Amount by which it is higher at first.
     pub early: u32,
-    /// The misfit above which no name is given yet, after many touches; at most `threshold`.
-    pub doubt: i32,
     /// The touches after which `early` has halved: 1 / this in Q32.
     pub halving: u32,
     /// The promised share of known objects' sequences that end as strangers, in millionths.
@@ -113,45 +105,28 @@ const fn flag(byte: u8) -> Option<bool> {
 
 impl MisfitTerms {
     /// Bytes in the section.
-    pub const LENGTH: usize = 40;
+    pub const LENGTH: usize = 32;
 
     /// Returns the bytes of the section.
     pub fn to_bytes(&self) -> [u8; Self::LENGTH] {
-        let Self { held, rivals, first, least, threshold, early, doubt, halving, alarms, sequences, confidence } =
-            *self;
+        let Self { rivals, first, threshold, early, halving, alarms, sequences, confidence } = *self;
         let mut bytes = [0; Self::LENGTH];
-        let (threshold, doubt) = (threshold.cast_unsigned(), doubt.cast_unsigned());
-        let numbers = [first, least, threshold, early, doubt, halving, alarms, sequences, confidence];
-        let head = [held.code(), rivals, 0, 0];
+        let numbers = [first, threshold.cast_unsigned(), early, halving, alarms, sequences, confidence];
+        let head = [rivals, 0, 0, 0];
         let all = head.into_iter().chain(numbers.into_iter().flat_map(u32::to_le_bytes));
         bytes.iter_mut().zip(all).for_each(|(byte, from)| *byte = from);
         bytes
     }
 
     fn from_bytes(bytes: &[u8; Self::LENGTH]) -> Option<Self> {
-        let (&[held, rivals, _, _], numbers) = bytes.split_first_chunk::<4>()?;
-        let numbers = numbers.as_chunks::<4>().0.first_chunk::<9>()?.map(u32::from_le_bytes);
-        let [first, least, threshold, early, doubt, halving, alarms, sequences, confidence] = numbers;
-        let (threshold, doubt) = (threshold.cast_signed(), doubt.cast_signed());
+        let (&[rivals, _, _, _], numbers) = bytes.split_first_chunk::<4>()?;
+        let numbers = numbers.as_chunks::<4>().0.first_chunk::<7>()?.map(u32::from_le_bytes);
+        let [first, threshold, early, halving, alarms, sequences, confidence] = numbers;
+        let threshold = threshold.cast_signed();
         let makes_sense = (1..=MisfitTest::MOST_RIVALS).contains(&usize::from(rivals))
             && first > 0
-            && least >= first
-            && doubt <= threshold
             && early <= i32::MAX.cast_unsigned();
-        let held = Held::from_code(held)?;
-        makes_sense.then_some(Self {
-            held,
-            rivals,
-            first,
-            least,
-            threshold,
-            early,
-            doubt,
-            halving,
-            alarms,
-            sequences,
-            confidence,
-        })
+        makes_sense.then_some(Self { rivals, first, threshold, early, halving, alarms, sequences, confidence })
     }
 }
 
@@ -254,13 +229,10 @@ mod tests {
     use std::vec::Vec;
 
     const TERMS: MisfitTerms = MisfitTerms {
-        held: Held::Certain,
         rivals: 3,
         first: 5,
-        least: 90,
         threshold: 300_000,
         early: 500_000,
-        doubt: -100_000,
         halving: 150_000_000,
         alarms: 20_000,
         sequences: 10_000,
@@ -282,7 +254,7 @@ mod tests {
     #[test]
     fn a_test_is_read_back_as_written() {
         let bytes = section();
-        assert_eq!(bytes.len(), 4 + 40 + 3 * MisfitTest::record_length(3));
+        assert_eq!(bytes.len(), 4 + 32 + 3 * MisfitTest::record_length(3));
         let strangers = Strangers::from_bytes(&bytes, 4).unwrap();
         assert!(strangers.background);
         let test = strangers.test.unwrap();
@@ -310,17 +282,13 @@ mod tests {
         assert_eq!(Strangers::from_bytes(&bytes, 3), None);
         assert_eq!(Strangers::from_bytes(&Strangers::header(true, false), 1), None);
         let record = 4 + MisfitTerms::LENGTH;
-        let wrong: [(usize, &[u8]); 12] = [
+        let wrong: [(usize, &[u8]); 8] = [
             (0, &[2]),
             (1, &[2]),
             (4, &[0]),
-            (4, &[3]),
-            (5, &[0]),
-            (5, &[17]),
+            (4, &[17]),
             (8, &[0; 4]),
-            (12, &[4, 0, 0, 0]),
-            (20, &[255; 4]),
-            (24, &300_001_i32.to_le_bytes()),
+            (16, &[255; 4]),
             (record, &[41]),
             (record + 8, &[4]),
         ];

@@ -209,13 +209,12 @@ fn strangers_line(lines: &mut Lines, test: &Tested) {
     lines.line(
         "strangers",
         format!(
-            "{}: at most {} % of known objects are taken for unknown, {} % sure; {} sequences; names after {} touches at \
-             the earliest",
-            test.held,
+            "at most {} % of known objects are taken for unknown, {} % sure; {} sequences; names after {} touches at the \
+             earliest",
             super::percent(test.promised),
             super::percent(test.confidence),
             test.sequences,
-            test.least_touches
+            test.first_touches
         ),
     );
 }

@@ -85,8 +85,6 @@ pub struct Promised {
 /// A test of whether touches fit any object that a model knows.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Tested {
-    /// Rule for holding names back: "likely" or "certain".
-    pub held: &'static str,
     /// The promised share of known objects' sequences that end as unknown.
     pub promised: f64,
     /// The probability that the promise is kept.
@@ -95,20 +93,16 @@ pub struct Tested {
     pub sequences: u32,
     /// Touches before which nothing is tested, and no name is given.
     pub first_touches: u32,
-    /// Touches before which no name is given.
-    pub least_touches: u32,
     /// The misfit above which an object is unknown, after many touches, in nats.
     pub threshold: f64,
 }
 
 pub(super) fn tested(terms: &MisfitTerms) -> Tested {
     Tested {
-        held: terms.held.name(),
         promised: f64::from(terms.alarms) / 1e6,
         confidence: f64::from(terms.confidence) / 1e6,
         sequences: terms.sequences,
         first_touches: terms.first,
-        least_touches: terms.least,
         threshold: f64::from(terms.threshold) / 65_536.0,
     }
 }
