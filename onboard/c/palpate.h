@@ -1522,15 +1522,9 @@ static inline int64_t palpate_own_(const palpate_recognizer *recognizer, uint_fa
 static inline int64_t palpate_misfit_(const palpate_recognizer *recognizer, uint_fast16_t leader)
 {
     const uint8_t *test = recognizer->model->strangers_;
-<<<<<<< HEAD
     const uint32_t touches = recognizer->touches;
-    const uint_fast8_t rivals = PALPATE_BYTE(test + 5);
-    const uint8_t *record = test + 44 + PALPATE_AS_(size_t, palpate_record_(rivals) * leader);
-=======
-    const uint32_t touches = recognizer->touches - recognizer->forgotten;
     const uint_fast8_t rivals = PALPATE_BYTE(test + 4);
     const uint8_t *record = test + 36 + PALPATE_AS_(size_t, palpate_record_(rivals) * leader);
->>>>>>> ddb99abf (A test of strangers states one limit)
     const uint8_t *means = record + 8 + rivals + (rivals & 1), *slopes = means + 2 * rivals, *weights = slopes + 2 * rivals;
     int32_t ahead[16];
     uint64_t squares = 0;

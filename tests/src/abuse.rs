@@ -1,21 +1,17 @@
 //! Every way to abuse a model file: bytes that a reader must refuse, and why. `shared/FORMAT.md` lists them by name.
 
 use crate::random::{self, Shape};
-use crate::wide::widened;
 use crate::replay::groups_and_splits;
 use crate::sections::{trained, with_sections};
 use crate::vectors::{Cut, Run};
+use crate::wide::widened;
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate::with;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
-<<<<<<< HEAD
-    Axis, Counted, Group, HEADER_LENGTH, Header, Held, Length, Limits, Link, MUST_UNDERSTAND, MisfitTerms,
-=======
-    Axis, Counted, EarlyExit, Group, HEADER_LENGTH, Header, Length, Limits, Link, MUST_UNDERSTAND, MisfitTerms,
->>>>>>> ddb99abf (A test of strangers states one limit)
-    ObjectMisfit, Outputs, Plan, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, TrainedNoise,
-    TrainedProbe, TrainedTouches, checksum, write_section,
+    Axis, Counted, Group, HEADER_LENGTH, Header, Length, Limits, Link, MUST_UNDERSTAND, MisfitTerms, ObjectMisfit,
+    Outputs, Plan, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, TrainedNoise, TrainedProbe,
+    TrainedTouches, checksum, write_section,
 };
 use palpate_shared::{Descriptor, Patterns, Poses};
 

@@ -2,7 +2,7 @@
 
 use crate::abuse::places;
 use crate::scripts::sealed;
-use palpate_shared::format::{HEADER_LENGTH, Layout, MUST_UNDERSTAND, VERSION};
+use palpate_shared::format::{HEADER_LENGTH, MUST_UNDERSTAND};
 use rand::RngExt;
 use rand::rngs::SmallRng;
 

@@ -234,9 +234,8 @@ pub type LeftOpen = (&'static str, fn(&Model<'_>) -> bool);
 
 /// Models whose margins `FORMAT.md` leaves open. Two implementations may differ in these, in what follows from them, and in
 /// [names](NAMES_LEFT_OPEN); in nothing else.
-pub const MARGINS_LEFT_OPEN: [LeftOpen; 2] = [
-    ("subtrees of compact and wide trees whose sizes contradict each other must end the", has_contradictions),
-];
+pub const MARGINS_LEFT_OPEN: [LeftOpen; 1] =
+    [("subtrees of compact and wide trees whose sizes contradict each other must end the", has_contradictions)];
 
 /// Models whose names of objects it leaves open.
 pub const NAMES_LEFT_OPEN: LeftOpen =

@@ -6,12 +6,8 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-<<<<<<< HEAD
-    Held, Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence,
-=======
-    EarlyExit, Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence,
->>>>>>> ddb99abf (A test of strangers states one limit)
-    Section, Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
+    Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence, Section,
+    Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;

@@ -1,6 +1,6 @@
 //! Models with optional sections.
 
-use palpate_shared::format::{HEADER_LENGTH, Header, Tag, Trained, VERSION, checksum};
+use palpate_shared::format::{HEADER_LENGTH, Header, Tag, Trained, checksum};
 
 /// The model with these optional sections instead of those that it has.
 ///

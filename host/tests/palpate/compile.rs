@@ -1,7 +1,6 @@
 use crate::fixtures::*;
-use palpate::compile::{Instructions, Layout, Leaf, Settings, compile, longest_time, open};
+use palpate::compile::{Instructions, Leaf, Settings, compile, longest_time, open};
 use palpate::ensemble::inputs;
-use palpate::error::CompileProblem;
 
 fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
     Node::Split { feature, threshold, missing_left: true, left, right }

@@ -123,7 +123,7 @@ fn a_test_is_replaced_and_taken_out_again() {
 fn without_other_shapes_a_test_is_made_too() {
     let model = compile::open(&MODELS[0]).unwrap();
     let calibrated = calibrate(&model, &of(0..KNOWN, 30_000, 2), &[], &Settings::default()).unwrap();
-    assert!(calibrated.terms.least >= 5 && calibrated.terms.sequences > 300);
+    assert!(calibrated.terms.first >= 5 && calibrated.terms.sequences > 300);
     assert!(calibrated.alarms as f64 <= 0.02 * f64::from(calibrated.terms.sequences));
 }
 

@@ -8,7 +8,6 @@
 //! `rows.csv` holds rows of features with a header; rows at every threshold are made besides. Without arguments a file of
 //! XGBoost's that is used in tests is exported.
 
-use palpate_base::with;
 use palpate_trees::compile::{self, Settings, compile};
 use palpate_trees::ensemble::Ensemble;
 use palpate_trees::onboard::Model;

@@ -9,7 +9,6 @@ use super::masks::{LEAVES, Masks};
 use super::preorder;
 use super::ranks;
 use super::{Sections, built_in};
-use crate::bytes::at;
 use palpate_shared::format::{Group, Layout, LeafType};
 
 /// Blocks with fewer rows do not repay the preparation for a tree.
@@ -203,17 +202,6 @@ impl Sums<'_> {
             }
         }
         self.masked = 0;
-    }
-
-    /// Room for the leaves that are reached in the next tree.
-    fn next(&mut self) -> &mut Leaves {
-        let [first, second, third, fourth] = &mut *self.reached;
-        match self.waiting {
-            0 => first,
-            1 => second,
-            2 => third,
-            _ => fourth,
-        }
     }
 
     /// Adds the leaves of the next tree that are reached, sooner or later.

@@ -207,12 +207,6 @@ impl Masks {
     }
 }
 
-/// A number below 2^32.
-const fn low(number: usize) -> u32 {
-    let [a, b, c, d, ..] = number.to_le_bytes();
-    u32::from_le_bytes([a, b, c, d])
-}
-
 /// This number of one bits, up to 63.
 const fn ones(count: usize) -> u64 {
     (1_u64 << (count & 63)).wrapping_sub(1)

@@ -74,9 +74,7 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
             Layout::Compact if built_in::layout(Layout::Compact) => {
                 preorder::check(&group, &mut nodes, &mut leaves, leaf, 3)
             }
-            Layout::Wide if built_in::layout(Layout::Wide) => {
-                preorder::check(&group, &mut nodes, &mut leaves, leaf, 6)
-            }
+            Layout::Wide if built_in::layout(Layout::Wide) => preorder::check(&group, &mut nodes, &mut leaves, leaf, 6),
             _ => return Err(wrong),
         };
         section(fits.is_some(), model.nodes)?;

@@ -7,8 +7,8 @@ use super::{
 use crate::bytes::Wrong;
 use crate::layouts::{Sections, built_in};
 use palpate_shared::format::{
-    Guard, Layout, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence, Section, Sentinel, SharedLeaves,
-    Strangers, Tag, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_section,
+    Guard, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence, Section, Sentinel, SharedLeaves, Strangers,
+    Tag, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_section,
 };
 
 /// The content of the section with this tag; empty if there is none; no section that is read is empty.

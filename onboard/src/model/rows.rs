@@ -1,7 +1,7 @@
 //! The margins of many rows at once.
 
 use super::{Model, fixed};
-use crate::layouts::batch::{self, Batch};
+use crate::layouts::batch::Batch;
 use palpate_shared::format::Layout;
 
 /// With fewer rows than this, one after the other is as fast.

@@ -192,5 +192,4 @@ mod tests {
         assert_eq!((header.odds(), header.last_object(), header.unit()), (u64::MAX - 1, 9, 0.25));
         assert_eq!((header.magic().to_le_bytes(), header.version(), header.max_touches()), (MAGIC, VERSION, 0));
     }
-
 }

@@ -20,12 +20,7 @@ mod strangers;
 mod trained;
 
 pub use crate::checksum::checksum;
-<<<<<<< HEAD
-pub use codes::{Counted, Held, Key, Layout, LeafType, Length, MAPS_LAYOUT, Per, RAW_FEATURES};
-=======
 pub use codes::{Counted, Key, Layout, LeafType, Length, MAPS_LAYOUT, Per, RAW_FEATURES};
-pub use early::EarlyExit;
->>>>>>> ddb99abf (A test of strangers states one limit)
 pub use evidence::{RowEvidence, Shifts, Weights};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION};
 pub use key::f32_key;

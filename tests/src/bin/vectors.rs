@@ -15,8 +15,8 @@ use palpate_shared::{ContactTime, Descriptor, MISSING_FEATURE, Patterns, Pose, T
 use palpate_tests::abuse::{self, changed, section};
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::{trained, with_sections};
-use palpate_tests::wide::widened;
 use palpate_tests::vectors::{hex, numbers, refusal, touch_words};
+use palpate_tests::wide::widened;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -69,7 +69,10 @@ fn stated(model: &[u8], touches: TrainedTouches) -> Vec<u8> {
 }
 
 fn compiled(shape: Shape, seed: u64, leaf: Leaf, layout: Layout) -> Vec<u8> {
-    in_layout(compile(&random::ensemble(shape, seed), &with!(Settings::default(), leaf)).expect("it fits").bytes, layout)
+    in_layout(
+        compile(&random::ensemble(shape, seed), &with!(Settings::default(), leaf)).expect("it fits").bytes,
+        layout,
+    )
 }
 
 /// A compact model with splits of six bytes, if that is the layout.
@@ -240,11 +243,7 @@ fn sections(text: &mut String) {
 
 /// Models over rows of features.
 fn rows(text: &mut String) {
-    for (layout, leaf) in [
-        (Layout::Compact, Leaf::I16),
-        (Layout::Wide, Leaf::F32),
-        (Layout::Compact, Leaf::I8),
-    ] {
+    for (layout, leaf) in [(Layout::Compact, Leaf::I16), (Layout::Wide, Leaf::F32), (Layout::Compact, Leaf::I8)] {
         let ensemble = random::over_rows(random::ensemble(SHAPE, 14), 5, 1.000_001e-3);
         let bytes = compile(&ensemble, &with!(Settings::default(), leaf)).expect("it fits").bytes;
         let bytes = in_layout(bytes, layout);

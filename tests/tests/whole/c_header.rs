@@ -163,8 +163,7 @@ fn set(name: &str) -> Option<u64> {
 fn batch(models: &[Parts], seed: u64, number: u64) -> Vec<(Vec<u8>, String)> {
     if number == 0 {
         let of_i8 = cuts().into_iter().map(|(_, base, _)| base);
-        let of_i16 =
-            [Layout::Compact, Layout::Wide].map(|layout| abuse::model(layout, Leaf::I16, false));
+        let of_i16 = [Layout::Compact, Layout::Wide].map(|layout| abuse::model(layout, Leaf::I16, false));
         let models: Vec<Parts> = of_i8.chain(of_i16).map(|base| Parts::of(&base)).collect();
         return sweep(&models, &mut SmallRng::seed_from_u64(seed));
     }

@@ -26,8 +26,11 @@ fn hold(ensemble: &Ensemble, compiled: &Compiled, touches: &[Touch]) {
 /// The ensemble's model, with splits of three bytes and of six.
 fn models(ensemble: &Ensemble, settings: &Settings) -> Vec<Compiled> {
     let compiled = compile(ensemble, settings).unwrap();
-    let wide = (compiled.layout == Layout::Compact)
-        .then(|| Compiled { bytes: widened(&compiled.bytes), layout: Layout::Wide, ..compiled.clone() });
+    let wide = (compiled.layout == Layout::Compact).then(|| Compiled {
+        bytes: widened(&compiled.bytes),
+        layout: Layout::Wide,
+        ..compiled.clone()
+    });
     std::iter::once(compiled).chain(wide).collect()
 }
 

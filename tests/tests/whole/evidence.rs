@@ -1,6 +1,6 @@
 //! Hard cases of evidence and stopping.
 
-use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::compile::{Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
 use palpate::with;
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};

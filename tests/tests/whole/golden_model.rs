@@ -1,10 +1,10 @@
-//! Pins the model format: these bytes are what version 1 means (`shared/FORMAT.md`).
+//! Pins the model format: these bytes are what version 3 means (`shared/FORMAT.md`).
 
-use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::compile::{Leaf, Settings, compile};
 use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, inputs};
 use palpate::with;
-use palpate_onboard::Model;
-use palpate_shared::{ContactTime, Descriptor, Touch};
+use palpate_shared::Descriptor;
+use palpate_tests::wide::widened;
 
 /// Two trees over curvature: κ < 1000.5 (missing left), then slope < -3 (missing right) on the right; and one split.
 fn ensemble() -> Ensemble {
@@ -28,27 +28,8 @@ fn ensemble() -> Ensemble {
     }
 }
 
-/// Two trees over contact patterns: pattern < 3, then κ < 1000.5 (missing left) on the right; and pair < 70000 (missing
-/// right).
-fn over_patterns() -> Ensemble {
-    let split =
-        |feature, threshold, missing_left, left, right| Node::Split { feature, threshold, missing_left, left, right };
-    let leaf = |a: f32, b: f32| Node::Leaf(vec![a, b]);
-    let first = vec![
-        split(0, 3.0, true, 1, 2),
-        leaf(1.0, -1.0),
-        split(1, 1000.5, true, 3, 4),
-        leaf(0.5, 0.25),
-        leaf(-0.5, 0.0),
-    ];
-    let second = vec![split(3, 70000.0, false, 1, 2), leaf(0.125, 0.0), leaf(-0.125, 0.0625)];
-    let trees = [first, second].into_iter().map(|nodes| Tree { nodes, output: Output::Each }).collect();
-    Ensemble { inputs: inputs(Descriptor::ContactsCurvature), trees, ..ensemble() }
-}
-
-fn compiled(ensemble: &Ensemble, leaf: Leaf, layout: Layout, shared: bool) -> Vec<u8> {
-    let settings = with!(Settings::default(), leaf, layout = Some(layout), shared_leaves = Some(shared));
-    compile(ensemble, &settings).unwrap().bytes
+fn compiled(ensemble: &Ensemble, leaf: Leaf) -> Vec<u8> {
+    compile(ensemble, &with!(Settings::default(), leaf)).unwrap().bytes
 }
 
 /// All after the version, up to the checksum.
@@ -60,39 +41,20 @@ fn body(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn the_bytes_of_every_layout_are_pinned() {
-    let mut header = compiled(&ensemble(), Leaf::I8, Layout::Complete, false)[..96].to_vec();
+fn the_bytes_of_both_layouts_are_pinned() {
+    let bytes = compiled(&ensemble(), Leaf::I8);
+    let mut header = bytes[..96].to_vec();
     // The ensemble's hash has the version in it.
     header[72..80].fill(0);
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
     assert_eq!(header.chunks(16).map(hex).collect::<Vec<_>>(), HEADER);
-    let bodies = SECTIONS.map(|(leaf, layout, _)| body(&compiled(&ensemble(), leaf, layout, false)));
-    assert_eq!(bodies, SECTIONS.map(|(.., expected)| expected));
-    assert_eq!(body(&compiled(&over_patterns(), Leaf::I8, Layout::Patterns, false)), PATTERNS);
-    assert_eq!(body(&compiled(&ensemble(), Leaf::I8, Layout::Compact, true)), SHARED);
-}
-
-#[test]
-fn tables_by_contact_pattern_give_the_margins_worked_out_by_hand() {
-    let bytes = compiled(&over_patterns(), Leaf::I8, Layout::Patterns, false);
-    let model = Model::new(&bytes).unwrap();
-    let (some, missing) = (ContactTime::from_micros, ContactTime::MISSING);
-    for (times, expected) in [
-        ([missing; 3], [1.375, -1.4375]),
-        ([some(0), missing, missing], [1.375, -1.4375]),
-        ([missing, some(0), missing], [1.375, -1.4375]),
-        // pair = 69999, then 70000.
-        ([some(0), some(69_999), missing], [1.125, -0.25]),
-        ([missing, some(70_000), some(0)], [0.875, -0.1875]),
-        ([some(5), missing, some(0)], [0.875, -0.1875]),
-        // κ = 1000, then 1001.
-        ([some(1_000), some(0), some(0)], [0.875, -0.1875]),
-        ([some(1_000), some(0), some(1)], [-0.125, -0.4375]),
-    ] {
-        let mut margins = [0; 2];
-        assert!(model.margins(&Touch::new(times), &mut margins));
-        assert_eq!(margins.map(|margin| f64::from(margin) * f64::from(model.unit())), expected, "{times:?}");
+    for (leaf, expected) in LEAVES {
+        assert_eq!(body(&compiled(&ensemble(), leaf)), expected, "{leaf:?}");
     }
+    assert_eq!(body(&widened(&bytes)), WIDE);
+    // Enough equal leaves to store each once.
+    let repeated = Ensemble { trees: (0..6).flat_map(|_| ensemble().trees).collect(), ..ensemble() };
+    assert_eq!(body(&compiled(&repeated, Leaf::I8)), SHARED);
 }
 
 const HEADER: [&str; 6] = [
@@ -104,34 +66,18 @@ const HEADER: [&str; 6] = [
     "0c 00 00 00 0c 00 00 00 0c 00 00 00 00 00 00 00",
 ];
 
-const PATTERNS: &str = "02 61 62 01 63 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 01 01 04 01 02 01 02 00 03 01 04 01 e9 03 00 00 70 11 01 00 d8 24 d8 24 d8 24 c8 70 b8 74 b8 74 b8 74 78 64";
-
-const SHARED: &str = "02 61 62 01 63 00 0c 80 00 00 0e 00 00 00 01 00 00 00 88 80 78 84 c0 40 a0 90 60 80 00 00 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 00 01 04 02 01 02 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 00 02 00 00 00 00 01 00 00 00 01 02 03 04";
-
-const SECTIONS: [(Leaf, Layout, &str); 5] = [
-    (
-        Leaf::I8,
-        Layout::Complete,
-        "02 61 62 01 63 00 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 00 01 04 02 01 02 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff 01 00 00 00 01 00 00 00 02 00 00 00 01 00 00 00 01 00 00 01 01 00 00 01 00 00 00 00 88 80 78 84 c0 40 c0 40 a0 90 60 80",
-    ),
+const LEAVES: [(Leaf, &str); 3] = [
+    (Leaf::I8, "TODO"),
     (
         Leaf::I16,
-        Layout::Compact,
         "02 61 62 01 63 00 00 02 00 00 00 fe ff ff 00 00 00 00 00 00 00 00 00 01 04 02 01 02 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 00 02 00 00 00 00 01 00 00 80 00 00 00 80 ff 40 00 00 04 00 fc 00 02 00 01 00 fe 00 00",
     ),
     (
-        Leaf::I8,
-        Layout::Wide,
-        "02 61 62 01 63 00 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 fd ff ff ff e9 03 00 00 70 11 01 00 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 02 00 00 00 02 00 00 01 01 00 00 00 01 00 00 00 00 00 88 80 78 84 c0 40 a0 90 60 80",
-    ),
-    (
-        Leaf::I8,
-        Layout::Grid,
-        "02 61 62 01 63 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 01 04 02 01 01 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff e8 20 e8 20 e8 20 c8 70 88 60 88 60 b8 74 78 64 78 64 e8 20 e8 20 e8 20",
-    ),
-    (
         Leaf::F32,
-        Layout::Compact,
         "02 61 62 01 63 00 00 00 00 3f 00 00 00 bf 00 00 00 00 00 00 00 00 00 01 04 02 01 02 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff 00 00 00 00 02 00 00 00 02 00 00 00 00 01 00 00 01 00 00 01 00 00 00 80 3f 00 00 80 bf 00 00 00 3f 00 00 80 3e 00 00 00 bf 00 00 00 00 00 00 00 3e 00 00 00 00 00 00 00 be 00 00 80 3d",
     ),
 ];
+
+const WIDE: &str = "02 61 62 01 63 00 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 fd ff ff ff e9 03 00 00 70 11 01 00 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 02 00 00 00 02 00 00 01 01 00 00 00 01 00 00 00 00 00 88 80 78 84 c0 40 a0 90 60 80";
+
+const SHARED: &str = "02 61 62 01 63 00 0c 80 00 00 0e 00 00 00 01 00 00 00 88 80 78 84 c0 40 a0 90 60 80 00 00 20 00 00 00 e0 ff ff ff 00 00 00 00 00 00 00 00 00 01 04 02 01 02 04 01 e9 03 00 00 70 11 01 00 fd ff ff ff 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 01 00 00 01 00 02 00 00 00 00 01 00 00 00 01 02 03 04";

@@ -1,7 +1,6 @@
 //! Bytes that are not a model are refused, and bytes that pass can be walked.
 
 use palpate::compile::{Layout, Leaf, Settings, compile};
-use palpate::with;
 use palpate_onboard::{Batch, Model, ModelError, Recognizer, RowsSeen, Stopping};
 use palpate_shared::Descriptor;
 use palpate_shared::format::{HEADER_LENGTH, MUST_UNDERSTAND, PatternShares, Trained, TrainedTouches};

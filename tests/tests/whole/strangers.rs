@@ -106,32 +106,6 @@ fn a_background_with_more_evidence_than_any_object_lets_none_be_named() {
 }
 
 #[test]
-<<<<<<< HEAD
-=======
-fn verdicts_survive_a_snapshot() {
-    let bytes = with(&model(), section(MisfitTerms { threshold: -1, ..TERMS }, false, 0, 0, 0)).unwrap();
-    let model = Model::new(&bytes).unwrap();
-    let stopping = Stopping::from_model(&model);
-    let mut recognizer = Recognizer::<4>::new(&model, stopping).unwrap();
-    recognizer.push_margins(&[0; 4]);
-    assert_eq!(recognizer.verdict(), Verdict::Unknown);
-    let mut buffer = [0; 80];
-    let snapshot = recognizer.snapshot(&mut buffer).unwrap();
-    let mut other = Recognizer::<4>::new(&model, stopping).unwrap();
-    other.restore(snapshot).unwrap();
-    assert_eq!(other.verdict(), Verdict::Unknown);
-    let plain = self::model();
-    let plain = Model::new(&plain).unwrap();
-    let mut recognizer = Recognizer::<4>::new(&plain, Stopping::from_model(&plain).with_max_touches(1)).unwrap();
-    recognizer.push_margins(&[0; 4]);
-    let snapshot = recognizer.snapshot(&mut buffer).unwrap();
-    let mut other = Recognizer::<4>::new(&plain, stopping).unwrap();
-    other.restore(snapshot).unwrap();
-    assert_eq!(other.verdict(), Verdict::GaveUp);
-}
-
-#[test]
->>>>>>> ddb99abf (A test of strangers states one limit)
 fn the_object_before_leaves_nothing_in_the_background_where_weights_begin() {
     let bytes = with(&model(), Strangers::header(true, false).to_vec()).unwrap();
     let model = Model::new(&bytes).unwrap();

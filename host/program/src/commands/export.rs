@@ -4,9 +4,7 @@ use super::expected::PriorArguments;
 use super::numbers::error_rate;
 use super::unstated::UnstatedArguments;
 use palpate::Result;
-use palpate::compile::{
-    self, Compiled, CompiledModel, Instructions, Language, Layout, Leaf, Settings,
-};
+use palpate::compile::{self, Compiled, CompiledModel, Instructions, Language, Layout, Leaf, Settings};
 use palpate::ensemble::{self, Ensemble, Inputs, TouchOrigin, train};
 use palpate::error::Error;
 use palpate::output;

@@ -80,7 +80,9 @@ pub enum CompileProblem {
     #[error("the ensemble has more than 65,536 different thresholds, or a tree with more splits than that")]
     TooManyThresholds,
     /// No code can be written of the trees.
-    #[error("the ensemble cannot become code: its leaves are f32 or beyond two bytes, or it has more thresholds than 256 columns hold")]
+    #[error(
+        "the ensemble cannot become code: its leaves are f32 or beyond two bytes, or it has more thresholds than 256 columns hold"
+    )]
     NoCode,
     /// A name is too long.
     #[error("the name {name:?} is too long for a model")]

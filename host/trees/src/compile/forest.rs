@@ -27,7 +27,6 @@ pub(super) struct Forest<'a> {
 pub(super) struct Branches<'a> {
     pub(super) root: Branch<'a>,
     pub(super) output: Output,
-    pub(super) depth: usize,
     pub(super) splits: usize,
     /// The largest absolute value of a leaf.
     pub(super) largest: f32,
@@ -76,8 +75,8 @@ impl<'a> Forest<'a> {
             let own = |node| ensemble.threshold(index, node);
             let mut reader =
                 Reader { tree, own: &own, values, features, thresholds, left: tree.nodes.len(), largest: 0.0 };
-            let (root, splits, depth) = reader.branch(0, 0).map_err(place)?;
-            trees.push(Arc::new(Branches { root, output: tree.output, depth, splits, largest: reader.largest }));
+            let (root, splits) = reader.branch(0, 0).map_err(place)?;
+            trees.push(Arc::new(Branches { root, output: tree.output, splits, largest: reader.largest }));
         }
         let forest = Self {
             base: &ensemble.base_margins,
@@ -176,8 +175,8 @@ struct Reader<'a, 'r> {
 }
 
 impl<'a> Reader<'a, '_> {
-    /// A branch, its splits and its depth.
-    fn branch(&mut self, index: usize, depth: usize) -> Result<(Branch<'a>, usize, usize), TreeProblem> {
+    /// A branch and its splits.
+    fn branch(&mut self, index: usize, depth: usize) -> Result<(Branch<'a>, usize), TreeProblem> {
         if depth > MAX_DEPTH {
             return Err(TreeProblem::TooDeep { most: MAX_DEPTH });
         }
@@ -188,7 +187,7 @@ impl<'a> Reader<'a, '_> {
             Node::Leaf(values) => {
                 check_leaf(index, values, self.values)?;
                 self.largest = values.iter().fold(self.largest, |largest, value| largest.max(value.abs()));
-                Ok((Branch::Leaf(Cow::Borrowed(values)), 0, 0))
+                Ok((Branch::Leaf(Cow::Borrowed(values)), 0))
             }
             &Node::Split { feature, threshold, missing_left, left, right } => {
                 let features = self.features;
@@ -203,8 +202,8 @@ impl<'a> Reader<'a, '_> {
                         return Err(TreeProblem::Child { node: index, side, child, nodes });
                     }
                 }
-                let (left, left_splits, left_depth) = self.branch(left, depth + 1)?;
-                let (right, right_splits, right_depth) = self.branch(right, depth + 1)?;
+                let (left, left_splits) = self.branch(left, depth + 1)?;
+                let (right, right_splits) = self.branch(right, depth + 1)?;
                 let own = (self.own)(index).unwrap_or(Threshold::below(f64::from(threshold)));
                 let split = match self.thresholds.cut(feature, threshold, own) {
                     Some(cut) => Split { feature: number, cut, missing_left, left, right, left_splits },
@@ -218,8 +217,7 @@ impl<'a> Reader<'a, '_> {
                         left_splits: right_splits,
                     },
                 };
-                let depth = 1 + left_depth.max(right_depth);
-                Ok((Branch::Split(Box::new(split)), 1 + left_splits + right_splits, depth))
+                Ok((Branch::Split(Box::new(split)), 1 + left_splits + right_splits))
             }
         }
     }

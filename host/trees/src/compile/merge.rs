@@ -178,17 +178,17 @@ impl Steps {
 
 /// A tree that is as shallow as can be.
 fn balanced<'a>(cuts: &[i32], values: &[f32], feature: u8, missing_left: bool, object: usize) -> Branches<'a> {
-    fn branch<'a>(cuts: &[i32], values: &[f32], feature: u8, missing_left: bool) -> (Branch<'a>, usize) {
+    fn branch<'a>(cuts: &[i32], values: &[f32], feature: u8, missing_left: bool) -> Branch<'a> {
         let middle = cuts.len() / 2;
-        let Some(&cut) = cuts.get(middle) else { return (Branch::Leaf(Cow::Owned(vec![values[0]])), 0) };
-        let (left, left_depth) = branch(&cuts[..middle], &values[..=middle], feature, missing_left);
-        let (right, right_depth) = branch(&cuts[middle + 1..], &values[middle + 1..], feature, missing_left);
+        let Some(&cut) = cuts.get(middle) else { return Branch::Leaf(Cow::Owned(vec![values[0]])) };
+        let left = branch(&cuts[..middle], &values[..=middle], feature, missing_left);
+        let right = branch(&cuts[middle + 1..], &values[middle + 1..], feature, missing_left);
         let split = Split { feature, cut, missing_left, left, right, left_splits: middle };
-        (Branch::Split(Box::new(split)), 1 + left_depth.max(right_depth))
+        Branch::Split(Box::new(split))
     }
-    let (root, depth) = branch(cuts, values, feature, missing_left);
+    let root = branch(cuts, values, feature, missing_left);
     let largest = values.iter().fold(0.0, |largest: f32, value| largest.max(value.abs()));
-    Branches { root, output: Output::One(object), depth, splits: cuts.len(), largest }
+    Branches { root, output: Output::One(object), splits: cuts.len(), largest }
 }
 
 #[cfg(test)]
@@ -235,35 +235,32 @@ mod tests {
 
     /// Integers that the leaves of every tree are rounded to add up to what a model gives, at every threshold.
     #[test]
-    fn a_model_of_merged_trees_gives_the_sums_of_all_trees_in_every_layout() {
+    fn a_model_of_merged_trees_gives_the_sums_of_all_trees() {
         for (seed, count, largest, kind) in
             [(1, 300, 0.5, Leaf::I16), (2, 300, 0.5, Leaf::I8), (3, 12, 0.1, Leaf::I16), (4, 600, 0.01, Leaf::I16)]
         {
             let ensemble = random(seed, count, largest);
-            for layout in [super::super::Layout::Complete, super::super::Layout::Compact, super::super::Layout::Wide] {
-                let settings = Settings { layout: Some(layout), leaf: kind, ..Settings::default() };
-                let compiled = compile(&ensemble, &settings).unwrap();
-                let model = open(&compiled.bytes).unwrap();
-                let forest = super::Forest::new(&ensemble, None).unwrap();
-                let scale = super::Scale::for_trees(&forest, kind).unwrap();
-                let mut rows = Numbers(9);
-                for _ in 0..300 {
-                    let row: [f32; 4] = std::array::from_fn(|_| match rows.below(19) {
-                        18 => f32::NAN,
-                        whole => whole as f32 - 9.0,
-                    });
-                    let mut expected: Vec<i32> =
-                        ensemble.base_margins.iter().map(|base| scale.integer(*base, 0)).collect();
-                    for (index, tree) in ensemble.trees.iter().enumerate() {
-                        let Output::One(object) = tree.output else { unreachable!() };
-                        let shift = scale.shifts[index];
-                        expected[object] += scale.integer(tree.leaf(&row)[0], shift) << shift;
-                    }
-                    let keys = row.map(|value| if value.is_nan() { MISSING_FEATURE } else { f32_key(value) });
-                    let mut margins = [0; 3];
-                    assert!(model.margins_of(&keys, &mut margins));
-                    assert_eq!(margins[..], expected, "{row:?}, {layout:?}, {kind:?}");
+            let settings = Settings { leaf: kind, ..Settings::default() };
+            let compiled = compile(&ensemble, &settings).unwrap();
+            let model = open(&compiled.bytes).unwrap();
+            let forest = super::Forest::new(&ensemble, None).unwrap();
+            let scale = super::Scale::for_trees(&forest, kind).unwrap();
+            let mut rows = Numbers(9);
+            for _ in 0..300 {
+                let row: [f32; 4] = std::array::from_fn(|_| match rows.below(19) {
+                    18 => f32::NAN,
+                    whole => whole as f32 - 9.0,
+                });
+                let mut expected: Vec<i32> = ensemble.base_margins.iter().map(|base| scale.integer(*base, 0)).collect();
+                for (index, tree) in ensemble.trees.iter().enumerate() {
+                    let Output::One(object) = tree.output else { unreachable!() };
+                    let shift = scale.shifts[index];
+                    expected[object] += scale.integer(tree.leaf(&row)[0], shift) << shift;
                 }
+                let keys = row.map(|value| if value.is_nan() { MISSING_FEATURE } else { f32_key(value) });
+                let mut margins = [0; 3];
+                assert!(model.margins_of(&keys, &mut margins));
+                assert_eq!(margins[..], expected, "{row:?}, {kind:?}");
             }
         }
     }

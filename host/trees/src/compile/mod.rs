@@ -76,8 +76,8 @@ use cells::Cells;
 use code::{Program, Statements};
 use forest::Forest;
 use lowered::Lowered;
-use parts::Parts;
 use palpate_onboard::Stopping;
+use parts::Parts;
 
 /// Settings of compilation.
 #[derive(Clone, Debug, PartialEq)]

@@ -254,7 +254,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let cuts_bytes = rest.take(cuts_length)?;
     let group_bytes = Bytes(rest.take(8 * group_count)?);
     let splits = Bytes(rest.take(splits_length)?);
-    let mut leaves = Bytes(rest.take(leaves_length)?);
+    let leaves = Bytes(rest.take(leaves_length)?);
     if rest.0.len() != 4 {
         return Err(ProofProblem::Format { what: "sections of other lengths than it states" });
     }

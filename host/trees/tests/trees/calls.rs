@@ -4,7 +4,7 @@ use crate::fixtures::{Fixture, fixture};
 use palpate_base::with;
 use palpate_onboard::{C_HEADER, Model, Recognizer, Refused, RowsSeen, Stopping, Verdict};
 use palpate_shared::format::{Limits, Tag};
-use palpate_trees::compile::{Language, Layout, Leaf, Restated, Settings, compile, emit, restate};
+use palpate_trees::compile::{Language, Leaf, Restated, Settings, compile, emit, restate};
 use palpate_trees::ensemble::Probability;
 use palpate_trees::rows::Encoder;
 use palpate_trees::verify::Candidate;
@@ -82,14 +82,10 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
             if number > 1 && ["f32", "i16"][number % 2] == form {
                 continue;
             }
-            let settings = with!(
-                Settings::default(),
-                leaf,
-                layout = Some(Layout::Compact),
-                scales = (form == "whole").then(|| vec![1000.0; rows[0].len()])
-            );
+            let settings =
+                with!(Settings::default(), leaf, scales = (form == "whole").then(|| vec![1000.0; rows[0].len()]));
             let Ok(plain) = compile(ensemble, &settings) else { continue };
-            let code = with!(settings.clone(), layout = None, code = true);
+            let code = with!(settings.clone(), code = true);
             let code = if form == "code" { compile(ensemble, &code).unwrap() } else { plain.clone() };
             let name = format!("m{number}{form}");
             let header = &code.sources(&name, &[Language::C]).unwrap()[0].1;
@@ -188,12 +184,11 @@ fn rows_of_a_sequence_are_numbered_and_refused_by_the_same_bits_as_in_rust() {
         let settings = with!(
             Settings::default(),
             leaf,
-            layout = Some(Layout::Compact),
             scales = (form == "whole").then(|| vec![1000.0; rows[0].len()]),
             position = Some(name_of_position.clone())
         );
         let plain = compile(ensemble, &settings).unwrap();
-        let code = with!(settings.clone(), layout = None, code = true);
+        let code = with!(settings.clone(), code = true);
         let mut bytes = plain.bytes.clone();
         if is_guarded {
             let model = Model::new(&plain.bytes).unwrap();

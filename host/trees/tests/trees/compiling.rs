@@ -4,7 +4,7 @@ use crate::fixtures::{leaf, of_one_value, of_two_objects, split, stump};
 use palpate_base::with;
 use palpate_onboard::{ModelError, Stopping};
 use palpate_trees::compile::{
-    Compiled, CompiledModel, Goal, Layout, Leaf, Restated, Settings, compile, compile_within, names, open, restate,
+    Compiled, CompiledModel, Layout, Leaf, Restated, Settings, compile, compile_within, names, open, restate,
 };
 use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Tree};
 use palpate_trees::error::{CompileProblem, Problem, Setting, TreeProblem};
@@ -22,8 +22,8 @@ fn chain(splits: usize, feature: impl Fn(usize) -> usize) -> Vec<Node> {
     nodes
 }
 
-fn settings_of(layout: Option<Layout>, leaf: Leaf) -> Settings {
-    with!(Settings::default(), layout, leaf)
+fn settings_of(leaf: Leaf) -> Settings {
+    with!(Settings::default(), leaf)
 }
 
 /// The problem of an ensemble that is not compiled.
@@ -43,50 +43,6 @@ fn setting(settings: &Settings) -> &'static str {
 }
 
 #[test]
-fn half_the_bytes_are_worth_a_fifth_more_instructions_and_three_times_the_smallest_are_too_many() {
-    let shallow: Vec<Vec<Node>> = (0..40).map(|_| chain(2, |number| number)).collect();
-    let deep: Vec<Vec<Node>> = (0..10).map(|_| chain(20, |number| number % 8)).collect();
-    let full = {
-        // Seven splits over eight features: no table.
-        let mut nodes: Vec<Node> = (0..7).map(|n| split(n, 1_000.0 * n as f32, 2 * n + 1, 2 * n + 2)).collect();
-        nodes.extend((0..8).map(|_| leaf(&[0.5, 0.25])));
-        vec![nodes; 30]
-    };
-    for (ensemble, expected) in [
-        (of_two_objects(Descriptor::Curvature, shallow), Layout::Grid),
-        (of_two_objects(Descriptor::Oriented, deep), Layout::Compact),
-        (of_two_objects(Descriptor::Oriented, full), Layout::Complete),
-    ] {
-        let chosen = compile(&ensemble, &Settings::default()).unwrap();
-        assert_eq!(chosen.layout, expected);
-        let smallest = chosen.candidates.iter().map(|candidate| candidate.bytes).min().unwrap();
-        let cost = |bytes: usize, instructions: u64| bytes as f64 * (instructions as f64).powi(4);
-        for other in &chosen.candidates {
-            let shared_leaves = Some(other.shared_leaves);
-            let how = with!(settings_of(Some(other.layout), Leaf::I16), shared_leaves);
-            let compiled = compile(&ensemble, &how).unwrap();
-            assert_eq!((other.bytes, other.instructions), (compiled.bytes.len(), compiled.instructions));
-            let is_large = other.bytes > 3 * smallest;
-            let own = cost(chosen.bytes.len(), chosen.instructions.m4f);
-            assert!(is_large || cost(other.bytes, other.instructions.m4f) >= own, "{:?}", other.layout);
-        }
-        let goal = |goal| compile(&ensemble, &with!(Settings::default(), goal)).unwrap();
-        assert_eq!(goal(Goal::Size).bytes.len(), smallest);
-        let fastest = chosen.candidates.iter().map(|candidate| candidate.instructions.m4f).min().unwrap();
-        assert_eq!(goal(Goal::Speed).instructions.m4f, fastest);
-    }
-}
-
-#[test]
-fn an_ensemble_that_does_not_fit_a_layout_says_so_in_a_variant() {
-    let deep = of_two_objects(Descriptor::Oriented, vec![chain(9, |number| number % 8)]);
-    for layout in [Layout::Complete, Layout::Grid] {
-        assert_eq!(refusal(&deep, &settings_of(Some(layout), Leaf::I16)), CompileProblem::DoesNotFit { layout });
-    }
-    assert!(compile(&deep, &settings_of(Some(Layout::Compact), Leaf::I16)).is_ok());
-}
-
-#[test]
 fn trees_with_more_left_splits_than_a_byte_counts_take_the_wide_layout() {
     /// A full tree: 2^depth − 1 splits, then the leaves.
     fn full(depth: u32) -> Vec<Node> {
@@ -99,7 +55,7 @@ fn trees_with_more_left_splits_than_a_byte_counts_take_the_wide_layout() {
     // 255 splits below the root's left side, then 511.
     for (depth, expected) in [(9, Layout::Compact), (10, Layout::Wide)] {
         let deep = of_two_objects(Descriptor::Oriented, vec![full(depth)]);
-        assert_eq!(compile(&deep, &settings_of(Some(Layout::Compact), Leaf::I16)).unwrap().layout, expected);
+        assert_eq!(compile(&deep, &Settings::default()).unwrap().layout, expected);
     }
 }
 
@@ -157,24 +113,22 @@ fn the_stated_margin_error_is_what_rounding_does_and_no_more() {
     let leaves = [[1.0, -0.3], [0.123_456, 0.7]];
     let ensemble = stump(500.0, leaves);
     for (kind, most) in [(Leaf::I8, 127.0), (Leaf::I16, 32_767.0), (Leaf::F32, f64::INFINITY)] {
-        for layout in [Layout::Compact, Layout::Complete, Layout::Grid] {
-            let compiled = compile(&ensemble, &settings_of(Some(layout), kind)).unwrap();
-            let model = open(&compiled.bytes).unwrap();
-            let mut worst = 0.0_f64;
-            for (curvature, leaf) in [(0, leaves[0]), (500, leaves[1])] {
-                let mut margins = [0; 2];
-                model.margins_of(&[curvature, curvature], &mut margins);
-                for (margin, value) in margins.into_iter().zip(leaf) {
-                    worst = worst.max((f64::from(margin) * f64::from(model.unit()) - f64::from(value)).abs());
-                }
+        let compiled = compile(&ensemble, &settings_of(kind)).unwrap();
+        let model = open(&compiled.bytes).unwrap();
+        let mut worst = 0.0_f64;
+        for (curvature, leaf) in [(0, leaves[0]), (500, leaves[1])] {
+            let mut margins = [0; 2];
+            model.margins_of(&[curvature, curvature], &mut margins);
+            for (margin, value) in margins.into_iter().zip(leaf) {
+                worst = worst.max((f64::from(margin) * f64::from(model.unit()) - f64::from(value)).abs());
             }
-            let stated = f64::from(compiled.margin_error);
-            assert_eq!(model.margin_error(), compiled.margin_error);
-            assert!(worst <= stated, "{worst} > {stated} with {kind:?} in {layout:?}");
-            assert!(stated <= 0.5 / most * 1.01 || kind == Leaf::F32, "{stated} with {kind:?} in {layout:?}");
-            if kind != Leaf::F32 {
-                assert!(worst > 0.0 && stated <= 1.001 * worst, "{stated} for {worst} with {kind:?} in {layout:?}");
-            }
+        }
+        let stated = f64::from(compiled.margin_error);
+        assert_eq!(model.margin_error(), compiled.margin_error);
+        assert!(worst <= stated, "{worst} > {stated} with {kind:?}");
+        assert!(stated <= 0.5 / most * 1.01 || kind == Leaf::F32, "{stated} with {kind:?}");
+        if kind != Leaf::F32 {
+            assert!(worst > 0.0 && stated <= 1.001 * worst, "{stated} for {worst} with {kind:?}");
         }
     }
 }
@@ -186,7 +140,7 @@ fn sums_that_f32_rounds_are_not_stated_to_be_exact_where_no_leaf_is_rounded() {
     let tree = |feature| vec![split(feature, 500.0, 1, 2), leaf(&[value, -value]), leaf(&[-value, value])];
     for features in [[0, 0, 0], [0, 1, 2]] {
         let ensemble = of_two_objects(Descriptor::Oriented, features.map(tree).into());
-        let compiled = compile(&ensemble, &settings_of(Some(Layout::Compact), Leaf::I8)).unwrap();
+        let compiled = compile(&ensemble, &settings_of(Leaf::I8)).unwrap();
         let model = open(&compiled.bytes).unwrap();
         let mut margins = [0; 2];
         model.margins_of(&[0; 8], &mut margins);
@@ -198,7 +152,7 @@ fn sums_that_f32_rounds_are_not_stated_to_be_exact_where_no_leaf_is_rounded() {
 #[test]
 fn leaves_of_a_common_power_of_two_are_exact_in_every_width() {
     for kind in [Leaf::I8, Leaf::I16] {
-        let compiled = compile(&stump(500.0, [[1.5, -0.25], [0.75, 0.5]]), &settings_of(None, kind)).unwrap();
+        let compiled = compile(&stump(500.0, [[1.5, -0.25], [0.75, 0.5]]), &settings_of(kind)).unwrap();
         assert_eq!(compiled.margin_error, 0.0);
     }
 }
@@ -313,9 +267,9 @@ fn what_fits_a_budget_is_as_exact_as_there_is_room_for() {
     let leaf_of = |compiled: &Compiled| open(&compiled.bytes).unwrap().leaf_type();
     let trees = (0..40).map(|i| vec![split(0, 10.0 * i as f32, 1, 2), leaf(&[0.7, -0.3]), leaf(&[-0.123, 0.456])]);
     let ensemble = of_two_objects(Descriptor::Oriented, trees.collect());
-    let settings = settings_of(Some(Layout::Compact), Leaf::F32);
-    let [f32, i16, i8] = [Leaf::F32, Leaf::I16, Leaf::I8]
-        .map(|leaf| compile(&ensemble, &settings_of(Some(Layout::Compact), leaf)).unwrap().bytes.len());
+    let settings = settings_of(Leaf::F32);
+    let [f32, i16, i8] =
+        [Leaf::F32, Leaf::I16, Leaf::I8].map(|leaf| compile(&ensemble, &settings_of(leaf)).unwrap().bytes.len());
     assert!(f32 > i16 && i16 > i8);
     for (most, leaf) in
         [(usize::MAX, Leaf::F32), (f32, Leaf::F32), (f32 - 1, Leaf::I16), (i16 - 1, Leaf::I8), (i8, Leaf::I8)]
@@ -341,40 +295,31 @@ fn few_leaves(trees: usize, different: usize) -> Ensemble {
 }
 
 #[test]
-fn equal_leaves_stand_once_where_that_is_smaller_and_give_the_same_margins() {
+fn equal_leaves_stand_once_where_that_is_smaller_and_give_the_ensembles_margins() {
     let forest = few_leaves(100, 5);
-    for layout in [Layout::Compact, Layout::Complete, Layout::Wide] {
-        for &leaf in Leaf::ALL {
-            let how = |shared| with!(settings_of(Some(layout), leaf), shared_leaves = Some(shared));
-            let (plain, shared) = (compile(&forest, &how(false)).unwrap(), compile(&forest, &how(true)).unwrap());
-            assert_eq!((plain.shared_leaves, shared.shared_leaves), (None, Some(5)));
-            assert!(shared.bytes.len() < plain.bytes.len(), "{layout:?} {leaf:?}");
-            let model = open(&shared.bytes).unwrap();
-            let mut margins = [[0; 2]; 2];
-            for at in 0..50 {
-                let mut row = [MISSING_FEATURE; 8];
-                row[..2].copy_from_slice(&[2_600 * at, 1_200 * at]);
-                open(&plain.bytes).unwrap().margins_of(&row, &mut margins[0]);
-                model.margins_of(&row, &mut margins[1]);
-                assert_eq!(margins[0], margins[1]);
+    for &leaf in Leaf::ALL {
+        let shared = compile(&forest, &settings_of(leaf)).unwrap();
+        assert_eq!(shared.shared_leaves, Some(5), "{leaf:?}");
+        let model = open(&shared.bytes).unwrap();
+        let mut margins = [0; 2];
+        for at in 0..50 {
+            let mut row = [MISSING_FEATURE; 8];
+            row[..2].copy_from_slice(&[2_600 * at, 1_200 * at]);
+            assert!(model.margins_of(&row, &mut margins));
+            for (margin, own) in margins.iter().zip(forest.margins_of_features(&row.map(|feature| feature as f32))) {
+                let error = (f64::from(*margin) * f64::from(model.unit()) - f64::from(own)).abs();
+                assert!(error <= f64::from(model.margin_error()), "{leaf:?}: {error}");
             }
         }
-        let small = compile(&forest, &with!(settings_of(Some(layout), Leaf::I16), goal = Goal::Size)).unwrap();
-        assert_eq!((small.candidates.len(), small.shared_leaves), (2, Some(5)));
     }
     // Where all of them differ, a number is only more.
-    let all = compile(&few_leaves(100, 400), &with!(settings_of(None, Leaf::I16), goal = Goal::Size)).unwrap();
-    assert!(all.candidates.iter().all(|candidate| !candidate.shared_leaves), "{:?}", all.candidates);
-    // Tables have none.
-    let table = with!(settings_of(Some(Layout::Grid), Leaf::I16), shared_leaves = Some(true));
-    assert_eq!(compile(&stump(500.0, [[1.0, -1.0], [1.0, -1.0]]), &table).unwrap().shared_leaves, None);
+    assert_eq!(compile(&few_leaves(100, 400), &settings_of(Leaf::I16)).unwrap().shared_leaves, None);
 }
 
 #[test]
 fn the_number_of_a_leaf_has_two_bytes_if_more_than_256_leaves_differ() {
     for (different, width) in [(256, 1), (257, 2)] {
-        let how = with!(settings_of(Some(Layout::Compact), Leaf::I16), shared_leaves = Some(true));
-        let compiled = compile(&few_leaves(100, different), &how).unwrap();
+        let compiled = compile(&few_leaves(100, different), &settings_of(Leaf::F32)).unwrap();
         assert_eq!(compiled.shared_leaves, Some(different));
         let model = open(&compiled.bytes).unwrap();
         assert_eq!(model.shared_leaves().unwrap().number_length(), width);
@@ -384,8 +329,8 @@ fn the_number_of_a_leaf_has_two_bytes_if_more_than_256_leaves_differ() {
 
 #[test]
 fn what_is_restated_about_a_model_leaves_its_table_of_leaves_alone() {
-    let how = with!(settings_of(Some(Layout::Compact), Leaf::I16), shared_leaves = Some(true));
-    let compiled = compile(&few_leaves(20, 5), &how).unwrap();
+    let compiled = compile(&few_leaves(20, 5), &Settings::default()).unwrap();
+    assert_eq!(compiled.shared_leaves, Some(5));
     let restated = Restated { max_touches: Some(7), priors: Some(vec![0, -5]), ..Restated::default() };
     let bytes = restate(&open(&compiled.bytes).unwrap(), &restated).unwrap();
     let (model, own) = (open(&bytes).unwrap(), open(&compiled.bytes).unwrap());

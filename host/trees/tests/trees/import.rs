@@ -1,17 +1,13 @@
 //! Files that other libraries wrote, with their own margins: `tests/data/import`.
 
-use crate::fixtures::{
-    FIXTURES, Fixture, assert_says, computed, directory, files, fixture, leaf, of_one_value, parsed, split,
-};
+use crate::fixtures::{FIXTURES, Fixture, assert_says, directory, files, fixture, leaf, of_one_value, parsed, split};
 use palpate_base::with;
-use palpate_trees::compile::{self, Core, Goal, Instructions, Layout, Leaf, Settings};
+use palpate_trees::compile::{self, Leaf, Settings};
 use palpate_trees::ensemble::import::Options;
-use palpate_trees::ensemble::{Ensemble, Node, Provenance, Threshold};
+use palpate_trees::ensemble::{Ensemble, Node, Threshold};
 use palpate_trees::prove::prove;
 use palpate_trees::rows::{self, Encoder, Features, Rows, columns_of, scales};
-use palpate_trees::shared::Descriptor;
 use palpate_trees::shared::format::f32_key;
-use palpate_trees::train::{self, train};
 use palpate_trees::verify::predict::{Predicted, predict};
 use palpate_trees::verify::{Candidate, Library, verify};
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,7 +15,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 fn compiled(ensemble: &Ensemble, leaf: Leaf) -> Vec<u8> {
-    compile::compile(ensemble, &with!(Settings::default(), leaf, goal = Goal::Size)).unwrap().bytes
+    compile::compile(ensemble, &with!(Settings::default(), leaf)).unwrap().bytes
 }
 
 fn best(margins: &[f64]) -> usize {
@@ -553,44 +549,33 @@ const EVERY_WAY: [&str; 12] = [
 ];
 
 #[test]
-fn every_model_is_proved_and_some_with_every_leaf_in_every_layout_each_also_in_whole_units() {
-    let every_way = Leaf::ALL.iter().flat_map(|&leaf| Layout::OF_DATA.iter().map(move |&layout| (leaf, Some(layout))));
-    let every_way: Vec<(Leaf, Option<Layout>)> = every_way.collect();
+fn every_model_is_proved_and_some_with_every_leaf_each_also_in_whole_units() {
     let mut counts = BTreeMap::new();
     for fixture in FIXTURES.iter() {
         let (name, ensemble) = (&fixture.name, &fixture.ensemble);
         let is_every = EVERY_WAY.contains(&name.as_str()) || fixture.is_categorical();
-        let mut ways = 0;
-        for &(leaf, layout) in if is_every { &every_way[..] } else { &[(Leaf::I16, None)] } {
+        for &leaf in if is_every { Leaf::ALL } else { &[Leaf::I16] } {
             for scales in [None, Some(scales::fit(ensemble, &fixture.rows))] {
                 let is_scaled = scales.is_some();
-                let settings = with!(Settings::default(), leaf, layout, scales);
-                let compiled = match compile::compile(ensemble, &settings) {
+                let of = || format!("{name}, {leaf:?}, in whole units: {is_scaled}");
+                let compiled = match compile::compile(ensemble, &with!(Settings::default(), leaf, scales)) {
                     Ok(compiled) => compiled,
                     // One number stands for a missing value in every feature, of whatever scale.
                     Err(error) if is_scaled && error.to_string().contains("the same scale for all features") => {
                         continue;
                     }
-                    Err(error) => {
-                        assert!(error.to_string().contains("does not fit the layout"), "{name}: {error}");
-                        continue;
-                    }
+                    Err(error) => panic!("{}: {error}", of()),
                 };
-                let of = || format!("{name}, {leaf:?}, {layout:?}, in whole units: {is_scaled}");
                 prove(&compiled.bytes, ensemble).unwrap_or_else(|error| panic!("{}: {error}", of()));
                 let model = compile::open(&compiled.bytes).unwrap();
                 let verified = verify(&model, ensemble, &fixture.rows, Library::default(), &()).unwrap();
                 verified.check().unwrap_or_else(|problem| panic!("{}: {problem}", of()));
-                ways += 1;
                 *counts.entry((is_scaled, compiled.layout.name())).or_insert(0) += 1;
             }
         }
-        assert!(ways >= if is_every { 6 } else { 1 }, "{name}: {ways}");
     }
     println!("{counts:?}");
-    for layout in ["compact", "complete", "wide"] {
-        assert!(counts[&(false, layout)] > 50 && counts[&(true, layout)] > 40, "{counts:?}");
-    }
+    assert!(counts[&(false, "compact")] > 50 && counts[&(true, "compact")] > 40, "{counts:?}");
 }
 
 /// FNV-1a, 32 of its 64 bits.
@@ -600,21 +585,14 @@ fn checksum(bytes: &[u8]) -> u32 {
     all as u32
 }
 
-/// Checksums of every model in each layout, as they were. `PALPATE_GOLDENS=write` records them again, for a change that is
+/// Checksums of every model, as they were. `PALPATE_GOLDENS=write` records them again, for a change that is
 /// meant to change them.
 #[test]
-fn models_stay_in_every_layout() {
-    let layouts = [None, Some(Layout::Compact), Some(Layout::Complete), Some(Layout::Grid), Some(Layout::Wide)];
+fn the_bytes_of_every_model_stay() {
     let mut text = String::new();
     for Fixture { name, ensemble, .. } in FIXTURES.iter() {
-        text += name;
-        for layout in layouts {
-            match compile::compile(ensemble, &with!(Settings::default(), layout)) {
-                Ok(compiled) => write!(text, " {:08x}", checksum(&compiled.bytes)).unwrap(),
-                Err(_) => text += " -",
-            }
-        }
-        text.push('\n');
+        let compiled = compile::compile(ensemble, &Settings::default()).unwrap();
+        writeln!(text, "{name} {:08x}", checksum(&compiled.bytes)).unwrap();
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/trees/models.txt");
     if std::env::var_os("PALPATE_GOLDENS").is_some_and(|value| value == "write") {
@@ -663,7 +641,7 @@ fn checksum_of_margins(bytes: &[u8], rows: &[Vec<f32>]) -> u32 {
     checksum(&all)
 }
 
-/// Checksums of the margins of every model with leaves of each type, as they were in the layout of complete trees.
+/// Checksums of the margins of every model with leaves of each type, as they were in a layout of version 2, of complete trees.
 /// `PALPATE_GOLDENS=write` records them again, for a change that is meant to change them.
 #[test]
 fn margins_of_every_model_stay_with_every_type_of_leaf() {
@@ -672,15 +650,8 @@ fn margins_of_every_model_stay_with_every_type_of_leaf() {
         let rows = rows_at_thresholds(fixture);
         text += &fixture.name;
         for &leaf in Leaf::ALL {
-            let margins = |layout| {
-                let settings = with!(Settings::default(), leaf, layout = Some(layout));
-                let compiled = compile::compile(&fixture.ensemble, &settings).ok()?;
-                Some(checksum_of_margins(&compiled.bytes, &rows))
-            };
-            let all: Vec<u32> =
-                [Layout::Complete, Layout::Compact, Layout::Wide].into_iter().filter_map(margins).collect();
-            assert!(all.iter().all(|own| *own == all[0]), "{}, {leaf:?}", fixture.name);
-            write!(text, " {:08x}", all[0]).unwrap();
+            let margins = checksum_of_margins(&compiled(&fixture.ensemble, leaf), &rows);
+            write!(text, " {margins:08x}").unwrap();
         }
         text.push('\n');
     }
@@ -702,92 +673,9 @@ fn trees_of_one_split_whose_thresholds_fall_together_in_whole_units_are_proved()
         .map(|number| vec![split(0, number as f32 / 300.0, 1, 2), leaf(&[0.01]), leaf(&[-0.01 * number as f32])]);
     let ensemble = of_one_value(1, stumps.collect());
     for scales in [None, Some(vec![10.0])] {
-        let settings = with!(Settings::default(), layout = Some(Layout::Complete), scales);
+        let settings = with!(Settings::default(), scales);
         let bytes = compile::compile(&ensemble, &settings).unwrap().bytes;
         prove(&bytes, &ensemble).unwrap();
-    }
-}
-
-/// An ensemble that was trained on touches of three spheres, each with an error: larger ones are flatter.
-fn trained() -> Ensemble {
-    let mut state = 1_u64;
-    let mut random = |below: u64| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) % below) as f32
-    };
-    let labels: Vec<u32> = (0..3_000).map(|row| row % 3).collect();
-    let features: Vec<f32> = labels
-        .iter()
-        .flat_map(|&label| [90_000.0 / (label + 1) as f32 + random(30_000) - random(30_000), random(80_000)])
-        .collect();
-    let rows = train::Rows { features: &features, columns: 2, labels: &labels, weights: None };
-    let parameters = train::Parameters {
-        multi_output: true,
-        rounds: 20,
-        depth: 4,
-        eta: 0.3,
-        min_child_weight: 1.0,
-        bins: 64,
-        base_margin: 0.5,
-    };
-    let (base_margins, trees) = train(rows, 3, &parameters, None, &|| std::ops::ControlFlow::Continue(())).unwrap();
-    let objects = ["small", "middle", "large"].map(String::from).into();
-    let inputs = computed(Descriptor::Curvature).into();
-    Ensemble { inputs, objects, base_margins, trees, origin: Provenance::default() }
-}
-
-/// The candidate that a goal is for.
-fn best_for(goal: Goal, candidates: &[compile::Candidate]) -> compile::Candidate {
-    let is_exact = candidates.iter().any(|candidate| candidate.margin_error == 0.0);
-    let mut of = candidates.to_vec();
-    of.retain(|candidate| !is_exact || candidate.margin_error == 0.0);
-    let least = of.iter().map(|candidate| candidate.bytes).min().unwrap();
-    let order = |candidate: &compile::Candidate| {
-        let (bytes, instructions) = (candidate.bytes as f64, candidate.instructions.m4f as f64);
-        match goal {
-            Goal::Size => (bytes, instructions),
-            Goal::Speed => (instructions, bytes),
-            Goal::Balanced(_) => {
-                let is_out = candidate.bytes > 3 * least;
-                (if is_out { f64::MAX } else { bytes.ln() + 4.0 * instructions.ln() }, bytes)
-            }
-        }
-    };
-    of.sort_by(|a, b| order(a).partial_cmp(&order(b)).unwrap());
-    of[0]
-}
-
-#[test]
-fn every_candidate_of_every_model_costs_what_it_takes_once_it_is_written_and_the_best_is_chosen() {
-    let touches = ("touches", &trained());
-    let all = FIXTURES.iter().map(|fixture| (fixture.name.as_str(), &fixture.ensemble));
-    let mut counts = BTreeMap::new();
-    for ((name, ensemble), &leaf) in all.chain([touches]).flat_map(|own| Leaf::ALL.iter().map(move |leaf| (own, leaf)))
-    {
-        let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding) as f32;
-        let settings = with!(Settings::default(), leaf);
-        for goal in [Goal::Size, Goal::Speed, Goal::Balanced(Core::M4F)] {
-            let chosen = compile::compile(ensemble, &with!(settings.clone(), goal)).unwrap();
-            let best = best_for(goal, &chosen.candidates);
-            assert_eq!((chosen.layout, chosen.instructions), (best.layout, best.instructions), "{name}, {leaf:?}");
-            assert_eq!((chosen.bytes.len(), chosen.shared_leaves.is_some()), (best.bytes, best.shared_leaves));
-        }
-        for candidate in compile::compile(ensemble, &settings).unwrap().candidates {
-            let of = format!("{name}, {leaf:?}, {candidate:?}");
-            let own =
-                with!(settings.clone(), layout = Some(candidate.layout), shared_leaves = Some(candidate.shared_leaves));
-            let written = compile::compile(ensemble, &own).unwrap_or_else(|error| panic!("{of}: {error}"));
-            let instructions = Instructions::of_model(&compile::open(&written.bytes).unwrap());
-            assert_eq!((written.bytes.len(), instructions), (candidate.bytes, candidate.instructions), "{of}");
-            let error = written.margin_error - candidate.margin_error;
-            let ulps = 2.0 * f32::EPSILON * written.margin_error;
-            assert!((0.0..=rounding + ulps).contains(&error) && (error == 0.0 || rounding > 0.0), "{of}: {error}");
-            *counts.entry((candidate.layout.name(), candidate.shared_leaves)).or_insert(0) += 1;
-        }
-    }
-    let layouts = ["compact", "complete", "grid"].map(|layout| (layout, false));
-    for kind in layouts.into_iter().chain([("compact", true), ("complete", true)]) {
-        assert!(counts.contains_key(&kind), "{counts:?}");
     }
 }
 

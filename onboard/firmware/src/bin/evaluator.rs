@@ -29,16 +29,8 @@ const NEVER: Option<Stopping> = Stopping::new(1e-15, u32::MAX);
 fn main() -> ! {
     let (Some(peripherals), Some(stopping)) = (cortex_m::Peripherals::take(), NEVER) else { fail() };
     let mut meter = Meter::new(peripherals.SYST);
-    let models = models![
-        "one-i16",
-        "one-i8",
-        "one-d3",
-        "each100-i16",
-        "each100-i8",
-        "each40-i16",
-        "each40-i8",
-        "each20-d7",
-    ];
+    let models =
+        models!["one-i16", "one-i8", "one-d3", "each100-i16", "each100-i8", "each40-i16", "each40-i8", "each20-d7",];
     let bytes = include_bytes!(concat!(env!("OUT_DIR"), "/bench/touches.bin"));
     let mut touches = [Touch::from_micros([0; 3]); TOUCHES];
     for (touch, bytes) in touches.iter_mut().zip(bytes.as_chunks::<12>().0) {

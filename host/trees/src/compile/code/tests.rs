@@ -2,7 +2,7 @@
 
 use super::super::{Leaf, Settings, compile, open};
 use super::Program;
-use crate::compile::{Compiled, Core, Language, Layout};
+use crate::compile::{Compiled, Core, Language};
 use crate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree, computed};
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
@@ -176,12 +176,8 @@ impl Case {
 
     /// Its trees as data.
     fn data(&self) -> Compiled {
-        // Tables have other leaves.
-        let walked = [Layout::Complete, Layout::Compact, Layout::Wide].into_iter().find_map(|layout| {
-            let settings = Settings { layout: Some(layout), leaf: self.leaf, ..Settings::default() };
-            compile(&self.ensemble, &settings).ok()
-        });
-        walked.unwrap_or_else(|| panic!("{} fits no layout", self.name))
+        let settings = Settings { leaf: self.leaf, ..Settings::default() };
+        compile(&self.ensemble, &settings).unwrap_or_else(|error| panic!("{}: {error}", self.name))
     }
 
     /// True if it has classes of rows.
