@@ -29,6 +29,8 @@ pub(super) struct Member {
     pub(super) leaf: String,
     /// Size.
     pub(super) bytes: usize,
+    /// The same trees as C code, if their leaves are integers.
+    pub(super) code: Option<Code>,
     /// Nanoseconds per touch on this machine.
     pub(super) nanoseconds: f64,
     /// Instructions per touch on the chips.
@@ -43,6 +45,15 @@ pub(super) struct Member {
     pub(super) at_30: f64,
     /// Touches of a fixed number from which on errors stay at or below 1 %.
     pub(super) to_1_percent: Option<usize>,
+}
+
+/// Estimates of trees as C code on a Cortex-M4F.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Code {
+    /// Bytes of flash.
+    pub(super) bytes: usize,
+    /// Instructions per touch.
+    pub(super) instructions: u64,
 }
 
 /// Trees, depth and bins of the family.
@@ -89,6 +100,14 @@ fn member(
     compiled: &compile::Compiled,
 ) -> Result<Member> {
     let settings = context.settings;
+    let code = match leaf {
+        Leaf::F32 => None,
+        _ => {
+            let written = compile::compile(ensemble, &with!(compile::Settings::default(), leaf, code = true))?;
+            let instructions = written.instructions.m4f;
+            written.code.map(|program| Code { bytes: program.flash(), instructions })
+        }
+    };
     let model = compile::open(&compiled.bytes)?;
     let margins = Margins::new(Candidate::Compiled(&model), &large.test)?;
     let groups = settings.cost_groups;
@@ -99,6 +118,7 @@ fn member(
         paper: ensemble.descriptor() == Some(palpate_shared::Descriptor::Times),
         leaf: leaf.name().into(),
         bytes: compiled.bytes.len(),
+        code,
         nanoseconds: nanoseconds(&model, touches),
         instructions: Instructions::new(compiled, touches)?,
         margin_error: parity::difference(ensemble, &model, &all, &())?.max_margin_error,
@@ -244,6 +264,8 @@ fn table(context: &Context, members: &[Member]) -> Table {
         "ns per touch",
         &chips[0],
         &chips[1],
+        "bytes as C code, M4F (estimated)",
+        "instructions as C code, M4F (estimated)",
         "largest margin error (nats)",
         "stated bound (nats)",
         "accuracy at 10",
@@ -261,6 +283,8 @@ fn table(context: &Context, members: &[Member]) -> Table {
             Cell::Number(member.nanoseconds, 0),
             Cell::count(member.instructions.m4f.number),
             Cell::count(member.instructions.m0_plus.number),
+            member.code.map_or(Cell::Missing, |code| Cell::count(code.bytes)),
+            member.code.map_or(Cell::Missing, |code| Cell::count(code.instructions)),
             Cell::Number(member.margin_error, 5),
             Cell::Number(member.stated_error, 5),
             Cell::Percent(member.at_10, 1),
@@ -294,6 +318,7 @@ mod tests {
             paper: false,
             leaf: String::new(),
             bytes,
+            code: None,
             nanoseconds: 1.0,
             instructions: Instructions {
                 m4f: Count { number: 1, measured: true },

@@ -73,8 +73,8 @@ struct Work {
 type Comparisons = BTreeMap<(usize, u8), f64>;
 
 impl Program {
-    /// Bytes of code and tables on a Cortex-M4F.
-    pub(in super::super) fn flash(&self) -> usize {
+    /// Estimate of the bytes of flash that the C code takes on a Cortex-M4F, its constants included.
+    pub fn flash(&self) -> usize {
         let has_keys = self.has_keys();
         let (mut different, mut splits) = (0, 0);
         for trees in self.functions() {
