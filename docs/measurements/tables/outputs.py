@@ -7,7 +7,7 @@ MODEL has an output for each placement, TOUCHES is a directory of captured text 
     for features in strangers,outputs strangers; do
         for target in thumbv7em-none-eabihf thumbv6m-none-eabi; do
             cargo build --release --bin cost --no-default-features --target $target \
-                --features compact,complete,grid,wide,patterns,i8-leaves,i16-leaves,f32-leaves,shared-leaves,$features
+                --features compact,wide,i8-leaves,i16-leaves,f32-leaves,shared-leaves,$features
             cp target/$target/release/cost cost-$features-$target
         done
     done

@@ -7,7 +7,7 @@ const GONE: &[(&str, &str)] = &[
     ("probe design", "compare probes with a loop in Python (docs/guide/real-probe.md)"),
     ("data cast", "run the simulator's example: cargo run --release -p palpate-simulator --example cast"),
     ("data check A B", "evaluate a model of one data set on the other: palpate evaluate MODEL DATA"),
-    ("--layout", "there is one layout of data; --emit writes code where speed counts"),
+    ("--layout", "there is one layout of data; --emit c-code writes code where speed counts"),
     ("--early-exit", "code of all trees is fast: --emit c-code"),
     ("--emit thumb", "use --emit c-code, which compilers turn into code that is about as fast"),
     ("--emit thumb-m4f", "use --emit c-code, which compilers turn into code that is about as fast"),

@@ -45,7 +45,6 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
                 stated.by_object |= HAS_STRANGERS;
                 Strangers::from_bytes(content, model.objects()).is_some()
             }
-            // Tables have no leaves to share.
             _ if built_in::SHARED_LEAVES && tag == Tag::SharedLeaves.code() => {
                 stated.by_object |= HAS_SHARED_LEAVES;
                 SharedLeaves::from_bytes(content).is_some()

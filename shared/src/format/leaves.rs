@@ -2,7 +2,7 @@
 
 /// The table of a model whose leaves are shared, and how long a number is that stands for a leaf.
 ///
-/// Only for trees that are walked; tables of margins have no leaves to share.
+/// Only for trees that are walked: trees that are code have no leaves in the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SharedLeaves<'a> {
     /// True if a number has two bytes, and not one.

@@ -164,8 +164,8 @@ def main():
     palpate = Path(sys.argv[1]).resolve()
     wanted = sys.argv[2:]
     ours = {
-        f"ours {leaf}, for {goal} ({language})": partial(function, palpate=palpate, leaf=leaf, goal=goal)
-        for leaf, goal in [("i16", "speed"), ("i16", "size"), ("i8", "balanced"), ("f32", "balanced")]
+        f"ours {leaf} ({language})": partial(function, palpate=palpate, leaf=leaf)
+        for leaf in ["i16", "i8", "f32"]
         for language, function in [("Rust", exporters.ours_rust), ("C", exporters.ours_c)]
     }
     ours["ours i16, code (C)"] = partial(exporters.ours_code, palpate=palpate)

@@ -239,13 +239,13 @@ def run_export(command):
     return json.loads(done.stdout)
 
 
-def export(palpate, ensemble, directory, leaf, goal):
-    command = [palpate, "export", ensemble.path, "-o", directory / "model.palpate", "--leaf", leaf, "--layout", goal]
+def export(palpate, ensemble, directory, leaf):
+    command = [palpate, "export", ensemble.path, "-o", directory / "model.palpate", "--leaf", leaf]
     return run_export([*command, "--emit", "c"])
 
 
-def ours_c(ensemble, directory, palpate, leaf, goal):
-    exported = export(palpate, ensemble, directory, leaf, goal)
+def ours_c(ensemble, directory, palpate, leaf):
+    exported = export(palpate, ensemble, directory, leaf)
     features = ensemble.rows.shape[1]
     answer = f"""    palpate_margins_of(&model, features, {features}, margins, {ensemble.outputs});
     for (i = 1; i < {ensemble.outputs}; i++) {{
@@ -300,8 +300,8 @@ int peer_class(const float *row)
     return Source([write(directory, "peer.c", wrapper)], clang=True)
 
 
-def ours_rust(ensemble, directory, palpate, leaf, goal):
-    exported = export(palpate, ensemble, directory, leaf, goal)
+def ours_rust(ensemble, directory, palpate, leaf):
+    exported = export(palpate, ensemble, directory, leaf)
     features = ["palpate", exported["layout"], f"{leaf}-leaves"]
     features += [feature for feature, key in [("shared-leaves", "shared_leaves"), ("real", "features")] if key in exported]
     return rust(ensemble, directory, directory / "model.palpate", features)

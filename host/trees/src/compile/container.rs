@@ -1,4 +1,4 @@
-//! The file of a model around its content: header, text, optional sections, checksum. The content here is trees or tables.
+//! The file of a model around its content: header, text, optional sections, checksum. The content here is trees.
 
 use crate::error::{CompileProblem, Error, Result};
 use palpate_onboard::Model;
@@ -72,7 +72,7 @@ impl Container {
     }
 }
 
-/// The file of a model whose content is neither trees nor tables, such as maps: margins and priors are 0.
+/// The file of a model whose content is no trees, such as maps: margins and priors are 0.
 ///
 /// # Errors
 /// [`CompileProblem::TooLarge`](crate::error::CompileProblem::TooLarge) for more than 4 GB.

@@ -6,7 +6,7 @@ use crate::prove::leaves_at;
 use palpate_onboard::Model;
 
 /// The first tree, in the ensemble's order, whose leaf for this row differs between the model and the ensemble.
-/// `None` if there is none, or the model is a table and has no trees.
+/// `None` if there is none, or the model has no trees.
 pub(super) fn first_different_tree(
     model: &Model<'_>,
     reference: &Reference<'_>,

@@ -1,4 +1,4 @@
-//! Trees as C or as Rust: the same integers as the layouts of data, to the bit.
+//! Trees as C or as Rust: the same integers as the trees in bytes, to the bit.
 //!
 //! ```text
 //! walked trees ──► Program (columns of ranks, splits, leaves in units) ──► c: nested ifs    ──► model.h

@@ -1,4 +1,4 @@
-//! Code against the layouts of data: to the bit, on this machine and on emulated chips; and its cost.
+//! Code against the trees in bytes: to the bit, on this machine and on emulated chips; and its cost.
 
 use super::super::{Leaf, Settings, compile, open};
 use super::Program;
@@ -228,7 +228,7 @@ fn keys(row: &[f32], key: Key) -> Vec<i32> {
     row.iter().map(|&value| if key == Key::Real { f32_key(value) } else { whole(value) }).collect()
 }
 
-/// Margins of the layout of data.
+/// Margins of the trees in bytes.
 fn expected(compiled: &Compiled, rows: &[Vec<i32>]) -> Vec<Vec<i32>> {
     let model = open(&compiled.bytes).unwrap();
     let margins = |row: &Vec<i32>| {
