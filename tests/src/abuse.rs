@@ -165,7 +165,8 @@ fn whole(put: Put<'_>) {
     put("a byte after the end", "length", length, [&good[..], &[0]].concat());
     put("a length of 4 GB", "length", length, changed(&good, 8, &[0xff; 4]));
     put("version 0", "version", 4, changed(&good, 4, &[0, 0]));
-    put("a later version", "version", 4, changed(&good, 4, &[3, 0]));
+    put("version 2", "version", 4, changed(&good, 4, &[2, 0]));
+    put("a later version", "version", 4, changed(&good, 4, &[4, 0]));
     let mut bytes = good.clone();
     bytes[length - 5] ^= 1;
     put("a bit that has changed", "checksum", 8, bytes);

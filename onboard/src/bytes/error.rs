@@ -1,7 +1,7 @@
 //! Reasons why bytes are not a model.
 
 use core::fmt;
-use palpate_shared::format::take_section;
+use palpate_shared::format::{VERSION, take_section};
 
 /// Reason why bytes are not a model; [`ModelError::offset`] is the place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,11 +105,9 @@ impl fmt::Display for ModelError {
             }
             Self::Length { expected, found } => write!(f, "the model has {expected} bytes, but there are {found}"),
             Self::NotAModel => f.write_str("this is not a Palpate model"),
-            Self::Version(version) => write!(
-                f,
-                "the model is of format version {version}, and this program reads versions 1 to {}",
-                palpate_shared::format::VERSION
-            ),
+            Self::Version(version) => {
+                write!(f, "the model is of format version {version}, and this program reads version {VERSION}")
+            }
             Self::Checksum { stated, computed } => {
                 write!(f, "the checksum is {computed:08x} where the model states {stated:08x}: its bytes were changed")
             }
