@@ -175,7 +175,7 @@ impl Descriptor {
     }
 
     /// True if touches with missing contacts have features: the `Contacts` forms.
-    pub const fn uses_partial_touches(self) -> bool {
+    const fn uses_partial_touches(self) -> bool {
         matches!(self, Self::ContactsCurvature | Self::ContactsGravity | Self::ContactsOriented)
     }
 

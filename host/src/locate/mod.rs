@@ -37,7 +37,7 @@ pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, calibrate, ca
 pub use shape::{Relief, Sample, Shape, samples};
 pub use surface::Surface;
 #[cfg(feature = "train")]
-pub use table::{BareTable, LEAST_PRESSES, Measured, REACH, bare_table};
+pub use table::{BareTable, Measured, REACH, bare_table};
 pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};
 pub use write::write;
 

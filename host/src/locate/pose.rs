@@ -21,7 +21,7 @@ pub struct Until {
 impl Until {
     /// True if the most likely of an object's poses is as sure: its intervals, and that the object is there, turned like that or
     /// as it looks the same. Those that it may be turned to are at the same place.
-    pub fn is_met(&self, poses: &[Pose]) -> bool {
+    pub(crate) fn is_met(&self, poses: &[Pose]) -> bool {
         let Some(first) = poses.first() else { return false };
         let most = self.millimeters * 1_000.0;
         let is_there = |pose: &&Pose| {

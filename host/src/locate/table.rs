@@ -12,7 +12,7 @@ use serde::Serialize;
 use std::fmt::Write as _;
 
 /// The fewest presses in which each finger must have met the table.
-pub const LEAST_PRESSES: usize = 10;
+const LEAST_PRESSES: usize = 10;
 /// A contact is with the table if it is this close to it, in millimeters, and no outlier.
 const NEAR: f64 = 5.0;
 /// Largest share of contacts that are not with the table.

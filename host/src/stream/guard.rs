@@ -6,9 +6,9 @@ use palpate_shared::format::Limits;
 use palpate_trees::rows::{Encoder, RowSequence, Sequences};
 
 /// Room on each side of the values that were learned, in their range.
-pub const GUARD_MARGIN: f64 = 0.5;
+const GUARD_MARGIN: f64 = 0.5;
 /// Rows with equal values that are taken, in those of the longest such run that was learned.
-pub const GUARD_RUN: u32 = 2;
+const GUARD_RUN: u32 = 2;
 
 /// The section of a guard that takes every row of these sequences: values up to half of their range beyond them, missing ones
 /// if there is one, and the same value for twice as many rows as in any of them. A feature that stays the same through a whole

@@ -36,7 +36,6 @@ mod shape;
 pub use calibrate::{calibrate, calibrate_with};
 pub use evaluate::{Comparison, Evaluated, Grown, Point, PromiseOfSequences, Wanted, evaluate};
 pub use folds::{Estimated, Learned, estimate};
-pub use guard::{GUARD_MARGIN, GUARD_RUN};
 pub use settings::Settings;
 #[cfg(feature = "train")]
 pub use settings::StrangerTest;

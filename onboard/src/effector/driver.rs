@@ -131,7 +131,7 @@ impl Effector {
 
     /// Microseconds from the first contact of the touch in progress, or else of the last one that was returned, to the last
     /// call.
-    pub fn since_contact(&self) -> u32 {
+    pub(crate) fn since_contact(&self) -> u32 {
         after(self.now.unwrap_or(self.began), self.origin().unwrap_or(self.began))
     }
 

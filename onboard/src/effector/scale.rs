@@ -54,7 +54,7 @@ impl Scale {
 
     /// The longest that contacts can be apart with this probe so that they are never more than `micros` apart with the
     /// model's.
-    pub fn shortest(&self, micros: u32) -> u32 {
+    pub(crate) fn shortest(&self, micros: u32) -> u32 {
         let most = self.linear.max(self.square).max(1);
         u32::try_from(u64::from(micros) * ONE / most).unwrap_or(u32::MAX)
     }

@@ -125,7 +125,7 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
     }
 
     /// Sets the name and version of the chip's program on the link; [`PROGRAM`] by default.
-    pub const fn set_program(&mut self, program: &'static str) {
+    pub(crate) const fn set_program(&mut self, program: &'static str) {
         self.program = program;
     }
 
@@ -208,7 +208,7 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
     }
 
     /// True if the touches so far have decided; no further one counts before a reset.
-    pub fn has_decided(&self) -> bool {
+    pub(crate) fn has_decided(&self) -> bool {
         self.state.as_ref().is_some_and(|state| state.verdict() != Verdict::Undecided)
     }
 

@@ -29,7 +29,7 @@ pub(crate) mod error;
 mod xgboost;
 
 /// Starting value of every margin; the same for all objects, so it changes no verdict. XGBoost's default.
-pub const BASE_MARGIN: f32 = 0.5;
+pub(crate) const BASE_MARGIN: f32 = 0.5;
 
 /// The trainer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -159,7 +159,7 @@ impl Settings {
     /// The settings that [`train`] uses for `dataset`: which touches are evidence is decided, and the descriptor is the
     /// form for those.
     #[must_use]
-    pub fn resolved(&self, dataset: &Dataset) -> Self {
+    pub(crate) fn resolved(&self, dataset: &Dataset) -> Self {
         let usual = if dataset.holds_approaches() { Counted::Contacts } else { Counted::Full };
         let counted = self.counted.unwrap_or(usual);
         let descriptor = match counted {

@@ -275,7 +275,9 @@ pub fn identifier(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Settings, compile};
     use super::*;
+    use crate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};
 
     const HOUSEHOLD: &[u8] = include_bytes!("../../../../models/household.palpate");
 
@@ -295,10 +297,26 @@ mod tests {
 
     #[test]
     fn an_array_that_is_too_long_for_an_avr_is_an_error_there_that_says_what_to_do() {
-        let model = Model::new(HOUSEHOLD).unwrap();
-        let source = emit(&model, "household", Language::C);
-        let error = source.lines().find(|line| line.starts_with("#error \"model HOUSEHOLD has")).unwrap();
-        assert!(HOUSEHOLD.len() > LONGEST_ON_AVR && error.contains("32767") && error.contains("--leaf i8"), "{error}");
+        let trees = (0..4_000_u16).map(|tree| Tree {
+            nodes: vec![
+                Node::Split { feature: 0, threshold: f32::from(tree % 90), missing_left: true, left: 1, right: 2 },
+                Node::Leaf(vec![f32::from(tree), 0.0]),
+                Node::Leaf(vec![0.0, f32::from(tree)]),
+            ],
+            output: Output::Each,
+        });
+        let ensemble = Ensemble {
+            inputs: Inputs::unnamed(1),
+            objects: ["a", "b"].map(String::from).into(),
+            base_margins: vec![0.0; 2],
+            trees: trees.collect(),
+            origin: Provenance::default(),
+        };
+        let long = compile(&ensemble, &Settings::default()).unwrap().bytes;
+        let model = Model::new(&long).unwrap();
+        let source = emit(&model, "long", Language::C);
+        let error = source.lines().find(|line| line.starts_with("#error \"model LONG has")).unwrap();
+        assert!(long.len() > LONGEST_ON_AVR && error.contains("32767") && error.contains("--leaf i8"), "{error}");
         // Before anything that an AVR's compiler would stop at first.
         assert!(source.find(error) < source.find("#include"));
         // Shorter ones are none.

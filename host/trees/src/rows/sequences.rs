@@ -167,7 +167,7 @@ impl Sequences {
     ///
     /// # Errors
     /// Errors of [`Sequences::read`], and of the records.
-    pub fn from_table(
+    fn from_table(
         header: &[&str],
         records: impl Iterator<Item = Result<(u64, Vec<String>)>>,
         features: impl Into<Features>,
