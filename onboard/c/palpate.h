@@ -519,8 +519,7 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 if (!palpate_check_strangers_(model, content, length)) {
                     return PALPATE_FIELD;
                 }
-            } else if (PALPATE_SHARED && (PALPATE_LAYOUTS & 11) != 0 && last == 12) {
-                /* Tables of margins have no leaves to share. */
+            } else if (PALPATE_SHARED && (PALPATE_LAYOUTS & 3) != 0 && last == 12) {
                 if (!palpate_holds_(length, 4, 0, 0) || PALPATE_BYTE(content) - 1u > 1) {
                     return PALPATE_FIELD;
                 }
@@ -861,7 +860,7 @@ PALPATE_API palpate_error palpate_open_code(palpate_model *model, const uint8_t 
                                             void (*code)(const int32_t *features, int32_t *margins))
 {
     const palpate_error error = palpate_open_(model, bytes, length);
-    if (error == PALPATE_OK && model->layout_ != 6) {
+    if (error == PALPATE_OK && model->layout_ != 2) {
         return palpate_wrong_(model, PALPATE_FIELD, bytes + 6);
     }
     model->code = code;
