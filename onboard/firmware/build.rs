@@ -14,18 +14,15 @@ fn main() -> io::Result<()> {
 }
 
 /// Files that `palpate-tests`' `bench_models` writes, and those of its `located`.
-const BENCH: [&str; 19] = [
+const BENCH: [&str; 16] = [
     "one-i16.palpate",
-    "one-compact.palpate",
+    "one-i8.palpate",
     "one-d3.palpate",
     "each100-i16.palpate",
     "each100-i8.palpate",
     "each40-i16.palpate",
     "each40-i8.palpate",
-    "each40-compact.palpate",
     "each20-d7.palpate",
-    "grid-i8.palpate",
-    "grid-i16.palpate",
     "identity.palpate",
     "identity.bin",
     "estimates.bin",

@@ -15,11 +15,11 @@ const PERCENT: u64 = 2;
 const IMAGES: [(&str, &str, &str); 8] = [
     ("verdicts: `compact`, `i8-leaves`", "verdict", "compact,i8-leaves"),
     ("… and posteriors", "posterior", "compact,i8-leaves"),
-    ("verdicts: `complete`, `f32-leaves`", "verdict", "complete,f32-leaves"),
+    ("verdicts: `compact`, `f32-leaves`", "verdict", "compact,f32-leaves"),
     (
-        "verdicts: `compact`, `complete`, `grid`, `wide`, `i8-leaves`, `i16-leaves`, `strangers`",
+        "verdicts: `compact`, `wide`, `i8-leaves`, `i16-leaves`, `strangers`",
         "verdict",
-        "compact,complete,grid,wide,i8-leaves,i16-leaves,strangers",
+        "compact,wide,i8-leaves,i16-leaves,strangers",
     ),
     ("`effector`: three switches to touches", "effector", "compact,i8-leaves"),
     ("`link`: touches in, verdicts and posteriors out", "link", "compact,i8-leaves"),

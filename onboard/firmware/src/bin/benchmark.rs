@@ -1,6 +1,6 @@
 //! Cost of a touch on this chip, from the switches to the host: instructions, stack, flash and RAM.
 //!
-//! The `evaluator` image measures the evaluator alone, layout by layout, next to other evaluators.
+//! The `evaluator` image measures the evaluator alone, model by model, next to other evaluators.
 #![no_std]
 #![no_main]
 
