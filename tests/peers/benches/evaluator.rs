@@ -12,7 +12,7 @@
 //! multi-output tree is split into one tree per object.
 
 use hessboost::prelude::{BoostedModel, Iterations, ModelFormat};
-use palpate::compile::{Layout, Leaf, Settings, compile};
+use palpate::compile::{Leaf, Settings, compile};
 use palpate::ensemble::train;
 use palpate::ensemble::{Ensemble, Node, Output, OverTouches, Tree, feature_row, inputs};
 use palpate::touches::Dataset;
@@ -27,6 +27,9 @@ use std::time::Instant;
 
 /// Rows that are timed.
 const ROWS: usize = 2000;
+
+/// Types of leaves that are timed.
+const LEAVES: [Leaf; 3] = [Leaf::I16, Leaf::I8, Leaf::F32];
 
 /// Number of runs; the fastest one counts, since the others were disturbed.
 static RUNS: LazyLock<usize> = LazyLock::new(|| if *QUICK { 1 } else { 7 });
@@ -54,15 +57,8 @@ fn compare(name: &str, ensemble: &Ensemble, touches: &[Touch]) {
     println!("\n{name}: {} touches", touches.len());
     let mut ours = f64::INFINITY;
     let mut margins = vec![0; ensemble.objects.len()];
-    for (leaf, layout) in [
-        (Leaf::I16, Layout::Complete),
-        (Leaf::I8, Layout::Complete),
-        (Leaf::F32, Layout::Complete),
-        (Leaf::I16, Layout::Compact),
-        (Leaf::I16, Layout::Grid),
-    ] {
-        let settings = with!(Settings::default(), leaf, layout = Some(layout));
-        let Ok(compiled) = compile(ensemble, &settings) else { continue };
+    for leaf in LEAVES {
+        let compiled = compile(ensemble, &with!(Settings::default(), leaf)).expect("a compiled ensemble");
         let model = Model::new(&compiled.bytes).expect("a valid model");
         for (touch, expected) in touches.iter().zip(&expected) {
             model.margins(touch, &mut margins);
@@ -73,8 +69,8 @@ fn compare(name: &str, ensemble: &Ensemble, touches: &[Touch]) {
             assert!(errors.fold(0.0, f64::max) <= f64::from(model.margin_error()));
         }
         let time = nanoseconds(touches, |touch| model.margins(touch, black_box(&mut margins)));
-        ours = if leaf == Leaf::I16 && layout == Layout::Complete { time } else { ours };
-        let label = format!("palpate {} {}", layout.name(), leaf.name());
+        ours = if leaf == Leaf::I16 { time } else { ours };
+        let label = format!("palpate {}", leaf.name());
         println!("  {label:26} {time:9.0} ns {:9} bytes", compiled.bytes.len());
     }
     let mut out = vec![0.0; ensemble.objects.len()];
@@ -114,14 +110,8 @@ fn all_at_once(ensemble: &Ensemble, touches: &[Touch], rows: &[Vec<f32>], hessbo
     let descriptor = ensemble.descriptor().expect("a descriptor");
     let (objects, mut batch) = (ensemble.objects.len(), Batch::new());
     println!("  all at once, one thread, medians of {PAIRED} paired rounds:");
-    for (leaf, layout) in [
-        (Leaf::I16, Layout::Complete),
-        (Leaf::I8, Layout::Complete),
-        (Leaf::F32, Layout::Complete),
-        (Leaf::I16, Layout::Compact),
-    ] {
-        let settings = with!(Settings::default(), leaf, layout = Some(layout));
-        let Ok(compiled) = compile(ensemble, &settings) else { continue };
+    for leaf in LEAVES {
+        let compiled = compile(ensemble, &with!(Settings::default(), leaf)).expect("a compiled ensemble");
         let model = Model::new(&compiled.bytes).expect("a valid model");
         let mut singly = vec![0; objects * touches.len()];
         let row_by_row = |margins: &mut [i32]| {
@@ -148,8 +138,8 @@ fn all_at_once(ensemble: &Ensemble, touches: &[Touch], rows: &[Vec<f32>], hessbo
         let paired = paired(PAIRED, 0.1, &mut [&mut ours, &mut one_by_one, &mut theirs]);
         let names = ["palpate", "palpate, row by row", "hessboost"];
         for ((name, seconds), ratio) in names.iter().zip(&paired.seconds).zip(&paired.ratios) {
-            let label = format!("{} {}", layout.name(), leaf.name());
-            println!("    {label:14} {name:20} {:9.1} ns {ratio:6.2} ×", 1e9 * seconds / touches.len() as f64);
+            let leaf = leaf.name();
+            println!("    {leaf:4} {name:20} {:9.1} ns {ratio:6.2} ×", 1e9 * seconds / touches.len() as f64);
         }
     }
 }
@@ -170,7 +160,7 @@ fn check(name: &str, rows: &[Vec<f32>], expected: &[Vec<f32>], mut margins: impl
 }
 
 fn report(name: &str, time: f64, ours: f64) {
-    println!("  {name:26} {time:9.0} ns {:9.2} × palpate complete i16", time / ours);
+    println!("  {name:26} {time:9.0} ns {:9.2} × palpate i16", time / ours);
 }
 
 /// Nanoseconds per item.
