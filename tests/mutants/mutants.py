@@ -39,7 +39,7 @@ ROOMS = {
     "capture": ("palpate", r"^host/src/(capture|touches)/"),
     "simulator": ("palpate-simulator", r"^host/simulator/src/"),
 }
-# Not mutated, by file and function: tests, and what is about to be deleted.
+# Not mutated in BASE, by file and function: tests, and what was about to be deleted then.
 LEFT_OUT = [
     r"(^|/)tests?(/|\.rs)|_tests\.rs",
     r"^shared/src/format/(evidence|strangers|signature)\.rs",

@@ -417,9 +417,9 @@ pub(crate) fn touch(numbers: &[f64]) -> Result<Touch, TouchesProblem> {
 /// libraries.)
 ///
 /// `leaf` is "i8", "i16" or "f32": what leaves are stored as. With `max_bytes` leaves are stored in fewer bits where the model
-/// would be larger; if it still is, that is an error. `error_rate` and `max_touches` are where recognizers stop; `priors` say how likely each object is. `scales` say how
-/// many units make up 1 of each feature, for a chip that measures in whole numbers. `row_number` names the feature that is a row's
-/// number in its sequence, counted from 1.
+/// would be larger; if it still is, that is an error. `error_rate` and `max_touches` are where recognizers stop; `priors` say
+/// how likely each object is. `scales` say how many units make up 1 of each feature, for a chip that measures in whole numbers.
+/// `row_number` names the feature that is a row's number in its sequence, counted from 1.
 ///
 /// >>> import palpate
 /// >>> data = palpate.capture(["bowl", "mouse"], touches=300)

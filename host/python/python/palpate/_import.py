@@ -80,9 +80,10 @@ def compile(
     as; with "f32" the margins of an XGBoost model stay its own, bit for bit. What to know about the model is a `ModelWarning`,
     and is in its `notes`.
 
-    With `max_bytes`, leaves are stored in fewer bits where the model would be larger; if it still is, that is an error: no tree is left out. `error_rate` and `max_touches` are where recognizers stop, `priors`
-    say how likely each object is, `scales` how many units make up 1 of each feature for a chip that measures in whole
-    numbers. `row_number` names the feature that is a row's number in its sequence, counted from 1: recognizers count it.
+    With `max_bytes`, leaves are stored in fewer bits where the model would be larger; if it still is, that is an error: no
+    tree is left out. `error_rate` and `max_touches` are where recognizers stop, `priors` say how likely each object is,
+    `scales` how many units make up 1 of each feature for a chip that measures in whole numbers. `row_number` names the
+    feature that is a row's number in its sequence, counted from 1: recognizers count it.
 
     >>> import palpate
     >>> data = palpate.capture(["bowl", "mouse"], touches=300)
