@@ -53,7 +53,7 @@ static PROGRAM: LazyLock<PathBuf> = LazyLock::new(|| here("replay", &[]).unwrap(
 
 /// Same program under sanitizers, with every layout, including code, which is not one of the header's defaults.
 static SANITIZED: LazyLock<PathBuf> = LazyLock::new(|| {
-    let layouts = "-DPALPATE_LAYOUTS=95";
+    let layouts = "-DPALPATE_LAYOUTS=7";
     let sanitizers = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", layouts];
     here("sanitized", &sanitizers).unwrap_or_else(|error| {
         println!("SKIPPED: this compiler has no sanitizers, so only answers are compared: {error}");
@@ -520,7 +520,7 @@ fn two_models_in_one_file_say_which_lines_make_room_for_both_and_compile_with_th
         let mut all = models().into_iter();
         all.find(|bytes| (bytes[6], bytes[7]) == (layout, leaf) && bytes[14] >= objects).expect("such a model")
     };
-    for (index, bytes) in [of(0, 0, 1), of(2, 1, 2)].iter().enumerate() {
+    for (index, bytes) in [of(0, 0, 1), of(1, 1, 2)].iter().enumerate() {
         let name = ["first", "second"][index];
         put(&format!("{name}.h"), &emit(&Model::new(bytes).unwrap(), name, Language::C));
     }

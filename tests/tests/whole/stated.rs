@@ -134,14 +134,14 @@ const CHIPS: [(usize, &str, &str); 4] = [
 /// The rows of that table, and the macros defined for them.
 const C_ROWS: [(&str, &str); 5] = [
     (
-        "rows, one layout (complete), i8 leaves",
-        "-DROWS -DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0",
+        "rows, compact, i8 leaves",
+        "-DROWS -DPALPATE_LAYOUTS=PALPATE_COMPACT -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0",
     ),
     (
-        "touches, one layout (complete), i8 leaves",
-        "-DPALPATE_LAYOUTS=PALPATE_COMPLETE -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0",
+        "touches, compact, i8 leaves",
+        "-DPALPATE_LAYOUTS=PALPATE_COMPACT -DPALPATE_LEAVES=PALPATE_I8 -DPALPATE_STRANGERS=0",
     ),
-    ("touches, all layouts and leaves", "-DPALPATE_STRANGERS=0"),
+    ("touches, compact and wide, all leaves", "-DPALPATE_STRANGERS=0"),
     ("… and a misfit test", "-DPALPATE_STRANGERS=1"),
     ("everything: also posteriors, names", "-DEVERYTHING"),
 ];
