@@ -112,6 +112,7 @@ fn a_model_of_another_file_is_told_with_the_first_tree_that_differs() {
     fails(at, "verify model.palpate other.ubj rows.csv", 1, expected);
     fs::write(at.join("margins.csv"), "0.5\n").unwrap();
     let expected = "margins.csv: it has margins of 1 rows, but there are 60 rows";
+    fails(at, "verify model.palpate source.json rows.csv --library-margins margins.csv", 1, expected);
 }
 
 #[test]
