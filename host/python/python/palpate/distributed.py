@@ -178,8 +178,9 @@ def capture(
 
     Each mesh is divided into shards of at most `touches_per_shard`. A shard that is there already, of the same mesh, settings
     and version, is not captured again: a capture that was interrupted is repeated with the same call. Shards of workers that
-    die, and all unfinished ones if the scheduler is restarted, are submitted again, at most three times in all; one that
-    kills its worker each time, or whose mesh is refused, is named in the summary, and the others finish.
+    die, and all unfinished ones if the scheduler is restarted, are submitted again, at most three times in all. The last time
+    a shard runs alone, so that no other shard can kill its worker. One that kills its worker each time, or whose mesh is
+    refused, is named in the summary, and the others finish.
 
     The other arguments are those of `palpate.capture`. Afterwards `out` holds what `palpate capture` would have written:
     `<object>.txt` for each object and, if none was refused, `dataset.json`. The format "parquet" adds `<object>.parquet`, the
@@ -212,7 +213,13 @@ def capture(
     kept = {job for job in jobs if _record(store, job) is not None} if store.files.exists(store.path("parts")) else set()
     logger.info("%d objects in %d shards, %d of them there already", len(objects), len(jobs), len(kept))
     finished, resubmitted, refused = len(kept), 0, list[Refused]()
-    todo = {client.submit(_capture, job, key=job.key(1), pure=False): (job, 1) for job in jobs if job not in kept}
+
+    def submit(job: _Job, attempt: int) -> distributed.Future:
+        return client.submit(_capture, job, key=job.key(attempt), pure=False)
+
+    todo = {submit(job, 1): (job, 1) for job in jobs if job not in kept}
+    # Shards before their last attempt: each waits until nothing else runs.
+    suspects = list[_Job]()
     completed = distributed.as_completed(todo)
     for future in completed:
         job, attempt = todo.pop(future)
@@ -225,10 +232,13 @@ def capture(
                 finished += 1
             elif attempt < ATTEMPTS:
                 logger.warning("%s, shard %s, attempt %d: %s", job.name, job.shard, attempt, _said(error))
-                again = client.submit(_capture, job, key=job.key(attempt + 1), pure=False)
-                todo[again] = (job, attempt + 1)
-                completed.add(again)
                 resubmitted += 1
+                if attempt + 1 == ATTEMPTS:
+                    suspects.append(job)
+                else:
+                    again = submit(job, attempt + 1)
+                    todo[again] = (job, attempt + 1)
+                    completed.add(again)
             else:
                 reason = f"its worker died in each of {ATTEMPTS} attempts. Capture it alone, with more memory."
                 refused.append(Refused(job.name, job.shard, reason))
@@ -236,6 +246,11 @@ def capture(
             refused.append(Refused(job.name, job.shard, str(error)))
         else:
             finished += 1
+        if suspects and not todo:
+            job = suspects.pop()
+            alone = submit(job, ATTEMPTS)
+            todo[alone] = (job, ATTEMPTS)
+            completed.add(alone)
         if progress is not None:
             progress("touching", finished, len(jobs))
     for lost in refused:
