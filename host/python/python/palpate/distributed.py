@@ -213,7 +213,7 @@ def capture(
     kept = {job for job in jobs if _record(store, job) is not None} if store.files.exists(store.path("parts")) else set()
     logger.info("%d objects in %d shards, %d of them there already", len(objects), len(jobs), len(kept))
     finished, resubmitted, refused = len(kept), 0, list[Refused]()
-    todo: dict[distributed.Future, tuple[_Job, int]] = {}
+    todo: dict[distributed.Future[None], tuple[_Job, int]] = {}
     completed = distributed.as_completed()
 
     def submit(job: _Job, attempt: int) -> None:
