@@ -180,10 +180,12 @@ def test_a_shard_that_kills_its_worker_each_time_is_named_and_the_others_finish(
     everything = {"touches": 900, "pose": False, **options}
     ((_, _, _, digest),) = palpate.distributed._objects(["fork"], everything, str(out), 3)
     with (
-        distributed.LocalCluster(n_workers=3, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
     ):
         cluster.scheduler.allowed_failures = 0
+        # All shards wait at the one worker, so that its death takes every one of them with it.
+        cluster.scheduler.WORKER_SATURATION = float("inf")
         client.register_plugin(Deadly(f"capture-{digest}"))
         summary = palpate.distributed.capture(
             client, ["fork", *OBJECTS], 900, out, touches_per_shard=300
@@ -191,6 +193,7 @@ def test_a_shard_that_kills_its_worker_each_time_is_named_and_the_others_finish(
     assert {(lost.object, lost.shard) for lost in summary.refused} == {("fork", f"{part}/3") for part in (1, 2, 3)}
     assert all("its worker died in each of 3 attempts" in lost.reason for lost in summary.refused)
     assert summary.objects == 2 and set(files(out)) == {"bowl.txt", "mouse.txt"}
+    assert summary.resubmitted > 2 * len(summary.refused), "shards of other objects lost their worker too"
 
 
 def test_a_mesh_that_is_refused_is_named_and_the_others_finish(client: distributed.Client, tmp_path: Path) -> None:

@@ -179,7 +179,7 @@ def capture(
     Each mesh is divided into shards of at most `touches_per_shard`. A shard that is there already, of the same mesh, settings
     and version, is not captured again: a capture that was interrupted is repeated with the same call. Shards of workers that
     die, and all unfinished ones if the scheduler is restarted, are submitted again, at most three times in all. The last time
-    a shard runs alone, so that no other shard can kill its worker. One that kills its worker each time, or whose mesh is
+    a shard runs alone, so that no other shard of this capture can kill its worker. One that kills its worker each time, or whose mesh is
     refused, is named in the summary, and the others finish.
 
     The other arguments are those of `palpate.capture`. Afterwards `out` holds what `palpate capture` would have written:
@@ -213,14 +213,19 @@ def capture(
     kept = {job for job in jobs if _record(store, job) is not None} if store.files.exists(store.path("parts")) else set()
     logger.info("%d objects in %d shards, %d of them there already", len(objects), len(jobs), len(kept))
     finished, resubmitted, refused = len(kept), 0, list[Refused]()
+    todo: dict[distributed.Future[None], tuple[_Job, int]] = {}
+    completed = distributed.as_completed()
 
-    def submit(job: _Job, attempt: int) -> distributed.Future:
-        return client.submit(_capture, job, key=job.key(attempt), pure=False)
+    def submit(job: _Job, attempt: int) -> None:
+        future = client.submit(_capture, job, key=job.key(attempt), pure=False)
+        todo[future] = (job, attempt)
+        completed.add(future)
 
-    todo = {submit(job, 1): (job, 1) for job in jobs if job not in kept}
-    # Shards before their last attempt: each waits until nothing else runs.
+    for job in jobs:
+        if job not in kept:
+            submit(job, 1)
+    # Shards before their last attempt: each waits until no other shard runs.
     suspects = list[_Job]()
-    completed = distributed.as_completed(todo)
     for future in completed:
         job, attempt = todo.pop(future)
         if progress is not None:
@@ -236,9 +241,7 @@ def capture(
                 if attempt + 1 == ATTEMPTS:
                     suspects.append(job)
                 else:
-                    again = submit(job, attempt + 1)
-                    todo[again] = (job, attempt + 1)
-                    completed.add(again)
+                    submit(job, attempt + 1)
             else:
                 reason = f"its worker died in each of {ATTEMPTS} attempts. Capture it alone, with more memory."
                 refused.append(Refused(job.name, job.shard, reason))
@@ -247,10 +250,7 @@ def capture(
         else:
             finished += 1
         if suspects and not todo:
-            job = suspects.pop()
-            alone = submit(job, ATTEMPTS)
-            todo[alone] = (job, ATTEMPTS)
-            completed.add(alone)
+            submit(suspects.pop(), ATTEMPTS)
         if progress is not None:
             progress("touching", finished, len(jobs))
     for lost in refused:
