@@ -55,11 +55,13 @@ pub fn model(layout: Layout, leaf: Leaf, each: bool) -> Vec<u8> {
 /// A small model whose leaves are shared: numbers of one byte, or of two.
 pub fn shared(layout: Layout, is_wide: bool) -> Vec<u8> {
     // Leaves of many values repay a table of more than 256.
-    let (objects, trees, different) = if is_wide { (16, 110, 360) } else { (3, 16, 5) };
+    let (objects, trees, different) = if is_wide { (8, 240, 400) } else { (3, 16, 5) };
     let shape =
         Shape { descriptor: Descriptor::Curvature, objects, trees, depth: 2, each: true, thresholds: 6, leaf: 1.0 };
     let ensemble = random::with_few_leaves(random::ensemble(shape, 5), different);
     let bytes = compile(&ensemble, &with!(Settings::default(), leaf = Leaf::I8)).expect("a small ensemble").bytes;
+    let found = Model::new(&bytes).expect("a model").shared_leaves().map(|leaves| leaves.number_length());
+    assert_eq!(found, Some(1 + usize::from(is_wide)), "numbers of leaves");
     if layout == Layout::Wide { widened(&bytes) } else { bytes }
 }
 

@@ -75,14 +75,15 @@ fn a_change_with_a_right_checksum_is_refused_or_can_be_walked() {
 fn something_else_is_called_something_else() {
     let model = abuse::model(Layout::Compact, Leaf::I8, true);
     // Its version comes before its length.
-    let later = [&b"PLPT\x03\0"[..], &[0; 100]].concat();
+    let [earlier, later] = [2, 4].map(|version| [&b"PLPT"[..], &[version], &[0; 101]].concat());
     let unknown = with_sections(&model, &section(77 | MUST_UNDERSTAND, &[1, 2, 3]));
     for (bytes, expected) in [
         (&b"{\"learner\":"[..], "not a Palpate model"),
         (b"PLP0", "not a Palpate model"),
         (b"\0\0\0\0\0", "not a Palpate model"),
         (b"P", "truncated"),
-        (&later, "version 3"),
+        (&earlier, "version 2"),
+        (&later, "version 4"),
         (&unknown, "section 77"),
     ] {
         let error = Model::new(bytes).unwrap_err();

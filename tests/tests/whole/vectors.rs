@@ -209,7 +209,7 @@ fn the_recognizer_gives_what_the_vectors_say() {
         }
     }
     println!("{} models, {} touches, {} results, {} lengths of parts", counts[0], counts[1], counts[2], counts[3]);
-    assert!(counts[0] > 60 && counts[1] > 500 && counts[2] > 2_000 && counts[3] > 900, "{counts:?}");
+    assert!(counts[0] > 60 && counts[1] > 500 && counts[2] > 2_000 && counts[3] > 600, "{counts:?}");
 }
 
 #[test]
@@ -219,8 +219,8 @@ fn the_vectors_have_every_layout_leaf_descriptor_and_verdict() {
         .map(|line| &*bytes(line.2.split(' ').next().unwrap()).leak())
         .collect();
     let of = |at: usize| models.iter().map(|bytes| bytes[at]).collect::<BTreeSet<u8>>();
-    assert_eq!(of(4), BTreeSet::from([1, 2]));
-    assert_eq!(of(6), (0..5).collect());
+    assert_eq!(of(4), BTreeSet::from([3]));
+    assert_eq!(of(6), (0..2).collect());
     assert_eq!(of(7), (0..3).collect());
     assert_eq!(of(12), (0..7).chain([255]).collect());
     assert_eq!(of(13), (0..2).collect());
@@ -289,7 +289,7 @@ fn maps_have_the_numbers_that_the_format_states() {
     );
     let stated = [
         format!("A model of layout {MAPS_LAYOUT} has maps"),
-        format!("6 code {MAPS_LAYOUT} maps |"),
+        format!("2 code {MAPS_LAYOUT} maps |"),
         format!("| {} | yes | maps in layout {MAPS_LAYOUT} alone", Tag::Maps.code()),
         format!("**Maps** tag {} must be understood: {lengths}", Tag::Maps.code()),
         format!("| {} | (near · {WIDTHS} + width) · {DISTANCES} + distance |", 2 * WIDTHS * DISTANCES),

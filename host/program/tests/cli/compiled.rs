@@ -50,7 +50,7 @@ fn export_and_inspect_say_size_splits_leaves_error_and_cost_of_the_file() {
     let export = "export ensemble.json -o other.palpate --error-rate 5%";
     let exported = figures(at, export);
     let inspected = figures(at, "inspect other.palpate");
-    assert_eq!(inspected["version"], 1);
+    assert_eq!(inspected["version"], 3);
     assert_eq!(inspected["descriptor"], "curvature");
     assert_eq!(inspected["objects"], json!(["bowl", "fork"]));
     assert_eq!(inspected["stopping"], json!({"error_rate": 0.05, "max_touches": 200}));

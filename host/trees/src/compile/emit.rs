@@ -300,8 +300,8 @@ mod tests {
         let trees = (0..4_000_u16).map(|tree| Tree {
             nodes: vec![
                 Node::Split { feature: 0, threshold: f32::from(tree % 90), missing_left: true, left: 1, right: 2 },
-                Node::Leaf(vec![f32::from(tree), 0.0]),
-                Node::Leaf(vec![0.0, f32::from(tree)]),
+                Node::Leaf(vec![f32::from(tree) / 1e3, 0.0]),
+                Node::Leaf(vec![0.0, f32::from(tree) / 1e3]),
             ],
             output: Output::Each,
         });
