@@ -1,7 +1,7 @@
 """Exporters of tree ensembles on two emulated chips: bytes, instructions per row, and classes that differ from the library's.
 
     cargo build --release
-    python3.11 tests/peers/exporters/compare.py target/release/palpate [wine digits synthetic touches forest forest30]
+    python3.11 tests/peers/exporters/compare.py target/release/palpate [wine digits synthetic touches paper forest forest30]
 
 Makes an environment with the packages of requirements.txt beside itself (`venv`, not committed) and runs itself in it. Needs
 gcc-arm-none-eabi with newlib and libstdc++, qemu-system-arm, and Rust's targets thumbv7em-none-eabihf and thumbv6m-none-eabi.
