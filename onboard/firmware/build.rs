@@ -14,7 +14,7 @@ fn main() -> io::Result<()> {
 }
 
 /// Files that `palpate-tests`' `bench_models` writes, and those of its `located`.
-const BENCH: [&str; 16] = [
+const BENCH: [&str; 17] = [
     "one-i16.palpate",
     "one-i8.palpate",
     "one-d3.palpate",
@@ -22,6 +22,7 @@ const BENCH: [&str; 16] = [
     "each100-i8.palpate",
     "each40-i16.palpate",
     "each40-i8.palpate",
+    "each40-wide.palpate",
     "each20-d7.palpate",
     "identity.palpate",
     "identity.bin",

@@ -14,7 +14,7 @@
 
 use palpate::Error;
 use palpate::Result;
-use palpate::compile::{Leaf, Settings, compile};
+use palpate::compile::{Instructions, Leaf, Settings, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::ensemble::{Ensemble, Node, Output};
 use palpate::touches::Dataset;
@@ -24,6 +24,7 @@ use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::{Descriptor, Touch};
 use palpate_tests::identity;
 use palpate_tests::random::{self, Shape};
+use palpate_tests::wide::widened;
 use std::path::{Path, PathBuf};
 
 fn main() -> Result<()> {
@@ -43,33 +44,36 @@ fn main() -> Result<()> {
     let deep = ensemble(trained, compact(20, 7, 256), Descriptor::Curvature)?;
     let few = with!(train::Settings::paper(), rounds = 20, depth = 3);
     let shallow = ensemble(trained, few, Descriptor::Times)?;
+    let compiled = |ensemble, leaf| compile(ensemble, &with!(Settings::default(), leaf)).map(|compiled| compiled.bytes);
     let models = [
-        ("one-i16", &one, Leaf::I16),
-        ("one-i8", &one, Leaf::I8),
-        ("one-d3", &shallow, Leaf::I16),
-        ("each100-i16", &each100, Leaf::I16),
-        ("each100-i8", &each100, Leaf::I8),
-        ("each40-i16", &each40, Leaf::I16),
-        ("each40-i8", &each40, Leaf::I8),
-        ("each20-d7", &deep, Leaf::I8),
-        ("identity", &each40, Leaf::I16),
+        ("one-i16", compiled(&one, Leaf::I16)?),
+        ("one-i8", compiled(&one, Leaf::I8)?),
+        ("one-d3", compiled(&shallow, Leaf::I16)?),
+        ("each100-i16", compiled(&each100, Leaf::I16)?),
+        ("each100-i8", compiled(&each100, Leaf::I8)?),
+        ("each40-i16", compiled(&each40, Leaf::I16)?),
+        ("each40-i8", compiled(&each40, Leaf::I8)?),
+        ("each20-d7", compiled(&deep, Leaf::I8)?),
+        ("each40-wide", widened(&compiled(&each40, Leaf::I16)?)),
+        ("identity", compiled(&each40, Leaf::I16)?),
     ];
     let touches = touches(data.as_ref().map(|data| &data.test));
     write(&out.join("touches.bin"), &touches.iter().flat_map(times).collect::<Vec<u8>>())?;
     let mut estimates = Vec::new();
-    for (name, ensemble, leaf) in models {
-        let compiled = compile(ensemble, &with!(Settings::default(), leaf))?;
+    for (name, bytes) in models {
+        let instructions = Instructions::of_model(&Model::new(&bytes).expect("a compiled model"));
+        let Instructions { m4f, m0_plus } = instructions;
         println!(
-            "{name:16} {:7} bytes, {:6} splits, {:.2} bytes per split, {} instructions per touch by the stated model",
-            compiled.bytes.len(),
-            compiled.splits,
-            compiled.bytes.len() as f64 / compiled.splits as f64,
-            compiled.instructions.m4f
+            "{name:16} {:7} bytes, {m4f} instructions on a Cortex-M4F, {:?} on a Cortex-M0+",
+            bytes.len(),
+            m0_plus
         );
-        write(&out.join(format!("{name}.palpate")), &compiled.bytes)?;
-        estimates.extend((compiled.instructions.m4f as u32).to_le_bytes());
+        write(&out.join(format!("{name}.palpate")), &bytes)?;
+        for stated in [m4f, m0_plus.unwrap_or(0)] {
+            estimates.extend((stated as u32).to_le_bytes());
+        }
         if name == "identity" {
-            write(&out.join("identity.bin"), &expected(&compiled.bytes, &touches)?)?;
+            write(&out.join("identity.bin"), &expected(&bytes, &touches)?)?;
         }
     }
     write(&out.join("estimates.bin"), &estimates)?;

@@ -1,10 +1,9 @@
 //! Cost of a compiled model on a chip: instructions, flash, RAM and stack, estimated.
 //!
-//! Instructions are those from measurements to margins, by a model of the evaluator. The firmware's
-//! `evaluator` prints the Cortex-M4F figure beside what the emulated chip counts, for ensembles of all shapes, and fails
-//! where the two are more than 15 % apart. The Cortex-M0+ figure is fitted to the same program's counts for thumbv6m
-//! (`onboard/README.md` lists them), within 10 % of each. Flash of the code is that of the firmware's `verdict` image,
-//! RAM and stack are those that `evaluator` prints. All figures are of the firmware's profile (`opt-level = "s"`).
+//! Instructions are those from measurements to margins, by a model of the evaluator. The firmware's `evaluator` prints them
+//! beside what the emulated chips count, for ensembles of all shapes, and fails where the two are more than 15 % apart. Flash of
+//! the code is that of the firmware's `verdict` image, RAM and stack are those that `evaluator` prints. All figures are of the
+//! firmware's profile (`opt-level = "s"`).
 
 use super::groups::groups_and_splits;
 use palpate_onboard::Model;
@@ -98,12 +97,12 @@ impl Memory {
     /// Memory of a compiled model on a processor, with these features of palpate-onboard.
     pub fn of_model(model: &Model<'_>, core: Core, features: &[&str]) -> Self {
         let objects = model.object_count();
-        // A recognizer: 8 bytes per object and 40; an opened model: 64.
-        let ram = 8 * objects + 40 + 64;
+        // A recognizer: 8 bytes per object and 32; an opened model: 64.
+        let ram = 8 * objects + 32 + 64;
         // The most that was seen for ten objects, less their margins.
         let stack = 4 * objects
             + match model.layout() {
-                Layout::Compact | Layout::Wide => 1_116,
+                Layout::Compact | Layout::Wide => 1_024,
                 // A whole row of features, and the columns' numbers.
                 Layout::Code => 1_500,
             };
@@ -114,22 +113,22 @@ impl Memory {
 /// Features of palpate-onboard that models need, and the bytes of flash of each on a Cortex-M4F and a Cortex-M0+, beyond
 /// what all of them have: `verdict` images of the firmware, which the ignored tests of `tests/tests/whole/images.rs` compare.
 pub const FEATURES: [(&str, [usize; 2]); 12] = [
-    ("compact", [780, 1_012]),
-    ("wide", [900, 1_076]),
-    ("code", [0, 130]),
+    ("compact", [364, 424]),
+    ("wide", [392, 424]),
+    ("code", [600, 220]),
     ("i8-leaves", [0, 0]),
-    ("i16-leaves", [76, 60]),
-    ("f32-leaves", [400, 940]),
-    ("shared-leaves", [1_372, 1_160]),
-    ("sentinel", [380, 420]),
-    ("row-evidence", [492, 632]),
-    ("sequences", [92, 136]),
-    ("strangers", [3_496, 4_736]),
-    ("outputs", [1_764, 2_000]),
+    ("i16-leaves", [136, 64]),
+    ("f32-leaves", [560, 1_200]),
+    ("shared-leaves", [1_372, 1_140]),
+    ("sentinel", [380, 464]),
+    ("row-evidence", [448, 604]),
+    ("sequences", [100, 136]),
+    ("strangers", [3_380, 4_380]),
+    ("outputs", [1_716, 1_952]),
 ];
 
 /// Flash of what all images of verdicts have.
-const COMMON: [usize; 2] = [5_948, 5_472];
+const COMMON: [usize; 2] = [6_304, 5_956];
 
 /// True if the model numbers the rows of a sequence, or states which of them it takes.
 pub(super) fn has_sequences(model: &Model<'_>) -> bool {
@@ -206,8 +205,8 @@ const M4F: Costs = Costs {
     axis: 90,
     leaf: Leaf { ten_i8: 24, five_i16: 19, five_f32: 30, alone: 11 },
     shared_tree: 45,
-    tree: (25.0, 57, 5),
-    step: (17.0, 28.0),
+    tree: (25.0, 51, 5),
+    step: (21.0, 49.0),
 };
 
 const M0_PLUS: Costs = Costs {
@@ -216,8 +215,8 @@ const M0_PLUS: Costs = Costs {
     // No estimate is made with f32.
     leaf: Leaf { ten_i8: 57, five_i16: 31, five_f32: 0, alone: 14 },
     shared_tree: 60,
-    tree: (35.0, 80, 7),
-    step: (24.0, 39.0),
+    tree: (35.0, 51, 8),
+    step: (37.0, 88.0),
 };
 
 impl Costs {

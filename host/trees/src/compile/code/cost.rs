@@ -1,14 +1,15 @@
 //! Size and speed of trees as C, estimated by counting columns, comparisons, leaves and calls.
 //!
-//! The numbers are fitted to what arm-none-eabi-gcc makes at `-Os` of 50 models, from 8 to 15,000 splits, and to the counts of
-//! emulated chips, within 15 % of them. Five other models were 16 to 57 % off, so that the ignored test of this folder, which asks
-//! for 15 %, fails: those without a split, by votes, and of categories or missing values. Where keys are compared, a compiler makes a
-//! comparison that comes again in a function only once.
+//! The costs are fitted to what emulated chips count for code of arm-none-eabi-gcc at `-Os`: 194 models, from none to 15,000 splits,
+//! within 11 % on a Cortex-M4F and within 15 % on a Cortex-M0+. An ignored test of this folder compares them with other models.
+//! Where keys are compared, a compiler makes a comparison that comes again in a function only once, and leaves out most of those
+//! whose result follows from others.
 
-use super::columns::Kind;
+use super::columns::{Column, Kind};
 use super::program::{CodeNode, CodeTree, Program};
 use crate::compile::cost::Instructions;
-use std::collections::{BTreeMap, HashSet};
+use palpate_shared::format::Key;
+use std::collections::{HashMap, HashSet};
 
 /// Instructions of the parts of a program on one processor.
 struct Costs {
@@ -16,71 +17,115 @@ struct Costs {
     call: f64,
     /// An object's base and margin.
     object: f64,
-    /// A column of keys, one that is made alone, and one of several.
-    key: [f64; 2],
+    /// A loop over columns of keys; each column, where there are several; each column of f32 values.
+    run: f64,
+    key: f64,
+    real: f64,
+    /// A column whose features may be a sentinel.
+    sentinel: f64,
     /// A column of ranks by conversion; by search, and each step of that.
     grid: f64,
     search: (f64, f64),
     /// A function that adds up trees of an object.
     function: f64,
-    /// A comparison of keys: of the first 16, and of the others.
-    key_step: [f64; 2],
+    /// A comparison of keys; what one past the first [`KEPT`] of a function takes more; one whose result is known.
+    new: f64,
+    beyond: f64,
+    known: f64,
     /// A comparison of ranks.
     step: f64,
-    /// An addition to one of the two sums of a leaf, with ranks.
-    addition: f64,
-    /// A value of a leaf with one for each object; a leaf that is a vote.
+    /// A leaf with a value for each object, and each value; a leaf that is a vote; a leaf that is a list, and each entry.
+    leaf: f64,
     value: f64,
     vote: f64,
+    list: f64,
+    entry: f64,
 }
 
 const M4F: Costs = Costs {
-    call: 4.0,
-    object: 6.0,
-    key: [9.0, 15.6],
-    grid: 28.0,
-    search: (30.0, 2.5),
-    function: 7.7,
-    key_step: [2.8, 4.1],
-    step: 2.5,
-    addition: 1.8,
-    value: 7.4,
-    vote: 32.0,
+    call: 3.5,
+    object: 4.0,
+    run: 5.2,
+    key: 8.9,
+    real: 4.2,
+    sentinel: 5.8,
+    grid: 18.5,
+    search: (32.6, 2.2),
+    function: 11.3,
+    new: 3.3,
+    beyond: 5.5,
+    known: 1.1,
+    step: 3.7,
+    leaf: 5.3,
+    value: 6.9,
+    vote: 15.2,
+    list: 18.8,
+    entry: 9.2,
 };
 
 const M0_PLUS: Costs = Costs {
-    call: 3.0,
-    object: 6.5,
-    key: [10.0, 19.9],
-    grid: 52.0,
-    search: (41.0, 3.9),
-    function: 10.0,
-    key_step: [3.0, 4.9],
-    step: 3.0,
-    addition: 1.0,
-    value: 9.2,
-    vote: 36.0,
+    call: 0.0,
+    object: 5.7,
+    run: 7.1,
+    key: 11.4,
+    real: 5.9,
+    sentinel: 7.8,
+    grid: 32.6,
+    search: (36.9, 3.9),
+    function: 9.8,
+    new: 3.6,
+    beyond: 5.6,
+    known: 1.4,
+    step: 3.8,
+    leaf: 2.1,
+    value: 9.0,
+    vote: 18.0,
+    list: 18.9,
+    entry: 12.1,
 };
 
-/// Comparisons and additions of one walk through all trees.
-#[derive(Clone, Copy, Default)]
-struct Work {
-    comparisons: f64,
-    additions: f64,
+/// Keys of a function that stay in registers, about.
+const KEPT: usize = 7;
+
+/// Rows of which the mean is taken.
+const ROWS: usize = 100;
+
+/// Comparisons that a row has made in a function, and from them the least and the greatest rank that each column may have.
+#[derive(Default)]
+struct Seen {
+    made: HashSet<(usize, u8)>,
+    ranks: HashMap<usize, (u8, u8)>,
+    new: usize,
 }
 
-/// Comparisons of a function, each with how often a row makes it.
-type Comparisons = BTreeMap<(usize, u8), f64>;
+impl Seen {
+    /// Instructions of a comparison of keys.
+    fn compare(&mut self, column: usize, at: u8, rank: u8, costs: &Costs) -> f64 {
+        if !self.made.insert((column, at)) {
+            return 0.0;
+        }
+        let (least, greatest) = self.ranks.entry(column).or_insert((0, u8::MAX));
+        let is_known = *greatest <= at || *least > at;
+        if rank <= at {
+            *greatest = at.min(*greatest);
+        } else {
+            *least = (at + 1).max(*least);
+        }
+        if is_known {
+            return costs.known;
+        }
+        self.new += 1;
+        costs.new + if self.new > KEPT { costs.beyond } else { 0.0 }
+    }
+}
 
 impl Program {
     /// Estimate of the bytes of flash that the C code takes on a Cortex-M4F, its constants included.
     pub fn flash(&self) -> usize {
         let has_keys = self.has_keys();
-        let (mut different, mut splits) = (0, 0);
+        let (mut comparisons, mut splits) = (0, 0);
         for trees in self.functions() {
-            let mut comparisons = Comparisons::new();
-            trees.iter().for_each(|tree| tree.root.comparisons(1.0, &mut comparisons));
-            different += comparisons.len();
+            comparisons += different(&trees);
             splits += trees.iter().map(|tree| tree.root.count()).sum::<usize>();
         }
         let cuts: usize = match has_keys {
@@ -98,60 +143,46 @@ impl Program {
         }
         let fits = leaves.iter().all(|values| values.iter().all(|value| i8::try_from(*value).is_ok()));
         let table = leaves.len() * self.objects() * if fits { 1 } else { 2 };
-        let of_splits = if has_keys { 18 * different + 3 * splits } else { 10 * different + 5 * splits };
+        let of_splits = if has_keys { 18 * comparisons + 3 * splits } else { 10 * comparisons + 5 * splits };
         22 * self.objects() + 13 * self.columns.len() + 19 * self.runs().count() + 4 * cuts + of_splits + table
     }
 
-    /// About how many instructions a row takes, from features to margins, where either side of a split is as likely.
+    /// About how many instructions a row takes, from features to margins: the mean over rows in which a feature is as likely between
+    /// any two thresholds next to each other, or beyond all of them.
     pub(in super::super) fn instructions(&self) -> Instructions {
-        let mut work = Work::default();
-        for trees in self.functions() {
-            let mut comparisons = Comparisons::new();
-            for tree in trees {
-                tree.root.comparisons(1.0, &mut comparisons);
-                work.additions += tree.additions(&|left, right| (left + right) / 2.0);
-            }
-            work.comparisons += self.made(&comparisons);
-        }
-        self.instructions_of(work)
+        // Any numbers do that are spread out; these are of Knuth's linear congruential generator.
+        let mut state = 1_u64;
+        let mut place = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state >> 33
+        };
+        let row = |_| {
+            let places: Vec<u64> = (0..self.features).map(|_| place()).collect();
+            let rank = |column: &Column| {
+                let below = (places[usize::from(column.feature)] * (column.cuts.len() as u64 + 1)) >> 31;
+                below.checked_sub(1).map_or(0, |last| column.at(last as u8).saturating_add(1))
+            };
+            self.columns.iter().map(rank).collect()
+        };
+        self.mean_instructions(&(0..ROWS).map(row).collect::<Vec<_>>())
+    }
+
+    /// The mean over rows of a rank for each column.
+    pub(super) fn mean_instructions(&self, rows: &[Vec<u8>]) -> Instructions {
+        let walk = Walk::new(self);
+        self.on_each(|costs| rows.iter().map(|ranks| walk.of_row(ranks, costs)).sum::<f64>() / rows.len() as f64)
     }
 
     /// The most that a row takes.
     pub(in super::super) fn instructions_of_longest_ways(&self) -> Instructions {
-        let mut work = Work::default();
-        for trees in self.functions() {
-            let mut comparisons = Comparisons::new();
-            let mut steps = 0.0;
-            for tree in trees {
-                tree.root.comparisons(1.0, &mut comparisons);
-                steps += tree.root.sum(1.0, &|_| 0.0, &f64::max);
-                work.additions += tree.additions(&f64::max);
-            }
-            work.comparisons += if self.has_keys() { steps.min(comparisons.len() as f64) } else { steps };
-        }
-        self.instructions_of(work)
+        let walk = Walk::new(self);
+        self.on_each(|costs| walk.longest(costs))
     }
 
-    /// Instructions for a row of keys.
-    #[cfg(test)]
-    pub(super) fn instructions_of_row(&self, keys: &[i32]) -> Instructions {
-        let ranks = self.ranks(keys);
-        let mut work = Work::default();
-        for trees in self.functions() {
-            let mut comparisons = Comparisons::new();
-            for tree in trees {
-                let mut node = &tree.root;
-                while let CodeNode::Split(split) = node {
-                    *comparisons.entry((split.column, split.at)).or_default() += 1.0;
-                    node = if ranks[split.column] <= split.at { &split.left } else { &split.right };
-                }
-                if let (CodeNode::Leaf(values), Some(_)) = (node, tree.object) {
-                    work.additions += additions(values[0]);
-                }
-            }
-            work.comparisons += self.made(&comparisons);
-        }
-        self.instructions_of(work)
+    /// What all rows take, and `walk` of a row.
+    fn on_each(&self, walk: impl Fn(&Costs) -> f64) -> Instructions {
+        let on = |costs| (self.fixed(costs) + walk(costs)).round() as u64;
+        Instructions { m4f: on(&M4F), m0_plus: Some(on(&M0_PLUS)) }
     }
 
     /// The trees of each function.
@@ -160,61 +191,104 @@ impl Program {
         ones.chain(self.trees.iter().filter(|tree| tree.object.is_none()).map(|tree| vec![tree]))
     }
 
-    /// Comparisons that a row makes in a function.
-    fn made(&self, comparisons: &Comparisons) -> f64 {
-        let has_keys = self.has_keys();
-        comparisons.values().map(|&count| if has_keys { count.min(1.0) } else { count }).sum()
-    }
-
-    fn instructions_of(&self, work: Work) -> Instructions {
-        let on = |costs: &Costs| self.cost(costs, work).round() as u64;
-        Instructions { m4f: on(&M4F), m0_plus: Some(on(&M0_PLUS)) }
-    }
-
-    fn cost(&self, costs: &Costs, work: Work) -> f64 {
-        let has_keys = self.has_keys();
-        let rank = |kind: Kind| match kind {
+    /// Instructions of columns, calls and base margins.
+    fn fixed(&self, costs: &Costs) -> f64 {
+        let columns = self.columns.len() as f64;
+        let rank = |column: &Column| match column.kind {
             Kind::Grid { .. } => costs.grid,
             Kind::Search { steps } => costs.search.0 + costs.search.1 * f64::from(steps),
         };
-        let columns: f64 = match has_keys {
-            true => self.runs().map(|run| costs.key[usize::from(run.len() > 1)] * run.len() as f64).sum(),
-            false => self.columns.iter().map(|column| rank(column.kind)).sum(),
+        let numbers: f64 = if self.has_keys() {
+            let of_run = |run: &[Column]| costs.run + if run.len() > 1 { costs.key * run.len() as f64 } else { 0.0 };
+            let reals = if self.key == Key::Real { costs.real * columns } else { 0.0 };
+            self.runs().map(of_run).sum::<f64>() + reals
+        } else {
+            self.columns.iter().map(rank).sum()
         };
+        let sentinels = if self.sentinel.is_some() { costs.sentinel * columns } else { 0.0 };
         let functions: usize = (0..self.objects()).map(|object| self.chunks(object).len()).sum();
-        let comparisons = match has_keys {
-            true => {
-                let first = work.comparisons.min(16.0);
-                costs.key_step[0] * first + costs.key_step[1] * (work.comparisons - first)
-            }
-            false => costs.step * work.comparisons + costs.addition * work.additions,
-        };
-        let vectors = self.trees.iter().filter(|tree| tree.object.is_none()).count() as f64;
-        let leaf = if self.vote().is_some() { costs.vote } else { costs.value * self.objects() as f64 };
         let objects = costs.object * self.objects() as f64;
-        costs.call + objects + columns + costs.function * functions as f64 + comparisons + vectors * leaf
+        costs.call + objects + numbers + sentinels + costs.function * functions as f64
     }
 }
 
-impl CodeTree {
-    /// Additions of the leaf that is reached, where `below` joins those of a split's sides.
-    fn additions(&self, below: &dyn Fn(f64, f64) -> f64) -> f64 {
-        if self.object.is_none() { 0.0 } else { self.root.sum(0.0, &|values| additions(values[0]), below) }
+/// Trees as a row goes through them.
+struct Walk<'p> {
+    functions: Vec<Vec<&'p CodeTree>>,
+    has_keys: bool,
+    vote: Option<i32>,
+}
+
+impl<'p> Walk<'p> {
+    fn new(program: &'p Program) -> Self {
+        Self { functions: program.functions().collect(), has_keys: program.has_keys(), vote: program.vote() }
     }
+
+    /// Instructions of a row's comparisons and leaves.
+    fn of_row(&self, ranks: &[u8], costs: &Costs) -> f64 {
+        let mut sum = 0.0;
+        for trees in &self.functions {
+            let mut seen = Seen::default();
+            for tree in trees {
+                let mut node = &tree.root;
+                while let CodeNode::Split(split) = node {
+                    let rank = ranks[split.column];
+                    sum += if self.has_keys { seen.compare(split.column, split.at, rank, costs) } else { costs.step };
+                    node = if rank <= split.at { &split.left } else { &split.right };
+                }
+                if let (CodeNode::Leaf(values), None) = (node, tree.object) {
+                    sum += costs.of_vector(values, self.vote);
+                }
+            }
+        }
+        sum
+    }
+
+    /// The same where every tree takes its longest way, and every comparison that is not another one has to be made.
+    fn longest(&self, costs: &Costs) -> f64 {
+        let mut sum = 0.0;
+        for trees in &self.functions {
+            let mut steps = 0.0;
+            for tree in trees {
+                steps += tree.root.sum(1.0, &|_| 0.0, &f64::max);
+                if tree.object.is_none() {
+                    sum += tree.root.sum(0.0, &|values| costs.of_vector(values, self.vote), &f64::max);
+                }
+            }
+            sum += if self.has_keys {
+                let new = f64::min(steps, different(trees) as f64);
+                costs.new * new + costs.beyond * (new - KEPT as f64).max(0.0)
+            } else {
+                costs.step * steps
+            };
+        }
+        sum
+    }
+}
+
+impl Costs {
+    /// Instructions of a leaf with a value for each object, which is added by its number.
+    fn of_vector(&self, values: &[i32], vote: Option<i32>) -> f64 {
+        let Some(vote) = vote else { return self.leaf + self.value * values.len() as f64 };
+        let given = values.iter().filter(|value| **value != 0).count();
+        if given == 1 && values.contains(&vote) { self.vote } else { self.list + self.entry * given.max(1) as f64 }
+    }
+}
+
+/// Number of different comparisons in trees of a function.
+fn different(trees: &[&CodeTree]) -> usize {
+    let mut all = HashSet::new();
+    trees.iter().for_each(|tree| tree.root.comparisons(&mut all));
+    all.len()
 }
 
 impl CodeNode {
-    /// Adds the chance of each comparison, where either side of a split is as likely.
-    fn comparisons(&self, chance: f64, all: &mut Comparisons) {
+    /// Adds the comparisons: a column, and the rank at or below which a row goes left.
+    fn comparisons(&self, all: &mut HashSet<(usize, u8)>) {
         if let Self::Split(split) = self {
-            *all.entry((split.column, split.at)).or_default() += chance;
-            split.left.comparisons(chance / 2.0, all);
-            split.right.comparisons(chance / 2.0, all);
+            all.insert((split.column, split.at));
+            split.left.comparisons(all);
+            split.right.comparisons(all);
         }
     }
-}
-
-/// Additions of a leaf, which is 256 · high + low.
-fn additions(value: i32) -> f64 {
-    f64::from(u8::from(value >> 8 != 0) + u8::from(value & 255 != 0))
 }
