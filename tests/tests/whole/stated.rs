@@ -94,7 +94,7 @@ fn the_crates_readme_states_what_exponentials_and_state_cost() {
 }
 
 /// Rows of the table of evaluators, and what `evaluator` calls them.
-const EVALUATORS: [(&str, &str); 7] = [
+const EVALUATORS: [(&str, &str); 8] = [
     ("1000 one-output, depth 6, i16", "one-i16"),
     ("… in `irithyll-core` 1.0", "irithyll-core"),
     ("… as 8-byte nodes, f32 compares", "8-byte nodes"),
@@ -102,6 +102,7 @@ const EVALUATORS: [(&str, &str); 7] = [
     ("… i8", "each100-i8"),
     ("40 multi-output, depth 5, i16", "each40-i16"),
     ("40 multi-output, depth 5, i8", "each40-i8"),
+    ("40 multi-output, depth 5, i16, splits of six bytes", "each40-wide"),
 ];
 
 #[test]
