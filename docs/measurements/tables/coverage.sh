@@ -32,7 +32,7 @@ while [ "$run" -le "$fits" ]; do
     # What a recording does not state.
     rm "$out/recorded/dataset.json"
     # shellcheck disable=SC2086
-    "$palpate" probe fit "$out/recorded" $known -o "$out/fitted.toml" --force --json ${FIT:-} 2>>"$out/log" | tr -d ' \n' |
+    "$palpate" probe fit "$out/recorded" $known -o "$out/fitted.toml" --json ${FIT:-} 2>>"$out/log" | tr -d ' \n' |
         sed 's/.*"speed_factor":{\([^}]*\)}.*"late":\[{\([^}]*\)},{\([^}]*\)}.*/\1;\2;\3\n/' >>"$out/fits"
     run=$((run + 1))
 done

@@ -51,7 +51,7 @@ while read -r factor middle outer noise; do
         # What a recording does not state.
         rm "$out/recorded/dataset.json"
         # shellcheck disable=SC2086
-        quiet probe fit "$out/recorded" $known -o "$out/fitted-$factor-$count.toml" --force
+        quiet probe fit "$out/recorded" $known -o "$out/fitted-$factor-$count.toml"
         quiet capture "$meshes" -o "$out/fitted" --touches "$touches" --probe "$out/fitted-$factor-$count.toml" --force
         printf '| %s ' "$(trained "$out/fitted" "$out/test")"
     done

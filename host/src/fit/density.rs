@@ -9,20 +9,13 @@
 //! faces (κ = 0 except for noise) and the farthest edges. Tables are made for steps of σ as they are needed, and read with
 //! interpolation; what a candidate probe does to times (factor, offsets) is undone before a table is read.
 
-use super::candidate::{Hypothesis, NOISE};
+use super::candidate::NOISE;
 use super::late::Late;
 use super::line::{Axis, Kernel, LEVELS, Line, RATIO, deviation_of, mix};
 use super::observed::{FULL, OUTER, Observed, mirrored};
-use crate::random::{self, Purpose};
 use palpate_shared::Touch;
-use palpate_shared::format::Counted;
-use rand::RngExt;
-use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use std::sync::OnceLock;
-
-/// Simulated approaches that are kept as they are.
-const SOME: usize = 4_000;
 
 /// A density of two numbers.
 #[derive(Clone, Debug)]
@@ -99,8 +92,6 @@ pub(super) struct Densities {
     outer: Vec<f32>,
     /// The share of each set of fingers among all approaches, a set and its mirror image alike.
     pub(super) shares: [f64; 8],
-    /// Contact times of some of the approaches, in milliseconds.
-    some: Vec<[Option<f64>; 3]>,
     levels: [OnceLock<Level>; LEVELS],
     /// Densities cut off by a stroke, if the recordings have one.
     pub(super) late: Option<Late>,
@@ -133,34 +124,9 @@ impl Densities {
             neighbors,
             outer,
             shares: mirrored(&counts, touches.len()),
-            some: (touches.iter().take(SOME))
-                .map(|touch| touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e3)))
-                .collect(),
             levels: std::array::from_fn(|_| OnceLock::new()),
             late: window.map(|window| Late::new(touches, window)),
         }
-    }
-
-    /// Touches as a candidate probe would record them, made of some of the simulated ones.
-    pub(super) fn redrawn(&self, candidate: &Hypothesis, kept: Counted) -> Vec<Observed> {
-        let mut random = random::generator(1, Purpose::Fit, &self.name, 0);
-        let Hypothesis { factor, late, noise, missed } = *candidate;
-        let again = |times: &[Option<f64>; 3]| {
-            let times: [Option<f64>; 3] = std::array::from_fn(|finger| {
-                let (chance, normal): (f64, f64) = (random.random(), StandardNormal.sample(&mut random));
-                let time = times[finger].filter(|_| chance >= missed[finger])?;
-                Some(factor * time + late[finger] + noise * normal)
-            });
-            let first = times.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-            let end = self.late.as_ref().map_or(f64::INFINITY, |late| first + late.window);
-            Observed::of_times(times.map(|time| time.filter(|time| *time <= end)))
-        };
-        let is_kept = |observed: &Observed| match kept {
-            Counted::All => true,
-            Counted::Contacts => observed.fingers != 0,
-            Counted::Full => observed.fingers == FULL,
-        };
-        self.some.iter().map(again).filter(is_kept).collect()
     }
 
     /// Makes the tables of usual noise, side by side; those of other noise are made when they are needed.

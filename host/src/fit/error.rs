@@ -30,12 +30,6 @@ pub enum FitProblem {
         /// Description of what was recorded.
         found: String,
     },
-    /// Recordings look wrong.
-    #[error("recordings look wrong:\n  {}\nNothing was written", suspects.join("\n  "))]
-    Suspects {
-        /// Suspicious findings, each a sentence or two.
-        suspects: Vec<String>,
-    },
 }
 
 impl Problem for FitProblem {
@@ -50,7 +44,6 @@ impl Problem for FitProblem {
             Self::OtherStroke { .. } => {
                 "Give the stroke that the touches were recorded with, or none: it is then estimated from the recordings."
             }
-            Self::Suspects { .. } => "Record again, or leave the recording out.",
         }
         .into()
     }

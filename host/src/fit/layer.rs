@@ -9,7 +9,6 @@ use super::density::Densities;
 use super::likelihood::Plate;
 use super::recording::Recording;
 use super::search::{self, Best};
-use super::slopes;
 use super::stroke::Stroke;
 use super::touched::Touched;
 use super::{Evidence, Settings};
@@ -110,9 +109,6 @@ pub(super) struct Layer {
     pub(super) adds: [f64; NUMBERS],
 }
 
-/// A search for the best probe near another one.
-type Climb = fn(search::Likelihood<'_>, &Hypothesis) -> Best;
-
 /// Angle and bend as numbers of about the same scale.
 type Numbers = [f64; LAYER];
 /// Count of these numbers.
@@ -161,17 +157,17 @@ impl Layers<'_> {
         }
     }
 
-    /// The best probe with these numbers, near another one, by a quick climb or an exact one.
-    fn explained(&self, numbers: Numbers, from: &Hypothesis, climb: Climb) -> Result<Best> {
+    /// The best probe with these numbers, near another one.
+    fn explained(&self, numbers: Numbers, from: &Hypothesis) -> Result<Best> {
         progress::check(self.progress)?;
         let densities = self.densities(&real_of(numbers));
         let evidence = self.evidence(&densities);
-        Ok(climb(&|candidate: &Hypothesis| evidence.log_likelihood(candidate, |_| true), from))
+        Ok(search::near(&|candidate: &Hypothesis| evidence.log_likelihood(candidate), from))
     }
 
     /// Compass search: a step to either side of each number, and half of it where none is better.
     fn best(&self, plain: &Best) -> Result<(Numbers, Best)> {
-        let (mut numbers, mut best) = (START, self.explained(START, &plain.candidate, slopes::again)?);
+        let (mut numbers, mut best) = (START, self.explained(START, &plain.candidate)?);
         // What was tried is no better.
         let mut tried = vec![START];
         let [mut step, last] = STEPS;
@@ -185,7 +181,7 @@ impl Layers<'_> {
                         continue;
                     }
                     tried.push(there);
-                    let found = self.explained(there, &best.candidate, slopes::again)?;
+                    let found = self.explained(there, &best.candidate)?;
                     if found.log_likelihood > best.log_likelihood + 0.05 {
                         (numbers, best, moved) = (there, found, true);
                         break;
@@ -202,11 +198,10 @@ impl Layers<'_> {
     /// Half the widths of the intervals, from the curvatures of the likelihood, and what they add to those of the probe's
     /// numbers: these move with the layer, by slopes that are measured along the way.
     fn widths(&self, numbers: Numbers, best: &Best) -> Result<(Numbers, [f64; NUMBERS])> {
-        // Differences of maxima: exact ones, since each of a quick climb may be a tenth of a nat too low.
         let at = |ways: &[(usize, f64)]| {
             let mut there = numbers;
             ways.iter().for_each(|(index, way)| there[*index] += way * CURVATURE);
-            self.explained(there, &best.candidate, search::near)
+            self.explained(there, &best.candidate)
         };
         let center = at(&[])?.log_likelihood;
         let mut curvatures = Matrix2::identity();
@@ -252,7 +247,7 @@ pub(super) fn layer(
     let plain = {
         let densities = layers.densities(&Noise::default());
         let evidence = layers.evidence(&densities);
-        search::best(&|candidate: &Hypothesis| evidence.log_likelihood(candidate, |_| true), None)
+        search::best(&|candidate: &Hypothesis| evidence.log_likelihood(candidate), None)
     };
     let (numbers, best) = layers.best(&plain)?;
     let gain = best.log_likelihood - plain.log_likelihood;

@@ -5,10 +5,9 @@
 //! the nominal probe. The distortion of a candidate probe is then applied to the density of the simulated touches, which
 //! is cheap. The fit is the candidate under which the recorded touches are likeliest (maximum likelihood with a weak
 //! preference for probes with small errors, by Nelder–Mead from several starts). Full and partial touches count, and
-//! approaches that touched nothing; if the pose was recorded, each touch is compared with approaches in its pose.
-//! Intervals are those of 95 % by profile likelihood (Wilks' theorem), widened empirically, since the tables are simulated
-//! and smoothed. They do not cover deviations that the simulation does not know, such as a finger that is
-//! bent aside.
+//! approaches that touched nothing; recorded poses make no difference. Intervals are those of 95 % by profile likelihood
+//! (Wilks' theorem), widened empirically, since the tables are simulated and smoothed. They do not cover deviations that
+//! the simulation does not know, such as a finger that is bent aside.
 //!
 //! Only differences of contact times are recorded, so an offset that all three fingers share cannot be found, and changes
 //! nothing: offsets are relative to the first finger's.
@@ -18,9 +17,6 @@
 //!
 //! Presses on a flat plate, with half a turn of the probe after each, say more about offsets than touches of objects: on a
 //! plate κ is 0, and the slope changes its sign. They say nothing else: their noise and their misses are their own.
-//!
-//! Recordings that look wrong ([`Suspect`]) are named: of another object than their name says, of two objects in one
-//! file, or of a probe that was changed on the way.
 //!
 //! ```no_run
 //! use palpate::mesh::source;
@@ -46,21 +42,17 @@ mod likelihood;
 mod line;
 mod observed;
 mod outcome;
-mod posed;
 mod recording;
 #[cfg(test)]
 mod robots;
 mod search;
-mod slopes;
 mod stroke;
-mod suspects;
 #[cfg(all(test, feature = "objects"))]
 mod tests;
 mod timer;
 mod touched;
 mod words;
 pub use outcome::{Fit, GrazingEstimate, Warning};
-pub use suspects::Suspect;
 pub use words::{Estimate, NOT_TOLD, between, offset, offset_between};
 
 use crate::capture;
@@ -119,28 +111,22 @@ struct Evidence<'a> {
 }
 
 impl Evidence<'_> {
-    /// The logarithm of the likelihood of the recordings `which` asks for, and of the plate, with how usual the candidate is.
-    fn log_likelihood(&self, candidate: &Hypothesis, which: impl Fn(usize) -> bool + Sync) -> f64 {
-        let of = |index: usize| {
-            let recording = &self.recordings[index];
-            let explained = Explained::new(candidate, &self.objects[self.of[index]], recording.kept);
-            recording.log_likelihood(&explained)
+    /// The logarithm of the likelihood of the recordings and of the plate, with how usual the candidate is.
+    fn log_likelihood(&self, candidate: &Hypothesis) -> f64 {
+        let of = |(recording, object): (&Recording<'_>, &usize)| {
+            Explained::new(candidate, &self.objects[*object], recording.kept).log_likelihood(&recording.touches)
         };
         let plate = self.plate.as_ref().map_or(0.0, |plate| plate.log_likelihood(candidate));
-        (0..self.recordings.len()).filter(|index| which(*index)).map(of).sum::<f64>() + plate + candidate.usual()
+        self.recordings.iter().zip(&self.of).map(of).sum::<f64>() + plate + candidate.usual()
     }
 }
-
-/// The fewest simulated approaches to each object with which recordings are checked for other objects: with fewer, sound ones
-/// look wrong, since densities are too coarse.
-pub const LEAST_TO_CHECK: u64 = 12_000;
 
 /// Finds the probe that made recorded touches of `objects`, which are matched by their names, and presses on a flat plate
 /// if there are any, with a half turn of the probe after each. Where the objects lie on a table, recordings that state their
 /// placement are compared with that one, others with all of the object's by their weights; the table is a plate too.
 ///
 /// Equal recordings, objects and settings give equal fits on any number of threads. Cost: half a minute of a
-/// processor for ten meshes and 300 recorded approaches to four of them, twice that where touches have poses.
+/// processor for ten meshes and 300 recorded approaches to four of them.
 ///
 /// # Errors
 /// [`FitProblem::NotRecorded`] if a recorded object is not among the objects; [`FitProblem::FewRecorded`] for fewer than
@@ -168,10 +154,10 @@ pub fn fit(
     let rigid: Vec<&[Touch]> = rigid.iter().map(Vec::as_slice).collect();
     let stroke = stroke::stroke(recorded, &rigid, kept, &settings.origin.probe)?;
     let recordings: Vec<Recording<'_>> =
-        recorded.objects.iter().map(|own| Recording::without_poses(&own.name, own.touches(), kept)).collect();
+        recorded.objects.iter().map(|own| Recording::new(&own.name, own.touches(), kept)).collect();
     let pressed = plate.map(|touches| Plate::new(touches.iter().map(Observed::of)));
     let layer = layer::layer(&recordings, samples, pressed.as_ref(), stroke, progress)?;
-    let simulated = Simulated::new(touched, layer, settings, progress)?;
+    let simulated = Simulated::new(&touched, layer, settings, progress)?;
     let densities = simulated.densities(stroke);
     fit_to(&simulated, &densities, stroke, recorded, plate, settings, progress)
 }
@@ -198,16 +184,12 @@ fn fit_to(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
-    let Simulated { touched, layer, .. } = simulated;
+    let layer = &simulated.layer;
     let place = |own: &ObjectTouches| place(&own.name, objects.iter().map(|own| own.name.as_str()));
     let of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
     let kept = kept(recorded);
-    let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
-        in_poses: posed::in_poses(&own.name, own.touches(), &touched[object], &layer.real, settings),
-        is_mixed: touched[object].is_mixed(),
-        ..Recording::without_poses(&own.name, own.touches(), kept)
-    });
-    let recordings: Vec<Recording<'_>> = recordings.collect();
+    let recordings: Vec<Recording<'_>> =
+        recorded.objects.iter().map(|own| Recording::new(&own.name, own.touches(), kept)).collect();
     let evidence = Evidence {
         recordings: &recordings,
         objects,
@@ -224,10 +206,7 @@ fn fit_to(
     let center = best.candidate.numbers();
     let widened = |(index, ends): (usize, search::Ends)| ends.widened(index, center[index], layer.adds[index]);
     let ends: Vec<search::Ends> = ends.into_iter().enumerate().map(widened).collect();
-    progress.begin("checking the recordings", None);
-    let is_checked = settings.approaches >= LEAST_TO_CHECK;
-    let suspects = if is_checked { suspects::suspects(&evidence, &best, progress)? } else { Vec::new() };
-    let mut fit = outcome::outcome(&evidence, &best, &ends, layer, timer, suspects, settings);
+    let mut fit = outcome::outcome(&evidence, &best, &ends, layer, timer, settings);
     fit.readings = timer::readings(all(), timer).map(|micros| micros / 1e3);
     fit.warnings = advice::warnings(&fit, timer);
     Ok(fit)
@@ -262,12 +241,11 @@ fn scenes(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> R
 /// Each object, touched by the nominal probe, with a hand that goes on past it; fingers may bend.
 struct Simulated {
     touches: Vec<ObjectTouches>,
-    touched: Vec<Touched>,
     layer: Layer,
 }
 
 impl Simulated {
-    fn new(touched: Vec<Touched>, layer: Layer, settings: &Settings, progress: &dyn Progress) -> Result<Self> {
+    fn new(touched: &[Touched], layer: Layer, settings: &Settings, progress: &dyn Progress) -> Result<Self> {
         // What the hand does not reach is left out later, when a candidate says how fast it is.
         let probe = with!(settings.origin.probe, stroke = None, stroke_tolerance = None);
         let (touches, seed) = (settings.approaches, settings.seed);
@@ -280,7 +258,7 @@ impl Simulated {
             Ok(if is_weighed { touches.as_often_as_placed() } else { touches })
         };
         let touches = touched.iter().map(one).collect::<Result<_>>()?;
-        Ok(Self { touches, touched, layer })
+        Ok(Self { touches, layer })
     }
 
     /// The densities of the touches where the recordings have this stroke.
@@ -299,7 +277,7 @@ fn searched(
     let likelihood = |candidate: &Hypothesis| match progress.is_cancelled() {
         // As bad as can be, and so soon over.
         true => f64::NEG_INFINITY,
-        false => evidence.log_likelihood(candidate, |_| true),
+        false => evidence.log_likelihood(candidate),
     };
     let mut best = search::best(&likelihood, near);
     for _ in 0..4 {

@@ -2,11 +2,9 @@
 
 use super::candidate::Hypothesis;
 use super::layer::{Layer, MOST_ANGLE};
-use super::recording::Recording;
 use super::search::{Best, Ends};
-use super::suspects::Suspect;
 use super::words::{Estimate, NOT_TOLD, between, offset, offset_between};
-use super::{Evidence, LEAST_TO_CHECK, Settings, Timer};
+use super::{Evidence, Settings, Timer};
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::hand;
 use crate::probe::noise::{Grazing, Noise};
@@ -77,17 +75,11 @@ pub struct Fit {
     pub presses: usize,
     /// Names of the recorded objects, or placements.
     pub objects: Vec<String>,
-    /// Names of these that were not checked for other objects: those without a placement on a table, or all if fewer than
-    /// [`LEAST_TO_CHECK`] approaches to each object were simulated.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub unchecked: Vec<String>,
     /// Surroundings of the objects.
     #[serde(skip_serializing_if = "Surroundings::is_floating")]
     pub scene: Surroundings,
     /// Warnings about numbers that the recordings cannot determine, and proposals for the next recording.
     pub warnings: Vec<Warning>,
-    /// Recordings that look wrong.
-    pub suspects: Vec<Suspect>,
 }
 
 /// Gathers results; warnings are still to come.
@@ -97,7 +89,6 @@ pub(super) fn outcome(
     ends: &[Ends],
     layer: &Layer,
     timer: Timer,
-    suspects: Vec<Suspect>,
     settings: &Settings,
 ) -> Fit {
     let resolution = match timer {
@@ -150,13 +141,8 @@ pub(super) fn outcome(
         contacts: super::counts(evidence),
         presses: evidence.plate.as_ref().map_or(0, |plate| plate.count),
         objects: evidence.recordings.iter().map(|own| own.name.to_owned()).collect(),
-        unchecked: {
-            let is_unchecked = |own: &&Recording<'_>| own.is_mixed || settings.approaches < LEAST_TO_CHECK;
-            evidence.recordings.iter().filter(is_unchecked).map(|own| own.name.to_owned()).collect()
-        },
         scene: settings.origin.scene,
         warnings: Vec::new(),
-        suspects,
     }
 }
 
@@ -204,9 +190,6 @@ impl Fit {
         // Writing to a string cannot fail.
         for warning in &self.warnings {
             _ = writeln!(text, "# Poorly determined: {warning}");
-        }
-        for suspect in &self.suspects {
-            _ = writeln!(text, "# LOOKS WRONG: {suspect}");
         }
         _ = writeln!(text, "{unit}radius = {radius:?}\nspacing = {spacing:?}\nspeed = {speed:?}\ntilt = {tilt:?}");
         if let Some(stroke) = stroke {

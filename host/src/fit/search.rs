@@ -5,7 +5,7 @@ use argmin::core::{CostFunction, Executor, State};
 use argmin::solver::neldermead::NelderMead;
 
 /// Objective of the search: the logarithm of the likelihood of a candidate.
-pub(super) type Likelihood<'a> = &'a (dyn Fn(&Hypothesis) -> f64 + Sync);
+type Likelihood<'a> = &'a (dyn Fn(&Hypothesis) -> f64 + Sync);
 
 /// A candidate, and the logarithm of its likelihood.
 #[derive(Clone, Copy, Debug, PartialEq)]

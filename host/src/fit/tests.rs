@@ -7,7 +7,7 @@ use crate::probe::approach::Probe;
 use crate::probe::noise::Grazing;
 use crate::touches::{ObjectTouches, Recorded, Source, Surroundings};
 use crate::with;
-use palpate_shared::ContactTime;
+use palpate_shared::{ContactTime, Pose};
 use std::sync::LazyLock;
 
 /// Faults of a probe. Times are in milliseconds.
@@ -54,17 +54,12 @@ fn record(times: [Option<f64>; 3], probe: &Crooked, numbers: &mut Numbers) -> To
     Touch::new(ticks.map(|tick| tick.map_or(ContactTime::MISSING, |tick| ContactTime::from_micros(tick as u32))))
 }
 
-/// The objects that were recorded, and two others; made only once.
-static OBJECTS: LazyLock<[Object; 5]> =
-    LazyLock::new(|| ["bowl", "mouse", "wristwatch", "fork", "spoon"].map(|name| builtin::one(name).unwrap()));
+/// The objects that were recorded, made only once.
+static OBJECTS: LazyLock<[Object; 3]> =
+    LazyLock::new(|| ["bowl", "mouse", "wristwatch"].map(|name| builtin::one(name).unwrap()));
 
-/// The objects that were recorded.
 fn objects() -> Vec<Object> {
-    OBJECTS[..3].to_vec()
-}
-
-fn other(name: &str) -> Object {
-    OBJECTS.iter().find(|object| object.name == name).unwrap().clone()
+    OBJECTS.to_vec()
 }
 
 /// Approaches to an object, by a probe with deviations.
@@ -102,19 +97,15 @@ fn settings() -> Settings {
     Settings { approaches: 20_000, ..Settings::default() }
 }
 
-/// Touches of rigid fingers, and their densities where no stroke ends them.
-type Rigid = (Simulated, Vec<Densities>);
-
-/// Touches of rigid fingers, made once for all fits to them.
-fn simulated(objects: &[Object], settings: &Settings) -> Rigid {
-    let scenes = scenes(objects, settings, &()).unwrap();
-    let touched = touched::touched(objects, scenes, &Dataset::default());
-    let simulated = Simulated::new(touched, Layer::default(), settings, &()).unwrap();
+/// Touches of rigid fingers, made once for all fits to them, and their densities where no stroke ends them.
+static SIMULATED: LazyLock<(Simulated, Vec<Densities>)> = LazyLock::new(|| {
+    let (objects, settings) = (objects(), settings());
+    let scenes = scenes(&objects, &settings, &()).unwrap();
+    let touched = touched::touched(&objects, scenes, &Dataset::default());
+    let simulated = Simulated::new(&touched, Layer::default(), &settings, &()).unwrap();
     let densities = simulated.densities(Stroke::default());
     (simulated, densities)
-}
-
-static SIMULATED: LazyLock<Rigid> = LazyLock::new(|| simulated(&objects(), &settings()));
+});
 /// Touches of the bent probe, and presses on a plate.
 static RECORDED: LazyLock<Dataset> = LazyLock::new(|| recorded(&objects(), 400, 1, &BENT));
 static PLATE: LazyLock<Vec<Touch>> = LazyLock::new(|| plate(60, &BENT));
@@ -122,8 +113,8 @@ static PLATE: LazyLock<Vec<Touch>> = LazyLock::new(|| plate(60, &BENT));
 static FOUND: LazyLock<Fit> = LazyLock::new(|| fitted(&RECORDED, Some(&PLATE)));
 
 /// The fit of a probe whose fingers are known to be rigid, and whose objects to stay.
-fn rigid((simulated, endless): &Rigid, recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
-    let settings = settings();
+fn fitted(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
+    let ((simulated, endless), settings) = (&*SIMULATED, settings());
     let own = |own: &ObjectTouches| {
         let object = place(&own.name, simulated.touches.iter().map(|own| own.name.as_str())).unwrap();
         simulated.touches[object].touches()
@@ -132,10 +123,6 @@ fn rigid((simulated, endless): &Rigid, recorded: &Dataset, plate: Option<&[Touch
     let stroke = stroke::stroke(recorded, &touches, kept(recorded), &settings.origin.probe).unwrap();
     let ended = stroke.window.map(|_| simulated.densities(stroke));
     fit_to(simulated, ended.as_ref().unwrap_or(endless), stroke, recorded, plate, &settings, &()).unwrap()
-}
-
-fn fitted(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
-    rigid(&SIMULATED, recorded, plate)
 }
 
 /// The fit of an unknown probe.
@@ -154,7 +141,6 @@ fn near(fit: &Fit, probe: &Crooked, [factor, offset, noise]: [f64; 3]) {
     for (missed, share) in fit.missed.iter().flatten().zip(probe.missed) {
         assert!((missed.value - share).abs() < 0.03, "{told}");
     }
-    assert!(fit.suspects.is_empty(), "{:?}", fit.suspects);
 }
 
 #[test]
@@ -209,26 +195,11 @@ fn without_a_plate_curvature_is_told_and_the_slope_hardly() {
     assert!(asked.record.contains("flat plate"), "{asked}");
 }
 
-/// Touches of the bent probe with their poses.
-fn posed() -> Dataset {
-    let mut posed = recorded(&objects(), 250, 2, &BENT);
-    let origin = Origin { approaches: true, seed: 1_002, ..Origin::default() };
-    for (own, object) in posed.objects.iter_mut().zip(&objects()) {
-        let scenes = capture::scenes(&[object], &origin, &()).unwrap();
-        let poses = capture::touches(&scenes[0], &object.name, &origin, 0..250).unwrap();
-        let with = |(touch, posed): (&Touch, &Touch)| touch.with_pose(posed.pose().unwrap());
-        own.edit(|touches| *touches = touches.iter().zip(poses.touches()).map(with).collect());
-    }
-    posed
-}
-
 #[test]
-fn recorded_poses_tell_the_slope_as_well() {
-    let plain = fitted(&recorded(&objects(), 250, 2, &BENT), None);
-    let found = fitted(&posed(), None);
-    near(&found, &BENT, [0.06, 3.0, 0.5]);
-    let width = |fit: &Fit| fit.late[1].width().unwrap();
-    assert!(width(&found) < 0.6 * width(&plain), "{:?} {:?}", found.late, plain.late);
+fn recorded_poses_make_no_difference() {
+    let pose = Pose { direction: [0, 0, -32_767], alignment: [32_767, 0, 0] };
+    let posed = RECORDED.each(|own| own.changed(|touch| touch.with_pose(pose)));
+    assert_eq!(fitted(&posed, Some(&PLATE)), *FOUND);
 }
 
 #[test]
@@ -312,69 +283,6 @@ fn a_recorded_object_without_a_mesh_is_named() {
 }
 
 #[test]
-fn a_recording_under_a_wrong_name_is_named_with_the_right_one() {
-    let mut wrong = recorded(&objects(), 300, 14, &BENT);
-    let fork = other("fork");
-    wrong.objects[1].edit(|touches| *touches = approaches(&fork, 300, 14, &BENT));
-    let all = [objects(), vec![fork]].concat();
-    let simulated = simulated(&all, &settings());
-    let found = rigid(&simulated, &wrong, None);
-    let expected = Suspect::OtherObject { object: "mouse".into(), looks_like: "fork".into() };
-    assert_eq!(found.suspects, [expected]);
-    // Also where it is the only recording.
-    let only = Dataset::new(vec![wrong.objects[1].clone()]);
-    let found = rigid(&simulated, &only, None);
-    assert!(
-        matches!(&found.suspects[..], [Suspect::OtherObject { looks_like, .. }] if looks_like == "fork"),
-        "{:?}",
-        found.suspects
-    );
-}
-
-#[test]
-fn two_objects_in_one_recording_are_named_with_the_place() {
-    let mut two = recorded(&objects(), 300, 15, &BENT);
-    let watch = two.objects[2].touches().to_vec();
-    two.objects[0].edit(|touches| _ = touches.splice(180.., watch[..120].iter().copied()));
-    let found = layered(&two, None);
-    let [Suspect::TwoObjects { object, other, from: Some(from), to: Some(to), .. }] = &found.suspects[..] else {
-        panic!("{:?}", found.suspects)
-    };
-    assert_eq!((object.as_str(), other.as_str()), ("bowl", "wristwatch"));
-    assert!(from.abs_diff(181) < 15 && *to > 290, "{from} to {to}");
-    // And if they are mixed.
-    let mut mixed = recorded(&objects(), 300, 15, &BENT);
-    mixed.objects[0].edit(|touches| (0..300).step_by(3).for_each(|index| touches[index] = watch[index]));
-    let found = fitted(&mixed, None);
-    assert!(
-        matches!(&found.suspects[..], [Suspect::TwoObjects { object, other, .. }] if object == "bowl" && other == "wristwatch"),
-        "{:?}",
-        found.suspects
-    );
-}
-
-#[test]
-fn a_probe_that_was_moved_on_the_way_is_named_with_the_place() {
-    let mut moved = recorded(&objects(), 300, 16, &BENT);
-    let after = Crooked { late: [0.0, -12.0, 6.0], ..BENT };
-    let changed = approaches(&objects()[0], 400, 17, &after);
-    moved.objects[0].edit(|touches| _ = touches.splice(150.., changed[..250].iter().copied()));
-    let found = fitted(&moved, None);
-    let suspect = found.suspects.iter().find(|suspect| matches!(suspect, Suspect::Changed { .. }));
-    let Some(Suspect::Changed { object, from, what }) = suspect else { panic!("{:?}", found.suspects) };
-    assert_eq!(object, "bowl");
-    assert!(from.abs_diff(151) < 40 && what.contains("second finger"), "{from}: {what}");
-}
-
-#[test]
-fn a_mesh_of_another_shape_is_like_no_recording() {
-    let mut other = recorded(&objects(), 300, 18, &BENT);
-    other.objects[1].edit(|touches| *touches = approaches(&self::other("spoon"), 300, 18, &BENT));
-    let found = fitted(&other, None);
-    assert!(found.suspects.iter().any(|suspect| suspect.to_string().starts_with("mouse: ")), "{:?}", found.suspects);
-}
-
-#[test]
 fn a_fit_is_the_same_on_any_number_of_threads_and_read_back_as_written() {
     let (recorded, plate) = (recorded(&objects()[..2], 80, 19, &BENT), plate(30, &BENT));
     let with = |threads: usize| {
@@ -452,8 +360,7 @@ fn a_stated_stroke_is_kept_and_recordings_of_another_are_refused_with_both() {
 }
 
 #[test]
-fn full_touches_and_poses_of_a_short_stroke_are_fitted_as_well() {
-    near(&fitted(&stopped(&posed(), 250), None), &BENT, [0.06, 3.0, 0.5]);
+fn full_touches_of_a_short_stroke_are_fitted_as_well() {
     let mut full = stopped(&recorded(&objects(), 900, 10, &BENT), 250);
     full.objects.iter_mut().for_each(|object| *object = object.filtered(Touch::is_full));
     let found = fitted(&full, None);
@@ -501,22 +408,8 @@ fn a_probe_is_fitted_to_objects_that_stand_on_a_table() {
 }
 
 #[test]
-fn a_recording_in_another_placement_than_it_states_looks_wrong_and_one_that_is_unknown_is_refused() {
-    let (mut recorded, settings) = tabled(450, 12, &BENT, true);
-    let bowl = recorded.objects.iter_mut().find(|own| own.name == "bowl").unwrap();
-    let by_source = bowl.by_source();
-    let [one, other] = [0, 1].map(|source| bowl.sources()[source].clone());
-    assert!(bowl.sources().len() == 2, "{:?}", bowl.sources());
-    // Each is called the other.
-    let touches = by_source.iter().flatten().map(|&touch| bowl.touches()[touch]).collect();
-    let lengths = by_source.iter().map(|touches| touches.len() as u64);
-    *bowl = ObjectTouches::in_runs("bowl", touches, [other, one].into_iter().zip(lengths).collect());
-    let found = fit(&recorded, &objects(), Some(&PLATE), &settings, &()).unwrap();
-    let said: Vec<String> = found.suspects.iter().map(ToString::to_string).collect();
-    assert!(
-        said.iter().any(|said| said.starts_with("bowl/") && said.contains("look like touches of the bowl/")),
-        "{said:?}"
-    );
+fn a_recording_in_an_unknown_placement_is_refused() {
+    let (recorded, settings) = tabled(60, 12, &BENT, true);
     let lying = Recorded { object: "bowl".into(), placement: Some("+q".into()), ..Recorded::default() };
     let unknown = ObjectTouches::new("bowl", recorded.objects[0].touches().to_vec(), Source::Recording(lying));
     let error = fit(&Dataset::new(vec![unknown]), &objects(), None, &settings, &()).unwrap_err();

@@ -16,13 +16,6 @@ pub(super) struct Touched {
 }
 
 impl Touched {
-    /// True if it is an object in several placements.
-    pub(super) fn is_mixed(&self) -> bool {
-        let mut placements = self.scenes.iter().map(|scene| scene.table().map(|table| &table.placement));
-        let first = placements.next();
-        placements.any(|placement| Some(placement) != first)
-    }
-
     /// For each scene the share of the largest weight.
     pub(super) fn shares(&self) -> Vec<f64> {
         let most = self.weights.iter().copied().fold(0.0, f64::max);

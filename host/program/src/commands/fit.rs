@@ -1,18 +1,18 @@
 //! `palpate probe`, and `palpate probe fit`.
 
+use super::Global;
 use super::numbers::count;
 use super::probe::{IN_MILLIMETERS, SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::recognize_lines::{Event, each_of};
 use super::scene::SceneArguments;
-use super::{Global, remark};
-use palpate::error::{FitProblem, ProbeProblem};
-use palpate::fit::{Fit, GrazingEstimate, LEAST_TO_CHECK, NOT_TOLD, Settings, between, fit, offset, offset_between};
+use palpate::error::ProbeProblem;
+use palpate::fit::{Fit, GrazingEstimate, NOT_TOLD, Settings, between, fit, offset, offset_between};
 use palpate::locate::{BareTable, Measured, REACH, bare_table};
 use palpate::output;
 use palpate::touches::{Origin, read_touches};
 use palpate::with;
-use palpate::{Error, Result, wording};
+use palpate::{Error, Result};
 use palpate_shared::format::Length;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ enum Command {
 #[command(after_help = "\
 RECORDED is a data set that your probe made, of objects whose meshes you have, matched by their names. The probe that explains the recorded touches best is written: how fast it really is, how late each finger touches, its noise, what it misses, its timer. `palpate capture --probe probe.toml` then gives touches as it would.
 
-A few hundred approaches to three or four objects are enough. Presses on a flat plate, with half a turn of the probe after each, determine offsets better than any object, and nothing else: one line per press, in a file for --plate. Recordings that look wrong are named, and nothing is written.
+A few hundred approaches to three or four objects are enough. Presses on a flat plate, with half a turn of the probe after each, determine offsets better than any object, and nothing else: one line per press, in a file for --plate. Poses of touches make no difference.
 
 Without SOURCE, RECORDED is a file of presses on the bare table by a hand that states its position: 20 of them beside the object, straight down, with half a turn of the hand after each. The height of the table and the offsets of the outer fingertips are printed, and the probe is written with them. It needs --probe in millimeters.
 
@@ -106,17 +106,8 @@ fn run_fit(arguments: &FitArguments, global: &Global) -> Result<()> {
     let plate = arguments.plate.as_deref().map(read_touches).transpose()?;
     let settings = with!(Settings::default(), origin, approaches = arguments.approaches, seed = global.seed());
     let found = fit(&recorded, &objects, plate.as_deref(), &settings, &Bar::new())?;
-    let suspects: Vec<String> = found.suspects.iter().map(ToString::to_string).collect();
-    if global.force || suspects.is_empty() {
-        output::write_bytes(&arguments.output, found.toml().as_bytes())?;
-    }
-    global.print_about(&arguments.output, &found, || table(&found, arguments.approaches))?;
-    if !suspects.is_empty() && !global.force {
-        return Err(Error::from(FitProblem::Suspects { suspects }).in_file(&arguments.recorded));
-    }
-    for suspect in suspects {
-        remark(&format!("palpate: warning: {suspect}."));
-    }
+    output::write_bytes(&arguments.output, found.toml().as_bytes())?;
+    global.print_about(&arguments.output, &found, || table(&found))?;
     match global.json {
         true => Ok(()),
         false => output::print_about(&arguments.output, &format!("Wrote {}\n", arguments.output.display())),
@@ -173,7 +164,7 @@ fn bare_text(found: &BareTable, path: &Path) -> String {
 }
 
 /// Estimates, one line for each number.
-fn table(found: &Fit, simulated: u64) -> String {
+fn table(found: &Fit) -> String {
     let [full, pairs] = found.contacts;
     let presses = if found.presses > 0 { format!(", {} presses on a plate", found.presses) } else { String::new() };
     let mut text = format!(
@@ -215,19 +206,6 @@ fn table(found: &Fit, simulated: u64) -> String {
     };
     if found.stroke.is_some() {
         text += "\nThe stroke was not stated: no recorded contact is later, where many would be.";
-    }
-    if !found.unchecked.is_empty() {
-        // Writing to a string cannot fail.
-        _ = write!(
-            text,
-            "\nNot checked for other objects, since {}: {}.",
-            match simulated < LEAST_TO_CHECK {
-                true =>
-                    format!("fewer than {} approaches to each object were simulated", wording::count(LEAST_TO_CHECK)),
-                false => "their recordings state no placement".to_owned(),
-            },
-            found.unchecked.join(", ")
-        );
     }
     let coarse = found.readings.or(found.timer.filter(|timer| *timer >= 5.0));
     if let Some(interval) = coarse {

@@ -1,7 +1,7 @@
 //! `palpate probe fit` and `palpate capture --probe`, as a user calls them.
 
 use crate::fixtures::CROOKED;
-use crate::{Folder, complains, fails, figures, palpate, read, says, shapes, succeeds};
+use crate::{fails, figures, read, says, succeeds};
 use serde_json::Value;
 use std::fs;
 
@@ -37,22 +37,8 @@ fn a_crooked_probe_is_fitted_and_touches_are_captured_as_it_gives_them() {
     assert_eq!(figures(at, evaluate)["accuracy"], with_probe["accuracy"]);
     let expected = "true.toml and the data set state different probes: [real]: ";
     fails(at, "evaluate ensemble.json touches --probe true.toml", 1, expected);
-}
-
-#[test]
-fn recordings_that_look_wrong_are_named_and_nothing_is_written() {
-    let at = &Folder::new();
-    shapes(at);
-    succeeds(at, "capture meshes -o recorded --seed 5 --approaches 150");
-    fs::copy(at.join("recorded/cigar.txt"), at.join("recorded/disc.txt")).unwrap();
-    fs::remove_file(at.join("recorded/dataset.json")).unwrap();
-    let fit = "probe fit recorded meshes -o fitted.toml --approaches 12000";
-    complains(palpate(at, fit), fit, 1, "disc: these look like touches of the cigar … Nothing was written");
-    assert!(!at.join("fitted.toml").exists());
-    succeeds(at, &format!("{fit} --force"));
-    assert!(fs::read_to_string(at.join("fitted.toml")).unwrap().contains("# LOOKS WRONG: disc: "));
-    let expected = "disc was recorded, but is not among the objects";
-    fails(at, "probe fit recorded meshes/ball.obj meshes/cigar.obj -o fitted.toml", 1, expected);
+    let expected = "mouse was recorded, but is not among the objects: bowl";
+    fails(at, "probe fit recorded meshes/bowl.obj -o other.toml", 1, expected);
 }
 
 #[test]

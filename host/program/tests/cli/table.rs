@@ -49,6 +49,4 @@ fn a_probe_over_a_table_is_fitted_from_objects_that_stand_on_it() {
     let speed = said.lines().find_map(|line| line.strip_prefix("speed over nominal")).unwrap();
     let speed: f64 = speed.split_whitespace().next().unwrap().parse().unwrap();
     assert!((speed - 1.0).abs() < 0.05, "{said}");
-    // Densities of so few are too coarse to find touches of other objects.
-    assert!(said.contains("fewer than 12,000 approaches to each object were simulated: brick/"), "{said}");
 }
