@@ -27,7 +27,7 @@ static RECEIVED: Ring = Ring([const { AtomicU8::new(0) }; WAITING]);
 static SENT: [AtomicU8; 64] = [const { AtomicU8::new(0) }; 64];
 
 /// Bytes that have come.
-pub struct Line {
+pub(crate) struct Line {
     channel: Channel<CH0>,
     /// Place in the ring of the first byte that nobody has taken.
     taken: usize,
@@ -36,13 +36,13 @@ pub struct Line {
 }
 
 /// The way out.
-pub struct Sender(Channel<CH1>);
+pub(crate) struct Sender(Channel<CH1>);
 
 /// The interrupt of a frame that has left, or of a ring that was written for 2³² bytes.
-pub const INTERRUPT: pac::Interrupt = pac::Interrupt::DMA_IRQ_0;
+pub(crate) const INTERRUPT: pac::Interrupt = pac::Interrupt::DMA_IRQ_0;
 
 /// Begins to listen. The UART goes on without its owner.
-pub fn open(_: Uart, dma: pac::DMA, resets: &mut pac::RESETS) -> (Line, Sender) {
+pub(crate) fn open(_: Uart, dma: pac::DMA, resets: &mut pac::RESETS) -> (Line, Sender) {
     let channels = dma.split(resets);
     let (mut line, mut sender) = (Line { channel: channels.ch0, taken: 0, heard: None }, Sender(channels.ch1));
     line.channel.enable_irq0();
@@ -93,7 +93,7 @@ impl Line {
     }
 
     /// Takes a byte.
-    pub fn pop(&mut self) -> Option<u8> {
+    pub(crate) fn pop(&mut self) -> Option<u8> {
         if self.is_empty() {
             return None;
         }
@@ -103,12 +103,12 @@ impl Line {
     }
 
     /// True if no byte waits.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.taken == self.end()
     }
 
     /// Returns how many of `wait` microseconds the chip may sleep from `now`: until the next look, while the line is not quiet.
-    pub fn longest_sleep(&mut self, wait: u32, now: u32) -> u32 {
+    pub(crate) fn longest_sleep(&mut self, wait: u32, now: u32) -> u32 {
         let Some((heard, since)) = self.heard else { return wait };
         let end = self.end();
         if heard != end {
@@ -123,7 +123,7 @@ impl Line {
 
     /// A byte begins: looks follow, since its further edges would all wake the chip.
     #[allow(unsafe_code)] // See `watch_edge`.
-    pub fn edge(&mut self, now: u32) {
+    pub(crate) fn edge(&mut self, now: u32) {
         // SAFETY: a bit of a pin that is nobody's but the UART's.
         let has_edge = unsafe { (*pac::IO_BANK0::ptr()).proc0_ints(0).read().bits() } & EDGE != 0;
         if has_edge {
@@ -146,7 +146,7 @@ impl Line {
 
 impl Sender {
     /// Sleeps until the frame before has left, and starts this one.
-    pub fn send(&mut self, frame: &[u8]) {
+    pub(crate) fn send(&mut self, frame: &[u8]) {
         for part in frame.chunks(SENT.len()) {
             self.wait();
             part.iter().zip(&SENT).for_each(|(byte, to)| to.store(*byte, Ordering::Release));

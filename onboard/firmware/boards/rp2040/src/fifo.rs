@@ -7,47 +7,47 @@ use heapless::Deque;
 use rp2040_hal as hal;
 
 /// Bytes that have come.
-pub struct Line {
+pub(crate) struct Line {
     reader: Reader<UART0, Wires>,
     received: Deque<u8, WAITING>,
 }
 
 /// The way out.
-pub struct Sender(Writer<UART0, Wires>);
+pub(crate) struct Sender(Writer<UART0, Wires>);
 
 /// Begins to listen.
-pub fn open(uart: Uart, _: pac::DMA, _: &mut pac::RESETS) -> (Line, Sender) {
+pub(crate) fn open(uart: Uart, _: pac::DMA, _: &mut pac::RESETS) -> (Line, Sender) {
     let (mut reader, writer) = uart.split();
     reader.enable_rx_interrupt();
     (Line { reader, received: Deque::new() }, Sender(writer))
 }
 
 /// The interrupt of bytes that have come.
-pub const INTERRUPT: pac::Interrupt = pac::Interrupt::UART0_IRQ;
+pub(crate) const INTERRUPT: pac::Interrupt = pac::Interrupt::UART0_IRQ;
 
 impl Line {
     /// Takes a byte.
-    pub fn pop(&mut self) -> Option<u8> {
+    pub(crate) fn pop(&mut self) -> Option<u8> {
         self.received.pop_front()
     }
 
     /// True if no byte waits.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.received.is_empty()
     }
 
     /// Returns how many of `wait` microseconds the chip may sleep: all, since bytes wake it.
-    pub fn longest_sleep(&mut self, wait: u32, _: u32) -> u32 {
+    pub(crate) fn longest_sleep(&mut self, wait: u32, _: u32) -> u32 {
         wait
     }
 
     /// Does nothing: no edge of this wire has an interrupt.
-    pub fn edge(&mut self, _: u32) {}
+    pub(crate) fn edge(&mut self, _: u32) {}
 }
 
 impl Sender {
     /// Waits until the last bytes are in the FIFO.
-    pub fn send(&mut self, frame: &[u8]) {
+    pub(crate) fn send(&mut self, frame: &[u8]) {
         self.0.write_full_blocking(frame);
     }
 }

@@ -14,11 +14,11 @@ const MAPPED: usize = 0x1000_0000;
 const PAGE: usize = 256;
 
 /// The part of the flash behind the program. There is one.
-pub struct Flash(());
+pub(crate) struct Flash(());
 
 impl Flash {
     /// Takes it, once.
-    pub fn take() -> Option<Self> {
+    pub(crate) fn take() -> Option<Self> {
         cortex_m::singleton!(: () = ()).map(|()| Self(()))
     }
 }

@@ -17,17 +17,17 @@ use rp2040_hal as hal;
 /// A switch to ground.
 type Switch<G> = Pin<G, FunctionSioInput, PullUp>;
 /// The three switches.
-pub type Switches = (Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>);
+pub(crate) type Switches = (Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>);
 /// The signal that no approach is under way, to ground: from the robot's controller, or a button.
-pub type Over = Switch<Gpio5>;
+pub(crate) type Over = Switch<Gpio5>;
 /// The link's wires.
-pub type Wires = (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>);
+pub(crate) type Wires = (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>);
 
 /// The UART on them.
-pub type Uart = UartPeripheral<Enabled, UART0, Wires>;
+pub(crate) type Uart = UartPeripheral<Enabled, UART0, Wires>;
 
 /// Bytes that may wait for the main loop: everything that a host sends without an answer, 8 commands and a question.
-pub const WAITING: usize = 2048;
+pub(crate) const WAITING: usize = 2048;
 
 /// The chip's microsecond timer.
 #[derive(Clone, Copy)]
@@ -39,7 +39,7 @@ impl Clock for Micros {
     }
 }
 
-pub struct Shared {
+pub(crate) struct Shared {
     watcher: Watcher<Switch<Gpio2>, Switch<Gpio3>, Switch<Gpio4>>,
     over: Over,
     /// The signal as the main loop has last seen it.
@@ -52,7 +52,7 @@ pub struct Shared {
 static SHARED: Mutex<RefCell<Option<Shared>>> = Mutex::new(RefCell::new(None));
 
 /// Does something with what is shared, with interrupts held back.
-pub fn with<T>(act: impl FnOnce(&mut Shared) -> T) -> Option<T> {
+pub(crate) fn with<T>(act: impl FnOnce(&mut Shared) -> T) -> Option<T> {
     critical_section::with(|cs| within(cs, act))
 }
 
@@ -62,7 +62,7 @@ fn within<T>(cs: CriticalSection<'_>, act: impl FnOnce(&mut Shared) -> T) -> Opt
 
 /// Begins to watch and to listen.
 #[allow(unsafe_code)]
-pub fn start(switches: Switches, over: Over, line: Line, mut alarm: Alarm0, timer: Timer) {
+pub(crate) fn start(switches: Switches, over: Over, line: Line, mut alarm: Alarm0, timer: Timer) {
     for kind in [Interrupt::EdgeLow, Interrupt::EdgeHigh] {
         over.set_interrupt_enabled(kind, true);
         switches.0.set_interrupt_enabled(kind, true);
@@ -82,12 +82,12 @@ pub fn start(switches: Switches, over: Over, line: Line, mut alarm: Alarm0, time
 }
 
 /// Returns the messages of the switches.
-pub fn sense() -> Sensed {
+pub(crate) fn sense() -> Sensed {
     with(|shared| shared.watcher.sense(&shared.clock)).unwrap_or(Sensed::Nothing(0))
 }
 
 /// True while the signal says that no approach is under way.
-pub fn is_over() -> bool {
+pub(crate) fn is_over() -> bool {
     with(|shared| {
         shared.was_over = shared.over.is_low().unwrap_or(false);
         shared.was_over
@@ -96,7 +96,7 @@ pub fn is_over() -> bool {
 }
 
 /// Reads bytes that the UART has received; returns their number.
-pub fn receive(buffer: &mut [u8]) -> usize {
+pub(crate) fn receive(buffer: &mut [u8]) -> usize {
     let mut count = 0;
     for slot in buffer {
         let Some(byte) = with(|shared| shared.line.pop()).flatten() else { break };
@@ -108,7 +108,7 @@ pub fn receive(buffer: &mut [u8]) -> usize {
 
 /// Does something with the flash, which nothing may read meanwhile. What the switches did is found afterwards, and not
 /// taken for a contact time.
-pub fn while_nobody_looks(act: impl FnOnce()) {
+pub(crate) fn while_nobody_looks(act: impl FnOnce()) {
     critical_section::with(|cs| {
         act();
         within(cs, |shared| shared.watcher.interrupt_late(&shared.clock));
@@ -116,7 +116,7 @@ pub fn while_nobody_looks(act: impl FnOnce()) {
 }
 
 /// Sleeps until an interrupt, or for as long as `wait` of [`ProbeStation`](palpate_onboard::station::ProbeStation) says.
-pub fn sleep(wait: impl FnOnce(u32) -> u32) {
+pub(crate) fn sleep(wait: impl FnOnce(u32) -> u32) {
     critical_section::with(|cs| {
         let busy = within(cs, |shared| {
             // Never so soon that the alarm is missed.
