@@ -1,6 +1,6 @@
 //! Imports that most tests need, and helpers for touches.
 
-pub(crate) use crate::repetitions::{assert_rare, repetitions};
+pub(crate) use crate::repetitions::repetitions;
 pub(crate) use palpate::compile::CompiledModel;
 pub(crate) use palpate::ensemble::{
     Ensemble, Inputs, Node, Output, OverTouches, Provenance, StatedProbe, TouchOrigin, Tree,
@@ -19,6 +19,21 @@ pub(crate) use palpate::with;
 pub(crate) use std::collections::BTreeMap;
 pub(crate) use std::path::Path;
 pub(crate) use std::sync::LazyLock;
+
+/// Asserts that what fails with a probability of at most `share` did not fail more often than that: a binomial test at 1 %.
+pub(crate) fn assert_rare(what: &str, failures: u64, repetitions: u64, share: f64) {
+    // Of 40 at most 6, of 200 at most 18, where the share is 5 %.
+    let (mut most, all) = (0, repetitions as f64);
+    let mut exactly = (1.0 - share).powf(all);
+    let mut at_most = exactly;
+    while at_most < 0.99 {
+        exactly *= (all - most as f64) / (most as f64 + 1.0) * share / (1.0 - share);
+        at_most += exactly;
+        most += 1;
+    }
+    println!("{what}: {failures} of {repetitions} failed; at most {most} may");
+    assert!(failures <= most, "{what}: {failures} of {repetitions} failed; at most {most} may");
+}
 
 /// The touches that `keep` says.
 pub(crate) fn filtered(object: &ObjectTouches, keep: impl Fn(&Touch) -> bool) -> ObjectTouches {
