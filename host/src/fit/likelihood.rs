@@ -11,14 +11,14 @@ const ODD: f64 = 0.004;
 
 /// Likelihood of one object's touches under a candidate.
 pub(super) struct Explained<'a> {
-    candidate: Hypothesis,
+    pub(super) candidate: Hypothesis,
     smoothed: super::density::Smoothed<'a>,
     shares: [f64; 8],
     /// The stroke: the recorded one as a time, and its effect on the simulated approaches.
     stroke: Option<Stroke>,
     /// The logarithm of the share of approaches that were recorded.
-    recorded: f64,
-    kept: Counted,
+    pub(super) recorded: f64,
+    pub(super) kept: Counted,
     /// [`product`] of each two sets of fingers.
     products: [[f64; 8]; 8],
 }
@@ -64,16 +64,16 @@ impl<'a> Explained<'a> {
     }
 
     /// [`product`] under this candidate.
-    fn product(&self, touched: u8, recorded: u8) -> f64 {
+    pub(super) fn product(&self, touched: u8, recorded: u8) -> f64 {
         self.products[usize::from(touched & FULL)][usize::from(recorded & FULL)]
     }
 
     /// The stroke as a time on the recording's clock, in milliseconds; none without one.
-    fn window(&self) -> Option<f64> {
+    pub(super) fn window(&self) -> Option<f64> {
         self.stroke.map(|stroke| stroke.window)
     }
 
-    /// The logarithm of the density of a touch.
+    /// The logarithm of the density of a touch in any pose.
     pub(super) fn log_density(&self, observed: &Observed) -> f64 {
         let Hypothesis { factor, late: [first, middle, third], .. } = self.candidate;
         let Observed { fingers, first: x, second: y, odd } = *observed;
@@ -127,7 +127,7 @@ impl<'a> Explained<'a> {
         (density * (1.0 - ODD) + ODD * odd / 8.0).ln() - self.recorded
     }
 
-    /// The logarithm of the likelihood of touches.
+    /// The logarithm of the likelihood of touches in any pose.
     pub(super) fn log_likelihood(&self, touches: &[Observed]) -> f64 {
         let few = self.few();
         let of = |touch: &Observed| few[usize::from(touch.fingers)].unwrap_or_else(|| self.log_density(touch));
@@ -145,7 +145,7 @@ impl<'a> Explained<'a> {
 }
 
 /// The probability that of the `touched` fingers these are `recorded` and the others missed their contact.
-fn product(touched: u8, recorded: u8, missed: &[f64; 3]) -> f64 {
+pub(super) fn product(touched: u8, recorded: u8, missed: &[f64; 3]) -> f64 {
     let of = |finger: usize| match (touched >> finger & 1, recorded >> finger & 1) {
         (0, _) => 1.0,
         (_, 0) => missed[finger],

@@ -5,9 +5,10 @@
 //! the nominal probe. The distortion of a candidate probe is then applied to the density of the simulated touches, which
 //! is cheap. The fit is the candidate under which the recorded touches are likeliest (maximum likelihood with a weak
 //! preference for probes with small errors, by Nelder–Mead from several starts). Full and partial touches count, and
-//! approaches that touched nothing; recorded poses make no difference. Intervals are those of 95 % by profile likelihood
-//! (Wilks' theorem), widened empirically, since the tables are simulated and smoothed. They do not cover deviations that
-//! the simulation does not know, such as a finger that is bent aside.
+//! approaches that touched nothing; if the pose was recorded, each touch is compared with approaches in its pose.
+//! Intervals are those of 95 % by profile likelihood (Wilks' theorem), widened empirically, since the tables are simulated
+//! and smoothed. They do not cover deviations that the simulation does not know, such as a finger that is
+//! bent aside.
 //!
 //! Only differences of contact times are recorded, so an offset that all three fingers share cannot be found, and changes
 //! nothing: offsets are relative to the first finger's.
@@ -42,6 +43,7 @@ mod likelihood;
 mod line;
 mod observed;
 mod outcome;
+mod posed;
 mod recording;
 #[cfg(test)]
 mod robots;
@@ -114,7 +116,7 @@ impl Evidence<'_> {
     /// The logarithm of the likelihood of the recordings and of the plate, with how usual the candidate is.
     fn log_likelihood(&self, candidate: &Hypothesis) -> f64 {
         let of = |(recording, object): (&Recording<'_>, &usize)| {
-            Explained::new(candidate, &self.objects[*object], recording.kept).log_likelihood(&recording.touches)
+            recording.log_likelihood(&Explained::new(candidate, &self.objects[*object], recording.kept))
         };
         let plate = self.plate.as_ref().map_or(0.0, |plate| plate.log_likelihood(candidate));
         self.recordings.iter().zip(&self.of).map(of).sum::<f64>() + plate + candidate.usual()
@@ -126,7 +128,7 @@ impl Evidence<'_> {
 /// placement are compared with that one, others with all of the object's by their weights; the table is a plate too.
 ///
 /// Equal recordings, objects and settings give equal fits on any number of threads. Cost: half a minute of a
-/// processor for ten meshes and 300 recorded approaches to four of them.
+/// processor for ten meshes and 300 recorded approaches to four of them, twice that where touches have poses.
 ///
 /// # Errors
 /// [`FitProblem::NotRecorded`] if a recorded object is not among the objects; [`FitProblem::FewRecorded`] for fewer than
@@ -154,10 +156,10 @@ pub fn fit(
     let rigid: Vec<&[Touch]> = rigid.iter().map(Vec::as_slice).collect();
     let stroke = stroke::stroke(recorded, &rigid, kept, &settings.origin.probe)?;
     let recordings: Vec<Recording<'_>> =
-        recorded.objects.iter().map(|own| Recording::new(&own.name, own.touches(), kept)).collect();
+        recorded.objects.iter().map(|own| Recording::without_poses(&own.name, own.touches(), kept)).collect();
     let pressed = plate.map(|touches| Plate::new(touches.iter().map(Observed::of)));
     let layer = layer::layer(&recordings, samples, pressed.as_ref(), stroke, progress)?;
-    let simulated = Simulated::new(&touched, layer, settings, progress)?;
+    let simulated = Simulated::new(touched, layer, settings, progress)?;
     let densities = simulated.densities(stroke);
     fit_to(&simulated, &densities, stroke, recorded, plate, settings, progress)
 }
@@ -184,12 +186,15 @@ fn fit_to(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
-    let layer = &simulated.layer;
+    let Simulated { touched, layer, .. } = simulated;
     let place = |own: &ObjectTouches| place(&own.name, objects.iter().map(|own| own.name.as_str()));
     let of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
     let kept = kept(recorded);
-    let recordings: Vec<Recording<'_>> =
-        recorded.objects.iter().map(|own| Recording::new(&own.name, own.touches(), kept)).collect();
+    let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
+        in_poses: posed::in_poses(&own.name, own.touches(), &touched[object], &layer.real, settings),
+        ..Recording::without_poses(&own.name, own.touches(), kept)
+    });
+    let recordings: Vec<Recording<'_>> = recordings.collect();
     let evidence = Evidence {
         recordings: &recordings,
         objects,
@@ -241,11 +246,12 @@ fn scenes(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> R
 /// Each object, touched by the nominal probe, with a hand that goes on past it; fingers may bend.
 struct Simulated {
     touches: Vec<ObjectTouches>,
+    touched: Vec<Touched>,
     layer: Layer,
 }
 
 impl Simulated {
-    fn new(touched: &[Touched], layer: Layer, settings: &Settings, progress: &dyn Progress) -> Result<Self> {
+    fn new(touched: Vec<Touched>, layer: Layer, settings: &Settings, progress: &dyn Progress) -> Result<Self> {
         // What the hand does not reach is left out later, when a candidate says how fast it is.
         let probe = with!(settings.origin.probe, stroke = None, stroke_tolerance = None);
         let (touches, seed) = (settings.approaches, settings.seed);
@@ -258,7 +264,7 @@ impl Simulated {
             Ok(if is_weighed { touches.as_often_as_placed() } else { touches })
         };
         let touches = touched.iter().map(one).collect::<Result<_>>()?;
-        Ok(Self { touches, layer })
+        Ok(Self { touches, touched, layer })
     }
 
     /// The densities of the touches where the recordings have this stroke.

@@ -27,7 +27,11 @@ pub(super) const OUTER: u8 = 0b101;
 
 impl Observed {
     pub(super) fn of(touch: &Touch) -> Self {
-        let times = touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e3));
+        Self::of_times(touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e3)))
+    }
+
+    /// Observation from contact times on any common clock, in milliseconds.
+    pub(super) fn of_times(times: [Option<f64>; 3]) -> Self {
         let (fingers, first, second) = match times {
             [Some(a), Some(b), Some(c)] => (FULL, a - 2.0 * b + c, c - a),
             [Some(a), Some(b), None] => (0b011, b - a, 0.0),

@@ -41,7 +41,7 @@ impl Bench {
     fn fitted(&self, recorded: &Dataset, plate: Option<&[Touch]>, held: &Dataset) -> (Best, Vec<f64>) {
         let (of, kept) = (self.of(recorded), kept(recorded));
         let recordings: Vec<Recording<'_>> =
-            recorded.objects.iter().map(|own| Recording::new(&own.name, own.touches(), kept)).collect();
+            recorded.objects.iter().map(|own| Recording::without_poses(&own.name, own.touches(), kept)).collect();
         let evidence = Evidence {
             recordings: &recordings,
             objects: &self.densities,
@@ -76,7 +76,7 @@ fn a_plate_makes_no_fit_to_compliant_robots_worse() {
     let objects = source::objects(&[shared.join("objects").to_str().unwrap().into()]).unwrap();
     let scenes = scenes(&objects, &settings, &()).unwrap();
     let touched = touched::touched(&objects, scenes, &Dataset::default());
-    let simulated = Simulated::new(&touched, Layer::default(), &settings, &()).unwrap();
+    let simulated = Simulated::new(touched, Layer::default(), &settings, &()).unwrap();
     let densities = simulated.densities(Stroke::default());
     drop(simulated);
     let bench = Bench { objects, densities };

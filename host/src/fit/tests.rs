@@ -7,7 +7,7 @@ use crate::probe::approach::Probe;
 use crate::probe::noise::Grazing;
 use crate::touches::{ObjectTouches, Recorded, Source, Surroundings};
 use crate::with;
-use palpate_shared::{ContactTime, Pose};
+use palpate_shared::ContactTime;
 use std::sync::LazyLock;
 
 /// Faults of a probe. Times are in milliseconds.
@@ -102,7 +102,7 @@ static SIMULATED: LazyLock<(Simulated, Vec<Densities>)> = LazyLock::new(|| {
     let (objects, settings) = (objects(), settings());
     let scenes = scenes(&objects, &settings, &()).unwrap();
     let touched = touched::touched(&objects, scenes, &Dataset::default());
-    let simulated = Simulated::new(&touched, Layer::default(), &settings, &()).unwrap();
+    let simulated = Simulated::new(touched, Layer::default(), &settings, &()).unwrap();
     let densities = simulated.densities(Stroke::default());
     (simulated, densities)
 });
@@ -195,11 +195,26 @@ fn without_a_plate_curvature_is_told_and_the_slope_hardly() {
     assert!(asked.record.contains("flat plate"), "{asked}");
 }
 
+/// Touches of the bent probe with their poses.
+fn posed() -> Dataset {
+    let mut posed = recorded(&objects(), 250, 2, &BENT);
+    let origin = Origin { approaches: true, seed: 1_002, ..Origin::default() };
+    for (own, object) in posed.objects.iter_mut().zip(&objects()) {
+        let scenes = capture::scenes(&[object], &origin, &()).unwrap();
+        let poses = capture::touches(&scenes[0], &object.name, &origin, 0..250).unwrap();
+        let with = |(touch, posed): (&Touch, &Touch)| touch.with_pose(posed.pose().unwrap());
+        own.edit(|touches| *touches = touches.iter().zip(poses.touches()).map(with).collect());
+    }
+    posed
+}
+
 #[test]
-fn recorded_poses_make_no_difference() {
-    let pose = Pose { direction: [0, 0, -32_767], alignment: [32_767, 0, 0] };
-    let posed = RECORDED.each(|own| own.changed(|touch| touch.with_pose(pose)));
-    assert_eq!(fitted(&posed, Some(&PLATE)), *FOUND);
+fn recorded_poses_tell_the_slope_as_well() {
+    let plain = fitted(&recorded(&objects(), 250, 2, &BENT), None);
+    let found = fitted(&posed(), None);
+    near(&found, &BENT, [0.06, 3.0, 0.5]);
+    let width = |fit: &Fit| fit.late[1].width().unwrap();
+    assert!(width(&found) < 0.6 * width(&plain), "{:?} {:?}", found.late, plain.late);
 }
 
 #[test]
@@ -360,7 +375,8 @@ fn a_stated_stroke_is_kept_and_recordings_of_another_are_refused_with_both() {
 }
 
 #[test]
-fn full_touches_of_a_short_stroke_are_fitted_as_well() {
+fn full_touches_and_poses_of_a_short_stroke_are_fitted_as_well() {
+    near(&fitted(&stopped(&posed(), 250), None), &BENT, [0.06, 3.0, 0.5]);
     let mut full = stopped(&recorded(&objects(), 900, 10, &BENT), 250);
     full.objects.iter_mut().for_each(|object| *object = object.filtered(Touch::is_full));
     let found = fitted(&full, None);

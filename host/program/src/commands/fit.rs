@@ -34,7 +34,7 @@ enum Command {
 #[command(after_help = "\
 RECORDED is a data set that your probe made, of objects whose meshes you have, matched by their names. The probe that explains the recorded touches best is written: how fast it really is, how late each finger touches, its noise, what it misses, its timer. `palpate capture --probe probe.toml` then gives touches as it would.
 
-A few hundred approaches to three or four objects are enough. Presses on a flat plate, with half a turn of the probe after each, determine offsets better than any object, and nothing else: one line per press, in a file for --plate. Poses of touches make no difference.
+A few hundred approaches to three or four objects are enough. Presses on a flat plate, with half a turn of the probe after each, determine offsets better than any object, and nothing else: one line per press, in a file for --plate.
 
 Without SOURCE, RECORDED is a file of presses on the bare table by a hand that states its position: 20 of them beside the object, straight down, with half a turn of the hand after each. The height of the table and the offsets of the outer fingertips are printed, and the probe is written with them. It needs --probe in millimeters.
 
