@@ -11,7 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
     match Listing::parse(bytes, &Listing::path(directory)) {
         Ok(listing) => {
             for entry in &listing.objects {
-                let file = entry.file(directory, listing.origin.format);
+                let file = entry.file(directory);
                 assert_eq!(file.parent(), Some(directory), "{}", file.display());
             }
             let text = serde_json::to_vec(&listing).expect("a listing is JSON");
