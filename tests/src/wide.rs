@@ -3,7 +3,7 @@
 use crate::abuse::{places, sealed};
 use palpate_shared::format::{Axis, Columns, Layout};
 
-/// The same trees with wide splits.
+/// A compact model's trees with wide splits.
 ///
 /// # Panics
 /// If it is no compact model.

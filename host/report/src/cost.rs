@@ -29,7 +29,7 @@ pub(super) struct Member {
     pub(super) leaf: String,
     /// Size.
     pub(super) bytes: usize,
-    /// The same trees as C code, if their leaves are integers.
+    /// Trees as C code, if their leaves are integers.
     pub(super) code: Option<Code>,
     /// Nanoseconds per touch on this machine.
     pub(super) nanoseconds: f64,

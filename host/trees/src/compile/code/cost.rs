@@ -2,8 +2,8 @@
 //!
 //! The costs are fitted to what emulated chips count for code of arm-none-eabi-gcc at `-Os`: 194 models, from none to 15,000 splits,
 //! within 11 % on a Cortex-M4F and within 15 % on a Cortex-M0+. An ignored test of this folder compares them with other models.
-//! Where keys are compared, a compiler makes a comparison that comes again in a function only once, and leaves out most of those
-//! whose result follows from others.
+//! A compiler makes a comparison of keys that comes again in a function only once, and leaves out most of those whose result
+//! follows from others.
 
 use super::columns::{Column, Kind};
 use super::program::{CodeNode, CodeTree, Program};
@@ -87,7 +87,7 @@ const M0_PLUS: Costs = Costs {
 /// Keys of a function that stay in registers, about.
 const KEPT: usize = 7;
 
-/// Rows of which the mean is taken.
+/// Rows that an estimate is the mean over.
 const ROWS: usize = 100;
 
 /// Comparisons that a row has made in a function, and from them the least and the greatest rank that each column may have.
@@ -179,7 +179,7 @@ impl Program {
         self.on_each(|costs| walk.longest(costs))
     }
 
-    /// What all rows take, and `walk` of a row.
+    /// Instructions that all rows take, and those of `walk`.
     fn on_each(&self, walk: impl Fn(&Costs) -> f64) -> Instructions {
         let on = |costs| (self.fixed(costs) + walk(costs)).round() as u64;
         Instructions { m4f: on(&M4F), m0_plus: Some(on(&M0_PLUS)) }
@@ -244,7 +244,7 @@ impl<'p> Walk<'p> {
         sum
     }
 
-    /// The same where every tree takes its longest way, and every comparison that is not another one has to be made.
+    /// Instructions where every tree takes its longest way, and every comparison that is not another one has to be made.
     fn longest(&self, costs: &Costs) -> f64 {
         let mut sum = 0.0;
         for trees in &self.functions {
