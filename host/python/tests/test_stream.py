@@ -54,8 +54,8 @@ def test_a_promise_is_kept_on_fresh_sequences_by_models_of_every_kind(kind: int)
     ends = palpate.evaluate_sequences(sure.model, X, y, sequence=sequence)
     assert 0.02 < ends.error < 0.06 and ends.mean_rows < LENGTH, ends
     assert ends.raw["promise"]["finding"] != "broken"
-    # A forest's shares of votes are no log-probabilities: a table makes evidence of them.
-    assert sure.raw["row_evidence"]["kept"] or kind != 2
+    # A forest's shares of votes are no log-probabilities: a scale makes evidence of them.
+    assert sure.raw["scale"]["kept"] or kind != 2
 
 
 def test_the_recognizer_gives_the_verdicts_that_the_evaluation_counts() -> None:
