@@ -493,13 +493,27 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 }
                 model->table_ = content + 4;
             } else if (last == 13) {
-                /* The prediction: a link, a rule for ties, a scale that is positive and finite; a divisor that is not 0. */
-                if (!palpate_holds_(length, 8, 0, 0) || (PALPATE_BYTE(content) & 127) > 4 || PALPATE_BYTE(content + 1) > 1 ||
+                /* The prediction: a link, a rule for ties, a scale that is positive and finite; a divisor that is not 0; such a
+                 * scale and a finite offset for each output. */
+                if (!palpate_holds_(length, 8, 0, 0) || (PALPATE_BYTE(content) & 63) > 4 || PALPATE_BYTE(content + 1) > 1 ||
                     palpate_u32_(content + 4) - 1 >= 0x7f7fffffu) {
                     return PALPATE_FIELD;
                 }
                 if (PALPATE_BYTE(content) > 127 && (!palpate_holds_(length, 12, 0, 0) || palpate_u32_(content + 8) == 0)) {
                     return PALPATE_FIELD;
+                }
+                if ((PALPATE_BYTE(content) & 64) != 0) {
+                    uint32_t own = PALPATE_BYTE(content) > 127 ? 12 : 8;
+                    uint_fast16_t output;
+                    if (!palpate_holds_(length, own, model->objects, 8)) {
+                        return PALPATE_FIELD;
+                    }
+                    for (output = 0; output < model->objects; output++, own += 8) {
+                        if (palpate_u32_(content + own) - 1 >= 0x7f7fffffu ||
+                            (palpate_u32_(content + own + 4) & 0x7fffffffu) >= 0x7f800000u) {
+                            return PALPATE_FIELD;
+                        }
+                    }
                 }
             } else if (PALPATE_SENTINEL && last == 14) {
                 if (!palpate_holds_(length, 8, 0, 0) || palpate_i32_(content) > palpate_i32_(content + 4)) {
@@ -1959,18 +1973,25 @@ static inline float palpate_float_(uint32_t bits)
     return both.value;
 }
 
-/* A sum as an f32 value before the inverse link, times the scale that the model states. */
-static inline float palpate_raw_(const palpate_model *model, uint32_t sum)
+/* The sum of an output as an f32 value before the inverse link: times the scale that the model states, and with `whole` plus
+ * the output's offset. */
+static inline float palpate_raw_(const palpate_model *model, uint_fast16_t output, uint32_t sum, int whole)
 {
     const uint8_t *prediction = palpate_prediction_(model);
-    const float scale = palpate_float_(prediction == NULL ? 0x3f800000u : palpate_u32_(prediction + 4));
+    const uint8_t link = PALPATE_AS_(uint8_t, prediction == NULL ? 0 : PALPATE_BYTE(prediction));
+    const uint8_t *own = (link & 64) == 0 ? NULL : prediction + (link > 127 ? 12 : 8) + 8 * output;
     const float unit = palpate_float_(palpate_u32_(model->bytes + 32));
-    return PALPATE_IS_F32_(model) ? palpate_float_(sum) * scale : PALPATE_AS_(float, PALPATE_AS_(int32_t, sum)) * (unit * scale);
+    const float scale =
+        palpate_float_(own != NULL ? palpate_u32_(own) : prediction == NULL ? 0x3f800000u : palpate_u32_(prediction + 4));
+    /* Not to be added before it is rounded. */
+    const volatile float value =
+        PALPATE_IS_F32_(model) ? palpate_float_(sum) * scale : PALPATE_AS_(float, PALPATE_AS_(int32_t, sum)) * (unit * scale);
+    return own != NULL && whole ? value + palpate_float_(palpate_u32_(own + 4)) : value;
 }
 
 /* The value of a row of `count` features before the inverse link: the margin of a model with one output, times the scale
- * that the model states; 0 for a model with several outputs. The bits are the crate's if the compiler computes in f32
- * (no excess precision). */
+ * and plus the offset that the model states; 0 for a model with several outputs. The bits are the crate's if the compiler
+ * computes in f32 (no excess precision). */
 PALPATE_API float palpate_predict_raw(const palpate_model *model, const int32_t *features, uint16_t count)
 {
     uint32_t sum;
@@ -1978,7 +1999,7 @@ PALPATE_API float palpate_predict_raw(const palpate_model *model, const int32_t 
         return 0;
     }
     palpate_sum_(model, features, count, &sum);
-    return palpate_raw_(model, sum);
+    return palpate_raw_(model, 0, sum, 1);
 }
 
 /* e^x: within 1e-7 of the result. */
@@ -2041,7 +2062,7 @@ PALPATE_API float palpate_inverse_link(const palpate_model *model, float margin)
     if (link > 127) {
         margin /= PALPATE_AS_(float, palpate_u32_(prediction + 8));
     }
-    switch (link & 127) {
+    switch (link & 63) {
     case 1:
         if (margin >= 0) {
             return 1.0f / (1.0f + palpate_exp_(-margin));
@@ -2072,7 +2093,16 @@ static inline void palpate_values_of_(const palpate_model *model, const uint32_t
 {
     uint_fast16_t i;
     for (i = 0; i < model->objects; i++) {
-        values[i] = palpate_inverse_link(model, palpate_raw_(model, sums[i]));
+        values[i] = palpate_inverse_link(model, palpate_raw_(model, i, sums[i], 1));
+    }
+}
+
+/* The values of a row by its sums, without the offsets of outputs. */
+static inline void palpate_differences_of_(const palpate_model *model, const uint32_t *sums, float *values)
+{
+    uint_fast16_t i;
+    for (i = 0; i < model->objects; i++) {
+        values[i] = palpate_raw_(model, i, sums[i], 0);
     }
 }
 

@@ -10,8 +10,8 @@ use palpate::with;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
     Axis, Counted, Group, HEADER_LENGTH, Header, Length, Limits, Link, MUST_UNDERSTAND, MisfitTerms, ObjectMisfit,
-    Outputs, Plan, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, TrainedNoise, TrainedProbe,
-    TrainedTouches, checksum, write_section,
+    OutputScale, Outputs, Plan, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, TrainedNoise,
+    TrainedProbe, TrainedTouches, checksum, write_section,
 };
 use palpate_shared::{Descriptor, Patterns, Poses};
 
@@ -360,7 +360,7 @@ fn predictions(put: Put<'_>) {
         let mut content = Vec::new();
         let prediction =
             Prediction { link: Link::Exponential, last_of_ties: true, scale: 64.0, targets: false, average };
-        prediction.write(&mut |part| content.extend_from_slice(part));
+        prediction.write(&[], &mut |part| content.extend_from_slice(part));
         content
     };
     let prediction = content(1);
@@ -378,6 +378,15 @@ fn predictions(put: Put<'_>) {
     with("a scale of nothing", Tag::Prediction, &[&prediction[..4], &[0; 4]].concat());
     with("a mean of trees without their number", Tag::Prediction, &content(50)[..11]);
     with("a mean of no trees", Tag::Prediction, &[&content(50)[..8], &[0; 4]].concat());
+    let mut scaled = Vec::new();
+    let own = OutputScale { scale: 2.0, offset: 1.0 };
+    let outputs = usize::from(plain[14]) + 1;
+    Prediction::default().write(&vec![own; outputs], &mut |part| scaled.extend_from_slice(part));
+    let last = scaled.len() - OutputScale::LENGTH;
+    with("scales of fewer outputs than there are", Tag::Prediction, &scaled[..scaled.len() - 1]);
+    with("an output's scale of nothing", Tag::Prediction, &[&scaled[..last], &[0; 8]].concat());
+    let infinite = f32::NEG_INFINITY.to_le_bytes();
+    with("an offset that is no number", Tag::Prediction, &[&scaled[..last + 4], &infinite].concat());
     let sentinel = Sentinel { low: 1, high: 0 }.to_bytes();
     with("a sentinel that is too short", Tag::Sentinel, &sentinel[..7]);
     with("a sentinel that ends before it begins", Tag::Sentinel, &sentinel);
@@ -576,7 +585,8 @@ fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
     let guard = limits.to_bytes().repeat(usize::from(plain[15]) + 1);
     let mut prediction = Vec::new();
     let averaged = Prediction { link: Link::Identity, last_of_ties: true, scale: 0.5, targets: false, average: 5 };
-    averaged.write(&mut |part| prediction.extend_from_slice(part));
+    let own = OutputScale { scale: 0.5, offset: 1e9 };
+    averaged.write(&vec![own; objects], &mut |part| prediction.extend_from_slice(part));
     let sections = [
         (Tag::FeatureNames.code(), names.to_vec(), 0),
         (must(Tag::Prediction), prediction.clone(), prediction.len()),

@@ -6,8 +6,8 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-    Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, Outputs, Plan, Position, Prediction, Section, Sentinel,
-    Strangers, Tag, Temperature, Weights, f32_key, write_section,
+    Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, OutputScale, Outputs, Plan, Position, Prediction, Section,
+    Sentinel, Strangers, Tag, Temperature, Weights, f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::rngs::SmallRng;
@@ -76,8 +76,11 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
         let average = if last_of_ties { 1 } else { 7 };
         let prediction = Prediction { link, last_of_ties, scale, targets: false, average };
         let mut content = Vec::new();
-        prediction.write(&mut |part| content.extend_from_slice(part));
-        write_section(Tag::Prediction, scale != 1.0, &content, &mut put);
+        let count = if rng.random_bool(0.5) { objects } else { 0 };
+        let own = (0..count).map(|_| OutputScale { scale, offset: rng.random_range(-1e6..1e6) });
+        let scales: Vec<OutputScale> = own.collect();
+        prediction.write(&scales, &mut |part| content.extend_from_slice(part));
+        write_section(Tag::Prediction, scale != 1.0 || !scales.is_empty(), &content, &mut put);
     }
     if rng.random_bool(0.5) {
         let low = rng.random_range(-300..300);

@@ -90,9 +90,10 @@ impl Ensemble {
     /// where margins start; an empty name stands for a feature that has none. `link` is "identity", "logistic",
     /// "exponential", "square" or "softplus": what makes a value of a margin. With `last_of_ties` the last of several
     /// largest margins names the class, otherwise the first. With `targets` each output is a value, and none is a class.
-    /// `probability` is "softmax", "logistic", "shares" or "unknown": what makes probabilities of margins.
+    /// `probability` is "softmax", "logistic", "shares" or "unknown": what makes probabilities of margins. With `compares_f64`
+    /// the library compares values in f64, otherwise it rounds rows to f32 first.
     #[staticmethod]
-    #[pyo3(signature = (kind, features, base, trees, *, names=None, notes=Vec::new(), link="identity", last_of_ties=false, targets=false, probability="softmax"))]
+    #[pyo3(signature = (kind, features, base, trees, *, names=None, notes=Vec::new(), link="identity", last_of_ties=false, targets=false, probability="softmax", compares_f64=false))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn from_trees(
         py: Python<'_>,
@@ -106,6 +107,7 @@ impl Ensemble {
         last_of_ties: bool,
         targets: bool,
         probability: &str,
+        compares_f64: bool,
     ) -> Result<Self, Failure> {
         let found = Link::ALL.iter().copied().find(|known| known.name() == link);
         let link =
@@ -130,7 +132,8 @@ impl Ensemble {
             })
         };
         let trees = trees.into_iter().map(tree).collect::<PyResult<_>>()?;
-        let parts = Parts { kind, features, names: Vec::new(), base, trees, notes, prediction, probability };
+        let parts =
+            Parts { kind, features, names: Vec::new(), base, trees, notes, prediction, probability, compares_f64 };
         let ensemble = py.detach(|| parts.into_ensemble(names.as_deref())).map_err(Error::from)?;
         Ok(Self { ensemble: Arc::new(ensemble) })
     }
@@ -162,6 +165,8 @@ impl Ensemble {
         }
         if let Some(imported) = &mut ensemble.origin.imported {
             imported.thresholds.clear();
+            // Scalers compute in f64, whatever the trees do.
+            imported.compares_f64 = true;
         }
         Self { ensemble: Arc::new(ensemble) }
     }

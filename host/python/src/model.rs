@@ -296,7 +296,8 @@ impl Model {
         self.model().leaf_type().name()
     }
 
-    /// The largest possible difference of a margin from the full model's, in nats.
+    /// The largest possible difference of a margin from the full model's, in nats, or of a value's: of several targets that of
+    /// the one with the largest.
     #[getter]
     fn margin_error(&self) -> f32 {
         palpate::trees::verify::bound(self.model()) as f32
@@ -313,7 +314,8 @@ impl Model {
     ///
     /// A model over touches takes a data set, or rows of three contact times in seconds (NaN where a finger did not
     /// touch), with the probe's direction and alignment nine numbers. A model over features takes rows of those, NaN where
-    /// one is missing; with leaves as f32 its margins are an XGBoost model's own, bit for bit. Of a table (pandas, polars, pyarrow)
+    /// one is missing; with leaves as f32 its margins are an XGBoost model's own, bit for bit, and those of a regression with
+    /// other leaves have the digits that f32 values lack. Of a table (pandas, polars, pyarrow)
     /// the columns are found by their names, in any order and among others.
     #[pyo3(signature = (rows))]
     fn margins<'py>(slf: &Bound<'py, Self>, rows: Rows<'py>) -> Result<Output<'py, f64, Ix2>, Failure> {
@@ -470,6 +472,6 @@ pub(crate) fn compile(
     })?;
     let model = Model::of(compiled.bytes.clone())?;
     let settings = with!(settings, leaf = model.model().leaf_type());
-    let notes = notes(ensemble, settings.scales.as_deref());
+    let notes = [notes(ensemble, settings.scales.as_deref()), compiled.notes.clone()].concat();
     Ok(Model { notes, source: Some((Arc::clone(ensemble), settings, compiled)), ..model })
 }

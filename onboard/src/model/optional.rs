@@ -46,7 +46,7 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
                 stated.by_object |= HAS_SHARED_LEAVES;
                 SharedLeaves::from_bytes(content).is_some()
             }
-            _ if tag == Tag::Prediction.code() => Prediction::from_bytes(content).is_some(),
+            _ if tag == Tag::Prediction.code() => Prediction::from_bytes(content, model.objects()).is_some(),
             _ if cfg!(feature = "sentinel") && tag == Tag::Sentinel.code() => {
                 stated.by_object |= HAS_SENTINEL;
                 Sentinel::from_bytes(content).is_some()

@@ -2,7 +2,7 @@
 
 use super::Model;
 use crate::exponential::exp2_negative;
-use palpate_shared::format::{Link, Prediction, f32_key};
+use palpate_shared::format::{Link, OutputScale, Prediction, f32_key};
 
 impl Model<'_> {
     /// The class of a row: that with the largest margin, and of several the first, or the last where
@@ -35,43 +35,49 @@ impl Model<'_> {
         best
     }
 
-    /// The value of a row before the inverse link: the margin of a model with one output, times
-    /// [`Prediction::scale`]. `None` for a model with several outputs.
+    /// The value of a row before the inverse link: the margin of a model with one output, times the scale and plus the offset
+    /// that the model states. `None` for a model with several outputs.
     ///
     /// With f32 leaves it is the sum times the scale, rounded once; otherwise the margin as f32 times the product of
-    /// [`Model::unit`] and the scale as f32: three roundings, each of 2^-24 of the value at most.
+    /// [`Model::unit`] and the scale as f32: three roundings, each of 2^-24 of the value at most. An
+    /// [offset](OutputScale::offset) adds one, of 2^-24 of the result.
     ///
-    /// Cost: that of the margins, and three operations of floating point. Cannot fail otherwise.
+    /// Cost: that of the margins, and four operations of floating point. Cannot fail otherwise.
     pub fn predict_raw(&self, features: &[i32]) -> Option<f32> {
         if self.object_count() != 1 {
             return None;
         }
         let mut margin = [0];
         self.sum(features, &mut margin);
-        let ([margin], scale) = (margin, self.prediction().scale);
-        Some(if self.is_float() {
-            f32::from_bits(margin.cast_unsigned()) * scale
-        } else {
-            margin as f32 * (self.unit() * scale)
-        })
+        Some(self.raw(0, margin[0]))
     }
 
     /// The values of a row, one for each output, before the inverse link: of a model with several
     /// [targets](Prediction::targets), or of one output as [`Model::predict_raw`]. `room` has as many numbers as there are
     /// outputs; `false`, and nothing written, if it or `values` is shorter. `values` beyond them are left alone.
     ///
-    /// Cost: that of the margins, and three operations of floating point for each output. Cannot fail otherwise.
+    /// Cost: that of the margins, and four operations of floating point for each output. Cannot fail otherwise.
     pub fn predict_raw_each(&self, features: &[i32], room: &mut [i32], values: &mut [f32]) -> bool {
         let outputs = self.object_count();
         let (Some(sums), Some(values)) = (room.get_mut(..outputs), values.get_mut(..outputs)) else { return false };
         sums.fill(0);
         self.sum(features, sums);
-        let scale = self.prediction().scale;
-        let factor = self.unit() * scale;
-        for (value, sum) in values.iter_mut().zip(sums) {
-            *value = if self.is_float() { f32::from_bits(sum.cast_unsigned()) * scale } else { *sum as f32 * factor };
+        for (output, (value, sum)) in values.iter_mut().zip(sums).enumerate() {
+            *value = self.raw(output, *sum);
         }
         true
+    }
+
+    /// The sum of an output as a value before the inverse link.
+    fn raw(&self, output: usize, sum: i32) -> f32 {
+        let own = self.output_scale(output);
+        let scale = own.map_or_else(|| self.prediction().scale, |own| own.scale);
+        let value = if self.is_float() {
+            f32::from_bits(sum.cast_unsigned()) * scale
+        } else {
+            sum as f32 * (self.unit() * scale)
+        };
+        own.map_or(value, |own| value + own.offset)
     }
 
     /// Predicted values, as the library gives them: [`Model::predict_raw_each`] after the model's inverse link.
@@ -94,7 +100,15 @@ impl Model<'_> {
     ///
     /// Cost: a few instructions for each optional section.
     pub fn prediction(&self) -> Prediction {
-        Prediction::from_bytes(self.stated_prediction()).unwrap_or_default()
+        Prediction::from_bytes(self.stated_prediction(), self.object_count()).unwrap_or_default()
+    }
+
+    /// The scale and the offset of an output, if the model states them for each: all others have the
+    /// [scale](Prediction::scale) of [`Model::prediction`], and no offset.
+    ///
+    /// Cost: a few instructions for each optional section.
+    pub fn output_scale(&self, output: usize) -> Option<OutputScale> {
+        OutputScale::of(self.stated_prediction(), output)
     }
 }
 

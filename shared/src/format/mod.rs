@@ -27,7 +27,7 @@ pub use key::f32_key;
 pub use leaves::SharedLeaves;
 pub use outputs::Outputs;
 pub use plan::Plan;
-pub use prediction::{Link, Prediction, Sentinel};
+pub use prediction::{Link, OutputScale, Prediction, Sentinel};
 pub use promise::{OddsByObject, Promise, PromisedNoise, Temperature};
 pub use records::{Axis, Columns, Group};
 pub use sequences::{Fault, Guard, Limits, Position};

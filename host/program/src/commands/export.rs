@@ -8,7 +8,7 @@ use palpate::compile::{self, Compiled, CompiledModel, Instructions, Language, La
 use palpate::ensemble::{self, Ensemble, Inputs, TouchOrigin, train};
 use palpate::error::Error;
 use palpate::output;
-use palpate::rows::scales::{self, Effect, Merged};
+use palpate::rows::scales::{self, Effect, Single};
 use palpate::rows::{Rows, notes, warnings};
 use palpate::with;
 use palpate::wording::count;
@@ -118,9 +118,9 @@ struct Exported {
     /// The prediction of a model over rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     predicts: Option<Predicts>,
-    /// Features of which thresholds become the same in f32.
+    /// Features of which rows go another way in f32 than in the library.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    merged: Vec<Merged>,
+    in_f32: Vec<Single>,
     /// The kind of file, if another library wrote it.
     #[serde(skip_serializing_if = "Option::is_none")]
     imported: Option<String>,
@@ -204,10 +204,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         },
         classes: ensemble.objects.clone(),
         predicts: Predicts::of(&ensemble),
-        merged: if settings.scales.is_some() { Vec::new() } else { scales::merged(&ensemble) },
+        in_f32: if settings.scales.is_some() { Vec::new() } else { scales::singles(&ensemble) },
         imported: imported.map(|imported| imported.kind.clone()),
-        warnings: warnings(&ensemble, settings.scales.as_deref()),
-        notes: notes(&ensemble, settings.scales.as_deref()),
+        warnings: [warnings(&ensemble, settings.scales.as_deref()), compiled.notes.clone()].concat(),
+        notes: [notes(&ensemble, settings.scales.as_deref()), compiled.notes.clone()].concat(),
         scales: settings
             .scales
             .as_ref()

@@ -19,7 +19,7 @@ For a model of another library, DATA is a CSV file: every row goes through the m
 
 --prove needs no data: an independent reader of the model compares each tree with its trees in ENSEMBLE on every possible row, and a row of each of their leaves goes through the chip's own code. With DATA both are done.
 
-The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class, or predicts another value, where the stated rounding does not explain it.
+The exit code is 1 if a margin differs by more than the model states, or if the library puts a row into another class, or predicts another value, where the stated rounding does not explain it: for a value, one that is small against what the trees add up to.
 
 Examples:
   palpate verify model.palpate ensemble.json data
@@ -118,7 +118,7 @@ fn text(verified: &Verified) -> String {
         text += &match verified.library_max_value_error {
             Some(error) => format!(
                 "The library predicts values that differ by at most {error:.2e}; for {rows} rows by more than the rounding of \
-                 margins that the model states explains\n"
+                 margins that the model states explains, or by more than a thousandth of what its trees add up to\n"
             ),
             None => format!(
                 "The library predicts another class for {rows} rows; the rounding that the model states does not explain \
@@ -128,7 +128,7 @@ fn text(verified: &Verified) -> String {
     }
     if let Some((change, classes)) = verified.scaling {
         text += &format!(
-            "Measuring in whole numbers changes the rows' margins by at most {}, and the class of {}\n",
+            "Measuring in whole numbers, or in f32, changes the rows' margins by at most {}, and the class of {}\n",
             scientific(change),
             count(classes)
         );

@@ -193,7 +193,7 @@ class Ensemble:
         Reads the bytes of such a file. `notes` are facts about it that it does not state.
         """
     @staticmethod
-    def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ..., link: str = "identity", last_of_ties: bool = False, targets: bool = False, probability: str = "softmax") -> Ensemble:
+    def from_trees(kind: str, features: SupportsGetItem[int, str], base: SupportsGetItem[int, SupportsFloat | SupportsIndex], trees: SupportsGetItem[int, tuple[SupportsIndex | None, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]], *, names: SupportsGetItem[int, str] | None = None, notes: SupportsGetItem[int, str] = ..., link: str = "identity", last_of_ties: bool = False, targets: bool = False, probability: str = "softmax", compares_f64: bool = False) -> Ensemble:
         """
         An ensemble of trees in memory. Each tree is a tuple of columns with one entry per node: the output that its
         leaves are for (`None`: each leaf has a value for each output), the left child (where x <= threshold; negative in
@@ -201,7 +201,8 @@ class Ensemble:
         where margins start; an empty name stands for a feature that has none. `link` is "identity", "logistic",
         "exponential", "square" or "softplus": what makes a value of a margin. With `last_of_ties` the last of several
         largest margins names the class, otherwise the first. With `targets` each output is a value, and none is a class.
-        `probability` is "softmax", "logistic", "shares" or "unknown": what makes probabilities of margins.
+        `probability` is "softmax", "logistic", "shares" or "unknown": what makes probabilities of margins. With `compares_f64`
+        the library compares values in f64, otherwise it rounds rows to f32 first.
         """
     @staticmethod
     def load(path: str | PathLike[str], names: SupportsGetItem[int, str] | None = None, *, all_trees: bool = False, missing: SupportsFloat | SupportsIndex | None = None) -> Ensemble:

@@ -61,6 +61,7 @@ def read(model: Any, names: list[str] | None) -> Ensemble:
         last_of_ties=parts.last_of_ties,
         targets=parts.targets,
         probability=parts.probability,
+        compares_f64=kind.startswith("HistGradientBoosting"),
     )
 
 

@@ -174,8 +174,11 @@ pub struct Predicts {
     /// Function from a margin to a value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<&'static str>,
-    /// Factor from a margin of the model to the library's.
+    /// Factor from a margin of the model to the library's: the largest of the outputs'.
     pub scale: f32,
+    /// For each output of a regression its own factor and what is added after it; absent where nothing is.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub scales_and_offsets: Vec<[f32; 2]>,
     /// Number that a margin is divided by before the link; absent if that is 1.
     #[serde(skip_serializing_if = "is_one")]
     pub average: u32,
@@ -202,6 +205,9 @@ pub(super) fn predicts(model: &Model<'_>) -> Option<Predicts> {
         },
         link: is_value.then(|| prediction.link.name()),
         scale: prediction.scale,
+        scales_and_offsets: (0..model.object_count())
+            .filter_map(|output| model.output_scale(output).map(|own| [own.scale, own.offset]))
+            .collect(),
         average: prediction.average,
         last_of_ties: prediction.last_of_ties,
         missing: model.sentinel().map(|sentinel| [sentinel.low, sentinel.high]),

@@ -3,8 +3,9 @@
 
 use super::cost::has_sequences;
 use crate::ensemble::Probability;
+use crate::verify::bound_of;
 use palpate_onboard::Model;
-use palpate_shared::format::Key;
+use palpate_shared::format::{Key, Link};
 use std::fmt::Write as _;
 
 /// A model as C calls it.
@@ -161,21 +162,29 @@ impl Calls<'_> {
             );
         }
         let sums = self.sums();
-        let mut call = |about: &str, kind: &str, function: &str, more: &str, body: &str| {
+        let mut call = |about: &str, stated: &str, kind: &str, function: &str, more: &str, body: &str| {
             _ = write!(
                 text,
-                "/* {about} of a row of {features} features, {missing} where one is missing. {SAFE} */\n\
+                "/* {about} of a row of {features} features, {missing} where one is missing.{stated} {SAFE} */\n\
                  static inline {kind} {name}_{function}(const {row} *row{more})\n{{\n{body}}}\n\n"
             );
         };
-        if objects == 1 {
-            let body = format!(
-                "    float value;\n{sums}    palpate_values_of_(&{name}_opened_, sums, &value);\n    return value;\n"
-            );
-            call("The value", "float", "value", "", &body);
-        } else if self.model.prediction().targets {
-            let body = format!("{sums}    palpate_values_of_(&{name}_opened_, sums, values);\n");
-            call(&format!("The {objects} values"), "void", "values", ", float *values", &body);
+        if objects == 1 || self.model.prediction().targets {
+            let (about, kind, function, parameter) = match objects {
+                1 => ("The value".to_owned(), "float", "value", ""),
+                _ => (format!("The {objects} values"), "void", "values", ", float *values"),
+            };
+            let body = |of: &str| match objects {
+                1 => format!("    float value;\n{sums}    {of}(&{name}_opened_, sums, &value);\n    return value;\n"),
+                _ => format!("{sums}    {of}(&{name}_opened_, sums, values);\n"),
+            };
+            let (bounds, offsets) = self.of_values();
+            call(&about, &bounds, kind, function, parameter, &body("palpate_values_of_"));
+            if let Some(offsets) = offsets {
+                let function = format!("{function}_without_offset");
+                let about = format!("{about}, less {offsets},");
+                call(&about, &bounds, kind, &function, parameter, &body("palpate_differences_of_"));
+            }
         } else {
             let body = if self.is_code {
                 format!(
@@ -188,7 +197,7 @@ impl Calls<'_> {
                      return palpate_predict_class(&{name}_opened_, {keys}, {features}, margins, {objects});\n"
                 )
             };
-            call("The class", "int", "predict", "", &body);
+            call("The class", "", "int", "predict", "", &body);
             let body = match self.probability {
                 Probability::Unknown => return text,
                 Probability::Shares => format!("{sums}    palpate_values_of_(&{name}_opened_, sums, posteriors);\n"),
@@ -197,10 +206,29 @@ impl Calls<'_> {
                     format!("{sums}    palpate_posteriors_of_(&{name}_opened_, sums, {apart}, posteriors);\n")
                 }
             };
-            let about = format!("The {objects} probabilities, within {:.1e} of the library's,", self.bound());
-            call(&about, "void", "posteriors", ", float *posteriors", &body);
+            let of_f32 = if row == "float" { " for f32 values" } else { "" };
+            let about = format!("The {objects} probabilities, within {:.1e} of the library's{of_f32},", self.bound());
+            call(&about, "", "void", "posteriors", ", float *posteriors", &body);
         }
         text
+    }
+
+    /// A sentence on how close values are to the library's, and the offsets that they are without in another function, if there
+    /// are such and a value is a margin.
+    fn of_values(&self) -> (String, Option<String>) {
+        let prediction = self.model.prediction();
+        let outputs = 0..self.model.object_count();
+        let bounds = outputs.clone().map(|output| format!("{:.1e}", bound_of(self.model, output)));
+        let bounds = format!(" Margins are within {} of the library's", bounds.collect::<Vec<_>>().join(", "));
+        let offsets: Vec<f32> =
+            outputs.filter_map(|output| self.model.output_scale(output).map(|own| own.offset)).collect();
+        if offsets.is_empty() || prediction.link != Link::Identity || prediction.average != 1 {
+            return (bounds + ".", None);
+        }
+        let step = |offset: &f32| format!("{} near {offset}", offset.abs().next_up() - offset.abs());
+        let steps: Vec<String> = offsets.iter().map(step).collect();
+        let list: Vec<String> = offsets.iter().map(ToString::to_string).collect();
+        (format!("{bounds}; an f32 steps by {}.", steps.join(", ")), Some(list.join(", ")))
     }
 
     /// The farthest that a probability can be from the library's.

@@ -73,12 +73,26 @@ pub enum CompileProblem {
         /// See `of`.
         units: &'static str,
     },
-    /// Leaves are too large for their type.
-    #[error("the ensemble's leaves are too large for the model format")]
-    LeavesTooLarge,
-    /// There are more thresholds or splits than six bytes number.
-    #[error("the ensemble has more than 65,536 different thresholds, or a tree with more splits than that")]
-    TooManyThresholds,
+    /// Sums of leaves do not fit integers.
+    #[error("margins of {trees} trees are too large for sums of {leaf} leaves")]
+    LeavesTooLarge {
+        /// Trees.
+        trees: usize,
+        /// The leaves' type.
+        leaf: &'static str,
+    },
+    /// There are more thresholds than two bytes number.
+    #[error("the ensemble has {thresholds} different thresholds, and a model can have 65,536")]
+    TooManyThresholds {
+        /// Different thresholds.
+        thresholds: usize,
+    },
+    /// A tree has more splits than two bytes number.
+    #[error("the ensemble has a tree with {splits} splits, and a model's can have 65,535")]
+    TooManySplits {
+        /// Splits of the largest tree.
+        splits: usize,
+    },
     /// No code can be written of the trees.
     #[error(
         "the ensemble cannot become code: its leaves are f32 or beyond two bytes, or it has more thresholds than 256 columns hold"
@@ -130,10 +144,11 @@ impl Problem for CompileProblem {
                 );
             }
             Self::NoCode => "Choose leaves of i16 or i8, or a model with its trees.",
-            Self::TooManyThresholds => {
-                "Train fewer trees, or trees with fewer splits; or compare whole numbers (`export --scale`), which makes thresholds equal."
+            Self::TooManyThresholds { .. } => {
+                "Round the features to the sensor's resolution before training, or compare whole numbers (`export --scale`, in Python `scales`), which makes thresholds equal; or train fewer trees. Splits may be as many."
             }
-            Self::LeavesTooLarge => "Choose leaves of f32, or scale what was trained on.",
+            Self::TooManySplits { .. } => "Train with fewer leaves in a tree.",
+            Self::LeavesTooLarge { .. } => "Choose leaves of f32, or train fewer trees.",
             Self::TooLarge | Self::OverBudget { .. } => "Train fewer trees, or trees with fewer splits.",
             Self::NameTooLong { .. } => "Use names of at most 255 bytes.",
         }

@@ -1,6 +1,7 @@
 //! Lowers a forest, and writes it in preorder.
 
 use super::axes::{Axes, visit};
+use super::error::CompileProblem;
 use super::forest::Forest;
 use super::lowered::Lowered;
 use super::merge::{Merged, Source, merge};
@@ -9,6 +10,9 @@ use super::quantize::Scale;
 use super::share::share;
 use super::trees::{self, Leaves, Sections};
 use palpate_shared::format::{Layout, LeafType};
+
+/// The most different thresholds: two bytes number them.
+const MAX_THRESHOLDS: usize = 1 << 16;
 
 impl<'f> Lowered<'f> {
     /// Lowers a forest for leaves of one type; `None` where they do not fit it.
@@ -26,18 +30,31 @@ impl<'f> Lowered<'f> {
         trees.map(|&tree| self.sources[tree].clone()).collect()
     }
 
-    /// The layout that numbers the trees' columns, thresholds and splits; `None` if there are too many of these.
-    pub(super) fn layout(&self) -> Option<Layout> {
+    /// The layout that numbers the trees' columns, thresholds and splits.
+    ///
+    /// # Errors
+    /// [`CompileProblem`] that says of what there is too much.
+    pub(super) fn layout(&self) -> Result<Layout, CompileProblem> {
         let trees = &self.forest.trees;
-        let are_short = trees.iter().all(|tree| u16::try_from(tree.splits).is_ok());
-        if !are_short || u16::try_from(self.runs.len()).is_err() {
-            return None;
+        let splits = trees.iter().map(|tree| tree.splits).max().unwrap_or_default();
+        if u16::try_from(splits).is_err() {
+            return Err(CompileProblem::TooManySplits { splits });
+        }
+        if u16::try_from(self.runs.len()).is_err() {
+            return Err(CompileProblem::TooLarge);
         }
         // Columns and left subtrees are numbered in a byte.
         let mut is_narrow = self.axes.columns <= 256;
         trees.iter().for_each(|tree| visit(&tree.root, &mut |split| is_narrow &= split.left_splits <= 255));
-        let is_wide = || self.axes.cuts().len() <= 1 << 16;
-        if is_narrow { Some(Layout::Compact) } else { is_wide().then_some(Layout::Wide) }
+        if is_narrow {
+            return Ok(Layout::Compact);
+        }
+        let thresholds = self.axes.cuts().len();
+        if thresholds <= MAX_THRESHOLDS {
+            Ok(Layout::Wide)
+        } else {
+            Err(CompileProblem::TooManyThresholds { thresholds })
+        }
     }
 
     /// The trees in a layout, equal leaves once where that is smaller.

@@ -50,6 +50,7 @@ mod lower;
 mod lowered;
 mod merge;
 mod model;
+mod notes;
 mod parts;
 mod quantize;
 mod range;
@@ -78,6 +79,7 @@ use forest::Forest;
 use lowered::Lowered;
 use palpate_onboard::Stopping;
 use parts::Parts;
+use range::Held;
 
 /// Settings of compilation.
 #[derive(Clone, Debug, PartialEq)]
@@ -158,6 +160,8 @@ pub struct Compiled {
     pub code: Option<Program>,
     /// Rule that turns margins into the probabilities of the library that trained it.
     pub probability: Probability,
+    /// Notes for the user on how close a regression's values are to the library's, each a sentence.
+    pub notes: Vec<String>,
 }
 
 /// When recognizers stop.
@@ -180,25 +184,25 @@ pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
 /// written of, if that is asked for; [`Setting`](crate::error::Setting) for settings out of their ranges.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let original = ensemble;
-    let ensemble = &*range::scaled(ensemble);
+    let Held { ensemble, scales, rounding } = range::held(ensemble, settings.leaf);
+    let ensemble = &*ensemble;
     let stopping = stopping(settings.error_rate, settings.max_touches)?;
     let forest = Forest::new(ensemble, settings.scales.as_deref())?;
     write::check_sentinel(ensemble, settings)?;
-    let lowered = Lowered::new(&forest, settings.leaf).ok_or(CompileProblem::LeavesTooLarge)?;
+    let lowered = lowered(&forest, settings.leaf)?;
     let cells = Cells::new(&forest);
     let trees_error = rounding::margin_error(&forest, cells.as_ref(), settings.leaf, &lowered.rounding);
-    let rounding = ensemble.origin.imported.as_ref().map_or(0.0, |imported| imported.rounding);
     let scale = f64::from(ensemble.prediction().scale);
-    let margin_error = rounding::round_up(f64::from(trees_error) + rounding / scale);
+    let margin_error = rounding::round_up(f64::from(trees_error) + rounding);
     let (layout, parts, code) = if settings.code {
         let program = Program::new(&lowered, &stated(ensemble, settings)).ok_or(CompileProblem::NoCode)?;
         let parts = Parts { base: vec![0; forest.objects()], unit: lowered.scale.unit, ..Parts::default() };
         (Layout::Code, parts, Some(program))
     } else {
-        let layout = lowered.layout().ok_or(CompileProblem::TooManyThresholds)?;
+        let layout = lowered.layout()?;
         (layout, lowered.write(layout), None)
     };
-    let parts = Parts { margin_error, ..parts };
+    let parts = Parts { margin_error, scales, ..parts };
     let bytes = write::write(ensemble, write::hash(original), settings, &forest, stopping, layout, &parts)?;
     let model = model::open_any(&bytes)?;
     Ok(Compiled {
@@ -210,8 +214,15 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
         instructions: code.as_ref().map_or_else(|| Instructions::of_model(&model), Program::instructions),
         code,
         probability: original.origin.imported.as_ref().map(|imported| imported.probability).unwrap_or_default(),
+        notes: notes::of_values(original, &model, settings.leaf, rounding > f64::from(trees_error)),
         bytes,
     })
+}
+
+/// A forest lowered for leaves of one type.
+fn lowered<'f>(forest: &Forest<'f>, leaf: Leaf) -> Result<Lowered<'f>> {
+    let too_large = CompileProblem::LeavesTooLarge { trees: forest.trees.len(), leaf: leaf.name() };
+    Ok(Lowered::new(forest, leaf).ok_or(too_large)?)
 }
 
 /// Statements of the model that code depends on.
@@ -226,7 +237,7 @@ fn stated(ensemble: &Ensemble, settings: &Settings) -> Statements {
 /// Trees of the ensemble that each tree of a model with such leaves stands for, in the model's order. `scales` are those of
 /// features of rows that are whole numbers.
 pub(crate) fn order(ensemble: &Ensemble, leaf: Leaf, scales: Option<&[f32]>) -> Result<Vec<Source>> {
-    let ensemble = range::scaled(ensemble);
+    let ensemble = range::held(ensemble, leaf).ensemble;
     let forest = Forest::new(&ensemble, scales.filter(|_| ensemble.schema().is_none()))?;
-    Ok(Lowered::new(&forest, leaf).ok_or(CompileProblem::LeavesTooLarge)?.order())
+    Ok(lowered(&forest, leaf)?.order())
 }

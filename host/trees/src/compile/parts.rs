@@ -1,7 +1,7 @@
 //! The parts of a compiled model, before they are written.
 
 use super::container::OwnedSection;
-use palpate_shared::format::{Axis, Group, Tag};
+use palpate_shared::format::{Axis, Group, OutputScale, Tag};
 
 /// Parts of a forest.
 #[derive(Default)]
@@ -17,6 +17,8 @@ pub(super) struct Parts {
     pub(super) base: Vec<i32>,
     pub(super) unit: f32,
     pub(super) margin_error: f32,
+    /// The scale and the offset of each output, where leaves are centered.
+    pub(super) scales: Vec<OutputScale>,
 }
 
 impl Parts {

@@ -30,25 +30,33 @@ impl Scale {
         let Some(most) = most(leaf) else {
             return Some(Self { unit: F32_UNIT, shifts: vec![0; forest.trees.len()] });
         };
-        if let Some(exact) = Self::exact(forest, most) {
-            return Some(exact);
-        }
         let largest: Vec<f64> = forest.trees.iter().map(|tree| f64::from(tree.largest)).collect();
         let all = largest.iter().copied().fold(0.0, f64::max);
+        let base = forest.base.iter().map(|base| f64::from(base.abs())).fold(0.0, f64::max);
+        let fits = |scale: &Self| {
+            let range: f64 = scale.shifts.iter().map(|&shift| (most + 1.0) * f64::from(1_u32 << shift)).sum();
+            range + base / f64::from(scale.unit) < RANGE
+        };
+        if let Some(exact) = Self::exact(forest, most).filter(fits) {
+            return Some(exact);
+        }
         // From the finest unit to the coarsest, the first that some tree needs and whose sums stay in range.
         // Leaves too large for any of these take as many shifts as they need.
-        (0..=max_shift(leaf)).rev().chain(max_shift(leaf) + 1..=16).find_map(|shift| {
+        let finest = (0..=max_shift(leaf)).rev().chain(max_shift(leaf) + 1..=16).find_map(|shift| {
             let unit = unit_for(all, most * f64::from(1 << shift))?;
             let shifts: Vec<u8> = largest.iter().map(|&value| shift_for(value, most * f64::from(unit))).collect();
             let needed =
                 shift == 0 || shifts.contains(&0) || unit_for(all, most * f64::from(1 << (shift - 1))).is_none();
-            if !needed {
-                return None;
-            }
-            let range: f64 = shifts.iter().map(|&shift| (most + 1.0) * f64::from(1_u32 << shift)).sum();
-            let base = forest.base.iter().map(|base| f64::from(base.abs())).fold(0.0, f64::max) / f64::from(unit);
-            (range + base < RANGE).then_some(Self { unit, shifts })
-        })
+            Some(Self { unit, shifts }).filter(|scale| needed && fits(scale))
+        });
+        // Of a base that is far larger than the leaves, the unit that holds it.
+        let coarser = || {
+            let unit =
+                unit_for(all, most).into_iter().flat_map(|unit| (1..32).map(move |step| unit * f32::exp2(step as f32)));
+            let mut scales = unit.map(|unit| Self { unit, shifts: vec![0; largest.len()] });
+            scales.find(|scale| f64::from(scale.unit) <= MAX_UNIT && fits(scale))
+        };
+        finest.or_else(coarser)
     }
 
     /// A unit of which every leaf and every base margin is a whole multiple, if there is one that all leaves fit: then

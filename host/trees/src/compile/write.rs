@@ -9,7 +9,7 @@ use crate::error::{CompileProblem, Error, Result};
 use crate::rows::whole;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{
-    HeaderBuilder, Layout, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, f32_key,
+    HeaderBuilder, Layout, OutputScale, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, f32_key,
 };
 
 /// The model's bytes; `hash` is that of the ensemble as it was read.
@@ -48,12 +48,17 @@ pub(super) fn write(
         .with_cuts_length(count(parts.cuts.len())?)
         .with_nodes_length(count(parts.nodes.len())?)
         .with_leaves_length(count(parts.leaves.len())?);
-    let sections = sections(ensemble, settings, forest)?.into_iter().chain(parts.sections()).collect();
+    let sections = sections(ensemble, settings, forest, &parts.scales)?.into_iter().chain(parts.sections()).collect();
     Container { header, text: text(ensemble)?, sections, content: parts.content(&priors) }.bytes()
 }
 
 /// Sections that do not depend on the trees.
-fn sections(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Result<Vec<OwnedSection>> {
+fn sections(
+    ensemble: &Ensemble,
+    settings: &Settings,
+    forest: &Forest<'_>,
+    scales: &[OutputScale],
+) -> Result<Vec<OwnedSection>> {
     let mut sections = settings.stated.sections.clone();
     let mut put = |tag, must_understand, content| sections.push(OwnedSection::new(tag, must_understand, content));
     let origin = &ensemble.origin;
@@ -75,11 +80,11 @@ fn sections(ensemble: &Ensemble, settings: &Settings, forest: &Forest<'_>) -> Re
     let imported = origin.imported.as_ref();
     if let Some(imported) = imported.filter(|_| forest.schema.is_none()) {
         let prediction = imported.prediction;
-        if prediction != Prediction::default() {
+        if prediction != Prediction::default() || !scales.is_empty() {
             let mut content = Vec::new();
-            prediction.write(&mut |part| content.extend_from_slice(part));
+            prediction.write(scales, &mut |part| content.extend_from_slice(part));
             // Whoever does not know it would take scaled margins for values, or targets for classes.
-            put(Tag::Prediction, prediction.scale != 1.0 || prediction.targets, content);
+            put(Tag::Prediction, prediction.scale != 1.0 || prediction.targets || !scales.is_empty(), content);
         }
         if let Some(sentinel) = sentinel(ensemble, settings) {
             put(Tag::Sentinel, true, sentinel.to_bytes().to_vec());

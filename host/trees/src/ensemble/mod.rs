@@ -11,6 +11,7 @@ pub mod import;
 mod inputs;
 mod nodes;
 mod origin;
+mod values;
 mod xgboost;
 
 pub(crate) use check::check_leaf;
@@ -20,7 +21,8 @@ pub use error::{EnsembleProblem, NameProblem, TreeProblem};
 pub(crate) use inputs::computed;
 pub use inputs::{Inputs, Occurring, Schema};
 pub use nodes::Threshold;
-pub use origin::{Columns, Imported, Probability, Provenance};
+pub use origin::{Columns, Exact, Imported, Probability, Provenance};
+pub(crate) use values::TOLERATED;
 
 use palpate_shared::format::Prediction;
 use std::borrow::Cow;

@@ -33,6 +33,11 @@ impl Threshold {
         }
     }
 
+    /// True if a value goes left.
+    pub(crate) fn is_left(self, value: f64) -> bool {
+        value < self.value || self.inclusive && value == self.value
+    }
+
     /// True if all whole numbers of units are on one side: the other one is of missing and infinite values alone, as with
     /// CatBoost's border next to the least f32.
     pub(crate) fn is_beyond_all(self) -> bool {

@@ -40,6 +40,19 @@ pub struct Imported {
     /// Columns of the library's rows, where there are more than a model can have features: the ensemble has only those that
     /// its trees use.
     pub columns: Option<Columns>,
+    /// True if the library compares values in f64. One that rounds rows to f32 first goes the same way as a model does.
+    pub compares_f64: bool,
+    /// A regression's numbers as the library adds them in f64; none where it adds f32.
+    pub exact: Option<Exact>,
+}
+
+/// Numbers that a library adds in f64, before the [scale](Prediction::scale).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Exact {
+    /// Starting values of the margins.
+    pub base: Vec<f64>,
+    /// For each node of each tree the values of a leaf; none of a split.
+    pub leaves: Vec<Vec<Vec<f64>>>,
 }
 
 /// Rule that turns the margins of classes into the probabilities that a library predicts.

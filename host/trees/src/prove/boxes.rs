@@ -1,6 +1,7 @@
 //! Boxes of rows: for each feature an interval of keys, and whether a missing value is in it.
 
 use super::ProofProblem;
+use super::numbers::Numbers;
 use crate::ensemble::{Ensemble, Node, Output, Threshold};
 use palpate_shared::format::f32_key;
 
@@ -212,10 +213,9 @@ impl Keys {
 ///
 /// # Errors
 /// Errors of [`Tree::new`].
-pub(super) fn of_ensemble(ensemble: &Ensemble, keys: &Keys) -> Result<Vec<Tree>, ProofProblem> {
-    let scale = f64::from(ensemble.prediction().scale);
+pub(super) fn of_ensemble(ensemble: &Ensemble, numbers: &Numbers<'_>, keys: &Keys) -> Result<Vec<Tree>, ProofProblem> {
     let step = |number: usize, index: usize, node: &Node| match node {
-        Node::Leaf(values) => Step::Leaf(values.iter().map(|&value| f64::from(value) * scale).collect()),
+        Node::Leaf(_) => Step::Leaf(numbers.leaf(number, index)),
         &Node::Split { feature, threshold, missing_left, left, right } => {
             let own = ensemble.threshold(number, index).unwrap_or(Threshold::below(threshold.into()));
             let own = if *keys == Keys::Real { Threshold::below(threshold.into()) } else { own };

@@ -9,8 +9,7 @@ use crate::ensemble::Occurring;
 fn sums(subject: Subject<'_>, rows: &mut Rows) -> Vec<Span> {
     let Subject { sources, ensemble, .. } = subject;
     let scale = f64::from(ensemble.prediction().scale);
-    let start = |&base: &f32| Span::of(f64::from(base) * scale, 0.0);
-    let mut sums: Vec<Span> = ensemble.base_margins.iter().map(start).collect();
+    let mut sums: Vec<Span> = subject.base.iter().map(|&base| Span::of(base, 0.0)).collect();
     let add = |sum: f64, value: f64| f64::from((sum / scale) as f32 + (value / scale) as f32) * scale;
     for tree in sources {
         let values = if tree.object.is_some() { 1 } else { sums.len() };

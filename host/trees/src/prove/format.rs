@@ -16,9 +16,12 @@ pub(super) struct Plain {
     pub(super) feature_names: Vec<String>,
     /// Keys that count as missing.
     pub(super) sentinel: Option<[i64; 2]>,
-    /// Size of a unit in the library's margins, and of a margin of the trees.
+    /// Size of a unit in the library's margins, and of a margin of the trees: of outputs with a scale of their own in those of
+    /// the output with the largest.
     pub(super) unit: f64,
     pub(super) scale: f64,
+    /// The scale and the offset of each output, where they are stated.
+    pub(super) scales: Vec<[f64; 2]>,
     /// Code of the link, true if the last of several equal classes is predicted, and the divisor of a margin before the link.
     pub(super) link: (u8, bool, u32),
     /// True if outputs are targets, and none is a class.
@@ -154,6 +157,7 @@ struct Stated<'b> {
     shared: Option<(usize, &'b [u8])>,
     sentinel: Option<[i64; 2]>,
     scale: f64,
+    outputs: Vec<[f64; 2]>,
     link: (u8, bool, u32),
     targets: bool,
     scales: Vec<f32>,
@@ -161,11 +165,12 @@ struct Stated<'b> {
 }
 
 impl<'b> Stated<'b> {
-    fn read(mut sections: Bytes<'b>, features: usize) -> Result<Self, ProofProblem> {
+    fn read(mut sections: Bytes<'b>, features: usize, outputs: usize) -> Result<Self, ProofProblem> {
         let mut stated = Self {
             shared: None,
             sentinel: None,
             scale: 1.0,
+            outputs: Vec::new(),
             link: (0, false, 1),
             targets: false,
             scales: vec![1.0; features],
@@ -195,7 +200,10 @@ impl<'b> Stated<'b> {
                     content.take(1)?;
                     stated.scale = f64::from(content.float()?);
                     let average = if link >= 128 { content.number(4)? as u32 } else { 1 };
-                    stated.link = (link & 127, is_last, average);
+                    stated.link = (link & 63, is_last, average);
+                    for _ in 0..if link & 64 == 0 { 0 } else { outputs } {
+                        stated.outputs.push([content.float()?.into(), content.float()?.into()]);
+                    }
                 }
                 14 => stated.sentinel = Some([content.signed(4)?, content.signed(4)?]),
                 _ => {}
@@ -238,8 +246,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     text.text()?;
     // A name is empty where the text ends too early.
     let names = (0..objects).map(|_| text.text().unwrap_or_default()).collect();
-    let Stated { shared, sentinel, scale, link, targets, scales, feature_names } =
-        Stated::read(Bytes(rest.take(sections_length)?), features)?;
+    let Stated { shared, sentinel, scale, outputs, link, targets, scales, feature_names } =
+        Stated::read(Bytes(rest.take(sections_length)?), features, objects)?;
     let is_f32 = kind == 2;
     let leaves_of = Leaves { kind, unit: if is_f32 { scale } else { unit * scale }, shared };
     let base: Result<Vec<f64>, _> = (0..objects)
@@ -286,6 +294,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
         sentinel,
         unit: unit * scale,
         scale,
+        scales: outputs,
         link,
         targets,
         most: [127.0, 32767.0, 0.0].get(usize::from(kind)).copied().unwrap_or(0.0),

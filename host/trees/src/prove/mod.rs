@@ -15,6 +15,7 @@ mod boxes;
 mod cells;
 mod error;
 mod format;
+mod numbers;
 mod span;
 mod trees;
 
@@ -26,6 +27,7 @@ use crate::error::Result;
 use crate::rows::{Encoder, missing_text};
 use boxes::{Keys, Rows, Tree, Values, of_ensemble};
 use format::Plain;
+use numbers::Numbers;
 use palpate_onboard::Model;
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{LeafType, Link, f32_key};
@@ -80,8 +82,9 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble) -> Result<Proof> {
     let model = compile::open(bytes)?;
     let plain = format::read(bytes)?;
     statements(&plain, ensemble)?;
-    let sources = of_ensemble(ensemble, &plain.keys)?;
-    let subject = Subject { model, plain: &plain, sources: &sources, ensemble };
+    let numbers = Numbers::new(&plain, ensemble);
+    let (sources, base) = (of_ensemble(ensemble, &numbers, &plain.keys)?, numbers.base());
+    let subject = Subject { model, plain: &plain, sources: &sources, base: &base, ensemble };
     let found = trees::compare(subject, &plain.order(ensemble, model.leaf_type())?)?;
     let mut proof = subject.proof(&found);
     if proof.margin_error > proof.stated
@@ -96,8 +99,18 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble) -> Result<Proof> {
     Ok(proof)
 }
 
-/// For each tree of a model the trees of the ensemble that it should stand for, the size of a step of its leaves, and the
-/// values of the leaf that a row of keys reaches.
+/// The leaf of a model's tree that a row reaches.
+pub(crate) struct Reached {
+    /// Trees of the ensemble that it should stand for.
+    pub(crate) source: Source,
+    /// Size of a step of its leaves.
+    pub(crate) step: f64,
+    pub(crate) own: Vec<f64>,
+    /// Values that the trees of the ensemble add.
+    pub(crate) expected: Vec<f64>,
+}
+
+/// The leaves of a model's trees that a row of keys reaches; in a tree of the ensemble it reaches `node`.
 ///
 /// # Errors
 /// [`ProofProblem`] if the bytes cannot be read, or the model has another number of trees than it should.
@@ -105,20 +118,27 @@ pub(crate) fn leaves_at(
     model: &Model<'_>,
     ensemble: &Ensemble,
     row: &[i32],
-) -> Result<Vec<(Source, f64, Vec<f64>)>, ProofProblem> {
+    node: impl Fn(usize) -> usize,
+) -> Result<Vec<Reached>, ProofProblem> {
     let plain = format::read(model.bytes())?;
     let order = plain.order(ensemble, model.leaf_type())?;
     if order.len() != plain.trees.len() {
         return Err(ProofProblem::Trees { what: format!("{} and not {}", plain.trees.len(), order.len()) });
     }
+    let numbers = Numbers::new(&plain, ensemble);
     let mut row: Vec<Values> = row.iter().map(|key| plain.values(*key)).collect();
     let mut leaf = |(source, (tree, step)): (Source, &(Tree, f64))| {
-        let mut values = Vec::new();
+        let mut own = Vec::new();
         tree.leaves(&mut row, &mut |leaf, _| {
-            values = leaf.to_vec();
+            own = leaf.to_vec();
             Ok::<(), ProofProblem>(())
         })?;
-        Ok((source, *step, values))
+        let mut expected = vec![-f64::from(source.offset) * step; own.len()];
+        for &tree in &source.trees {
+            let values = numbers.leaf(tree, node(tree));
+            expected.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        }
+        Ok(Reached { source, step: *step, own, expected })
     };
     order.into_iter().zip(&plain.trees).map(&mut leaf).collect()
 }
@@ -170,6 +190,8 @@ struct Subject<'s> {
     plain: &'s Plain,
     /// The ensemble's trees, over the model's keys.
     sources: &'s [Tree],
+    /// The ensemble's base margins.
+    base: &'s [f64],
     ensemble: &'s Ensemble,
 }
 
@@ -177,6 +199,11 @@ impl Subject<'_> {
     fn proof(self, found: &Found) -> Proof {
         let Self { plain, ensemble, .. } = self;
         let largest = found.trees.iter().map(|tree| tree.error).fold(0.0, f64::max);
+        let range = |(output, (name, &[_, least, most])): (usize, (&String, &[f64; 3]))| {
+            let [scale, offset] = plain.scales.get(output).copied().unwrap_or([plain.scale, 0.0]);
+            let [least, most] = [least, most].map(|end| end * (scale / plain.scale) + offset);
+            (name.clone(), least, most)
+        };
         Proof {
             trees: found.trees.len(),
             ensemble_trees: ensemble.trees.len(),
@@ -184,12 +211,7 @@ impl Subject<'_> {
             largest_difference: largest,
             margin_error: found.outputs.iter().map(|[error, ..]| *error).fold(0.0, f64::max),
             stated: plain.stated,
-            ranges: plain
-                .names
-                .iter()
-                .zip(&found.outputs)
-                .map(|(name, &[_, least, most])| (name.clone(), least, most))
-                .collect(),
+            ranges: plain.names.iter().zip(&found.outputs).enumerate().map(range).collect(),
             splits: plain.trees.iter().map(|(tree, _)| tree.depth()).sum(),
             estimated: Instructions::of_longest_ways(&self.model),
             other_link: self.other_link(),
@@ -200,10 +222,9 @@ impl Subject<'_> {
     fn margins(&self, row: &[i32]) -> Vec<f64> {
         let count = self.plain.names.len();
         if self.plain.most == 0.0 {
-            let scale = f64::from(self.ensemble.prediction().scale);
             let mut margins = vec![0.0; count];
             self.model.f32_margins_of(row, &mut margins);
-            return margins.into_iter().map(|margin| f64::from(margin) * scale).collect();
+            return margins.into_iter().map(|margin| f64::from(margin) * self.plain.scale).collect();
         }
         let mut margins = vec![0; count];
         self.model.margins_of(row, &mut margins);

@@ -180,13 +180,15 @@ struct Sums {
 
 impl<'s> Totals<'s> {
     fn new(subject: Subject<'s>) -> Self {
-        let Subject { plain, ensemble, .. } = subject;
-        let scale = f64::from(ensemble.prediction().scale);
-        let sums = |(&base, &own): (&f64, &f32)| {
-            let own = f64::from(own) * scale;
-            Sums { error: 0.0, least: base, most: base, base: own, units: plain.steps(own, plain.rounded_to()) }
+        let Subject { plain, .. } = subject;
+        let sums = |(&base, &own): (&f64, &f64)| Sums {
+            error: 0.0,
+            least: base,
+            most: base,
+            base: own,
+            units: plain.steps(own, plain.rounded_to()),
         };
-        Self { subject, outputs: plain.base.iter().zip(&ensemble.base_margins).map(sums).collect() }
+        Self { subject, outputs: plain.base.iter().zip(subject.base).map(sums).collect() }
     }
 
     fn add(&mut self, object: Option<usize>, compared: &Compared, offset: f64) {

@@ -140,7 +140,7 @@ pub enum RowsProblem {
     },
     /// The library predicts another value.
     #[error(
-        "the library predicts other values for {rows} rows, and the rounding that the model states does not explain them: the first is row {}, of {} instead of {}",
+        "the library predicts other values for {rows} rows, farther away than the rounding that the model states, or than a thousandth of what its trees add up to: the first is row {}, of {} instead of {}",
         first.row, first.values[0], first.values[1]
     )]
     Value {
@@ -294,7 +294,7 @@ impl Problem for RowsProblem {
             Self::ValueRows { .. } => "Give one line for each row, without a header.",
             Self::ValueColumns { .. } | Self::ValueText { .. } => VALUES,
             Self::Value { .. } => {
-                "Check that the predictions are those of these rows, by the very model of this file; `--link` sets another link at export."
+                "Export with the leaves that `export` advises, if it notes how far values may be off; and check that the predictions are those of these rows, by the very model of this file. `--link` sets another link at export."
             }
             Self::NoColumn { .. } => "Name one of the columns in the header.",
             Self::Number { .. } => "Give a number, or leave the cell empty where the value is missing.",

@@ -25,26 +25,40 @@ pub struct Effect {
     pub values_are_whole: Option<bool>,
 }
 
-/// Thresholds of a feature that f32 cannot tell apart.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct Merged {
+/// Thresholds of a feature that the library compares in f64, and a model in f32.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Single {
     /// The feature's name.
     pub feature: String,
     /// Its different thresholds in the file.
     pub thresholds: usize,
     /// Number of these that stay different in f32.
     pub different: usize,
+    /// About which share of rows goes another way at one of them: half a step of f32 at each, over the range of all.
+    pub share: f64,
+    /// Units in 1 with which whole numbers part more values than f32 does, if the file's own thresholds are known.
+    pub scale: Option<f32>,
 }
 
-impl fmt::Display for Merged {
+/// The share of rows from which on a user is told.
+const NOTED: f64 = 1e-3;
+
+impl fmt::Display for Single {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { feature, thresholds, different } = self;
+        let Self { feature, thresholds, different, share, scale } = self;
         write!(
             f,
-            "{feature}: of {thresholds} thresholds {different} stay different in f32, so that values between the others go \
-             another way than in the library. A scale compares whole numbers instead (--scale {feature}=UNITS, in Python \
-             scales=)."
-        )
+            "{feature}: of {thresholds} thresholds {different} stay different in f32, and about 1 row in {:.0} goes another \
+             way than in the library, which compares f64. ",
+            (1.0 / share).max(1.0)
+        )?;
+        match scale {
+            Some(scale) => write!(
+                f,
+                "A scale compares whole numbers instead (--scale {feature}={scale}, in Python {scale} for it in scales=)."
+            ),
+            None => f.write_str("Subtract what its values have in common before training."),
+        }
     }
 }
 
@@ -77,15 +91,30 @@ fn thresholds(ensemble: &Ensemble, feature: usize) -> Vec<(Threshold, f32)> {
     thresholds
 }
 
-/// The features with thresholds that become the same in f32: values between those go another way than in the library.
-pub fn merged(ensemble: &Ensemble) -> Vec<Merged> {
+/// The features for which a share of rows worth a note goes another way than in a library that compares f64.
+pub fn singles(ensemble: &Ensemble) -> Vec<Single> {
     let names = ensemble.inputs.names();
-    let of_feature = names.into_iter().enumerate().map(|(feature, name)| {
-        let thresholds = thresholds(ensemble, feature);
+    let of_feature = names.into_iter().enumerate().filter_map(|(feature, name)| {
+        let mut thresholds = thresholds(ensemble, feature);
+        // Zeros that LightGBM takes as missing have thresholds of their own.
+        thresholds.retain(|(own, _)| !own.is_beyond_all() && own.value.abs() > 1e-30);
+        let [(first, _), .., (last, _)] = thresholds[..] else { return None };
+        let half = |(_, single): &(Threshold, f32)| f64::from(single.abs().next_up() - single.abs()) / 2.0;
+        let share = thresholds.iter().map(half).sum::<f64>() / (last.value - first.value);
         let different = thresholds.iter().map(|(_, single)| single.to_bits()).collect::<BTreeSet<_>>().len();
-        Merged { feature: name.into(), thresholds: thresholds.len(), different }
+        let is_known = ensemble.origin.imported.as_ref().is_some_and(|imported| !imported.thresholds.is_empty());
+        let scale = Some(mending(&thresholds)).filter(|_| is_known);
+        Some(Single { feature: name.into(), thresholds: thresholds.len(), different, share, scale })
     });
-    of_feature.filter(|merged| merged.different < merged.thresholds).collect()
+    of_feature.filter(|single| ensemble.compares_f64() && single.share >= NOTED).collect()
+}
+
+/// 1 where thresholds are whole or halfway between whole numbers, otherwise the largest power of ten with which they fit 32 bits.
+fn mending(thresholds: &[(Threshold, f32)]) -> f32 {
+    let values = || thresholds.iter().map(|(own, _)| own.value.abs());
+    let digits = (f64::from(i32::MAX) / values().fold(0.0, f64::max)).log10().floor();
+    let most = if values().all(|value| (2.0 * value).fract() == 0.0) { digits.min(0.0) } else { digits };
+    10.0_f64.powf(most) as f32
 }
 
 /// A threshold of a feature that is not a whole number, if there is one: such a feature needs a scale. Halves, which trainers

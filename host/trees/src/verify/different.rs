@@ -2,7 +2,7 @@
 
 use super::reference::Reference;
 use crate::ensemble::Ensemble;
-use crate::prove::leaves_at;
+use crate::prove::{Reached, leaves_at};
 use palpate_onboard::Model;
 
 /// The first tree, in the ensemble's order, whose leaf for this row differs between the model and the ensemble.
@@ -14,16 +14,11 @@ pub(super) fn first_different_tree(
     row: &[f64],
 ) -> Option<usize> {
     let encoded = reference.encoder.row(row);
-    // Share of a vote.
-    let scale = f64::from(ensemble.prediction().scale);
-    let leaves = leaves_at(model, ensemble, &encoded).ok()?;
-    let different = leaves.iter().filter_map(|(source, step, values)| {
-        let differs = values.iter().enumerate().any(|(value, own)| {
-            let leaf = |&tree: &usize| f64::from(reference.leaf(tree, row, &encoded)[value]) * scale;
-            let expected = source.trees.iter().map(leaf).sum::<f64>() - f64::from(source.offset) * step;
-            // Half a step for each tree, or nothing with f32 leaves.
-            (own - expected).abs() > 0.501 * step * source.trees.len() as f64
-        });
+    let reached = leaves_at(model, ensemble, &encoded, |tree| reference.leaf_node(tree, row, &encoded)).ok()?;
+    let different = reached.iter().filter_map(|Reached { source, step, own, expected }| {
+        // Half a step for each tree, or nothing with f32 leaves.
+        let slack = 0.501 * step * source.trees.len() as f64;
+        let differs = own.iter().zip(expected).any(|(own, expected)| (own - expected).abs() > slack);
         source.trees.first().filter(|_| differs).copied()
     });
     different.min()

@@ -13,7 +13,7 @@ mod values;
 pub use crate::rows::ClassDiffers;
 pub use candidate::Candidate;
 pub use estimate::Estimate;
-pub use reference::{bound, margins, unit};
+pub use reference::{bound, bound_of, margins, unit};
 pub use score::{Classes, Regression, RowsEvaluation, evaluate_rows};
 
 use crate::ensemble::{Ensemble, Threshold};
@@ -71,11 +71,15 @@ pub struct Verified {
     /// True if the library's margins look like probabilities.
     #[serde(skip)]
     pub are_probabilities: bool,
+    /// True if a margin differs from the ensemble's, or from the library's, by more than the model states for its output.
+    #[serde(skip)]
+    pub is_beyond: [bool; 2],
     /// The first tree that adds another leaf, if margins differ by more than is stated.
     #[serde(skip)]
     pub first_tree: Option<String>,
-    /// Given rows that, measured in whole numbers of the features' units, reach another leaf than with their own values:
-    /// the largest difference of a margin, and rows with another class. `None` for a model that compares f32.
+    /// Given rows that reach another leaf as the model measures them, in whole numbers of the features' units or in f32, than
+    /// with their own values: the largest difference of a margin, and rows with another class. `None` where the library, too,
+    /// compares f32.
     #[serde(skip)]
     pub scaling: Option<(f64, usize)>,
 }
@@ -88,12 +92,13 @@ impl Verified {
     pub fn check(&self) -> Result<(), RowsProblem> {
         let bound = self.stated_bound;
         let beyond = |whose, error, tree| Err(RowsProblem::Beyond { whose, error, bound, tree });
-        if self.max_margin_error > bound {
+        let [is_beyond_ensemble, is_beyond_library] = self.is_beyond;
+        if is_beyond_ensemble {
             return beyond("the ensemble's", self.max_margin_error, self.first_tree.clone());
         }
         match self.library_max_margin_error {
             Some(_) if self.are_probabilities => return Err(RowsProblem::Probabilities),
-            Some(error) if error > bound + self.library_text_error => return beyond("the library's", error, None),
+            Some(error) if is_beyond_library => return beyond("the library's", error, None),
             _ => {}
         }
         let rows = self.library_class_unexplained.filter(|&rows| rows > 0).or(self.library_values_unexplained);
@@ -215,6 +220,7 @@ pub fn verify(
         first_value,
         library_text_error: library.text_error,
         are_probabilities: library.are_probabilities,
+        is_beyond: [difference.example.is_some(), library.is_beyond],
         first_tree,
         scaling: scaling(&reference, rows),
     })
@@ -256,7 +262,7 @@ fn compare_all(
     first: usize,
     progress: &dyn Progress,
 ) -> Result<Difference> {
-    let bound = bound(model);
+    let bounds = bounds(model);
     let prediction = model.prediction();
     let own = margins_of_rows(model, &reference.encoder, values);
     let own = own.par_chunks_exact(model.object_count());
@@ -264,13 +270,23 @@ fn compare_all(
     let compared = rows.map(|(index, (row, own))| -> Result<_> {
         progress::advance(progress, 1)?;
         let encoded = reference.encoder.row(row);
-        let full: Vec<f64> = reference.margins(row, &encoded).into_iter().map(f64::from).collect();
+        let full = reference.margins(row, &encoded);
         let margin_error = largest_difference(own, &full);
         let class_differs = usize::from(class_by(own, &prediction) != class_by(&full, &prediction));
-        let example = (margin_error > bound).then(|| (first + index, row.to_vec()));
+        let example = is_beyond(own, &full, &bounds).then(|| (first + index, row.to_vec()));
         Ok(Difference { margin_error, class_differs, example })
     });
     compared.try_reduce(Difference::default, |one, other| Ok(one.with(other)))
+}
+
+/// The farthest that each output's margin can be from the library's own.
+fn bounds(model: &Model<'_>) -> Vec<f64> {
+    (0..model.object_count()).map(|output| bound_of(model, output)).collect()
+}
+
+/// True if a margin is farther from the other than its bound.
+fn is_beyond(one: &[f64], other: &[f64], bounds: &[f64]) -> bool {
+    one.iter().zip(other).zip(bounds).any(|((one, other), bound)| (one - other).abs() > *bound)
 }
 
 fn largest_difference(one: &[f64], other: &[f64]) -> f64 {
@@ -286,6 +302,7 @@ struct OfLibrary {
     first: Option<ClassDiffers>,
     text_error: f64,
     are_probabilities: bool,
+    is_beyond: bool,
 }
 
 /// Compares the given rows' margins and classes with the library's.
@@ -300,7 +317,7 @@ fn compare_library(
     }
     let outputs = model.object_count();
     let prediction = model.prediction();
-    let stated = bound(model);
+    let (stated, bounds) = (bound(model), bounds(model));
     let rounding = Rounding::of(model, reference);
     let is_vote = reference.is_vote();
     let mut found =
@@ -324,6 +341,8 @@ fn compare_library(
         error = error.max(largest_difference(&own, &expected));
         let half = |margin: &f64| margin.abs() * f64::from(f32::EPSILON) / 2.0;
         found.text_error = expected.iter().map(half).fold(found.text_error, f64::max);
+        let slack: Vec<f64> = bounds.iter().zip(&expected).map(|(bound, margin)| bound + half(margin)).collect();
+        found.is_beyond |= is_beyond(&own, &expected, &slack);
         let class = class_by(&expected, &prediction);
         let own = if prediction.targets { 0 } else { model.predict_class(&encoded, &mut scratch).unwrap_or_default() };
         if own == class {
@@ -351,19 +370,17 @@ fn are_probabilities(library: &[Vec<f64>], outputs: usize) -> bool {
             .all(|row| row.iter().all(is_share) && (row.len() == 1 || (row.iter().sum::<f64>() - 1.0).abs() < 1e-4))
 }
 
-/// Effect of measuring in whole numbers on the given rows.
+/// Effect on the given rows of measuring in whole numbers, or in f32.
 fn scaling(reference: &Reference<'_>, rows: &Rows) -> Option<(f64, usize)> {
-    if reference.encoder == Encoder::Real {
+    if reference.encoder == Encoder::Real && !reference.ensemble.compares_f64() {
         return None;
     }
     let prediction = reference.ensemble.prediction();
     let changes = rows.iter().map(|row| {
-        let singles: Vec<f32> = row.iter().map(|&value| value as f32).collect();
-        let as_they_are = reference.ensemble.margins_of_features(&singles);
-        let measured = reference.margins(row, &reference.encoder.row(row));
-        let nats = |margins: &[f32]| margins.iter().copied().map(f64::from).collect::<Vec<_>>();
-        let change = largest_difference(&nats(&as_they_are), &nats(&measured));
-        (change, usize::from(class_by(&nats(&as_they_are), &prediction) != class_by(&nats(&measured), &prediction)))
+        let as_they_are = reference.library_margins(row);
+        let measured = reference.measured(row, &reference.encoder.row(row));
+        let change = largest_difference(&as_they_are, &measured);
+        (change, usize::from(class_by(&as_they_are, &prediction) != class_by(&measured, &prediction)))
     });
     Some(changes.fold((0.0, 0), |(most, classes), (change, class)| (f64::max(most, change), classes + class)))
 }

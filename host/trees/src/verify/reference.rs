@@ -4,7 +4,7 @@ use crate::ensemble::{Ensemble, Node, Output, Tree};
 use crate::rows::Encoder;
 use palpate_onboard::Model;
 use palpate_shared::MISSING_FEATURE;
-use palpate_shared::format::{LeafType, Sentinel};
+use palpate_shared::format::{LeafType, OutputScale, Sentinel};
 
 /// The ensemble as a model compares: values as f32, or as whole numbers of the features' units.
 pub(super) struct Reference<'a> {
@@ -12,12 +12,15 @@ pub(super) struct Reference<'a> {
     pub(super) encoder: Encoder,
     /// The features that stand for a missing value in the model.
     pub(super) sentinel: Option<Sentinel>,
+    /// True if the model adds the ensemble's f32 values in their order.
+    is_f32: bool,
 }
 
 impl<'a> Reference<'a> {
     /// The ensemble as `model` compares.
     pub(super) fn new(ensemble: &'a Ensemble, model: &Model<'_>) -> Self {
-        Self { ensemble, encoder: Encoder::of(model), sentinel: model.sentinel() }
+        let is_f32 = model.leaf_type() == LeafType::F32;
+        Self { ensemble, encoder: Encoder::of(model), sentinel: model.sentinel(), is_f32 }
     }
 
     /// True if the first of two classes has the remainder to 1 of the second one's leaves, as in a vote.
@@ -36,44 +39,69 @@ impl<'a> Reference<'a> {
         is_each && self.ensemble.objects.len() > 1 && self.ensemble.prediction().scale != 1.0
     }
 
-    /// The margins of the model's input.
-    pub(super) fn margins(&self, row: &[f64], encoded: &[i32]) -> Vec<f32> {
-        match &self.encoder {
-            Encoder::Real => self.ensemble.margins_of_features(&singles(row)),
-            Encoder::Scaled(scales) => {
-                self.ensemble.margins_of_leaves(|number, tree| self.scaled_leaf(number, tree, encoded, scales))
-            }
+    /// The margins of the model's input, added as the model states how close its own are.
+    pub(super) fn margins(&self, row: &[f64], encoded: &[i32]) -> Vec<f64> {
+        if !self.is_f32 {
+            return self.measured(row, encoded);
         }
+        let known = self.known(row);
+        let leaf =
+            |number, tree: &'a Tree| tree.nodes[self.node(number, tree, &known, encoded)].leaf().unwrap_or_default();
+        self.ensemble.margins_of_leaves(leaf).into_iter().map(f64::from).collect()
     }
 
-    /// The leaf of a tree, given by its number, that a row reaches.
-    pub(super) fn leaf(&self, number: usize, row: &[f64], encoded: &[i32]) -> &'a [f32] {
-        let tree = &self.ensemble.trees[number];
-        match &self.encoder {
-            Encoder::Real => tree.leaf(&self.ensemble.known_features(&singles(row))),
-            Encoder::Scaled(scales) => self.scaled_leaf(number, tree, encoded, scales),
-        }
+    /// The margins of the model's input, added as the library does.
+    pub(super) fn measured(&self, row: &[f64], encoded: &[i32]) -> Vec<f64> {
+        let known = self.known(row);
+        self.ensemble.library_margins(|number, tree| self.node(number, tree, &known, encoded))
     }
 
-    /// The leaf that whole numbers reach: left if the number is below the threshold in the feature's units.
-    fn scaled_leaf<'t>(&self, number: usize, tree: &'t Tree, encoded: &[i32], scales: &[f32]) -> &'t [f32] {
-        let mut index = 0;
-        loop {
-            match &tree.nodes[index] {
-                Node::Leaf(values) => return values,
-                Node::Split { feature, missing_left, left, right, .. } => {
-                    let value = encoded[*feature];
-                    let value = self.sentinel.map_or(value, |sentinel| sentinel.or_missing(value));
-                    let threshold = self.ensemble.threshold(number, index);
-                    let goes_left = match (value, threshold) {
-                        (MISSING_FEATURE, _) | (_, None) => *missing_left,
-                        (value, Some(threshold)) => f64::from(value) < threshold.units(scales[*feature]),
-                    };
-                    index = if goes_left { *left } else { *right };
-                }
-            }
-        }
+    /// A row's f32 values, NaN where one is missing.
+    fn known(&self, row: &[f64]) -> Vec<f32> {
+        let singles: Vec<f32> = row.iter().map(|&value| value as f32).collect();
+        self.ensemble.known_features(&singles).into_owned()
     }
+
+    /// The margins of a row that is compared as the library does, in f64 or in f32.
+    pub(super) fn library_margins(&self, row: &[f64]) -> Vec<f64> {
+        let known = self.known(row);
+        let is_f64 = self.ensemble.compares_f64();
+        self.ensemble.library_margins(|number, tree| match is_f64 {
+            false => tree.leaf_node(&known),
+            true => walk(tree, |index, feature, missing_left| match self.ensemble.threshold(number, index) {
+                Some(threshold) if !known[feature].is_nan() => threshold.is_left(row[feature]),
+                _ => missing_left,
+            }),
+        })
+    }
+
+    /// The node of a tree's leaf, given its number, that a row reaches.
+    pub(super) fn leaf_node(&self, number: usize, row: &[f64], encoded: &[i32]) -> usize {
+        self.node(number, &self.ensemble.trees[number], &self.known(row), encoded)
+    }
+
+    /// The node that whole numbers reach: left if the number is below the threshold in the feature's units. `known` are the
+    /// row's f32 values.
+    fn node(&self, number: usize, tree: &Tree, known: &[f32], encoded: &[i32]) -> usize {
+        let Encoder::Scaled(scales) = &self.encoder else { return tree.leaf_node(known) };
+        walk(tree, |index, feature, missing_left| {
+            let value = encoded[feature];
+            let value = self.sentinel.map_or(value, |sentinel| sentinel.or_missing(value));
+            match (value, self.ensemble.threshold(number, index)) {
+                (MISSING_FEATURE, _) | (_, None) => missing_left,
+                (value, Some(threshold)) => f64::from(value) < threshold.units(scales[feature]),
+            }
+        })
+    }
+}
+
+/// The node of the leaf that is reached where `goes_left` answers for a split, its feature, and a missing value's side.
+fn walk(tree: &Tree, goes_left: impl Fn(usize, usize, bool) -> bool) -> usize {
+    let mut index = 0;
+    while let Node::Split { feature, missing_left, left, right, .. } = &tree.nodes[index] {
+        index = if goes_left(index, *feature, *missing_left) { *left } else { *right };
+    }
+    index
 }
 
 /// Rounding that may put two classes into another order than the library's.
@@ -100,10 +128,6 @@ impl Rounding {
     }
 }
 
-fn singles(row: &[f64]) -> Vec<f32> {
-    row.iter().map(|&value| value as f32).collect()
-}
-
 /// A model's margins as the library has them: in nats, the trainer's own f32 if the model adds those, times the scale that
 /// the model states.
 pub fn margins(model: &Model<'_>, encoded: &[i32]) -> Vec<f64> {
@@ -114,18 +138,36 @@ pub fn margins(model: &Model<'_>, encoded: &[i32]) -> Vec<f64> {
         let scale = model.prediction().scale;
         return margins.into_iter().map(|margin| f64::from(margin * scale)).collect();
     }
-    let unit = unit(model);
     let mut margins = vec![0; objects];
     model.margins_of(encoded, &mut margins);
-    margins.into_iter().map(|margin| f64::from(margin) * unit).collect()
+    let scales = scales(model);
+    margins.into_iter().zip(scales).map(|(margin, [unit, offset])| f64::from(margin) * unit + offset).collect()
 }
 
-/// Size of one unit of a margin in the library, in nats: the model's unit times the scale that it states.
+/// Size of one unit of a margin in the library, in nats, where all outputs have the same: the model's unit times the scale that
+/// it states.
 pub fn unit(model: &Model<'_>) -> f64 {
     f64::from(model.unit()) * f64::from(model.prediction().scale)
 }
 
-/// The farthest that a margin can be from the library's own.
+/// For each output the size of a unit of its margin in the library, and what is added: the model's unit times the scale that it
+/// states, and the offset.
+pub(super) fn scales(model: &Model<'_>) -> Vec<[f64; 2]> {
+    let scale = model.prediction().scale;
+    let of = |output| {
+        let own = model.output_scale(output).unwrap_or(OutputScale { scale, offset: 0.0 });
+        [f64::from(model.unit()) * f64::from(own.scale), f64::from(own.offset)]
+    };
+    (0..model.object_count()).map(of).collect()
+}
+
+/// The farthest that a margin of any output can be from the library's own.
 pub fn bound(model: &Model<'_>) -> f64 {
     f64::from(model.margin_error()) * f64::from(model.prediction().scale)
+}
+
+/// The farthest that an output's margin can be from the library's own.
+pub fn bound_of(model: &Model<'_>, output: usize) -> f64 {
+    let scale = model.output_scale(output).map_or(model.prediction().scale, |own| own.scale);
+    f64::from(model.margin_error()) * f64::from(scale)
 }

@@ -83,8 +83,10 @@ impl Together {
 
 /// Margins in nats of those in the model's units.
 fn in_nats(model: &Model<'_>, units: &[i32], margins: &mut [f64]) {
-    let unit = reference::unit(model);
-    margins.iter_mut().zip(units).for_each(|(margin, units)| *margin = f64::from(*units) * unit);
+    let scales = reference::scales(model);
+    for ((margin, units), [unit, offset]) in margins.iter_mut().zip(units).zip(scales.iter().cycle()) {
+        *margin = f64::from(*units) * unit + offset;
+    }
 }
 
 /// The margins of rows of features in the model's units, as [`Model::margins_of`] gives them: one row for each, on all

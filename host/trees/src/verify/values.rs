@@ -1,6 +1,7 @@
 //! A model's classes and values compared with the output of the library's own `predict`.
 
-use super::reference::{Reference, Rounding, bound, margins};
+use super::reference::{Reference, Rounding, bound_of, margins};
+use crate::ensemble::TOLERATED;
 use crate::error::{Result, RowsProblem};
 use crate::rows::{ClassDiffers, Rows, ValueDiffers, class};
 use palpate_onboard::Model;
@@ -33,12 +34,16 @@ pub(super) fn compare(
     let is_value = outputs == 1 || model.prediction().targets;
     let wanted = if is_value { outputs } else { 1 };
     let mut found = OfPredictions { error: is_value.then_some(0.0), ..OfPredictions::default() };
+    // A bound that is large against what the trees add up to explains nothing.
+    let reach = reference.ensemble.reach();
+    let allowed = |(output, reach): (usize, &f64)| bound_of(model, output).min(TOLERATED * reach);
+    let allowed: Vec<f64> = reach.iter().enumerate().filter(|_| is_value).map(allowed).collect();
     for (number, (row, said)) in (1..).zip(rows.iter().zip(library)) {
         if said.len() != wanted {
             return Err(RowsProblem::ValueColumns { row: number, found: said.len(), wanted }.into());
         }
         if is_value {
-            values(model, reference, (number, row), said, &mut found)?;
+            values(model, reference, (number, row), (said, &allowed), &mut found)?;
         } else {
             classes(model, reference, (number, row), said.first().map_or("", String::as_str), &mut found)?;
         }
@@ -64,7 +69,7 @@ fn classes(
     }
     found.differ += 1;
     let full = reference.margins(row, &encoded);
-    let gap = (f64::from(full[expected]) - f64::from(full[own])).abs();
+    let gap = (full[expected] - full[own]).abs();
     if !Rounding::of(model, reference).explains(gap) {
         found.unexplained += 1;
         let classes = [own, expected].map(|class| names[class].clone());
@@ -73,29 +78,33 @@ fn classes(
     Ok(())
 }
 
-/// Accepted distance of a value from the library's, beside the rounding of margins: links are within 5e-7 of the value.
+/// Accepted distance of a value from the library's, beside the rounding of margins, in shares of the value: links are within
+/// 5e-7 of it.
 const LINK_ERROR: f64 = 2e-6;
+/// The same without a link, where the library's value may be an f32.
+const F32_ERROR: f64 = f32::EPSILON as f64;
 
 fn values(
     model: &Model<'_>,
     reference: &Reference<'_>,
     (number, row): (usize, &[f64]),
-    said: &[String],
+    (said, allowed): (&[String], &[f64]),
     found: &mut OfPredictions,
 ) -> Result<()> {
     let prediction = model.prediction();
+    let of_value = if prediction.link == Link::Identity { F32_ERROR } else { LINK_ERROR };
     let encoded = reference.encoder.row(row);
     let outputs = model.object_count();
     let mut own = vec![0.0; outputs];
     model.predict_each(&encoded, &mut vec![0; outputs], &mut own);
     let mut is_within = true;
     let mut first = None;
-    for ((text, &own), margin) in said.iter().zip(&own).zip(margins(model, &encoded)) {
+    for (((text, &own), margin), allowed) in said.iter().zip(&own).zip(margins(model, &encoded)).zip(allowed) {
         let own = f64::from(own);
         let expected: f64 =
             text.parse().map_err(|_| RowsProblem::ValueText { text: text.clone(), row: number, known: Vec::new() })?;
-        let ends = [-1.0, 1.0].map(|sign| exact(prediction, margin + sign * bound(model)));
-        let slack = LINK_ERROR * ends[0].abs().max(ends[1].abs()) + f64::from(f32::MIN_POSITIVE);
+        let ends = [-1.0, 1.0].map(|sign| exact(prediction, margin + sign * allowed));
+        let slack = of_value * ends[0].abs().max(ends[1].abs()) + f64::from(f32::MIN_POSITIVE);
         if !(ends[0] - slack..=ends[1] + slack).contains(&expected) {
             is_within = false;
             first.get_or_insert(ValueDiffers { row: number, values: [own, expected] });

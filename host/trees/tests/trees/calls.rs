@@ -13,7 +13,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// Rows as C initializers: with an encoder as the whole numbers that it makes of them.
-fn initializers(rows: &[Vec<f64>], whole: Option<&Encoder>) -> String {
+pub(crate) fn initializers(rows: &[Vec<f64>], whole: Option<&Encoder>) -> String {
     let cell = |value: f64| match value {
         value if value.is_nan() => "NAN".to_owned(),
         value if value.is_infinite() => format!("{}INFINITY", if value < 0.0 { "-" } else { "" }),
@@ -30,7 +30,7 @@ fn initializers(rows: &[Vec<f64>], whole: Option<&Encoder>) -> String {
 }
 
 /// Output of a C program with these functions and calls, built beside the headers in `directory` with warnings denied.
-fn printed(directory: &Path, functions: &str, calls: &str, macros: &[&str]) -> String {
+pub(crate) fn printed(directory: &Path, functions: &str, calls: &str, macros: &[&str]) -> String {
     let source =
         format!("#include <math.h>\n#include <stdio.h>\n{functions}int main(void)\n{{\n{calls}    return 0;\n}}\n");
     std::fs::write(directory.join("program.c"), source).unwrap();

@@ -104,7 +104,8 @@ fn models_of_300_leaves_300_columns_and_70_000_thresholds_compile_or_say_what_to
     }
     let stumps = (0..70_000).map(|n| vec![split(n % 8, n as f32, 1, 2), leaf(&[0.01, 0.0]), leaf(&[0.0, 0.01])]);
     let problem = refusal(&of_two_objects(Descriptor::Oriented, stumps.collect()), &settings_of(Leaf::F32));
-    assert!(problem.fix().contains("fewer trees"), "{problem}: {}", problem.fix());
+    assert_eq!(problem, CompileProblem::TooManyThresholds { thresholds: 70_000 });
+    assert!(problem.fix().contains("Round the features"), "{problem}: {}", problem.fix());
 }
 
 #[test]

@@ -5,6 +5,7 @@ use palpate_base::with;
 use palpate_trees::compile::{self, Leaf, Settings};
 use palpate_trees::ensemble::import::Options;
 use palpate_trees::ensemble::{Ensemble, Node, Threshold};
+use palpate_trees::error::RowsProblem;
 use palpate_trees::prove::prove;
 use palpate_trees::rows::{self, Encoder, Features, Rows, columns_of, scales};
 use palpate_trees::shared::format::f32_key;
@@ -199,11 +200,16 @@ fn classes_and_values_are_the_librarys_own_predictions_for_every_link() {
     {
         let Fixture { name, ensemble, rows, predictions: said, .. } = fixture;
         for leaf in [Leaf::F32, Leaf::I16, Leaf::I8] {
-            let bytes = compiled(ensemble, leaf);
-            let model = compile::open(&bytes).unwrap();
+            let compiled = compile::compile(ensemble, &with!(Settings::default(), leaf)).unwrap();
+            let model = compile::open(&compiled.bytes).unwrap();
             let library = Library { margins: Some(&fixture.margins), values: Some(said) };
             let verified = verify(&model, ensemble, rows, library, &()).unwrap();
-            verified.check().unwrap_or_else(|problem| panic!("{name}, {leaf:?}: {problem}"));
+            match verified.check() {
+                // Leaves of 8 bits may be too coarse, which is said.
+                Err(RowsProblem::Value { .. }) if leaf == Leaf::I8 && !compiled.notes.is_empty() => {}
+                checked => checked.unwrap_or_else(|problem| panic!("{name}, {leaf:?}: {problem}")),
+            }
+            assert!(leaf == Leaf::I8 || compiled.notes.is_empty(), "{name}, {leaf:?}: {:?}", compiled.notes);
             let is_value = verified.library_max_value_error.is_some();
             counts[usize::from(is_value)] += 1;
             if leaf == Leaf::F32 {
@@ -344,10 +350,10 @@ fn whole_numbers_that_f32_does_not_hold_are_compared_as_lightgbm_does_where_they
     };
     assert_ne!(classes(None), expected, "f32 holds every 128th second");
     assert_eq!(classes(Some(vec![1e6, 1.0, 1.0, 1e6])), expected);
-    let merged = scales::merged(ensemble);
-    let [seconds] = &merged[..] else { panic!("{merged:?}") };
-    assert_eq!(seconds.feature, "height");
-    assert!(seconds.thresholds >= seconds.different + 3, "{seconds:?}");
+    let singles = scales::singles(ensemble);
+    let [seconds] = &singles[..] else { panic!("{singles:?}") };
+    assert_eq!((&*seconds.feature, seconds.scale), ("height", Some(1.0)));
+    assert!(seconds.thresholds >= seconds.different + 3 && seconds.share > 1e-3, "{seconds:?}");
 }
 
 #[test]
@@ -373,7 +379,9 @@ fn regressions_of_any_size_of_target_give_the_ensembles_own_bits() {
                 values.iter_mut().for_each(|value| *value *= factor);
             }
         }
-        scaled.origin.imported.as_mut().unwrap().rounding *= f64::from(factor);
+        let imported = scaled.origin.imported.as_mut().unwrap();
+        imported.rounding *= f64::from(factor);
+        imported.exact = None;
         let bytes = compiled(&scaled, Leaf::F32);
         let model = compile::open(&bytes).unwrap();
         let full = predict(Candidate::Full(&scaled), &rows.values, 4, false).unwrap();

@@ -9,3 +9,4 @@ mod objectives;
 mod rows;
 #[path = "../../../../tests/data/import/table.rs"]
 mod table;
+mod values;

@@ -5,7 +5,7 @@ use super::options::{default_names, named};
 use super::spelled_out::spelled_out;
 use super::votes;
 use crate::ensemble::{
-    Ensemble, Imported, Inputs, MAX_OBJECTS, Node, Output, Probability, Provenance, Threshold, Tree, columns,
+    Ensemble, Exact, Imported, Inputs, MAX_OBJECTS, Node, Output, Probability, Provenance, Threshold, Tree, columns,
 };
 use crate::error::EnsembleProblem;
 use palpate_shared::format::Prediction;
@@ -24,6 +24,8 @@ pub(super) struct Draft {
     pub(super) notes: Vec<String>,
     /// True if the library, too, adds in f32, in another order.
     pub(super) f32_sums: bool,
+    /// True if it compares values in f64.
+    pub(super) compares_f64: bool,
     /// Rule by which the library's `predict` turns margins into a class or a value.
     pub(super) prediction: Prediction,
     /// Rule by which its `predict_proba` turns margins into probabilities.
@@ -62,6 +64,8 @@ impl Draft {
         self.divide();
         let scale = f64::from(self.prediction.scale);
         let rounding = self.rounding(&base, &leaves, scale);
+        let is_regression = outputs == 1 || self.prediction.targets;
+        let exact = (is_regression && (self.compares_f64 || !self.f32_sums)).then(|| self.exact());
         let objects = named(names, self.names)?;
         let base_margins = self.base.iter().map(|&base| base as f32).collect();
         let mut thresholds = Vec::new();
@@ -86,6 +90,8 @@ impl Draft {
             sentinel: self.sentinel,
             thresholds,
             columns,
+            compares_f64: self.compares_f64,
+            exact,
         };
         let origin = Provenance { imported: Some(imported), ..Provenance::default() };
         let ensemble = Ensemble { inputs: Inputs::Rows(features), objects, base_margins, trees, origin };
@@ -105,7 +111,7 @@ impl Draft {
     /// Turns shares of votes into whole numbers, if all trees vote and start from nothing: see [`votes::count`].
     fn count_votes(&mut self) -> Option<f32> {
         let starts = self.base.iter().any(|&base| base != 0.0);
-        if starts || self.trees.iter().any(|tree| tree.output != Output::Each) {
+        if starts || self.prediction.targets || self.trees.iter().any(|tree| tree.output != Output::Each) {
             return None;
         }
         let trees = self.trees.len();
@@ -122,6 +128,16 @@ impl Draft {
             DraftNode::Split { .. } | DraftNode::Set { .. } => None,
         };
         self.trees.iter().map(|tree| tree.nodes.iter().filter_map(leaf).collect()).collect()
+    }
+
+    /// The numbers that are added, in f64.
+    fn exact(&self) -> Exact {
+        let leaf = |node: &DraftNode| match node {
+            DraftNode::Leaf(values) => values.clone(),
+            DraftNode::Split { .. } | DraftNode::Set { .. } => Vec::new(),
+        };
+        let leaves = self.trees.iter().map(|tree| tree.nodes.iter().map(leaf).collect()).collect();
+        Exact { base: self.base.clone(), leaves }
     }
 
     /// The farthest that a margin in f32, times `scale`, can be from the library's, which starts from `base` and adds

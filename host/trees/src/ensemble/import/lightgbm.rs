@@ -86,6 +86,7 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     }
     let version = head.text("version").unwrap_or_default();
     let mut draft = Draft { features: own, kind: format!("LightGBM text {version}"), ..Draft::default() };
+    draft.compares_f64 = true;
     // The library divides what such a model's trees add up to by their number before its link.
     let is_averaged = head.values.contains_key("average_output");
     let rounds = if is_averaged { (blocks.len() / outputs).max(1) } else { 1 };

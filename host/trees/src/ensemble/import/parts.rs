@@ -25,6 +25,8 @@ pub struct Parts {
     pub prediction: Prediction,
     /// Rule by which its `predict_proba` turns margins into probabilities.
     pub probability: Probability,
+    /// True if the library compares values in f64, and does not round rows to f32 first.
+    pub compares_f64: bool,
 }
 
 /// A tree as columns, one entry for each node; node 0 is its root.
@@ -53,7 +55,7 @@ impl Parts {
     /// [`EnsembleProblem`] for columns of unequal length, children and features out of range, a node that is reached
     /// twice, and everything that [`Ensemble::check`] refuses.
     pub fn into_ensemble(self, names: Option<&[String]>) -> Result<Ensemble, EnsembleProblem> {
-        let Self { kind, features, names: own, base, trees, notes, prediction, probability } = self;
+        let Self { kind, features, names: own, base, trees, notes, prediction, probability, compares_f64 } = self;
         let outputs = base.len();
         let trees = trees
             .into_iter()
@@ -62,8 +64,8 @@ impl Parts {
                 tree.draft(outputs).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
             })
             .collect::<Result<_, _>>()?;
-        Draft { features, names: own, base, trees, kind, notes, prediction, probability, ..Draft::default() }
-            .finish(names)
+        let draft = Draft { features, names: own, base, trees, kind, notes, ..Draft::default() };
+        Draft { prediction, probability, compares_f64, ..draft }.finish(names)
     }
 }
 

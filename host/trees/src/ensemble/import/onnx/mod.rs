@@ -9,6 +9,7 @@ mod five;
 mod wire;
 
 use super::draft::{Draft, DraftTree, Targeted};
+use super::draft_node::DraftNode;
 use super::unsupported;
 use crate::ensemble::{Ensemble, MAX_OBJECTS, Threshold, columns::check_count};
 use crate::error::EnsembleProblem;
@@ -73,6 +74,12 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     }
     check_count(count)?;
     draft.features = vec![String::new(); count];
+    // Thresholds are doubles where the rows are.
+    let is_double = |node: &DraftNode| match node {
+        DraftNode::Split { threshold, .. } => f64::from(threshold.value as f32) != threshold.value,
+        DraftNode::Set { .. } | DraftNode::Leaf(_) => false,
+    };
+    draft.compares_f64 = draft.trees.iter().flat_map(|tree| &tree.nodes).any(is_double);
     draft.finish(names)
 }
 
