@@ -202,8 +202,8 @@ impl Maps {
     /// `confidence`, on sequences of approaches to these meshes on a simulated table.
     ///
     /// `aimed` says how approaches are aimed, and which approaches the promise is for: "chosen" ones, as by `Locator.next`, or "random"
-    /// ones about the place believed in. `real` is what the simulated hand and table add. `until` goes on until the place is as
-    /// sure, such as (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing
+    /// ones about the place believed in. `real` is what the simulated hand and table add. `until` goes on after the name until the
+    /// place is as sure, such as (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing
     /// is named before the eighth approach then. `workspace` is how far from the table's origin the middle finger comes down in x and
     /// y, in millimeters, by default twice the range.
     #[pyo3(signature = (meshes, *, millimeters=None, error_rate=0.01, confidence=0.95, sequences=1000, max_touches=25,
@@ -524,7 +524,7 @@ impl Locator {
         (f64::from(next.x) / 1e3, f64::from(next.y) / 1e3, f64::from(next.roll) * 360.0 / 256.0)
     }
 
-    /// The verdict after the last touch.
+    /// The verdict and the place after the last touch.
     #[getter]
     fn located<'py>(&self, py: Python<'py>) -> Result<objects::Located<'py>, Failure> {
         self.say(py)
@@ -583,11 +583,11 @@ impl Locator {
             Verdict::GaveUp => intern!(py, "gave-up"),
             _ => intern!(py, "undecided"),
         };
-        let leader = locating.leader();
+        let best = locating.best();
         let degrees = |turn: u16| f64::from(turn) * 360.0 / 65_536.0;
         let mode = class(py, "Mode", &MODE)?;
         let mut modes = Vec::new();
-        for pose in locating.poses(leader) {
+        for pose in locating.poses(best) {
             let [x, y] = pose.position.map(|micrometers| f64::from(micrometers) / 1e3);
             let [x_within, y_within] = pose.within.map(|micrometers| f64::from(micrometers) / 1e3);
             let turned = pose.yaw_within.map(|within| (degrees(pose.yaw), degrees(within)));
@@ -596,15 +596,17 @@ impl Locator {
             let placement = maps.placement_name(pose.placement);
             modes.push(mode.call1((placement, x, y, yaw, x_within, y_within, yaw_within, share))?);
         }
-        let posterior = 1.0 / (1.0 + locating.rivals() as f64 / (1_u64 << 56) as f64);
+        let posterior = locating.posteriors().get(best).copied().unwrap_or(0.0);
         let modes = pyo3::types::PyTuple::new(py, modes)?;
         let made = class(py, "Located", &LOCATED)?.call1((
             state,
-            maps.object_name(leader),
+            maps.object_name(best),
             posterior,
             locating.touches(),
             modes,
             locating.met_table_alone(),
+            locating.leader() != best,
+            locating.is_exhausted(),
         ))?;
         Ok(objects::Located(made))
     }

@@ -45,6 +45,31 @@ def follow(locator: palpate.Locator, data: palpate.DataSet, rows: npt.NDArray[np
     return located
 
 
+def test_the_posterior_is_that_of_the_object_that_is_stated(maps: palpate.Maps) -> None:
+    locator = palpate.Locator(maps, error_rate=1e-9)
+    for heights in [(0.0, 0.0, 0.0), (12.0, 14.0, 9.0), (11.0, None, 10.0)]:
+        located = locator.push_heights(heights, *locator.next())
+        assert located.posterior == locator.posteriors[located.best], located
+        assert located.posterior >= 1 / len(maps.objects) - 0.01, located
+
+
+def test_a_verdict_stays(maps: palpate.Maps, touches: palpate.DataSet) -> None:
+    locator = palpate.Locator(maps)
+    bowl, mouse = (np.flatnonzero((touches.objects == number) & (touches.instances == 0)) for number in range(2))
+    named = follow(locator, touches, bowl)
+    assert named.object == "bowl" and not named.contradicted and not named.exhausted
+    contradicted = False
+    for row in mouse[:30]:
+        located = locator.push(*moved(touches, int(row), (12.0, -7.0), 40.0))
+        assert located.object == "bowl" and located.decided, located
+        assert all(mode.placement in [lies for name, lies in maps.placements if name == "bowl"] for mode in located.modes)
+        assert located.contradicted == (max(locator.posteriors, key=lambda name: locator.posteriors[name]) != "bowl")
+        contradicted |= located.contradicted
+    assert contradicted
+    locator.reset()
+    assert locator.located.object is None
+
+
 def test_an_object_is_named_and_located(maps: palpate.Maps, touches: palpate.DataSet) -> None:
     locator = palpate.Locator(maps)
     for number, name in enumerate(OBJECTS):

@@ -96,7 +96,7 @@ impl Following for Placing {
     }
 
     fn best(&self) -> usize {
-        self.locating().leader()
+        self.locating().best()
     }
 
     fn posteriors(&self) -> Vec<f64> {

@@ -100,7 +100,7 @@ pub(crate) fn share_tested(per: Per) -> f64 {
 }
 
 /// Chooses thresholds from starts; `supplied` is what the sequences used up, if they did.
-pub(super) fn chosen(
+pub(crate) fn chosen(
     sequences: &[Sequence],
     objects: &[String],
     way: &Way<'_>,

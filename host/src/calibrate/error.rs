@@ -181,7 +181,7 @@ pub struct Remedy {
 
 impl Remedy {
     /// Error for this tally of names, of sequences that used up the `supplied` touches, or of `sequences` that did not.
-    pub(super) fn new(
+    pub(crate) fn new(
         tally: Tally,
         &Terms { rate, confidence, .. }: &Terms,
         supplied: Option<Supplied>,

@@ -59,7 +59,7 @@ pub(crate) use calibrated::Stated;
 pub use calibrated::{Calibrated, Gain, Guarded, OfObject, OfRecorded, OfRows, Used, Worse};
 pub(crate) use choose::share_tested;
 pub use choose::{Chosen, choose};
-pub(crate) use choose::{Way, choose_independent};
+pub(crate) use choose::{Way, choose_independent, chosen};
 #[cfg(all(test, feature = "train"))]
 use draw::MarginSupply;
 pub use draw::{TouchSupply, follow};

@@ -124,6 +124,23 @@ pub enum LocateProblem {
         /// Recordings that are needed.
         needed: u64,
     },
+    /// Places do not become as sure as they are to be.
+    #[error(
+        "of {right} objects that were named rightly only {placed} had a place as sure as {millimeters} mm and {degrees}° within \
+         {approaches} approaches"
+    )]
+    NeverPlaced {
+        /// Objects that were named rightly.
+        right: usize,
+        /// Objects whose place became as sure.
+        placed: usize,
+        /// Half of the intervals that was asked for, in millimeters.
+        millimeters: f64,
+        /// Half of the interval of the yaw, in degrees.
+        degrees: f64,
+        /// Limit of approaches.
+        approaches: u32,
+    },
     /// An object of the model is not on the table.
     #[error("{object} is not among the objects to calibrate on")]
     Missing {
@@ -172,6 +189,7 @@ impl Problem for LocateProblem {
             Self::FewRecordings { .. } => {
                 "Record the objects in more places, or promise a higher error rate; more touches in the same places do not help."
             }
+            Self::NeverPlaced { .. } => "Ask for less, such as 3 mm and 5 degrees, or allow more approaches.",
             Self::Missing { .. } | Self::Unknown { .. } => {
                 "Give the objects that the model was trained on, all of them and no others."
             }

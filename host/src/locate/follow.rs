@@ -42,10 +42,12 @@ pub trait Locating: Send + Sync {
     fn begin_of(&mut self, weights: &[u32]);
     /// Takes in the heights of an approach.
     fn push(&mut self, seen: Seen) -> Verdict;
-    /// The verdict so far.
+    /// The first verdict, which stays.
     fn verdict(&self) -> Verdict;
     /// The object with the most evidence.
     fn leader(&self) -> usize;
+    /// The object that was recognized; until then the leader.
+    fn best(&self) -> usize;
     /// Sum of the weights of the others, in Q56.
     fn rivals(&self) -> u64;
     /// True if the last search ended before it was done.
@@ -54,7 +56,7 @@ pub trait Locating: Send + Sync {
     fn familiarity(&self) -> Familiarity;
     /// Logarithm of the best cell's likelihood for each touch, in 1/64 nat.
     fn fit(&self) -> i32;
-    /// The most likely poses of an object, at most four.
+    /// The most likely poses of an object, the largest share first, at most four.
     fn poses(&self, object: usize) -> Vec<Pose>;
     /// Posteriors of all objects.
     fn posteriors(&self) -> Vec<f64>;
@@ -119,6 +121,10 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
 
     fn leader(&self) -> usize {
         self.locator.leader()
+    }
+
+    fn best(&self) -> usize {
+        self.locator.best()
     }
 
     fn rivals(&self) -> u64 {

@@ -17,6 +17,14 @@ pub(super) fn index([x, y]: [i32; 2], [i, j]: [i32; 2]) -> Option<usize> {
 
 /// Cells of the connected pieces that are at least a twentieth of the largest: noise on the table makes small ones.
 pub(super) fn pieces(half: [i32; 2], cells: Vec<[i32; 2]>) -> Vec<[i32; 2]> {
+    let mut pieces = connected(half, cells);
+    let largest = pieces.iter().map(Vec::len).max().unwrap_or(0);
+    pieces.retain(|piece| piece.len() * 20 >= largest);
+    pieces.concat()
+}
+
+/// Cells by connected pieces.
+pub(super) fn connected(half: [i32; 2], cells: Vec<[i32; 2]>) -> Vec<Vec<[i32; 2]>> {
     let mut is_free = vec![false; count(half)];
     cells.iter().filter_map(|at| index(half, *at)).for_each(|cell| is_free[cell] = true);
     let mut pieces = Vec::new();
@@ -32,9 +40,7 @@ pub(super) fn pieces(half: [i32; 2], cells: Vec<[i32; 2]>) -> Vec<[i32; 2]> {
         }
         pieces.push(piece);
     }
-    let largest = pieces.iter().map(Vec::len).max().unwrap_or(0);
-    pieces.retain(|piece| piece.len() * 20 >= largest);
-    pieces.concat()
+    pieces
 }
 
 /// The mean; none of no numbers.

@@ -33,7 +33,7 @@ pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspec
 pub use learn::{learn, probe_of};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, POSE, Pose, Seen, TESTED};
 pub use pose::{Off, Until};
-pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, calibrate, calibrate_recorded, evaluate};
+pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, ToPlace, calibrate, calibrate_recorded, evaluate};
 pub use shape::{Relief, Sample, Shape, samples};
 pub use surface::Surface;
 #[cfg(feature = "train")]

@@ -6,7 +6,8 @@ use super::pose::{Equivalents, Off, Until};
 use super::world::{Aimed, Drawn, Real, Standing, World};
 use super::write::{Restated, restated};
 use super::{Effort, Hand, Maps, Promised, Seen, TESTED, locating};
-use crate::calibrate::{self, Chosen, Stop, Tally, Way, choose_groups, margin_of, odds_of};
+use crate::calibrate::error::Remedy;
+use crate::calibrate::{self, Begin, Chosen, Stop, Tally, Way, choose_groups, margin_of, odds_of};
 use crate::error::{CalibrateProblem, Error, Result};
 use crate::evaluate::Finding;
 use crate::evidence::{self, Follower, Given, Limit, Outcome, Sequence, Totals};
@@ -36,7 +37,7 @@ pub struct Terms {
     pub real: Real,
     /// Make a test for unknown objects: no object is named before the eighth touch then.
     pub unknown: bool,
-    /// Go on until the pose is as sure, beyond the name.
+    /// Go on until the pose of the named object is as sure; the promise is of the name.
     pub until: Option<Until>,
     /// Weight of the pose where approaches are chosen, in 64ths.
     pub pose: u16,
@@ -87,6 +88,37 @@ pub struct Calibrated {
     /// Recordings that it rests on; none if it rests on simulated approaches.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recordings: Option<usize>,
+    /// Results of going on until the place is sure; none unless that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub until: Option<ToPlace>,
+}
+
+/// Results of going on until the place of a named object is sure.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ToPlace {
+    /// Objects that were named rightly.
+    pub right: usize,
+    /// Objects of these whose place became sure.
+    pub placed: usize,
+    /// Approaches on average, those to the name included.
+    pub mean_approaches: f64,
+}
+
+impl ToPlace {
+    /// Results of sequences of objects of these classes.
+    ///
+    /// # Errors
+    /// [`LocateProblem::NeverPlaced`], if less than half of the objects that were named rightly have a sure place.
+    fn of(each: &[Played], until: Until, approaches: u32) -> Result<Self, LocateProblem> {
+        let right = each.iter().filter(|played| played.is_right).count();
+        let placed = each.iter().filter(|played| played.in_intervals.is_some()).count();
+        if 2 * placed < right {
+            let Until { millimeters, degrees } = until;
+            return Err(LocateProblem::NeverPlaced { right, placed, millimeters, degrees, approaches });
+        }
+        let approaches: usize = each.iter().map(|played| played.outcome.approaches).sum();
+        Ok(Self { right, placed, mean_approaches: approaches as f64 / each.len().max(1) as f64 })
+    }
 }
 
 /// Results of an evaluation on a simulated table.
@@ -106,7 +138,7 @@ pub struct Evaluation {
     pub mean_approaches: f64,
     /// Median and 95 % quantile of the distance of right names' poses from the truth, in millimeters.
     pub off: [f64; 2],
-    /// Right names, each with a pose.
+    /// Right names with a pose: all of them without [`Terms::until`], otherwise those whose pose became as sure.
     pub poses: usize,
     /// Poses whose truth is in their intervals, modulo symmetry; without [`Terms::until`] in those of one of their modes.
     pub poses_in_interval: usize,
@@ -151,13 +183,14 @@ pub struct OfObject {
 /// code: Learn-then-Test by fixed-sequence testing, as for all models. Chosen approaches depend on the follower, so they are played
 /// with it.
 ///
-/// Before, half as many other sequences say how unlikely touches of a known object may be, where unknown ones are to be found (1 %
-/// of them are less likely at some touch), and by what factor the intervals of poses must be wider to hold 95 % of the poses at which names are sure (split
-/// conformal prediction).
+/// Before, half as many other sequences say at which thresholds to begin; how unlikely touches of a known object may be, where
+/// unknown ones are to be found (1 % of them are less likely at some touch); and with [`Terms::until`] by what factor the intervals of
+/// poses must be wider to hold 95 % of the poses at which places are sure (split conformal prediction). In the end they say how many
+/// approaches the place takes.
 ///
 /// # Errors
-/// [`LocateProblem`] for maps without a hand or objects that they do not know; [`CalibrateProblem`](crate::error::CalibrateProblem)
-/// if no threshold keeps the promise.
+/// [`LocateProblem`] for maps without a hand, objects that they do not know, and places that never become sure;
+/// [`CalibrateProblem`](crate::error::CalibrateProblem) if no threshold keeps the promise.
 pub fn calibrate(
     maps: Maps<'_>,
     standing: &[Standing],
@@ -171,15 +204,36 @@ pub fn calibrate(
     let bytes = restated(maps, &plain)?;
     let plain_maps = opened(&bytes)?;
     let before = Terms { sequences: terms.sequences.div_ceil(2), seed: terms.seed.wrapping_add(1), ..*terms };
+    let followed = follow(plain_maps, standing, probe, &before, strictest(terms), progress)?;
+    let units: Vec<usize> = (0..followed.len()).collect();
+    let Begin { starts, .. } = Begin::new(&followed, &units, terms.sequences, &terms.promise, strictest(terms));
     // Where a test is to decide, sequences are as long as it takes.
     let least = if terms.unknown { TESTED } else { 1 };
-    let each = play(plain_maps, standing, probe, &before, (odds_of(terms.promise.margin()), least), progress)?;
+    let goes_on = terms.unknown || terms.until.is_some();
+    let odds = odds_of(terms.promise.margin());
+    let each = if goes_on { play(plain_maps, standing, probe, &before, (odds, least), progress)? } else { Vec::new() };
+    if let Some(until) = terms.until {
+        ToPlace::of(&each, until, terms.max_touches)?;
+    }
     let misfit = terms.unknown.then(|| misfit(&each));
     let stated = Restated { misfit, stretch: terms.until.map_or(0, |_| stretch(&each)), ..plain };
     let bytes = restated(maps, &stated)?;
     let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest(terms), progress)?;
-    let chosen = calibrate::choose(&sequences, &super::names(&maps), strictest(terms), &terms.promise)?;
-    promised(maps, &chosen, probe, terms, stated, None)
+    let way = Way { starts: &starts, loosest: None };
+    let chosen =
+        calibrate::chosen(&sequences, &super::names(&maps), &way, &terms.promise, None).map_err(|mut problem| {
+            if let CalibrateProblem::NotKept { wrong, given, remedy, .. } = &mut problem {
+                let both = [super::stated(&maps), terms.real].map(|real| real.noise(probe.speed).to_string());
+                let noise = (both[0] != both[1]).then_some(both);
+                let tally = Tally { wrong: *wrong, all: *given };
+                *remedy = Some(Box::new(Remedy::new(tally, &terms.promise, None, sequences.len(), noise)));
+            }
+            problem
+        })?;
+    let calibrated = promised(maps, &chosen, probe, terms, stated, None)?;
+    let Some(until) = terms.until else { return Ok(calibrated) };
+    let placed = play(opened(&calibrated.model)?, standing, probe, &before, (chosen.odds.strictest(), 1), progress)?;
+    Ok(Calibrated { until: Some(ToPlace::of(&placed, until, terms.max_touches)?), ..calibrated })
 }
 
 /// Refuses objects that are not those of the maps.
@@ -290,6 +344,7 @@ fn promised(
         max_touches: terms.max_touches,
         noise: noise.to_string(),
         recordings,
+        until: None,
     })
 }
 
@@ -364,16 +419,19 @@ fn follow(
 #[derive(Clone, Debug)]
 struct Played {
     outcome: Outcome,
+    /// True if its name is right.
+    is_right: bool,
     /// Likelihoods of the best cell for each touch, from where a test decides.
     fits: Vec<i32>,
-    /// Distance of the pose from the truth; none if the object lies in another way, or no name was given.
+    /// Distance of the pose from the truth; none if the object lies in another way, no name was given, or it has no sure pose.
     off: Option<Off>,
-    /// This distance in units of the pose's intervals, of the closest mode where there are several.
+    /// This distance in units of the pose's intervals, of the closest mode where there are several; none unless the name is right
+    /// and the pose sure.
     in_intervals: Option<f64>,
     looked: [u64; 2],
 }
 
-/// Plays sequences until a name is sure, and with [`Terms::until`] its pose.
+/// Plays sequences until a name is sure, and with [`Terms::until`] until the pose of the named object is.
 fn play(
     maps: Maps<'_>,
     standing: &[Standing],
@@ -389,35 +447,39 @@ fn play(
     let of = |index: usize| -> Result<Played> {
         progress::advance(progress, 1)?;
         let (mut pressed, mut pressing) = setup.sequence(index as u64);
-        let (mut outcome, mut fits, mut modes) = (Outcome::default(), Vec::new(), Vec::new());
+        let (mut outcome, mut fits, mut modes, mut is_placed) = (Outcome::default(), Vec::new(), Vec::new(), false);
         let Ok(_) = evidence::follow(&mut pressed, &mut pressing, |follower, counted| {
             (outcome.touches, outcome.approaches) = (counted.touches as usize, counted.approaches as usize);
-            let familiarity = follower.familiarity();
-            outcome.unknown = familiarity == Familiarity::Stranger;
-            if counted.touches as usize >= TESTED {
-                fits.push(follower.locating.fit());
+            if outcome.recognized.is_none() {
+                let familiarity = follower.familiarity();
+                outcome.unknown = familiarity == Familiarity::Stranger;
+                if counted.touches as usize >= TESTED {
+                    fits.push(follower.locating.fit());
+                }
+                let may_name = familiarity == Familiarity::Known && counted.touches as usize >= least;
+                outcome.recognized = (may_name && follower.rivals() <= odds).then(|| follower.leader());
             }
-            let leader = follower.leader();
-            let poses = follower.locating.poses(leader);
-            let is_sure = terms.until.is_none_or(|until| until.is_met(&poses));
-            let may_name = familiarity == Familiarity::Known && counted.touches as usize >= least;
-            if may_name && follower.rivals() <= odds && is_sure {
-                (outcome.recognized, modes) = (Some(leader), poses);
+            if let Some(name) = outcome.recognized {
+                modes = follower.locating.poses(name);
+                is_placed = terms.until.is_none_or(|until| until.is_met(&modes));
             }
-            outcome.unknown || outcome.recognized.is_some() || counted.touches >= terms.max_touches
+            outcome.unknown || is_placed || counted.touches >= terms.max_touches
         });
+        if !is_placed {
+            modes.clear();
+        }
         let off = modes.first().and_then(|pose| equivalents.off(&pressed.before, pose));
         let is_right = outcome.recognized == Some(pressed.class);
         // Asked for its pose, it states one; else up to four.
         modes.truncate(terms.until.map_or(usize::MAX, |_| 1));
         let parts = modes.iter().filter_map(|pose| Some(equivalents.off(&pressed.before, pose)?.in_intervals(pose)));
-        let in_intervals = is_right.then(|| parts.fold(ELSEWHERE, f64::min));
-        Ok(Played { outcome, fits, off, in_intervals, looked: pressing.looked })
+        let in_intervals = (is_right && is_placed).then(|| parts.fold(ELSEWHERE, f64::min));
+        Ok(Played { outcome, is_right, fits, off, in_intervals, looked: pressing.looked })
     };
     (0..terms.sequences).into_par_iter().map(of).collect()
 }
 
-/// Plays sequences to the model's own threshold.
+/// Plays sequences to the model's own threshold, and with [`Terms::until`] on until the place is sure.
 ///
 /// # Errors
 /// Errors of [`calibrate`](fn@calibrate).

@@ -3,7 +3,7 @@
 use super::contacts::{Met, tips};
 use super::error::LocateProblem;
 use super::follow::seen;
-use super::grid::{index, pieces, places};
+use super::grid::{connected, index, pieces, places};
 use super::{Approach, Hand, Standing};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
@@ -12,6 +12,7 @@ use crate::probe::scene::{Scene, Table};
 use glam::{DMat3, DVec3};
 use palpate_shared::Touch;
 use rayon::prelude::*;
+use std::collections::HashSet;
 
 /// A cell's guess is a plane through as many of the nearest samples.
 const NEAR: usize = 10;
@@ -90,24 +91,37 @@ impl Shape {
         Self { probe: *probe, noise, middle: [0.0; 2], half, samples: Vec::new() }
     }
 
-    /// The object that samples met, and what is about it.
+    /// The object that samples met, and what is about it. Its middle is that of the box of the contacts with the largest connected
+    /// part of the relief: contacts that stray above the table have no say in it.
     ///
     /// # Errors
     /// [`LocateProblem::NotMet`] with this name, if no contact is clearly above the table.
     pub fn of(samples: Vec<Sample>, probe: &Probe, noise: f64, name: &str) -> Result<Self> {
-        let is_object = |sample: &&Sample| sample.is_contact && sample.height > OBJECT.max(3.0 * noise);
-        let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-        for sample in samples.iter().filter(is_object) {
-            for (end, at) in ends.iter_mut().zip(sample.place) {
-                *end = [end[0].min(at), end[1].max(at)];
-            }
-        }
-        if ends[0][0] > ends[0][1] {
-            return Err(LocateProblem::NotMet { object: name.into(), placement: String::new() }.into());
-        }
-        let middle = ends.map(|[low, high]| ((low + high) / 2.0).round());
-        let half = ends.map(|[low, high]| ((high - low) / 2.0 + UNSEEN).min(MOST));
-        Ok(Self { probe: *probe, noise, middle, half, samples })
+        let least = OBJECT.max(3.0 * noise);
+        let is_object = |sample: &&Sample| sample.is_contact && sample.height > least;
+        let all = ends(samples.iter().filter(is_object))
+            .ok_or_else(|| LocateProblem::NotMet { object: name.into(), placement: String::new() })?;
+        let shape = Self { probe: *probe, noise, middle: [0.0; 2], half: [0.0; 2], samples }.about(all, all);
+        let relief = shape.relief();
+        let raised = places(relief.half).zip(&relief.heights).filter(|(_, height)| **height > least);
+        let parts = connected(relief.half, raised.map(|(at, _)| at).collect());
+        let largest: HashSet<_> = parts.into_iter().max_by_key(Vec::len).into_iter().flatten().collect();
+        let is_of_largest = |sample: &&Sample| {
+            is_object(sample)
+                && largest.contains(&[0, 1].map(|axis| (sample.place[axis] - shape.middle[axis]).round() as i32))
+        };
+        let own = ends(shape.samples.iter().filter(is_of_largest)).unwrap_or(all);
+        Ok(shape.about(own, all))
+    }
+
+    /// The same samples about the middle of a box, as far as another one and what is about it.
+    fn about(self, own: [[f64; 2]; 2], all: [[f64; 2]; 2]) -> Self {
+        let middle = own.map(|[low, high]| ((low + high) / 2.0).round());
+        let half = [0, 1].map(|axis| {
+            let [low, high] = all[axis].map(|end| (end - middle[axis]).abs());
+            (low.max(high) + UNSEEN).min(MOST)
+        });
+        Self { middle, half, ..self }
     }
 
     /// Takes in a touch.
@@ -172,6 +186,13 @@ impl Shape {
         }
         best.1
     }
+}
+
+/// The box of samples: its ends along x and y; none without samples.
+fn ends<'s>(samples: impl Iterator<Item = &'s Sample>) -> Option<[[f64; 2]; 2]> {
+    samples
+        .map(|sample| sample.place.map(|at| [at, at]))
+        .reduce(|ends, at| [0, 1].map(|axis| [ends[axis][0].min(at[axis][0]), ends[axis][1].max(at[axis][1])]))
 }
 
 /// Farthest cell from the middle of a map, in millimeters.

@@ -182,6 +182,41 @@ fn recordings_are_not_merged_where_the_pose_is_not_sure() {
     }
 }
 
+#[test]
+fn a_contact_that_strays_above_the_table_moves_no_objects_middle() {
+    let puck = |[x, y]: [f64; 2]| if x.hypot(y) < 30.0 { 18.0 } else { 0.0 };
+    let of = |place: [f64; 2], stray: Option<[f64; 2]>| {
+        // The pattern of touches is about a point that is 25 mm from the place in x and y.
+        let mut touches = pressed([place[0] - 25.0, place[1] - 25.0], 0.0, 300, |at| puck(at.map(|axis| axis - 25.0)));
+        if let Some([x, y]) = stray {
+            touches.push(touch([x, y], [Some(0.1), Some(1.9), Some(0.0)]));
+        }
+        touches
+    };
+    let settings = Settings::default();
+    for (place, stray) in [([0.0; 2], [-53.7, -6.9]), ([4.0, -9.0], [10.0, 50.0]), ([4.0, -9.0], [-40.0, -40.0])] {
+        let [clean, strayed] = [None, Some(stray)].map(|stray| {
+            let samples = shape::all_samples(&of(place, stray), &probe()).unwrap();
+            Shape::of(samples, &probe(), 0.5, "puck").unwrap()
+        });
+        assert_eq!(strayed.middle, clean.middle, "{stray:?}");
+        assert!((0..2).all(|axis| (clean.middle[axis] - place[axis]).abs() <= 2.0), "{:?}", clean.middle);
+        let learned = recorded("puck", &[of(place, Some(stray))], &probe(), &settings).unwrap();
+        assert!(learned.len() == 1 && learned[0].looks_round(), "{stray:?}");
+    }
+    // All parts of the object are on the map, not the largest alone.
+    let two = |[x, y]: [f64; 2]| {
+        let is_small = (50.0..62.0).contains(&x) && (0.0..30.0).contains(&y);
+        if puck([x - 10.0, y - 25.0]) > 0.0 || is_small { 18.0 } else { 0.0 }
+    };
+    let samples = shape::all_samples(&pressed([0.0; 2], 0.0, 300, two), &probe()).unwrap();
+    let both = Shape::of(samples, &probe(), 0.5, "two").unwrap();
+    assert!((both.middle[0] - 10.0).abs() <= 2.0, "{:?}", both.middle);
+    let relief = both.relief();
+    let at = [56 - both.middle[0] as i32, 15 - both.middle[1] as i32];
+    assert!(height(&relief, at) > 15.0);
+}
+
 /// A data set that states the hand.
 fn dataset(objects: Vec<ObjectTouches>) -> Dataset {
     let origin = Origin { unit: Length::Millimeter, probe: probe(), pose: true, position: true, ..Origin::default() };

@@ -187,6 +187,38 @@ fn intervals_of_poses_change_only_where_a_promise_is_for_poses() {
 }
 
 #[test]
+fn a_calibration_for_places_states_approaches_until_the_place_and_refuses_what_is_never_met() {
+    let calibrated = |millimeters, degrees| {
+        let until = Some(Until { millimeters, degrees });
+        calibrate(Maps::new(&MODEL).unwrap(), &STANDING, &probe(), &Terms { until, ..terms(40) }, &())
+    };
+    let found = calibrated(4.0, 8.0).unwrap();
+    let to_place = found.until.unwrap();
+    assert!(to_place.right >= 15 && to_place.placed * 10 >= to_place.right * 8, "{to_place:?}");
+    assert!(to_place.mean_approaches > found.mean_approaches, "{to_place:?}, {}", found.mean_approaches);
+    let error = calibrated(0.5, 0.5).unwrap_err().to_string();
+    assert!(error.contains("only 0 had a place as sure as 0.5 mm and 0.5° within 20 approaches"), "{error}");
+    let plain = calibrate(Maps::new(&MODEL).unwrap(), &STANDING, &probe(), &terms(40), &()).unwrap();
+    assert!(plain.until.is_none());
+}
+
+#[test]
+fn going_on_until_the_place_changes_no_name() {
+    let evaluated = |until| {
+        let terms = Terms { until, ..terms(60) };
+        evaluate(Maps::new(&MODEL).unwrap(), &STANDING, &probe(), &terms, &()).unwrap()
+    };
+    let plain = evaluated(None);
+    // The last one is never met.
+    for (millimeters, degrees) in [(4.0, 8.0), (2.0, 4.0), (0.5, 0.5)] {
+        let found = evaluated(Some(Until { millimeters, degrees }));
+        assert!(found.given >= plain.given && found.wrong <= plain.wrong + 1, "{found:?}");
+        assert!(found.poses <= found.given - found.wrong && found.mean_approaches > plain.mean_approaches);
+        assert_eq!(found.poses == 0, millimeters < 1.0, "{found:?}");
+    }
+}
+
+#[test]
 fn an_object_that_the_model_does_not_know_is_called_unknown() {
     let mut objects = objects().to_vec();
     let known = standing(&objects.iter().collect::<Vec<_>>(), &probe(), &()).unwrap();

@@ -129,9 +129,10 @@ export! {
         with(|table| number(table.press(x, y, roll)))
     }
 
-    /// Puts out what is believed: verdict (as of `player`), the leader, touches, each object's posterior; then for each pose that
-    /// the object may have, likeliest first: object, placement among those laid, x, y, yaw (NaN for any), share of all belief, halves
-    /// of the 95 % intervals of x, y and yaw. Lengths are in millimeters and angles in radians. Returns how many poses.
+    /// Puts out what is believed: verdict (as of `player`), the recognized object or else the leader, touches, each object's
+    /// posterior; then for each pose that the object may have, likeliest first: object, placement among those laid, x, y, yaw (NaN
+    /// for any), share of all belief, halves of the 95 % intervals of x, y and yaw. Lengths are in millimeters and angles in
+    /// radians. Returns how many poses.
     fn belief() -> i32 {
         with(|table| number(table.belief()))
     }

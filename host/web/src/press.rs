@@ -85,7 +85,7 @@ impl Table {
             Verdict::Unknown => 2,
             Verdict::GaveUp => 3,
         };
-        self.output = vec![f64::from(verdict), locating.leader() as f64, locating.touches() as f64];
+        self.output = vec![f64::from(verdict), locating.best() as f64, locating.touches() as f64];
         self.output.extend(locating.posteriors());
         let ghosts = hidden.ghosts();
         for ghost in &ghosts {

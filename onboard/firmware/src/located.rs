@@ -64,7 +64,7 @@ pub fn touch(bytes: &[u8; TOUCH]) -> Touch {
 pub struct Found {
     /// The verdict; none for a touch that is refused.
     pub verdict: Option<Verdict>,
-    /// The leader's most likely pose.
+    /// The most likely pose of the recognized object, or else of the leader.
     pub pose: Option<Pose>,
     /// Next approach.
     pub next: Approach,
@@ -74,7 +74,7 @@ pub struct Found {
 pub fn push(locator: &mut OnChip<'_>, touch: &Touch, hand: Hand, terms: &Terms) -> Found {
     let verdict = locator.push(touch, hand);
     let mut pose = [Pose::default()];
-    let found = locator.poses(locator.leader(), &mut pose);
+    let found = locator.poses(locator.best(), &mut pose);
     let next = locator.choose(hand.spacing, hand.stroke.unwrap_or(u32::MAX), terms.within, terms.pose);
     Found { verdict, pose: pose.into_iter().take(found).next(), next }
 }

@@ -71,6 +71,8 @@ pub struct Locator<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: 
     pub(super) best: i32,
     pub(super) looked: u32,
     pub(super) exhausted: Option<Exhausted>,
+    /// The first verdict, which stays.
+    verdict: Verdict,
     pub(super) random: Random,
     seed: u32,
 }
@@ -112,6 +114,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locator
             best: NOTHING,
             looked: 0,
             exhausted: None,
+            verdict: Verdict::Undecided,
             random: Random(seed),
             seed,
         }
@@ -122,7 +125,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P> Locator<
     /// This locator with the same maps at another place, and another place for the same cells. Cost: all but the cells is copied.
     pub(crate) fn over<'n, Q>(self, maps: Maps<'n>, pool: Q) -> Locator<'n, CELLS, TOUCHES, OBJECTS, Q> {
         let Self { stopping, effort, seen, touches, count, priors, dropped, posteriors, .. } = self;
-        let Self { best, looked, exhausted, random, seed, .. } = self;
+        let Self { best, looked, exhausted, verdict, random, seed, .. } = self;
         Locator {
             maps,
             stopping,
@@ -137,6 +140,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P> Locator<
             best,
             looked,
             exhausted,
+            verdict,
             random,
             seed,
         }
@@ -159,6 +163,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool
     /// Forgets all touches, for another object. Cost: that of a search without touches.
     pub fn reset(&mut self) {
         (self.touches, self.count, self.random) = (0, 0, Random(self.seed));
+        self.verdict = Verdict::Undecided;
         self.search();
     }
 
@@ -189,28 +194,45 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool
         hand.seen(touch).map(|seen| self.push_seen(seen))
     }
 
-    /// Takes in the heights of an approach.
+    /// Takes in the heights of an approach. The first verdict other than [`Verdict::Undecided`] stays until a reset; posteriors and
+    /// the object's place go on with further touches.
     ///
-    /// Cost: a search, about as much as [`Effort::lookups`] says. Cannot fail: once there is no more room for
-    /// touches, the verdict is [`Verdict::GaveUp`] unless an object has been named.
+    /// Cost: a search, about as much as [`Effort::lookups`] says. Until there is a verdict also a pass over the objects and one over
+    /// the touches, and one over the kept cells where the maps have a test for unknown objects. Cannot fail: once there is no more
+    /// room for touches, the verdict is [`Verdict::GaveUp`] unless there was another.
     pub fn push_seen(&mut self, seen: Seen) -> Verdict {
-        let Some(slot) = self.seen.get_mut(self.touches) else { return self.verdict() };
-        *slot = seen;
-        self.touches += 1;
-        self.search();
-        self.verdict()
+        if let Some(slot) = self.seen.get_mut(self.touches) {
+            *slot = seen;
+            self.touches += 1;
+            self.search();
+            if self.verdict == Verdict::Undecided {
+                self.verdict = self.decide();
+            }
+        }
+        self.verdict
     }
 
-    /// The verdict on the touches so far. No object is named before a finger met more than the table: on an empty table the object
-    /// that is easiest to miss would be. Cost: a pass over the objects and one over the touches, and one over the kept cells
-    /// where the maps have a test for unknown objects. Cannot fail, like all that follows.
-    pub fn verdict(&self) -> Verdict {
+    /// The first verdict on the touches so far. Cost of this and of the next: a few instructions. Cannot fail, like all that follows.
+    pub const fn verdict(&self) -> Verdict {
+        self.verdict
+    }
+
+    /// The object that was recognized, whichever leads by now; until then the [leader](Self::leader).
+    pub fn best(&self) -> usize {
+        match self.verdict {
+            Verdict::Recognized { object, .. } => usize::from(object),
+            _ => self.leader(),
+        }
+    }
+
+    /// A verdict on the last search alone. No object is named before a finger met more than the table: on an empty table the object
+    /// that is easiest to miss would be.
+    fn decide(&self) -> Verdict {
         let touches = u32::try_from(self.touches).unwrap_or(u32::MAX);
         let familiarity = self.familiarity();
         let is_sure = familiarity == Familiarity::Known
             && self.exhausted.is_none()
             && !self.met_table_alone()
-            && self.touches > 0
             && self.rivals().q56() <= self.stopping.odds();
         if familiarity == Familiarity::Stranger {
             Verdict::Unknown
@@ -235,7 +257,8 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool
             .0
     }
 
-    /// Sum of the weights of all other objects, that of the leader being 1. Cost: a pass over the objects.
+    /// Sum of the weights of all objects but the leader, that of the leader being 1. It is above 1 while the leader has less than
+    /// half of the belief. Cost: a pass over the objects.
     pub fn rivals(&self) -> Rivals {
         let leader = self.leader();
         let objects = self.posteriors.iter().take(self.maps.objects()).enumerate();

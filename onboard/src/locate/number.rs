@@ -105,10 +105,13 @@ pub(super) fn add(a: i32, b: i32) -> i32 {
     larger + of_sum(65_536 + u64::from(power(larger - smaller)))
 }
 
-/// 2^-x for a difference of logarithms, in Q56.
+/// e^-`nats` for a difference of logarithms, in Q56; more than 2^8 counts as much.
 pub(super) fn odds(nats: i32) -> u64 {
     let bits = u64::from(nats.unsigned_abs()).saturating_mul(BITS);
-    if nats < 0 { u64::MAX } else { crate::exp2_negative(bits) }
+    if nats >= 0 {
+        return crate::exp2_negative(bits);
+    }
+    (8_u64 << 32).checked_sub(bits).map_or(u64::MAX, |left| crate::exp2_negative(left).saturating_mul(1 << 8))
 }
 
 /// Random numbers for choices that must be the same on every machine: xorshift.
@@ -157,6 +160,10 @@ mod tests {
         assert_eq!((power(-1), logarithm(0), sine(64), sine(-64)), (65_535, NOTHING, 16_384, -16_384));
         assert!((f64::from(add(-100, -100)) - (-100.0 + 64.0 * 2_f64.ln())).abs() <= 1.5);
         assert_eq!(add(0, NOTHING), 0);
-        assert!((odds(64) as f64 / (1_u64 << 56) as f64 - (-1_f64).exp()).abs() < 1e-6);
+        for nats in -354..1_200 {
+            let exact = (-f64::from(nats) / 64.0).exp();
+            assert!((odds(nats) as f64 / (1_u64 << 56) as f64 / exact - 1.0).abs() < 1e-4, "{nats}");
+        }
+        assert_eq!(odds(-400), u64::MAX);
     }
 }

@@ -233,8 +233,10 @@ fn a_wedge_and_a_cylinder_are_told_apart_with_place_and_yaw() {
     for (place, yaw) in [([12.0, -9.0], 0.6), ([-20.0, 17.0], 2.4), ([3.0, 5.0], 4.9)] {
         let mut find = |object: u8, height: Heights| {
             locator.reset();
+            // The first name may be another.
             let verdict = touch(&mut locator, height, place, yaw, 8);
-            assert!(matches!(verdict, Verdict::Recognized { object: found, .. } if found == object), "{verdict:?}");
+            assert!(matches!(verdict, Verdict::Recognized { .. }), "{verdict:?}");
+            assert_eq!(locator.leader(), usize::from(object));
             poses(&locator, usize::from(object))[0]
         };
         let pose = find(0, wedge);
@@ -260,6 +262,11 @@ fn an_object_that_looks_the_same_from_behind_has_two_poses() {
     assert!([one, other].iter().all(|pose| far(pose, place) < 2.0), "{one:?} {other:?}");
     assert!(turns.iter().any(|&turn| turn < 6.0) && turns.iter().any(|&turn| turn > 174.0), "{one:?} {other:?}");
     assert!(one.share + other.share > 60_000 && one.share < 50_000, "{one:?} {other:?}");
+    // The largest share comes first, however many are asked for.
+    let shares: Vec<u32> = poses(&locator, 0).iter().map(|pose| pose.share).collect();
+    assert!(shares.is_sorted_by(|one, next| one >= next), "{shares:?}");
+    let mut first = [Pose::default()];
+    assert_eq!((locator.poses(0, &mut first), first), (1, [one]));
     assert!(poses(&locator, usize::MAX).is_empty() && locator.poses(0, &mut []) == 0);
 }
 
@@ -324,6 +331,60 @@ fn weights_say_which_objects_there_may_be() {
     // As often as there are objects, whatever was before.
     assert!(locator.reset_to(&[7, 7]));
     assert!(matches!(touch(&mut locator, wedge, [9.0, 9.0], 2.0, 1), Verdict::Recognized { object: 0, .. }));
+}
+
+#[test]
+fn a_name_stays_with_its_place_whatever_is_touched_then() {
+    let mut locator = locator(&BOTH);
+    let place = [6.0, -3.0];
+    let first = touch(&mut locator, wedge, place, 0.8, 1);
+    assert!(matches!(first, Verdict::Recognized { object: 0, .. }), "{first:?}");
+    let before = poses(&locator, locator.best())[0];
+    assert!(locator.best() == 0 && locator.leader() == 0);
+    // The wedge is replaced by a cylinder: more touches than there is room for.
+    for number in 0..40 {
+        let at = Approach { x: 6_000 - 1_000 * (number % 13), y: 1_000 * (number % 7) - 6_000, roll: 19 };
+        assert_eq!(locator.push_seen(met(cylinder, at, place, 0.0)), first);
+        assert!(locator.verdict() == first && locator.best() == 0);
+        assert!(poses(&locator, locator.best()).iter().all(|pose| pose.placement == before.placement));
+    }
+    assert_eq!((locator.leader(), locator.touches()), (1, 32));
+    assert!(locator.posterior(0) < 1_000, "{}", locator.posterior(0));
+    locator.reset();
+    assert_eq!((locator.verdict(), locator.best()), (Verdict::Undecided, locator.leader()));
+    // So does a verdict without a name.
+    let bytes = model(&[WEDGE, CYLINDER], 0);
+    let maps = Maps::new(&bytes).unwrap();
+    let stopping = Stopping::from_odds((1 << 56) / 99, 2);
+    let mut locator = Locator::<4096, 32, 2>::new(maps.try_into().unwrap(), stopping, Effort::default(), 1);
+    let far = Approach { x: 50_000, y: 50_000, roll: 0 };
+    let verdicts = [far; 2].map(|at| locator.push_seen(met(wedge, at, place, 0.8)));
+    assert_eq!(verdicts, [Verdict::Undecided, Verdict::GaveUp]);
+    for _ in 0..8 {
+        let at = locator.choose(SPACING, STROKE, 60_000, 20);
+        assert_eq!(locator.push_seen(met(wedge, at, place, 0.8)), Verdict::GaveUp);
+    }
+    assert!(locator.rivals().q56() < locator.stopping.odds());
+}
+
+#[test]
+fn rivals_are_right_at_any_share_of_the_leader() {
+    let lower: Heights = |x, y| if x.hypot(y) < 14.0 { 20.0 } else { 0.0 };
+    let box_of: Heights = |x, y| if x.abs().max(y.abs()) < 15.0 { 24.0 } else { 0.0 };
+    let placed = [WEDGE, CYLINDER, Placed(2, lower, [17, 17], true), Placed(3, box_of, [18, 18], false)];
+    let bytes = model(&placed, 0);
+    let maps = Maps::new(&bytes).unwrap();
+    let mut locator = Locator::<4096, 32, 4>::new(maps.try_into().unwrap(), maps.stopping(), Effort::default(), 1);
+    let (mut at, mut shares) = (Approach { x: 20_000, y: -20_000, roll: 0 }, Vec::new());
+    for _ in 0..6 {
+        locator.push_seen(met(box_of, at, [4.0, 7.0], 0.4));
+        at = locator.choose(SPACING, STROKE, 60_000, 20);
+        let share = f64::from(locator.posterior(locator.leader())) / 65_536.0;
+        let of_rivals = locator.rivals().posterior().to_f64();
+        assert!((of_rivals / share - 1.0).abs() < 0.03, "{of_rivals} for {share}");
+        shares.push(share);
+    }
+    assert!(shares[0] < 0.45 && shares[5] > 0.9, "{shares:?}");
 }
 
 #[test]

@@ -60,7 +60,7 @@ pub trait Locates {
         None
     }
 
-    /// True if no finger met more than the table, and the place of this rank of the most likely object.
+    /// True if no finger met more than the table, and the place of this rank of the recognized object, or else of the most likely one.
     ///
     /// # Errors
     /// [`Refusal::NoModel`] without maps.
@@ -173,7 +173,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locates for
         let touch = touch.with_position(Position { micrometers: position });
         let pressed = self.with(model, |locator, hand| {
             let decision = decision(locator.push(&touch, hand)?);
-            let (best, evidence) = (locator.leader(), locator.evidence());
+            let (best, evidence) = (locator.best(), locator.evidence());
             let evidence = evidence.get(..locator.maps().objects()).unwrap_or_default();
             let detail = detail.then(|| Detail::new(u64::from(locator.posterior(best)) << 40, evidence));
             let touches = u32::try_from(locator.touches()).unwrap_or(u32::MAX);
@@ -210,7 +210,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locates for
         self.with(model, |locator, _| {
             let (mut poses, rank) = ([TablePose::default(); PLACES], usize::from(rank));
             let poses = if locator.touches() == 0 { None } else { poses.get_mut(..=rank) }.unwrap_or_default();
-            let found = locator.poses(locator.leader(), poses);
+            let found = locator.poses(locator.best(), poses);
             (locator.met_table_alone(), poses.get(..found).and_then(|found| found.get(rank)).copied())
         })
     }

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 /// Recognize objects from a stream of touches.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and six numbers of the probe's direction and alignment if the model needs them. Each line out is the verdict so far: undecided, recognized, unknown or gave-up. After a verdict, and after an empty line, the next touch is the first of another object. FILE may be a robot's log (MCAP) as well. A model of maps takes touches with a position: twelve columns.
+Each line in is a touch: three contact times in seconds, - for a finger that did not touch, and six numbers of the probe's direction and alignment if the model needs them. Each line out is the verdict so far: undecided, recognized, unknown or gave-up. After a verdict, and after an empty line, the next touch is the first of another object. FILE may be a robot's log (MCAP) as well. A model of maps takes touches with a position: twelve columns. With --next, the first approach to each object is at x = y = 0, with the row in any direction.
 
 With --features each line in is a row of features for a model of another library: CSV with the features' names in the header; out is the class of each row, or a regression's value. With --add-up out is the verdict so far. With --sequence-column evidence begins where a sequence does, and nothing more is said of one after its verdict; without it the row after a verdict is the first of another object, and a promise is for the first verdict alone.
 
@@ -217,6 +217,7 @@ impl<'m> Stream<'m> {
             posterior: self.recognizer.posterior(best).to_f64(),
             refused,
             table_alone: false,
+            exhausted: false,
             next: self.next(),
         }
     }

@@ -23,6 +23,9 @@ pub(super) struct Line<'a> {
     /// True where a sequence ends without a name, and nothing but the table was met.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub(super) table_alone: bool,
+    /// True where the search for the place ended before it was done: then no object is named, however likely it is.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub(super) exhausted: bool,
     /// The approach that helps most.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) next: Option<Entry>,
@@ -39,8 +42,12 @@ impl Line<'_> {
                 output::print(&format!("{:4}  {:10}  nothing but the table was met\n", self.touch, self.verdict))?
             }
             None => output::print(&format!(
-                "{:4}  {:10}  {} {:.4}\n",
-                self.touch, self.verdict, self.object, self.posterior
+                "{:4}  {:10}  {} {:.4}{}\n",
+                self.touch,
+                self.verdict,
+                self.object,
+                self.posterior,
+                if self.exhausted { ", but the search for its place was not finished" } else { "" }
             ))?,
         }
         self.next.as_ref().map_or(Ok(()), |next| output::print(&format!("      {next}\n")))

@@ -190,20 +190,21 @@ impl<'m> Stream<'m> {
     }
 
     fn print(&mut self, refused: Option<String>) -> Result<()> {
-        let leader = self.locating.leader();
+        let best = self.locating.best();
         let verdict = self.locating.verdict();
-        let posterior = self.locating.posteriors().get(leader).copied().unwrap_or(0.0);
+        let posterior = self.locating.posteriors().get(best).copied().unwrap_or(0.0);
         let line = Line {
             touch: self.touches,
             verdict: verdict_name(verdict),
-            object: if self.touches == 0 { "" } else { self.maps.object_name(leader) },
+            object: if self.touches == 0 { "" } else { self.maps.object_name(best) },
             posterior,
             refused,
             table_alone: matches!(verdict, Verdict::Unknown | Verdict::GaveUp) && self.locating.met_table_alone(),
+            exhausted: self.locating.is_exhausted(),
             next: None,
         };
         let Some(within) = self.within else { return line.print(self.json) };
-        let poses = if self.touches == 0 { Vec::new() } else { self.locating.poses(leader) };
+        let poses = if self.touches == 0 { Vec::new() } else { self.locating.poses(best) };
         let next = (verdict == Verdict::Undecided).then(|| self.locating.choose(&self.hand, within, POSE));
         print_located(line, poses, next, |placement| self.maps.placement_name(placement))
     }

@@ -11,7 +11,7 @@ use palpate::ensemble::StatedProbe;
 use palpate::error::LocateProblem;
 use palpate::evaluate::Finding;
 use palpate::locate::{
-    self, Aimed, Calibrated, Evaluation, Inspected, MapsFile, POSE, Promised, Real, Standing, Terms, Until,
+    self, Aimed, Calibrated, Evaluation, Inspected, MapsFile, POSE, Promised, Real, Standing, Terms, ToPlace, Until,
 };
 use palpate::output;
 use palpate::probe::Probe;
@@ -28,7 +28,7 @@ pub(crate) struct TableArguments {
     /// Aim of simulated approaches: chosen, where they tell most, or random [default: the promise's, or chosen]
     #[arg(long, value_name = "HOW", value_parser = aimed, requires = "objects")]
     aimed: Option<Aimed>,
-    /// Go on until the pose is as sure, beyond the name: half of its 95 % intervals, such as 3mm/5deg
+    /// Go on after the name until the place is as sure: half of its 95 % intervals, such as 3mm/5deg
     #[arg(long, value_name = "LENGTH/ANGLE", value_parser = until, requires = "objects")]
     until: Option<Until>,
     /// Make a test for objects that the model does not know; names then take eight approaches or more
@@ -207,6 +207,10 @@ fn calibrated_text(path: &Path, calibrated: &Calibrated, before: u64) -> String 
             percent(1.0 - given as f64 / sequences.max(1) as f64, 2),
             decimal(calibrated.mean_approaches, 1),
         )
+        + &calibrated.until.map_or_else(String::new, |ToPlace { right, placed, mean_approaches }| {
+            let approaches = decimal(mean_approaches, 1);
+            format!("Until the place is sure: {approaches} approaches each; {placed} of {right} objects named rightly had a sure place.\n")
+        })
         + calibrated.recordings.map_or("", |_| note)
         + &super::thresholds::text(&margins, &Default::default(), calibrate::margin_of(before))
         + &format!("{}: {} bytes\n", path.display(), count(calibrated.model.len()))
@@ -229,6 +233,11 @@ fn evaluated_text(evaluated: &Evaluation, terms: &Terms, noise: &str, are_others
         count(evaluated.poses),
         if terms.until.is_some() { "their pose" } else { "one of the modes of their pose" },
     );
+    let lost = given - wrong - evaluated.poses;
+    if lost > 0 {
+        // Writing to a string cannot fail.
+        _ = writeln!(text, "{} right names had no sure place in the end", count(lost));
+    }
     if let Some(tested) = &evaluated.promise {
         let promised = &tested.promised;
         // Writing to a string cannot fail.

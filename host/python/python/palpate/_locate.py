@@ -25,8 +25,14 @@ class CalibratedMaps:
 
     @property
     def mean_approaches(self) -> float:
-        """Approaches on average."""
+        """Approaches on average until the name."""
         return float(self.raw["mean_approaches"])
+
+    @property
+    def approaches_to_place(self) -> float | None:
+        """Approaches on average until the place was as sure as `until` asked for; None without it."""
+        until = self.raw.get("until")
+        return None if until is None else float(until["mean_approaches"])
 
     @property
     def sequences(self) -> int:
@@ -64,5 +70,5 @@ class MapsEvaluation:
 
     @property
     def placed(self) -> float:
-        """Share of the right names whose place was as true as `until` asked for; 1 without it."""
-        return float(self.raw["poses_within"] / max(self.raw["poses"], 1))
+        """Share of the right names whose place was found, and as true as `until` asked for; 1 without it."""
+        return float(self.raw["poses_within"] / max(self.raw["given"] - self.raw["wrong"], 1))

@@ -114,19 +114,24 @@ class Located:
     state: Literal["undecided", "recognized", "unknown", "gave-up"]
     """An object was recognized, the touches fit none that the maps know, or the limit of touches was reached."""
     best: str
-    """The object with the most evidence."""
+    """The object that was recognized; until then the one with the most evidence."""
     posterior: float
-    """Its posterior."""
+    """Its posterior, which goes on with touches after the verdict."""
     touches: int
     """The number of touches taken in."""
     modes: tuple[Mode, ...]
-    """Possible places, at most four, the most likely one first."""
+    """Its possible places, at most four, the one with the largest share first."""
     table_alone: bool = False
     """True if no finger met more than the table so far: if the state is "unknown" or "gave-up", there is probably no object."""
+    contradicted: bool = False
+    """True if another object has more evidence by now than the one that was recognized. The verdict stays: it is what a
+    calibration promises."""
+    exhausted: bool = False
+    """True if the last search for the place ended before it was done. It names no object, however large the posterior is."""
 
     @property
     def decided(self) -> bool:
-        """True if further touches change nothing about the verdict; they may still about the place."""
+        """True once there is a verdict. It stays until `reset`; the place goes on with further touches."""
         return self.state != "undecided"
 
     @property

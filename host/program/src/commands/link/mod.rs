@@ -274,6 +274,7 @@ impl<'c> Printer<'c> {
                     posterior,
                     refused: self.refused.map(|refusal| refusal.to_string()),
                     table_alone: matches!(decision, Decision::Unknown | Decision::GaveUp) && *table_alone,
+                    exhausted: false,
                     next: None,
                 };
                 let name = |placement: u8| self.chip.placements.get(usize::from(placement)).map_or("", String::as_str);
