@@ -34,7 +34,7 @@ pub(super) fn section(context: &Context) -> Result<Section> {
     section.blocks.push(Block::Pictures(pictures.collect()));
     for object in context.objects {
         for instance in object.instances() {
-            let facts = Facts::of(&instance.mesh);
+            let facts = object.facts(instance);
             let complaints = facts.complaints(object.millimeters);
             if complaints.is_empty() {
                 continue;
@@ -102,7 +102,7 @@ pub(super) fn described(probe: &Probe, unit: Length) -> String {
 pub(super) fn to_repair(context: &Context) -> Vec<String> {
     let capture = &context.settings.capture;
     let is_broken = |object: &Object, instance: &Instance| {
-        let facts = Facts::of(&instance.mesh);
+        let facts = object.facts(instance);
         let length = capture.length_of(object, instance).unwrap_or(capture.length);
         view::verdict(&facts, length, &capture.probe).starts_with("repair")
     };

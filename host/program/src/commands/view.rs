@@ -115,7 +115,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         &view::Settings { touches, seed: global.seed(), length, clearance, probe, cone: scene.cone() },
     )?;
     output::write_bytes(output, page.as_bytes())?;
-    let facts = Facts::of(object.mesh());
+    let facts = object.facts(object.first());
     let complaints = facts.complaints(object.millimeters);
     let verdict = view::verdict(&facts, length, &probe);
     if global.json {

@@ -64,7 +64,7 @@ const MOST_APPROACHES: u64 = 200_000;
 /// Errors of [`Scene::new`], [`Probe::check`] and [`placements::of_object`].
 pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     settings.probe.check(settings.length)?;
-    let facts = Facts::of(object.mesh());
+    let facts = object.facts(object.first());
     let lying = settings.cone.map(|cone| Lying::new(object, cone)).transpose()?;
     let first = lying.as_ref().and_then(Lying::first);
     let (scene, mesh) = match first {

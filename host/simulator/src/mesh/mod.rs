@@ -70,6 +70,8 @@ pub struct Object {
     pub name: String,
     /// Number of millimeters in a unit of its meshes, if known: needed to touch it at its true size.
     pub millimeters: Option<f64>,
+    /// The step in which the file of its coarsest mesh rounds coordinates, in units of its meshes; 0 if that is not known.
+    pub step: f64,
     /// Weights of its placements on a table that replace those of their solid angles, by name: a placement that is not among
     /// them is left out. Empty: solid angles.
     pub placement_weights: Vec<(String, f64)>,
@@ -94,7 +96,8 @@ impl Object {
     pub fn new(name: impl Into<String>, mesh: Mesh) -> Self {
         let name = name.into();
         let first = Instance { name: name.clone(), mesh };
-        Self { name, millimeters: None, placement_weights: Vec::new(), notes: Vec::new(), first, others: Vec::new() }
+        let (placement_weights, notes, others) = (Vec::new(), Vec::new(), Vec::new());
+        Self { name, millimeters: None, step: 0.0, placement_weights, notes, first, others }
     }
 
     /// An object with several meshes of unknown units; none if there is no instance.
@@ -104,6 +107,7 @@ impl Object {
         Some(Self {
             name: name.into(),
             millimeters: None,
+            step: 0.0,
             placement_weights: Vec::new(),
             notes: Vec::new(),
             first,
@@ -116,10 +120,20 @@ impl Object {
         &self.first.mesh
     }
 
+    /// Its only instance, or the first of several.
+    pub fn first(&self) -> &Instance {
+        &self.first
+    }
+
     /// Its instances: at least one.
     pub fn instances(&self) -> impl ExactSizeIterator<Item = &Instance> + Clone {
         let count = 1 + self.others.len();
         (0..count).map(|index| if index == 0 { &self.first } else { &self.others[index - 1] })
+    }
+
+    /// Facts about an instance: about its mesh, and the step in which its file rounds it.
+    pub fn facts(&self, instance: &Instance) -> facts::Facts {
+        facts::Facts { step: self.step, ..facts::Facts::of(&instance.mesh) }
     }
 
     /// The longest side of an instance's bounding box in millimeters, where its units are known.

@@ -5,7 +5,7 @@
 
 use crate::error::{Error, MeshProblem, Place, Result};
 use crate::mesh::Mesh;
-use crate::mesh::exact::{Bounds, Moved, rounded};
+use crate::mesh::exact::{Bounds, Moved, rounded, step_of_decimals};
 use crate::mesh::polygon::Cutter;
 use crate::mesh::words::{coordinate, number, shown};
 use std::fs::File;
@@ -37,10 +37,10 @@ pub fn read(path: &Path) -> Result<Mesh> {
 /// # Errors
 /// Errors of [`read`].
 pub fn parse(text: impl BufRead, path: &Path) -> Result<Mesh> {
-    parse_moved(text, path).map(|(mesh, _)| mesh)
+    parse_moved(text, path).map(|(mesh, ..)| mesh)
 }
 
-/// Parses a mesh, and returns the offset subtracted from its coordinates.
+/// Parses a mesh, and returns the offset subtracted from its coordinates and the step in which they are rounded.
 pub(super) fn parse_moved(text: impl BufRead, path: &Path) -> Result<Moved> {
     let mut filter = FacesOnly::new(text, path);
     let loaded = tobj::load_obj_buf(&mut filter, &tobj::LoadOptions::default(), |_| Ok(Default::default()));
@@ -50,12 +50,14 @@ pub(super) fn parse_moved(text: impl BufRead, path: &Path) -> Result<Moved> {
     filter.check_indices()?;
     let unusable = |problem| Error::at(Place::file(path), problem);
     let (models, _) = loaded.map_err(|error| unusable(MeshProblem::Unreadable { reason: error.to_string() }))?;
-    let offset = Bounds::of(models.iter().flat_map(|model| model.mesh.positions.as_chunks().0).copied()).offset();
+    let vertices: Vec<[f64; 3]> = models.iter().flat_map(|model| model.mesh.positions.as_chunks().0).copied().collect();
+    let offset = Bounds::of(vertices.iter().copied()).offset();
     let mut mesh = Mesh::default();
     for model in models {
         append(&mut mesh, model.mesh, offset);
     }
-    Ok((mesh.usable().map_err(unusable)?, offset))
+    let step = step_of_decimals(&vertices, &mesh.triangles);
+    Ok((mesh.usable().map_err(unusable)?, offset, step))
 }
 
 fn append(mesh: &mut Mesh, part: tobj::Mesh, offset: [f64; 3]) {

@@ -1,7 +1,7 @@
 //! Meshes that a file places by transforms, some of them several times: common code of the readers of scenes.
 
 use super::Mesh;
-use super::exact::Moved;
+use super::exact::{Moved, step_of_decimals, step_of_f32};
 use crate::error::MeshProblem;
 use glam::{DAffine3, DVec3};
 
@@ -11,6 +11,8 @@ use glam::{DAffine3, DVec3};
 pub(super) struct Placed {
     vertices: Vec<[f64; 3]>,
     triangles: Vec<[u32; 3]>,
+    /// The step in which 32-bit numbers round the coordinates.
+    step: f64,
     /// The most bytes that vertices and triangles may take.
     limit: u64,
 }
@@ -19,7 +21,7 @@ impl Placed {
     /// An empty scene of a file of `length` bytes. With the growth of vectors, its mesh, and one that is to be placed, take
     /// less than 192 bytes for each byte of the file and 768 KB.
     pub(super) fn new(length: u64) -> Self {
-        Self { vertices: Vec::new(), triangles: Vec::new(), limit: (3 << 16) + 48 * length }
+        Self { vertices: Vec::new(), triangles: Vec::new(), step: 0.0, limit: (3 << 16) + 48 * length }
     }
 
     /// Refuses a mesh if its vertices or triangles would make the scene too large.
@@ -59,12 +61,20 @@ impl Placed {
         Ok(())
     }
 
+    /// Takes note of 32-bit numbers in which the file holds vertices that `transform` places.
+    pub(super) fn note_f32(&mut self, vertices: &[[f32; 3]], transform: &DAffine3) {
+        let longest = transform.matrix3.to_cols_array_2d().map(|axis| DVec3::from(axis).length());
+        let step = step_of_f32(vertices.iter().map(|vertex| vertex.map(f64::from)));
+        self.step = self.step.max(step * DVec3::from(longest).max_element());
+    }
+
     /// The mesh of the whole scene.
     ///
     /// # Errors
     /// Errors of [`Mesh::usable`].
     pub(super) fn into_mesh(self) -> Result<Moved, MeshProblem> {
+        let step = self.step.max(step_of_decimals(&self.vertices, &self.triangles));
         let (mesh, moved) = Mesh::from_f64(&self.vertices, self.triangles);
-        Ok((mesh.usable()?, moved))
+        Ok((mesh.usable()?, moved, step))
     }
 }

@@ -21,7 +21,7 @@ const FREECAD: &str = "Export a mesh of it as STL, for example with FreeCAD";
 const CLOUDCOMPARE: &str = "Convert it to PLY with normals, for example with CloudCompare";
 const PARAVIEW: &str = "Convert its surface to PLY or STL, for example with ParaView";
 
-const FORMATS: [Unread; 17] = [
+const FORMATS: [Unread; 18] = [
     Unread {
         name: "OFF",
         extensions: &["off", "coff"],
@@ -43,6 +43,12 @@ const FORMATS: [Unread; 17] = [
         extensions: &["sldprt", "sldasm", "ipt", "iam", "catpart", "f3d", "x_t", "x_b", "jt", "fcstd", "skp"],
         begins: &[],
         instead: "Export a mesh of it as STL with that program",
+    },
+    Unread {
+        name: "OpenSCAD",
+        extensions: &["scad"],
+        begins: &[],
+        instead: "Export a mesh of it as STL with OpenSCAD",
     },
     Unread {
         name: "VRML or X3D",
@@ -85,7 +91,7 @@ fn points(path: &Path) -> Option<(&'static str, &'static str)> {
     let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     let (what, word) = match extension.as_deref() {
         Some("pcd") => ("points in PCD", ".pcd"),
-        Some("xyz") => ("points in XYZ", ".xyz"),
+        Some("xyz" | "asc") => ("points in XYZ", ".xyz"),
         _ if path.file_name()? == "scene_camera.json" => ("depth images", "depth image"),
         _ => return None,
     };

@@ -13,10 +13,10 @@ fn complaint(text: &str) -> String {
     parse_text(text).unwrap_err().to_string()
 }
 
-/// One triangle in the geometry `g`, with this asset, these other libraries and this scene.
+/// One triangle in the geometry `g`, with this asset, or else z up, these other libraries and this scene.
 fn triangle(asset: &str, libraries: &str, nodes: &str) -> String {
     format!(
-        "<COLLADA><asset>{asset}</asset><library_geometries><geometry id=\"g\"><mesh>\n\
+        "<COLLADA><asset>{asset}<up_axis>Z_UP</up_axis></asset><library_geometries><geometry id=\"g\"><mesh>\n\
          <source id=\"s\"><float_array id=\"a\" count=\"9\">0 0 0 1 0 0 0 <!-- here --> 2 0</float_array>\n\
          <technique_common><accessor source=\"#a\" count=\"3\" stride=\"3\"/></technique_common></source>\n\
          <vertices id=\"v\"><input semantic=\"POSITION\" source=\"#s\"/></vertices>\n\
@@ -43,6 +43,20 @@ fn transforms_apply_in_their_order_and_outer_nodes_last() {
     assert_eq!(placed("", "", &nodes), [[[10.0, 2.0, 0.0], [10.0, 4.0, 0.0], [6.0, 2.0, 0.0]]]);
     let matrix = format!("<node><matrix>0 -1 0 10  1 0 0 0  0 0 1 5  0 0 0 1</matrix>{INSTANCE}</node>");
     assert_eq!(placed("", "", &matrix), [[[10.0, 0.0, 5.0], [10.0, 1.0, 5.0], [8.0, 0.0, 5.0]]]);
+}
+
+#[test]
+fn transforms_of_nodes_without_geometry_are_not_looked_at() {
+    let odd = ["<lookat>1 2 3 0 0 0 0 0 1</lookat>", "<skew>1 1 0 0 0 1 0</skew>", "<matrix>1 2</matrix>"];
+    let camera =
+        |odd| format!("<node>{odd}<node>{odd}<instance_camera url=\"#c\"/></node></node><node>{INSTANCE}</node>");
+    let library = |odd| format!("<library_nodes><node id=\"n\">{odd}</node></library_nodes>");
+    for odd in odd {
+        let nodes = camera(odd) + "<node><instance_node url=\"#n\"/></node>";
+        assert_eq!(placed("", &library(odd), &nodes).len(), 1, "{odd}");
+        let said = complaint(&triangle("", "", &format!("<node>{odd}<node>{INSTANCE}</node></node>")));
+        assert!(said.starts_with("cup.dae:8: "), "{said}");
+    }
 }
 
 #[test]
@@ -86,6 +100,10 @@ fn the_upward_axis_becomes_z_and_the_unit_is_stated() {
     assert_eq!(read("<up_axis>Z_UP</up_axis>"), read(""));
     assert_eq!(read("<up_axis> Y_UP\n</up_axis>"), [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 2.0]]);
     assert_eq!(read("<up_axis>X_UP</up_axis>"), [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [-2.0, 0.0, 0.0]]);
+    let unstated = triangle("", "", &node).replace("<up_axis>Z_UP</up_axis>", "");
+    let contents = parse(unstated.as_bytes(), Path::new("cup.dae")).unwrap();
+    assert_eq!(corners(&contents.mesh)[0], read("<up_axis>Y_UP</up_axis>"));
+    assert_eq!(contents.notes, ["cup.dae states no upward axis: y is up, by the standard of COLLADA"]);
     let unit = |asset: &str| parse_text(&triangle(asset, "", &node)).unwrap().1;
     assert_eq!([unit(""), unit("<unit meter=\"0.01\"/>"), unit("<unit/>")], [None, Some(10.0), Some(1000.0)]);
     for (asset, expected) in

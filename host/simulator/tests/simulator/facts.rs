@@ -108,7 +108,10 @@ fn a_pot_of_which_handle_and_spout_alone_are_inside_out_is_not_right_side_out() 
 #[test]
 fn a_cavity_faces_inward_and_a_solid_inside_another_may_face_outward() {
     let hollow = |inner| Facts::of(&globes(&[([0.0; 3], 1.0, false), ([0.1; 3], 0.5, inner)]));
-    assert!(hollow(true).is_right_side_out() && hollow(false).is_right_side_out());
+    for facts in [hollow(true), hollow(false)] {
+        assert!(facts.is_right_side_out() && facts.complaints(None).is_empty());
+        assert_eq!(facts.verdict(0.03), "usable", "no finger reaches what is inside");
+    }
     // In the box of the larger one, but not in it.
     let beside = Facts::of(&globes(&[([0.0; 3], 1.0, false), ([0.85; 3], 0.1, true)]));
     assert_eq!(beside.inside_out().count(), 1);

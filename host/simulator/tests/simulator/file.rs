@@ -53,7 +53,17 @@ fn what_is_nothing_is_refused_as_what_its_extension_says() {
         ("cup.gltf", b"", "cup.gltf:1: the glTF file is damaged"),
         ("cup.dae", b"nothing", "cup.dae:1: the COLLADA file is damaged"),
         ("cup.obj", b"nothing", "cup.obj: the mesh has no faces"),
-        ("cup", b"\x89PNG\r\n", "cup: the mesh has no faces"),
+        (
+            "cup",
+            b"\x89PNG\r\n",
+            "cup: a file that is neither OBJ, STL, PLY, glTF nor COLLADA is not read. Export a mesh",
+        ),
+        (
+            "arm.urdf",
+            b"<?xml version=\"1.0\"?>\n<!-- arm --><robot/>",
+            "arm.urdf: a description of a robot or a world (<robot>)",
+        ),
+        ("arm.xml", b"<mujoco/>", "<mujoco>) is not read. Give the meshes that it names, with --true-size"),
         ("scene.dae", b"<X3D></X3D>", "scene.dae: the COLLADA file is damaged: its root is <X3D>, not <COLLADA>"),
         ("page.dae", b"<html></html>", "page.dae: a web page is not read"),
     ] {

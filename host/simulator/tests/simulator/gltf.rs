@@ -58,6 +58,28 @@ fn nodes_place_their_meshes_and_a_mirror_keeps_the_outside() {
 }
 
 #[test]
+fn hidden_nodes_are_left_out_with_all_below_them_and_a_note_says_so() {
+    let square = square();
+    let mut document = document(&square, None);
+    document["extensionsRequired"] = json!(["KHR_node_visibility"]);
+    document["nodes"] = json!([
+        {"children": [1, 2]},
+        {"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": true}, "VENDOR_remark": 5}},
+        {"children": [3], "extensions": {"KHR_node_visibility": {"visible": false}}},
+        {"mesh": 1}
+    ]);
+    let contents = |document: &Value| parse(&glb_of(document, &buffer(&square)), Path::new("cup.glb"));
+    let shown = contents(&document).unwrap();
+    assert_eq!(corners(&shown.mesh), [corners(&square)[0]]);
+    assert_eq!(shown.notes, ["cup.glb hides 1 node (KHR_node_visibility), left out with all below"]);
+    document["nodes"][2]["extensions"]["KHR_node_visibility"] = json!({});
+    let shown = contents(&document).unwrap();
+    assert_eq!((corners(&shown.mesh), shown.notes.len()), (corners(&square), 0));
+    document["nodes"][0]["extensions"] = json!({"KHR_node_visibility": {"visible": false}});
+    assert_says(contents(&document).unwrap_err(), &["cup.glb: the mesh has no faces"]);
+}
+
+#[test]
 fn strips_fans_missing_indices_and_short_ones_make_triangles_and_lines_do_not() {
     let strip = changed(|document| {
         document["meshes"] = json!([{"primitives": [

@@ -67,6 +67,11 @@ fn a_few_bytes_after_the_last_triangle_are_left_out_and_said() {
         let text = format!("{}{}", samples::stl_text(&globe), "\n".repeat(rest));
         assert!(notes(text).is_empty());
     }
+    // Some programs fill up the last block with zeros.
+    let filled = [whole.clone(), vec![0; 2_000]].concat();
+    assert_eq!(parse_bytes(&filled).unwrap().triangles.len(), globe.triangles.len());
+    assert!(notes(&filled).concat().contains("has 2000 bytes after its last triangle, left out"));
+    assert!(complaint([filled, vec![1]].concat()).contains("triangles, which are"));
 }
 
 #[test]

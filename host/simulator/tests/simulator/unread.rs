@@ -35,6 +35,8 @@ fn a_format_that_is_not_read_is_named_with_what_converts_it() {
         ),
         (b"# .PCD v0.7\n", "mug.PCD", "points in PCD are not read. Instead, make a mesh of the points first"),
         (b"0 0 0\n1 0 0\n", "mug.xyz", "points in XYZ are not read. Instead, make a mesh of the points first"),
+        (b"0 0 0\n1 0 0\n", "mug.asc", "points in XYZ are not read"),
+        (b"cube(3);", "mug.scad", "OpenSCAD is not read. Export a mesh of it as STL with OpenSCAD."),
         (b"{}", "mug/scene_camera.json", "depth images are not read. Instead, make a mesh of the depth images first"),
     ] {
         assert_says(said(bytes, name), &[expected]);

@@ -1,7 +1,7 @@
 //! COLLADA: the geometries of a scene, placed by its nodes.
 //!
 //! `roxmltree` parses. Nodes may be nested, and instances of other nodes. The unit is not applied, but stated with the
-//! mesh; where the file states its upward axis, the mesh is turned so that z is up. What would change the surface and is
+//! mesh; the mesh is turned so that z is up. Transforms of nodes without geometry are not looked at. What would change the surface and is
 //! not read (skins, morphs, splines, skew, polygons with holes) is rejected by name; materials, lights, cameras, animations
 //! and physics are skipped.
 
@@ -19,12 +19,12 @@ use roxmltree::{Document, Node, NodeId};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Reads the mesh of a COLLADA file, and how many millimeters its unit is, if it says; errors name `path`.
+/// Reads the mesh of a COLLADA file, how many millimeters its unit is, if it says, and remarks on the file; errors name `path`.
 ///
 /// # Errors
 /// If the XML is malformed, a number is damaged, a reference is dangling or circular, the file uses an unsupported feature, or no
 /// face is left.
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>)> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>, Vec<String>)> {
     let text = text(bytes, path)?;
     let here = |problem| Error::at(Place::file(path), problem);
     let document = Document::parse(&text).map_err(|error| {
@@ -44,6 +44,11 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>)> {
     let root = document.root_element();
     if !named(root, "COLLADA") {
         let name: String = root.tag_name().name().chars().take(40).collect();
+        if ["robot", "sdf", "mujoco"].contains(&name.as_str()) {
+            let what = format!("a description of a robot or a world (<{name}>)");
+            let instead = "Give the meshes that it names, with --true-size and the unit that its scale makes of them";
+            return Err(here(MeshProblem::Unsupported { what, instead }));
+        }
         return Err(here(damaged(format!("its root is <{name}>, not <COLLADA>"))));
     }
     let mut scene = Scene::new(&document, bytes.len() as u64);
@@ -52,7 +57,9 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>)> {
         let row = u64::from(document.text_pos_at(position).row);
         Error::at(Place::line(path, row + line), problem)
     })?;
-    Ok((scene.placed.into_mesh().map_err(here)?, millimeters))
+    let note = || format!("{} states no upward axis: y is up, by the standard of COLLADA", path.display());
+    let notes = if stated(root, "up_axis").is_none() { vec![note()] } else { Vec::new() };
+    Ok((scene.placed.into_mesh().map_err(here)?, millimeters, notes))
 }
 
 /// The file's text. Names in it may be in Latin-1, if it says so: numbers are ASCII in either.
@@ -101,14 +108,17 @@ fn millimeters(root: Node<'_, '_>) -> Result<Option<f64>, Wrong> {
     }
 }
 
-/// The turn that makes z the upward axis, where the file says which one is.
+/// The turn that makes z the upward axis. Where the file does not say which one is, y is.
 fn upright(root: Node<'_, '_>) -> Result<DAffine3, Wrong> {
-    let Some(axis) = stated(root, "up_axis") else { return Ok(DAffine3::IDENTITY) };
-    let turn = match axis.text().unwrap_or_default().trim() {
+    let axis = stated(root, "up_axis");
+    let turn = match axis.map_or("Y_UP", |axis| axis.text().unwrap_or_default().trim()) {
         "X_UP" => DMat3::from_cols(DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y),
         "Y_UP" => DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
         "Z_UP" => DMat3::IDENTITY,
-        other => return Err(wrong(axis, damaged(format!("{:?} is not an up axis", shown(other.as_bytes()))))),
+        other => {
+            let what = format!("{:?} is not an up axis", shown(other.as_bytes()));
+            return Err(wrong(axis.unwrap_or(root), damaged(what)));
+        }
     };
     Ok(DAffine3::from_mat3(turn))
 }
@@ -119,7 +129,7 @@ fn is_instance(node: Node<'_, '_>) -> bool {
 }
 
 /// Something is wrong with an element.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Wrong {
     node: NodeId,
     /// Number of lines after the element's first.
@@ -196,17 +206,19 @@ impl<'a, 'input> Scene<'a, 'input> {
     /// Places the nodes of a visual scene, in the order of the file.
     fn place_nodes(&mut self, scene: Node<'a, 'input>, turn: DAffine3) -> Result<(), Wrong> {
         let mut waiting = Vec::new();
-        self.wait(scene, turn, &mut waiting)?;
+        self.wait(scene, Ok(turn), &mut waiting)?;
+        // What is wrong with a transform counts where it places a geometry: cameras and lights have odd ones.
+        let inner = |outer: Result<DAffine3, Wrong>, node| Ok(outer? * transform::of(node)?);
         while let Some((child, transform)) = waiting.pop() {
             match child.tag_name().name() {
-                "node" => self.wait(child, transform * transform::of(child)?, &mut waiting)?,
+                "node" => self.wait(child, inner(transform, child), &mut waiting)?,
                 "instance_node" => {
                     let node = self.find(child, "url", "node")?;
-                    self.wait(node, transform * transform::of(node)?, &mut waiting)?;
+                    self.wait(node, inner(transform, node), &mut waiting)?;
                 }
                 "instance_geometry" => {
                     let geometry = self.find(child, "url", "geometry")?;
-                    self.place(child, geometry, &transform)?;
+                    self.place(child, geometry, &transform?)?;
                 }
                 "instance_controller" => {
                     let controller = self.find(child, "url", "controller")?;
@@ -224,15 +236,15 @@ impl<'a, 'input> Scene<'a, 'input> {
     fn wait(
         &mut self,
         parent: Node<'a, 'input>,
-        transform: DAffine3,
-        waiting: &mut Vec<(Node<'a, 'input>, DAffine3)>,
+        transform: Result<DAffine3, Wrong>,
+        waiting: &mut Vec<(Node<'a, 'input>, Result<DAffine3, Wrong>)>,
     ) -> Result<(), Wrong> {
         let from = waiting.len();
         for child in parent.children().filter(|&child| named(child, "node") || is_instance(child)) {
             self.steps = self.steps.checked_sub(1).ok_or_else(|| {
                 wrong(child, damaged("its nodes are instances of each other in a circle, or far too many".into()))
             })?;
-            waiting.push((child, transform));
+            waiting.push((child, transform.clone()));
         }
         waiting.get_mut(from..).unwrap_or_default().reverse();
         Ok(())

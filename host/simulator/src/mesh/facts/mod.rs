@@ -8,6 +8,7 @@ mod parts;
 
 pub use parts::Part;
 
+use super::exact::FINE;
 use crate::mesh::Mesh;
 use glam::Vec3;
 
@@ -33,6 +34,8 @@ pub struct Facts {
     pub volume: f64,
     /// Its parts, the one with most triangles first.
     pub parts: Vec<Part>,
+    /// The step in which its file rounds coordinates; 0 if that is not known.
+    pub step: f64,
 }
 
 /// The sizes in millimeters that an object for a finger may have: a grain of rice to a car.
@@ -57,6 +60,7 @@ impl Facts {
             widest_gap: gaps::widest(&welded),
             volume: parts.iter().map(|part| part.volume).sum(),
             parts,
+            step: 0.0,
         }
     }
 
@@ -106,16 +110,21 @@ impl Facts {
     }
 
     /// Warnings before touching the mesh, as sentences: that it is open, inside out in all or some of its parts, not a
-    /// manifold, or of a size that cannot be. `millimeters` is how many its unit is, if that is known. None
+    /// manifold, of a size that cannot be, or rounded by its file. `millimeters` is how many its unit is, if that is known. None
     /// if nothing is wrong.
     pub fn complaints(&self, millimeters: Option<f64>) -> Vec<String> {
-        let sentences = [self.open(), self.turned(), self.contrary(), self.branching(), self.size(millimeters)];
+        let rounded = self.rounded().map(|why| format!("The mesh is rounded: {why}."));
+        let sentences =
+            [self.open(), self.turned(), self.contrary(), self.branching(), self.size(millimeters), rounded];
         sentences.into_iter().flatten().collect()
     }
 
     /// Says if the mesh can be touched as it is by fingers of a diameter (in the units of its file), in words:
     /// "usable", or "repair first" and why. What is wrong and makes no difference to touches is no reason.
     pub fn verdict(&self, diameter: f64) -> String {
+        if let Some(why) = self.rounded() {
+            return format!("repair first: {why}");
+        }
         match (self.widest_gap >= diameter, self.is_right_side_out()) {
             (true, _) => format!(
                 "repair first: a gap is {} wide and a finger {}, so it reaches inside where a real one may find a surface",
@@ -128,6 +137,11 @@ impl Facts {
                     .into()
             }
         }
+    }
+
+    /// The coarse steps in which the file rounds the mesh, in words; none if they are fine.
+    fn rounded(&self) -> Option<String> {
+        rounded(self.step, f64::from((self.high - self.low).max_element()))
     }
 
     fn open(&self) -> Option<String> {
@@ -178,6 +192,17 @@ impl Facts {
             )),
         }
     }
+}
+
+/// What is wrong with coordinates in steps of `step` for a mesh whose longest side is `side`; none if they are fine.
+pub(super) fn rounded(step: f64, side: f64) -> Option<String> {
+    (step > FINE * side).then(|| {
+        format!(
+            "its file gives coordinates in steps of {}, and its longest side is {}; export it near the origin, or with more digits",
+            short(step),
+            short(side)
+        )
+    })
 }
 
 fn edges(count: usize) -> String {

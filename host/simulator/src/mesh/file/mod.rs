@@ -70,11 +70,13 @@ impl Format {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Contents {
-    /// Its mesh, in the units of the file. A COLLADA file that states its upward axis is turned so that z is up.
+    /// Its mesh, in the units of the file. Of a COLLADA file it is turned so that z is up.
     pub mesh: Mesh,
     /// Offset subtracted from its coordinates: the center of a mesh that is so far from the origin (more than 16 times
     /// its longest side) that f32 would damage it; else zeros.
     pub moved: [f64; 3],
+    /// The step in which the file rounds its coordinates, in its units; 0 if that is not known.
+    pub step: f64,
     /// Number of millimeters in its unit, where the file says: COLLADA with a unit, glTF (meters, by its standard).
     pub millimeters: Option<f64>,
     /// Format of the file.
@@ -129,6 +131,16 @@ fn parse_buffered(mut reader: impl BufRead, length: u64, path: &Path, folder: Op
     parse_usual(text.as_slice(), text.len() as u64, path, folder)
 }
 
+/// The error of a text that was read as OBJ because it is nothing else, and has no faces.
+fn not_obj(error: Error, path: &Path) -> Error {
+    let is_called_so = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
+    if is_called_so || error.problem() != Some(&MeshProblem::NoFaces) {
+        return error;
+    }
+    let what = "a file that is neither OBJ, STL, PLY, glTF nor COLLADA".into();
+    Error::at(Place::file(path), MeshProblem::Unsupported { what, instead: "Export a mesh as one of these" })
+}
+
 fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Option<&Path>) -> Result<Contents> {
     let io = |source| Error::io(path, "read the mesh", source);
     let head = reader.fill_buf().map_err(io)?;
@@ -139,8 +151,8 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
     }
     let mut notes = Vec::new();
     let format = Format::of_usual(head, length, path.extension().and_then(|extension| extension.to_str()));
-    let ((mesh, moved), millimeters) = match format {
-        Format::Obj => (obj::parse_moved(reader, path)?, None),
+    let ((mesh, moved, step), millimeters) = match format {
+        Format::Obj => (obj::parse_moved(reader, path).map_err(|error| not_obj(error, path))?, None),
         Format::Stl => {
             let (moved, odd) = stl::parse(reader, length, path)?;
             notes = odd;
@@ -151,12 +163,16 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
             let mut bytes = Vec::new();
             // A file that grows while it is read is cut: its end is missing, as its parser says.
             reader.take(length).read_to_end(&mut bytes).map_err(io)?;
-            let (mesh, millimeters) = match format {
-                Format::Gltf => (gltf::parse(&bytes, path, folder)?, Some(1_000.0)),
+            let (moved, millimeters, remarks) = match format {
+                Format::Gltf => {
+                    let (moved, remarks) = gltf::parse(&bytes, path, folder)?;
+                    (moved, Some(1_000.0), remarks)
+                }
                 _ => collada::parse(&bytes, path)?,
             };
-            (mesh, millimeters)
+            notes = remarks;
+            (moved, millimeters)
         }
     };
-    Ok(Contents { mesh, moved, millimeters, format, notes })
+    Ok(Contents { mesh, moved, step, millimeters, format, notes })
 }

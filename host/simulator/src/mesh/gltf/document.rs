@@ -60,8 +60,25 @@ pub(super) struct Node {
     pub(super) rotation: Option<Box<[f64; 4]>>,
     pub(super) scale: Option<Box<[f64; 3]>>,
     pub(super) weights: Option<Vec<f64>>,
-    #[serde(default)]
-    pub(super) extensions: Extensions,
+    pub(super) extensions: Option<NodeExtensions>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct NodeExtensions {
+    #[serde(rename = "KHR_node_visibility")]
+    pub(super) visibility: Option<Visibility>,
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    pub(super) instancing: Option<IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Visibility {
+    #[serde(default = "visible")]
+    pub(super) visible: bool,
+}
+
+fn visible() -> bool {
+    true
 }
 
 /// The names of extensions. What they say is not kept.

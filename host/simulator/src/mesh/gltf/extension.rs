@@ -2,6 +2,8 @@
 
 use crate::error::MeshProblem;
 
+/// Says which nodes are hidden.
+const VISIBILITY: &str = "KHR_node_visibility";
 pub(super) const QUANTIZED: &str = "KHR_mesh_quantization";
 
 /// Extensions that put the numbers of a mesh elsewhere.
@@ -30,7 +32,8 @@ const HARMLESS: [&str; 15] = [
 /// Refuses a file that requires an extension which may change the surface. Quantization may be that of normals and
 /// textures: positions that have it are refused where they are read.
 pub(super) fn check_required(required: &[String]) -> Result<(), MeshProblem> {
-    let is_harmless = |name: &&String| *name == QUANTIZED || HARMLESS.iter().any(|harmless| name.starts_with(harmless));
+    let is_read = |name: &str| name == QUANTIZED || name == VISIBILITY;
+    let is_harmless = |name: &&String| is_read(name) || HARMLESS.iter().any(|harmless| name.starts_with(harmless));
     let harmful = required.iter().find(|name| !is_harmless(name));
     harmful.map_or(Ok(()), |name| Err(unsupported(name)))
 }

@@ -2,7 +2,8 @@
 //!
 //! `serde_json` reads the document; every accessor is checked and read here. Coordinates are taken as they stand: glTF
 //! says that y is up, but files disagree. What would change the surface and is not read (Draco, meshopt, quantization,
-//! skins, morphs) is rejected by name; materials, textures, cameras and animations are skipped.
+//! skins, morphs) is rejected by name; materials, textures, cameras and animations are skipped. Nodes that are not visible are
+//! left out with all below them, and a note says so.
 
 mod accessor;
 mod container;
@@ -18,12 +19,12 @@ use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Reads the mesh of a glTF file; errors name `path`. Files that it names are looked for in `folder`.
+/// Reads the mesh of a glTF file, with remarks on the file; errors name `path`. Files that it names are looked for in `folder`.
 ///
 /// # Errors
 /// If the JSON is invalid, a number that it states is impossible, a file beside it cannot be read, it uses an unsupported
 /// feature, or no face is left.
-pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<Moved> {
+pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<(Moved, Vec<String>)> {
     let parts = container::parts(bytes, path)?;
     let document: Document = serde_json::from_slice(parts.json).map_err(|error| {
         if serde_json::from_slice::<document::Version1>(parts.json).is_ok() {
@@ -45,8 +46,12 @@ pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<
         data: Data { document: &document, buffers, most_zeros: length },
         document: &document,
         placed: Placed::new(length),
+        hidden: 0,
     };
-    scene.mesh().map_err(here)
+    let (moved, hidden) = scene.mesh().map_err(here)?;
+    let nodes = if hidden == 1 { "1 node" } else { &format!("{hidden} nodes") };
+    let note = format!("{} hides {nodes} (KHR_node_visibility), left out with all below", path.display());
+    Ok((moved, if hidden > 0 { vec![note] } else { Vec::new() }))
 }
 
 /// Something is wrong with a file as a whole.
@@ -83,10 +88,13 @@ struct Scene<'a> {
     data: Data<'a>,
     document: &'a Document,
     placed: Placed,
+    /// Number of nodes that are not visible.
+    hidden: usize,
 }
 
 impl Scene<'_> {
-    fn mesh(mut self) -> Result<Moved, MeshProblem> {
+    /// The mesh of the scene, and the number of nodes that are not visible.
+    fn mesh(mut self) -> Result<(Moved, usize), MeshProblem> {
         let nodes = &self.document.nodes;
         let mut waiting: Vec<(u32, DAffine3)> = Vec::new();
         let add = |nodes: &[u32], transform: &DAffine3, waiting: &mut Vec<_>| {
@@ -126,6 +134,11 @@ impl Scene<'_> {
                 Some(met) if !*met => *met = true,
                 _ => return Err(accessor::damaged(format!("nodes[{index}] has two parents, or is above itself"))),
             }
+            let visibility = node.extensions.as_ref().and_then(|extensions| extensions.visibility.as_ref());
+            if visibility.is_some_and(|visibility| !visibility.visible) {
+                self.hidden += 1;
+                continue;
+            }
             let transform = parent * transform(node, index)?;
             if let Some(mesh) = node.mesh {
                 self.check_node(node)?;
@@ -133,14 +146,13 @@ impl Scene<'_> {
             }
             add(&node.children, &transform, &mut waiting);
         }
-        self.placed.into_mesh()
+        Ok((self.placed.into_mesh()?, self.hidden))
     }
 
     /// Rejects features that would place or bend a node's mesh in another way than its transform.
     fn check_node(&self, node: &Node) -> Result<(), MeshProblem> {
-        let instancing = "EXT_mesh_gpu_instancing";
-        if node.extensions.as_ref().is_some_and(|extensions| extensions.contains_key(instancing)) {
-            return Err(extension::unsupported(instancing));
+        if node.extensions.as_ref().is_some_and(|extensions| extensions.instancing.is_some()) {
+            return Err(extension::unsupported("EXT_mesh_gpu_instancing"));
         }
         if node.skin.is_some() {
             let what = "a skin, which bends the mesh,".into();
@@ -193,6 +205,7 @@ impl Scene<'_> {
             })?;
         }
         parts.into_iter().try_for_each(|(vertices, triangles)| {
+            self.placed.note_f32(&vertices, transform);
             let places = vertices.into_iter().map(|vertex| Vec3::from(vertex).as_dvec3());
             self.placed.place(places, &triangles, transform)
         })

@@ -8,7 +8,7 @@ mod counted;
 mod header;
 
 use super::Mesh;
-use super::exact::{Bounds, Moved, rounded};
+use super::exact::{Bounds, Moved, rounded, step_of_decimals, step_of_f32};
 use super::polygon::Cutter;
 use super::unread;
 use crate::error::{Error, MeshProblem, Place, Result};
@@ -69,10 +69,14 @@ pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Moved> {
     }
     let here = |problem| Error::at(Place::file(path), problem);
     let offset = Bounds::of(faces.used(&vertices.0).chain(strips.used(&vertices.0))).offset();
-    let rounded = vertices.0.into_iter().map(|vertex| rounded(vertex, offset)).collect();
+    let rounded = vertices.0.iter().map(|&vertex| rounded(vertex, offset)).collect();
     let mut mesh = Mesh { vertices: rounded, triangles: Vec::new() };
     faces.cut(&mut mesh).and_then(|()| strips.cut_strips(&mut mesh)).map_err(here)?;
-    Ok((mesh.usable().map_err(here)?, offset))
+    let step = match is_text {
+        true => step_of_decimals(&vertices.0, &mesh.triangles),
+        false => step_of_f32(vertices.0.iter().copied()),
+    };
+    Ok((mesh.usable().map_err(here)?, offset, step))
 }
 
 /// Receiver of the rows of an element, one by one.

@@ -5,8 +5,7 @@ mod search;
 
 use crate::error::{Error, MeshProblem, Place, Result};
 use crate::mesh::file;
-use crate::mesh::{BACKGROUND, builtin};
-use crate::mesh::{Instance, Object};
+use crate::mesh::{BACKGROUND, Instance, Mesh, Object, builtin, facts};
 use rayon::prelude::*;
 use search::{Finder, Found, LEVELS, lossy};
 use std::collections::BTreeMap;
@@ -199,16 +198,17 @@ impl Source {
             Self::BuiltIn(name) => whole(builtin::one(name)),
             Self::Background => whole(builtin::background(builtin::BACKGROUND_SHAPES, 1)),
             Self::File { name, path, notes } => whole(file::read(&path).map(|contents| {
-                let file::Contents { mesh, millimeters, moved: by, notes: read, .. } = contents;
-                let notes = notes.into_iter().chain(moved(&path, by)).chain(read).collect();
-                let object = Object::new(name, mesh);
-                Object { millimeters, notes, ..object }
+                let (millimeters, step) = (contents.millimeters, contents.step);
+                let (mesh, read) = noted(&path, contents);
+                let notes = notes.into_iter().chain(read).collect();
+                Object { millimeters, step, notes, ..Object::new(name, mesh) }
             })),
             Self::Instances { name, files, notes } => {
                 let read = |(name, path): (String, PathBuf)| {
-                    let file::Contents { mesh, millimeters, moved: by, notes, .. } = file::read(&path)?;
-                    let notes: Vec<String> = moved(&path, by).into_iter().chain(notes).collect();
-                    Ok((Instance { name, mesh }, (millimeters, notes)))
+                    let contents = file::read(&path)?;
+                    let (millimeters, step) = (contents.millimeters, contents.step);
+                    let (mesh, notes) = noted(&path, contents);
+                    Ok((Instance { name, mesh }, (millimeters, (step, notes))))
                 };
                 let read: Vec<Result<_>> = files.into_par_iter().map(read).collect();
                 let (mut good, mut errors) = (Vec::new(), Vec::new());
@@ -218,9 +218,14 @@ impl Source {
                 });
                 let (mut instances, stated): (Vec<_>, Vec<_>) = good.into_iter().unzip();
                 let (units, read): (Vec<_>, Vec<_>) = stated.into_iter().unzip();
+                let (steps, read): (Vec<f64>, Vec<_>) = read.into_iter().unzip();
                 let (millimeters, note) = one_unit(&mut instances, &units);
+                let scale = |unit: Option<f64>| unit.zip(millimeters).map_or(1.0, |(unit, first)| unit / first);
+                let steps = steps.into_iter().zip(units).map(|(step, unit)| step * scale(unit));
+                let step = steps.fold(0.0, f64::max);
                 let object = Object::of_instances(name, instances).map(|object| Object {
                     millimeters,
+                    step,
                     notes: notes.into_iter().chain(read.into_iter().flatten()).chain(note).collect(),
                     ..object
                 });
@@ -230,13 +235,17 @@ impl Source {
     }
 }
 
-/// A note about a mesh whose coordinates count from its center.
-fn moved(path: &Path, by: [f64; 3]) -> Option<String> {
-    let [x, y, z] = by;
-    let is_moved = by != [0.0; 3];
-    is_moved.then(|| {
+/// The mesh of a file, and notes about it: that its coordinates count from its center, that they are rounded, and what was noted
+/// when it was read.
+fn noted(path: &Path, file::Contents { mesh, moved, step, notes, .. }: file::Contents) -> (Mesh, Vec<String>) {
+    let [x, y, z] = moved;
+    let far = (moved != [0.0; 3]).then(|| {
         format!("{} is far from its origin: its coordinates count from its center, {x}, {y}, {z}", path.display())
-    })
+    });
+    let [low, high] = mesh.bounds();
+    let rounded = facts::rounded(step, f64::from((high - low).max_element()));
+    let rounded = rounded.map(|why| format!("{} is rounded: {why}", path.display()));
+    (mesh, far.into_iter().chain(rounded).chain(notes).collect())
 }
 
 /// The unit of an object's instances in millimeters. Each instance may state its own: those that differ are scaled to the

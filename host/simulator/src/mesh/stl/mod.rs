@@ -1,16 +1,16 @@
 //! STL files, binary and text. Corners at the same place become one vertex.
 //!
 //! A reader of our own: a file is binary if its length is that of the triangles that it counts, or cannot be text. Then
-//! the count must hold: after the last triangle there may be a few bytes, but not another one. All solids of a text file
+//! the count must hold: after the last triangle there may be a few bytes, or zeros, but not another one. All solids of a text file
 //! are read. One that is not closed may be of a program that does not close them, or of a file that was cut between two facets:
 //! a note says so. Normals, colors and attributes say nothing that the corners do not.
 
 use super::Mesh;
-use super::exact::Moved;
+use super::exact::{Moved, step_of_decimals, step_of_f32};
 use super::words::{coordinate, shown};
 use crate::error::{Error, MeshProblem, Place, Result};
 use std::collections::HashMap;
-use std::io::{BufRead, ErrorKind};
+use std::io::{BufRead, ErrorKind, Read};
 use std::path::Path;
 
 /// The bytes of a binary file before its triangles; the last four are their number.
@@ -40,15 +40,19 @@ fn bytes_of(count: u32) -> u64 {
 /// there, a coordinate is not finite, or no face is left.
 pub(super) fn parse(mut reader: impl BufRead, length: u64, path: &Path) -> Result<(Moved, Vec<String>)> {
     let head = reader.fill_buf().map_err(|source| Error::io(path, "read the mesh", source))?;
-    let (welder, note) = if !is_binary(head, length) && is_text(head) {
-        Text { reader, path, line: 0, raw: Vec::new(), next: 0 }.parse()?
+    let (welder, note, step) = if !is_binary(head, length) && is_text(head) {
+        let (welder, note) = Text { reader, path, line: 0, raw: Vec::new(), next: 0 }.parse()?;
+        let step = step_of_decimals(&welder.vertices, &welder.triangles);
+        (welder, note, step)
     } else {
-        binary(reader, length, path)?
+        let (welder, note) = binary(reader, length, path)?;
+        let step = step_of_f32(welder.vertices.iter().copied());
+        (welder, note, step)
     };
     let (mesh, moved) = Mesh::from_f64(&welder.vertices, welder.triangles);
     let mesh = mesh.usable().map_err(|problem| Error::at(Place::file(path), problem))?;
     let notes = note.into_iter().map(|note| format!("{} {note}", path.display())).collect();
-    Ok(((mesh, moved), notes))
+    Ok(((mesh, moved, step), notes))
 }
 
 /// True if a file that starts with `head`, and is not binary by its length, is meant as text.
@@ -68,11 +72,11 @@ fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Noted> {
     let mut header = [0; HEADER];
     reader.read_exact(&mut header).map_err(cut(length))?;
     let count = stated(&header).unwrap_or_default();
-    let rest = length.checked_sub(bytes_of(count)).filter(|&rest| rest < TRIANGLE as u64);
-    let Some(rest) = rest.filter(|&rest| rest == 0 || count > 0) else {
+    let other_length = || {
         let what = format!("it states {count} triangles, which are {} bytes, but has {length} bytes", bytes_of(count));
-        return Err(Error::at(Place::byte(path, HEADER as u64 - 4), MeshProblem::Damaged { format: "STL", what }));
+        Error::at(Place::byte(path, HEADER as u64 - 4), MeshProblem::Damaged { format: "STL", what })
     };
+    let rest = length.checked_sub(bytes_of(count)).filter(|&rest| rest == 0 || count > 0).ok_or_else(other_length)?;
     let mut welder = Welder::default();
     let mut triangle = [0; TRIANGLE];
     for index in 0..count {
@@ -95,6 +99,10 @@ fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Noted> {
             *corner = welder.corner(vertex).map_err(|problem| Error::at(Place::byte(path, start), problem))?;
         }
         welder.triangles.push(corners);
+    }
+    let mut others = reader.take(rest).bytes();
+    if rest >= TRIANGLE as u64 && others.any(|byte| byte.is_ok_and(|byte| byte != 0)) {
+        return Err(other_length());
     }
     let bytes = if rest == 1 { "byte" } else { "bytes" };
     Ok((welder, (rest > 0).then(|| format!("has {rest} {bytes} after its last triangle, left out"))))
