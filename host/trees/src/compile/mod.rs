@@ -46,6 +46,7 @@ mod emit;
 mod error;
 mod forest;
 mod groups;
+mod legend;
 mod lower;
 mod lowered;
 mod merge;
@@ -62,8 +63,9 @@ mod write;
 pub use budget::compile_within;
 pub use container::{OwnedSection, file};
 pub use cost::{Core, FEATURES, Instructions, Memory, code_flash, features};
-pub use emit::{HEADER, Language, check_place, emit, identifier, write_sources};
+pub use emit::{HEADER, Language, NO_CODE, check_place, emit, identifier, write_sources};
 pub use error::CompileProblem;
+pub use legend::label_numbers;
 pub(crate) use merge::Source;
 pub use model::{CompiledModel, names, open, thresholds};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
@@ -78,6 +80,7 @@ use forest::Forest;
 use lowered::Lowered;
 use palpate_onboard::Stopping;
 use parts::Parts;
+use std::collections::BTreeMap;
 
 /// Settings of compilation.
 #[derive(Clone, Debug, PartialEq)]
@@ -158,6 +161,8 @@ pub struct Compiled {
     pub code: Option<Program>,
     /// Rule that turns margins into the probabilities of the library that trained it.
     pub probability: Probability,
+    /// Categories of the library's columns, by the numbers that stand for them, as far as they are known.
+    pub categories: BTreeMap<usize, Vec<String>>,
 }
 
 /// When recognizers stop.
@@ -201,6 +206,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let parts = Parts { margin_error, ..parts };
     let bytes = write::write(ensemble, write::hash(original), settings, &forest, stopping, layout, &parts)?;
     let model = model::open_any(&bytes)?;
+    let imported = original.origin.imported.as_ref();
     Ok(Compiled {
         splits: forest.splits(),
         leaves: forest.leaves(),
@@ -209,7 +215,8 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
         shared_leaves: different_leaves(&model),
         instructions: code.as_ref().map_or_else(|| Instructions::of_model(&model), Program::instructions),
         code,
-        probability: original.origin.imported.as_ref().map(|imported| imported.probability).unwrap_or_default(),
+        probability: imported.map(|imported| imported.probability).unwrap_or_default(),
+        categories: imported.map(|imported| imported.categories.clone()).unwrap_or_default(),
         bytes,
     })
 }

@@ -40,6 +40,8 @@ pub struct Imported {
     /// Columns of the library's rows, where there are more than a model can have features: the ensemble has only those that
     /// its trees use.
     pub columns: Option<Columns>,
+    /// Categories of columns of the library's rows, by the numbers that stand for them, where the file has them.
+    pub categories: BTreeMap<usize, Vec<String>>,
 }
 
 /// Rule that turns the margins of classes into the probabilities that a library predicts.

@@ -30,7 +30,7 @@ fn initializers(rows: &[Vec<f64>], whole: Option<&Encoder>) -> String {
 }
 
 /// Output of a C program with these functions and calls, built beside the headers in `directory` with warnings denied.
-fn printed(directory: &Path, functions: &str, calls: &str, macros: &[&str]) -> String {
+pub(crate) fn printed(directory: &Path, functions: &str, calls: &str, macros: &[&str]) -> String {
     let source =
         format!("#include <math.h>\n#include <stdio.h>\n{functions}int main(void)\n{{\n{calls}    return 0;\n}}\n");
     std::fs::write(directory.join("program.c"), source).unwrap();
