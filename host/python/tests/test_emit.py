@@ -61,7 +61,7 @@ def test_a_classifier_becomes_a_header_whose_calls_give_its_classes_and_probabil
     estimator, model = compiled(name)
     written = model.emit(tmp_path / "model.h", form=form)
     assert [Path(path).name for path in written] == ["model.h"]
-    lines = '        model_posteriors(rows[i], p);\n        printf("%d %.9g %.9g %.9g\\n", model_predict(rows[i]), p[0], p[1], p[2]);\n'
+    lines = '        model_posteriors(rows[i], p);\n        printf("%d %.9g %.9g %.9g\\n", (int)model_labels[model_predict(rows[i])], p[0], p[1], p[2]);\n'
     found = np.array(said(tmp_path, lines))
     np.testing.assert_array_equal(found[:, 0], np.array(model.predict(ROWS), dtype=float))
     bound = float((tmp_path / "model.h").read_text().split("probabilities, within ")[1].split()[0])

@@ -33,12 +33,6 @@ class _Parts:
     """True if each output is a target of a regression, and none is a class."""
 
 
-_VOTES = (
-    "The margins are shares of the trees' votes: classes are right, posteriors are not calibrated, and evidence of "
-    "several rows adds up slowly."
-)
-
-
 def read(model: Any, names: list[str] | None) -> Ensemble:
     """The trees of an estimator whose class is in `KNOWN`."""
     kind = type(model).__name__
@@ -91,7 +85,7 @@ def _votes(model: Any, estimators: Sequence[Any]) -> _Parts:
             values = values[:, :, 0]
         trees.append(_tree(estimator.tree_, None if is_each else 0, values / len(estimators)))
     outputs = len(model.classes_) if is_classifier else targets
-    return _Parts([0.0] * outputs, trees, [_VOTES] if is_classifier else [], probability="shares", targets=targets > 1)
+    return _Parts([0.0] * outputs, trees, [], probability="shares", targets=targets > 1)
 
 
 def _isolation(model: Any) -> _Parts:

@@ -2,6 +2,7 @@
 //! is a constant.
 
 use super::cost::has_sequences;
+use super::legend::Legend;
 use crate::ensemble::Probability;
 use crate::verify::bound_of;
 use palpate_onboard::Model;
@@ -11,6 +12,7 @@ use std::fmt::Write as _;
 /// A model as C calls it.
 pub(super) struct Calls<'a> {
     pub(super) model: &'a Model<'a>,
+    pub(super) legend: &'a Legend<'a>,
     /// Prefix of all names.
     pub(super) name: &'a str,
     pub(super) probability: Probability,
@@ -48,7 +50,7 @@ fn long(bytes: &[u8], at: usize) -> u32 {
 impl Calls<'_> {
     /// The model as `palpate_open` leaves it, and the functions that read it.
     pub(super) fn text(&self) -> String {
-        let mut text = self.opened();
+        let mut text = self.opened() + &self.legend.c(self.name);
         if self.model.descriptor().is_none() {
             text += &self.of_rows();
         }
@@ -197,7 +199,8 @@ impl Calls<'_> {
                      return palpate_predict_class(&{name}_opened_, {keys}, {features}, margins, {objects});\n"
                 )
             };
-            call("The class", "", "int", "predict", "", &body);
+            let about = format!("The class (the index in: {})", self.legend.listed());
+            call(&about, "", "int", "predict", "", &body);
             let body = match self.probability {
                 Probability::Unknown => return text,
                 Probability::Shares => format!("{sums}    palpate_values_of_(&{name}_opened_, sums, posteriors);\n"),
@@ -270,7 +273,7 @@ impl Calls<'_> {
         format!(
             "/* Begins: nothing was added yet. {OWN} */\n\
              static inline void {name}_begin(palpate_recognizer *state)\n{{\n    palpate_start_(state, &{name}_opened_);\n}}\n\n\
-             /* Adds {step}: the number of the object that is recognized; -1 while none is, -2 if none fits, -3 at the limit of \
+             /* Adds {step}: the index of the object that is recognized; -1 while none is, -2 if none fits, -3 at the limit of \
              steps. After a decision nothing changes until {name}_begin. {OWN} */\n\
              static inline int {name}_push(palpate_recognizer *state, {parameter})\n{{\n{body}}}\n\n\
              /* The decision at the end, or without one the object with the most evidence; -1 if nothing was added. {OWN} */\n\
@@ -318,7 +321,7 @@ impl Calls<'_> {
             "/* Begins a sequence: nothing was added yet. {OWN} */\n\
              static inline void {name}_begin(palpate_recognizer *state{seen})\n{{\n    \
              palpate_start_(state, &{name}_opened_);\n{begin}}}\n\n\
-             /* Adds a row of {measured} features{number} {missing} where one is missing: the number of the object that is recognized; -1 \
+             /* Adds a row of {measured} features{number} {missing} where one is missing: the index of the object that is recognized; -1 \
              while none is, -2 if none fits, -3 at the limit of steps{refused}. After a decision nothing changes until {name}_begin. \
              {OWN} */\n\
              static inline int {name}_push(palpate_recognizer *state{seen}, const {row} *row)\n{{\n    int32_t keys[{features}];\n\

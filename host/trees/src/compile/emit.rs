@@ -4,6 +4,7 @@ use super::Compiled;
 use super::calls::Calls;
 use super::code::Program;
 use super::cost::{Instructions, has_sequences};
+use super::legend::{Legend, plain};
 use super::model::open_any;
 use crate::ensemble::Probability;
 use crate::error::{Error, Result};
@@ -11,6 +12,7 @@ use palpate_base::output;
 use palpate_base::wording::count;
 use palpate_onboard::Model;
 use palpate_shared::format::Tag;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -55,18 +57,25 @@ impl Compiled {
     pub fn sources(&self, name: &str, languages: &[Language]) -> Result<Vec<(&'static str, String)>> {
         let model = open_any(&self.bytes)?;
         let name = identifier(name);
+        let legend = Legend::new(&model, &self.categories);
         let source = |language: &Language| {
             let text = match (language, &self.code) {
                 // With the model's array.
-                (Language::C, code) => c(&model, &name, self.probability, code.as_ref()),
-                (Language::Rust, None) => rust(&model, &name),
-                (Language::Rust, Some(program)) => program.rust(&about(&model), model.checksum()),
+                (Language::C, code) => c(&legend, &name, self.probability, code.as_ref()),
+                (Language::Rust, None) => rust(&legend, &name),
+                (Language::Rust, Some(program)) => {
+                    program.rust(&about(&model), model.checksum()) + "\n" + &legend.rust("")
+                }
             };
             (language.extension(), text)
         };
         Ok(languages.iter().map(source).collect())
     }
 }
+
+/// Allowed forms of a model whose bytes alone are known, for an error: no code can be written of it.
+pub const NO_CODE: &str = "c or rust for a model that was loaded or calibrated: it is bytes, and code is written from an ensemble. \
+                           Code stops at the error rate that the ensemble is compiled with, not at calibrated thresholds";
 
 /// Name of the header that reads models in C.
 pub const HEADER: &str = "palpate.h";
@@ -107,13 +116,14 @@ pub fn check_place(path: &Path, place: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Source file of a model whose bytes alone are known. It is the one that [`Compiled::sources`] writes, without probabilities: the
-/// bytes do not say how the library turns margins into them.
+/// Source file of a model whose bytes alone are known. It is the one that [`Compiled::sources`] writes, without probabilities and
+/// categories: the bytes do not say how the library turns margins into the former, and numbers into the latter.
 pub fn emit(model: &Model<'_>, name: &str, language: Language) -> String {
-    let name = identifier(name);
+    let (name, categories) = (identifier(name), BTreeMap::new());
+    let legend = Legend::new(model, &categories);
     match language {
-        Language::C => c(model, &name, Probability::Unknown, None),
-        Language::Rust => rust(model, &name),
+        Language::C => c(&legend, &name, Probability::Unknown, None),
+        Language::Rust => rust(&legend, &name),
     }
 }
 
@@ -133,9 +143,10 @@ fn avr_error(name: &str, length: usize) -> String {
     )
 }
 
-fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<&Program>) -> String {
+fn c(legend: &Legend<'_>, name: &str, probability: Probability, code: Option<&Program>) -> String {
+    let model = legend.model;
     let functions = code.map_or_else(String::new, |program| program.c_functions(name) + &program.c_opening(name));
-    let calls = Calls { model, name, probability, is_code: code.is_some() }.text();
+    let calls = Calls { model, legend, name, probability, is_code: code.is_some() }.text();
     let guard = format!("{}_MODEL_H", name.to_uppercase());
     let layout = model.layout().name().to_uppercase();
     let leaf = model.leaf_type().name().to_uppercase();
@@ -177,8 +188,7 @@ fn c(model: &Model<'_>, name: &str, probability: Probability, code: Option<&Prog
          #if defined(__AVR__)\n    PROGMEM\n#elif defined(__GNUC__)\n    __attribute__((aligned(4)))\n#endif\n    = {{\n\
          {array}}};\n\n{functions}{calls}#endif\n",
         cost = cost(model, code),
-        // Neither ends the comment nor seems to begin another.
-        about = about(model).replace("*/", "* /").replace("/*", "/ *"),
+        about = about(model),
         checks = checks(&name.to_uppercase(), &layout, &leaf, &needed, objects),
         array = array(model.bytes()),
         open = match functions.as_str() {
@@ -220,13 +230,15 @@ fn checks(name: &str, layout: &str, leaf: &str, needed: &[(&str, u8)], objects: 
     checks.into_iter().map(check).collect()
 }
 
-fn rust(model: &Model<'_>, name: &str) -> String {
+fn rust(legend: &Legend<'_>, name: &str) -> String {
+    let model = legend.model;
     format!(
         "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}{sentinel}{weights}{sequences}.\n\n\
          /// The model: `Model::new(&{constant}.0)`.\n\
          #[rustfmt::skip]\n\
          pub static {constant}: palpate_onboard::Aligned<[u8; {length}]> = palpate_onboard::Aligned([\n\
-         {array}]);\n",
+         {array}]);\n\n{constants}",
+        constants = legend.rust(&format!("{}_", name.to_uppercase())),
         about = about(model),
         layout = model.layout().name(),
         leaf = model.leaf_type().name(),
@@ -248,8 +260,7 @@ fn has_weights(model: &Model<'_>) -> bool {
 /// Description of the model, in one line.
 fn about(model: &Model<'_>) -> String {
     let names: Vec<&str> = (0..model.object_count()).map(|object| model.object_name(object)).collect();
-    let text = format!("{} objects: {}; checksum {:08x}.", names.len(), names.join(", "), model.checksum());
-    text.chars().map(|character| if character.is_control() { ' ' } else { character }).collect()
+    plain(&format!("{} objects: {}; checksum {:08x}.", names.len(), names.join(", "), model.checksum()))
 }
 
 fn array(bytes: &[u8]) -> String {

@@ -46,6 +46,7 @@ mod emit;
 mod error;
 mod forest;
 mod groups;
+mod legend;
 mod lower;
 mod lowered;
 mod merge;
@@ -63,8 +64,9 @@ mod write;
 pub use budget::compile_within;
 pub use container::{OwnedSection, file};
 pub use cost::{Core, FEATURES, Instructions, Memory, code_flash, features};
-pub use emit::{HEADER, Language, check_place, emit, identifier, write_sources};
+pub use emit::{HEADER, Language, NO_CODE, check_place, emit, identifier, write_sources};
 pub use error::CompileProblem;
+pub use legend::label_numbers;
 pub(crate) use merge::Source;
 pub use model::{CompiledModel, names, open, thresholds};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
@@ -80,6 +82,7 @@ use lowered::Lowered;
 use palpate_onboard::Stopping;
 use parts::Parts;
 use range::Held;
+use std::collections::BTreeMap;
 
 /// Settings of compilation.
 #[derive(Clone, Debug, PartialEq)]
@@ -162,6 +165,8 @@ pub struct Compiled {
     pub probability: Probability,
     /// Notes for the user on how close a regression's values are to the library's, each a sentence.
     pub notes: Vec<String>,
+    /// Categories of the library's columns, by the numbers that stand for them, as far as they are known.
+    pub categories: BTreeMap<usize, Vec<String>>,
 }
 
 /// When recognizers stop.
@@ -205,6 +210,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let parts = Parts { margin_error, scales, ..parts };
     let bytes = write::write(ensemble, write::hash(original), settings, &forest, stopping, layout, &parts)?;
     let model = model::open_any(&bytes)?;
+    let imported = original.origin.imported.as_ref();
     Ok(Compiled {
         splits: forest.splits(),
         leaves: forest.leaves(),
@@ -213,7 +219,8 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
         shared_leaves: different_leaves(&model),
         instructions: code.as_ref().map_or_else(|| Instructions::of_model(&model), Program::instructions),
         code,
-        probability: original.origin.imported.as_ref().map(|imported| imported.probability).unwrap_or_default(),
+        probability: imported.map(|imported| imported.probability).unwrap_or_default(),
+        categories: imported.map(|imported| imported.categories.clone()).unwrap_or_default(),
         notes: notes::of_values(original, &model, settings.leaf, rounding > f64::from(trees_error)),
         bytes,
     })

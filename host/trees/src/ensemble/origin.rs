@@ -40,6 +40,8 @@ pub struct Imported {
     /// Columns of the library's rows, where there are more than a model can have features: the ensemble has only those that
     /// its trees use.
     pub columns: Option<Columns>,
+    /// Categories of columns of the library's rows, by the numbers that stand for them, where the file has them.
+    pub categories: BTreeMap<usize, Vec<String>>,
     /// True if the library compares values in f64. One that rounds rows to f32 first goes the same way as a model does.
     pub compares_f64: bool,
     /// A regression's numbers as the library adds them in f64; none where it adds f32.

@@ -5,6 +5,7 @@ mod calls;
 mod compiling;
 mod fixtures;
 mod import;
+mod legend;
 mod objectives;
 mod rows;
 #[path = "../../../../tests/data/import/table.rs"]

@@ -9,6 +9,7 @@ use crate::ensemble::{
 };
 use crate::error::EnsembleProblem;
 use palpate_shared::format::Prediction;
+use std::collections::BTreeMap;
 
 /// An ensemble that is being read.
 #[derive(Default)]
@@ -34,6 +35,8 @@ pub(super) struct Draft {
     pub(super) sentinel: Option<[f32; 2]>,
     /// Divisor of the library's raw scores that makes log-odds of them, whose softmax are its probabilities.
     pub(super) divisor: Option<f64>,
+    /// Categories of columns, by the numbers that stand for them.
+    pub(super) categories: BTreeMap<usize, Vec<String>>,
 }
 
 /// A tree whose leaves have values in f64.
@@ -92,6 +95,7 @@ impl Draft {
             columns,
             compares_f64: self.compares_f64,
             exact,
+            categories: self.categories,
         };
         let origin = Provenance { imported: Some(imported), ..Provenance::default() };
         let ensemble = Ensemble { inputs: Inputs::Rows(features), objects, base_margins, trees, origin };

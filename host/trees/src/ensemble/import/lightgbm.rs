@@ -85,7 +85,8 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
         return Err(head.damaged("feature_names", &format!("has {} names for {features} features", own.len())));
     }
     let version = head.text("version").unwrap_or_default();
-    let mut draft = Draft { features: own, kind: format!("LightGBM text {version}"), ..Draft::default() };
+    let kind = format!("LightGBM text {version}");
+    let mut draft = Draft { features: own, kind, categories: names_of_categories(text, &head), ..Draft::default() };
     draft.compares_f64 = true;
     // The library divides what such a model's trees add up to by their number before its link.
     let is_averaged = head.values.contains_key("average_output");
@@ -116,6 +117,29 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
         draft.trees.push(DraftTree { nodes, output });
     }
     Ok(draft.finish(names)?)
+}
+
+/// The categories of each column that has some, as LightGBM's Python package states those of a pandas table below the trees: of all
+/// its columns of categories in their order. Empty where they are not as many as LightGBM's own, or too few for its numbers.
+fn names_of_categories(text: &str, head: &Block<'_>) -> BTreeMap<usize, Vec<String>> {
+    let stated = |key: &str| text.lines().rev().find_map(|line| line.strip_prefix(key));
+    let lists: Option<Vec<Vec<serde_json::Value>>> =
+        stated("pandas_categorical:").and_then(|lists| serde_json::from_str(lists).ok());
+    let lists = lists.unwrap_or_default();
+    let columns = stated("[categorical_feature: ").unwrap_or_default().trim_end_matches(']').split(',');
+    let columns: Vec<usize> = columns.filter_map(|column| column.parse().ok()).collect();
+    let infos: Vec<&str> = head.text("feature_infos").unwrap_or_default().split(' ').collect();
+    let holds = |(column, names): (&usize, &Vec<serde_json::Value>)| {
+        let mut numbers = infos.get(*column).copied().unwrap_or_default().split(':');
+        let is_held =
+            |number: &str| number == "none" || number.parse().is_ok_and(|number: i32| number < names.len() as i32);
+        numbers.all(is_held)
+    };
+    if lists.len() != columns.len() || !columns.iter().zip(&lists).all(holds) {
+        return BTreeMap::new();
+    }
+    let name = |name: serde_json::Value| name.as_str().map_or_else(|| name.to_string(), String::from);
+    columns.into_iter().zip(lists).map(|(column, names)| (column, names.into_iter().map(name).collect())).collect()
 }
 
 /// The lines before the first tree, and those of each tree.

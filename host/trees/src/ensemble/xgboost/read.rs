@@ -87,7 +87,10 @@ impl Document {
         }
         let mut notes = Vec::new();
         let taken = taken(&forest, &attributes, groups, options.all_trees, &mut notes)?;
-        let Forest { tree_info, trees, .. } = forest;
+        let Forest { tree_info, trees, cats, .. } = forest;
+        let named = cats.get("enc").and_then(serde_json::Value::as_array).into_iter().flatten().map(category_names);
+        let categories =
+            named.map(Option::unwrap_or_default).enumerate().filter(|(_, names)| !names.is_empty()).collect();
         if trees.is_empty() {
             return Err(EnsembleProblem::NoTrees);
         }
@@ -124,8 +127,16 @@ impl Document {
                 notes.push(MISSING_UNKNOWN.into());
             }
             let kind = format!("XGBoost {version} {kind}");
-            origin.imported =
-                Some(Imported { kind, notes, prediction, probability, sentinel, columns, ..Imported::default() });
+            origin.imported = Some(Imported {
+                kind,
+                notes,
+                prediction,
+                probability,
+                sentinel,
+                columns,
+                categories,
+                ..Imported::default()
+            });
         }
         let mut ensemble = Ensemble { inputs, objects, base_margins, trees, origin };
         if let Some(weights) = weights {
@@ -246,6 +257,20 @@ fn forest(booster: GradientBooster) -> Result<(Forest, Option<Vec<f32>>), Ensemb
     let weights = booster.weight_drop.or(inner.1).or(forest.weight_drop.take());
     // gbtree writes no weights, or none for its trees.
     Ok((forest, weights.filter(|weights| !weights.is_empty())))
+}
+
+/// The names of a feature's categories: numbers, or the bytes of all names, and where each begins and ends.
+fn category_names(feature: &serde_json::Value) -> Option<Vec<String>> {
+    let list =
+        |name: &str| feature.get(name)?.as_array()?.iter().map(serde_json::Value::as_i64).collect::<Option<Vec<_>>>();
+    let values = list("values")?;
+    let Some(offsets) = list("offsets") else { return Some(values.iter().map(ToString::to_string).collect()) };
+    let name = |ends: &[i64]| {
+        let bytes = values.get(usize::try_from(ends[0]).ok()?..usize::try_from(ends[1]).ok()?)?;
+        let bytes: Vec<u8> = bytes.iter().map(|byte| *byte as u8).collect();
+        Some(String::from_utf8_lossy(&bytes).into_owned())
+    };
+    offsets.windows(2).map(name).collect()
 }
 
 /// Multiplies leaves by their tree's weight, in f32 as XGBoost does.

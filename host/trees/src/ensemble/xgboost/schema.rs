@@ -42,6 +42,9 @@ pub(super) struct GradientBooster {
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct Forest {
+    /// The names of categories, since 3.1: a form of its own is no reason to refuse a model.
+    #[serde(default, skip_serializing)]
+    pub(super) cats: serde_json::Value,
     pub(super) gbtree_model_param: ForestParameters,
     #[serde(default)]
     pub(super) iteration_indptr: Vec<u64>,

@@ -32,6 +32,7 @@ impl Document {
                 feature_types: Vec::new(),
                 gradient_booster: GradientBooster {
                     model: Some(Forest {
+                        cats: serde_json::Value::Null,
                         gbtree_model_param: ForestParameters {
                             num_parallel_tree: "1".into(),
                             num_trees: trees.len().to_string(),

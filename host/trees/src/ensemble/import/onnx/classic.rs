@@ -198,12 +198,6 @@ fn classes(
         "SOFTMAX" | "LOGISTIC" => Probability::Softmax,
         _ => Probability::Unknown,
     };
-    if is_votes {
-        draft.notes.push(
-            "Margins are shares of votes (probabilities), not log-odds: classes are right, posteriors are not calibrated."
-                .into(),
-        );
-    }
     if classes == 2 && named.len() == 1 {
         let base = match base {
             [] => 0.0,
