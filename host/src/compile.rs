@@ -2,7 +2,7 @@
 
 pub use palpate_trees::compile::*;
 
-use crate::ensemble::{Ensemble, OverTouches, TouchOrigin};
+use crate::ensemble::{Ensemble, OverTouches, TouchOrigin, train};
 use crate::error::{Error, Result};
 use crate::with;
 use palpate_onboard::Model;
@@ -11,12 +11,14 @@ use palpate_trees::compile as trees;
 
 /// Models of more objects than this are usually compiled with leaves of one byte: `docs/measurements/growth.md`
 /// has what that saves and what it costs.
-pub const MANY: usize = 50;
+const MANY: usize = 50;
 
-/// The defaults for a model of touches of this number of objects: leaves of one byte for more than [`MANY`] objects,
-/// where nearly all of a model is leaves, and two bytes for fewer.
-pub fn for_touches(objects: usize) -> Settings {
-    let leaf = if objects > MANY { Leaf::I8 } else { Leaf::I16 };
+/// The settings that an ensemble is compiled with unless others are asked for. Over touches leaves have one byte where they
+/// were rounded to it, so that two would hold nothing more, and for more than 50 objects, where nearly all of a model is
+/// leaves; all others have two.
+pub fn usual(ensemble: &Ensemble) -> Settings {
+    let is_small = || ensemble.objects.len() > MANY || train::is_rounded(ensemble, 8);
+    let leaf = if ensemble.schema().is_some() && is_small() { Leaf::I8 } else { Leaf::I16 };
     with!(Settings::default(), leaf)
 }
 

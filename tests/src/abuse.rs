@@ -592,6 +592,7 @@ fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
         (must(Tag::Prediction), prediction.clone(), prediction.len()),
         (must(Tag::Sentinel), Sentinel { low: -1, high: 1 }.to_bytes().to_vec(), 8),
         (must(Tag::Outputs), outputs.clone(), outputs.len()),
+        (Tag::Columns.code(), vec![4, 0, 0, 0, 3, 0], 0),
         (must(Tag::Position), Position { feature: 0, step: 3 }.to_bytes().to_vec(), Position::LENGTH),
         (must(Tag::Guard), guard.clone(), guard.len()),
     ];

@@ -351,7 +351,7 @@ impl Trial {
         let train_seconds = stages.end(format!("{name}: training"));
         progress::check(progress)?;
         progress.begin(&format!("compiling and testing {name}"), None);
-        let compile = with!(compile::Settings::default(), error_rate = settings.error_rate);
+        let compile = with!(compile::usual(&ensemble), error_rate = settings.error_rate);
         let mut compiled = compile::compile(&ensemble, &compile)?;
         stages.end(format!("{name}: compiling"));
         let calibration = calibrated(&compiled.bytes, split, &job)?;

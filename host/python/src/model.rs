@@ -216,8 +216,7 @@ impl Model {
         Ok(py.detach(|| {
             let Some((ensemble, settings, compiled)) = &self.source else {
                 if is_code {
-                    let allowed = "c or rust for a model that was loaded: it has bytes, not trees";
-                    return Err(Error::setting("form", name, allowed));
+                    return Err(Error::setting("form", name, library::NO_CODE));
                 }
                 let text = library::emit(self.model(), &stem, language);
                 return library::write_sources(&path, &[(language.extension(), text)]);
@@ -418,8 +417,8 @@ pub(crate) fn touch(numbers: &[f64]) -> Result<Touch, TouchesProblem> {
 /// Compiles an ensemble to the bytes that a microcontroller reads. (`palpate.compile` also takes models of other
 /// libraries.)
 ///
-/// `leaf` is "i8", "i16" or "f32": what leaves are stored as. With `max_bytes` leaves are stored in fewer bits where the model
-/// would be larger; if it still is, that is an error. `error_rate` and `max_touches` are where recognizers stop; `priors` say
+/// `leaf` is "i8", "i16" or "f32": what leaves are stored as; by default what `palpate export` chooses. With `max_bytes` leaves
+/// are stored in fewer bits where the model would be larger; if it still is, that is an error. `error_rate` and `max_touches` are where recognizers stop; `priors` say
 /// how likely each object is. `scales` say how many units make up 1 of each feature, for a chip that measures in whole numbers.
 /// `row_number` names the feature that is a row's number in its sequence, counted from 1.
 ///
@@ -429,14 +428,14 @@ pub(crate) fn touch(numbers: &[f64]) -> Result<Touch, TouchesProblem> {
 /// >>> model.size <= 4000
 /// True
 #[pyo3::pyfunction]
-#[pyo3(signature = (ensemble, *, max_bytes=None, leaf="i16", error_rate=0.01, max_touches=200,
+#[pyo3(signature = (ensemble, *, max_bytes=None, leaf=None, error_rate=0.01, max_touches=200,
     priors=None, scales=None, row_number=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn compile(
     py: Python<'_>,
     ensemble: Bound<'_, Ensemble>,
     max_bytes: Option<usize>,
-    leaf: &str,
+    leaf: Option<&str>,
     error_rate: f64,
     max_touches: u32,
     priors: Option<Vec<f64>>,
@@ -444,28 +443,12 @@ pub(crate) fn compile(
     row_number: Option<String>,
 ) -> Result<Model, Failure> {
     let ensemble = &ensemble.get().ensemble;
-    let counts = [
-        ("priors", priors.as_ref().map(Vec::len), ensemble.objects.len()),
-        ("scales", scales.as_ref().map(Vec::len), ensemble.inputs.count()),
-    ];
-    for (name, found, wanted) in counts {
-        if let Some(found) = found.filter(|&found| found != wanted) {
-            return Err(Error::setting(name, format!("a list of {found}"), format!("a list of {wanted}")).into());
-        }
-    }
-    let settings = with!(
-        Settings::default(),
-        leaf = Leaf::ALL.iter().copied().find(|known| known.name() == leaf).ok_or_else(|| Error::setting(
-            "leaf",
-            leaf,
-            "i8, i16 or f32"
-        ))?,
-        error_rate,
-        max_touches,
-        priors,
-        scales,
-        position = row_number
-    );
+    let named = |name: &str| Leaf::ALL.iter().copied().find(|known| known.name() == name);
+    let leaf =
+        leaf.map(|leaf| named(leaf).ok_or_else(|| Error::setting("leaf", leaf, "i8, i16 or f32"))).transpose()?;
+    let usual = library::usual(ensemble);
+    let leaf = leaf.unwrap_or(usual.leaf);
+    let settings = with!(usual, leaf, error_rate, max_touches, priors, scales, position = row_number);
     let compiled = py.detach(|| match max_bytes {
         None => library::compile(ensemble, &settings),
         Some(most) => library::compile_within(ensemble, &settings, most),

@@ -102,6 +102,13 @@ def test_a_model_fits_where_there_is_room(ensemble: palpate.Ensemble) -> None:
             palpate.compile(ensemble, **{option: value})
 
 
+def test_leaves_that_were_rounded_to_a_byte_take_one_unless_told_otherwise(touches: palpate.DataSet) -> None:
+    small = palpate.train(touches, preset="small")
+    assert [palpate.compile(small, leaf=leaf).leaf for leaf in (None, "i16")] == ["i8", "i16"]
+    model = palpate.TouchRecognizer(preset="small").fit(touches.times, touches.objects).model_
+    assert model.leaf == "i8"
+
+
 def test_weights_say_what_may_be_touched(model: palpate.Model, unseen: palpate.DataSet) -> None:
     recognizer = palpate.Recognizer(model)
     recognizer.reset([1, 0, 1])

@@ -1,5 +1,5 @@
 use crate::fixtures::*;
-use palpate::compile::{Instructions, Leaf, Settings, compile, longest_time, open};
+use palpate::compile::{Instructions, Leaf, Settings, compile, longest_time, open, usual};
 use palpate::ensemble::inputs;
 
 fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
@@ -50,6 +50,16 @@ fn a_model_states_the_probe_of_its_touches_and_the_published_one_only_where_none
     let mut stated = StatedProbe::default();
     (stated.probe.spacing, stated.probe.speed) = (2.0, 25.0);
     assert_eq!(header(Some(stated)), (2.0, 25.0, Some(stated.trained())));
+}
+
+#[test]
+fn leaves_take_a_byte_where_two_would_hold_nothing_more_or_objects_are_many() {
+    let of = |leaf: f32| stump(500.0, [[leaf, -1.0], [-1.0, leaf]]);
+    assert_eq!([of(0.3), of(0.25)].map(|ensemble| usual(&ensemble).leaf), [Leaf::I16, Leaf::I8]);
+    let rows = Ensemble { inputs: Inputs::unnamed(2), ..of(0.25) };
+    assert_eq!(usual(&rows), Settings::default());
+    let many = |count: usize| Ensemble { objects: (0..count).map(|object| object.to_string()).collect(), ..of(0.3) };
+    assert_eq!([many(50), many(51)].map(|ensemble| usual(&ensemble).leaf), [Leaf::I16, Leaf::I8]);
 }
 
 #[test]

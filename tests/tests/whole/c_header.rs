@@ -13,6 +13,7 @@ use palpate_tests::vectors::{self, Cut};
 use palpate_tests::{HOUSEHOLD, ROOT};
 use rand::SeedableRng;
 use rand::rngs::SmallRng;
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -231,6 +232,19 @@ impl<'m> Batch<'m> {
 fn damaged_models_are_taken_or_refused_alike_at_the_same_place_and_give_the_same_answers() {
     // With the sweep, which is the first batch, they are 100,000.
     damaged(52_000, None);
+}
+
+#[test]
+fn every_section_of_the_format_is_among_those_that_are_cut_at_every_length() {
+    let format = include_str!("../../../shared/FORMAT.md");
+    let table = format.split("| tag | must understand | content |").nth(1).expect("the sections");
+    let tag = |line: &str| line.strip_prefix("| ")?.split(' ').next()?.parse().ok();
+    let stated: BTreeSet<u16> = table.lines().skip(2).map_while(tag).collect();
+    let of = |base: &[u8]| Model::new(base).unwrap().optional_sections().map(|section| section.tag).collect::<Vec<_>>();
+    let mut cut: BTreeSet<u16> = cuts().iter().flat_map(|(_, base, _)| of(base)).collect();
+    // Maps are no trees: the header does not read them.
+    cut.insert(Tag::Maps.code());
+    assert_eq!(cut, stated);
 }
 
 /// An hour of it is `PALPATE_FUZZ_SECONDS=3600 cargo test --release -p palpate-tests --test whole damaged_models -- --ignored --nocapture`.

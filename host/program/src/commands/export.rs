@@ -5,7 +5,7 @@ use super::numbers::error_rate;
 use super::unstated::UnstatedArguments;
 use palpate::Result;
 use palpate::compile::{self, Compiled, CompiledModel, Instructions, Language, Layout, Leaf, Settings};
-use palpate::ensemble::{self, Ensemble, Inputs, TouchOrigin, train};
+use palpate::ensemble::{self, Ensemble, Inputs, TouchOrigin};
 use palpate::error::Error;
 use palpate::output;
 use palpate::rows::scales::{self, Effect, Single};
@@ -165,15 +165,11 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     set_link(&mut ensemble, arguments.link)?;
     let (scales, fitted) = scales(&arguments, &ensemble)?;
     let code = arguments.is_code()?;
-    let usual = match ensemble.inputs {
-        // Where leaves were rounded to one byte, two hold nothing more.
-        Inputs::Computed(_) if train::is_rounded(&ensemble, 8) => with!(Settings::default(), leaf = Leaf::I8),
-        Inputs::Computed(_) => compile::for_touches(ensemble.objects.len()),
-        Inputs::Rows(_) => Settings::default(),
-    };
+    let usual = compile::usual(&ensemble);
+    let leaf = arguments.leaf.unwrap_or(usual.leaf);
     let settings = with!(
-        Settings::default(),
-        leaf = arguments.leaf.unwrap_or(usual.leaf),
+        usual,
+        leaf,
         code,
         error_rate = arguments.error_rate,
         max_touches = arguments.max_touches,
@@ -293,7 +289,7 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
         return refuse("emit", "json");
     }
     if arguments.emit.iter().any(|emitted| matches!(emitted, Emitted::Code(_))) {
-        return refuse("emit", "code");
+        return Err(Error::setting("emit", "code", compile::NO_CODE));
     }
     let emitted = places(arguments)?;
     // The model itself may be what the source code is to stand beside.
@@ -521,15 +517,18 @@ fn summary(path: &Path, exported: &Exported) -> String {
         instructions(exported.instructions),
     );
     let header = exported.sources.iter().find(|source| source.extension().is_some_and(|extension| extension == "h"));
-    let call = match exported.predicts.as_ref().map(|predicts| predicts.what) {
-        Some("class") => "predict(row)",
-        Some("value") => "value(row)",
-        Some(_) => "values(row, values)",
-        None => "push(&state, times)",
-    };
     let name = compile::identifier(&path.file_stem().unwrap_or_default().to_string_lossy());
+    let call = match exported.predicts.as_ref().map(|predicts| predicts.what) {
+        Some("class") if compile::label_numbers(&exported.classes).is_some() => {
+            format!("{name}_labels[{name}_predict(row)]")
+        }
+        Some("class") => format!("{name}_predict(row)"),
+        Some("value") => format!("{name}_value(row)"),
+        Some(_) => format!("{name}_values(row, values)"),
+        None => format!("{name}_push(&state, times)"),
+    };
     text += &match (header, exported.sources.first()) {
-        (Some(header), _) => format!("In C: {name}_{call} of {}. More: --verbose\n", header.display()),
+        (Some(header), _) => format!("In C: {call} of {}. More: --verbose\n", header.display()),
         (None, Some(source)) => format!("Source code: {}. More: --verbose\n", source.display()),
         (None, None) => "A header for C: --emit c. More: --verbose\n".into(),
     };

@@ -219,6 +219,7 @@ fn a_compiled_model_such_as_a_calibrated_one_becomes_an_array() {
     for (more, expected) in [
         ("", "--emit is not given. Use c or rust"),
         ("--emit json", "--emit is json. Use it with an ensemble"),
+        ("--emit c-code", "Use c or rust for a model that was loaded or calibrated: it is bytes"),
         ("--emit c --leaf i8", "--leaf is given. Use it with an ensemble"),
         ("--emit c --error-rate 5%", "--error-rate is given"),
     ] {
@@ -274,6 +275,12 @@ fn leaves_of_touches_of_more_than_fifty_objects_take_a_byte_unless_told_otherwis
         many.base_margins = vec![0.5; objects];
         many.save(at.join("many.json")).unwrap();
         assert_eq!(figures(at, &format!("export many.json -o many.palpate {more}"))["leaf"], expected);
+        if more.is_empty() {
+            // What the library does with it, too.
+            let usual = palpate::compile::usual(&many);
+            let compiled = palpate::compile::compile(&many, &usual).unwrap();
+            assert_eq!(fs::read(at.join("many.palpate")).unwrap(), compiled.bytes);
+        }
     }
 }
 

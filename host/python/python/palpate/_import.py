@@ -65,7 +65,7 @@ def compile(
     *,
     max_bytes: int | None = None,
     names: Sequence[str] | None = None,
-    leaf: str = "i16",
+    leaf: str | None = None,
     error_rate: float = 0.01,
     max_touches: int = 200,
     priors: Sequence[float] | None = None,
@@ -77,7 +77,7 @@ def compile(
     """Compiles an ensemble, or a model of another library, to the bytes that a microcontroller reads.
 
     `model`, `names`, `all_trees` and `missing` are as for `to_ensemble`. `leaf` is "i8", "i16" or "f32": what leaves are stored
-    as; with "f32" the margins of an XGBoost model stay its own, bit for bit. What to know about the model is a `ModelWarning`,
+    as, by default what `palpate export` chooses; with "f32" the margins of an XGBoost model stay its own, bit for bit. What to know about the model is a `ModelWarning`,
     and is in its `notes`.
 
     With `max_bytes`, leaves are stored in fewer bits where the model would be larger; if it still is, that is an error: no

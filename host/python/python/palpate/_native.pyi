@@ -699,13 +699,13 @@ def checksums(meshes: Meshes) -> list[tuple[str, list[str]]]:
     their instances. All files are read.
     """
 
-def compile(ensemble: Ensemble, *, max_bytes: SupportsIndex | None = None, leaf: str = "i16", error_rate: SupportsFloat | SupportsIndex = 0.01, max_touches: SupportsIndex = 200, priors: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None, scales: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None, row_number: str | None = None) -> Model:
+def compile(ensemble: Ensemble, *, max_bytes: SupportsIndex | None = None, leaf: str | None = None, error_rate: SupportsFloat | SupportsIndex = 0.01, max_touches: SupportsIndex = 200, priors: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None, scales: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None, row_number: str | None = None) -> Model:
     """
     Compiles an ensemble to the bytes that a microcontroller reads. (`palpate.compile` also takes models of other
     libraries.)
 
-    `leaf` is "i8", "i16" or "f32": what leaves are stored as. With `max_bytes` leaves are stored in fewer bits where the model
-    would be larger; if it still is, that is an error. `error_rate` and `max_touches` are where recognizers stop; `priors` say
+    `leaf` is "i8", "i16" or "f32": what leaves are stored as; by default what `palpate export` chooses. With `max_bytes` leaves
+    are stored in fewer bits where the model would be larger; if it still is, that is an error. `error_rate` and `max_touches` are where recognizers stop; `priors` say
     how likely each object is. `scales` say how many units make up 1 of each feature, for a chip that measures in whole numbers.
     `row_number` names the feature that is a row's number in its sequence, counted from 1.
 

@@ -39,7 +39,7 @@ class TouchRecognizer:
         rounds: int | None = None,
         noise: str = "",
         timer: str = "",
-        leaf: str = "i16",
+        leaf: str | None = None,
         seed: int = 1,
     ) -> None:
         self.preset = preset

@@ -1,6 +1,6 @@
 /* 2 objects: ab, c; checksum 20997fc5.
  * Written by `palpate export`; not to be edited. */
-/* From features to margins: at most 977 instructions on a Cortex-M4F, 1,368 on a Cortex-M0+, estimated.
+/* From features to margins: at most 977 instructions on a Cortex-M4F, 1,353 on a Cortex-M0+, estimated.
  * Flash: 173 bytes for the model's array, and the functions that are called. RAM: the stack, and a palpate_recognizer for
  * each stream; nothing is static. */
 #ifndef MODEL_MODEL_H
@@ -80,13 +80,18 @@ static const palpate_model model_opened_ = {
 #endif
 };
 
+enum {
+    MODEL_CLASS_AB = 0, /* ab */
+    MODEL_CLASS_C = 1, /* c */
+};
+
 /* Begins: nothing was added yet. Threads and interrupts may call it at once, each with a state of its own. */
 static inline void model_begin(palpate_recognizer *state)
 {
     palpate_start_(state, &model_opened_);
 }
 
-/* Adds a step by its three times in microseconds, PALPATE_MISSING for one that there is not: the number of the object that is recognized; -1 while none is, -2 if none fits, -3 at the limit of steps. After a decision nothing changes until model_begin. Threads and interrupts may call it at once, each with a state of its own. */
+/* Adds a step by its three times in microseconds, PALPATE_MISSING for one that there is not: the index of the object that is recognized; -1 while none is, -2 if none fits, -3 at the limit of steps. After a decision nothing changes until model_begin. Threads and interrupts may call it at once, each with a state of its own. */
 static inline int model_push(palpate_recognizer *state, const uint32_t *times)
 {
     return palpate_add_times_(state, times);

@@ -259,7 +259,8 @@ fn forest(booster: GradientBooster) -> Result<(Forest, Option<Vec<f32>>), Ensemb
     Ok((forest, weights.filter(|weights| !weights.is_empty())))
 }
 
-/// The names of a feature's categories: numbers, or the bytes of all names, and where each begins and ends.
+/// The names of a feature's categories: numbers, or the bytes of all names, and where each begins and ends. None where some are not
+/// ASCII: of a pandas table XGBoost 3.2 then counts characters, not bytes.
 fn category_names(feature: &serde_json::Value) -> Option<Vec<String>> {
     let list =
         |name: &str| feature.get(name)?.as_array()?.iter().map(serde_json::Value::as_i64).collect::<Option<Vec<_>>>();
@@ -267,8 +268,7 @@ fn category_names(feature: &serde_json::Value) -> Option<Vec<String>> {
     let Some(offsets) = list("offsets") else { return Some(values.iter().map(ToString::to_string).collect()) };
     let name = |ends: &[i64]| {
         let bytes = values.get(usize::try_from(ends[0]).ok()?..usize::try_from(ends[1]).ok()?)?;
-        let bytes: Vec<u8> = bytes.iter().map(|byte| *byte as u8).collect();
-        Some(String::from_utf8_lossy(&bytes).into_owned())
+        bytes.iter().map(|&byte| u8::try_from(byte).ok().filter(u8::is_ascii).map(char::from)).collect()
     };
     offsets.windows(2).map(name).collect()
 }
