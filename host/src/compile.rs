@@ -22,6 +22,21 @@ pub fn usual(ensemble: &Ensemble) -> Settings {
     with!(Settings::default(), leaf)
 }
 
+/// Whole weights of objects, for [`Recognizer::reset_to`](palpate_onboard::Recognizer::reset_to), from numbers in any unit.
+///
+/// # Errors
+/// [`Setting`](crate::error::Setting) unless they are finite, none is below 0, and one is above.
+pub fn weights(weights: &[f64]) -> Result<Vec<u32>> {
+    let most = weights.iter().copied().fold(0.0, f64::max);
+    if most <= 0.0 || !weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite()) {
+        let allowed = "finite numbers, none below 0 and at least one above";
+        return Err(Error::setting("weights", format!("{weights:?}"), allowed));
+    }
+    // 31 bits, and no object that is possible becomes impossible.
+    let whole = |weight: &f64| (weight / most * f64::from(1_u32 << 31)).round().max(f64::from(u8::from(*weight > 0.0)));
+    Ok(weights.iter().map(|weight| whole(weight) as u32).collect())
+}
+
 /// Compiles an ensemble. The model states the ensemble's own probe, or the published one where the ensemble states none.
 ///
 /// # Errors

@@ -79,7 +79,7 @@ impl<'a, 'py, T: Element, D: Dimension> FromPyObject<'a, 'py> for Input<'py, T, 
         let found: usize = array.getattr("ndim")?.extract()?;
         match D::NDIM {
             Some(wanted) if wanted != found => Err(pyo3::exceptions::PyValueError::new_err(format!(
-                "an array of {found} dimensions, where {wanted} are needed"
+                "a {found}-dimensional array, where a {wanted}-dimensional one is needed"
             ))),
             _ => array.extract().map(Self),
         }

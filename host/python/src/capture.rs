@@ -27,6 +27,13 @@ pub(crate) enum Meshes {
     Named(Vec<(String, Given)>),
 }
 
+/// Whether approaches are kept that touched nothing, or how many approaches are made, all of which are kept.
+#[derive(FromPyObject)]
+pub(crate) enum Approaches {
+    Kept(bool),
+    Count(u64),
+}
+
 /// Meshes or sources that stand for one object.
 pub(crate) enum Given {
     Source(String),
@@ -36,7 +43,7 @@ pub(crate) enum Given {
 impl Meshes {
     /// The objects, read.
     pub(crate) fn objects(self, instances: bool) -> palpate::Result<Vec<Object>> {
-        match self {
+        let objects: Vec<Object> = match self {
             Self::Sources(sources) if instances => source::objects_of_instances(&sources),
             Self::Sources(sources) => source::objects(&sources),
             Self::Named(named) => named
@@ -50,7 +57,11 @@ impl Meshes {
                     }
                 })
                 .collect(),
+        }?;
+        if objects.is_empty() {
+            return Err(Error::setting("meshes", "empty", "at least one mesh, directory or built-in object"));
         }
+        Ok(objects)
     }
 }
 
@@ -142,9 +153,10 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 /// scaled so that its longest side has `length` units; with `millimeters`, the length of a unit of the meshes, it keeps
 /// its true size and the `probe` is in millimeters.
 ///
-/// `touches` full touches of each object are kept, or with `approaches` that many approaches whether fingers touch or not;
-/// `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a table in each of their placements, and
-/// approaches come within that many degrees of straight down. `position` keeps where the hand was, too, of all approaches
+/// `touches` full touches of each object are kept, or with `approaches=True` that many approaches whether fingers touch or not;
+/// `approaches=500` are 500 approaches. `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a
+/// table in each of their placements, and approaches come within that many degrees of straight down. `position` keeps where
+/// the hand was, too, of all approaches
 /// straight down to objects of true size on a table; `within` is how far from an object's middle they aim at most. The same
 /// `seed` gives the same touches on any number of `threads`, and the same as the program's. `samples` are the first of
 /// a part of these touches or approaches, from 0, and the one after its last. With `instances` a directory inside a directory
@@ -159,7 +171,7 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 /// >>> data.times.shape, bool(data.times.min() == 0.0)
 /// ((200, 3), True)
 #[pyo3::pyfunction]
-#[pyo3(signature = (meshes, *, touches=21_000, seed=1, probe=None, approaches=false, pose=false, aim="box", cone=None,
+#[pyo3(signature = (meshes, *, touches=21_000, seed=1, probe=None, approaches=Approaches::Kept(false), pose=false, aim="box", cone=None,
     position=false, within=None, length=10.0, millimeters=None, instances=false, samples=None, out=None, force=false,
     threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "they are keywords in Python")]
@@ -169,7 +181,7 @@ pub(crate) fn capture(
     touches: u64,
     seed: u64,
     probe: Option<Probe>,
-    approaches: bool,
+    approaches: Approaches,
     pose: bool,
     aim: &str,
     cone: Option<f64>,
@@ -187,6 +199,10 @@ pub(crate) fn capture(
     if millimeters.is_some() && probe.is_none() {
         return Err(Error::setting("probe", "not given", "a probe in millimeters, as millimeters is given").into());
     }
+    let (touches, approaches) = match approaches {
+        Approaches::Kept(kept) => (touches, kept),
+        Approaches::Count(count) => (count, true),
+    };
     let origin = Origin {
         touches,
         seed,

@@ -32,6 +32,14 @@ type Splits = (Vec<usize>, Vec<f64>, Vec<bool>);
 #[pyo3::pyclass(frozen, module = "palpate._native")]
 pub(crate) struct Ensemble {
     pub(crate) ensemble: Arc<ensemble::Ensemble>,
+    /// Labels of the classifier's classes, an array in their order.
+    pub(crate) labels: Option<Py<PyAny>>,
+}
+
+impl From<ensemble::Ensemble> for Ensemble {
+    fn from(ensemble: ensemble::Ensemble) -> Self {
+        Self { ensemble: Arc::new(ensemble), labels: None }
+    }
 }
 
 /// A tree as columns: output, left, right, feature, threshold, missing_left, values.
@@ -61,8 +69,7 @@ impl Ensemble {
         missing: Option<f32>,
     ) -> Result<Self, Failure> {
         let options = Options { names: names.as_deref(), all_trees, missing, ..Options::default() };
-        let ensemble = py.detach(|| ensemble::load_with(&path, &options))?;
-        Ok(Self { ensemble: Arc::new(ensemble) })
+        Ok(py.detach(|| ensemble::load_with(&path, &options))?.into())
     }
 
     /// Reads the bytes of such a file. `notes` are facts about it that it does not state.
@@ -81,7 +88,7 @@ impl Ensemble {
         if let Some(imported) = &mut ensemble.origin.imported {
             imported.notes.extend(notes);
         }
-        Ok(Self { ensemble: Arc::new(ensemble) })
+        Ok(ensemble.into())
     }
 
     /// An ensemble of trees in memory. Each tree is a tuple of columns with one entry per node: the output that its
@@ -134,8 +141,7 @@ impl Ensemble {
         let trees = trees.into_iter().map(tree).collect::<PyResult<_>>()?;
         let parts =
             Parts { kind, features, names: Vec::new(), base, trees, notes, prediction, probability, compares_f64 };
-        let ensemble = py.detach(|| parts.into_ensemble(names.as_deref())).map_err(Error::from)?;
-        Ok(Self { ensemble: Arc::new(ensemble) })
+        Ok(py.detach(|| parts.into_ensemble(names.as_deref())).map_err(Error::from)?.into())
     }
 
     /// The feature and the threshold of each split, and whether a value that equals it goes left.
@@ -155,9 +161,14 @@ impl Ensemble {
         Ok(splits)
     }
 
-    /// Copies the trees with other thresholds, in the order of `_splits`; values below them go left.
-    fn _with_thresholds(&self, thresholds: Vec<f32>) -> Self {
-        let mut ensemble = (*self.ensemble).clone();
+    /// Copies the trees with other thresholds, in the order of `_splits`, and perhaps other names of features; values below them
+    /// go left.
+    #[pyo3(signature = (thresholds, names=None))]
+    fn _with_thresholds(&self, thresholds: Vec<f32>, names: Option<Vec<String>>) -> Self {
+        let (mut ensemble, mut notes) = ((*self.ensemble).clone(), Vec::new());
+        if let Some(names) = names.filter(|names| names.len() == ensemble.inputs.count()) {
+            ensemble.inputs = Inputs::named(names, &mut notes);
+        }
         for ((tree, node, _), new) in self.split_nodes().zip(thresholds) {
             if let Node::Split { threshold, .. } = &mut ensemble.trees[tree].nodes[node] {
                 *threshold = new;
@@ -165,10 +176,16 @@ impl Ensemble {
         }
         if let Some(imported) = &mut ensemble.origin.imported {
             imported.thresholds.clear();
+            imported.notes.extend(notes);
             // Scalers compute in f64, whatever the trees do.
             imported.compares_f64 = true;
         }
-        Self { ensemble: Arc::new(ensemble) }
+        ensemble.into()
+    }
+
+    /// The same trees, of a classifier whose classes have these labels, an array in their order: models predict them.
+    fn _with_labels(&self, labels: Py<PyAny>) -> Self {
+        Self { ensemble: Arc::clone(&self.ensemble), labels: Some(labels) }
     }
 
     /// Writes an ensemble over touches as XGBoost's JSON.
@@ -340,5 +357,5 @@ pub(crate) fn train(
         None => library::train(dataset, &settings, progress),
         Some(background) => library::train_with_background(dataset, background, &settings, progress),
     })?;
-    Ok(Ensemble { ensemble: Arc::new(ensemble) })
+    Ok(ensemble.into())
 }

@@ -2,6 +2,7 @@
 
 use palpate::error::{Error, Place, Setting};
 use pyo3::prelude::*;
+use std::ffi::CString;
 use std::path::PathBuf;
 
 /// Failure of a call.
@@ -32,6 +33,12 @@ impl From<Failure> for PyErr {
             Failure::Library(error) => Python::attach(|py| exception(py, &error).unwrap_or_else(|failed| failed)),
         }
     }
+}
+
+/// Warns with a `ModelWarning`.
+pub(crate) fn note_of(py: Python<'_>, text: &str) -> PyResult<()> {
+    let class = py.import("palpate._errors")?.getattr("ModelWarning")?;
+    PyErr::warn(py, &class, &CString::new(text)?, 1)
 }
 
 fn exception(py: Python<'_>, error: &Error) -> PyResult<PyErr> {

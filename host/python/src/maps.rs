@@ -4,7 +4,7 @@ use crate::arrays::ARRAY_LIKE;
 use crate::capture::Meshes;
 use crate::cells::{OpenedLocator, OpenedMaps};
 use crate::data::DataSet;
-use crate::failure::Failure;
+use crate::failure::{Failure, note_of};
 use crate::objects::{self, Probe, Real, class};
 use crate::recognizer::numbers;
 use crate::work::{Callback, long};
@@ -12,10 +12,10 @@ use palpate::calibrate::{self, Per};
 use palpate::capture::{self, Settings as Capture};
 use palpate::compile;
 use palpate::error::{Error, LocateProblem, Place};
-use palpate::locate::{self, Aimed, Approach, Hand, MapsFile, Promised, Seen, Settings, Terms, Until};
+use palpate::locate::{self, Aimed, Approach, Hand, Heights, MapsFile, Promised, Seen, Settings, Terms, Until};
 use palpate::mesh::Object;
+use palpate::mesh::facts::sides;
 use palpate::onboard::Verdict;
-use palpate::onboard::locate::Contact;
 use palpate::output;
 use palpate::shared::format::Length;
 use palpate::touches::{Dataset, Origin, Surroundings, located, touch_of_seconds};
@@ -81,6 +81,20 @@ fn sized(meshes: Meshes, millimeters: Option<f64>) -> palpate::Result<Vec<Object
     let mut objects = meshes.objects(false)?;
     objects.iter_mut().for_each(|object| object.millimeters = object.millimeters.or(millimeters));
     Ok(objects)
+}
+
+/// Sizes that are none of objects for this hand, in words: the length of a unit may be another.
+fn odd_sizes(objects: &[Object], probe: &palpate::probe::approach::Probe, range: f64) -> Vec<String> {
+    // By default the hand goes to twice the range, and the outer fingers beyond it.
+    let usual = probe.spacing..=4.0 * (2.0 * range + probe.spacing);
+    let of = |object: &Object| {
+        let size = object.instances().find_map(|instance| object.true_size(instance))?;
+        (!usual.contains(&size.max_element())).then(|| {
+            let (name, sides) = (&object.name, sides(size));
+            format!("{name} is {sides} mm, for fingers {} mm apart. See whether `millimeters` is right.", probe.spacing)
+        })
+    };
+    objects.iter().filter_map(of).collect()
 }
 
 /// Sequences that are played on a simulated table.
@@ -192,10 +206,16 @@ impl Maps {
             approaches: true,
             ..Origin::default()
         };
-        long(py, progress.as_ref(), |progress| {
-            let (dataset, _) = capture::in_memory(&sized(meshes, millimeters)?, &Capture::from(origin), progress)?;
-            Self::learned(&dataset, &settings)
-        })
+        let (maps, odd) = long(py, progress.as_ref(), |progress| {
+            let objects = sized(meshes, millimeters)?;
+            let odd = odd_sizes(&objects, &origin.probe, range);
+            let (dataset, _) = capture::in_memory(&objects, &Capture::from(origin), progress)?;
+            Ok((Self::learned(&dataset, &settings)?, odd))
+        })?;
+        for note in odd {
+            note_of(py, &note)?;
+        }
+        Ok(maps)
     }
 
     /// Finds the loosest threshold at which at most a share of `error_rate` of the names is wrong, with a probability of
@@ -396,8 +416,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Row {
 
     fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
         if let Ok(degrees) = object.extract::<f64>() {
-            let (sin, cos) = degrees.to_radians().sin_cos();
-            return Ok(Self([cos, sin, 0.0]));
+            return Ok(Self(locate::row(degrees).map_err(Failure::from)?));
         }
         let vector: Three = object.extract()?;
         Ok(Self(vector.all()))
@@ -480,8 +499,8 @@ impl Locator {
     }
 
     /// Takes in the heights above the table that three fingertips met, in millimeters, `None` or NaN for a finger that met nothing.
-    /// `x` and `y` are the middle finger's, `alignment` is as for `push`, and `lowest` is the height down to which the hand went,
-    /// 0 or less where it would have met the table.
+    /// `x` and `y` are the middle finger's, at most 2 m from the table's origin, `alignment` is as for `push`, and `lowest` is the
+    /// height down to which the hand went, 0 or less where it would have met the table.
     #[pyo3(signature = (heights, x, y, alignment, *, lowest=0.0))]
     fn push_heights<'py>(
         &mut self,
@@ -492,20 +511,8 @@ impl Locator {
         alignment: Row,
         lowest: f64,
     ) -> Result<objects::Located<'py>, Failure> {
-        let Row([across, along, _]) = alignment;
-        let micrometers = |millimeters: f64| (millimeters * 1e3).round() as i32;
-        let spacing = f64::from(self.hand.spacing);
-        let contact = |height: Option<f64>| height.map_or(Contact::Nothing, |height| Contact::At(micrometers(height)));
-        if let Some(wrong) = [x, y, across, along, lowest].into_iter().find(|number| !number.is_finite()) {
-            return Err(Error::setting("x, y, alignment or lowest", wrong, "finite numbers").into());
-        }
-        let row = [across, along].map(|share| (share * spacing).round() as i32);
-        let Three(heights) = heights;
-        // As for times: a finger cannot have stopped far below the table.
-        if let Some(below) = heights.iter().flatten().map(|height| -height).find(|below| *below > locate::BELOW) {
-            return Err(Error::from(LocateProblem::Below { millimeters: below }).into());
-        }
-        let seen = Seen::new([x, y].map(micrometers), row, heights.map(contact), micrometers(lowest));
+        let (Three(met), Row(row)) = (heights, alignment);
+        let seen = Heights { met, place: [x, y], row, lowest }.seen(&self.hand)?;
         self.take(py, seen)
     }
 
@@ -546,13 +553,12 @@ impl Locator {
 
     /// Forgets all touches, for the next object. `weights` say how often each object lies there, in any unit.
     #[pyo3(signature = (weights=None))]
-    fn reset(&mut self, weights: Option<Vec<u32>>) -> Result<(), Failure> {
+    fn reset(&mut self, weights: Option<Vec<f64>>) -> Result<(), Failure> {
         let objects = self.cell.borrow_owner().borrow_dependent().objects();
-        let is_wrong = |weights: &&Vec<u32>| weights.len() != objects || weights.iter().all(|&weight| weight == 0);
-        if weights.as_ref().filter(is_wrong).is_some() {
-            let allowed = format!("{objects} of them, one above 0 at least");
-            return Err(Error::setting("weights", "all 0, or too many or few", allowed).into());
+        if let Some(count) = weights.as_ref().map(Vec::len).filter(|&count| count != objects) {
+            return Err(Error::setting("weights", format!("a list of {count}"), format!("a list of {objects}")).into());
         }
+        let weights = weights.as_deref().map(compile::weights).transpose()?;
         self.seed = self.seed.wrapping_add(1);
         self.next = None;
         let seed = self.seed;

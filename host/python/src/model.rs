@@ -5,7 +5,8 @@ use crate::cells::OpenedModel;
 use crate::data::DataSet;
 use crate::ensemble::Ensemble;
 use crate::failure::Failure;
-use numpy::ndarray::{Ix1, Ix2};
+use crate::objects;
+use numpy::ndarray::Ix2;
 use palpate::compile::{self as library, Compiled, CompiledModel, Language, Leaf, Settings};
 use palpate::ensemble::Probability;
 use palpate::error::{CompileProblem, Error, EvaluateProblem, TouchesProblem};
@@ -46,6 +47,8 @@ pub(crate) struct Model {
     pub(crate) features: Features,
     /// Facts about its source.
     notes: Vec<String>,
+    /// Labels of the classifier that it was compiled from, an array in the order of its objects.
+    labels: Option<Py<PyAny>>,
     /// The ensemble that it was compiled from, how, and the result; none of a model that was loaded.
     source: Option<(Arc<palpate::ensemble::Ensemble>, Settings, Compiled)>,
 }
@@ -57,7 +60,7 @@ impl Model {
         })?;
         let encoder = Encoder::of(opened.borrow_dependent());
         let features = Features::from(opened.borrow_dependent());
-        Ok(Self { opened: Arc::new(opened), encoder, features, notes: Vec::new(), source: None })
+        Ok(Self { opened: Arc::new(opened), encoder, features, notes: Vec::new(), labels: None, source: None })
     }
 
     pub(crate) fn model(&self) -> &onboard::Model<'_> {
@@ -197,7 +200,7 @@ impl Model {
 
     /// Writes the model as source code, and returns the files. `form` is "c" (an array), "rust", "c-code" (trees as C) or
     /// "rust-code" (trees as Rust); without it a name that ends in ".h" means "c", and ".rs" "rust". What has to be built with it,
-    /// such as palpate.h, is written beside it, and for trees as Rust the model.
+    /// such as palpate.h, is written beside it, and for trees as Rust the model. Directories that are missing are made.
     #[pyo3(signature = (path, *, form=None))]
     fn emit(&self, py: Python<'_>, path: PathBuf, form: Option<&str>) -> Result<Vec<PathBuf>, Failure> {
         let of_suffix = path.extension().and_then(|extension| match extension.to_str() {
@@ -342,11 +345,12 @@ impl Model {
         Ok(two(slf.py(), shares.flatten().collect(), objects)?)
     }
 
-    /// The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value
-    /// (its values, a column for each of several targets), with `raw` the margin before the inverse link. Rows are as for
-    /// `margins`.
+    /// The prediction of the library that trained a model over rows of features, as an array: the class of each row, or its value
+    /// (its values, a column for each of several targets), with `raw` the margin before the inverse link. Classes are the labels
+    /// of the classifier, of its own type; without it (of a model or ensemble from a file or bytes), or with other `names`, they are
+    /// the objects' names. Rows are as for `margins`.
     #[pyo3(signature = (rows, *, raw=false))]
-    fn predict<'py>(slf: &Bound<'py, Self>, rows: Rows<'py>, raw: bool) -> Result<Predictions<'py>, Failure> {
+    fn predict<'py>(slf: &Bound<'py, Self>, rows: Rows<'py>, raw: bool) -> Result<objects::Predictions<'py>, Failure> {
         let Rows::Array(array) = rows else { return Err(Error::from(EvaluateProblem::OverTouches).into()) };
         let (py, own) = (slf.py(), slf.get());
         if own.model().descriptor().is_some() {
@@ -363,30 +367,26 @@ impl Model {
                 own.predicted(py, array.rows()?, raw)?
             }
         };
-        Ok(match predicted {
+        Ok(objects::Predictions(match predicted {
             Predicted::Values(values) if own.model().object_count() > 1 => {
-                Predictions::Targets(two(py, values, own.model().object_count())?)
+                two(py, values, own.model().object_count())?.0.into_any()
             }
-            Predicted::Values(values) => Predictions::Values(one(py, values)),
+            Predicted::Values(values) => one(py, values).0.into_any(),
             Predicted::Classes(classes) => {
-                let names = own.objects();
-                Predictions::Classes(classes.into_iter().filter_map(|class| names.get(class).cloned()).collect())
+                let labels = match &own.labels {
+                    Some(labels) => labels.bind(py).clone(),
+                    None => py.import("numpy")?.call_method1("array", (own.objects(),))?,
+                };
+                let classes = classes.into_iter().map(|class| class as i64).collect();
+                labels.call_method1("take", (one(py, classes),))?
             }
-        })
+        }))
     }
 
     fn __repr__(&self) -> String {
         let model = self.model();
         format!("Model({} bytes, {} objects, {})", model.bytes().len(), model.object_count(), model.layout().name())
     }
-}
-
-/// Predictions of a model over rows.
-#[derive(pyo3::IntoPyObject)]
-pub(crate) enum Predictions<'py> {
-    Classes(Vec<String>),
-    Values(Output<'py, f32, Ix1>),
-    Targets(Output<'py, f32, Ix2>),
 }
 
 /// Touches from rows of three or nine numbers.
@@ -442,6 +442,7 @@ pub(crate) fn compile(
     scales: Option<Vec<f32>>,
     row_number: Option<String>,
 ) -> Result<Model, Failure> {
+    let labels = ensemble.get().labels.as_ref().map(|labels| labels.clone_ref(py));
     let ensemble = &ensemble.get().ensemble;
     let named = |name: &str| Leaf::ALL.iter().copied().find(|known| known.name() == name);
     let leaf =
@@ -456,5 +457,5 @@ pub(crate) fn compile(
     let model = Model::of(compiled.bytes.clone())?;
     let settings = with!(settings, leaf = model.model().leaf_type());
     let notes = [notes(ensemble, settings.scales.as_deref()), compiled.notes.clone()].concat();
-    Ok(Model { notes, source: Some((Arc::clone(ensemble), settings, compiled)), ..model })
+    Ok(Model { notes, labels, source: Some((Arc::clone(ensemble), settings, compiled)), ..model })
 }

@@ -48,6 +48,8 @@ handed_out! {
     CalibratedMaps is "palpate._locate"."CalibratedMaps";
     /// Results of maps on a simulated table.
     MapsEvaluation is "palpate._locate"."MapsEvaluation";
+    /// Predictions of a model.
+    Predictions is "palpate._types"."Predictions";
     /// A table of pandas.
     DataFrame is "pandas"."DataFrame";
 }

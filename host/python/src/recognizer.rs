@@ -182,7 +182,8 @@ impl Recognizer {
     /// Forgets all touches, for the next object. `weights` say how often each object is touched, in place of the model's
     /// priors, in any unit.
     #[pyo3(signature = (weights=None))]
-    fn reset(&mut self, weights: Option<Vec<u32>>) -> Result<(), Failure> {
+    fn reset(&mut self, weights: Option<Vec<f64>>) -> Result<(), Failure> {
+        let weights = weights.as_deref().map(compile::weights).transpose()?;
         self.seen.reset();
         self.cell.with_dependent_mut(|_, recognizer| match weights {
             None => {

@@ -6,7 +6,7 @@ use crate::maps::{Row, Three};
 use crate::objects::Probe;
 use numpy::ndarray::Ix2;
 use palpate::error::Error;
-use palpate::locate::{self, Relief, Sample};
+use palpate::locate::{self, Heights, Relief};
 use palpate::touches::{located, touch_of_seconds};
 use pyo3::prelude::*;
 
@@ -72,17 +72,8 @@ impl Shape {
     /// Takes in heights, as `Locator.push_heights` does.
     #[pyo3(signature = (heights, x, y, alignment, *, lowest=0.0))]
     fn push_heights(&mut self, heights: Three, x: f64, y: f64, alignment: Row, lowest: f64) -> Result<(), Failure> {
-        let Row([across, along, _]) = alignment;
-        if let Some(wrong) = [x, y, across, along, lowest].into_iter().find(|number| !number.is_finite()) {
-            return Err(Error::setting("x, y, alignment or lowest", wrong, "finite numbers").into());
-        }
-        let Three(heights) = heights;
-        let samples = [-1.0, 0.0, 1.0].into_iter().zip(heights).map(|(finger, height)| Sample {
-            place: [x + finger * self.spacing * across, y + finger * self.spacing * along],
-            height: height.unwrap_or(lowest.max(0.0)),
-            is_contact: height.is_some(),
-        });
-        self.shape.add(samples);
+        let (Three(met), Row(row)) = (heights, alignment);
+        self.shape.add(Heights { met, place: [x, y], row, lowest }.samples(self.spacing)?);
         self.relief = None;
         Ok(())
     }
@@ -95,8 +86,11 @@ impl Shape {
     }
 
     /// Share of the cells that may be the object's whose height is known to some millimeters.
-    fn known(&mut self, millimeters: f64) -> f64 {
-        self.relief().known(millimeters)
+    fn known(&mut self, millimeters: f64) -> Result<f64, Failure> {
+        if millimeters.is_nan() || millimeters <= 0.0 {
+            return Err(Error::setting("millimeters", millimeters, "a number above 0").into());
+        }
+        Ok(self.relief().known(millimeters))
     }
 
     /// Heights in millimeters on a grid of 1 mm about the origin, a row for each y, ascending.
@@ -105,7 +99,8 @@ impl Shape {
         self.grid(py, |relief| relief.heights.clone())
     }
 
-    /// The least and the greatest height of each cell: nineteen of twenty such intervals hold the truth.
+    /// The least and the greatest height of each cell: nineteen of twenty such intervals hold the truth, of cells within 8 mm of a
+    /// touch. Others have the interval from the table to the highest height so far, which states nothing.
     #[getter]
     fn bounds<'py>(&mut self, py: Python<'py>) -> PyResult<(Output<'py, f64, Ix2>, Output<'py, f64, Ix2>)> {
         let low = self.grid(py, |relief| relief.bounds.iter().map(|bounds| bounds[0]).collect())?;

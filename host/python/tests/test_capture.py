@@ -22,6 +22,8 @@ def test_a_capture_in_memory_is_the_one_on_the_disk(tmp_path: Path) -> None:
     np.testing.assert_array_equal(memory.direction, disk.direction)
     assert memory.approaches == disk.approaches == [300, 300]
     assert memory.holds_approaches and np.isnan(memory.times).any()
+    number = palpate.capture(["bowl", "mouse"], **(options | {"approaches": 300, "touches": 7}))
+    np.testing.assert_array_equal(number.times, memory.times)
 
 
 def test_threads_and_parts_change_no_touch() -> None:

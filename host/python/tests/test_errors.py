@@ -9,6 +9,7 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import palpate
 import pytest
 
@@ -38,12 +39,27 @@ def test_errors_say_where_what_and_what_to_do(tmp_path: Path) -> None:
         ({"probe": palpate.Probe(tilt=90.0)}, "tilt is 90"),
         ({"millimeters": 1.0}, "probe is not given"),
         ({"threads": 0}, "threads is 0"),
+        ({"approaches": 0}, "approaches is 0. Use 1 or more."),
     ],
 )
 def test_settings_out_of_range_name_the_setting(options: dict[str, object], message: str) -> None:
     with pytest.raises(palpate.SettingError) as caught:
         palpate.capture("bowl", **options)
     assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize("meshes", [[], {}, ()])
+def test_no_meshes_at_all_are_an_error(meshes: object) -> None:
+    with pytest.raises(palpate.SettingError, match="meshes is empty. Use at least one"):
+        palpate.capture(meshes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", [palpate.Probe, palpate.Real])
+@pytest.mark.parametrize("value", ["probe.toml", None, True, [1.0]])
+def test_values_of_a_probe_and_of_noise_are_numbers(kind: type, value: object) -> None:
+    with pytest.raises(palpate.SettingError, match=r"(radius|height) is .*\. Use a number"):
+        kind(value)
+    kind(np.float32(0.5))
 
 
 def test_bytes_that_are_no_model_are_refused() -> None:

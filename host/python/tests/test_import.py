@@ -18,8 +18,10 @@ from sklearn import (
     dummy,
     ensemble,
     linear_model,
+    metrics,
     model_selection,
     multiclass,
+    pipeline,
     tree,
 )
 
@@ -167,7 +169,7 @@ def test_whole_numbers_that_f32_does_not_hold_go_where_lightgbm_sends_them() -> 
     expected = estimator.predict(seconds, raw_score=True)
     for given in (seconds, seconds.astype(np.int64)):
         assert np.abs(model.margins(given) - expected).max() <= model.margin_error < 1e-4
-        assert model.predict(given) == [str(kind) for kind in estimator.predict(seconds)]
+        np.testing.assert_array_equal(model.predict(given), estimator.predict(seconds))
     recognizer = palpate.Recognizer(model)
     recognizer.push_row(seconds[0])
     assert recognizer.best == str(expected[0].argmax())
@@ -394,11 +396,50 @@ def test_a_calibrated_classifier_gives_its_classes_and_by_a_sigmoid_its_probabil
     ordered = np.sort(shares, axis=1)
     clear = ordered[:, -1] - ordered[:, -2] > 1e-4
     assert clear.mean() > 0.9
-    found = np.array(model.predict(test))
-    np.testing.assert_array_equal(found[clear], estimator.predict(test).astype(str)[clear])
+    np.testing.assert_array_equal(model.predict(test)[clear], estimator.predict(test)[clear])
     if classes == 2 and method == "sigmoid":
         margins = model.margins(test)
         np.testing.assert_allclose(1 / (1 + np.exp(margins[:, 0] - margins[:, 1])), shares[:, 1], atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["words", "numbers", "floats", "flags", "objects"])
+def test_classes_are_predicted_as_labels_of_the_classifiers_own_type(kind: str) -> None:
+    train, codes = np.nan_to_num(TRAIN), labels(TRAIN, 2)
+    y: Any = {
+        "words": np.array(CLASSES)[codes],
+        "numbers": codes * 7 - 3,
+        "floats": codes * 2.0,
+        "flags": codes > 0,
+        "objects": np.array(CLASSES, dtype=object)[codes],
+    }[kind]
+    for estimator in (
+        ensemble.RandomForestClassifier(4, random_state=1),
+        lightgbm.LGBMClassifier(n_estimators=4, num_leaves=5, verbose=-1, n_jobs=1),
+        pipeline.make_pipeline("passthrough", ensemble.HistGradientBoostingClassifier(max_iter=4)),
+    ):
+        estimator.fit(train, y)
+        expected = estimator.predict(train)
+        for source in (estimator, palpate.to_ensemble(estimator)):
+            found = palpate.compile(source, leaf="f32").predict(train)
+            assert found.dtype == expected.dtype and metrics.accuracy_score(expected, found) == 1.0
+            assert np.mean(found == expected) == 1.0 and len(palpate.compile(source).predict(train[:0])) == 0
+        # Bytes hold names alone, and whoever gives names means them.
+        loaded = palpate.Model(palpate.compile(estimator, leaf="f32").to_bytes())
+        np.testing.assert_array_equal(loaded.predict(train), expected.astype(str))
+        named = palpate.compile(estimator, leaf="f32", names=["no", "yes"]).predict(train)
+        assert named.tolist() == ["yes" if label == y[codes == 1][0] else "no" for label in expected]
+
+
+def test_an_objective_of_ones_own_that_predicts_no_classes_is_refused() -> None:
+    def own(truth: Any, score: Any) -> Any:
+        share = 1 / (1 + np.exp(-score))
+        return share - truth, share * (1 - share)
+
+    estimator = lightgbm.LGBMClassifier(n_estimators=3, objective=own, verbose=-1, n_jobs=1).fit(TRAIN, labels(TRAIN, 2))
+    with pytest.raises(palpate.InputError, match="predicts scores, and no classes. Give `model.booster_`"):
+        palpate.compile(estimator)
+    expected = estimator.booster_.predict(TEST, raw_score=True)
+    assert np.abs(palpate.compile(estimator.booster_, leaf="f32").predict(TEST) - expected).max() < 1e-4
 
 
 def test_a_frozen_model_is_taken_calibrated_and_several_that_are_averaged_are_refused() -> None:
@@ -406,7 +447,7 @@ def test_a_frozen_model_is_taken_calibrated_and_several_that_are_averaged_are_re
     forest = ensemble.RandomForestClassifier(5, random_state=1).fit(train, labels(train, 2))
     frozen = calibration.CalibratedClassifierCV(FrozenEstimator(forest), method="sigmoid").fit(train, labels(train, 2))
     model = palpate.compile(frozen, leaf="f32")
-    assert model.predict(train) == [str(name) for name in frozen.predict(train)]
+    np.testing.assert_array_equal(model.predict(train), frozen.predict(train))
     averaged = calibration.CalibratedClassifierCV(forest, cv=3).fit(train, labels(train, 2))
     with pytest.raises(palpate.InputError, match="averages 3 calibrated models"):
         palpate.to_ensemble(averaged)
@@ -438,7 +479,11 @@ def test_what_has_no_trees_that_can_be_read_is_refused_by_name() -> None:
     halves = {"objective": "binary", "verbose": -1, "num_threads": 1}
     folds = lightgbm.cv(halves, lightgbm.Dataset(TRAIN, labels(TRAIN, 2)), 2, return_cvbooster=True)["cvbooster"]
     for model, message in [
-        (ensemble.RandomForestClassifier(), "not fitted"),
+        (ensemble.RandomForestClassifier(), "the RandomForestClassifier is not fitted"),
+        (lightgbm.LGBMClassifier(), "the LGBMClassifier is not fitted"),
+        (xgboost.XGBClassifier(), "the XGBClassifier is not fitted"),
+        (catboost.CatBoostClassifier(), "the CatBoostClassifier is not fitted"),
+        (lightgbm.LGBMClassifier, "LGBMClassifier is a class, not a model. Give an object of it"),
         (categories, "splits on categories"),
         (several, "classes of several kinds"),
         (folds, "lightgbm's CVBooster has no trees that can be read"),
@@ -491,7 +536,7 @@ def test_exact_ties_break_as_in_scikit_learn(estimator: Any, leaf: str) -> None:
     estimator.fit(grid, (grid[:, 0] != grid[:, 1]).astype(int))
     model = palpate.compile(estimator, leaf=leaf)
     assert np.ptp(model.margins(grid), axis=1).max() == 0.0
-    assert list(model.predict(grid)) == [str(name) for name in estimator.predict(grid)]
+    np.testing.assert_array_equal(model.predict(grid), estimator.predict(grid))
 
 
 def test_classes_by_another_threshold_than_the_posterior_are_refused() -> None:
@@ -575,5 +620,5 @@ def test_a_model_over_features_recognizes_rows() -> None:
     assert refused.refused == "the model is over rows of features, not touches"
     with pytest.raises(palpate.InputError, match="4 columns for 6 features"):
         model.margins(TEST[:, :4])
-    with pytest.raises(ValueError, match="1 dimensions"):
+    with pytest.raises(ValueError, match="a 1-dimensional array, where a 2-dimensional one is needed"):
         model.margins(TEST[0])

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import pickle
+import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -219,8 +221,6 @@ def test_wrong_touches_are_refused(maps: palpate.Maps, tmp_path: Path) -> None:
         locator.push((0.0, 0.1), (0.0, 0.0, 0.0), 0.0)
     with pytest.raises(palpate.PalpateError, match="coordinate NaN"):
         locator.push((0.0, 0.1, 0.0), (0.0, None, 0.0), 0.0)
-    with pytest.raises(palpate.SettingError, match="lowest"):
-        locator.push_heights((0.0, 0.1, 0.0), 0.0, 0.0, 0.0, lowest=math.inf)
     with pytest.raises(palpate.SettingError, match="aimed is best"):
         maps.evaluate(OBJECTS, millimeters=UNIT, aimed="best")
     # A file of this format does not state its unit; the built-in objects have one.
@@ -228,9 +228,68 @@ def test_wrong_touches_are_refused(maps: palpate.Maps, tmp_path: Path) -> None:
     wedge.write_text("v 0 0 0\nv 40 0 0\nv 0 40 0\nv 0 0 40\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
     with pytest.raises(palpate.PalpateError, match="the true size is unknown"):
         palpate.Maps.of_meshes([str(wedge)], probe=PROBE)
-    with pytest.raises(palpate.PalpateError, match="no objects"):
+    with pytest.raises(palpate.PalpateError, match="meshes is empty"):
         palpate.Maps.of_meshes({}, probe=PROBE)
     assert locator.touches == 0
+
+
+@pytest.mark.parametrize(
+    ("heights", "x", "y", "alignment", "lowest", "message"),
+    [
+        ((math.inf, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0, "a height is inf mm"),
+        ((0.0, None, 1e9), 0.0, 0.0, 0.0, 0.0, "a height is 1000000000 mm"),
+        ((-20.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0, "stopped 20 mm below the table"),
+        ((0.0, 0.0, 0.0), 5000.0, 0.0, 0.0, 0.0, "x is 5000 mm, and places and heights are at most 2000 mm"),
+        ((0.0, 0.0, 0.0), 0.0, math.nan, 0.0, 0.0, "y is NaN mm"),
+        ((0.0, 0.0, 0.0), 0.0, 0.0, 1e9, 0.0, "alignment is 1000000000. Use degrees from -360 to 360"),
+        ((0.0, 0.0, 0.0), 0.0, 0.0, math.nan, 0.0, "alignment is NaN"),
+        ((0.0, 0.0, 0.0), 0.0, 0.0, (5.0, 5.0, 0.0), 0.0, "alignment"),
+        ((0.0, 0.0, 0.0), 0.0, 0.0, 0.0, math.inf, "lowest is inf mm"),
+    ],
+)
+def test_heights_that_no_hand_met_are_refused_by_locator_and_shape_alike(
+    maps: palpate.Maps, heights: Any, x: float, y: float, alignment: Any, lowest: float, message: str
+) -> None:
+    for owner in (palpate.Locator(maps), palpate.Shape(PROBE, workspace=30)):
+        with pytest.raises(palpate.PalpateError, match=message):
+            owner.push_heights(heights, x, y, alignment, lowest=lowest)
+        assert owner.touches == 0
+
+
+def test_places_that_no_locator_keeps_are_refused_in_touches_too(maps: palpate.Maps) -> None:
+    for owner in (palpate.Locator(maps), palpate.Shape(PROBE, workspace=30)):
+        with pytest.raises(palpate.PalpateError, match="y is -5000 mm"):
+            owner.push((0.0, 0.1, 0.0), (0.0, -5000.0, 10.0), 0.0)
+        owner.push((0.0, 0.1, 0.0), (900.0, 0.0, 500.0), -360.0)
+        assert owner.touches == 1
+
+
+def test_weights_are_numbers_in_any_unit_of_which_none_is_below_0(maps: palpate.Maps) -> None:
+    locator = palpate.Locator(maps)
+    for weights in ([-1, 2], [math.nan, 1], [math.inf, 1], [0, 0.0], [1]):
+        with pytest.raises(palpate.SettingError, match="weights"):
+            locator.reset(weights)
+    shares = []
+    for weights in ([1, 3], [0.25, 0.75], [1e9, 3e9]):
+        locator.reset(weights)
+        shares.append(locator.posteriors)
+    assert shares[0] == shares[1] == shares[2] and shares[0]["mouse"] > 2 * shares[0]["bowl"]
+
+
+def test_meshes_of_a_size_that_the_hand_is_not_for_are_noted() -> None:
+    wedge = [[0, 0, 0], [40, 0, 0], [0, 40, 0], [0, 0, 40]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    for millimeters, size in ((10.0, "400 × 400 × 400"), (0.1, "4 × 4 × 4"), (1.0, None)):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", palpate.ModelWarning)
+            palpate.Maps.of_meshes({"wedge": wedge}, probe=PROBE, millimeters=millimeters, approaches=2000, cell=2.0)
+        said = f"wedge is {size} mm, for fingers 15 mm apart. See whether `millimeters` is right."
+        assert [str(one.message) for one in caught] == ([] if size is None else [said])
+
+
+@pytest.mark.parametrize("millimeters", [math.nan, 0.0, -1.0])
+def test_what_is_known_to_no_length_is_no_share(millimeters: float) -> None:
+    with pytest.raises(palpate.SettingError, match="millimeters"):
+        palpate.Shape(PROBE, workspace=30).known(millimeters)
 
 
 def test_an_object_without_a_mesh_is_explored_until_it_is_known(maps: palpate.Maps) -> None:

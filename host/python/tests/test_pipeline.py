@@ -57,10 +57,7 @@ def test_a_pipeline_decides_as_scikit_learn_does_next_to_every_threshold(scaler,
     tried = np.concatenate([edges(pipeline, X), rows(2)])
     expected = pipeline.predict(tried)
     found = compiled.predict(tried)
-    if hasattr(model, "predict_proba"):
-        assert found == [str(value) for value in expected]
-    else:
-        assert np.array_equal(found, expected.astype(np.float32))
+    assert np.array_equal(found, expected if hasattr(model, "predict_proba") else expected.astype(np.float32))
 
 
 def test_two_scalers_and_a_step_that_does_nothing_are_folded_one_after_the_other():
@@ -69,7 +66,39 @@ def test_two_scalers_and_a_step_that_does_nothing_are_folded_one_after_the_other
     steps = preprocessing.StandardScaler(), "passthrough", preprocessing.MinMaxScaler()
     pipeline = make_pipeline(*steps, ensemble.HistGradientBoostingClassifier(max_iter=5)).fit(X, y)
     tried = np.concatenate([edges(pipeline, X), np.full((1, 5), np.nan)])
-    assert palpate.compile(pipeline).predict(tried) == [str(value) for value in pipeline.predict(tried)]
+    assert np.array_equal(palpate.compile(pipeline).predict(tried), pipeline.predict(tried))
+
+
+SCALER, FOREST = preprocessing.StandardScaler(), ensemble.RandomForestClassifier(n_estimators=5, max_depth=5, random_state=1)
+NESTED = {
+    "passthrough first": make_pipeline("passthrough", SCALER, FOREST),
+    "passthrough alone": make_pipeline("passthrough", FOREST),
+    "scalers inside": make_pipeline(make_pipeline("passthrough", SCALER), preprocessing.MinMaxScaler(), FOREST),
+    "model inside": make_pipeline(SCALER, make_pipeline(preprocessing.RobustScaler(), "passthrough", FOREST)),
+    "model alone": make_pipeline(make_pipeline(FOREST)),
+    "tables between": make_pipeline(SCALER, preprocessing.MinMaxScaler(), FOREST).set_output(transform="pandas"),
+}
+
+
+@pytest.mark.parametrize("name", NESTED)
+@pytest.mark.parametrize("named", [True, False], ids=["named", "unnamed"])
+def test_pipelines_in_pipelines_and_steps_that_do_nothing_keep_names_and_decisions(name, named):
+    pandas = pytest.importorskip("pandas")
+    columns = ["speed", "", "x" * 300, "temperature / °C", "f0"]
+    X, y = rows(5), np.array(["low", "high"])[(rows(5)[:, 1] > -3).astype(int)]
+    table = pandas.DataFrame(X, columns=columns) if named else X
+    pipeline = sklearn.base.clone(NESTED[name]).fit(table, y)
+    model = palpate.compile(pipeline)
+    tried = rows(6)
+    expected = pipeline.predict(pandas.DataFrame(tried, columns=columns) if named else tried)
+    assert np.array_equal(model.predict(tried), expected)
+    if named:
+        # As without a scaler: names that a model cannot hold are changed.
+        plain = palpate.to_ensemble(sklearn.base.clone(FOREST).fit(table, y))
+        assert model.features == plain.features == ["speed", "f1", "x" * 255, "temperature / °C", "f0"]
+        assert set(plain.notes) <= set(model.notes)
+        shuffled = pandas.DataFrame(tried, columns=model.features).iloc[:, ::-1]
+        assert np.array_equal(model.predict(shuffled), expected)
 
 
 def test_a_pipeline_with_a_step_over_several_columns_is_refused_by_its_name():

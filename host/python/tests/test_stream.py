@@ -12,7 +12,7 @@ import palpate
 import pandas as pd
 import pytest
 import xgboost
-from sklearn import base, ensemble, tree
+from sklearn import base, config_context, ensemble, metrics, model_selection, tree
 from sklearn.exceptions import NotFittedError
 from sklearn.frozen import FrozenEstimator
 from sklearn.utils.estimator_checks import parametrize_with_checks
@@ -206,21 +206,35 @@ def test_a_limit_of_no_rows_is_called_by_its_name() -> None:
         palpate.evaluate_sequences(model, X, y, sequence=sequence, max_rows=0)
 
 
+def alone(X: Any) -> npt.NDArray[np.int64]:
+    """Each row as a sequence of its own, of an array of any kind."""
+    return np.arange(X.shape[0] if hasattr(X, "shape") else len(np.asarray(X)))
+
+
 class PerRow(palpate.SequenceRecognizer):
     """Callable by scikit-learn's checks: these know no sequences, so each row is one of its own. Their labels are random, so
     nothing can be promised, and here the first column says the class."""
 
-    def fit(self, X: Any, y: Any, *, sequence: Any = None, groups: Any = None) -> PerRow:
-        if y is not None and np.ndim(X) == 2 and not hasattr(X, "toarray") and np.shape(X)[1] > 0:
+    def fit(self, X: Any, y: Any, *, sequence: Any = None, groups: Any = None, sample_weight: Any = None) -> PerRow:
+        if y is not None and not hasattr(X, "toarray") and np.asarray(X).ndim == 2 and np.asarray(X).shape[1] > 0:
             columns = np.asarray(X, dtype=float)[:, 0]
-            y = (columns > np.nanmedian(columns)).astype(int)[: len(y)]
-        super().fit(X, y, sequence=np.arange(np.shape(X)[0]) if sequence is None else sequence, groups=groups)
+            y = (columns > np.nanmedian(columns)).astype(int)[: len(np.asarray(y))]
+        super().fit(X, y, sequence=alone(X) if sequence is None else sequence, groups=groups, sample_weight=sample_weight)
         return self
 
+    def __sklearn_tags__(self) -> Any:
+        # What they ask of classifiers is for labels of their own.
+        tags = super().__sklearn_tags__()
+        tags.estimator_type = tags.classifier_tags = None
+        return tags
+
     def predict(self, X: Any, *, sequence: Any = None) -> npt.NDArray[Any]:
-        found = super().predict(X, sequence=np.arange(np.shape(X)[0]) if sequence is None else sequence)
+        found = super().predict(X, sequence=alone(X) if sequence is None else sequence)
         # They compare numbers.
         return np.array([-1 if one is None else one for one in found])
+
+    def score(self, X: Any, y: Any, *, sequence: Any = None, sample_weight: Any = None) -> float:
+        return super().score(X, y, sequence=alone(X) if sequence is None else sequence, sample_weight=sample_weight)
 
 
 # Rates that the few rows of the checks can promise.
@@ -228,7 +242,10 @@ LENIENT: dict[str, Any] = {"error_rate": 0.49, "confidence": 0.5, "train_share":
 
 
 def expected_failures(_: Any) -> dict[str, str]:
-    return {"check_fit2d_1sample": "one sequence cannot be divided, and the message counts sequences, not samples"}
+    return {
+        "check_fit2d_1sample": "one sequence cannot be divided, and the message counts sequences, not samples",
+        "check_sample_weight_equivalence_on_dense_data": "a promise counts sequences, whatever their weight",
+    }
 
 
 with warnings.catch_warnings():
@@ -362,3 +379,158 @@ def test_a_class_with_few_sequences_is_in_every_fold_or_named() -> None:
         except palpate.InputError as error:
             errors.append(str(error))
     assert any(error.startswith("no sequence of rare is among those to train on") for error in errors), errors
+
+
+def listed(count: int, seed: int) -> tuple[list[npt.NDArray[np.float32]], Any, Any]:
+    """Sequences of 8 to 12 rows, with a class and a group each."""
+    X, y, _, groups = streams(count, seed)
+    parts = [part[: 8 + number % 5] for number, part in enumerate(X.reshape(count, LENGTH, 2))]
+    return parts, y[::LENGTH], groups[::LENGTH]
+
+
+def lenient(**settings: Any) -> palpate.SequenceRecognizer:
+    return palpate.SequenceRecognizer(estimators()[2], **({"error_rate": 0.2, "max_rows": LENGTH} | settings))
+
+
+# Where a sequence is undecided, with the label `undecided_`.
+@pytest.mark.filterwarnings("ignore:y_pred contains classes not in y_true")
+@pytest.mark.parametrize("kind", ["texts", "numbers", "objects"])
+def test_a_list_of_sequences_is_taken_by_splitters_scorers_and_searches_as_it_is(kind: str) -> None:
+    X, y, groups = listed(450, 1)
+    codes = np.unique(y, return_inverse=True)[1]
+    y = {"texts": y, "numbers": codes * 5, "objects": y.astype(object)}[kind]
+    shuffled: Any = model_selection.KFold(3, shuffle=True, random_state=1)
+    for scoring in (None, "accuracy", "balanced_accuracy", "matthews_corrcoef"):
+        scores = model_selection.cross_val_score(lenient(), X, y, cv=shuffled, scoring=scoring, error_score="raise")
+        assert scores.min() > 0.4, (scoring, scores)
+    by_score, by_name = (
+        model_selection.cross_val_score(lenient(), X, y, scoring=scoring, error_score="raise") for scoring in (None, "accuracy")
+    )
+    np.testing.assert_array_equal(by_score, by_name)
+    tried = {"estimator__max_depth": [3, 4], "error_rate": [0.25, 0.3]}
+    search = model_selection.GridSearchCV(lenient(), tried, cv=shuffled, error_score="raise").fit(X, y)
+    assert search.best_score_ > 0.5 and search.best_estimator_.estimator_.max_depth == search.best_params_["estimator__max_depth"]
+    assert search.predict(X[:5]).shape == (5,) and search.score(X, y) > 0.5
+    by_group = model_selection.cross_val_score(lenient(), X, y, groups=groups, cv=model_selection.GroupKFold(3), error_score="raise")
+    assert by_group.min() > 0.4
+
+
+@pytest.mark.parametrize("table", ["arrays", "lists", "pandas", "pyarrow"])
+def test_a_list_of_sequences_and_rows_with_ids_give_the_same_model_and_verdicts(table: str) -> None:
+    parts, y, groups = listed(240, 1)
+    lengths = [len(part) for part in parts]
+    ids = np.repeat(np.arange(240), lengths)
+    frames: Any = [pd.DataFrame(part, columns=["a", "b"]) for part in parts]
+    given: Any = {"arrays": parts, "lists": [part.tolist() for part in parts], "pandas": frames}.get(table)
+    rows: Any = pd.concat(frames, ignore_index=True) if table == "pandas" else np.concatenate(parts)
+    if table == "pyarrow":
+        pyarrow = pytest.importorskip("pyarrow")
+        given = [pyarrow.Table.from_pandas(frame) for frame in frames]
+        rows = pyarrow.concat_tables(given)
+    for own in ({}, {"groups": groups}):
+        of_list = lenient(error_rate=0.3).fit(given, y, **own)
+        repeated = {name: np.repeat(value, lengths) for name, value in own.items()}
+        of_rows = lenient(error_rate=0.3).fit(rows, np.repeat(y, lengths), sequence=ids, **repeated)
+        assert of_list.model_.checksum == of_rows.model_.checksum
+    found = of_list.predict(given)
+    expected = of_rows.predict(rows, sequence=ids)
+    assert found.tolist() == [of_list.undecided_ if one is None else one for one in expected]
+    assert of_list.verdicts(given) == of_rows.verdicts(rows, sequence=ids)
+    assert of_list.score(given, y) == of_rows.score(rows, np.repeat(y, lengths), sequence=ids) == np.mean(found == y)
+    assert len(of_list.predict([])) == 0
+
+
+def test_a_sequence_without_a_verdict_counts_as_wrong_and_has_a_label_of_the_classes_type() -> None:
+    X, y, _ = listed(300, 1)
+    hard = [part[:4] for part in X]
+    codes = np.unique(y, return_inverse=True)[1]
+    for labels, undecided in [(y, ""), (codes, -1), (codes - 2, -3), (codes * 2.0, -1), (codes > 0, -1)]:
+        own = lenient(error_rate=0.3).fit(X, labels)
+        found = own.predict(hard)
+        assert own.undecided_ == undecided and 0 < np.mean(found == undecided) < 1
+        assert found.dtype.kind in (np.asarray(labels).dtype.kind, "i")
+        assert own.score(hard, labels) == metrics.accuracy_score(labels, found) == np.mean(found == labels)
+        weights = np.where(found == labels, 3.0, 1.0)
+        assert own.score(hard, labels, sample_weight=weights) == metrics.accuracy_score(labels, found, sample_weight=weights)
+        assert own.score(hard, labels, sample_weight=weights) > own.score(hard, labels)
+
+
+def test_weights_are_those_of_the_classifiers_training() -> None:
+    X, y, _ = listed(300, 1)
+    own = palpate.SequenceRecognizer(tree.DecisionTreeClassifier(max_depth=3), error_rate=0.4, max_rows=LENGTH)
+    plain = own.fit(X, y).estimator_
+    np.testing.assert_array_equal(own.fit(X, y, sample_weight=np.ones(300)).estimator_.predict(X[0]), plain.predict(X[0]))
+    heavy = own.fit(X, y, sample_weight=np.where(y == "cup", 3.0, 1.0)).estimator_
+    assert np.mean(heavy.predict(np.concatenate(X)) == "cup") > np.mean(plain.predict(np.concatenate(X)) == "cup") + 0.1
+    with pytest.raises(palpate.SettingError, match="sample_weight is given with a classifier that is fitted"):
+        palpate.SequenceRecognizer(plain, prefit=True).fit(X, y, sample_weight=np.ones(300))
+
+
+def test_scikit_learns_routing_hands_the_sequence_and_the_groups_on() -> None:
+    X, y, sequence, groups = streams(450, 1)
+    with config_context(enable_metadata_routing=True):
+        own = lenient(error_rate=0.3).set_fit_request(sequence=True, groups=True).set_score_request(sequence=True)
+        split: Any = {"cv": model_selection.GroupKFold(3), "params": {"sequence": sequence, "groups": groups}, "error_score": "raise"}
+        assert model_selection.cross_val_score(own, X, y, **split).min() > 0.4
+        assert model_selection.cross_val_score(base.clone(own), X, y, **split).min() > 0.4
+        with pytest.raises(ValueError, match="sequence"):
+            model_selection.cross_val_score(lenient(), X, y, **split)
+        with pytest.raises(palpate.InputError, match="`score` has no argument person to route. Use .*sequence"):
+            lenient().set_score_request(person=True)
+
+
+def test_what_is_wrong_with_a_list_of_sequences_is_said_with_its_place() -> None:
+    X, y, _ = listed(60, 1)
+    cases: list[tuple[Any, Any, str]] = [
+        (np.concatenate(X), y, r"X\[0\] has no rows and columns. Without `sequence`, X is a list"),
+        (pd.DataFrame(np.concatenate(X)), y, "X is one table, and `sequence` is not given. Without `sequence`"),
+        ([*X[:3], X[3][:0], *X[4:]], y, r"X\[3\] has no rows"),
+        ([*X[:3], X[3][:, :1], *X[4:]], y, r"X\[3\] has other columns than X\[0\]"),
+        (X, y[:-1], "y is 59 values. Use 60, one for each sequence"),
+        (X, [*y[:4], None, *y[5:]], r"sequence 5: the label is missing \(None\)"),
+        (X, np.stack([y, y], axis=1), r"the label is given in the shape \(60, 2\)"),
+    ]
+    for given, labels, message in cases:
+        with pytest.raises(palpate.PalpateError, match=message):
+            lenient().fit(given, labels)
+
+
+def test_columns_of_labels_and_tuples_as_ids_are_taken() -> None:
+    X, y, sequence, persons = streams(300, 1)
+    plain = lenient().fit(X, y, sequence=sequence, groups=persons).model_.checksum
+    for labels in (y.reshape(-1, 1), pd.DataFrame(y), y.tolist()):
+        assert lenient().fit(X, labels, sequence=pd.DataFrame(sequence), groups=persons.reshape(-1, 1)).model_.checksum == plain
+    pairs = [(int(person), int(own)) for person, own in zip(persons, sequence)]
+    named = lenient().fit(X, y, sequence=pairs)
+    assert len(named.predict(X, sequence=pairs)) == 300
+    wrong = [*y[:3], None, *y[4:]]
+    for call in (
+        lambda: lenient().fit(X, wrong, sequence=sequence),
+        lambda: palpate.calibrate(named.estimator_, X, wrong, sequence=sequence),
+        lambda: palpate.evaluate_sequences(named.model_, X, wrong, sequence=sequence),
+    ):
+        with pytest.raises(palpate.InputError, match=r"row 4: the label is missing \(None\). Give each row its label"):
+            call()
+
+
+def test_estimators_are_shown_with_the_arguments_that_were_given() -> None:
+    own = palpate.SequenceRecognizer(tree.DecisionTreeClassifier(max_depth=2), error_rate=0.1, folds=3)
+    assert repr(own) == "SequenceRecognizer(estimator=DecisionTreeClassifier(max_depth=2), error_rate=0.1, folds=3)"
+    assert repr(palpate.TouchRecognizer(rounds=3)) == "TouchRecognizer(rounds=3)"
+    # A new estimator is set before its arguments, whatever the order.
+    own.set_params(estimator__max_depth=7, estimator=tree.DecisionTreeClassifier())
+    assert own.estimator.max_depth == 7 and own.get_params()["estimator__max_depth"] == 7
+
+
+def test_an_estimate_above_the_rate_asked_for_is_said() -> None:
+    X, y, _ = listed(60, 1)
+    own = palpate.SequenceRecognizer(tree.DecisionTreeClassifier(max_depth=2), promise=False, folds=3)
+    warned = 0
+    for rate in (0.01, 0.02, 0.05, 0.3):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", palpate.ModelWarning)
+            error = own.set_params(error_rate=rate).fit([part * np.float32(0.4) for part in X], y).estimated_.error
+        said = [str(one.message) for one in caught if "estimated error rate" in str(one.message)]
+        assert len(said) == (error > rate) and all(f"above the {rate:g} asked for" in text for text in said)
+        warned += len(said)
+    assert warned

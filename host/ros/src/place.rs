@@ -75,6 +75,7 @@ impl Following for Placing {
                 LocateProblem::Nowhere => {
                     "a model of maps needs has_pose and has_position, with direction, alignment, and position in meters"
                 }
+                LocateProblem::Far { .. } => "give position in meters, in a frame whose origin is on the table",
                 LocateProblem::Below { .. } => "give times in seconds, and position in meters above the table",
                 _ => "a model of maps needs a direction whose z is at most -0.95",
             };

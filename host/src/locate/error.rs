@@ -1,5 +1,6 @@
 //! Problems with recognition of objects with a place.
 
+use super::stated::FARTHEST;
 use crate::calibrate::error::percent;
 use crate::error::Problem;
 use palpate_onboard::ModelError;
@@ -66,6 +67,14 @@ pub enum LocateProblem {
     #[error("a finger stopped {millimeters:.0} mm below the table")]
     Below {
         /// Distance.
+        millimeters: f64,
+    },
+    /// A place or height is beyond what a locator keeps.
+    #[error("{what} is {millimeters} mm, and places and heights are at most {} mm from the table's origin", FARTHEST)]
+    Far {
+        /// Coordinate or height.
+        what: &'static str,
+        /// Its value.
         millimeters: f64,
     },
     /// A hand comes from another direction.
@@ -177,6 +186,7 @@ impl Problem for LocateProblem {
                 "Give twelve columns: times, direction, alignment, and the hand's position in millimeters."
             }
             Self::Below { .. } => "Give times in seconds, and the position in millimeters above the table.",
+            Self::Far { .. } => "State it in millimeters, in a frame whose origin is on the table.",
             Self::NotDown => {
                 "Come straight down, and state the direction in the table's frame: its z is at most -0.95."
             }

@@ -1,6 +1,7 @@
 //! A located approach as a step of evidence, and an object's cells as a follower.
 
 use super::error::LocateProblem;
+use super::stated::reachable;
 use super::world::{Aimed, Drawn, Truth};
 use crate::error::{Error, Result};
 use crate::evidence::{Follower, Sequence, Sequences, Supplier};
@@ -21,10 +22,11 @@ pub const BELOW: f64 = 15.0;
 /// Heights that a touch met.
 ///
 /// # Errors
-/// [`LocateProblem::Nowhere`] without a position, [`LocateProblem::Below`] for one that cannot be of a hand above a table, and
-/// [`LocateProblem::NotDown`].
+/// [`LocateProblem::Nowhere`] without a position, [`LocateProblem::Far`] and [`LocateProblem::Below`] for one that cannot be of a
+/// hand above a table, and [`LocateProblem::NotDown`].
 pub fn seen(hand: &Hand, touch: &Touch) -> Result<Seen, LocateProblem> {
     let position = touch.position().ok_or(LocateProblem::Nowhere)?;
+    reachable(["x", "y", "z"].into_iter().zip(position.micrometers.map(|micrometers| f64::from(micrometers) / 1e3)))?;
     let last = touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or(0);
     let way = f64::from(last) * 1e-6 * f64::from(hand.speed) / 1e3;
     let below = way - f64::from(position.micrometers[2]) / 1e3;

@@ -22,6 +22,7 @@ mod register;
 mod shape;
 #[cfg(test)]
 mod shape_tests;
+mod stated;
 mod surface;
 #[cfg(feature = "train")]
 mod table;
@@ -35,6 +36,7 @@ pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, POSE, Pose, Seen
 pub use pose::{Off, Until};
 pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, ToPlace, calibrate, calibrate_recorded, evaluate};
 pub use shape::{Relief, Sample, Shape, samples};
+pub use stated::{FARTHEST, Heights, row};
 pub use surface::Surface;
 #[cfg(feature = "train")]
 pub use table::{BareTable, Measured, REACH, bare_table};

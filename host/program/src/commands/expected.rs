@@ -1,5 +1,6 @@
 //! Options for which objects to expect, and how often.
 
+use palpate::compile;
 use palpate::error::{Error, Result};
 
 /// Objects to expect.
@@ -87,14 +88,10 @@ impl ExpectedArguments {
             }
             weights.iter_mut().zip(allowed).filter(|(_, allowed)| !allowed).for_each(|(weight, _)| *weight = 0.0);
         }
-        let most = weights.iter().copied().fold(0.0, f64::max);
-        if most <= 0.0 {
+        if weights.iter().all(|weight| *weight <= 0.0) {
             return Err(Error::setting("only", self.only.join(","), "an object whose prior is above 0"));
         }
-        // 31 bits, and no object that is possible becomes impossible.
-        let whole =
-            |weight: f64| (weight / most * f64::from(1_u32 << 31)).round().max(f64::from(u8::from(weight > 0.0)));
-        Ok(Some(weights.into_iter().map(|weight| whole(weight) as u32).collect()))
+        compile::weights(&weights).map(Some)
     }
 }
 

@@ -25,7 +25,8 @@ def to_ensemble(
     that one of them wrote, as a path.
 
     A pipeline's scalers (StandardScaler, MinMaxScaler, MaxAbsScaler, RobustScaler) go into the thresholds, so that the model takes
-    rows as they are before scaling, and decides as the pipeline does on rows in f64 (an array of float32 is scaled in f32).
+    rows as they are before scaling, and decides as the pipeline does on rows in f64 (an array of float32 is scaled in f32). The
+    features have the names of the table that the pipeline was fitted on.
 
     `names` are the classes', in the order of the labels. Where training stopped early, the trees up to the best round are
     taken, as the library predicts with them; with `all_trees` all of them. `missing` is the number that stood for a missing
@@ -42,13 +43,22 @@ def to_ensemble(
         return model
     if isinstance(model, (str, os.PathLike)):
         return Ensemble.load(model, given, all_trees=all_trees, missing=missing)
+    if isinstance(model, type):
+        raise InputError(f"{model.__qualname__} is a class, not a model. Give an object of it that is fitted.")
     library, name = _class(type(model))
     reader = _READERS.get(library, {}).get(name)
     if reader is None:
         raise _refusal(model)
+    is_fitted = model.is_fitted() if hasattr(model, "is_fitted") else hasattr(model, "n_features_in_")
+    if hasattr(model, "fit") and name != "Pipeline" and not is_fitted:
+        raise InputError(f"the {name} is not fitted. Call its `fit` first.")
     if missing is not None and library != "xgboost":
         raise SettingError(f"missing is {missing}. Leave it out: a model of {library} says itself what is missing.")
-    return reader(model, _Asked(_classes(model) if given is None else given, all_trees, missing))
+    ensemble = reader(model, _Asked(_classes(model) if given is None else given, all_trees, missing))
+    labels = getattr(model, "classes_", ())
+    # `predict` gives the classifier's own labels, unless the classes have other names.
+    is_own = given is None and len(labels) == len(ensemble.objects)
+    return ensemble._with_labels(np.asarray(labels)) if is_own else ensemble
 
 
 @dataclass(frozen=True)
@@ -175,6 +185,11 @@ def _xgboost(model: Any, asked: _Asked) -> Ensemble:
 
 def _lightgbm(model: Any, asked: _Asked) -> Ensemble:
     booster = getattr(model, "booster_", model)
+    if hasattr(model, "classes_") and callable(model.objective):
+        raise InputError(
+            "with an objective of its own the LGBMClassifier predicts scores, and no classes. Give `model.booster_`, whose values "
+            'are those scores, or train with objective="binary" or "multiclass".'
+        )
     rounds = booster.current_iteration()
     taken = booster.best_iteration if booster.best_iteration > 0 and not asked.all_trees else rounds
     text = booster.model_to_string(num_iteration=taken)
@@ -202,7 +217,7 @@ def _of_pipeline(model: Any, asked: _Asked) -> Ensemble:
     scalers, last = _pipeline.steps_of(model)
     ensemble = to_ensemble(last, asked.names, all_trees=asked.all_trees)
     is_f64 = type(last).__name__.startswith("HistGradientBoosting") or _class(type(last))[0] == "lightgbm"
-    return _pipeline.fold(ensemble, scalers, model.n_features_in_, not is_f64) if scalers else ensemble
+    return _pipeline.fold(ensemble, scalers, not is_f64) if scalers else ensemble
 
 
 _Reader = Callable[[Any, _Asked], Ensemble]

@@ -7,7 +7,7 @@ from numpy import float32, float64, int16, int64
 from numpy.typing import ArrayLike, NDArray
 from os import PathLike
 from palpate._locate import CalibratedMaps, MapsEvaluation
-from palpate._types import Located, Meshes, Probe, Progress, Real, Touch, Verdict
+from palpate._types import Located, Meshes, Predictions, Probe, Progress, Real, Touch, Verdict
 from pandas import DataFrame
 from pathlib import Path
 from typing import Any, SupportsFloat, SupportsIndex, final
@@ -173,9 +173,14 @@ class Ensemble:
         """
         The feature and the threshold of each split, and whether a value that equals it goes left.
         """
-    def _with_thresholds(self, /, thresholds: SupportsGetItem[int, SupportsFloat | SupportsIndex]) -> Ensemble:
+    def _with_labels(self, /, labels: Any) -> Ensemble:
         """
-        Copies the trees with other thresholds, in the order of `_splits`; values below them go left.
+        The same trees, of a classifier whose classes have these labels, an array in their order: models predict them.
+        """
+    def _with_thresholds(self, /, thresholds: SupportsGetItem[int, SupportsFloat | SupportsIndex], names: SupportsGetItem[int, str] | None = None) -> Ensemble:
+        """
+        Copies the trees with other thresholds, in the order of `_splits`, and perhaps other names of features; values below them
+        go left.
         """
     @property
     def descriptor(self, /) -> str | None:
@@ -288,10 +293,10 @@ class Locator:
     def push_heights(self, /, heights: Touch, x: SupportsFloat | SupportsIndex, y: SupportsFloat | SupportsIndex, alignment: ArrayLike, *, lowest: SupportsFloat | SupportsIndex = 0.0) -> Located:
         """
         Takes in the heights above the table that three fingertips met, in millimeters, `None` or NaN for a finger that met nothing.
-        `x` and `y` are the middle finger's, `alignment` is as for `push`, and `lowest` is the height down to which the hand went,
-        0 or less where it would have met the table.
+        `x` and `y` are the middle finger's, at most 2 m from the table's origin, `alignment` is as for `push`, and `lowest` is the
+        height down to which the hand went, 0 or less where it would have met the table.
         """
-    def reset(self, /, weights: SupportsGetItem[int, SupportsIndex] | None = None) -> None:
+    def reset(self, /, weights: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None) -> None:
         """
         Forgets all touches, for the next object. `weights` say how often each object lies there, in any unit.
         """
@@ -443,7 +448,7 @@ class Model:
         """
         Writes the model as source code, and returns the files. `form` is "c" (an array), "rust", "c-code" (trees as C) or
         "rust-code" (trees as Rust); without it a name that ends in ".h" means "c", and ".rs" "rust". What has to be built with it,
-        such as palpate.h, is written beside it, and for trees as Rust the model.
+        such as palpate.h, is written beside it, and for trees as Rust the model. Directories that are missing are made.
         """
     @property
     def features(self, /) -> list[str]:
@@ -490,11 +495,12 @@ class Model:
         """
         The objects' (classes') names, in the order of the margins.
         """
-    def predict(self, /, rows: DataSet | ArrayLike, *, raw: bool = False) -> list[str] | NDArray[float32]:
+    def predict(self, /, rows: DataSet | ArrayLike, *, raw: bool = False) -> Predictions:
         """
-        The prediction of the library that trained a model over rows of features: the class of each row, by name, or its value
-        (its values, a column for each of several targets), with `raw` the margin before the inverse link. Rows are as for
-        `margins`.
+        The prediction of the library that trained a model over rows of features, as an array: the class of each row, or its value
+        (its values, a column for each of several targets), with `raw` the margin before the inverse link. Classes are the labels
+        of the classifier, of its own type; without it (of a model or ensemble from a file or bytes), or with other `names`, they are
+        the objects' names. Rows are as for `margins`.
         """
     def predict_proba(self, /, rows: DataSet | ArrayLike) -> NDArray[float64]:
         """
@@ -559,7 +565,7 @@ class Recognizer:
         Takes in a row of features, for a model over those, with NaN for a missing one. The features of a pandas series are
         found by their names. A model with a `position` counts it itself since the last `reset`: the row has the other features.
         """
-    def reset(self, /, weights: SupportsGetItem[int, SupportsIndex] | None = None) -> None:
+    def reset(self, /, weights: SupportsGetItem[int, SupportsFloat | SupportsIndex] | None = None) -> None:
         """
         Forgets all touches, for the next object. `weights` say how often each object is touched, in place of the model's
         priors, in any unit.
@@ -596,7 +602,8 @@ class Shape:
     @property
     def bounds(self, /) -> tuple[NDArray[float64], NDArray[float64]]:
         """
-        The least and the greatest height of each cell: nineteen of twenty such intervals hold the truth.
+        The least and the greatest height of each cell: nineteen of twenty such intervals hold the truth, of cells within 8 mm of a
+        touch. Others have the interval from the table to the highest height so far, which states nothing.
         """
     @property
     def heights(self, /) -> NDArray[float64]:
@@ -666,7 +673,7 @@ def calibrate(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], 
     Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
     """
 
-def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool = False, pose: bool = False, aim: str = "box", cone: SupportsFloat | SupportsIndex | None = None, position: bool = False, within: SupportsFloat | SupportsIndex | None = None, length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, samples: tuple[SupportsIndex, SupportsIndex] | None = None, out: str | PathLike[str] | None = None, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
+def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool | SupportsIndex = ..., pose: bool = False, aim: str = "box", cone: SupportsFloat | SupportsIndex | None = None, position: bool = False, within: SupportsFloat | SupportsIndex | None = None, length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, samples: tuple[SupportsIndex, SupportsIndex] | None = None, out: str | PathLike[str] | None = None, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
     """
     Touches objects with a simulated probe.
 
@@ -675,9 +682,10 @@ def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsInd
     scaled so that its longest side has `length` units; with `millimeters`, the length of a unit of the meshes, it keeps
     its true size and the `probe` is in millimeters.
 
-    `touches` full touches of each object are kept, or with `approaches` that many approaches whether fingers touch or not;
-    `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a table in each of their placements, and
-    approaches come within that many degrees of straight down. `position` keeps where the hand was, too, of all approaches
+    `touches` full touches of each object are kept, or with `approaches=True` that many approaches whether fingers touch or not;
+    `approaches=500` are 500 approaches. `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a
+    table in each of their placements, and approaches come within that many degrees of straight down. `position` keeps where
+    the hand was, too, of all approaches
     straight down to objects of true size on a table; `within` is how far from an object's middle they aim at most. The same
     `seed` gives the same touches on any number of `threads`, and the same as the program's. `samples` are the first of
     a part of these touches or approaches, from 0, and the one after its last. With `instances` a directory inside a directory

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,8 @@ _SCALERS = ("MaxAbsScaler", "MinMaxScaler", "RobustScaler", "StandardScaler")
 
 
 def steps_of(pipeline: Any) -> tuple[list[Any], Any]:
-    """The scalers of a pipeline, and the model at its end."""
-    *first, (_, last) = pipeline.steps
-    scalers = [step for _, step in first if step is not None and step != "passthrough"]
+    """The scalers of a pipeline and of those inside it, and the model at its end."""
+    *scalers, last = _flat(pipeline) or [None]
     for step in scalers:
         kind = type(step)
         if kind.__name__ not in _SCALERS or not kind.__module__.startswith("sklearn."):
@@ -27,12 +27,29 @@ def steps_of(pipeline: Any) -> tuple[list[Any], Any]:
     return scalers, last
 
 
-def fold(ensemble: Ensemble, scalers: list[Any], columns: int, in_f32: bool) -> Ensemble:
+def _flat(pipeline: Any) -> list[Any]:
+    """The steps, without those that change nothing."""
+    steps: list[Any] = []
+    for _, step in pipeline.steps:
+        if type(step).__name__ == "Pipeline" and type(step).__module__.startswith("sklearn."):
+            steps += _flat(step)
+        elif step is not None and not isinstance(step, str):
+            steps.append(step)
+    return steps
+
+
+def fold(ensemble: Ensemble, scalers: list[Any], in_f32: bool) -> Ensemble:
     """The ensemble with thresholds of rows that are not scaled: each row of f32 numbers goes the same way as scaled in f64.
 
     A scaler never puts a larger number before a smaller one, so the numbers that go left are those below one of the f32 numbers:
     it is found by bisection, with the scalers themselves. With `in_f32` the trees round scaled numbers to f32.
     """
+    names = getattr(scalers[0], "feature_names_in_", None)
+    # With names, they would ask for tables of them.
+    scalers = [copy.copy(scaler) for scaler in scalers]
+    for scaler in scalers:
+        vars(scaler).pop("feature_names_in_", None)
+    columns = int(scalers[0].n_features_in_)
     features, thresholds, inclusive = ensemble._splits()
     feature, threshold = np.array(features, dtype=np.int64), np.array(thresholds)
     # Places of the f32 numbers in their order: the number at `low` goes left, or is below all; that at `high` goes right.
@@ -56,7 +73,8 @@ def fold(ensemble: Ensemble, scalers: list[Any], columns: int, in_f32: bool) -> 
         goes_left = np.where(inclusive, scaled <= threshold, scaled < threshold)
         is_open = high - low > 1
         low, high = np.where(goes_left & is_open, middle, low), np.where(~goes_left & is_open, middle, high)
-    return ensemble._with_thresholds(np.where(high > most, np.inf, _number(np.minimum(high, most))).tolist())
+    below = np.where(high > most, np.inf, _number(np.minimum(high, most))).tolist()
+    return ensemble._with_thresholds(below, None if names is None else [str(name) for name in names])
 
 
 def _number(place: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:

@@ -36,8 +36,6 @@ class _Parts:
 def read(model: Any, names: list[str] | None) -> Ensemble:
     """The trees of an estimator whose class is in `KNOWN`."""
     kind = type(model).__name__
-    if not hasattr(model, "n_features_in_"):
-        raise InputError(f"the {kind} is not fitted. Call its `fit` first.")
     if getattr(model, "n_outputs_", 1) > 1 and _is_classifier(model):
         raise InputError(f"the {kind} has classes of several kinds, each of which is a question of its own. Train a model for each.")
     if _is_classifier(model) and len(model.classes_) < 2:

@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._errors import InputError, SettingError
+from ._errors import InputError, ModelWarning, SettingError
+from ._estimator import Estimator
 from ._import import compile, to_ensemble
 from ._native import Model, Recognizer
 from ._rows import names_of, numbered, rows_of, take
@@ -84,14 +85,27 @@ def _texts(values: _Ids) -> list[str]:
     return [str(value) for value in np.asarray(values).tolist()]
 
 
-def _ids(values: _Ids, what: str) -> list[str]:
+def _flat(values: Any, what: str) -> npt.NDArray[Any]:
+    """One value for each row; of tuples their texts."""
+    flat = np.asarray(values)
+    if flat.ndim == 2 and flat.shape[1] == 1:
+        return flat[:, 0]
+    if flat.ndim == 2 and isinstance(values, (list, tuple)):
+        return np.array([str(value) for value in values])
+    if flat.ndim != 1:
+        raise InputError(f"the {what} is given in the shape {flat.shape}. Give one column, with one {what} for each row.")
+    return flat
+
+
+def _ids(values: _Ids, what: str, of: str = "row") -> list[str]:
     """The name of what each row belongs to."""
+    flat = _flat(values, what)
     # A list as it is: NumPy would make text of a missing value among texts.
-    given = np.asarray(values) if hasattr(values, "dtype") else np.array([*values, None], dtype=object)[:-1]
-    for number, value in enumerate([] if given.dtype.kind in "biu" else given.tolist()):
+    given = list(values) if isinstance(values, (list, tuple)) else flat.tolist()
+    for number, value in enumerate([] if flat.dtype.kind in "biu" else given):
         if _is_missing(value):
-            raise InputError(f"row {number + 1}: the {what} is missing ({value!r}). Give each row the {what} that it belongs to.")
-    return _texts(given)
+            raise InputError(f"{of} {number + 1}: the {what} is missing ({value!r}). Give each {of} its {what}.")
+    return _texts(flat)
 
 
 def _is_missing(value: object) -> bool:
@@ -101,11 +115,11 @@ def _is_missing(value: object) -> bool:
         return True
 
 
-def _agree(rows: int, **columns: int | None) -> None:
+def _agree(rows: int, of: str = "row", /, **columns: int | None) -> None:
     """Refuses columns of another length than the rows'."""
     for name, length in columns.items():
         if length is not None and length != rows:
-            raise SettingError(f"{name} is {length} values. Use {rows}, one for each row.")
+            raise SettingError(f"{name} is {length} values. Use {rows}, one for each {of}.")
 
 
 def _stretches(sequence: list[str]) -> list[slice]:
@@ -133,6 +147,67 @@ def _of_one(stretches: list[slice], ids: npt.NDArray[Any], owners: npt.NDArray[A
             row = rows.start + int(others[0])
             raise InputError(f'row {row + 1}: the sequence "{ids[row]}" {what} "{first}" and "{owners[row]}". {_ONE}')
 
+
+def _joined(X: Any) -> tuple[Any, npt.NDArray[np.int64]]:
+    """The rows of a list with an array or a table for each sequence, and the number of each row's sequence."""
+    hint = "Without `sequence`, X is a list with an array of rows and columns, or a table, for each sequence."
+    if names_of(X) is not None:
+        raise InputError(f"X is one table, and `sequence` is not given. {hint}")
+    parts = list(X)
+    for number, part in enumerate(parts):
+        if np.ndim(part) != 2 or len(part) == 0:
+            raise InputError(f"X[{number}] has no rows and columns. {hint}")
+        if (names_of(part), np.shape(part)[1]) != (names_of(parts[0]), np.shape(parts[0])[1]):
+            raise InputError(f"X[{number}] has other columns than X[0]. Give all sequences the same ones, in the same order.")
+    numbers = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    if not parts or names_of(parts[0]) is None:
+        return np.concatenate([np.asarray(part) for part in parts]) if parts else np.empty((0, 0)), numbers
+    library = importlib.import_module(type(parts[0]).__module__.partition(".")[0])
+    return (library.concat_tables if hasattr(library, "concat_tables") else library.concat)(parts), numbers
+
+
+def _spread(name: str, values: Any, what: str, numbers: npt.NDArray[np.int64]) -> npt.NDArray[Any] | None:
+    """What is given for each sequence, for each of its rows."""
+    if values is None:
+        return None
+    flat = _flat(values, what)
+    _agree(int(numbers.max(initial=-1)) + 1, "sequence", **{name: len(flat)})
+    _ids(values, what, "sequence")
+    return flat[numbers]
+
+
+@dataclass(frozen=True)
+class _Sequences:
+    """Rows of sequences, and what is given for each row."""
+
+    table: Any
+    labels: npt.NDArray[Any]
+    ids: npt.NDArray[Any]
+    stretches: list[slice]
+    owners: npt.NDArray[Any] | None
+    weights: npt.NDArray[Any] | None
+
+    @classmethod
+    def of(cls, X: Any, y: Any, sequence: _Ids | None, groups: _Ids | None, sample_weight: Any) -> _Sequences:
+        """Checks rows, or a list of sequences, and what is given for each."""
+        if y is None:
+            raise InputError("a SequenceRecognizer requires y to be passed, but the target y is None. Give a class for each row.")
+        if sequence is None:
+            X, sequence = _joined(X)
+            y, groups = _spread("y", y, "label", sequence), _spread("groups", groups, "group", sequence)
+            sample_weight = _spread("sample_weight", sample_weight, "weight", sequence)
+        table, labels, ids = _table(X), _flat(y, "label"), _flat(sequence, "sequence")
+        owners = None if groups is None else _flat(groups, "group")
+        weights = None if sample_weight is None else _flat(sample_weight, "weight").astype(np.float64)
+        columns = {"y": labels, "sequence": ids, "groups": owners, "sample_weight": weights}
+        _agree(len(table), **{name: None if column is None else len(column) for name, column in columns.items()})
+        stretches = _stretches(_ids(sequence, "sequence"))
+        _ids(y, "label")
+        _of_one(stretches, ids, labels, "has the labels")
+        if groups is not None and owners is not None:
+            _ids(groups, "group")
+            _of_one(stretches, ids, owners, "belongs to the groups")
+        return cls(table, labels, ids, stretches, owners, weights)
 
 
 def calibrate(
@@ -182,7 +257,7 @@ def calibrate(
     calibrated, text = _native.calibrate(
         compiled,
         rows_of(owner, rows),
-        _texts(labels),
+        _ids(labels, "label"),
         _ids(sequence, "sequence"),
         groups=None if groups is None else _ids(groups, "group"),
         error_rate=error_rate,
@@ -220,7 +295,7 @@ def evaluate_sequences(
     text = _native.evaluate_sequences(
         model,
         rows_of(Recognizer(model), rows),
-        _texts(labels),
+        _ids(labels, "label"),
         _ids(sequence, "sequence"),
         groups=None if groups is None else _ids(groups, "group"),
         error_rate=error_rate,
@@ -232,13 +307,18 @@ def evaluate_sequences(
     )
 
 
-class SequenceRecognizer:
+class SequenceRecognizer(Estimator):
     """An estimator of scikit-learn's kind whose verdicts on sequences of rows keep a promised error rate.
 
     It takes a classifier that `palpate.compile` takes. `fit` trains a clone of it, `estimator_`, on a share of the sequences, or
-    groups, and calibrates on the others; `predict` gives a class for each sequence, or `None` without a verdict. A classifier that
-    is fitted already is taken as it is with `prefit`, or in scikit-learn's `FrozenEstimator`; all sequences are calibrated on
-    then, and must be others than those that it was trained on.
+    groups, and calibrates on the others; `predict` gives a class for each sequence. A classifier that is fitted already is taken
+    as it is with `prefit`, or in scikit-learn's `FrozenEstimator`; all sequences are calibrated on then, and must be others than
+    those that it was trained on.
+
+    `X` is a list with an array or a table for each sequence; labels, groups and weights are then one for each sequence, so that
+    scikit-learn's splitters, scorers and searches work as they are. Or `X` is one table, with the `sequence` of each row: labels,
+    groups and weights are one for each row, and scikit-learn's metadata routing hands `sequence` on (`set_fit_request`,
+    `set_score_request`).
 
     With `position` the classifier also gets the row's number in its sequence, counted from 1, as the last column (`"position"` of a
     table), which whoever follows a sequence counts, also on a chip. `guard` is as for `calibrate`.
@@ -280,54 +360,31 @@ class SequenceRecognizer:
         self.prefit = prefit
         self.seed = seed
 
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """The arguments, for `sklearn.base.clone` and searches."""
-        params = {name: getattr(self, name) for name in _PARAMETERS}
-        if deep and hasattr(self.estimator, "get_params") and not isinstance(self.estimator, type):
-            params |= {f"estimator__{name}": value for name, value in self.estimator.get_params().items()}
-        return params
-
-    def set_params(self, **params: Any) -> SequenceRecognizer:
-        """Sets arguments by name; `estimator__depth` is the estimator's `depth`."""
-        for name, value in params.items():
-            if name.startswith("estimator__"):
-                self.estimator.set_params(**{name.removeprefix("estimator__"): value})
-            elif name in _PARAMETERS:
-                setattr(self, name, value)
-            else:
-                raise InputError(f"a SequenceRecognizer has no {name}. Use {', '.join(_PARAMETERS)}.")
-        return self
-
-    def fit(self, X: npt.ArrayLike, y: _Ids, *, sequence: _Ids, groups: _Ids | None = None) -> SequenceRecognizer:
-        """Trains on some sequences, and calibrates on the others."""
-        if y is None:
-            raise InputError("a SequenceRecognizer requires y to be passed, but the target y is None. Give a class for each row.")
-        table = _table(X)
-        labels, ids = np.asarray(y), np.asarray(sequence)
-        owners = None if groups is None else np.asarray(groups)
-        _agree(len(table), y=len(labels), sequence=len(ids), groups=None if owners is None else len(owners))
-        stretches = _stretches(_ids(sequence, "sequence"))
-        _of_one(stretches, ids, labels, "has the labels")
-        if groups is not None and owners is not None:
-            _ids(groups, "group")
-            _of_one(stretches, ids, owners, "belongs to the groups")
+    def fit(
+        self, X: Any, y: _Ids, *, sequence: _Ids | None = None, groups: _Ids | None = None, sample_weight: Any = None
+    ) -> SequenceRecognizer:
+        """Trains on some sequences, and calibrates on the others. `sample_weight` is for the training of the classifier alone: a
+        promise counts all sequences alike."""
+        given = _Sequences.of(X, y, sequence, groups, sample_weight)
+        table, labels, ids, owners = given.table, given.labels, given.ids, given.owners
         known = numbered(table, _numbers(_texts(ids))) if self.position else table
         units = ids if owners is None else owners
         fitted, calibrated, folds = self._fitted(), np.ones(len(table), dtype=bool), None
-        if fitted is not None and (self.folds is not None or not self.promise):
-            raise SettingError("folds is given with a classifier that is fitted. Give one that folds of the sequences can train.")
+        if fitted is not None and (self.folds is not None or not self.promise or given.weights is not None):
+            name = "folds" if given.weights is None else "sample_weight"
+            raise SettingError(f"{name} is given with a classifier that is fitted. Give one that the sequences can train.")
         if not self.promise:
             for name, default in (("strangers", None), ("per", "average"), ("confidence", 0.95)):
-                if (given := getattr(self, name)) != default:
-                    raise SettingError(f"{name} is {given}, but an estimate has none. Leave it out, or promise=False.")
+                if (stated := getattr(self, name)) != default:
+                    raise SettingError(f"{name} is {stated}, but an estimate has none. Leave it out, or promise=False.")
         if fitted is None:
             train = self._train(units) if self.promise else calibrated
             if len(missing := np.setdiff1d(labels, labels[train])):
                 raise InputError(
                     f"no sequence of {', '.join(_texts(missing))} is among those to train on. Record more of each class, or use a larger train_share."
                 )
-            fitted = _clone(self.estimator).fit(take(known, train), labels[train])
-            folds = self._folded(table, known, labels, ids, owners, train)
+            fitted = self._trained(known, given, train)
+            folds = self._folded(known, given, train)
             calibrated = ~train
         self.estimator_ = fitted
         model = self._compiled(fitted, table)
@@ -357,6 +414,13 @@ class SequenceRecognizer:
             raw: dict[str, Any] = json.loads(text)
             shares = raw["error"], raw["undecided"], raw["mean_rows"], raw["sequences"]
             self.estimated_ = Estimated(found, *shares, raw)
+            if self.estimated_.error > self.error_rate:
+                warnings.warn(
+                    f"The estimated error rate, {self.estimated_.error:.3g}, is above the {self.error_rate:g} asked for. Record more "
+                    "sequences, train a better classifier, or ask for a higher rate.",
+                    ModelWarning,
+                    stacklevel=2,
+                )
             self.model_ = found
         self.classes_ = fitted.classes_
         for name in ("n_features_in_", "feature_names_in_"):
@@ -380,18 +444,16 @@ class SequenceRecognizer:
             )
         return compile(ensemble, max_touches=self.max_rows or 200, row_number=ensemble.features[-1])
 
-    def _folded(
-        self,
-        table: Any,
-        known: Any,
-        labels: npt.NDArray[Any],
-        ids: npt.NDArray[Any],
-        owners: npt.NDArray[Any] | None,
-        train: npt.NDArray[np.bool_],
-    ) -> list[Any] | None:
+    def _trained(self, known: Any, given: _Sequences, rows: npt.NDArray[np.bool_]) -> Any:
+        """A clone of the classifier, trained on some rows."""
+        weighted = {} if given.weights is None else {"sample_weight": given.weights[rows]}
+        return _clone(self.estimator).fit(take(known, rows), given.labels[rows], **weighted)
+
+    def _folded(self, known: Any, given: _Sequences, train: npt.NDArray[np.bool_]) -> list[Any] | None:
         """Folds of the training, whole sequences or groups, each with the model of the others."""
         if self.folds is None and self.promise:
             return None
+        table, labels, ids, owners = given.table, given.labels, given.ids, given.owners
         units = ids if owners is None else owners
         names, first = np.unique(units[train], return_index=True)
         count = 5 if self.folds is None else self.folds
@@ -407,8 +469,7 @@ class SequenceRecognizer:
             others = train & ~own
             if len(np.setdiff1d(labels[train], labels[others])):
                 raise InputError("a fold has all sequences of a class. Record more of each class, or use fewer folds.")
-            classifier = _clone(self.estimator).fit(take(known, others), labels[others])
-            model = self._compiled(classifier, table)
+            model = self._compiled(self._trained(known, given, others), table)
             rows = rows_of(Recognizer(model), take(table, own))
             groups = None if owners is None else _texts(owners[own])
             folds.append((model, rows, _texts(labels[own]), _texts(ids[own]), groups))
@@ -432,20 +493,20 @@ class SequenceRecognizer:
         names = np.unique(units)
         count = int(len(names) * self.train_share)
         if count == 0:
-            raise InputError(
-                f"there are {len(names)} sequences or groups, too few to train on some and calibrate on others. Record more."
-            )
+            raise InputError(f"too few sequences or groups to train on some and calibrate on others: {len(names)}. Record more.")
         np.random.default_rng(self.seed).shuffle(names)
         return np.isin(units, names[:count])
 
-    def verdicts(self, X: npt.ArrayLike, *, sequence: _Ids) -> list[Verdict]:
+    def verdicts(self, X: Any, *, sequence: _Ids | None = None) -> list[Verdict]:
         """The verdict on each sequence, in their order: its class as text, and the rows that it took."""
         if not hasattr(self, "model_"):
             raise _not_fitted(self)
+        if sequence is None:
+            X, sequence = _joined(X)
         table, ids = _table(X), _ids(sequence, "sequence")
         found, wanted = table.shape[1], getattr(self, "n_features_in_", None)
         # The columns of a table are found by their names.
-        if wanted is not None and found != wanted and names_of(table) is None:
+        if len(ids) and wanted is not None and found != wanted and names_of(table) is None:
             kind = type(self).__name__
             raise InputError(f"X has {found} features, but {kind} is expecting {wanted} features as input. Give those of the fit.")
         recognizer = Recognizer(self.model_)
@@ -454,39 +515,44 @@ class SequenceRecognizer:
         _agree(len(rows), sequence=len(ids))
         return [_verdict(recognizer, rows[stretch]) for stretch in _stretches(ids)]
 
-    def predict(self, X: npt.ArrayLike, *, sequence: _Ids) -> npt.NDArray[Any]:
-        """The class of each sequence, in their order; `None` without a verdict, or for what the model does not know."""
+    def predict(self, X: Any, *, sequence: _Ids | None = None) -> npt.NDArray[Any]:
+        """The class of each sequence, in their order. Without a verdict, or for what the model does not know, it is `None`; of a list
+        of sequences `undecided_`, so that all are of one type, as scikit-learn's metrics need."""
         verdicts = self.verdicts(X, sequence=sequence)
         by_name = {str(value): value for value in np.asarray(self.classes_).tolist()}
-        return np.array([by_name.get(verdict.object or "") for verdict in verdicts], dtype=object)
+        if sequence is not None:
+            return np.array([by_name.get(verdict.object or "") for verdict in verdicts], dtype=object)
+        found = [by_name.get(verdict.object or "", self.undecided_) for verdict in verdicts]
+        # With all classes, the type does not depend on those that were found.
+        return np.array([*found, *by_name.values()])[: len(found)]
+
+    @property
+    def undecided_(self) -> Any:
+        """The label of a sequence without a verdict in a list: "" among texts; among numbers -1, or 1 less than the least class."""
+        classes = np.asarray(self.classes_)
+        if classes.dtype.kind in "biuf":
+            return min(0, classes.min().item()) - 1
+        return "" if all(isinstance(value, str) for value in classes.tolist()) else None
+
+    def score(self, X: Any, y: _Ids, *, sequence: _Ids | None = None, sample_weight: Any = None) -> float:
+        """The share of the sequences that are named rightly; one without a verdict counts as wrong. The weight of a sequence is the
+        mean of its rows'."""
+        given = _Sequences.of(X, y, sequence, None, sample_weight)
+        found = self.predict(X, sequence=sequence)
+        weights = given.weights if given.weights is None else [given.weights[stretch].mean() for stretch in given.stretches]
+        return float(np.average(found == given.labels[[stretch.start for stretch in given.stretches]], weights=weights))
 
     def __sklearn_tags__(self) -> Any:
-        """Tags that scikit-learn reads from estimators. A verdict is on a sequence, not on a row: it is no classifier there."""
+        """Tags that scikit-learn reads from estimators."""
         utils, base = importlib.import_module("sklearn.utils"), importlib.import_module("sklearn.base")
         has_tags = hasattr(self.estimator, "__sklearn_tags__")
         inputs = base.get_tags(self.estimator).input_tags if has_tags else utils.InputTags()
         return utils.Tags(
-            estimator_type=None,
+            estimator_type="classifier",
             target_tags=utils.TargetTags(required=True),
+            classifier_tags=utils.ClassifierTags(),
             input_tags=utils.InputTags(allow_nan=inputs.allow_nan),
         )
-
-
-_PARAMETERS = (
-    "estimator",
-    "error_rate",
-    "per",
-    "confidence",
-    "max_rows",
-    "strangers",
-    "position",
-    "guard",
-    "folds",
-    "promise",
-    "train_share",
-    "prefit",
-    "seed",
-)
 
 
 def _table(X: Any) -> Any:

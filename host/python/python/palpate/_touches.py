@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._errors import InputError
+from ._estimator import Estimator
 from ._import import compile
 from ._native import DataSet, train
-from ._stream import _agree, _Ids, _ids, _not_fitted, _stretches
-
-_PARAMETERS = ("preset", "descriptor", "rounds", "noise", "timer", "leaf", "seed")
+from ._stream import _agree, _flat, _Ids, _ids, _not_fitted, _stretches
 
 
-class TouchRecognizer:
+class TouchRecognizer(Estimator):
     """An estimator of scikit-learn's kind that recognizes objects by touch.
 
     A row of `X` is a touch: three contact times in seconds, NaN where a finger did not touch; with the probe's direction and
@@ -50,28 +48,17 @@ class TouchRecognizer:
         self.leaf = leaf
         self.seed = seed
 
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """The arguments, for `sklearn.base.clone` and searches."""
-        return {name: getattr(self, name) for name in _PARAMETERS}
-
-    def set_params(self, **params: Any) -> TouchRecognizer:
-        """Sets arguments by name."""
-        for name, value in params.items():
-            if name not in _PARAMETERS:
-                raise InputError(f"a TouchRecognizer has no {name}. Use {', '.join(_PARAMETERS)}.")
-            setattr(self, name, value)
-        return self
-
     def fit(self, X: npt.ArrayLike, y: _Ids) -> TouchRecognizer:
         """Trains on touches and the object of each."""
         touches = np.asarray(X, dtype=np.float64)
-        self.classes_, objects = np.unique(np.asarray(y), return_inverse=True)
-        _agree(len(touches), y=len(objects))
+        labels = _flat(y, "label")
+        _agree(len(touches), y=len(_ids(y, "label")))
+        self.classes_, objects = np.unique(labels, return_inverse=True)
         names = [str(name) for name in self.classes_.tolist()]
         posed: dict[str, Any] = {"direction": touches[:, 3:6], "alignment": touches[:, 6:9]} if touches.shape[1] == 9 else {}
         is_partial = bool(np.isnan(touches[:, :3]).any())
         data = DataSet.from_arrays(touches[:, :3], objects, names, approaches=is_partial, **posed)
-        given = {name: getattr(self, name) for name in _PARAMETERS if name != "leaf"}
+        given = {name: value for name, value in self.get_params().items() if name != "leaf"}
         self.ensemble_ = train(data, **given)
         self.model_ = compile(self.ensemble_, leaf=self.leaf)
         return self
@@ -102,7 +89,8 @@ class TouchRecognizer:
 
     def score(self, X: npt.ArrayLike, y: _Ids, *, sequence: _Ids | None = None) -> float:
         """The share of touches, or sequences, whose object is found."""
-        labels = np.asarray(y)
+        labels = _flat(y, "label")
+        _agree(len(np.asarray(X)), y=len(labels))
         if sequence is not None:
             labels = labels[[stretch.start for stretch in _stretches(_ids(sequence, "sequence"))]]
         return float(np.mean(self.predict(X, sequence=sequence) == labels))

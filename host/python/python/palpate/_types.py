@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import numbers
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal, Protocol, TypeAlias, Union
+from dataclasses import dataclass, fields
+from typing import Any, Literal, Protocol, TypeAlias, Union
 
 import numpy as np
 import numpy.typing as npt
+
+from ._errors import SettingError
 
 Progress: TypeAlias = Callable[[str, int, Union[int, None]], object]
 """Is called with the name of a stage, the steps that are done, and their number where it is known."""
@@ -16,6 +19,10 @@ Progress: TypeAlias = Callable[[str, int, Union[int, None]], object]
 Touch: TypeAlias = Union[Sequence[Union[float, None]], npt.NDArray[np.float64]]
 """Three contact times in seconds, `None` or NaN for a finger that did not touch; with the probe's direction and alignment
 nine numbers."""
+
+
+Predictions: TypeAlias = npt.NDArray[Any]
+"""Values or labels of rows."""
 
 
 class HasFaces(Protocol):
@@ -38,8 +45,18 @@ Meshes: TypeAlias = Union[Source, Sequence[Source], Mapping[str, Union[Mesh, Sou
 """Files, directories and built-in objects; or names with their meshes or files."""
 
 
+class _Numbers:
+    """Values that are all numbers."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            if isinstance(value, bool) or not isinstance(value, numbers.Real) and not (value is None and field.default is None):
+                raise SettingError(f"{field.name} is {value!r}. Use a number; a file with a probe is for the program.")
+
+
 @dataclass(frozen=True)
-class Probe:
+class Probe(_Numbers):
     """Three spheres in a row, in units of which an object's longest side has 10, or in millimeters."""
 
     radius: float = 0.15
@@ -59,7 +76,7 @@ class Probe:
 
 
 @dataclass(frozen=True)
-class Real:
+class Real(_Numbers):
     """Noise that a hand and a table add to touches: to those that maps expect, and to simulated ones, as standard deviations."""
 
     height: float = 0.5

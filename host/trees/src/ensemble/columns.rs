@@ -82,7 +82,7 @@ fn splits(tree: &mut Tree) -> impl Iterator<Item = &mut usize> {
 
 /// Names that a model can hold, with defaults for missing ones. A name that it cannot hold is changed as
 /// [`holdable`] does, unless it would equal another one then.
-fn held(mut names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
+pub(super) fn held(mut names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
     let all: BTreeSet<String> = names.iter().cloned().collect();
     let mut changed = BTreeSet::new();
     for (index, name) in names.iter_mut().enumerate() {

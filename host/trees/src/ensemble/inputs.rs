@@ -49,6 +49,11 @@ impl Inputs {
         Self::Rows((0..count).map(Self::default_name).collect())
     }
 
+    /// Rows of features with these names, as a file's: where a model cannot hold one it is changed, and a note says so.
+    pub fn named(names: Vec<String>, notes: &mut Vec<String>) -> Self {
+        Self::Rows(super::columns::held(names, notes))
+    }
+
     /// The name of a feature that has none of its own.
     pub(crate) fn default_name(index: usize) -> String {
         format!("f{index}")

@@ -18,7 +18,7 @@ pub struct Options<'a> {
 }
 
 /// Note about every file of XGBoost.
-pub(in crate::ensemble) const MISSING_UNKNOWN: &str = "The file does not state the number that stood for a missing value in \
+pub(in crate::ensemble) const MISSING_UNKNOWN: &str = "The model does not state the number that stood for a missing value in \
                                           training (XGBoost's `missing=`): only NaN counts as missing. State the \
                                           number if there was another.";
 
