@@ -4,9 +4,10 @@ pub use palpate_trees::compile::*;
 
 use crate::ensemble::{Ensemble, OverTouches, TouchOrigin, train};
 use crate::error::{Error, Result};
+use crate::touches::Longest;
 use crate::with;
 use palpate_onboard::Model;
-use palpate_shared::format::Tag;
+use palpate_shared::format::{Length, Tag};
 use palpate_trees::compile as trees;
 
 /// Models of more objects than this are usually compiled with leaves of one byte: `docs/measurements/growth.md`
@@ -83,8 +84,14 @@ fn priors(outputs: &[(u8, f64)], priors: Option<&[f64]>) -> Result<Vec<f64>> {
     })
 }
 
-/// The longest time between two contacts that a model's touches can plausibly have, in seconds; for finding times in
-/// another unit.
+/// The longest time between two contacts that a model's touches can plausibly have, for finding times in another unit:
+/// [`longest_time`], in words.
+pub fn longest(model: &Model<'_>) -> Longest {
+    let unit = model.probe().map_or(Length::Tenth, |probe| probe.length);
+    Longest::of_scale("the model", longest_time(model), model.header().speed(), unit)
+}
+
+/// The longest time between two contacts that a model's touches can plausibly have, in seconds.
 ///
 /// A model states its probe's spacing and speed. An object of at most 10 units on its longest side has a diagonal of at
 /// most 10·√3, so that no contact comes later than (10·√3 + 2 · spacing) / speed after the first, and no feature of a

@@ -84,8 +84,8 @@
 //! |---|---|---|
 //! | none | | simulator, compiler, evaluator |
 //! | `train` | yes | `ensemble::train`, `fit`, `strangers` and `teach` |
-//! | `objects` | yes | `mesh::builtin`: ten objects made from implicit functions. 21 crates more, through fidget |
-//! | `mcap` | yes | touches and verdicts in robots' logs (MCAP). 21 crates more |
+//! | `objects` | yes | `mesh::builtin`: ten objects made from implicit functions. |
+//! | `mcap` | yes | touches and verdicts in robots' logs (MCAP) |
 //! | `serial` | yes | chips at serial ports |
 //! | `xgboost` | no | XGBoost 1.6.2 as a second trainer, built from its C++ source |
 //!

@@ -259,9 +259,9 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     let compact = with!(train::Settings::compact(), seed, probe, noise = settings.noise);
     let full = with!(compact.clone(), counted = Some(Counted::Full));
     let contacts = with!(compact, counted = Some(Counted::Contacts));
-    let paper = method("the paper's method", "paper", with!(train::Settings::paper(), seed, probe), &split)?;
-    let full = method("ours on full touches", "full", full, &split)?;
-    let ours = method("ours on every contact", "ensemble", contacts, &approaches)?;
+    let paper = method(METHODS[0], "paper", with!(train::Settings::paper(), seed, probe), &split)?;
+    let full = method(METHODS[1], "full", full, &split)?;
+    let ours = method(METHODS[2], "ensemble", contacts, &approaches)?;
     let model = compile::open(&ours.compiled.bytes)?;
     progress.begin("writing the page to play on", None);
     output::write_bytes(&out.join(PLAY), play_page(objects, [&paper, &full, &ours], settings)?.as_bytes())?;
@@ -286,11 +286,11 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
         command: settings.command.clone(),
         play: PLAY.into(),
         pictures: shown::pictures(objects, &summary.capture),
-        methods: vec![
-            shown::shown("paper", &paper),
-            shown::shown("ours on full touches", &full),
-            shown::shown("ours on every contact", &ours),
-        ],
+        methods: METHODS
+            .into_iter()
+            .zip([&paper, &full, &ours])
+            .map(|(name, trial)| shown::shown(name, trial))
+            .collect(),
         table: shown::table(&summary),
         note: shown::note(&summary),
         facts: shown::facts(&summary),
@@ -299,6 +299,9 @@ pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn P
     output::write_json(&out.join("summary.json"), &summary)?;
     Ok(summary)
 }
+
+/// The names of the methods in the table, on both pages and in messages.
+const METHODS: [&str; 3] = ["paper, full touches", "ours, full touches", "ours, every contact"];
 
 /// Everything that the results depend on.
 fn made_from(objects: &[Object], settings: &Settings) -> Result<serde_json::Value> {
@@ -464,8 +467,11 @@ fn recognize(model: &Model<'_>, touched: &ObjectTouches) -> Result<Recognition> 
 
 /// The page on which the objects can be touched, with all models.
 fn play_page(objects: &[Object], trials: [&Trial; 3], settings: &Settings) -> Result<String> {
-    let contender = |trial: &Trial| Contender::new(CompiledModel::from_bytes(trial.compiled.bytes.clone())?);
-    let contenders = trials.into_iter().map(contender).collect::<Result<Vec<_>>>()?;
+    let contender = |(name, trial): (&str, &Trial)| {
+        let model = CompiledModel::from_bytes(trial.compiled.bytes.clone())?;
+        Ok(Contender { name: name.into(), model })
+    };
+    let contenders = METHODS.into_iter().zip(trials).map(contender).collect::<Result<Vec<_>>>()?;
     let origin = settings.capture.origin.clone();
     play::page(
         objects,

@@ -225,6 +225,9 @@ pub(crate) fn capture(
     settings.check()?;
     long(py, progress.as_ref(), |progress| {
         let mut objects = meshes.objects(instances)?;
+        if objects.is_empty() {
+            return Err(Error::setting("meshes", "empty", "one object or more"));
+        }
         if millimeters.is_some() {
             objects.iter_mut().for_each(|object| object.millimeters = object.millimeters.or(millimeters));
         }

@@ -11,7 +11,9 @@ use palpate::ensemble::feature_row;
 use palpate::error::Error;
 use palpate::shared::format::Length;
 use palpate::shared::{Q15_ONE, Touch};
-use palpate::touches::{Dataset, Listing, ObjectTouches, Origin, Surroundings, folds, located, touch_of_seconds};
+use palpate::touches::{
+    Dataset, Listing, Longest, ObjectTouches, Origin, Surroundings, folds, located, touch_of_seconds,
+};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use std::path::PathBuf;
@@ -201,6 +203,8 @@ impl DataSet {
             touches: objects.iter().map(|object| object.len()).max().unwrap_or(0) as u64,
             ..Origin::default()
         });
+        let longest = origin.as_ref().map_or_else(Longest::default, Origin::longest);
+        longest.check_objects(&objects).map_err(Error::from)?;
         Ok(Self::new(Dataset { origin, ..Dataset::new(objects) }, None))
     }
 

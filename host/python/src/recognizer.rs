@@ -6,11 +6,12 @@ use crate::failure::Failure;
 use crate::model::{Model, touch};
 use crate::objects::{self, class};
 use numpy::ndarray::Ix1;
-use palpate::compile::{self, longest_time};
+use palpate::compile;
 use palpate::error::{Error, EvaluateProblem, TouchesProblem};
 use palpate::onboard::{Refused, RowsSeen, Stopping, Verdict};
 use palpate::rows::{Encoder, Features};
 use palpate::shared::Touch;
+use palpate::touches::Longest;
 use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -81,7 +82,7 @@ pub(crate) struct Recognizer {
     seen: Box<RowsSeen<256>>,
     names: Vec<Py<PyString>>,
     /// The longest time between contacts that makes sense, in seconds.
-    longest: f64,
+    longest: Option<Longest>,
 }
 
 #[pyo3::pymethods]
@@ -107,7 +108,7 @@ impl Recognizer {
             })
         })?;
         let names = compile::names(model.model()).iter().map(|name| PyString::new(py, name).unbind()).collect();
-        let longest = if model.model().descriptor().is_some() { longest_time(model.model()) } else { f64::INFINITY };
+        let longest = model.model().descriptor().map(|_| compile::longest(model.model()));
         let (encoder, features) = (Encoder::measured(model.model()), Features::measured(model.model()));
         Ok(Self { cell, encoder, features, seen: Box::default(), names, longest })
     }
@@ -117,12 +118,8 @@ impl Recognizer {
     /// verdict says why.
     fn push<'py>(&mut self, py: Python<'py>, touch: TouchInput) -> Result<objects::Verdict<'py>, Failure> {
         let TouchInput(touch) = touch;
-        let last = touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or(0);
-        let seconds = f64::from(last) * 1e-6;
-        if seconds > self.longest {
-            let speed = self.cell.borrow_dependent().model().header().speed();
-            let problem = EvaluateProblem::TimeTooLong { seconds, longest: self.longest, speed };
-            return Err(Error::from(problem).into());
+        if let Some(longest) = &self.longest {
+            longest.check(&touch).map_err(Error::from)?;
         }
         // A little later than the stroke is missing, as on the chip.
         let touch = palpate::evaluate::delivered(self.cell.borrow_dependent().model(), &touch);

@@ -90,7 +90,7 @@ def same(data: palpate.DataSet, other: palpate.DataSet) -> None:
 def test_a_table_comes_back_as_the_same_touches_also_through_parquet(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     nan, count = np.nan, 600
-    micros = rng.integers(0, 4_000_000_000, (count, 3))
+    micros = rng.integers(0, 16_000_000, (count, 3))
     micros[np.arange(count), rng.integers(0, 3, count)] = 0
     times = np.where(rng.random((count, 3)) < 0.2, nan, micros / 1e6)
     direction, alignment = (touched[:count] for touched in poses())
@@ -175,6 +175,20 @@ def test_touches_from_arrays_are_rounded_and_start_at_zero() -> None:
     ]:
         with pytest.raises(ValueError, match=message):
             palpate.DataSet.from_arrays(times, objects, ["cup", "spoon"])
+
+
+def test_times_that_are_not_in_seconds_and_captures_of_nothing_are_refused() -> None:
+    slow = np.array([[0.0, 62.2, 80.0], [107.0, 0.0, np.nan], [np.nan, 0.0, np.nan], [0.0, 0.0, 1.0]])
+    with pytest.raises(ValueError, match="touch 1 of cup: a finger touched 80.0 s .* hold at most 16.8 s.*not in milliseconds"):
+        palpate.DataSet.from_arrays(slow, [0] * 4, ["cup"])
+    with pytest.raises(ValueError, match="touch 1 of cup: .* no object of the data set's scale takes longer than 2.73 s"):
+        palpate.DataSet.from_arrays(slow / 10, [0] * 4, ["cup"], probe=palpate.Probe())
+    assert len(palpate.DataSet.from_arrays(slow / 10, [0] * 4, ["cup"]).times) == 4
+    # A clock that counts from 1970.
+    clock = palpate.DataSet.from_arrays([[1732819200.01, 1732819200.0, np.nan]], [0], ["cup"])
+    np.testing.assert_array_equal(clock.times, [[0.01, 0.0, np.nan]])
+    with pytest.raises(ValueError, match="meshes is empty"):
+        palpate.capture([])
 
 
 def test_no_data_set_forgets_which_touch_is_of_which_instance(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ use crate::page::document::{Block, Figure, Picture, Section};
 use crate::page::render;
 use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
-use palpate::mesh::facts::Facts;
 use palpate::mesh::{Instance, Object};
 use palpate::probe::approach::Probe;
 use palpate::touches::Origin;

@@ -76,15 +76,6 @@ pub use terms::Terms;
 pub use temperature::temperature;
 pub use unlike::unlike_training;
 
-/// The cases that the promised rate refers to, in words.
-pub fn of_what(per: Per) -> &'static str {
-    match per {
-        Per::Average => "all names given, on average,",
-        Per::Name => "each name, when it is given,",
-        Per::Object => "the names given to each object",
-    }
-}
-
 #[cfg(feature = "train")]
 pub(crate) use walk::allowed;
 pub(crate) use walk::{Stop, binomial_tail};

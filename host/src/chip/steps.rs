@@ -1,10 +1,10 @@
 //! Steps that are streamed to a chip: touches, and where one object ends and the next begins.
 
-use crate::error::{Error, Place, Result};
-use crate::touches::{Dataset, Log, ObjectTouches, Pool, parse_touch};
+use crate::error::Result;
+use crate::touches::{Dataset, Log, ObjectTouches, Pool, text};
 use palpate_shared::Touch;
 use std::io::BufRead;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Something to tell the chip.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,14 +33,7 @@ pub enum Steps {
     /// Touches of a log, in the order of their times; where the object changes, another one begins.
     Logged(std::vec::IntoIter<Step>),
     /// Lines of text as they come; an empty line begins another object.
-    Lines {
-        /// The lines.
-        reader: Box<dyn BufRead + Send>,
-        /// For errors.
-        path: PathBuf,
-        /// The last line read.
-        line: u64,
-    },
+    Lines(text::Lines<Box<dyn BufRead + Send>>),
 }
 
 impl Steps {
@@ -54,7 +47,7 @@ impl Steps {
 
     /// Lines as in a data set's files, until they end.
     pub fn lines(reader: Box<dyn BufRead + Send>, path: &Path) -> Self {
-        Self::Lines { reader, path: path.into(), line: 0 }
+        Self::Lines(text::Lines::new(reader, path))
     }
 
     /// The touches of a log.
@@ -80,7 +73,7 @@ impl Steps {
                 let is_touch = |step: &&Step| matches!(step, Step::Touch(_));
                 Some(steps.as_slice().iter().filter(is_touch).count() as u64)
             }
-            Self::Lines { .. } => None,
+            Self::Lines(_) => None,
         }
     }
 
@@ -111,19 +104,9 @@ impl Steps {
                 Ok(next.map(Step::Touch))
             }
             Self::Logged(steps) => Ok(steps.next()),
-            Self::Lines { reader, path, line } => {
-                let mut text = String::new();
-                *line += 1;
-                let read = reader.read_line(&mut text);
-                if read.map_err(|source| Error::io(&path, "read the touches", source))? == 0 {
-                    return Ok(None);
-                }
-                let text = text.trim();
-                if text.is_empty() {
-                    return Ok(Some(Step::Object(None)));
-                }
-                let touch = parse_touch(text).map_err(|problem| Error::at(Place::line(&path, *line), problem))?;
-                Ok(Some(Step::Touch(touch)))
+            Self::Lines(lines) => {
+                let step = |(_, touch): (u64, Option<Touch>)| touch.map_or(Step::Object(None), Step::Touch);
+                lines.next().map(|line| line.map(step)).transpose()
             }
         }
     }

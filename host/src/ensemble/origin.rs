@@ -6,7 +6,7 @@ use crate::probe::approach::Probe;
 use crate::probe::hand;
 use crate::probe::noise::Noise;
 use crate::probe::unit::{self, tenth};
-use crate::touches::{self, Dataset, Surroundings};
+use crate::touches::{self, Dataset, Longest, Surroundings};
 use palpate_shared::format::{Length, Outputs, Tag, TrainedProbe};
 use palpate_trees::compile::{self, CompiledModel, OwnedSection};
 use serde::{Deserialize, Serialize};
@@ -257,13 +257,9 @@ impl StatedProbe {
     /// Cost: a pass over touches that no capture made.
     ///
     /// # Errors
-    /// Errors of [`compare`](Self::compare), and [`ProbeProblem::OtherStroke`] with both strokes.
-    pub fn compare_with(
-        names: [&str; 2],
-        probe: Option<TrainedProbe>,
-        longest: u32,
-        dataset: &Dataset,
-    ) -> Result<(), ProbeProblem> {
+    /// Errors of [`compare`](Self::compare), [`ProbeProblem::OtherStroke`] with both strokes, and
+    /// [`TouchesProblem::TimeTooLong`](crate::error::TouchesProblem::TimeTooLong) for times that are not in seconds.
+    pub fn compare_with(names: [&str; 2], probe: Option<TrainedProbe>, longest: u32, dataset: &Dataset) -> Result<()> {
         let own = Self::of(dataset).map(|own| own.trained());
         let is_simulated = own.is_some() && !dataset.is_recorded();
         if let Some((probe, own)) = probe.zip(own) {
@@ -278,11 +274,23 @@ impl StatedProbe {
         if is_simulated {
             return Ok(());
         }
+        // Without a largest time that is known, millimeters are of no known scale. What states no probe is of the published one.
+        let published = || own.is_none().then(|| Self::default().trained());
+        let of_ten_units =
+            |probe: &TrainedProbe| (10.0 * 3.0_f64.sqrt() + 2.0 * f64::from(probe.spacing)) / f64::from(probe.speed);
+        if let Some(probe) =
+            probe.or_else(published).filter(|probe| probe.length == Length::Tenth || longest < u32::MAX)
+        {
+            let known = if longest < u32::MAX { 4e-6 * f64::from(longest) } else { 0.0 };
+            let of_scale = if probe.length == Length::Tenth { of_ten_units(&probe) } else { 0.0 };
+            let plausible = Longest::of_scale(names[0], known.max(of_scale), probe.speed, probe.length);
+            plausible.check_objects(&dataset.objects)?;
+        }
         // Touches with a position are of a table, whatever the probe states.
         let is_located = dataset.touches().any(|touch| touch.position().is_some());
         if probe.is_some_and(|probe| probe.cone == 0) && !is_located && !dataset.placement_shares().is_empty() {
             let [first, second] = names.map(str::to_owned);
-            return Err(ProbeProblem::Differs { first, second, differences: "scene floating and table".into() });
+            return Err(ProbeProblem::Differs { first, second, differences: "scene floating and table".into() }.into());
         }
         let stroke = probe.and_then(|probe| probe.stroke);
         let [window, allowed] = match probe.and_then(|probe| stroke_of(&probe)) {
@@ -314,7 +322,7 @@ impl StatedProbe {
             Some(((stroke, window), _)) => format!("a stroke of {stroke} ({})", seconds(window)),
             None => "no stroke".into(),
         };
-        Err(ProbeProblem::OtherStroke { first, second, stroke, latest: seconds(latest.micros), is_later })
+        Err(ProbeProblem::OtherStroke { first, second, stroke, latest: seconds(latest.micros), is_later }.into())
     }
 }
 

@@ -130,18 +130,6 @@ pub enum EvaluateProblem {
         /// Description of the fault.
         detail: String,
     },
-    /// A contact time is longer than an object can make it.
-    #[error(
-        "a finger touched {seconds:.1} s after the first, but no object of the model's scale takes longer than {longest:.2} s at its speed of {speed} units per second"
-    )]
-    TimeTooLong {
-        /// Seconds after the first contact.
-        seconds: f64,
-        /// The most seconds that make sense.
-        longest: f64,
-        /// The speed that the model states, in units per second.
-        speed: f32,
-    },
 }
 
 fn too_few_for_alarms(object: &str, object_sequences: usize, needed: u64) -> String {
@@ -201,7 +189,6 @@ impl Problem for EvaluateProblem {
                 );
             }
             Self::Touch { .. } => "Correct the line.",
-            Self::TimeTooLong { .. } => "Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms.",
         }
         .into()
     }

@@ -63,7 +63,7 @@ use crate::mesh::Object;
 use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
 use crate::progress::{self, Progress};
-use crate::touches::{Dataset, ObjectTouches, Origin};
+use crate::touches::{Dataset, Longest, ObjectTouches, Origin};
 use crate::with;
 use candidate::Hypothesis;
 use density::Densities;
@@ -142,6 +142,7 @@ pub fn fit(
     progress: &dyn Progress,
 ) -> Result<Fit> {
     let scenes = scenes(objects, settings, progress)?;
+    check_times(recorded, &scenes, &settings.origin)?;
     let recorded = &recorded.clone().matching(&touched::placements(objects, &scenes));
     // Contacts that are a little later than a stated stroke are missing, as in every model of this probe.
     let delivered = recorded.delivered_by(&settings.origin.probe);
@@ -162,6 +163,16 @@ pub fn fit(
     let simulated = Simulated::new(touched, layer, settings, progress)?;
     let densities = simulated.densities(stroke);
     fit_to(&simulated, &densities, stroke, recorded, plate, settings, progress)
+}
+
+/// Refuses recordings whose times are longer than a probe of the nominal speed takes over the largest object.
+fn check_times(recorded: &Dataset, scenes: &[Vec<Scene>], origin: &Origin) -> Result<()> {
+    let way = scenes.iter().flatten().map(|scene| {
+        let [low, high] = scene.bounds();
+        (high - low).length() + 2.0 * origin.clearance([low, high])
+    });
+    let (speed, seconds) = (origin.probe.speed, way.fold(0.0, f64::max) / origin.probe.speed);
+    Ok(Longest::of_scale("the simulation", seconds, speed, origin.unit).check_objects(&recorded.objects)?)
 }
 
 /// The object or placement of each recording, if there are enough touches.

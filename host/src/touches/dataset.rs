@@ -3,7 +3,7 @@
 use super::files::{EXTENSION, files};
 use super::text::Alike;
 use super::warning::Warning;
-use super::{Entry, Listing, Log, ObjectTouches, Origin, Recorded, Source, is_log, recording, text};
+use super::{Entry, Listing, Log, Longest, ObjectTouches, Origin, Recorded, Source, is_log, recording, text};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::Probe;
 use crate::probe::hand;
@@ -205,12 +205,12 @@ impl Dataset {
     fn listed(directory: &Path, listing: Listing) -> Result<Self> {
         let (mut objects, mut warnings) = (Vec::with_capacity(listing.objects.len()), Vec::new());
         // It may grow while it is recorded.
-        let may_grow = listing.is_recorded();
+        let (may_grow, longest) = (listing.is_recorded(), listing.origin.longest());
         for entry in &listing.objects {
             let path = entry.file(directory);
             let touches = match may_grow {
-                true => recording::read(entry, &path, &mut warnings)?,
-                false => read_listed(entry, &path, &mut warnings)?,
+                true => recording::read(entry, &path, &longest, &mut warnings)?,
+                false => read_listed(entry, &path, &longest, &mut warnings)?,
             };
             if touches.first().is_some_and(|touch| touch.position().is_some() != listing.origin.position) {
                 let (has_position, others) = (!listing.origin.position, Listing::STATED);
@@ -308,12 +308,12 @@ impl Dataset {
 }
 
 /// Reads an object's file, and compares it with the listing.
-fn read_listed(entry: &Entry, path: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
+fn read_listed(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
     let wrong = |problem| Error::at(Place::file(path), problem);
     if !path.exists() {
         return Err(wrong(TouchesProblem::Missing { name: entry.name.clone() }));
     }
-    let (touches, found) = text::read_with_checksum(path)?;
+    let (touches, found) = text::read_with_checksum(path, longest)?;
     if touches.len() as u64 != entry.touches {
         return Err(wrong(TouchesProblem::OtherCount { stated: entry.touches, found: touches.len() as u64 }));
     }

@@ -1,6 +1,7 @@
 //! Problems with data sets and files of touches.
 
 use crate::error::Problem;
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 /// Problems with data sets and files of touches.
@@ -34,10 +35,20 @@ pub enum TouchesProblem {
         seconds: f64,
     },
     /// A contact time is beyond the range of a touch.
-    #[error("the time {seconds} is longer than the 4294 s that a touch can hold")]
+    #[error("a finger touched {seconds} s after the first, and a touch can hold 4294 s")]
     LongTime {
-        /// The time.
+        /// The time after the first contact.
         seconds: f64,
+    },
+    /// A contact time is longer than an object can make it.
+    #[error("{of}a finger touched {seconds:.1} s after the first, but {why}")]
+    TimeTooLong {
+        /// Which touch, where no place says it: "touch 3 of bowl: ".
+        of: String,
+        /// Seconds after the first contact.
+        seconds: f64,
+        /// The most seconds that make sense, in words.
+        why: Cow<'static, str>,
     },
     /// A direction or alignment is not a unit vector.
     #[error("the {vector} has length {length:.3} where a unit vector has 1")]
@@ -72,6 +83,9 @@ pub enum TouchesProblem {
         /// The others.
         others: &'static str,
     },
+    /// A file is a bag of ROS that is not in MCAP.
+    #[error("a bag of ROS 1, or of ROS 2 in SQLite, is not read")]
+    Bag,
     /// A line is not UTF-8.
     #[error("not text (no UTF-8)")]
     NotText,
@@ -340,6 +354,10 @@ impl Problem for TouchesProblem {
                 "Correct the line: three times in seconds, - for a missing contact, and optionally direction and \
                  alignment, and behind them the position in millimeters."
             }
+            Self::TimeTooLong { .. } => {
+                "Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms. If they are in seconds, say which probe made them."
+            }
+            Self::Bag => "Convert it to MCAP: mcap convert BAG OUT.mcap.",
             Self::PositionWithoutPose => "Give direction and alignment, too.",
             Self::OtherPosition { .. } => "Give every touch of the data set a position, or none.",
             Self::HalfPose { .. } => "Give both or neither.",

@@ -1,6 +1,7 @@
 //! `dataset.json`: the content and origin of a data set.
 
 use super::files::EXTENSION;
+use super::log::is_bag;
 use super::{ObjectTouches, Origin, Recorded, Source};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
@@ -131,6 +132,9 @@ impl Listing {
     /// # Errors
     /// When the file cannot be read or is not a listing, and when it names an object twice or by a name that no file can have.
     pub fn read(directory: &Path) -> Result<Option<Self>> {
+        if directory.is_file() && is_bag(directory) {
+            return Err(Error::at(Place::file(directory), TouchesProblem::Bag));
+        }
         let path = Self::path(directory);
         match std::fs::read(&path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),

@@ -1,7 +1,7 @@
 //! Touches out of a robot's log, which is an MCAP file: `docs/reference/mcap.md` says what belongs in it.
 
 use super::logged::{Channels, Message};
-use super::{ObjectTouches, Source, Warning, mcap, text};
+use super::{Longest, ObjectTouches, Source, Warning, mcap, text};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use palpate_shared::Touch;
 use std::collections::{BTreeMap, HashMap};
@@ -45,8 +45,23 @@ pub fn begins_log(bytes: &[u8]) -> bool {
 
 /// True if the file at `path` is a log, by its first byte; false for a file that cannot be read.
 pub fn is_log(path: &Path) -> bool {
-    let mut first = [0];
-    path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut first)).is_ok() && begins_log(&first)
+    begins(path, begins_log)
+}
+
+/// True if the file at `path` is a bag of ROS that is not in MCAP; false for a file that cannot be read.
+pub(super) fn is_bag(path: &Path) -> bool {
+    begins(path, begins_bag)
+}
+
+/// True if the first bytes of a file say so.
+fn begins(path: &Path, says: impl Fn(&[u8]) -> bool) -> bool {
+    let mut first = Vec::new();
+    path.is_file() && File::open(path).and_then(|file| file.take(16).read_to_end(&mut first)).is_ok() && says(&first)
+}
+
+/// True if a file that begins like this is a bag of ROS that is not in MCAP.
+pub(super) fn begins_bag(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"#ROSBAG V") || bytes.starts_with(b"SQLite format 3\0")
 }
 
 /// The touches of a file: of a log, whichever objects they are of, or of lines of text.
@@ -113,6 +128,8 @@ impl Log {
         if touches.is_empty() {
             return Err(Error::at(Place::file(path), TouchesProblem::NoTouches));
         }
+        let checked = Longest::default().check_all(touches.iter().map(|logged| (logged.offset, &logged.touch)));
+        checked.map_err(|(offset, problem)| Error::at(Place::byte(path, offset), problem))?;
         // Messages of one time stay in the order of the file.
         touches.sort_by_key(|logged| logged.time);
         Ok(Self { path: path.into(), touches, objects, channels })

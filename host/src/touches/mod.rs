@@ -66,7 +66,7 @@ pub use object::{ObjectTouches, Pool, Source};
 pub use origin::Origin;
 pub use recording::{Recorded, Recording};
 pub use samples::Samples;
-pub use seconds::{located, touch_of_seconds};
+pub use seconds::{Longest, located, touch_of_seconds};
 pub use surroundings::Surroundings;
 pub use text::{parse_touch, write_touch};
 pub use warning::Warning;

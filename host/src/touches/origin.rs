@@ -1,6 +1,6 @@
 //! Origin of touches.
 
-use super::{Samples, Surroundings};
+use super::{Longest, Samples, Surroundings};
 use crate::error::{Error, Result};
 use crate::mesh::{Instance, Object};
 use crate::probe::approach::{Aim, CLEARANCE, Probe};
@@ -159,6 +159,15 @@ impl Origin {
         match self.unit {
             Length::Tenth => CLEARANCE,
             Length::Millimeter => ((high - low).max_element() / 2.0).max(self.probe.spacing + self.probe.radius),
+        }
+    }
+
+    /// The longest time between two contacts of the touches: that of the whole way of an approach, where objects have one size.
+    pub fn longest(&self) -> Longest {
+        let way = 3_f64.sqrt() * self.length + 2.0 * self.clearance([DVec3::ZERO; 2]);
+        match self.unit {
+            Length::Tenth => Longest::of_scale("the data set", way / self.probe.speed, self.probe.speed, self.unit),
+            Length::Millimeter => Longest::default(),
         }
     }
 

@@ -117,7 +117,7 @@ mod tests {
     use crate::touches::{ObjectTouches, Origin, Recorded, folds, parse_touch};
 
     fn dataset(origin: Option<Origin>) -> Dataset {
-        let lines = ["0 0.001 -", "- - 0", "0.000000 0.123456 12.000001 1 0 0 0 1 0"];
+        let lines = ["0 0.001 -", "- - 0", "0.000000 0.123456 1.200001 1 0 0 0 1 0"];
         let touches: Vec<_> = lines.iter().map(|line| parse_touch(line).unwrap()).collect();
         let objects = ["cup", "fork"].map(|name| ObjectTouches::new(name, touches.clone(), Source::Object));
         Dataset { origin, ..Dataset::new(objects.into()) }

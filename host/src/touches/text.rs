@@ -2,59 +2,129 @@
 //!
 //! A line holds three contact times in seconds, a missing contact as `-`, and optionally the probe's direction and
 //! alignment (six numbers), and behind these optionally the hand's position (three numbers, in millimeters). Either all lines
-//! have a position or none has one. Fields are separated by spaces or commas. The published data set has the same format.
+//! have a position or none has one. Fields are separated by spaces or commas. Times are on any clock, also one that counts from
+//! 1970. A byte-order mark, a first line of names and lines that begin with # are skipped. The published data set has the same
+//! format.
 
 use super::checksum::Checked;
+use super::log::begins_bag;
+use super::seconds::{Longest, contact_times};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::probe::approach::to_q15;
-use palpate_shared::{ContactTime, Pose, Position, Q15_ONE, Touch};
+use palpate_shared::{Pose, Position, Q15_ONE, Touch};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// The lines of a text of touches as they come: each with its number, and its touch, or none if it is blank. Lines that hold no
+/// touch by design are skipped; errors name `path`.
+///
+/// Memory: that of the longest line.
+pub struct Lines<R> {
+    text: R,
+    path: PathBuf,
+    line: u64,
+    /// True behind the first line that is neither blank nor a comment: names of columns can only stand there.
+    has_begun: bool,
+}
+
+impl<R: BufRead> Lines<R> {
+    /// The lines of `text`, which is called `path`.
+    pub fn new(text: R, path: &Path) -> Self {
+        Self { text, path: path.into(), line: 0, has_begun: false }
+    }
+
+    /// The touch of a line; none of a blank one. The outer none: nothing is to be read in it.
+    fn touch(&mut self, bytes: &[u8]) -> Result<Option<Option<Touch>>, TouchesProblem> {
+        if self.line == 1 && begins_bag(bytes) {
+            return Err(TouchesProblem::Bag);
+        }
+        let text = std::str::from_utf8(bytes).map_err(|_| TouchesProblem::NotText)?;
+        let text = text.trim_start_matches('\u{feff}').trim();
+        if text.is_empty() || text.starts_with('#') {
+            return Ok(text.is_empty().then_some(None));
+        }
+        let is_first = !std::mem::replace(&mut self.has_begun, true);
+        let is_word = |field: &str| field != "-" && field.parse::<f64>().is_err();
+        if is_first && fields(text).all(is_word) {
+            return Ok(None);
+        }
+        parse_touch(text).map(|touch| Some(Some(touch)))
+    }
+}
+
+impl<R: BufRead> Iterator for Lines<R> {
+    type Item = Result<(u64, Option<Touch>)>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let mut bytes = Vec::new();
+        loop {
+            bytes.clear();
+            self.line += 1;
+            match self.text.read_until(b'\n', &mut bytes) {
+                Err(error) => return Some(Err(Error::io(&self.path, "read the touches", error))),
+                Ok(0) => return None,
+                Ok(_) => {}
+            }
+            let touch = self.touch(&bytes).map_err(|problem| Error::at(Place::line(&self.path, self.line), problem));
+            match touch.transpose() {
+                None => {}
+                Some(touch) => return Some(touch.map(|touch| (self.line, touch))),
+            }
+        }
+    }
+}
 
 /// The touches in a text, one after the other; blank lines are skipped, and errors name `path`. A line with a position after
 /// lines without, or the other way round, is an error.
 ///
 /// Memory: that of the longest line.
-pub fn touches(mut text: impl BufRead, path: &Path) -> impl Iterator<Item = Result<Touch>> {
-    let (mut bytes, mut line, mut alike) = (Vec::new(), 0, Alike::default());
-    std::iter::from_fn(move || {
-        loop {
-            bytes.clear();
-            line += 1;
-            match text.read_until(b'\n', &mut bytes) {
-                Err(error) => return Some(Err(Error::io(path, "read the touches", error))),
-                Ok(0) => return None,
-                Ok(_) => {}
-            }
-            let wrong = |problem| Error::at(Place::line(path, line), problem);
-            match std::str::from_utf8(&bytes).map(str::trim) {
-                Err(_) => return Some(Err(wrong(TouchesProblem::NotText))),
-                Ok("") => {}
-                Ok(text) => return Some(parse_touch(text).and_then(|touch| alike.admit(touch)).map_err(wrong)),
-            }
-        }
+pub fn touches(text: impl BufRead, path: &Path) -> impl Iterator<Item = Result<Touch>> {
+    numbered(text, path).map(|read| read.map(|(_, touch)| touch))
+}
+
+/// The touches in a text, as [`touches`], with the numbers of their lines.
+pub(super) fn numbered(text: impl BufRead, path: &Path) -> impl Iterator<Item = Result<(u64, Touch)>> {
+    let mut alike = Alike::default();
+    Lines::new(text, path).filter_map(move |read| {
+        let (line, touch) = match read {
+            Ok((line, touch)) => (line, touch?),
+            Err(error) => return Some(Err(error)),
+        };
+        let admitted = alike.admit(touch).map_err(|problem| Error::at(Place::line(path, line), problem));
+        Some(admitted.map(|touch| (line, touch)))
     })
 }
 
-/// Reads the touches of one text file; blank lines are skipped.
+/// Reads the touches of one text file of which no origin is known; blank lines are skipped.
 ///
 /// # Errors
-/// When the file cannot be read, holds no touch, or has a wrong line.
+/// When the file cannot be read, holds no touch, has a wrong line, or times that are not in seconds.
 pub fn read(path: &Path) -> Result<Vec<Touch>> {
-    read_with_checksum(path).map(|(touches, _)| touches)
+    read_with_checksum(path, &Longest::default()).map(|(touches, _)| touches)
 }
 
-/// Reads the touches, and the file's checksum.
-pub(super) fn read_with_checksum(path: &Path) -> Result<(Vec<Touch>, u32)> {
+/// Reads the touches, none of which is expected to take longer than `longest`, and the file's checksum.
+pub(super) fn read_with_checksum(path: &Path, longest: &Longest) -> Result<(Vec<Touch>, u32)> {
     let file = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
     let mut text = BufReader::with_capacity(1 << 16, Checked::new(file));
-    let touches = touches(&mut text, path).collect::<Result<Vec<_>>>()?;
+    let touches = within(&mut text, path, longest)?;
     if touches.is_empty() {
         return Err(Error::at(Place::file(path), TouchesProblem::NoTouches));
     }
     Ok((touches, text.into_inner().checksum()))
+}
+
+/// All touches in a text, as [`touches`]. Where many of them take longer than `longest`, they are refused.
+///
+/// # Errors
+/// When a line is wrong, or times are not in seconds.
+pub fn within(text: impl BufRead, path: &Path, longest: &Longest) -> Result<Vec<Touch>> {
+    let touches = numbered(text, path).collect::<Result<Vec<_>>>()?;
+    let checked = longest.check_all(touches.iter().map(|(line, touch)| (*line, touch)));
+    checked.map_err(|(line, problem)| Error::at(Place::line(path, line), problem))?;
+    Ok(touches.into_iter().map(|(_, touch)| touch).collect())
 }
 
 /// Reads one line: three contact times in seconds on any common clock (`-` where missing), rounded to whole
@@ -64,10 +134,10 @@ pub(super) fn read_with_checksum(path: &Path) -> Result<(Vec<Touch>, u32)> {
 /// # Errors
 /// Fault of the line.
 pub fn parse_touch(line: &str) -> Result<Touch, TouchesProblem> {
-    let mut fields = [""; 12];
+    let mut found = [""; 12];
     let mut count = 0;
-    for field in line.split(|c: char| c == ',' || c.is_whitespace()).filter(|field| !field.is_empty()) {
-        if let Some(slot) = fields.get_mut(count) {
+    for field in fields(line) {
+        if let Some(slot) = found.get_mut(count) {
             *slot = field;
         }
         count += 1;
@@ -75,8 +145,8 @@ pub fn parse_touch(line: &str) -> Result<Touch, TouchesProblem> {
     if ![3, 9, 12].contains(&count) {
         return Err(TouchesProblem::Fields { count });
     }
-    let [a, b, c, pose @ ..] = fields;
-    let touch = Touch::new([parse_time(a)?, parse_time(b)?, parse_time(c)?]);
+    let [a, b, c, pose @ ..] = found;
+    let touch = Touch::new(contact_times([parse_time(a)?, parse_time(b)?, parse_time(c)?])?);
     if count == 3 {
         return Ok(touch);
     }
@@ -88,6 +158,11 @@ pub fn parse_touch(line: &str) -> Result<Touch, TouchesProblem> {
         return Ok(touch);
     }
     Ok(touch.with_position(position([parse_number(x)?, parse_number(y)?, parse_number(z)?])?))
+}
+
+/// The fields of a line.
+fn fields(line: &str) -> impl Iterator<Item = &str> {
+    line.split(|c: char| c == ',' || c.is_whitespace()).filter(|field| !field.is_empty())
 }
 
 /// Touches that all have a position, or all have none.
@@ -108,29 +183,8 @@ impl Alike {
     }
 }
 
-/// The longest contact time that a touch can hold, in microseconds.
-const LONGEST: f64 = (u32::MAX - 1) as f64;
-
-fn parse_time(field: &str) -> Result<ContactTime, TouchesProblem> {
-    if field == "-" {
-        return Ok(ContactTime::MISSING);
-    }
-    contact_time(parse_number(field)?)
-}
-
-/// Seconds as whole microseconds.
-pub(super) fn contact_time(seconds: f64) -> Result<ContactTime, TouchesProblem> {
-    if !seconds.is_finite() {
-        return Err(TouchesProblem::NotFinite { text: format!("the time {seconds}") });
-    }
-    if seconds < 0.0 {
-        return Err(TouchesProblem::NegativeTime { seconds });
-    }
-    let micros = (seconds * 1e6).round();
-    if micros > LONGEST {
-        return Err(TouchesProblem::LongTime { seconds });
-    }
-    Ok(ContactTime::from_micros(micros as u32))
+fn parse_time(field: &str) -> Result<Option<f64>, TouchesProblem> {
+    if field == "-" { Ok(None) } else { parse_number(field).map(Some) }
 }
 
 fn parse_unit(name: &'static str, fields: [&str; 3]) -> Result<[i16; 3], TouchesProblem> {
@@ -254,6 +308,49 @@ mod tests {
     }
 
     #[test]
+    fn a_mark_names_of_columns_and_comments_are_skipped_and_clocks_may_count_from_1970() {
+        let plain = "0.000123 0 -\n0 0.5 0.25\n";
+        let read = |text: &str| within(text.as_bytes(), Path::new("cup.txt"), &Longest::default());
+        for text in [
+            "\u{feff}0.000123 0 -\r\n\r\n0 0.5 0.25",
+            "\u{feff}first,middle,last\n0.000123,0,-\n0,0.5,0.25\n",
+            "# by hand\n\nt1\tt2\tt3\n0.000123\t0\t-\n#0 0 9\n0 0.5 0.25\n",
+            "1732819200.000123 1732819200 -\n1732819201.5 1732819202 1732819201.75\n",
+            "5000.000123 5000 -\n1e4 10000.5 10000.25\n",
+        ] {
+            assert_eq!(read(text).unwrap(), read(plain).unwrap(), "{text}");
+        }
+        for (text, place) in [
+            ("0 0 0\nfirst middle last\n", "cup.txt:2: \"first\" is not a number"),
+            ("first middle last\nfirst middle last\n0 0 0", "cup.txt:2: \"first\""),
+            ("# t1\nx 0 0\n", "cup.txt:2: \"x\" is not a number"),
+            ("nan nan nan\n", "cup.txt:1: nan is not finite"),
+            (
+                "0 1732819200 0\n",
+                "cup.txt:1: a finger touched 1732819200 s after the first, and a touch can hold 4294 s",
+            ),
+        ] {
+            let said = read(text).unwrap_err().to_string();
+            assert!(said.starts_with(place), "{said}");
+        }
+    }
+
+    #[test]
+    fn times_of_which_most_are_too_long_are_refused_at_the_line_of_the_first() {
+        let longest = Longest::of_scale("the model", 2.0, 10, palpate_shared::format::Length::Tenth);
+        let read = |text: &str| within(text.as_bytes(), Path::new("cup.txt"), &longest);
+        // Contacts at one time say nothing of the unit.
+        let lines = "- 0 -\n0 0 0\n0 1.5 -\n\n0 62 -\n";
+        let said = read(lines).unwrap_err().to_string();
+        let why = "cup.txt:5: a finger touched 62.0 s after the first, but no object of the model's scale takes longer than 2.00 s at \
+                   its speed of 10 units per second. Give times in seconds, not in milliseconds: 0.0622 for 62.2 ms.";
+        assert!(said.starts_with(why), "{said}");
+        assert_eq!(read(&(lines.to_owned() + "0 1.9 -\n")).unwrap().len(), 5, "one of three may be a slip");
+        // With a position heights tell.
+        assert!(read("0 62 - 0 0 -1 1 0 0 1 2 3\n").is_ok());
+    }
+
+    #[test]
     fn wrong_lines_are_refused_with_what_is_wrong() {
         for (line, what) in [
             ("", "0 fields"),
@@ -263,7 +360,7 @@ mod tests {
             ("0 -0.1 0", "the time -0.1 is negative"),
             ("0 nan 0", "nan is not finite"),
             ("0 inf 0", "inf is not finite"),
-            ("0 1e9 0", "longer than"),
+            ("0 1e9 0", "a finger touched 1000000000 s after the first"),
             ("0 x 0", "\"x\" is not a number"),
             ("0 0 0 1 0 0 0 1 0 1 2", "11 fields"),
             ("0 0 0 1 0 0 0 1 0 1 2 3 4", "13 fields"),

@@ -39,6 +39,9 @@ pub(super) fn text(evaluated: &Evaluated) -> String {
     }
     if let Some(strangers) = &evaluated.strangers {
         text += &strangers_table(strangers);
+        if strangers.has_test && evaluated.evaluation.approaches.is_some() {
+            text += "That is of sequences of touches that are evidence; the promise was tested on sequences of approaches.\n";
+        }
     }
     if !evaluated.trained_on.is_empty() {
         let objects = evaluated.trained_on.join(", ");

@@ -256,7 +256,7 @@ fn has_option(command: &str, option: &str) -> bool {
 fn hint(error: &Error, command: &str) -> Option<String> {
     let has = |option: &str| has_option(command, option);
     let said = match error.problem() {
-        Some(MeshProblem::Unread { .. }) if has("skip-bad") => "--skip-bad goes on without what cannot be read.",
+        Some(MeshProblem::Unread { .. }) if has("skip-bad") => "--skip-bad continues without what cannot be read.",
         Some(MeshProblem::SameName { first, second, .. })
             if has("instances") && first.parent() != second.parent() && first.file_stem() == second.file_stem() =>
         {
@@ -271,7 +271,16 @@ fn hint(error: &Error, command: &str) -> Option<String> {
 fn cli() -> clap::Command {
     let cli = Cli::command();
     let overview = overview(&cli);
-    with_unwrapped_help(cli).after_help(overview)
+    with_negative_numbers(with_unwrapped_help(cli)).after_help(overview)
+}
+
+/// A command whose values may begin with a minus sign: those that have to be above 0 are refused as what they are.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let allowed = |argument: clap::Arg| {
+        let takes_values = argument.get_action().takes_values();
+        argument.allow_negative_numbers(takes_values)
+    };
+    command.mut_args(allowed).mut_subcommands(with_negative_numbers)
 }
 
 /// A command whose help below the options is wrapped to the terminal's width, and that of the commands below it.

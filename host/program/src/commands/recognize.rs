@@ -9,6 +9,7 @@ use palpate::chip::Entry;
 use palpate::compile::{self, CompiledModel};
 use palpate::error::{Error, EvaluateProblem, Place};
 use palpate::locate::MapsFile;
+use palpate::touches::Longest;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::format::Counted;
@@ -135,7 +136,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if arguments.active && model.plan().is_none() {
         return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
     }
-    let longest = compile::longest_time(&model);
+    let longest = compile::longest(&model);
     let (active, json) = (arguments.active, global.json);
     let mut stream =
         Stream { recognizer, model: &model, weights, longest, active, json, touches: 0, is_any_partial: false };
@@ -153,8 +154,8 @@ struct Stream<'m> {
     model: &'m Model<'m>,
     /// Frequencies of the objects, if they are not the model's.
     weights: Option<Vec<u32>>,
-    /// The longest time between contacts that makes sense, in seconds.
-    longest: f64,
+    /// The longest time between contacts that makes sense.
+    longest: Longest,
     active: bool,
     json: bool,
     /// Number of touches, and whether a finger was missing in any of them.
@@ -167,7 +168,10 @@ impl<'m> Stream<'m> {
         match event {
             Event::Begin => self.reset(),
             Event::Touch { touch, place } => {
-                self.check(touch).map_err(|problem| Error::at(place, problem))?;
+                if touch.position().is_some() {
+                    return Err(Error::at(place, EvaluateProblem::Located));
+                }
+                self.longest.check(touch).map_err(|problem| Error::at(place, problem))?;
                 self.push(touch)?;
             }
         }
@@ -191,19 +195,6 @@ impl<'m> Stream<'m> {
     /// Begins another object.
     fn reset(&mut self) {
         reset(&mut self.recognizer, self.weights.as_deref());
-    }
-
-    /// Refuses times that no object can give, such as times in milliseconds.
-    fn check(&self, touch: &Touch) -> Result<(), EvaluateProblem> {
-        if touch.position().is_some() {
-            return Err(EvaluateProblem::Located);
-        }
-        let last = touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or(0);
-        let seconds = f64::from(last) * 1e-6;
-        if seconds <= self.longest {
-            return Ok(());
-        }
-        Err(EvaluateProblem::TimeTooLong { seconds, longest: self.longest, speed: self.model.header().speed() })
     }
 
     /// Line to print after a touch.

@@ -2,12 +2,12 @@
 
 use palpate::Result;
 use palpate::chip::Entry;
-use palpate::error::{Error, Place, TouchesProblem};
+use palpate::error::{Error, Place};
 use palpate::output;
-use palpate::touches::{Log, Logged, begins_log, parse_touch};
+use palpate::touches::{Log, Logged, begins_log, text};
 use palpate_shared::Touch;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, IsTerminal, Read};
 use std::path::Path;
 
 /// Verdict after a touch.
@@ -70,6 +70,11 @@ pub(super) enum Event<'e> {
 /// Hands on the touches of a file, or of standard input; of lines each before the next is waited for.
 pub(super) fn each_of(path: &Path, take: &mut dyn FnMut(Event<'_>) -> Result<()>) -> Result<()> {
     if path.as_os_str() == "-" {
+        if std::io::stdin().is_terminal() {
+            super::remark(
+                "palpate: reading touches from the keyboard: three times in seconds a line, such as 0 0.012 -",
+            );
+        }
         return each(std::io::stdin().lock(), Path::new("standard input"), take);
     }
     let touches = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
@@ -82,21 +87,11 @@ fn each(touches: impl Read, path: &Path, take: &mut dyn FnMut(Event<'_>) -> Resu
     if begins_log(begin) {
         return each_of_log(&Log::of(reader, path)?, path, take);
     }
-    let mut bytes = Vec::new();
-    for number in 1.. {
-        bytes.clear();
-        let read = reader.read_until(b'\n', &mut bytes);
-        if read.map_err(|source| Error::io(path, "read the touches", source))? == 0 {
-            break;
+    for line in text::Lines::new(reader, path) {
+        match line? {
+            (_, None) => take(Event::Begin)?,
+            (line, Some(touch)) => take(Event::Touch { touch: &touch, place: Place::line(path, line) })?,
         }
-        let place = || Place::line(path, number);
-        let line = std::str::from_utf8(&bytes).map_err(|_| Error::at(place(), TouchesProblem::NotText))?.trim();
-        if line.is_empty() {
-            take(Event::Begin)?;
-            continue;
-        }
-        let touch = parse_touch(line).map_err(|problem| Error::at(place(), problem))?;
-        take(Event::Touch { touch: &touch, place: place() })?;
     }
     Ok(())
 }

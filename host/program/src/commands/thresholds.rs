@@ -1,16 +1,19 @@
 //! Thresholds of a calibration, as text.
 
-use palpate::calibrate::{Per, Worse, of_what};
+use palpate::calibrate::{Per, Worse};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// The promise in words: its rate, its cases, and the meaning of its confidence.
 pub(super) fn promised(rate: f64, per: Per, cases: &str, confidence: f64) -> String {
+    let rate = super::percent(rate);
+    let promised = match per {
+        Per::Average => format!("At most {rate} % of the names are wrong{cases}, on average."),
+        Per::Name => format!("Each name is wrong{cases} at most {rate} % of the times that it is given."),
+        Per::Object => format!("At most {rate} % of the names given to each object are wrong{cases}."),
+    };
     format!(
-        "Promised: at most {} % of {} wrong{cases}, with a confidence of {} %: of all calibrations, including those that promise \
-         nothing, at most {} % promise what does not hold.\n",
-        super::percent(rate),
-        of_what(per),
+        "{promised} Confidence {} %: of all calibrations at most {} % state a promise that fails.\n",
         super::percent(confidence),
         super::percent(1.0 - confidence),
     )

@@ -146,7 +146,26 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let seconds = start.elapsed().as_secs_f64();
     made.ensemble.save(&arguments.output)?;
     let trained = Trained::new(&made, seconds)?;
+    warn(&made, &trained);
     global.print_about(&arguments.output, &trained, || text(&arguments.output, &trained, &made))
+}
+
+/// Says to stderr if nothing was learned, or if noise hides what there is.
+fn warn(made: &Made, trained: &Trained<'_>) {
+    if trained.splits == 0 {
+        super::remark(
+            "palpate: warning: no tree has a split: all touches look alike to it. Give thousands of touches of each object.",
+        );
+    }
+    let longest = made.dataset.touches().map(Touch::spread).max().map_or(0.0, f64::from);
+    let noise = made.settings.noise.deviation.largest;
+    if noise > longest {
+        let [noise, longest] = [noise, longest].map(|micros| decimal(micros / 1e6, 3));
+        super::remark(&format!(
+            "palpate: warning: noise of {noise} s on contact times hides all touches, of which the longest takes {longest} s. Give \
+             it in milliseconds: noise=5ms."
+        ));
+    }
 }
 
 impl<'m> Trained<'m> {

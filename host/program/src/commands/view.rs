@@ -11,7 +11,6 @@ use clap::ArgGroup;
 use glam::DVec3;
 use palpate::compile::CompiledModel;
 use palpate::error::CaptureProblem;
-use palpate::mesh::facts::Facts;
 use palpate::output;
 use palpate::touches::{Origin, Surroundings};
 use palpate::{Error, Result};

@@ -1,6 +1,6 @@
 //! Output of a run: the text that it prints, and its page.
 
-use super::{AT_APPROACHES, Method, PICTURE, PLAY, Recognition, Summary, TABLE_AT, Trial};
+use super::{AT_APPROACHES, METHODS, Method, PICTURE, PLAY, Recognition, Summary, TABLE_AT, Trial};
 use palpate::capture;
 use palpate::evaluate::{Approaches, Finding, PromiseCheck};
 use palpate::mesh::Object;
@@ -52,7 +52,7 @@ pub(super) fn shown(name: &str, Trial { curve, method, fewest, .. }: &Trial) -> 
 /// The table that the program prints and the page shows: the paper's method, ours where it waits for full touches, and
 /// ours where every contact is evidence, side by side.
 pub(super) fn table(summary: &Summary) -> Records {
-    let mut table = Records::new(["measure", "paper, full touches", "ours, full touches", "ours, every contact"]);
+    let mut table = Records::new(["measure"].into_iter().chain(METHODS));
     let both = |cell: &dyn Fn(&Method) -> Cell| [&summary.paper, &summary.full, &summary.ours].map(cell);
     let mut row = |name: String, [paper, full, ours]: [Cell; 3]| table.push([Cell::Text(name), paper, full, ours]);
     let wanted = rate(summary.ours.evaluation.sequential.error_rate);
@@ -152,15 +152,14 @@ fn calibration(summary: &Summary) -> String {
         ),
         (None, why) => format!("The model promises nothing: {}.", why.as_deref().unwrap_or("it was not calibrated")),
     };
-    let others = [("paper", &summary.paper), ("full touches", &summary.full)];
+    let others = METHODS.into_iter().zip([&summary.paper, &summary.full]);
     let why = |(name, method): (&str, &Method)| method.uncalibrated.as_ref().map(|why| format!(" {name}: {why}."));
-    promise + &others.into_iter().filter_map(why).collect::<String>()
+    promise + &others.filter_map(why).collect::<String>()
 }
 
 /// Promises whose rate was measured to be exceeded, and if chance may be the reason.
 fn above(summary: &Summary) -> String {
-    let methods =
-        [("the paper's method", &summary.paper), ("ours on full touches", &summary.full), ("ours", &summary.ours)];
+    let methods = METHODS.into_iter().zip([&summary.paper, &summary.full, &summary.ours]);
     let of = |(name, method): (&str, &Method)| {
         let own =
             method.evaluation.promise.as_ref().filter(|_| method.promise_of_approaches != method.evaluation.promise);
@@ -168,7 +167,7 @@ fn above(summary: &Summary) -> String {
         let said = checks.into_iter().filter_map(|(check, of)| exceeded(name, check?, of));
         said.collect::<Vec<_>>()
     };
-    methods.into_iter().flat_map(of).collect::<Vec<_>>().join(" ")
+    methods.flat_map(of).collect::<Vec<_>>().join(" ")
 }
 
 /// A promise whose rate was exceeded, as a sentence.
@@ -179,7 +178,7 @@ fn exceeded(name: &str, check: &PromiseCheck, of: &str) -> Option<String> {
         Finding::Broken => "by more than chance explains",
     };
     Some(format!(
-        "In sequences of {of}, {} (± {}) of the names that {name} gave are wrong: above the promised {}, {why}.",
+        "In sequences of {of}, {} (± {}) of the names that “{name}” gave are wrong: above the promised {}, {why}.",
         percent(check.error, 2),
         decimal(100.0 * check.standard_error, 2),
         rate(check.promised)
@@ -306,8 +305,8 @@ mod tests {
         };
         assert_eq!(exceeded("ours", &check(Finding::Kept, 0.009), "touches"), None);
         assert_eq!(
-            exceeded("ours on full touches", &check(Finding::Unclear, 0.0116), "approaches").unwrap(),
-            "In sequences of approaches, 1.16 % (± 0.11) of the names that ours on full touches gave are wrong: above the \
+            exceeded("ours, full touches", &check(Finding::Unclear, 0.0116), "approaches").unwrap(),
+            "In sequences of approaches, 1.16 % (± 0.11) of the names that “ours, full touches” gave are wrong: above the \
              promised 1 %, which may be chance."
         );
         let broken = exceeded("ours", &check(Finding::Broken, 0.03), "touches").unwrap();

@@ -68,7 +68,7 @@ fn bad_meshes_are_named_at_once_and_with_skip_bad_the_rest_is_captured() {
     let said = captured(at, "set -o data --touches 5", 1);
     assert!(said.starts_with("palpate: 2 of 5 meshes cannot be read:\n  set/cut.stl:2: the STL file"), "{said}");
     assert!(
-        said.contains("\n  set/empty.ply:1: ") && said.ends_with("--skip-bad goes on without what cannot be read.\n"),
+        said.contains("\n  set/empty.ply:1: ") && said.ends_with("--skip-bad continues without what cannot be read.\n"),
         "{said}"
     );
     assert!(!at.join("data").exists());

@@ -1,8 +1,28 @@
 //! Guidance for someone who uses the program for the first time.
 
-use crate::fixtures::spread;
-use crate::{Folder, figures, globe, palpate, says, stderr, succeeds};
+use crate::fixtures::{BOWL_AND_FORK, spread};
+use crate::{Folder, fails, figures, globe, palpate, says, stderr, succeeds};
 use serde_json::Value;
+use std::fs;
+
+#[test]
+fn a_training_that_learned_nothing_and_numbers_below_0_are_called_what_they_are() {
+    let at = &BOWL_AND_FORK.folder();
+    let said = |words: &str| String::from_utf8(palpate(at, words).stderr).unwrap();
+    let none = "no tree has a split: all touches look alike to it. Give thousands of touches";
+    let hidden = "noise of 5.000 s on contact times hides all touches, of which the longest takes";
+    assert!(!said("train data -o some.json --trees rounds=2").contains("warning"));
+    assert!(said("train data -o noisy.json --trees rounds=2 --real noise=5s").contains(hidden));
+    fs::create_dir(at.join("few")).unwrap();
+    for name in ["bowl", "fork"] {
+        fs::write(at.join(format!("few/{name}.txt")), "0 0.1 0.2\n".repeat(9)).unwrap();
+    }
+    assert!(said("train few -o few.json --trees rounds=2").contains(none));
+    for words in ["capture bowl mouse -o out --approaches -5", "capture bowl mouse -o out --touches -1"] {
+        fails(at, words, 2, "give a whole number, such as 21000");
+    }
+    fails(at, "capture bowl mouse -o out --seed -1", 2, "invalid value '-1' for '--seed");
+}
 
 #[test]
 fn a_promise_that_is_tested_on_other_data_than_it_was_made_for_says_so_and_whether_it_is_kept() {

@@ -16,7 +16,7 @@ fn run_goes_from_meshes_to_models_and_a_page_with_noise_which_its_command_states
     let at = &Folder::new();
     meshes(at);
     let words = "run meshes -o out --touches 300 --seed 3 --real noise=0..20ms,timer=1ms";
-    says(at, words, &["report.html"]);
+    let text = says(at, words, &["report.html"]);
     let out = at.join("out");
     for name in
         ["ensemble.json", "model.palpate", "paper.json", "paper.palpate", "play.html", "report.html", "summary.json"]
@@ -36,6 +36,13 @@ fn run_goes_from_meshes_to_models_and_a_page_with_noise_which_its_command_states
     assert!(noise("ensemble.json").is_string() && noise("paper.json").is_null());
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("globe") && page.contains("lump") && page.contains("</html>"));
+    // The methods have one name each, wherever they are.
+    let played = fs::read_to_string(out.join("play.html")).unwrap();
+    for method in ["paper, full touches", "ours, full touches", "ours, every contact"] {
+        assert!(text.contains(method) && page.contains(method) && played.contains(method), "{method}");
+    }
+    assert!(!page.contains("ours on ") && !played.contains("curvature, full touches"));
+    assert!(page.contains("class=\"within\""), "rows that belong to the one above");
 }
 
 #[test]

@@ -479,7 +479,7 @@ fn sequences_of_rows_are_calibrated_evaluated_and_recognized_verdict_after_verdi
     );
     assert_eq!(found["sequences"], 225);
     let text = succeeds(at, &calibrate);
-    assert!(text.starts_with("Promised: at most 10 % of all names given, on average, wrong"), "{text}");
+    assert!(text.starts_with("At most 10 % of the names are wrong, on average. Confidence 95 %: of all"), "{text}");
     let evaluate = format!("evaluate sure.palpate unseen.csv {COLUMNS}");
     let found = figures(at, &format!("{evaluate} --page page.html"));
     assert!(found["error"].as_f64() < Some(0.15) && found["promise"]["promised"] == 0.1, "{found}");
@@ -548,14 +548,9 @@ fn a_promise_for_groups_says_when_none_are_given_and_copies_are_noted() {
     let with: Vec<String> = rows.lines().map(|line| format!("{line},{}", person(line))).collect();
     fs::write(at.join("fresh.csv"), format!("{header},person\n{}\n", with.join("\n"))).unwrap();
     let calibrate = format!("calibrate model.palpate fresh.csv -o sure.palpate --error-rate 20% {COLUMNS}");
-    let expected = "of all calibrations, including those that promise nothing, at most 5 % promise what does not hold";
+    let expected = "Confidence 95 %: of all calibrations at most 5 % state a promise that fails.";
     let text = says(at, &format!("{calibrate} --group-column person"), &[expected]);
-    assert!(
-        text.starts_with(
-            "Promised: at most 20 % of all names given, on average, wrong in new groups, with a confidence of 95 %"
-        ),
-        "{text}"
-    );
+    assert!(text.starts_with("At most 20 % of the names are wrong in new groups, on average."), "{text}");
     let evaluate = format!("evaluate sure.palpate fresh.csv {COLUMNS}");
     says(at, &format!("{evaluate} --group-column person"), &[" were, each group weighing the same: "]);
     let alone = " were, each sequence as a group of its own, as none are given (--group-column): ";

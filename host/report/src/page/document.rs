@@ -279,10 +279,9 @@ fn marked(text: &str) -> Markup {
 }
 
 fn rows(data: &Records, title: &str) -> Markup {
-    // A column reads as numbers if none of its cells is words.
-    let numeric: Vec<bool> = (0..data.columns.len())
-        .map(|column| !data.rows.iter().any(|row| matches!(row[column], Cell::Text(_))))
-        .collect();
+    // A column reads as numbers unless most of its cells are words, such as "over 200".
+    let words = |column: usize| data.rows.iter().filter(|row| matches!(row[column], Cell::Text(_))).count();
+    let numeric: Vec<bool> = (0..data.columns.len()).map(|column| 2 * words(column) <= data.rows.len()).collect();
     html! {
         div.scroll tabindex="0" role="region" aria-label=(title) {
             table {
@@ -297,7 +296,8 @@ fn rows(data: &Records, title: &str) -> Markup {
                 tbody {
                     @for row in &data.rows {
                         tr { @for (cell, numeric) in row.iter().zip(&numeric) {
-                            td class=[numeric.then_some("number")] data-value=[cell.value()] { (cell.shown()) }
+                            @let within = cell.shown().starts_with("  ").then_some("within");
+                            td class=[numeric.then_some("number").or(within)] data-value=[cell.value()] { (cell.shown()) }
                         } }
                     }
                 }

@@ -138,7 +138,8 @@ function openPicture(data, touch) {
       requestAnimationFrame(step);
     }
   };
-  // The approach that a plan proposes: three lines toward the middle of the object, with the fingers where they start.
+  // The approach that a plan proposes: three lines toward the middle of the object, or down to the table, with the fingers where
+  // they start.
   const propose = (proposal) => {
     planned.visible = Boolean(proposal);
     if (proposal) {
@@ -146,7 +147,7 @@ function openPicture(data, touch) {
       const middle = vector(proposal.at ?? [0, 0, 0]);
       const ends = [-1, 0, 1].map((place) => {
         const aside = vector(proposal.alignment).multiplyScalar(place * spacing);
-        return [1, 0.55].map((far) => vector(proposal.direction).multiplyScalar(-far * reach).add(aside).add(middle));
+        return [1, proposal.at ? 0 : 0.55].map((far) => vector(proposal.direction).multiplyScalar(-far * reach).add(aside).add(middle));
       });
       stretch(plan, ends);
       ends.forEach(([from], finger) => heads[finger].position.copy(from));

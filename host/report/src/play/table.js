@@ -81,13 +81,15 @@
   const believed = () => {
     const count = sure(exports.belief(), "the belief"), objects = data.objects.length;
     const [verdict, leader, touches, ...rest] = taken(3 + objects + 9 * count);
+    // The locator rounds each by itself: together they are everything.
+    const sum = rest.slice(0, objects).reduce((sum, posterior) => sum + posterior) || 1;
     const ghost = (_, index) => {
       const [object, placement, x, y, yaw, share, ...within] = rest.slice(objects + 9 * index);
       return { object, placement, x, y, yaw, share, within };
     };
     return {
       verdict: ["undecided", "recognized", "unknown", "gave up"][verdict], leader, touches,
-      posteriors: rest.slice(0, objects), ghosts: Array.from({ length: count }, ghost),
+      posteriors: rest.slice(0, objects).map((posterior) => posterior / sum), ghosts: Array.from({ length: count }, ghost),
     };
   };
   const bars = openBars(data.objects.map(({ name }) => name));
@@ -103,8 +105,9 @@
     const pose = best ? ` It lies on the table as ${lying[leader][best.placement].name}: x ${one(best.x)} ± ${one(x)} mm, y ${one(best.y)} ± ${one(y)} mm, yaw `
       + `${Number.isNaN(yaw) ? "any" : `${degrees(best.yaw)} ± ${Math.ceil(yaw * 180 / Math.PI)}°`}.` : "";
     element("verdict").textContent = {
-      undecided: touches === 0 ? "Undecided: nothing is known yet." : `Undecided after ${count}: ${name} leads with ${percent(posteriors[leader])} %.`
-        + (posteriors[leader] > data.threshold ? " The search for poses ran out of room, so nothing is named yet." : ""),
+      undecided: touches === 0 ? "Undecided: nothing is known yet. Press the blue button." : posteriors[leader] > data.threshold
+        ? `Undecided after ${count}: ${name} is almost certain, but where it lies is not found yet. Press again.`
+        : `Undecided after ${count}: ${name} leads with ${percent(posteriors[leader])} %.`,
       recognized: `Recognized: ${name}, after ${count}.${pose}`,
       unknown: `It is no object that the maps know, after ${count}.`,
       "gave up": `The locator gave up after ${count}.`,

@@ -120,7 +120,7 @@ fn body(
         }
         main {
             section.table aria-label="The table" {
-                (scene::figure("Click the table to press there; R turns the row of fingers. Drag to turn the view, scroll or pinch to zoom; \
+                (scene::figure("Begin with the blue button, or click the table to press there; R turns the row of fingers. Drag to turn the view, scroll or pinch to zoom; \
                                 or use the arrow keys, + and \u{2212}."))
                 div.row {
                     button.main type="button" id="next" { "Press where it tells most" }

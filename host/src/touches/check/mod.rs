@@ -10,10 +10,9 @@ pub use summary::{ObjectSummary, Quantiles, Summary};
 use super::checksum::Checked;
 use super::dataset::name_of;
 use super::warning::channels_said;
-use super::{Entry, Listing, Log, Origin, Warning, is_log, logs, text};
+use super::{Entry, Listing, Log, Longest, Origin, Warning, is_log, logs, text};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use palpate_shared::Touch;
-use palpate_shared::format::Length;
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::BufReader;
@@ -68,7 +67,7 @@ impl Check {
         }
         let listing = match Listing::read(directory) {
             Ok(listing) => listing,
-            Err(error @ Error::Io { .. }) => return Err(error),
+            Err(error) if directory.is_file() || matches!(error, Error::Io { .. }) => return Err(error),
             Err(error) => {
                 findings.error(error);
                 None
@@ -120,7 +119,7 @@ struct Read {
 
 /// The objects that a listing names.
 fn listed(directory: &Path, listing: Listing, findings: &mut Findings) -> Result<Vec<Read>> {
-    let mut objects = Vec::new();
+    let (mut objects, longest) = (Vec::new(), listing.origin.longest());
     for Entry { name, touches: stated, approaches, crc32, .. } in listing.objects {
         let path = directory.join(format!("{name}.{}", super::files::EXTENSION));
         if !path.exists() {
@@ -128,7 +127,7 @@ fn listed(directory: &Path, listing: Listing, findings: &mut Findings) -> Result
             continue;
         }
         let before = findings.0.len();
-        let (touches, found) = read(&path, findings)?;
+        let (touches, found) = read(&path, &longest, findings)?;
         if findings.0.len() == before && touches.len() as u64 != stated {
             findings.problem(&path, TouchesProblem::OtherCount { stated, found: touches.len() as u64 });
         } else if crc32.is_some_and(|stated| stated != found) {
@@ -160,7 +159,7 @@ fn found(directory: &Path, findings: &mut Findings) -> Result<Vec<Read>> {
             logs.push(path);
             continue;
         }
-        let (touches, _) = read(&path, findings)?;
+        let (touches, _) = read(&path, &Longest::default(), findings)?;
         objects.push(Read { name, path, touches, approaches: None, is_logged: false });
     }
     logs.sort();
@@ -206,11 +205,11 @@ fn logged(path: &Path, objects: &mut Vec<Read>, findings: &mut Findings) -> Resu
 }
 
 /// The touches of a file that can be read, and the file's checksum.
-fn read(path: &Path, findings: &mut Findings) -> Result<(Vec<Touch>, u32)> {
+fn read(path: &Path, longest: &Longest, findings: &mut Findings) -> Result<(Vec<Touch>, u32)> {
     let file = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
     let mut reader = BufReader::with_capacity(1 << 16, Checked::new(file));
     let (mut touches, mut wrong) = (Vec::new(), 0);
-    for touch in text::touches(&mut reader, path) {
+    for touch in text::numbered(&mut reader, path) {
         match touch {
             Ok(touch) => touches.push(touch),
             Err(error @ Error::Io { .. }) => return Err(error),
@@ -225,7 +224,10 @@ fn read(path: &Path, findings: &mut Findings) -> Result<(Vec<Touch>, u32)> {
     if wrong > MOST_LINES {
         findings.wrong(path, format!("{} more lines are wrong", wrong - MOST_LINES), "Correct them, or capture again.");
     }
-    Ok((touches, reader.into_inner().checksum()))
+    if let Err((line, problem)) = longest.check_all(touches.iter().map(|(line, touch)| (*line, touch))) {
+        findings.error(Error::at(Place::line(path, line), problem));
+    }
+    Ok((touches.into_iter().map(|(_, touch)| touch).collect(), reader.into_inner().checksum()))
 }
 
 struct Findings(Vec<Finding>);
@@ -293,13 +295,11 @@ impl Findings {
         } else if count < 100 {
             self.note(path, &format!("only {count} touches"), "Capture some thousand of each object.");
         }
-        let Some(longest) = origin.and_then(longest) else { return };
-        let long = touches.iter().filter(|touch| last(touch) > longest).count();
-        let what = format!("{} last longer than the {longest:.2} s in which the probe passes the object", of(long));
-        if 2 * long > count {
-            self.wrong(path, what + ": the times are not in seconds", "Give times in seconds.");
-        } else if long > 0 {
-            self.note(path, &what, "Check those lines.");
+        let longest = origin.map_or_else(Longest::default, Origin::longest);
+        let is_slip = longest.check_all(touches.iter().map(|touch| ((), touch))).is_ok();
+        let too_long = touches.iter().filter(|_| is_slip).filter_map(|touch| longest.check(touch).err());
+        if let Some(problem) = too_long.clone().next() {
+            self.note(path, &format!("{}: {problem}", of(too_long.count())), "Check those lines.");
         }
     }
 
@@ -354,12 +354,6 @@ fn key(touch: &Touch) -> Key {
 /// The time between the first and the last contact, in seconds.
 fn last(touch: &Touch) -> f64 {
     f64::from(touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or_default()) / 1e6
-}
-
-/// The longest time between two contacts: the whole way of an approach. Unknown where objects have different sizes.
-fn longest(origin: &Origin) -> Option<f64> {
-    let way = 3_f64.sqrt() * origin.length + 2.0 * origin.clearance([glam::DVec3::ZERO; 2]);
-    (origin.unit == Length::Tenth).then(|| way / origin.probe.speed)
 }
 
 #[cfg(test)]

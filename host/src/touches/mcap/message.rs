@@ -89,9 +89,6 @@ fn cdr<T: serde::de::DeserializeOwned>(data: &[u8]) -> Result<T, TouchesProblem>
     }
 }
 
-/// The longest time that a touch can hold, in seconds.
-const LONGEST: f64 = 4294.0;
-
 fn felt(touched: CdrTouch, position: Option<[f64; 3]>) -> Result<(Touch, Option<String>), TouchesProblem> {
     let CdrTouch { times, has_pose, direction, alignment, object } = touched;
     touch(JsonTouch {
@@ -108,10 +105,6 @@ fn touch(message: JsonTouch) -> Result<(Touch, Option<String>), TouchesProblem> 
     if let Some(name) = object.as_ref().filter(|name| !is_file_name(name)) {
         return Err(TouchesProblem::BadName { name: name.clone() });
     }
-    // Clocks that count from 1970 are welcome: whole seconds are taken off, which leaves the rest as it is.
-    let first = times.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-    let start = if first > LONGEST && first.is_finite() { first.floor() } else { 0.0 };
-    let times = times.map(|time| time.map(|time| time - start));
     let (direction, alignment) = pose.map(|JsonPose { direction, alignment }| (direction, alignment)).unzip();
     let touch = touch_of_seconds(times, direction, alignment)?;
     let touch = match position {

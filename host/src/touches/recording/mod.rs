@@ -11,7 +11,7 @@ mod tests;
 use super::checksum::CRC;
 use super::files::files;
 use super::listing::is_file_name;
-use super::{Entry, Listing, Origin, Warning, text, write_touch};
+use super::{Entry, Listing, Longest, Origin, Warning, text, write_touch};
 use crate::error::{Error, Place, Result, TouchesProblem};
 use crate::output;
 use crc::{Digest, Table};
@@ -149,7 +149,8 @@ impl Recording {
     fn take_up(&mut self) -> Result<u64> {
         let object = &self.recorded.object;
         let Some(entry) = self.listing.objects.iter_mut().find(|entry| entry.name == *object) else { return Ok(0) };
-        let touches = read(entry, &self.path, &mut self.warnings)?.len() as u64;
+        let longest = self.listing.origin.longest();
+        let touches = read(entry, &self.path, &longest, &mut self.warnings)?.len() as u64;
         // What an interrupted recording had not listed is its own.
         let more = touches - entry.touches;
         if let Some(last) = self.listing.recorded.iter_mut().rev().find(|recorded| recorded.object == *object) {
@@ -367,7 +368,7 @@ fn differences(there: &Origin, here: &Origin) -> Vec<String> {
 }
 
 /// The touches of a recorded object: at least as many as listed.
-pub(super) fn read(entry: &Entry, path: &Path, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
+pub(super) fn read(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
     let bytes = match std::fs::read(path) {
         Err(error) if error.kind() == ErrorKind::NotFound && entry.touches == 0 => return Ok(Vec::new()),
         Err(error) if error.kind() == ErrorKind::NotFound => {
@@ -376,7 +377,7 @@ pub(super) fn read(entry: &Entry, path: &Path, warnings: &mut Vec<Warning>) -> R
         read => read.map_err(|error| Error::io(path, "read the touches", error))?,
     };
     let whole = whole(&bytes);
-    let touches = text::touches(whole, path).collect::<Result<Vec<_>>>()?;
+    let touches = text::within(whole, path, longest)?;
     let (stated, found) = (entry.touches, touches.len() as u64);
     if found < stated {
         return Err(Error::at(Place::file(path), TouchesProblem::OtherCount { stated, found }));

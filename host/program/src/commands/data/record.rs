@@ -3,7 +3,7 @@
 use crate::commands::link::LineOptions;
 use crate::commands::link::record::{RecordArguments, from_chip, summary};
 use crate::commands::{Global, remark};
-use palpate::touches::{Log, begins_log, text};
+use palpate::touches::{Log, Longest, begins_log, text};
 use palpate::{Error, Result, output};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -12,7 +12,7 @@ use std::time::SystemTime;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-A line is a touch: three contact times in seconds on any clock, - for a finger that did not touch, and optionally the probe's direction and alignment (six numbers), and behind them the hand's position in millimeters (three). Lines `- - -` for approaches that touched nothing are recorded too; a chip reports those if it is told when an approach is over (GP5 on a Pico). SOURCE may also be a robot's log (MCAP), of which the touches of NAME are taken, or a chip, whose touches are added as soon as it reports them, until Ctrl-C; if the cable is pulled, this waits for it.
+A line is a touch: three contact times in seconds on any clock, - for a finger that did not touch, and optionally the probe's direction and alignment (six numbers), and behind them the hand's position in millimeters (three), separated by blanks or commas. A first line of column names and lines that begin with # are skipped. Lines `- - -` for approaches that touched nothing are recorded too; a chip reports those if it is told when an approach is over (GP5 on a Pico). SOURCE may also be a robot's log (MCAP), of which the touches of NAME are taken, or a chip, whose touches are added as soon as it reports them, until Ctrl-C; if the cable is pulled, this waits for it.
 
 On a table, the object's name may end with its placement, as `palpate capture --scene table` names it; without one, the touches may be of any placement.
 
@@ -63,7 +63,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
             (source.as_str(), Box::new(opened))
         }
     };
-    let mut touches = read(BufReader::new(lines), Path::new(source), object)?;
+    let longest = record.origin(directory)?.longest();
+    let mut touches = read(BufReader::new(lines), Path::new(source), object, &longest)?;
     touches.truncate(arguments.stop_after.map_or(usize::MAX, |most| usize::try_from(most).unwrap_or(usize::MAX)));
     let mut recording = record.open(directory, object, source, SystemTime::now())?;
     recording.add_all(&touches).map_err(|error| error.in_file(source))?;
@@ -87,7 +88,7 @@ fn is_chip(source: &str) -> bool {
 }
 
 /// The touches in a file of lines; those of the object in a log.
-fn read(mut lines: impl BufRead, source: &Path, object: &str) -> Result<Vec<palpate_shared::Touch>> {
+fn read(mut lines: impl BufRead, source: &Path, object: &str, longest: &Longest) -> Result<Vec<palpate_shared::Touch>> {
     let begin = lines.fill_buf().map_err(|error| Error::io(source, "read the touches", error))?;
     if begins_log(begin) {
         let log = Log::of(lines, source)?;
@@ -98,7 +99,7 @@ fn read(mut lines: impl BufRead, source: &Path, object: &str) -> Result<Vec<palp
         }
         return Ok(touches);
     }
-    let touches = text::touches(lines, source).collect::<Result<Vec<_>>>()?;
+    let touches = text::within(lines, source, longest)?;
     match touches.is_empty() {
         true => Err(Error::at(palpate::error::Place::file(source), palpate::error::TouchesProblem::NoTouches)),
         false => Ok(touches),

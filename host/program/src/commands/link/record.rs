@@ -38,6 +38,14 @@ impl RecordArguments {
     /// # Errors
     /// Errors of [`Recording::open`], and when the probe file cannot be used.
     pub(crate) fn open(&self, directory: &Path, object: &str, source: &str, began: SystemTime) -> Result<Recording> {
+        let origin = self.origin(directory)?;
+        let recording = Recording::open(directory, object, Some(&origin), source, began)?;
+        recording.warnings().iter().for_each(|warning| remark(&format!("palpate: warning: {warning}")));
+        Ok(recording)
+    }
+
+    /// How touches are recorded into a directory.
+    pub(crate) fn origin(&self, directory: &Path) -> Result<Origin> {
         let (probe, unit) = match self.probe.read()? {
             Some(file) => (file.probe, file.unit),
             None => {
@@ -49,10 +57,7 @@ impl RecordArguments {
         if self.position && unit != Length::Millimeter {
             return Err(Error::setting("position", "given", "it with --probe FILE whose unit is mm"));
         }
-        let origin = Origin { position: self.position, ..Origin::recorded(probe, unit, self.pose || self.position) };
-        let recording = Recording::open(directory, object, Some(&origin), source, began)?;
-        recording.warnings().iter().for_each(|warning| remark(&format!("palpate: warning: {warning}")));
-        Ok(recording)
+        Ok(Origin { position: self.position, ..Origin::recorded(probe, unit, self.pose || self.position) })
     }
 }
 
@@ -119,8 +124,9 @@ pub(crate) fn summary(recording: &Recording, directory: &Path, contacts: [u64; 4
     };
     let missed = if none > 0 { format!(", {none} none") } else { String::new() };
     format!(
-        "recorded {touches} touches of {object}{lying} into {}, which holds {all} {of} now\ncontacts: {three} have three, {two} \
+        "recorded {touches} {} of {object}{lying} into {}, which holds {all} {of} now\ncontacts: {three} have three, {two} \
          two, {one} one{missed}\n",
+        if touches == 1 { "touch" } else { "touches" },
         directory.display()
     )
 }
