@@ -214,7 +214,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
         instructions: code.as_ref().map_or_else(|| Instructions::of_model(&model), Program::instructions),
         code,
         probability: original.origin.imported.as_ref().map(|imported| imported.probability).unwrap_or_default(),
-        notes: notes::of_values(original, &model, settings.leaf, rounding > f64::from(trees_error)),
+        notes: notes::of_values(original, &model, settings.leaf, [rounding, trees_error.into()]),
         bytes,
     })
 }
