@@ -66,7 +66,7 @@ pub(super) fn held(ensemble: &Ensemble, leaf: Leaf) -> Held<'_> {
         return as_it_is;
     }
     let offset = |sums: &Sums| if is_f32 { 0.0 } else { (sums.middle * before) as f32 };
-    // What the offset, an f32, leaves over.
+    // The part of a middle that its offset, an f32, leaves over.
     let rest = |sums: &Sums| sums.middle - f64::from(offset(sums)) / before;
     let range = |sums: &Sums| sums.reach + rest(sums).abs();
     // Sums of f32 have one scale.

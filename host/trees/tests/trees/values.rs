@@ -50,9 +50,9 @@ enum Kind {
     LightGbm,
     /// It is where margins start, in f64.
     Histogram,
-    /// The same with one split for all nodes of a level.
+    /// Likewise, in shallow trees.
     CatBoost,
-    /// The same in f32, which all sums are.
+    /// It is where margins start, in f32, and all sums are f32.
     XgBoost,
 }
 
