@@ -356,6 +356,71 @@ def test_each_target_of_a_booster_has_the_value_that_the_library_predicts() -> N
     np.testing.assert_allclose(palpate.compile(regressor, leaf="f32").predict(TEST), regressor.predict(TEST), atol=1e-5)
 
 
+def regressors() -> list[Any]:
+    """A regressor of each library and kind."""
+    return [
+        lightgbm.LGBMRegressor(n_estimators=60, verbose=-1, n_jobs=1),
+        xgboost.XGBRegressor(n_estimators=60, n_jobs=1),
+        catboost.CatBoostRegressor(iterations=60, verbose=0, thread_count=1, allow_writing_files=False),
+        ensemble.RandomForestRegressor(30, max_depth=8, random_state=1),
+        ensemble.GradientBoostingRegressor(n_estimators=60, random_state=1),
+        ensemble.HistGradientBoostingRegressor(max_iter=60, random_state=1),
+    ]
+
+
+@pytest.mark.parametrize(("mean", "deviation"), [(101325.0, 3.0), (2024.0, 1.0), (273.0, 2.0), (1.7e9, 3600.0)])
+@pytest.mark.parametrize("estimator", regressors(), ids=lambda estimator: type(estimator).__name__)
+def test_values_of_targets_far_from_0_stay_the_librarys(estimator: Any, mean: float, deviation: float) -> None:
+    train, test = rows(600, False, 5), rows(1000, False, 6)
+    estimator.fit(train, mean + deviation * (train[:, 0] + np.sin(2 * train[:, 1])))
+    expected = np.asarray(estimator.predict(test), dtype=np.float64)
+    spread = expected.std()
+    model = palpate.compile(estimator)
+    off = np.sqrt(np.mean((model.margins(test)[:, 0] - expected) ** 2)) / spread
+    step = float(np.spacing(np.float32(mean))) / spread
+    if type(estimator) is xgboost.XGBRegressor and any("and leaves of f32 give its own values" in note for note in model.notes):
+        # It rounds to f32 after each tree.
+        np.testing.assert_array_equal(palpate.compile(estimator, leaf="f32").predict(test), estimator.predict(test))
+    else:
+        assert off <= 0.002
+        assert np.sqrt(np.mean((np.asarray(model.predict(test)) - expected) ** 2)) / spread <= 0.002 + step / 3
+    assert any("_without_offset" in note for note in model.notes) or mean < 1e9
+
+
+def test_targets_of_different_sizes_keep_their_digits() -> None:
+    train, test = rows(600, False, 5), rows(1000, False, 6)
+    targets = np.stack([20 + 5 * train[:, 0], 101325 + 300 * train[:, 1], 0.5 + 0.1 * np.tanh(train[:, 2])], axis=1)
+    for estimator in (ensemble.RandomForestRegressor(30, max_depth=8, random_state=1), xgboost.XGBRegressor(n_estimators=60, n_jobs=1)):
+        expected = np.asarray(estimator.fit(train, targets).predict(test), dtype=np.float64)
+        off = np.asarray(palpate.compile(estimator).predict(test)) - expected
+        assert (np.sqrt((off**2).mean(axis=0)) <= 0.002 * expected.std(axis=0)).all()
+
+
+def test_a_note_on_f32_is_for_libraries_that_compare_f64_alone() -> None:
+    generator = np.random.default_rng(3)
+    seconds = 1_700_000_000 + generator.integers(0, 86400 * 3, 2000)
+    train, target = np.stack([seconds, generator.integers(0, 50, 2000)], axis=1), seconds // 3600 % 3
+    for estimator in (
+        lightgbm.LGBMClassifier(n_estimators=40, verbose=-1, n_jobs=1),
+        ensemble.HistGradientBoostingClassifier(max_iter=20),
+    ):
+        estimator.fit(train, target)
+        with pytest.warns(palpate.ModelWarning, match="of .* stay different in f32, and about 1 row in"):
+            palpate.compile(estimator)
+        model = palpate.compile(estimator, leaf="f32", scales=[1, 1])
+        assert [str(own) for own in model.predict(train)] == [str(own) for own in estimator.predict(train)]
+    for estimator in (
+        ensemble.RandomForestClassifier(20, max_depth=10, random_state=1),
+        ensemble.ExtraTreesClassifier(20, max_depth=10, random_state=1),
+        tree.DecisionTreeClassifier(random_state=1),
+        ensemble.GradientBoostingClassifier(n_estimators=20),
+        xgboost.XGBClassifier(n_estimators=20, n_jobs=1),
+    ):
+        model = palpate.compile(estimator.fit(train, target), leaf="f32")
+        assert not any("f32" in note for note in model.notes)
+        assert [str(own) for own in model.predict(train)] == [str(own) for own in estimator.predict(train)]
+
+
 @pytest.mark.parametrize("settings", [{}, {"max_features": 0.5, "bootstrap": True}, {"max_samples": 30, "contamination": 0.1}])
 def test_an_isolation_forest_gives_its_anomaly_score_and_states_where_outliers_begin(settings: dict[str, Any]) -> None:
     estimator = ensemble.IsolationForest(n_estimators=30, random_state=1, **settings).fit(np.nan_to_num(TRAIN))

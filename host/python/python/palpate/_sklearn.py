@@ -31,6 +31,8 @@ class _Parts:
     """The rule by which `predict_proba` makes probabilities of margins."""
     targets: bool = False
     """True if each output is a target of a regression, and none is a class."""
+    compares_f64: bool = False
+    """True if values are compared in f64, and not rounded to f32 first."""
 
 
 def read(model: Any, names: list[str] | None) -> Ensemble:
@@ -53,7 +55,7 @@ def read(model: Any, names: list[str] | None) -> Ensemble:
         last_of_ties=parts.last_of_ties,
         targets=parts.targets,
         probability=parts.probability,
-        compares_f64=kind.startswith("HistGradientBoosting"),
+        compares_f64=parts.compares_f64,
     )
 
 
@@ -155,7 +157,8 @@ def _calibrated(model: Any) -> _Parts:
         else:
             scaled = (values.reshape(-1, classes) * slopes).ravel()
         trees.append((output, left, right, feature, threshold, missing, np.ascontiguousarray(scaled)))
-    return _Parts(base, trees, notes, probability="softmax" if is_known else "unknown")
+    probability = "softmax" if is_known else "unknown"
+    return _Parts(base, trees, notes, probability=probability, compares_f64=parts.compares_f64)
 
 
 def _line(calibrator: Any, classes: int) -> tuple[float, float]:
@@ -264,7 +267,8 @@ def _histogram(model: Any) -> _Parts:
     elif link is None:
         name = type(model._loss.link).__name__
         raise InputError(f"the model's loss has the link {name}, which is not known. Train with a loss of scikit-learn's by name.")
-    return _Parts(([0.0] if is_binary else []) + [float(value) for value in first], trees, [], link)
+    base = ([0.0] if is_binary else []) + [float(value) for value in first]
+    return _Parts(base, trees, [], link, compares_f64=True)
 
 
 _LINKS = {"IdentityLink": "identity", "LogLink": "exponential"}

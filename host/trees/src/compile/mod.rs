@@ -221,7 +221,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
         code,
         probability: imported.map(|imported| imported.probability).unwrap_or_default(),
         categories: imported.map(|imported| imported.categories.clone()).unwrap_or_default(),
-        notes: notes::of_values(original, &model, settings.leaf, rounding > f64::from(trees_error)),
+        notes: notes::of_values(original, &model, settings.leaf, [rounding, trees_error.into()]),
         bytes,
     })
 }

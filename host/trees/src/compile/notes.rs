@@ -6,8 +6,8 @@ use crate::verify;
 use palpate_onboard::Model;
 
 /// Notes for the user, where the bound that a model states, or a step of f32, is not small against what the trees add up to.
-/// `is_before` if more is lost before leaves are rounded than by that.
-pub(super) fn of_values(ensemble: &Ensemble, model: &Model<'_>, leaf: Leaf, is_before: bool) -> Vec<String> {
+/// `errors` are those before leaves are rounded, and by that, in nats.
+pub(super) fn of_values(ensemble: &Ensemble, model: &Model<'_>, leaf: Leaf, errors: [f64; 2]) -> Vec<String> {
     let mut notes = Vec::new();
     if !ensemble.is_regression() {
         return notes;
@@ -15,28 +15,26 @@ pub(super) fn of_values(ensemble: &Ensemble, model: &Model<'_>, leaf: Leaf, is_b
     for (output, reach) in ensemble.reach().into_iter().enumerate().filter(|(_, reach)| *reach > 0.0) {
         let of =
             if ensemble.objects.len() == 1 { "Values" } else { &*format!("Values of {}", ensemble.objects[output]) };
-        let bound = verify::bound_of(model, output);
+        // Values of f32 leaves are their sums, which nothing rounds further.
+        let bound = match leaf {
+            Leaf::F32 => errors[0] * f64::from(model.prediction().scale),
+            Leaf::I8 | Leaf::I16 => verify::bound_of(model, output),
+        };
         if bound > TOLERATED * reach {
-            let advice = match leaf {
-                Leaf::F32 if !ensemble.adds_f32() => {
-                    "The library adds in f64: leaves of i16 are closer (--leaf i16, in Python leaf=\"i16\")."
-                }
-                Leaf::F32 => "Subtract their mean from the targets before training.",
-                Leaf::I8 | Leaf::I16 if ensemble.adds_f32() && is_before => {
-                    "The library itself rounds to f32 after each tree: leaves of f32 give its own values (--leaf f32, in \
-                     Python leaf=\"f32\")."
-                }
-                Leaf::I8 => "Leaves of i16 are closer (--leaf i16, in Python leaf=\"i16\").",
-                Leaf::I16 => "Leaves of f32 are closer (--leaf f32, in Python leaf=\"f32\").",
+            let is_librarys = leaf != Leaf::F32 && ensemble.adds_f32() && errors[0] > errors[1];
+            let better = if leaf == Leaf::I16 || is_librarys { Leaf::F32 } else { Leaf::I16 }.name();
+            let why = match is_librarys {
+                true => "The library itself rounds to f32 after each tree, and leaves of f32 give its own values",
+                false => &format!("Leaves of {better} are closer"),
             };
             let share = 100.0 * bound / reach;
             notes.push(format!(
-                "{of} are only known to be within {bound:.2e} of the library's, {share:.2} % of the farthest that its trees \
-                 lead from their middle. {advice}"
+                "{of} are only known to be within {bound:.2e} of the library's, {share:.2} % of half the sum of what each \
+                 tree's leaves span. {why} (--leaf {better}, in Python leaf=\"{better}\")."
             ));
         }
-        let offset = model.output_scale(output).map_or(0.0, |own| own.offset.abs());
-        let step = offset.next_up() - offset;
+        let offset = model.output_scale(output).map_or(0.0, |own| own.offset);
+        let step = offset.abs().next_up() - offset.abs();
         if f64::from(step) > TOLERATED * reach {
             notes.push(format!(
                 "{of} are f32, which steps by {step} near {offset}: in C, a function whose name ends in _without_offset gives \

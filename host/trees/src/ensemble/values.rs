@@ -1,4 +1,4 @@
-//! What a regression adds up, in f64.
+//! Numbers that a regression adds up, in f64.
 
 use super::{Ensemble, Exact, Output, Tree};
 
