@@ -43,7 +43,7 @@ pub enum TouchesProblem {
     /// A contact time is longer than an object can make it.
     #[error("{of}a finger touched {seconds:.1} s after the first, but {why}")]
     TimeTooLong {
-        /// Which touch, where no place says it: "touch 3 of bowl: ".
+        /// The touch, where no place says it: "touch 3 of bowl: ".
         of: String,
         /// Seconds after the first contact.
         seconds: f64,

@@ -78,7 +78,7 @@ pub struct Longest {
     why: Cow<'static, str>,
 }
 
-/// What features of a touch hold, where nothing else is known.
+/// The limit of features, where nothing else is known.
 impl Default for Longest {
     fn default() -> Self {
         Self { seconds: 16.777, why: "features of a touch hold at most 16.8 s".into() }

@@ -162,7 +162,7 @@ fn warn(made: &Made, trained: &Trained<'_>) {
     if noise > longest {
         let [noise, longest] = [noise, longest].map(|micros| decimal(micros / 1e6, 3));
         super::remark(&format!(
-            "palpate: warning: noise of {noise} s on contact times hides all touches, of which the longest takes {longest} s. Give \
+            "palpate: warning: noise of {noise} s on contact times hides all touches: the longest takes {longest} s. Give \
              it in milliseconds: noise=5ms."
         ));
     }

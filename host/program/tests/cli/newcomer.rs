@@ -10,7 +10,7 @@ fn a_training_that_learned_nothing_and_numbers_below_0_are_called_what_they_are(
     let at = &BOWL_AND_FORK.folder();
     let said = |words: &str| String::from_utf8(palpate(at, words).stderr).unwrap();
     let none = "no tree has a split: all touches look alike to it. Give thousands of touches";
-    let hidden = "noise of 5.000 s on contact times hides all touches, of which the longest takes";
+    let hidden = "noise of 5.000 s on contact times hides all touches: the longest takes";
     assert!(!said("train data -o some.json --trees rounds=2").contains("warning"));
     assert!(said("train data -o noisy.json --trees rounds=2 --real noise=5s").contains(hidden));
     fs::create_dir(at.join("few")).unwrap();

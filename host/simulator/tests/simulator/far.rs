@@ -119,7 +119,7 @@ fn read(name: &str, bytes: &[u8]) -> (String, String) {
 
 #[test]
 fn coordinates_that_32_bit_numbers_round_are_said_to_be_and_are_to_be_repaired() {
-    // Meters, in the coordinates of a country; and one of few corners, of which none falls onto another.
+    // Meters, in the coordinates of a country; and a mesh of few corners that all stay apart.
     let globe = Mesh::globe(12).stretched([0.04; 3]);
     for mesh in [globe, cuboid([0.8, 0.6, 0.9])] {
         for (name, bytes) in in_f32(&mesh, [450_000.0, 5_200_000.0, 300.0]) {

@@ -44,7 +44,7 @@ impl RecordArguments {
         Ok(recording)
     }
 
-    /// How touches are recorded into a directory.
+    /// Origin of the touches that are recorded into a directory.
     pub(crate) fn origin(&self, directory: &Path) -> Result<Origin> {
         let (probe, unit) = match self.probe.read()? {
             Some(file) => (file.probe, file.unit),

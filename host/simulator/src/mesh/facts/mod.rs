@@ -194,7 +194,7 @@ impl Facts {
     }
 }
 
-/// What is wrong with coordinates in steps of `step` for a mesh whose longest side is `side`; none if they are fine.
+/// The fault of coordinates in steps of `step`, for a mesh whose longest side is `side`; none if they are fine.
 pub(super) fn rounded(step: f64, side: f64) -> Option<String> {
     (step > FINE * side).then(|| {
         format!(
