@@ -100,6 +100,14 @@ pub fn singles(ensemble: &Ensemble) -> Vec<Single> {
         thresholds.retain(|(own, _)| !own.is_beyond_all() && own.value.abs() > 1e-30);
         let [(first, _), .., (last, _)] = thresholds[..] else { return None };
         let half = |(_, single): &(Threshold, f32)| f64::from(single.abs().next_up() - single.abs()) / 2.0;
+        // Thresholds are halfway between values: if those are f32, rows are too, such as arrays that LightGBM rounds.
+        let is_of_f32 = |own: &(Threshold, f32)| {
+            let quarters = own.0.value / (half(own) / 2.0);
+            (quarters - quarters.round()).abs() < 1e-6
+        };
+        if thresholds.iter().all(is_of_f32) {
+            return None;
+        }
         let share = thresholds.iter().map(half).sum::<f64>() / (last.value - first.value);
         let different = thresholds.iter().map(|(_, single)| single.to_bits()).collect::<BTreeSet<_>>().len();
         let is_known = ensemble.origin.imported.as_ref().is_some_and(|imported| !imported.thresholds.is_empty());

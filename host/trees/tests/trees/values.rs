@@ -391,6 +391,12 @@ fn a_note_says_how_many_rows_f32_sends_another_way_than_a_library_that_compares_
         let (ensemble, _) = stumps(40, ends, false, is_whole);
         assert_eq!(notes(&ensemble, None), Vec::<String>::new(), "{ends:?}");
     }
+    // Halfway between values that are f32 themselves.
+    let (mut ensemble, _) = stumps(40, [1.7e9, 1.7e9 + 259_200.0], true, true);
+    for own in ensemble.origin.imported.as_mut().unwrap().thresholds.iter_mut().flatten() {
+        own.value = f64::midpoint(f64::from(own.value as f32), f64::from((own.value as f32).next_up()));
+    }
+    assert_eq!(notes(&ensemble, None), Vec::<String>::new());
     // Ordinary numbers, many thresholds; and a counter that is spread far.
     for (ends, is_whole) in [([-3.0, 3.0], false), ([0.0, 6e8], true), ([0.0, 5000.0], true)] {
         let (ensemble, _) = stumps(3000, ends, true, is_whole);
